@@ -1,0 +1,28 @@
+// Every maximum of the system, and the relations between them. A loop, a queue or a table without an entry
+// here has no business in the core.
+#pragma once
+
+#include <cstdint>
+
+namespace focalfleet::limits {
+
+inline constexpr std::uint32_t kUnits = 32'768;
+inline constexpr std::uint32_t kBuses = 512;
+inline constexpr std::uint32_t kNodesPerBus = 128;   // electrical: a CAN segment carries no more
+inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of one staged move; two 4-bit counts on the wire
+inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;  // vectors from zero; 24 bits on the wire
+inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each: 28 minutes
+inline constexpr std::uint32_t kRequestRetries = 3;
+inline constexpr std::uint32_t kStageRetries = 3;
+inline constexpr std::uint32_t kRoundsPerConfiguration = 6;
+inline constexpr std::uint32_t kFramesPerBusQueued = 4096;
+inline constexpr std::uint32_t kFramesPerStep = 65'536;
+
+// The largest focal plane in view (20,000 units at 100 a bus) fits with room.
+static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
+static_assert(kNodesPerBus < 255, "255 is the broadcast address");
+static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
+// A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8 segments.
+static_assert(kFramesPerBusQueued >= kNodesPerBus * (1 + 2 * 8));
+
+}  // namespace focalfleet::limits

@@ -1,0 +1,24 @@
+// One CAN 2.0B data frame with a 29-bit identifier: the only kind that focalfleet sends or understands.
+// Ports drop (and count) everything else before it gets here.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace focalfleet {
+
+struct CanFrame {
+  std::uint32_t id = 0;     // 29 bits
+  std::uint8_t length = 0;  // 0..8
+  std::array<std::uint8_t, 8> data{};
+
+  [[nodiscard]] constexpr std::span<const std::uint8_t> payload() const {
+    return {data.data(), length};
+  }
+  constexpr bool operator==(const CanFrame&) const = default;
+};
+
+inline constexpr std::uint32_t kCanIdMax = (1u << 29) - 1;
+
+}  // namespace focalfleet

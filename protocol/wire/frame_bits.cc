@@ -1,0 +1,67 @@
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::uint32_t kUnstuffedTail = 1 + 1 + 1 + 7 + 3;  // CRC del., ACK, ACK del., EOF, intermission
+
+// Walks the stuffed part of a frame bit by bit: CRC and stuff bits grow as the wire would see them.
+class BitWalk {
+ public:
+  void Bits(std::uint32_t value, int count) {
+    for (int i = count - 1; i >= 0; --i) Bit(value >> i & 1);
+  }
+  void Crc() {
+    const std::uint32_t crc = crc_;
+    for (int i = 14; i >= 0; --i) Stuff(crc >> i & 1);
+  }
+  [[nodiscard]] std::uint32_t bits() const { return bits_; }
+  [[nodiscard]] std::uint16_t crc() const { return static_cast<std::uint16_t>(crc_); }
+
+ private:
+  void Bit(std::uint32_t bit) {
+    const std::uint32_t next = bit ^ (crc_ >> 14 & 1);
+    crc_ = crc_ << 1 & 0x7fff;
+    if (next != 0) crc_ ^= 0x4599;
+    Stuff(bit);
+  }
+  void Stuff(std::uint32_t bit) {
+    ++bits_;
+    run_ = bit == last_ ? run_ + 1 : 1;
+    last_ = bit;
+    if (run_ == 5) {
+      ++bits_;
+      last_ = bit ^ 1;
+      run_ = 1;
+    }
+  }
+
+  std::uint32_t crc_ = 0;
+  std::uint32_t bits_ = 0;
+  std::uint32_t last_ = 2;  // neither 0 nor 1: the first bit starts a run
+  int run_ = 0;
+};
+
+BitWalk Walk(const CanFrame& frame) {
+  BitWalk walk;
+  walk.Bits(0, 1);                    // start of frame
+  walk.Bits(frame.id >> 18, 11);      // base identifier
+  walk.Bits(0b11, 2);                 // SRR, IDE: recessive
+  walk.Bits(frame.id & 0x3ffff, 18);  // identifier extension
+  walk.Bits(0, 3);                    // RTR, r1, r0
+  walk.Bits(frame.length, 4);
+  for (const std::uint8_t byte : frame.payload()) walk.Bits(byte, 8);
+  return walk;
+}
+
+}  // namespace
+
+std::uint32_t FrameBits(const CanFrame& frame) {
+  BitWalk walk = Walk(frame);
+  walk.Crc();
+  return walk.bits() + kUnstuffedTail;
+}
+
+std::uint16_t FrameCrc(const CanFrame& frame) { return Walk(frame).crc(); }
+
+}  // namespace focalfleet

@@ -1,0 +1,89 @@
+// The 29-bit identifier, most significant field first, because the lowest number wins arbitration:
+//
+//   28..26 priority   25..20 function   19 from unit   18..11 node   10..3 sequence   2..0 detail
+//
+// Priority comes first so that a stop passes everything that waits; the node is part of the identifier, so two
+// units never send the same one; the sequence number is there, not in the payload, so that all eight bytes
+// carry data and an answer names the question it belongs to.
+#pragma once
+
+#include <cstdint>
+
+#include "protocol/base/ids.h"
+
+namespace focalfleet {
+
+enum class Function : std::uint8_t {
+  kStop = 0,
+  kStart = 1,
+  kDone = 2,
+  kClock = 3,
+  kArm = 4,
+  kConfirm = 5,
+  kStageBegin = 6,
+  kStageSegment = 7,
+  kHome = 8,
+  kProgress = 9,
+  kStatus = 10,
+  kVector = 11,
+  kFault = 12,
+  kIdentify = 13,
+  kParameterRead = 14,
+  kParameterWrite = 15,
+};
+inline constexpr std::uint32_t kFunctionCount = 16;
+
+struct FunctionRow {
+  Function function;
+  const char* name;
+  std::uint8_t priority;  // 0 wins; the same for both directions
+};
+
+/// The one table of functions, in the order of their numbers.
+inline constexpr FunctionRow kFunctions[kFunctionCount] = {
+    {Function::kStop, "stop", 0},
+    {Function::kStart, "start", 1},
+    {Function::kDone, "done", 2},
+    {Function::kClock, "clock", 2},
+    {Function::kArm, "arm", 3},
+    {Function::kConfirm, "confirm", 3},
+    {Function::kStageBegin, "stage_begin", 4},
+    {Function::kStageSegment, "stage_segment", 4},
+    {Function::kHome, "home", 4},
+    {Function::kProgress, "progress", 5},
+    {Function::kStatus, "status", 5},
+    {Function::kVector, "vector", 5},
+    {Function::kFault, "fault", 5},
+    {Function::kIdentify, "identify", 6},
+    {Function::kParameterRead, "parameter_read", 6},
+    {Function::kParameterWrite, "parameter_write", 6},
+};
+
+constexpr const FunctionRow& Row(Function function) {
+  return kFunctions[static_cast<std::uint8_t>(function)];
+}
+constexpr const char* Name(Function function) { return Row(function).name; }
+
+/// Where a frame goes to or comes from, and which exchange it belongs to. An answer repeats the sequence
+/// number of its request; a frame that a unit sends unasked carries 0.
+struct Address {
+  NodeId node;
+  std::uint8_t sequence = 0;
+  constexpr bool operator==(const Address&) const = default;
+};
+
+struct Identifier {
+  Function function;
+  bool from_unit = false;
+  Address address;
+  std::uint8_t detail = 0;  // 3 bits, meaning by function
+};
+
+constexpr std::uint32_t Pack(const Identifier& id) {
+  return static_cast<std::uint32_t>(Row(id.function).priority) << 26 |
+         static_cast<std::uint32_t>(id.function) << 20 | (id.from_unit ? 1u << 19 : 0u) |
+         static_cast<std::uint32_t>(id.address.node.value) << 11 |
+         static_cast<std::uint32_t>(id.address.sequence) << 3 | (id.detail & 7u);
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,211 @@
+// Every message of a unit's life, as values. Positions are whole vectors counted from the axis' zero (one
+// vector turns the motor's field by 360/subdivision degrees); times are 100 us ticks of the unit's clock.
+// Field widths on the wire are noted where they are narrower than the type; docs/protocol.md has the bytes.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <variant>
+
+#include "protocol/base/ids.h"
+
+namespace focalfleet {
+
+inline constexpr std::uint8_t kProtocolVersion = 1;
+
+// ---- what both ends speak of
+
+/// What a unit is doing. Sent in three bits.
+enum class UnitState : std::uint8_t {
+  kRest = 0,
+  kStaging = 1,   // has (part of) a move, not armed
+  kArmed = 2,     // will begin at the start signal
+  kMoving = 3,
+  kHoming = 4,
+  kFault = 5,     // stopped by a fault; takes no motion until the fault is cleared
+  kHostLost = 6,  // at rest; heard no host for its time-out: takes only stop and status
+};
+inline constexpr std::uint8_t kUnitStateCount = 7;
+const char* Name(UnitState state);
+
+enum class FaultCode : std::uint8_t {
+  kNone = 0,
+  kOverTemperature = 1,
+  kUnderVoltage = 2,
+  kOverCurrent = 3,
+  kFlash = 4,
+  kDriver = 5,
+};
+inline constexpr std::uint8_t kFaultCodeCount = 6;
+const char* Name(FaultCode code);
+
+/// How a motion ended. Sent in the detail bits of `done`.
+enum class Outcome : std::uint8_t { kArrived = 0, kStopped = 1, kFault = 2, kHomed = 3 };
+inline constexpr std::uint8_t kOutcomeCount = 4;
+const char* Name(Outcome outcome);
+
+/// Why a unit took or refused a request.
+enum class Answer : std::uint8_t {
+  kOk = 0,
+  kWrongMove = 1,    // not the move that is staged
+  kIncomplete = 2,   // segments are missing, or the digest differs
+  kOutOfRange = 3,   // the path leaves the axis' range
+  kWrongState = 4,   // not now
+  kBegunBefore = 5,  // this move was begun already: a move is never begun twice
+  kBadValue = 6,
+  kInterrupted = 7,  // a move was cut short by a power loss: home or set the position first
+};
+inline constexpr std::uint8_t kAnswerCount = 8;
+const char* Name(Answer answer);
+
+/// What a unit keeps per axis in FLASH. kHostTimeoutMs is the unit's (both axes show the same value).
+enum class Parameter : std::uint8_t {
+  kCounter1 = 0,       // timer counts per carrier period (V_counter1)
+  kRepeat = 1,         // carrier periods per vector (n), the tuned default
+  kSubdivision = 2,    // vectors per electrical turn
+  kMode = 3,           // WaveMode
+  kPosition = 4,       // vectors; writing it sets where the axis believes to stand (rest only)
+  kMinPosition = 5,    // vectors; a staged move outside is refused
+  kMaxPosition = 6,
+  kHomePosition = 7,   // vectors at the hard stop that homing drives to
+  kHostTimeoutMs = 8,  // silence of the host after which the unit is on its own
+};
+inline constexpr std::uint8_t kParameterCount = 9;
+const char* Name(Parameter parameter);
+
+/// One straight piece of an axis' path: from `start_ticks` after the start signal, `delta` vectors one by
+/// one, each shown for repeat * counter1 timer counts.
+struct Segment {
+  std::uint32_t start_ticks = 0;  // 24 bits
+  std::int32_t delta = 0;         // vectors, 24 bits
+  std::uint8_t repeat = 0;        // n, 1..255
+  constexpr bool operator==(const Segment&) const = default;
+};
+
+// ---- host to unit
+
+struct Stop {};  // one unit or, broadcast, all: end at the next vector
+struct Start {   // broadcast: armed units of `move` begin `delay_ticks` after this frame
+  MoveId move;
+  std::uint32_t delay_ticks = 0;  // 24 bits
+};
+struct Clock {  // broadcast: the host's time; also the sign that a host is there
+  std::uint64_t host_us = 0;  // 48 bits
+};
+struct ClockRequest {};
+struct Arm {
+  MoveId move;
+  std::uint32_t digest = 0;
+};
+struct Confirm {  // read back what was staged
+  MoveId move;
+};
+struct StageBegin {
+  MoveId move;
+  std::array<std::uint8_t, kAxisCount> segments{};  // 0..15 each
+  WaveMode mode = WaveMode::kAsymmetric;
+};
+struct StageSegment {
+  Axis axis = Axis::kTheta;
+  std::uint8_t index = 0;
+  Segment segment;
+};
+struct Home {  // drive both axes to their stops, phi first; begins at once
+  MoveId move;
+};
+struct ProgressRequest {};
+struct StatusRequest {
+  bool resume = false;  // a host is back: leave kHostLost
+};
+struct VectorRequest {
+  Axis axis = Axis::kTheta;
+};
+struct FaultRequest {
+  bool clear = false;
+};
+struct IdentifyRequest {};
+struct ParameterRead {
+  Axis axis = Axis::kTheta;
+  Parameter parameter = Parameter::kCounter1;
+};
+struct ParameterWrite {
+  Axis axis = Axis::kTheta;
+  Parameter parameter = Parameter::kCounter1;
+  std::int32_t value = 0;
+};
+
+using HostMessage =
+    std::variant<Stop, Start, Clock, ClockRequest, Arm, Confirm, StageBegin, StageSegment, Home,
+                 ProgressRequest, StatusRequest, VectorRequest, FaultRequest, IdentifyRequest,
+                 ParameterRead, ParameterWrite>;
+
+// ---- unit to host
+
+struct Done {  // a motion ended, or the answer to a stop: where the axes stand
+  Outcome outcome = Outcome::kArrived;
+  std::array<std::int32_t, kAxisCount> position{};  // vectors, 24 bits each
+  MoveId move;  // the last one begun
+};
+struct ClockReply {
+  std::uint32_t ticks = 0;  // the unit's clock, low 32 bits
+};
+struct ArmReply {
+  MoveId move;
+  Answer answer = Answer::kOk;
+};
+struct ConfirmReply {
+  MoveId move;
+  std::uint32_t digest = 0;
+  std::array<std::uint8_t, kAxisCount> segments{};  // received, 4 bits each
+  Answer answer = Answer::kOk;
+};
+struct HomeReply {
+  MoveId move;
+  Answer answer = Answer::kOk;
+};
+struct ProgressReply {
+  UnitState state = UnitState::kRest;
+  std::array<std::int32_t, kAxisCount> position{};  // vector applied now, 24 bits each
+  MoveId move;
+};
+struct StatusReply {
+  UnitState state = UnitState::kRest;
+  FaultCode fault = FaultCode::kNone;
+  bool interrupted = false;  // FLASH's mark `moving` was set at power-on: the position is not known
+  bool host_lost = false;
+  bool restarted = false;    // powered on since the last StatusRequest with resume
+  std::uint8_t progress_percent = 0;
+  MoveId move;               // the last one begun; 0: none
+  std::uint16_t moves_begun = 0;
+};
+struct VectorReply {  // FLASH of one axis
+  Axis axis = Axis::kTheta;
+  std::uint16_t vector = 0;  // 0..subdivision-1
+  std::uint16_t subdivision = 0;
+  std::int32_t turns = 0;    // whole electrical turns
+};
+struct FaultReply {
+  FaultCode code = FaultCode::kNone;
+  Axis axis = Axis::kTheta;
+  MoveId move;
+  std::uint16_t count = 0;  // faults since power-on
+};
+struct IdentifyReply {
+  SerialNumber serial;
+  std::uint8_t protocol_version = kProtocolVersion;
+  std::uint8_t firmware_major = 0;
+  std::uint8_t firmware_minor = 0;
+  std::uint8_t hardware = 0;
+};
+struct ParameterReply {  // to a read and to a write: the value that now holds
+  bool written = false;
+  Axis axis = Axis::kTheta;
+  Parameter parameter = Parameter::kCounter1;
+  Answer answer = Answer::kOk;
+  std::int32_t value = 0;
+};
+
+using UnitMessage = std::variant<Done, ClockReply, ArmReply, ConfirmReply, HomeReply, ProgressReply,
+                                 StatusReply, VectorReply, FaultReply, IdentifyReply, ParameterReply>;
+
+}  // namespace focalfleet
