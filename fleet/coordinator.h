@@ -1,0 +1,229 @@
+// The one transition function of the fleet: Step(inputs) -> effects. It holds what is known of every unit and
+// bus, and what is being done about it; it has no clock, thread, file, socket or log. The shell polls,
+// calls Step, and performs the effects in this order:
+//
+//   rows     -> store     one transaction for the batch; then Inputs::committed_through says so
+//   frames   -> buses     stop frames at once; the start signal is only emitted after the intent's commit
+//   plan_job -> planner   on a thread of its own; the answer comes back as PlanDone
+//   changed  -> DDS       the last value wins
+//
+// A configuration is a goal, pursued in rounds: plan from where everything stands, stage, confirm by read-back,
+// arm, commit the intent, start, watch. A unit that falls out at any step is named and frozen, and the next
+// round plans around it; units held back to protect it go on then. The number of rounds is bounded.
+// docs/way_of_a_move.md follows one move through here.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fleet/knowledge.h"
+#include "fleet/layout.h"
+#include "fleet/plan/planner.h"
+#include "fleet/records.h"
+#include "protocol/base/instants.h"
+#include "protocol/link/frame_port.h"
+
+namespace focalfleet {
+
+// ---- what comes in
+
+struct LinkEvent {
+  BusId bus;
+  LinkState state = LinkState::kUp;
+};
+
+/// Commands carry the number that their replies name.
+struct ApplyCommand {
+  std::string source;
+  std::vector<std::optional<Pose>> targets;  // Shape: (n)
+  bool fixed = false;
+};
+struct StopCommand {
+  std::optional<PositionerIndex> unit;  // none: all
+};
+struct HomeCommand {
+  std::vector<PositionerIndex> units;
+};
+struct EnableCommand {
+  std::vector<PositionerIndex> units;
+  bool enabled = true;
+  std::string reason;
+};
+struct AdoptCommand {  // take the serial number that answers at this place as its own
+  PositionerIndex unit;
+};
+struct WriteParameterCommand {
+  PositionerIndex unit;
+  Axis axis = Axis::kTheta;
+  Parameter parameter = Parameter::kRepeat;
+  std::int32_t value = 0;
+};
+struct Command {
+  std::uint64_t request = 0;
+  std::variant<ApplyCommand, StopCommand, HomeCommand, EnableCommand, AdoptCommand,
+               WriteParameterCommand>
+      what;
+};
+
+struct PlanDone {
+  std::uint64_t job = 0;
+  Result<Plan> plan;
+};
+
+struct Inputs {
+  HostInstant now;
+  std::span<const ReceivedFrame> frames;
+  std::span<const LinkEvent> links;
+  std::span<const Command> commands;
+  std::span<const PlanDone> plans;
+  std::uint64_t committed_through = 0;  // highest batch that is durable
+  bool store_failing = false;           // the last attempt to commit failed; the shell tries again
+};
+
+// ---- what goes out
+
+struct OutFrame {
+  BusId bus;
+  CanFrame frame;
+};
+
+struct PlanJob {
+  std::uint64_t job = 0;
+  std::vector<UnitKnowledge> start;
+  std::vector<std::optional<Pose>> targets;
+  std::vector<std::uint8_t> frozen;
+  PlanOptions options;
+  std::optional<PositionerIndex> make_way_for;  // homing: targets come from MakeWayForHoming
+};
+
+struct ReplyEffect {
+  std::uint64_t request = 0;
+  bool last = true;  // false: progress, more will come
+  std::optional<Error> error;
+  std::string text;
+};
+
+struct Effects {
+  std::uint64_t batch = 0;  // number of this batch of rows, 0 where there are none
+  std::vector<Row> rows;
+  std::vector<OutFrame> frames;
+  std::optional<PlanJob> plan_job;
+  std::vector<ReplyEffect> replies;
+  std::vector<PositionerIndex> changed;  // units whose status differs from what was last told
+  HostInstant wake_at = kNever;
+
+  void Clear();
+};
+
+// ---- what can be seen
+
+/// What the coordinator is doing with one unit. Transitions: kAllowed in unit_phase.h.
+enum class UnitPhase : std::uint8_t {
+  kAbsent,       // has not answered (yet)
+  kIdentifying,  // answered; its vectors are being read
+  kForeign,      // another serial number than the one bound here: not moved until adopted
+  kReady,
+  kStaging,
+  kConfirming,
+  kArming,
+  kArmed,
+  kMoving,
+  kHoming,
+  kSettling,     // its motion should be over; being asked
+  kFault,
+  kSilent,       // answered before, does not now
+};
+inline constexpr std::uint8_t kUnitPhaseCount = 13;
+const char* Name(UnitPhase phase);
+
+/// What came of a unit's target in the current or last configuration.
+enum class TargetOutcome : std::uint8_t { kNone, kPending, kArrived, kRefused, kFailed };
+constexpr const char* Name(TargetOutcome outcome) {
+  constexpr const char* kNames[] = {"none", "pending", "arrived", "refused", "failed"};
+  return kNames[static_cast<std::size_t>(outcome)];
+}
+
+struct UnitView {
+  UnitPhase phase = UnitPhase::kAbsent;
+  UnitKnowledge knowledge;         // while it moves: the hull
+  SerialNumber serial;             // that answers; 0: none yet
+  SerialNumber bound_serial;       // that belongs here; 0: none yet
+  UnitState reported_state = UnitState::kRest;
+  FaultCode fault = FaultCode::kNone;
+  MoveId move;
+  bool enabled = true;
+  std::string disabled_reason;
+  TargetOutcome outcome = TargetOutcome::kNone;
+  std::string outcome_reason;      // why refused or failed, for people
+  std::optional<Pose> target;
+};
+
+struct BusView {
+  LinkState link = LinkState::kUp;
+  std::uint64_t frames_sent = 0;
+  std::uint64_t frames_received = 0;
+  std::uint64_t bits = 0;          // both directions, exact
+  std::uint64_t malformed = 0;
+  std::uint64_t retries = 0;
+  double load = 0;                 // of the last second
+  double load_max = 0;             // highest second since the configuration began
+};
+
+struct ConfigurationView {
+  std::uint64_t id = 0;
+  std::string source;
+  ConfigurationState state = ConfigurationState::kDone;
+  std::uint32_t round = 0;
+  std::uint32_t targeted = 0;
+  std::uint32_t arrived = 0;
+  std::uint32_t refused = 0;
+  std::uint32_t failed = 0;
+  double makespan_predicted_s = 0;  // all rounds
+  double makespan_s = 0;            // start signals to last arrival, all rounds
+  double energy_J = 0;              // predicted
+  double peak_power_W = 0;          // predicted
+  std::uint64_t frames = 0;         // both directions, all buses, since it began
+  HostInstant began;
+  HostInstant started;              // start signal of this round; kNever before it
+};
+
+struct CoordinatorConfig {
+  std::uint32_t bit_rate_bps = 1'000'000;
+  DurationNs reply_wait = Milliseconds(50);        // one request's answer; then a retry
+  DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again
+  DurationNs poll_period = Milliseconds(1000);     // progress of each moving unit; health of each resting one x10
+  DurationNs clock_period = Milliseconds(500);
+  DurationNs start_delay = Milliseconds(250);      // start frame to start instant, all buses
+  DurationNs settle_margin = Milliseconds(500);    // after the predicted end before a unit is asked
+  DurationNs transmit_horizon = Milliseconds(4);   // how far ahead of the bit clock frames are released
+  DurationNs silence_limit = Milliseconds(3000);   // without an answer: silent
+};
+
+class Coordinator {
+ public:
+  /// `layout` outlives the coordinator.
+  Coordinator(const Layout* layout, std::vector<UnitDrive> drives, CoordinatorConfig config,
+              StoredFleet stored);
+  ~Coordinator();
+
+  void Step(const Inputs& inputs, Effects* effects);
+
+  [[nodiscard]] const UnitView& unit(PositionerIndex i) const;
+  /// Knowledge for showing: as `unit(i).knowledge`, but a moving unit's is predicted at `now`.
+  [[nodiscard]] UnitKnowledge KnowledgeAt(PositionerIndex i, HostInstant now) const;
+  [[nodiscard]] const BusView& bus(BusId bus) const;
+  [[nodiscard]] const ConfigurationView& configuration() const;
+  [[nodiscard]] std::span<const UnitDrive> drives() const;
+  [[nodiscard]] bool busy() const;  // a configuration or homing is under way
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace focalfleet

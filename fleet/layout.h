@@ -1,0 +1,95 @@
+// The focal plane as it is believed to be: where each unit sits, how long its arms are, which supply and bus
+// feed it. Frames: _fp is the focal plane in mm, seen from the sky side, angles counter-clockwise.
+// A unit's moving part is its phi arm, the segment from elbow to fibre, with a half-width; two units can only
+// touch when their reaches overlap, so neighbours are found once, in a grid, in O(n).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "protocol/base/ids.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+struct PointFp {
+  double x_mm = 0;
+  double y_mm = 0;
+};
+
+struct AxisGeometry {
+  double arm_mm = 0;
+  double zero_deg = 0;  // added to the axis' own angle in the kinematics
+  double gear = 1;      // motor revolutions per output revolution
+  double min_deg = 0;   // range of the axis' own angle
+  double max_deg = 0;
+};
+
+struct Unit {
+  UnitId id;
+  PointFp base_fp;
+  std::array<AxisGeometry, kAxisCount> axis;
+  double arm_half_width_mm = 0;  // Create fills in 0.08 of the nearest neighbour's distance where it is 0
+  RailId rail;
+  BusId bus;
+  NodeId node;
+  bool enabled = true;  // false: stands where it is, an obstacle
+
+  [[nodiscard]] const AxisGeometry& theta() const { return axis[Index(Axis::kTheta)]; }
+  [[nodiscard]] const AxisGeometry& phi() const { return axis[Index(Axis::kPhi)]; }
+  /// Farthest that any point of the arm, half-width included, gets from the base.
+  [[nodiscard]] double reach_mm() const {
+    return theta().arm_mm + phi().arm_mm + arm_half_width_mm;
+  }
+};
+
+struct Obstacle {
+  std::uint32_t id = 0;
+  PointFp centre_fp;
+  double radius_mm = 0;
+};
+
+class Layout {
+ public:
+  struct Options {
+    double clearance_mm = 0;  // 0: 0.012 of the pitch
+    std::vector<Obstacle> obstacles;
+  };
+
+  /// Checks the units (unique ids, finite numbers, positive arms, min < max, unique bus and node, limits) and
+  /// finds pitch, half-widths and neighbours. Units without bus or node are spread in order, 100 a bus.
+  /// Errors: kInvalid, names the unit.
+  static Result<Layout> Create(std::vector<Unit> units, Options options);
+
+  [[nodiscard]] std::span<const Unit> units() const { return units_; }
+  [[nodiscard]] const Unit& unit(PositionerIndex i) const { return units_[i.value]; }
+  [[nodiscard]] std::size_t size() const { return units_.size(); }
+  [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
+  [[nodiscard]] std::optional<PositionerIndex> Find(UnitId id) const;
+  [[nodiscard]] std::optional<PositionerIndex> Find(BusId bus, NodeId node) const;
+  /// Sorted; without duplicates.
+  [[nodiscard]] std::span<const BusId> buses() const { return buses_; }
+  /// Units whose reach overlaps this one's, clearance included; ascending.
+  [[nodiscard]] std::span<const PositionerIndex> neighbours(PositionerIndex i) const;
+  /// Median distance to the nearest neighbour; one unit alone: twice its reach.
+  [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
+  [[nodiscard]] double clearance_mm() const { return clearance_mm_; }
+  [[nodiscard]] double nearest_mm(PositionerIndex i) const { return nearest_mm_[i.value]; }
+
+ private:
+  std::vector<Unit> units_;
+  std::vector<Obstacle> obstacles_;
+  std::vector<BusId> buses_;
+  std::vector<double> nearest_mm_;
+  std::vector<std::uint32_t> neighbour_begin_;  // n + 1 offsets into neighbour_
+  std::vector<PositionerIndex> neighbour_;
+  std::unordered_map<UnitId, PositionerIndex> by_id_;
+  std::unordered_map<std::uint64_t, PositionerIndex> by_address_;
+  double pitch_mm_ = 0;
+  double clearance_mm_ = 0;
+};
+
+}  // namespace focalfleet

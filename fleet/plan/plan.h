@@ -1,0 +1,65 @@
+// A plan: for every unit that moves, exactly the segments that go on the bus. What is proven is what is
+// sent: times are whole 100 us ticks after the start signal, ways are whole vectors.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fleet/drive.h"
+#include "protocol/base/ids.h"
+#include "protocol/wire/staged_move.h"
+
+namespace focalfleet {
+
+struct UnitPlan {
+  PositionerIndex unit;
+  Pose from{};
+  Pose to{};
+  WaveMode mode = WaveMode::kAsymmetric;
+  std::array<AxisPath, kAxisCount> path;
+  /// Units whose later motion enters space that this one must first have left: if this one ends early, they
+  /// must be stopped before `begins_s` (their own first such motion), or they may touch it.
+  struct Follower {
+    PositionerIndex unit;
+    double begins_s = 0;  // seconds after the start signal
+  };
+  std::vector<Follower> followers;
+};
+
+enum class UnservedWhy : std::uint8_t {
+  kDisabled,        // named target of a disabled unit: passed over
+  kUnknownPlace,    // the unit's own position is an interval or unknown
+  kBlocked,         // no collision-free way was found; `by` names a unit or obstacle in the way
+  kTargetCollides,  // the target itself is not clear of what cannot move
+};
+const char* Name(UnservedWhy why);
+
+struct Unserved {
+  PositionerIndex unit;
+  UnservedWhy why = UnservedWhy::kBlocked;
+  std::optional<PositionerIndex> by;
+};
+
+struct Plan {
+  std::vector<UnitPlan> moves;      // ascending by unit; only units that move
+  std::vector<Unserved> unserved;   // ascending by unit
+  double makespan_s = 0;            // start signal to the last vector, by nominal clocks
+};
+
+/// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so far.
+/// Cost: O(segments).
+std::int32_t PositionAt(std::int32_t from, const AxisPath& path, const AxisDrive& drive, double t_s);
+
+/// End of the last segment of both axes, seconds after the start signal.
+double EndOf(const UnitPlan& plan, const UnitDrive& drive);
+
+/// The lowest and highest position that the axis passes, both ends included.
+struct Span {
+  std::int32_t low = 0;
+  std::int32_t high = 0;
+};
+Span SpanOf(std::int32_t from, const AxisPath& path);
+
+}  // namespace focalfleet

@@ -1,0 +1,130 @@
+// What must not be lost, as rows: the coordinator hands them out as effects, the store writes them in order
+// in one transaction a batch, and at start hands back what it holds. Vectors and parameters belong to the
+// serial number; the place on the plate (unit) only binds one.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fleet/knowledge.h"
+#include "protocol/base/ids.h"
+#include "protocol/wire/messages.h"
+
+namespace focalfleet {
+
+enum class Origin : std::uint8_t { kFactory, kTuning, kCampaign, kOperator, kMove, kHoming };
+constexpr const char* Name(Origin origin) {
+  constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator", "move", "homing"};
+  return kNames[static_cast<std::size_t>(origin)];
+}
+
+/// Where a unit stands now: the mirror of its FLASH and what it is worth.
+struct VectorRow {
+  SerialNumber serial;
+  UnitKnowledge knowledge;
+  std::array<std::uint16_t, kAxisCount> subdivision{};
+  MoveId move;  // the last one begun, as the unit says
+  Origin origin = Origin::kFactory;
+};
+
+/// "This unit is about to move": durable before any start signal; low..high is all that it may pass.
+struct IntentRow {
+  std::uint64_t configuration = 0;
+  SerialNumber serial;
+  UnitId unit;
+  MoveId move;
+  Pose from{};
+  Pose to{};
+  std::array<AxisKnowledge, kAxisCount> hull;  // kInterval
+};
+
+/// The intent's end, kept as history.
+enum class IntentEnd : std::uint8_t { kArrived, kStopped, kFault, kNeverBegan, kInterrupted, kHomed };
+constexpr const char* Name(IntentEnd end) {
+  constexpr const char* kNames[] = {"arrived",     "stopped",     "fault",
+                                    "never_began", "interrupted", "homed"};
+  return kNames[static_cast<std::size_t>(end)];
+}
+struct IntentEndRow {
+  SerialNumber serial;
+  MoveId move;
+  IntentEnd end = IntentEnd::kArrived;
+};
+
+struct BindingRow {  // which hardware sits at a place
+  UnitId unit;
+  SerialNumber serial;
+};
+
+struct EnableRow {
+  UnitId unit;
+  bool enabled = true;
+  std::string reason;
+};
+
+struct ParameterRow {
+  SerialNumber serial;
+  Axis axis = Axis::kTheta;
+  Parameter parameter = Parameter::kCounter1;
+  std::int32_t value = 0;
+  Origin origin = Origin::kOperator;
+};
+
+enum class ConfigurationState : std::uint8_t { kPlanning, kUploading, kMoving, kDone, kStopped, kFailed };
+constexpr const char* Name(ConfigurationState state) {
+  constexpr const char* kNames[] = {"planning", "uploading", "moving", "done", "stopped", "failed"};
+  return kNames[static_cast<std::size_t>(state)];
+}
+
+struct ConfigurationRow {
+  std::uint64_t id = 0;
+  std::string source;
+  ConfigurationState state = ConfigurationState::kPlanning;
+  std::uint32_t targeted = 0;
+  std::uint32_t arrived = 0;
+  std::uint32_t refused = 0;
+  std::uint32_t failed = 0;
+  double makespan_predicted_s = 0;
+  double makespan_s = 0;
+  double energy_J = 0;
+  double peak_power_W = 0;
+};
+
+enum class Severity : std::uint8_t { kInfo, kWarning, kError };
+struct AlarmRow {
+  std::uint64_t id = 0;
+  Severity severity = Severity::kWarning;
+  std::optional<UnitId> unit;
+  std::optional<BusId> bus;
+  std::string text;
+};
+
+/// The next move id to give out; written with the first intent that uses one.
+struct NextMoveRow {
+  MoveId next;
+};
+
+using Row = std::variant<VectorRow, IntentRow, IntentEndRow, BindingRow, EnableRow, ParameterRow,
+                         ConfigurationRow, AlarmRow, NextMoveRow>;
+
+/// All that the coordinator needs to go on after a restart.
+struct StoredFleet {
+  struct StoredUnit {
+    UnitId unit;
+    SerialNumber serial;
+    bool enabled = true;
+    std::string reason;
+  };
+  std::vector<StoredUnit> units;       // places that have a binding or were disabled
+  std::vector<VectorRow> vectors;      // by serial
+  std::vector<IntentRow> open_intents;
+  std::vector<ParameterRow> parameters;
+  MoveId next_move{1};
+  std::uint64_t next_configuration = 1;
+  std::uint64_t next_alarm = 1;
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,59 @@
+// From what an astronomer asks for to where two axes shall stand. A target is a point of the focal plane or
+// two angles; a point has up to two solutions (elbow left or right) and theta any whole turn in its range:
+// the one nearest to where the unit stands is taken. Also draws random configurations for load tests.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "fleet/knowledge.h"
+#include "fleet/layout.h"
+#include "protocol/base/result.h"
+#include "protocol/base/rng.h"
+
+namespace focalfleet {
+
+struct TargetAngles {
+  double theta_deg = 0;  // a direction: any whole turn in range serves
+  double phi_deg = 0;
+};
+
+struct TargetRow {
+  UnitId unit;
+  std::variant<PointFp, TargetAngles> place;
+  double priority = 0;
+  std::string target_id;  // carried through to every report
+  int line = 0;           // in the file it came from
+};
+
+struct Targets {
+  std::string source;  // file name for messages
+  std::vector<TargetRow> rows;
+};
+
+/// The pose for each unit, none where no target names it. Shape: (n).
+/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of range.
+/// Disabled units' targets are resolved too; the planner passes them over by name.
+Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets, const Layout& layout,
+                                                        std::span<const UnitDrive> drives,
+                                                        std::span<const UnitKnowledge> now);
+
+struct PoseFp {  // a whole configuration that is free of collisions
+  std::vector<Pose> poses;  // Shape: (n)
+};
+
+/// A random configuration in which all pairs (and obstacles) are clear: enabled units uniform over their
+/// patrol area; disabled units random with the arm folded back to phi + phi_zero >= 120 degrees.
+/// Where `standing` is given, units that it fixes keep that pose and the others are drawn around them.
+/// Errors: kRefused where some unit finds no clear place.
+Result<std::vector<Pose>> DrawConfiguration(const Layout& layout, std::span<const UnitDrive> drives,
+                                            std::span<const std::optional<Pose>> standing, Rng rng);
+
+/// Every unit folded back: theta in the middle of its range, phi as near to 180 degrees as it gets; disabled
+/// units as DrawConfiguration draws them.
+std::vector<Pose> FoldedConfiguration(const Layout& layout, std::span<const UnitDrive> drives);
+
+}  // namespace focalfleet
