@@ -4,7 +4,7 @@
 //
 //   rows     -> store     one transaction for the batch; then Inputs::committed_through says so
 //   frames   -> buses     stop frames at once; the start signal is only emitted after the intent's commit
-//   plan_job -> planner   on a thread of its own; the answer comes back as PlanDone
+//   plan_job -> planner   RunPlanJob on a thread of its own; the answer comes back as PlanDone
 //   changed  -> DDS       the last value wins
 //
 // A configuration is a goal, pursued in rounds: plan from where everything stands, stage, confirm by read-back,
@@ -70,9 +70,11 @@ struct Command {
       what;
 };
 
+/// A planner's answer (fleet/plan/job.h).
 struct PlanDone {
   std::uint64_t job = 0;
   Result<Plan> plan;
+  std::vector<PositionerIndex> homing;  // units that may home at once when `plan` has been carried out
 };
 
 struct Inputs {
@@ -98,7 +100,7 @@ struct PlanJob {
   std::vector<std::optional<Pose>> targets;
   std::vector<std::uint8_t> frozen;
   PlanOptions options;
-  std::optional<PositionerIndex> make_way_for;  // homing: targets come from MakeWayForHoming
+  std::vector<PositionerIndex> to_home;  // not empty: plan the next wave of homing, `targets` is empty
 };
 
 struct ReplyEffect {

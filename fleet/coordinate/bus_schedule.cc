@@ -1,0 +1,52 @@
+#include "fleet/coordinate/bus_schedule.h"
+
+#include <algorithm>
+
+#include "protocol/base/limits.h"
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+
+bool BusSchedule::Enqueue(const Entry& entry) {
+  if (waiting_ == limits::kFramesPerBusQueued) return false;
+  queue_[entry.frame.id >> 26].push_back(entry);
+  ++waiting_;
+  return true;
+}
+
+void BusSchedule::Release(HostInstant now, DurationNs horizon, BusId bus,
+                          std::vector<OutFrame>* frames, std::vector<PositionerIndex>* asked) {
+  busy_until_ = std::max(busy_until_, now);
+  for (auto& queue : queue_) {
+    while (!queue.empty() && busy_until_ < now + horizon) {
+      const Entry& entry = queue.front();
+      frames->push_back({bus, entry.frame});
+      if (entry.asks) asked->push_back(*entry.asks);
+      busy_until_ = busy_until_ + BitTime(FrameBits(entry.frame) + entry.reply_bits, bit_rate_bps_);
+      queue.pop_front();
+      --waiting_;
+    }
+  }
+}
+
+void BusSchedule::Charge(HostInstant now, std::uint32_t bits) {
+  busy_until_ = std::max(busy_until_, now) + BitTime(bits, bit_rate_bps_);
+}
+
+HostInstant BusSchedule::ReadyAt(DurationNs horizon) const {
+  if (waiting_ == 0) return kNever;
+  // Half a horizon is refilled at a time: frequent enough to keep the bus busy, rare enough to batch.
+  return busy_until_ - DurationNs{horizon.ns / 2};
+}
+
+std::size_t BusSchedule::Drop(NodeId node) {
+  std::size_t dropped = 0;
+  for (auto& queue : queue_)
+    dropped += std::erase_if(queue, [&](const Entry& entry) {
+      return (entry.frame.id >> 11 & 255) == node.value;
+    });
+  waiting_ -= dropped;
+  return dropped;
+}
+
+}  // namespace focalfleet

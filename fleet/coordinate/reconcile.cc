@@ -1,0 +1,59 @@
+#include "fleet/coordinate/reconcile.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr UnitKnowledge kUnknownPlace{};
+
+Reconciled Unknown(const char* reason, std::optional<IntentEnd> end = {}) {
+  return {kUnknownPlace, end, reason};
+}
+
+Reconciled AfterIntent(const UnitSays& unit, const IntentRow& intent) {
+  const bool began = unit.status.move == intent.move;
+  if (unit.status.interrupted) {
+    if (!began)
+      return Unknown("power was lost in a move that is not on record", IntentEnd::kNeverBegan);
+    return {InterruptedHull(intent, unit.subdivision), IntentEnd::kInterrupted,
+            "power was lost in mid-move"};
+  }
+  if (began)
+    return {Exactly(Witness::kReported, unit.position),
+            unit.position == intent.to ? IntentEnd::kArrived : IntentEnd::kStopped};
+  if (unit.position == intent.from)
+    return {Exactly(Witness::kReported, unit.position), IntentEnd::kNeverBegan};
+  return Unknown("its stored vectors differ from where its last move was to begin",
+                 IntentEnd::kNeverBegan);
+}
+
+}  // namespace
+
+UnitKnowledge InterruptedHull(const IntentRow& intent,
+                              const std::array<std::uint16_t, kAxisCount>& subdivision) {
+  UnitKnowledge hull = intent.hull;
+  for (const Axis axis : kAxes) {
+    hull[Index(axis)].witness = Witness::kInterval;
+    hull[Index(axis)].low -= subdivision[Index(axis)] / 2;
+    hull[Index(axis)].high += subdivision[Index(axis)] / 2;
+  }
+  return hull;
+}
+
+Reconciled Reconcile(const UnitSays& unit, const StoreSays& store) {
+  if (store.intent) return AfterIntent(unit, *store.intent);
+  if (!store.vector) {
+    if (unit.status.interrupted) return Unknown("power was lost in a move that is not on record");
+    return {Exactly(Witness::kReported, unit.position), {}};
+  }
+  const UnitKnowledge& stored = store.vector->knowledge;
+  if (!IsPlace(stored))  // neither waiting nor a restart makes an interval narrower
+    return {stored, {}, "its last move was cut short and it has not been homed since"};
+  if (unit.status.interrupted) return Unknown("power was lost in a move that is not on record");
+  if (unit.subdivision != store.vector->subdivision)
+    return Unknown("its subdivision differs from the stored one");
+  if (unit.position != PlaceOf(stored))
+    return Unknown("its stored vectors differ from the coordinator's");
+  return {stored, {}};
+}
+
+}  // namespace focalfleet
