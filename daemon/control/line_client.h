@@ -1,0 +1,54 @@
+// The asking end of a control socket, for programs that may wait: one request at a time, with a
+// limit on silence.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "daemon/control/messages.h"
+#include "protocol/base/instants.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+class LineClient {
+ public:
+  struct CallOptions {
+    std::optional<DurationNs> silence_max = Seconds(10);  // none: wait for ever
+    std::function<void(const Json&)> on_progress;         // may be empty
+  };
+
+  /// Errors: kUnavailable, names the path: nobody listens there, or it may not be opened.
+  static Result<LineClient> Connect(const std::string& path);
+
+  LineClient(LineClient&& other) noexcept;
+  LineClient& operator=(LineClient&& other) noexcept;
+  LineClient(const LineClient&) = delete;
+  LineClient& operator=(const LineClient&) = delete;
+  ~LineClient();
+
+  /// Sends one request and waits for its last answer: the result object.
+  /// Errors: what the server answered; or kUnavailable where the connection broke or stayed silent,
+  /// and then connected() is false: whether the request took effect is not known.
+  Result<Json> Call(const std::string& verb, const Json& args, const CallOptions& options);
+  Result<Json> Call(const std::string& verb, const Json& args) {
+    return Call(verb, args, CallOptions{});
+  }
+
+  [[nodiscard]] bool connected() const { return fd_ >= 0; }
+
+ private:
+  LineClient(int fd, std::string path) : fd_(fd), path_(std::move(path)) {}
+  Status SendAll(std::string_view bytes, const CallOptions& options);
+  Result<std::string> NextLine(const CallOptions& options);
+  tl::unexpected<Error> Broken(const std::string& why);
+
+  int fd_ = -1;
+  std::string path_;
+  std::uint64_t next_id_ = 1;
+  std::string received_;
+};
+
+}  // namespace focalfleet

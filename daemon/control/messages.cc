@@ -1,0 +1,178 @@
+#include "daemon/control/messages.h"
+
+#include <array>
+#include <limits>
+#include <utility>
+
+namespace focalfleet {
+namespace {
+
+constexpr std::array<std::pair<ErrorCode, const char*>, 5> kCodes = {{
+    {ErrorCode::kInvalid, "invalid"},
+    {ErrorCode::kRefused, "refused"},
+    {ErrorCode::kUnavailable, "unavailable"},
+    {ErrorCode::kFull, "full"},
+    {ErrorCode::kNewer, "newer"},
+}};
+
+std::string Dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+tl::unexpected<Error> Malformed(const std::string& what) {
+  return Fail(ErrorCode::kInvalid, "malformed control line: " + what);
+}
+
+const Json* Member(const Json& object, const char* name) {
+  const auto it = object.find(name);
+  return it == object.end() ? nullptr : &*it;
+}
+
+tl::unexpected<Error> BadArgument(const char* name, const char* expected) {
+  return Fail(ErrorCode::kInvalid, std::string("argument '") + name + "' must be " + expected);
+}
+
+Result<Json> ParseObject(std::string_view line) {
+  Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
+  if (json.is_discarded()) return Malformed("not JSON");
+  if (!json.is_object()) return Malformed("not an object");
+  return json;
+}
+
+Result<std::uint64_t> IdOf(const Json& object) {
+  const Json* id = Member(object, "id");
+  if (id == nullptr || !id->is_number_unsigned())
+    return Malformed("'id' must be a whole number, not negative");
+  return id->get<std::uint64_t>();
+}
+
+}  // namespace
+
+const char* CodeName(ErrorCode code) {
+  for (const auto& [known, name] : kCodes)
+    if (known == code) return name;
+  return "unavailable";
+}
+
+ErrorCode CodeOf(std::string_view name) {
+  for (const auto& [code, known] : kCodes)
+    if (name == known) return code;
+  return ErrorCode::kUnavailable;
+}
+
+Result<ControlRequest> DecodeRequest(std::string_view line) {
+  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line));
+  ControlRequest request;
+  FOCALFLEET_TRY_ASSIGN(request.id, IdOf(json));
+  const Json* verb = Member(json, "verb");
+  if (verb == nullptr || !verb->is_string()) return Malformed("'verb' must be a text");
+  request.verb = verb->get<std::string>();
+  if (const auto args = json.find("args"); args != json.end()) {
+    if (!args->is_object()) return Malformed("'args' must be an object");
+    request.args = std::move(*args);
+  }
+  return request;
+}
+
+Result<ControlAnswer> DecodeAnswer(std::string_view line) {
+  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line));
+  ControlAnswer answer;
+  FOCALFLEET_TRY_ASSIGN(answer.id, IdOf(json));
+  if (const auto progress = json.find("progress"); progress != json.end()) {
+    answer.kind = ControlAnswer::Kind::kProgress;
+    answer.body = std::move(*progress);
+    return answer;
+  }
+  const Json* ok = Member(json, "ok");
+  if (ok == nullptr || !ok->is_boolean()) return Malformed("neither 'progress' nor 'ok'");
+  if (ok->get<bool>()) {
+    if (const auto result = json.find("result"); result != json.end())
+      answer.body = std::move(*result);
+    return answer;
+  }
+  answer.kind = ControlAnswer::Kind::kError;
+  const Json* error = Member(json, "error");
+  if (error == nullptr || !error->is_object()) return Malformed("'error' must be an object");
+  const Json* code = Member(*error, "code");
+  const Json* text = Member(*error, "text");
+  answer.error.code = code != nullptr && code->is_string()
+                          ? CodeOf(code->get_ref<const std::string&>())
+                          : ErrorCode::kUnavailable;
+  answer.error.text =
+      text != nullptr && text->is_string() ? text->get<std::string>() : "no reason given";
+  return answer;
+}
+
+std::string EncodeRequest(const ControlRequest& request) {
+  return Dump({{"id", request.id}, {"verb", request.verb}, {"args", request.args}});
+}
+
+std::string EncodeProgress(std::uint64_t id, const Json& progress) {
+  return Dump({{"id", id}, {"progress", progress}});
+}
+
+std::string EncodeResult(std::uint64_t id, const Json& result) {
+  return Dump({{"id", id}, {"ok", true}, {"result", result}});
+}
+
+std::string EncodeError(std::uint64_t id, const Error& error) {
+  return Dump({{"id", id},
+               {"ok", false},
+               {"error", Json{{"code", CodeName(error.code)}, {"text", error.text}}}});
+}
+
+Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name) {
+  const Json* value = Member(args, name);
+  if (value == nullptr || !value->is_number_unsigned())
+    return BadArgument(name, "a whole number, not negative");
+  return value->get<std::uint64_t>();
+}
+
+Result<std::int64_t> IntegerArgument(const Json& args, const char* name) {
+  const Json* value = Member(args, name);
+  if (value == nullptr || !value->is_number_integer() ||
+      (value->is_number_unsigned() &&
+       value->get<std::uint64_t>() > std::uint64_t{std::numeric_limits<std::int64_t>::max()}))
+    return BadArgument(name, "a whole number");
+  return value->get<std::int64_t>();
+}
+
+Result<std::string> TextArgument(const Json& args, const char* name) {
+  const Json* value = Member(args, name);
+  if (value == nullptr || !value->is_string()) return BadArgument(name, "a text");
+  return value->get<std::string>();
+}
+
+Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise) {
+  if (Member(args, name) == nullptr) return otherwise;
+  return TextArgument(args, name);
+}
+
+Result<bool> FlagArgumentOr(const Json& args, const char* name, bool otherwise) {
+  const Json* value = Member(args, name);
+  if (value == nullptr) return otherwise;
+  if (!value->is_boolean()) return BadArgument(name, "true or false");
+  return value->get<bool>();
+}
+
+Result<std::uint64_t> UnsignedArgumentOr(const Json& args, const char* name,
+                                         std::uint64_t otherwise) {
+  if (Member(args, name) == nullptr) return otherwise;
+  return UnsignedArgument(args, name);
+}
+
+Result<std::vector<std::uint32_t>> UnsignedListArgument(const Json& args, const char* name) {
+  const Json* list = Member(args, name);
+  if (list == nullptr || !list->is_array()) return BadArgument(name, "a list of whole numbers");
+  std::vector<std::uint32_t> out;
+  out.reserve(list->size());
+  for (const Json& item : *list) {
+    if (!item.is_number_unsigned() ||
+        item.get<std::uint64_t>() > std::numeric_limits<std::uint32_t>::max())
+      return BadArgument(name, "a list of whole numbers");
+    out.push_back(static_cast<std::uint32_t>(item.get<std::uint64_t>()));
+  }
+  return out;
+}
+
+}  // namespace focalfleet

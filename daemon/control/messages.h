@@ -1,0 +1,68 @@
+// What travels on a control socket: one JSON object a line.
+//
+//   request   {"id":1,"verb":"apply","args":{...}}
+//   answers   {"id":1,"progress":{...}}                                  any number, may be lost
+//             {"id":1,"ok":true,"result":{...}}                          the last one, or
+//             {"id":1,"ok":false,"error":{"code":"refused","text":"..."}}
+//
+// Everything here is total: any bytes give a request or an Error, and nothing throws.
+#pragma once
+
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+using Json = nlohmann::json;
+
+/// One request line at most; a targets file of 32,768 units is about 1 MiB.
+inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;
+
+struct ControlRequest {
+  std::uint64_t id = 0;
+  std::string verb;
+  Json args = Json::object();
+};
+
+struct ControlAnswer {
+  enum class Kind : std::uint8_t { kProgress, kResult, kError };
+  std::uint64_t id = 0;
+  Kind kind = Kind::kResult;
+  Json body;    // progress or result
+  Error error;  // of kError
+};
+
+const char* CodeName(ErrorCode code);
+/// A name that no code has is kUnavailable: the peer failed in a way that we do not know.
+ErrorCode CodeOf(std::string_view name);
+
+/// Errors: kInvalid. `id` is then 0: the answer cannot be matched and goes out with id 0.
+Result<ControlRequest> DecodeRequest(std::string_view line);
+/// Errors: kInvalid.
+Result<ControlAnswer> DecodeAnswer(std::string_view line);
+
+/// Encoders give the line without its newline. Text that is not UTF-8 is repaired, NaN becomes
+/// null.
+std::string EncodeRequest(const ControlRequest& request);
+std::string EncodeProgress(std::uint64_t id, const Json& progress);
+std::string EncodeResult(std::uint64_t id, const Json& result);
+std::string EncodeError(std::uint64_t id, const Error& error);
+
+// Arguments by name, checked. Errors of all: kInvalid, names the argument.
+Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name);
+Result<std::int64_t> IntegerArgument(const Json& args, const char* name);
+Result<std::string> TextArgument(const Json& args, const char* name);
+/// Absent: `otherwise`.
+Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise);
+Result<bool> FlagArgumentOr(const Json& args, const char* name, bool otherwise);
+Result<std::uint64_t> UnsignedArgumentOr(const Json& args, const char* name,
+                                         std::uint64_t otherwise);
+/// A list of numbers that fit 32 bits.
+Result<std::vector<std::uint32_t>> UnsignedListArgument(const Json& args, const char* name);
+
+}  // namespace focalfleet
