@@ -1,0 +1,71 @@
+// What goes out on DDS, as values of our own; the types that idlc makes of focalfleet.idl stay
+// inside this room. Numbers that do not exist (the place of a unit that nobody knows, a target that
+// was not given) are NaN.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include "daemon/wall_time.h"
+#include "fleet/coordinator.h"
+
+namespace focalfleet {
+
+inline constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
+inline constexpr std::size_t kWitnessCount = 5;
+
+struct UnitStatusValue {
+  UnitId unit;
+  SerialNumber serial;        // that answers; 0: none yet
+  SerialNumber bound_serial;  // that belongs here; 0: none yet
+  BusId bus;
+  NodeId node;
+  WallTime at;
+  std::array<Witness, kAxisCount> witness{};
+  std::array<double, kAxisCount> low_deg{kNoNumber, kNoNumber};  // the axis' own angle
+  std::array<double, kAxisCount> high_deg{kNoNumber, kNoNumber};
+  double x_fp_mm = kNoNumber;  // the fibre, where both axes stand at one place
+  double y_fp_mm = kNoNumber;
+  std::array<double, kAxisCount> target_deg{kNoNumber, kNoNumber};
+  MoveId move;
+  UnitPhase phase = UnitPhase::kAbsent;
+  UnitState reported_state = UnitState::kRest;
+  FaultCode fault = FaultCode::kNone;
+  TargetOutcome outcome = TargetOutcome::kNone;
+  bool enabled = true;
+};
+
+struct BusStatusValue {
+  BusId bus;
+  WallTime at;
+  BusView view;
+};
+
+struct FleetStatusValue {
+  WallTime at;
+  WallTime started;     // of the daemon
+  std::string version;  // at most 31 bytes are sent
+  std::uint32_t units = 0;
+  std::uint32_t enabled = 0;
+  std::array<std::uint32_t, kUnitPhaseCount> units_by_phase{};  // index: UnitPhase
+  std::array<std::uint32_t, kWitnessCount>
+      units_by_witness{};  // index: Witness, the lesser of both axes
+  std::uint64_t configuration = 0;
+  double bus_load_max = 0;
+  bool busy = false;
+  bool store_failing = false;
+};
+
+struct ConfigurationProgressValue {
+  WallTime at;
+  ConfigurationView view;  // its host instants stay at home; source: at most 255 bytes are sent
+};
+
+struct AlarmValue {
+  WallTime at;
+  AlarmRow row;  // text: at most 255 bytes are sent
+};
+
+}  // namespace focalfleet
