@@ -10,6 +10,7 @@ inline constexpr std::uint32_t kUnits = 32'768;
 inline constexpr std::uint32_t kBuses = 512;
 inline constexpr std::uint32_t kNodesPerBus = 128;   // electrical: a CAN segment carries no more
 inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of one staged move; two 4-bit counts on the wire
+inline constexpr std::uint32_t kNeighboursPerUnit = 256;  // whose reach overlaps; 6 to 30 are usual
 inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;  // vectors from zero; 24 bits on the wire
 inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each: 28 minutes
 inline constexpr std::uint32_t kRequestRetries = 3;
