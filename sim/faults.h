@@ -1,0 +1,40 @@
+// Planted misbehaviour, for tests and load testers. Each is switched on by name and stays until it is switched
+// off; none of them is chance: chance (of a bus that loses frames) is drawn from the world's seed.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "protocol/base/ids.h"
+#include "protocol/base/instants.h"
+#include "protocol/wire/messages.h"
+
+namespace focalfleet::sim {
+
+/// How one unit misbehaves towards the host. Its motors obey as ever.
+struct UnitFaults {
+  bool silent = false;        // hears, acts, never sends
+  bool deaf = false;          // hears nothing
+  DurationNs late{0};         // every answer comes this much later
+  std::uint8_t copies = 1;    // every answer is sent so many times
+  bool wrong_digest = false;  // what it says it holds is not what was staged
+  bool mute_done = false;     // answers, but the end of a motion is never reported unasked
+  std::optional<SerialNumber> foreign_serial;  // other hardware sits at this place
+  /// In its next motion, so long after the first step: a fault. Used up when it happens.
+  struct InMotion {
+    DurationNs after{0};
+    FaultCode code = FaultCode::kOverTemperature;
+    Axis axis = Axis::kTheta;
+  };
+  std::optional<InMotion> in_motion;
+};
+
+/// How one bus misbehaves: chances per frame.
+struct BusFaults {
+  double drop = 0;       // it occupies the bus, nobody hears it
+  double duplicate = 0;  // it is sent twice
+  double late = 0;       // it enters arbitration only after `late_by`
+  DurationNs late_by = Milliseconds(5);
+};
+
+}  // namespace focalfleet::sim
