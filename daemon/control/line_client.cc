@@ -84,6 +84,8 @@ Status LineClient::SendAll(std::string_view bytes, const CallOptions& options) {
       const auto ready = WaitFor(fd_, POLLOUT, options.silence_max);
       if (!ready) return Broken(ready.error().text);
       if (!*ready) return Broken("the request was not taken in time");
+    } else if (errno == EPIPE || errno == ECONNRESET) {
+      return {};  // the server hung up, and may have said why
     } else if (errno != EINTR) {
       return Broken(std::string("the connection broke: ") + std::strerror(errno));
     }
@@ -108,7 +110,8 @@ Result<std::string> LineClient::NextLine(const CallOptions& options) {
     if (got == 0) return Broken("the connection was closed before the answer came");
     if (got > 0) {
       received_.append(chunk.data(), static_cast<std::size_t>(got));
-    } else if (errno != EAGAIN && errno != EINTR) {
+    } else if (errno != EAGAIN && errno != EINTR && errno != ECONNRESET) {
+      // A reset is told once, before what was sent ahead of it.
       return Broken(std::string("the connection broke: ") + std::strerror(errno));
     }
   }

@@ -70,15 +70,17 @@ class LineServer::Impl {
   struct Client {
     int fd = -1;
     std::string input;
-    std::size_t searched = 0;  // no newline before this
+    std::size_t line_end = std::string::npos;  // of the first complete line in input
     std::string output;
     std::size_t written = 0;  // of output
     std::uint32_t open = 0;   // lines handed out and not yet answered
     std::uint32_t watched = 0;
     bool input_ended = false;  // it will ask nothing more
     bool closing = false;      // only its output is still of interest
+    bool deaf = false;         // it closed: what it asked still counts, answers do not
 
     [[nodiscard]] std::size_t waiting() const { return output.size() - written; }
+    [[nodiscard]] bool has_line() const { return line_end != std::string::npos; }
   };
 
   Status Listen(const UnixAddress& temporary, const std::string& temporary_path);
@@ -184,18 +186,22 @@ bool LineServer::Impl::Read(Client* client) {
   std::array<char, 65536> chunk;
   const ssize_t got = ::recv(client->fd, chunk.data(), chunk.size(), 0);
   if (got > 0) {
+    const std::size_t searched = client->input.size();
     client->input.append(chunk.data(), static_cast<std::size_t>(got));
+    if (!client->has_line()) client->line_end = client->input.find('\n', searched);
     return true;
   }
   if (got == 0) {
     client->input_ended = true;
     return true;
   }
-  return errno == EAGAIN || errno == EINTR;
+  // A peer that closed with answers unread: the reset comes first, its last lines after it.
+  return errno == EAGAIN || errno == EINTR || errno == ECONNRESET;
 }
 
 /// Writes what goes. False: the client is gone.
 bool LineServer::Impl::Write(Client* client) {
+  if (client->deaf) client->written = client->output.size();
   while (client->waiting() > 0) {
     const ssize_t sent = ::send(client->fd, client->output.data() + client->written,
                                 client->waiting(), MSG_NOSIGNAL);
@@ -208,22 +214,21 @@ bool LineServer::Impl::Write(Client* client) {
 }
 
 bool LineServer::Impl::TakeLine(Client* client, std::string* line) {
-  const auto end = client->input.find('\n', client->searched);
-  const bool complete = end != std::string::npos;
-  if (!complete) client->searched = client->input.size();
-  if ((complete ? end : client->input.size()) > options_.line_bytes_max) {
+  const std::size_t length = client->has_line() ? client->line_end : client->input.size();
+  if (length > options_.line_bytes_max) {
     client->output += EncodeError(
         0, {ErrorCode::kInvalid,
             "a line of more than " + std::to_string(options_.line_bytes_max) + " bytes"});
     client->output += '\n';
     client->input.clear();
+    client->line_end = std::string::npos;
     client->closing = true;
     return false;
   }
-  if (!complete) return false;
-  line->assign(client->input, 0, end);
-  client->input.erase(0, end + 1);
-  client->searched = 0;
+  if (!client->has_line()) return false;
+  line->assign(client->input, 0, length);
+  client->input.erase(0, length + 1);
+  client->line_end = client->input.find('\n');
   ++client->open;
   return true;
 }
@@ -232,15 +237,16 @@ bool LineServer::Impl::TakeLine(Client* client, std::string* line) {
 bool LineServer::Impl::Settle(ClientId id, Client* client) {
   if (!Write(client)) return false;
   if (client->waiting() > options_.output_bytes_max) return false;
-  const bool nothing_more = client->closing || (client->input_ended && client->open == 0 &&
-                                                client->input.find('\n') == std::string::npos);
+  const bool asks_nothing = client->input_ended && !client->has_line();
+  const bool nothing_more =
+      client->closing || (asks_nothing && (client->open == 0 || client->deaf));
   if (nothing_more && client->waiting() == 0) return false;
   Watch(id, client);
   return true;
 }
 
 void LineServer::Impl::Watch(ClientId id, Client* client) {
-  const bool read = !client->input_ended && Listens(*client);
+  const bool read = !client->input_ended && !client->has_line() && Listens(*client);
   const std::uint32_t wanted =
       (read ? std::uint32_t{EPOLLIN} : 0u) | (client->waiting() > 0 ? std::uint32_t{EPOLLOUT} : 0u);
   if (wanted == client->watched) return;
@@ -257,10 +263,10 @@ void LineServer::Impl::Service(std::vector<IncomingLine>* lines) {
     if (event.data.u64 == kListener) Accept();
     const auto it = clients_.find(event.data.u64);
     if (it == clients_.end()) continue;
-    const bool hung_up = (event.events & (EPOLLHUP | EPOLLERR)) != 0;
-    const bool readable = (event.events & EPOLLIN) != 0;
-    // A peer that closed may have left a last request behind; nobody waits for its answer.
-    if (hung_up || (readable && !Read(&it->second))) Drop(it->first);
+    // A peer that asked and closed at once ("stop", and away) is still heard.
+    it->second.deaf = it->second.deaf || (event.events & (EPOLLHUP | EPOLLERR)) != 0;
+    const bool readable = it->second.deaf || (event.events & EPOLLIN) != 0;
+    if (readable && !Read(&it->second)) Drop(it->first);
   }
   bool more = false;
   for (auto it = clients_.begin(); it != clients_.end();) {
@@ -269,8 +275,10 @@ void LineServer::Impl::Service(std::vector<IncomingLine>* lines) {
     ++it;
     std::string line;
     if (Listens(client) && TakeLine(&client, &line)) lines->push_back({id, std::move(line)});
-    more = more || (Listens(client) && client.input.find('\n') != std::string::npos);
-    if (!Settle(id, &client)) Drop(id);
+    if (Settle(id, &client))
+      more = more || (Listens(client) && client.has_line());
+    else
+      Drop(id);
   }
   std::uint64_t count = 1;
   [[maybe_unused]] const ssize_t told =

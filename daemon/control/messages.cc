@@ -2,6 +2,7 @@
 
 #include <array>
 #include <limits>
+#include <optional>
 #include <utility>
 
 namespace focalfleet {
@@ -32,6 +33,13 @@ tl::unexpected<Error> BadArgument(const char* name, const char* expected) {
   return Fail(ErrorCode::kInvalid, std::string("argument '") + name + "' must be " + expected);
 }
 
+/// A number that this program made may be a signed one with an unsigned value.
+std::optional<std::uint64_t> UnsignedOf(const Json& value) {
+  if (!value.is_number_integer()) return std::nullopt;
+  if (!value.is_number_unsigned() && value.get<std::int64_t>() < 0) return std::nullopt;
+  return value.get<std::uint64_t>();
+}
+
 Result<Json> ParseObject(std::string_view line) {
   Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) return Malformed("not JSON");
@@ -41,9 +49,9 @@ Result<Json> ParseObject(std::string_view line) {
 
 Result<std::uint64_t> IdOf(const Json& object) {
   const Json* id = Member(object, "id");
-  if (id == nullptr || !id->is_number_unsigned())
-    return Malformed("'id' must be a whole number, not negative");
-  return id->get<std::uint64_t>();
+  const auto number = id == nullptr ? std::nullopt : UnsignedOf(*id);
+  if (!number) return Malformed("'id' must be a whole number, not negative");
+  return *number;
 }
 
 }  // namespace
@@ -123,9 +131,9 @@ std::string EncodeError(std::uint64_t id, const Error& error) {
 
 Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name) {
   const Json* value = Member(args, name);
-  if (value == nullptr || !value->is_number_unsigned())
-    return BadArgument(name, "a whole number, not negative");
-  return value->get<std::uint64_t>();
+  const auto number = value == nullptr ? std::nullopt : UnsignedOf(*value);
+  if (!number) return BadArgument(name, "a whole number, not negative");
+  return *number;
 }
 
 Result<std::int64_t> IntegerArgument(const Json& args, const char* name) {
@@ -167,10 +175,10 @@ Result<std::vector<std::uint32_t>> UnsignedListArgument(const Json& args, const 
   std::vector<std::uint32_t> out;
   out.reserve(list->size());
   for (const Json& item : *list) {
-    if (!item.is_number_unsigned() ||
-        item.get<std::uint64_t>() > std::numeric_limits<std::uint32_t>::max())
+    const auto number = UnsignedOf(item);
+    if (!number || *number > std::numeric_limits<std::uint32_t>::max())
       return BadArgument(name, "a list of whole numbers");
-    out.push_back(static_cast<std::uint32_t>(item.get<std::uint64_t>()));
+    out.push_back(static_cast<std::uint32_t>(*number));
   }
   return out;
 }

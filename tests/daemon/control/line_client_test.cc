@@ -1,0 +1,133 @@
+#include "daemon/control/line_client.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <atomic>
+#include <thread>
+
+#include "daemon/control/line_server.h"
+#include "tests/daemon/control/scratch.h"
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// A server on a thread of its own that answers by verb, until it is destroyed.
+class EchoServer {
+ public:
+  explicit EchoServer(const std::string& path) : server_(LineServer::Create(path).value()) {
+    thread_ = std::thread([this] { Run(); });
+  }
+  ~EchoServer() {
+    end_ = true;
+    thread_.join();
+  }
+  EchoServer(const EchoServer&) = delete;
+  EchoServer& operator=(const EchoServer&) = delete;
+
+ private:
+  void Run() {
+    while (!end_) {
+      pollfd poller{server_.fd(), POLLIN, 0};
+      ::poll(&poller, 1, 10);
+      std::vector<IncomingLine> lines;
+      server_.Service(&lines);
+      for (const auto& line : lines) Answer(line);
+    }
+  }
+  void Answer(const IncomingLine& line) {
+    const auto request = DecodeRequest(line.text);
+    if (!request) {
+      server_.Answer(line.client, EncodeError(0, request.error()));
+    } else if (request->verb == "count") {
+      for (int i = 1; i <= 3; ++i) server_.Progress(line.client, EncodeProgress(request->id, i));
+      server_.Answer(line.client, EncodeResult(request->id, "three"));
+    } else if (request->verb == "refuse") {
+      server_.Answer(line.client, EncodeError(request->id, {ErrorCode::kRefused, "busy"}));
+    } else if (request->verb == "mumble") {
+      server_.Answer(line.client, "}{");
+    } else if (request->verb == "echo") {
+      server_.Answer(line.client, EncodeResult(request->id, request->args));
+    }  // else: silence
+  }
+
+  LineServer server_;
+  std::atomic<bool> end_{false};
+  std::thread thread_;
+};
+
+TEST(LineClient, ReturnsTheResultAndShowsProgressOnTheWay) {
+  const Scratch scratch;
+  const EchoServer server(scratch / "s");
+  auto client = LineClient::Connect(scratch / "s").value();
+  std::vector<int> seen;
+  const auto result = client.Call(
+      "count", Json::object(),
+      {.on_progress = [&](const Json& progress) { seen.push_back(progress.get<int>()); }});
+  ASSERT_TRUE(result) << result.error().text;
+  EXPECT_EQ(*result, "three");
+  EXPECT_THAT(seen, ::testing::ElementsAre(1, 2, 3));
+}
+
+TEST(LineClient, CarriesALineOfManyBytesBothWays) {
+  const Scratch scratch;
+  const EchoServer server(scratch / "s");
+  auto client = LineClient::Connect(scratch / "s").value();
+  const std::string big(5'000'000, 'x');
+  const auto result = client.Call("echo", {{"text", big}});
+  ASSERT_TRUE(result) << result.error().text;
+  EXPECT_EQ((*result)["text"].get_ref<const std::string&>().size(), big.size());
+}
+
+TEST(LineClient, GivesTheServersErrorAndStaysConnected) {
+  const Scratch scratch;
+  const EchoServer server(scratch / "s");
+  auto client = LineClient::Connect(scratch / "s").value();
+  const auto refused = client.Call("refuse", Json::object());
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(refused.error().text, "busy");
+  EXPECT_TRUE(client.connected());
+  EXPECT_TRUE(client.Call("count", Json::object()));
+}
+
+TEST(LineClient, GivesUpASilentServer) {
+  const Scratch scratch;
+  const EchoServer server(scratch / "s");
+  auto client = LineClient::Connect(scratch / "s").value();
+  const auto nothing =
+      client.Call("silence", Json::object(), {.silence_max = Milliseconds(20), .on_progress = {}});
+  ASSERT_FALSE(nothing);
+  EXPECT_EQ(nothing.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(nothing.error().text, HasSubstr("no answer in time"));
+  EXPECT_FALSE(client.connected());
+}
+
+TEST(LineClient, NamesASocketThatNobodyAnswers) {
+  const Scratch scratch;
+  const auto client = LineClient::Connect(scratch / "s");
+  ASSERT_FALSE(client);
+  EXPECT_EQ(client.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(client.error().text, HasSubstr(scratch / "s"));
+}
+
+TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
+  const Scratch scratch;
+  auto server = std::make_unique<EchoServer>(scratch / "s");
+  auto mumbled = LineClient::Connect(scratch / "s").value();
+  EXPECT_FALSE(mumbled.Call("mumble", Json::object()));
+  EXPECT_FALSE(mumbled.connected());
+  auto client = LineClient::Connect(scratch / "s").value();
+  EXPECT_TRUE(client.Call("count", Json::object()));
+  server.reset();
+  const auto broken = client.Call("count", Json::object());
+  ASSERT_FALSE(broken);
+  EXPECT_EQ(broken.error().code, ErrorCode::kUnavailable);
+  EXPECT_FALSE(client.connected());
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,88 @@
+#include "daemon/control/messages.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace focalfleet {
+namespace {
+
+TEST(ControlMessages, RequestSurvivesTheWay) {
+  const ControlRequest sent{7, "apply", {{"source", "a.csv"}, {"wait", true}}};
+  const auto received = DecodeRequest(EncodeRequest(sent));
+  ASSERT_TRUE(received);
+  EXPECT_EQ(received->id, 7u);
+  EXPECT_EQ(received->verb, "apply");
+  EXPECT_EQ(received->args, sent.args);
+}
+
+TEST(ControlMessages, AnswersSurviveTheWay) {
+  const auto progress = DecodeAnswer(EncodeProgress(3, {{"round", 1}}));
+  ASSERT_TRUE(progress);
+  EXPECT_EQ(progress->kind, ControlAnswer::Kind::kProgress);
+  EXPECT_EQ(progress->body["round"], 1);
+  const auto result = DecodeAnswer(EncodeResult(3, Json::array({1, 2})));
+  ASSERT_TRUE(result);
+  EXPECT_EQ(result->kind, ControlAnswer::Kind::kResult);
+  EXPECT_EQ(result->body.size(), 2u);
+}
+
+TEST(ControlMessages, EveryErrorCodeSurvivesTheWay) {
+  for (const auto code : {ErrorCode::kInvalid, ErrorCode::kRefused, ErrorCode::kUnavailable,
+                          ErrorCode::kFull, ErrorCode::kNewer}) {
+    const auto answer = DecodeAnswer(EncodeError(1, {code, "why"}));
+    ASSERT_TRUE(answer);
+    EXPECT_EQ(answer->kind, ControlAnswer::Kind::kError);
+    EXPECT_EQ(answer->error.code, code);
+    EXPECT_EQ(answer->error.text, "why");
+  }
+}
+
+TEST(ControlMessages, AnythingMalformedIsAnErrorNotACrash) {
+  const std::string deep(100'000, '[');
+  for (const std::string& line :
+       {std::string(), std::string("{"), std::string("[]"), std::string("null"), std::string("{}"),
+        std::string(R"({"id":-1,"verb":"x"})"), std::string(R"({"id":"1","verb":"x"})"),
+        std::string(R"({"id":1})"), std::string(R"({"id":1,"verb":2})"),
+        std::string(R"({"id":1,"verb":"x","args":[]})"), std::string("\xff\xfe\0\x01", 4), deep}) {
+    const auto request = DecodeRequest(line);
+    ASSERT_FALSE(request) << line.substr(0, 40);
+    EXPECT_EQ(request.error().code, ErrorCode::kInvalid);
+    EXPECT_FALSE(DecodeAnswer(line));
+  }
+}
+
+TEST(ControlMessages, TextThatIsNotUtf8AndNumbersThatAreNoneStillMakeALine) {
+  const std::string line = EncodeResult(1, {{"text", "\xff"}, {"x", std::nan("")}});
+  const auto answer = DecodeAnswer(line);
+  ASSERT_TRUE(answer);
+  EXPECT_TRUE(answer->body["x"].is_null());
+}
+
+TEST(ControlMessages, ArgumentsAreCheckedByTypeAndRange) {
+  const Json args = {{"u", 3},
+                     {"neg", -3},
+                     {"text", "t"},
+                     {"flag", true},
+                     {"real", 1.5},
+                     {"list", {1, 2}},
+                     {"bad", {1, 5'000'000'000}}};
+  EXPECT_EQ(UnsignedArgument(args, "u").value(), 3u);
+  EXPECT_EQ(IntegerArgument(args, "neg").value(), -3);
+  EXPECT_EQ(TextArgument(args, "text").value(), "t");
+  EXPECT_TRUE(FlagArgumentOr(args, "flag", false).value());
+  EXPECT_FALSE(FlagArgumentOr(args, "absent", false).value());
+  EXPECT_EQ(UnsignedArgumentOr(args, "absent", 9).value(), 9u);
+  EXPECT_EQ(UnsignedListArgument(args, "list").value().size(), 2u);
+  EXPECT_FALSE(UnsignedArgument(args, "neg"));
+  EXPECT_FALSE(UnsignedArgument(args, "real"));
+  EXPECT_FALSE(UnsignedArgument(args, "absent"));
+  EXPECT_FALSE(TextArgument(args, "u"));
+  EXPECT_FALSE(TextArgumentOr(args, "u", ""));
+  EXPECT_FALSE(FlagArgumentOr(args, "u", true));
+  EXPECT_FALSE(UnsignedListArgument(args, "bad"));
+  EXPECT_NE(UnsignedArgument(args, "neg").error().text.find("neg"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace focalfleet
