@@ -1,0 +1,24 @@
+// Random messages of both directions with every field over its whole range on the wire, and each
+// message's fields as one comparable tuple. What is drawn here is what docs/protocol.md allows;
+// nothing is taken from the codec.
+#pragma once
+
+#include <string>
+#include <tuple>
+
+#include "protocol/base/rng.h"
+#include "protocol/wire/messages.h"
+
+namespace focalfleet::testing {
+
+HostMessage RandomHost(Rng& rng);
+HostMessage RandomHost(std::size_t alternative, Rng& rng);
+UnitMessage RandomUnit(Rng& rng);
+UnitMessage RandomUnit(std::size_t alternative, Rng& rng);
+
+/// Every field of a message as text, its type's place in the variant first: equal texts, equal
+/// messages.
+std::string Show(const HostMessage& message);
+std::string Show(const UnitMessage& message);
+
+}  // namespace focalfleet::testing

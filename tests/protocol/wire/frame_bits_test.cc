@@ -1,0 +1,125 @@
+#include "protocol/wire/frame_bits.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "protocol/base/rng.h"
+#include "protocol/wire/codec.h"
+#include "tests/protocol/random_messages.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet {
+namespace {
+
+// The oracle: a frame as a string of '0' and '1', by the field list of ISO 11898-1, the check
+// sequence by long division and the stuffing by looking at the string.
+std::string Binary(std::uint32_t value, int count) {
+  std::string text;
+  for (int i = count - 1; i >= 0; --i) text += (value >> i & 1) != 0 ? '1' : '0';
+  return text;
+}
+
+std::string CrcByDivision(const std::string& message) {
+  const std::string divisor = "1100010110011001";  // x^15 and 0x4599
+  std::string rest = message + std::string(15, '0');
+  for (std::size_t i = 0; i < message.size(); ++i)
+    if (rest[i] == '1')
+      for (std::size_t k = 0; k < divisor.size(); ++k)
+        rest[i + k] = rest[i + k] == divisor[k] ? '0' : '1';
+  return rest.substr(message.size());
+}
+
+std::string Stuffed(const std::string& bits) {
+  std::string out;
+  for (const char bit : bits) {
+    out += bit;
+    if (out.size() >= 5 && out.find_first_not_of(bit, out.size() - 5) == std::string::npos)
+      out += bit == '0' ? '1' : '0';
+  }
+  return out;
+}
+
+std::string BeforeCrc(const CanFrame& frame) {
+  std::string bits = "0" + Binary(frame.id >> 18, 11) + "11" + Binary(frame.id, 18) + "000" +
+                     Binary(frame.length, 4);
+  for (const std::uint8_t byte : frame.payload()) bits += Binary(byte, 8);
+  return bits;
+}
+
+std::uint32_t OracleBits(const CanFrame& frame) {
+  const std::string bits = BeforeCrc(frame);
+  const std::string tail =
+      "1"  // CRC delimiter
+      "1"
+      "1"  // ACK slot and delimiter
+      "1111111"
+      "111";
+  return static_cast<std::uint32_t>((Stuffed(bits + CrcByDivision(bits)) + tail).size());
+}
+
+CanFrame RandomFrame(Rng& rng) {
+  CanFrame frame{
+      static_cast<std::uint32_t>(rng.Below(1u << 29)), static_cast<std::uint8_t>(rng.Below(9)), {}};
+  const std::uint64_t kind = rng.Below(4);
+  for (auto& byte : frame.data) {
+    constexpr std::uint8_t kRuns[] = {0x00, 0xFF, 0x0F, 0xF0, 0x87, 0x78, 0xC3, 0x1E};
+    byte = kind == 0 ? static_cast<std::uint8_t>(rng.Below(256)) : kRuns[rng.Below(8)];
+  }
+  return frame;
+}
+
+TEST(FrameBits, TheOraclesCrcIsThePublishedOne) {
+  std::string digits;
+  for (const char c : std::string("123456789")) digits += Binary(static_cast<std::uint8_t>(c), 8);
+  EXPECT_EQ(CrcByDivision(digits), Binary(0x059E, 15)) << "check value of CRC-15/CAN";
+}
+
+TEST(FrameBits, EqualsTheLengthOfTheFrameWrittenOut) {
+  const auto seed = testing::TestSeed(11);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  for (int i = 0; i < 20'000; ++i) {
+    const CanFrame frame = RandomFrame(rng);
+    ASSERT_EQ(FrameBits(frame), OracleBits(frame)) << std::hex << frame.id;
+    ASSERT_EQ(Binary(FrameCrc(frame), 15), CrcByDivision(BeforeCrc(frame))) << std::hex << frame.id;
+  }
+}
+
+TEST(FrameBits, EqualsTheLengthOfEveryMessageWrittenOut) {
+  Rng rng(12);
+  for (std::size_t i = 0; i < 2000; ++i) {
+    const CanFrame host = Encode(testing::RandomHost(rng), {{static_cast<std::uint8_t>(i)}, 1});
+    const CanFrame unit = Encode(testing::RandomUnit(rng), {{static_cast<std::uint8_t>(i)}, 1});
+    ASSERT_EQ(FrameBits(host), OracleBits(host));
+    ASSERT_EQ(FrameBits(unit), OracleBits(unit));
+  }
+}
+
+TEST(FrameBits, StaysWithinTheKnownBounds) {
+  Rng rng(13);
+  for (int i = 0; i < 20'000; ++i) {
+    const CanFrame frame = RandomFrame(rng);
+    const std::uint32_t stuffable = 54 + 8u * frame.length;
+    ASSERT_GE(FrameBits(frame), stuffable + 13);
+    ASSERT_LE(FrameBits(frame), stuffable + 13 + (stuffable - 1) / 4);
+    ASSERT_LE(FrameBits(frame), kFrameBitsMax);
+  }
+  static_assert(kFrameBitsMax == 54 + 64 + 13 + (54 + 64 - 1) / 4);
+}
+
+TEST(FrameBits, IgnoresBytesBeyondTheLength) {
+  CanFrame frame{0x123456, 2, {1, 2, 3, 4, 5, 6, 7, 8}};
+  const std::uint32_t bits = FrameBits(frame);
+  frame.data[2] = 0;
+  EXPECT_EQ(FrameBits(frame), bits);
+}
+
+TEST(FrameBits, OneBitAtOneMegabitIsOneMicrosecond) {
+  EXPECT_EQ(BitTime(1, 1'000'000), Microseconds(1));
+  EXPECT_EQ(BitTime(160, 1'000'000), Microseconds(160));
+  EXPECT_EQ(BitTime(160, 250'000), Microseconds(640));
+}
+
+}  // namespace
+}  // namespace focalfleet

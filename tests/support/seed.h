@@ -1,0 +1,20 @@
+// One seed for a random test, printed with every failure inside its scope and taken from the
+// environment when it is to be seen again: FOCALFLEET_SEED=4711 ctest -R Codec.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+
+namespace focalfleet::testing {
+
+inline std::uint64_t TestSeed(std::uint64_t otherwise) {
+  const char* text = std::getenv("FOCALFLEET_SEED");
+  return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
+}
+
+}  // namespace focalfleet::testing
+
+#define FOCALFLEET_TRACE_SEED(seed) SCOPED_TRACE("FOCALFLEET_SEED=" + std::to_string(seed))
