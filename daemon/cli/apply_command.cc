@@ -1,0 +1,108 @@
+// apply FILE [--wait] [--fixed]: hands a targets file to the daemon.
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstring>
+
+#include "daemon/cli/client.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/progress_bar.h"
+#include "daemon/cli/text_file.h"
+
+namespace focalfleet::cli {
+namespace {
+
+struct ApplyOptions {
+  std::string file;
+  bool wait = false;
+  bool fixed = false;
+};
+
+// Ctrl-C ends the waiting, not the motion; whoever presses it must know that.
+void InstallInterruptNote() {
+  struct sigaction action {};
+  action.sa_handler = [](int) {
+    static constexpr char kNote[] =
+        "\nfocalfleet: no longer waiting; the configuration goes on (`focalfleet stop` ends it, "
+        "`focalfleet status` shows it)\n";
+    [[maybe_unused]] const auto written = write(STDERR_FILENO, kNote, sizeof kNote - 1);
+    _exit(static_cast<int>(ExitCode::kBroken));
+  };
+  sigaction(SIGINT, &action, nullptr);
+}
+
+void ShowProgress(ProgressBar* bar, const Json& progress) {
+  const std::string stage =
+      fmt::format("round {}: {}", CountIn(progress, "round"), TextIn(progress, "state"));
+  bar->Show(
+      NumberIn(progress, "fraction"), stage,
+      fmt::format("{} of {} arrived", CountIn(progress, "arrived"), CountIn(progress, "targeted")));
+}
+
+ExitCode TellAccepted(const Context& context, const Json& result) {
+  if (context.json) {
+    PrintJson(result);
+  } else {
+    const std::uint64_t id =
+        result.contains("configuration") ? CountIn(result, "configuration") : CountIn(result, "id");
+    Say(context,
+        fmt::format("configuration {} accepted; `focalfleet status` shows how it goes", id));
+  }
+  return ExitCode::kOk;
+}
+
+ExitCode TellSummary(const Context& context, const Json& configuration) {
+  if (context.json) {
+    // What the configuration does not know of itself is the fleet's; without an answer it stays 0.
+    const auto status = Ask(context, {.verb = "status"});
+    PrintJson(ApplySummary(configuration, status ? *status : Json::object()));
+  }
+  Say(context, DescribeConfiguration(configuration, context.colour_out));
+  return ExitCodeOf(configuration);
+}
+
+ExitCode RunApply(const Context& context, const ApplyOptions& options) {
+  auto text = ReadTextFile(options.file);
+  if (!text) return Report(context, text.error());
+  // The rest of the line and the escapes of its text must fit, too.
+  if (text->size() > kControlLineBytesMax / 2) {
+    return Report(context, {ErrorCode::kInvalid,
+                            fmt::format("{}: {} bytes; the daemon takes at most {}", options.file,
+                                        text->size(), kControlLineBytesMax / 2)});
+  }
+  if (options.wait) InstallInterruptNote();
+  ProgressBar bar(context);
+  Question question{.verb = "apply",
+                    .args = {{"source", options.file},
+                             {"targets_csv", std::move(*text)},
+                             {"fixed", options.fixed},
+                             {"wait", options.wait}},
+                    .long_lasting = options.wait,
+                    .on_progress = [&bar](const Json& p) { ShowProgress(&bar, p); }};
+  const auto result = Ask(context, question);
+  bar.End();
+  if (!result) return Report(context, result.error());
+  return options.wait ? TellSummary(context, *result) : TellAccepted(context, *result);
+}
+
+}  // namespace
+
+void AddApplyCommand(CommandLine* line) {
+  CLI::App* command = AddCommand(&line->app, "apply", "Move the fleet to the targets of a file",
+                                 "  focalfleet apply targets.csv --wait\n"
+                                 "  focalfleet apply targets.csv --wait --json > summary.json");
+  auto options = std::make_shared<ApplyOptions>();
+  AddFile(command, "FILE", &options->file,
+          "targets.csv: unit_id and x_mm, y_mm or theta_deg, phi_deg")
+      ->required();
+  command->add_flag("--wait", options->wait,
+                    "Wait until the configuration is over, with its progress");
+  command->add_flag("--fixed", options->fixed,
+                    "Units that the file does not name may not step aside");
+  OnChosen(line, command, options, RunApply);
+}
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,78 @@
+#include "daemon/cli/client.h"
+
+#include <fmt/format.h>
+
+#include "daemon/control/line_client.h"
+
+namespace focalfleet::cli {
+
+tl::expected<Json, Failure> Ask(const Context& context, const Question& question) {
+  const std::string path = context.SocketPath();
+  auto client = LineClient::Connect(path);
+  if (!client) {
+    return tl::unexpected<Failure>(
+        Failure{ExitCode::kNoDaemon,
+                {ErrorCode::kUnavailable,
+                 fmt::format("{}; is focalfleetd running, and is this its socket (--socket, "
+                             "$FOCALFLEET_SOCKET)?",
+                             client.error().text)}});
+  }
+  LineClient::CallOptions options;
+  if (question.long_lasting) options.silence_max.reset();
+  options.on_progress = question.on_progress;
+  auto answer = client->Call(question.verb, question.args, options);
+  if (answer) return std::move(*answer);
+  if (client->connected()) {
+    return tl::unexpected<Failure>(Failure{ExitCode::kRefused, answer.error()});
+  }
+  return tl::unexpected<Failure>(
+      Failure{ExitCode::kBroken,
+              {ErrorCode::kUnavailable,
+               fmt::format("{}; whether `{}` took effect is not known: look at `focalfleet status`",
+                           answer.error().text, question.verb)}});
+}
+
+namespace {
+
+const Json* Find(const Json& object, const char* key) {
+  if (!object.is_object()) return nullptr;
+  const auto found = object.find(key);
+  return found == object.end() ? nullptr : &*found;
+}
+
+}  // namespace
+
+double NumberIn(const Json& object, const char* key, double otherwise) {
+  const Json* value = Find(object, key);
+  return value != nullptr && value->is_number() ? value->get<double>() : otherwise;
+}
+
+std::uint64_t CountIn(const Json& object, const char* key) {
+  const Json* value = Find(object, key);
+  return value != nullptr && value->is_number_unsigned() ? value->get<std::uint64_t>() : 0;
+}
+
+std::string TextIn(const Json& object, const char* key) {
+  const Json* value = Find(object, key);
+  return value != nullptr && value->is_string() ? value->get<std::string>() : std::string();
+}
+
+const Json& ObjectIn(const Json& object, const char* key) {
+  static const Json kNothing = Json::object();
+  const Json* value = Find(object, key);
+  return value != nullptr && value->is_object() ? *value : kNothing;
+}
+
+const Json& ListIn(const Json& object, const char* key) {
+  static const Json kNothing = Json::array();
+  const Json* value = Find(object, key);
+  return value != nullptr && value->is_array() ? *value : kNothing;
+}
+
+std::string Shown(const Json& object, const char* key, const char* unit, int decimals) {
+  const Json* value = Find(object, key);
+  if (value == nullptr || !value->is_number()) return "-";
+  return fmt::format("{:.{}f}{}{}", value->get<double>(), decimals, *unit == '\0' ? "" : " ", unit);
+}
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,34 @@
+// One question to the daemon, and what its failure means to the caller: nobody there is exit code
+// 4, an answer that says no is 1, and a connection that breaks after the question went out is 5,
+// because nobody can say then whether it took effect.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "daemon/cli/context.h"
+#include "daemon/control/messages.h"
+
+namespace focalfleet::cli {
+
+struct Question {
+  std::string verb;
+  Json args = Json::object();
+  bool long_lasting = false;  // silence is no failure: the daemon answers when the motion is over
+  std::function<void(const Json&)> on_progress;
+};
+
+tl::expected<Json, Failure> Ask(const Context& context, const Question& question);
+
+/// Members of an answer, total: what is missing or of another type is the default.
+double NumberIn(const Json& object, const char* key, double otherwise = 0);
+std::uint64_t CountIn(const Json& object, const char* key);
+std::string TextIn(const Json& object, const char* key);
+const Json& ObjectIn(const Json& object, const char* key);
+const Json& ListIn(const Json& object, const char* key);
+
+/// `value` with its unit, or a dash where it is missing.
+std::string Shown(const Json& object, const char* key, const char* unit, int decimals);
+
+}  // namespace focalfleet::cli

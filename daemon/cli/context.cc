@@ -1,0 +1,62 @@
+#include "daemon/cli/context.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+
+namespace focalfleet::cli {
+
+std::string Context::SocketPath() const {
+  if (!socket.empty()) return socket;
+  const char* from_environment = std::getenv("FOCALFLEET_SOCKET");
+  return from_environment != nullptr && *from_environment != '\0' ? from_environment
+                                                                  : kDefaultSocket;
+}
+
+void Context::LookAtTerminals() {
+  terminal_out = isatty(STDOUT_FILENO) == 1;
+  terminal_err = isatty(STDERR_FILENO) == 1;
+  const char* no_colour = std::getenv("NO_COLOR");
+  const bool wanted = no_colour == nullptr || *no_colour == '\0';
+  colour_out = wanted && terminal_out && !json;
+  colour_err = wanted && terminal_err;
+}
+
+std::string Paint(bool colour_on, Colour colour, std::string_view text) {
+  constexpr std::array<const char*, 5> kCodes = {"", "32", "33", "31", "1"};
+  if (!colour_on || colour == Colour::kPlain) return std::string(text);
+  return fmt::format("\033[{}m{}\033[0m", kCodes[static_cast<std::size_t>(colour)], text);
+}
+
+void Say(const Context& context, std::string_view line) {
+  if (context.quiet || context.json) return;
+  fmt::print("{}\n", line);
+}
+
+void PrintJson(const Json& object) {
+  const std::string text = object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
+}
+
+ExitCode Report(const Context& context, const Failure& failure) {
+  fmt::print(stderr, "focalfleet: {} {}\n", Paint(context.colour_err, Colour::kRed, "error:"),
+             failure.error.text);
+  if (context.json) {
+    PrintJson({{"error", {{"code", CodeName(failure.error.code)}, {"text", failure.error.text}}},
+               {"exit", static_cast<int>(failure.exit)}});
+  }
+  return failure.exit;
+}
+
+ExitCode Report(const Context& context, const Error& error, ExitCode exit) {
+  return Report(context, Failure{exit, error});
+}
+
+std::string Count(std::uint64_t n, const char* singular, const char* plural) {
+  return fmt::format("{} {}", n, n == 1 ? singular : plural);
+}
+
+}  // namespace focalfleet::cli

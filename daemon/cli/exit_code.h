@@ -1,0 +1,32 @@
+// What the shell of an operator gets to know: six numbers, the same for every command.
+#pragma once
+
+#include "protocol/base/result.h"
+
+namespace focalfleet::cli {
+
+enum class ExitCode : int {
+  kOk = 0,
+  kRefused = 1,       // refused or invalid input: nothing changed
+  kUsage = 2,         // the command line itself is wrong
+  kSomeUnserved = 3,  // done, but some units were not served; they are named
+  kNoDaemon = 4,      // the daemon cannot be reached
+  kBroken = 5,        // stopped or failed on the way
+};
+
+/// Why a command ends without having done what it was asked for.
+struct Failure {
+  ExitCode exit = ExitCode::kRefused;
+  Error error;
+};
+
+inline constexpr const char* kExitCodesHelp =
+    "Exit codes:\n"
+    "  0  done\n"
+    "  1  refused or invalid input; nothing changed\n"
+    "  2  wrong usage\n"
+    "  3  done, but some units were not served (they are named)\n"
+    "  4  the daemon cannot be reached\n"
+    "  5  stopped or failed on the way";
+
+}  // namespace focalfleet::cli

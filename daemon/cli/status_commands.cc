@@ -1,0 +1,256 @@
+// status, unit, state, history: questions that change nothing.
+
+#include <fmt/format.h>
+
+#include "daemon/cli/client.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/table.h"
+#include "daemon/cli/text_file.h"
+
+namespace focalfleet::cli {
+namespace {
+
+// ---- status
+
+struct StatusOptions {
+  bool buses = false;
+};
+
+std::string Counted(const Json& counts) {
+  std::string text;
+  for (const auto& [name, count] : counts.items()) {
+    if (!count.is_number_unsigned() || count.get<std::uint64_t>() == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count.get<std::uint64_t>(), name);
+  }
+  return text.empty() ? "none" : text;
+}
+
+std::string DescribeBus(const Json& bus, bool colour_on) {
+  const std::string link = TextIn(bus, "link");
+  return fmt::format(
+      "  bus {}: {}, load {:.0f} % (highest {:.0f} %), {} sent, {} received, {} malformed, {} "
+      "retries\n",
+      CountIn(bus, "bus_id"), Paint(colour_on, link == "up" ? Colour::kGreen : Colour::kRed, link),
+      100 * NumberIn(bus, "load"), 100 * NumberIn(bus, "load_max"), CountIn(bus, "frames_sent"),
+      CountIn(bus, "frames_received"), CountIn(bus, "malformed"), CountIn(bus, "retries"));
+}
+
+// Healthy buses are only counted, unless all are wanted.
+std::string DescribeBuses(const Json& buses, double load_max, bool all, bool colour_on) {
+  std::size_t up = 0;
+  std::string lines;
+  for (const Json& bus : buses) {
+    const bool healthy = TextIn(bus, "link") == "up";
+    up += healthy ? 1u : 0u;
+    if (all || !healthy) lines += DescribeBus(bus, colour_on);
+  }
+  return fmt::format("buses      {} of {} up, highest load {:.0f} %\n{}", up, buses.size(),
+                     100 * load_max, lines);
+}
+
+std::string DescribeStatus(const Json& status, const StatusOptions& options, bool colour_on) {
+  const bool busy = status.value("busy", false);
+  const Json& store = ObjectIn(status, "store");
+  const bool failing = store.value("failing", false);
+  std::string text = fmt::format(
+      "focalfleetd {}, {}\n", TextIn(status, "version"),
+      busy ? Paint(colour_on, Colour::kYellow, "busy") : Paint(colour_on, Colour::kGreen, "idle"));
+  text += fmt::format("units      {}, {} enabled: {}\n", CountIn(status, "units"),
+                      CountIn(status, "enabled"), Counted(ObjectIn(status, "phases")));
+  text += fmt::format("positions  {}\n", Counted(ObjectIn(status, "witnesses")));
+  text += fmt::format(
+      "store      {}{}\n", TextIn(store, "path"),
+      failing ? Paint(colour_on, Colour::kRed, "  FAILING: nothing new is started") : "");
+  text += DescribeBuses(ListIn(status, "buses"), NumberIn(status, "bus_load_max"), options.buses,
+                        colour_on);
+  const Json& configuration = ObjectIn(status, "configuration");
+  text += CountIn(configuration, "id") == 0 ? "no configuration yet"
+                                            : DescribeConfiguration(configuration, colour_on);
+  return text;
+}
+
+ExitCode RunStatus(const Context& context, const StatusOptions& options) {
+  const auto status = Ask(context, {.verb = "status"});
+  if (!status) return Report(context, status.error());
+  if (context.json) PrintJson(*status);
+  Say(context, DescribeStatus(*status, options, context.colour_out));
+  return ExitCode::kOk;
+}
+
+void AddStatus(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "status", "Show the fleet, its buses and its configuration",
+                 "  focalfleet status\n  focalfleet status --json");
+  auto options = std::make_shared<StatusOptions>();
+  command->add_flag("--buses", options->buses,
+                    "A line for every bus, not only for those in trouble");
+  OnChosen(line, command, options, RunStatus);
+}
+
+// ---- unit
+
+struct UnitOptions {
+  std::uint32_t unit_id = 0;
+};
+
+ExitCode RunUnit(const Context& context, const UnitOptions& options) {
+  const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", options.unit_id}}});
+  if (!unit) return Report(context, unit.error());
+  if (context.json) PrintJson(*unit);
+  Say(context, DescribeObject(*unit));
+  return ExitCode::kOk;
+}
+
+void AddUnit(CommandLine* line) {
+  CLI::App* command = AddCommand(&line->app, "unit", "Show all that is known of one unit",
+                                 "  focalfleet unit 4711");
+  auto options = std::make_shared<UnitOptions>();
+  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  OnChosen(line, command, options, RunUnit);
+}
+
+// ---- state
+
+struct StateOptions {
+  std::string out;
+  bool allow_unknown = false;
+};
+
+bool IsPlaceWitness(const std::string& witness) {
+  return witness == "measured" || witness == "reported";
+}
+
+struct StateFile {
+  std::string csv = "unit_id,theta_deg,phi_deg\n";
+  std::size_t rows = 0;
+  Json unknown = Json::array();  // of {unit_id, theta, phi}: the witnesses
+};
+
+StateFile MakeStateFile(const Json& rows) {
+  StateFile file;
+  for (const Json& row : rows) {
+    const std::uint64_t id = CountIn(row, "unit_id");
+    const std::string theta = TextIn(row, "theta_witness");
+    const std::string phi = TextIn(row, "phi_witness");
+    ++file.rows;
+    if (IsPlaceWitness(theta) && IsPlaceWitness(phi)) {
+      file.csv += fmt::format("{},{:.6f},{:.6f}\n", id, NumberIn(row, "theta_low_deg"),
+                              NumberIn(row, "phi_low_deg"));
+    } else {
+      file.csv += fmt::format("{},nan,nan\n", id);
+      file.unknown.push_back({{"unit_id", id}, {"theta", theta}, {"phi", phi}});
+    }
+  }
+  return file;
+}
+
+std::string NameUnknown(const Json& unknown) {
+  constexpr std::size_t kShown = 10;
+  std::string text;
+  for (std::size_t i = 0; i < unknown.size() && i < kShown; ++i) {
+    text +=
+        fmt::format("{}{} (theta {}, phi {})", i == 0 ? "" : ", ", CountIn(unknown[i], "unit_id"),
+                    TextIn(unknown[i], "theta"), TextIn(unknown[i], "phi"));
+  }
+  if (unknown.size() > kShown) text += fmt::format(" and {} more", unknown.size() - kShown);
+  return text;
+}
+
+ExitCode RunState(const Context& context, const StateOptions& options) {
+  const auto state = Ask(context, {.verb = "state"});
+  if (!state) return Report(context, state.error());
+  const StateFile file = MakeStateFile(ListIn(*state, "rows"));
+  if (!file.unknown.empty() && !options.allow_unknown) {
+    return Report(
+        context,
+        {ErrorCode::kRefused,
+         fmt::format("the place of {} is not known: {}; wait until they rest, home them "
+                     "(`focalfleet home --not-known`), or write them as nan with "
+                     "--allow-unknown",
+                     Count(file.unknown.size(), "unit", "units"), NameUnknown(file.unknown))});
+  }
+  if (!options.out.empty()) {
+    if (const auto written = WriteFileAtomically(options.out, file.csv); !written) {
+      return Report(context, written.error());
+    }
+  }
+  if (context.json) {
+    PrintJson({{"units", file.rows},
+               {"out", options.out},
+               {"unknown", file.unknown},
+               {"rows", ListIn(*state, "rows")}});
+  } else if (options.out.empty()) {
+    fmt::print("{}", file.csv);
+  } else {
+    Say(context, fmt::format("{}: {}", options.out, Count(file.rows, "unit", "units")));
+  }
+  if (file.unknown.empty()) return ExitCode::kOk;
+  if (!context.json)
+    fmt::print(stderr, "focalfleet: written as nan: {}\n", NameUnknown(file.unknown));
+  return ExitCode::kSomeUnserved;
+}
+
+void AddState(CommandLine* line) {
+  CLI::App* command = AddCommand(
+      &line->app, "state", "Write where every axis stands as state.csv",
+      "  focalfleet state --out state.csv\n"
+      "  focalfleet plan --units units.csv --targets t.csv --from state.csv --out plan.csv");
+  auto options = std::make_shared<StateOptions>();
+  AddFile(command, "--out", &options->out, "File to write (default: stdout)");
+  command->add_flag("--allow-unknown", options->allow_unknown,
+                    "Write units of unknown place as nan, instead of refusing");
+  OnChosen(line, command, options, RunState);
+}
+
+// ---- history
+
+struct HistoryOptions {
+  std::uint32_t unit_id = 0;
+  bool of_unit = false;
+  std::uint32_t limit = 20;
+};
+
+ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
+  Json args{{"limit", options.limit}};
+  if (options.of_unit) args["unit_id"] = options.unit_id;
+  const auto history = Ask(context, {.verb = "history", .args = args});
+  if (!history) return Report(context, history.error());
+  if (context.json) PrintJson(*history);
+  std::string text;
+  for (const auto& [name, rows] : history->items()) {
+    if (!rows.is_array() || rows.empty()) continue;
+    text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n\n",
+                        Paint(context.colour_out, Colour::kBold, name),
+                        DescribeRows(rows, {"at", "time", "id", "unit_id", "configuration"}));
+  }
+  Say(context, text.empty() ? "nothing yet" : text);
+  return ExitCode::kOk;
+}
+
+void AddHistory(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "history", "Show past configurations, or the moves of a unit",
+                 "  focalfleet history\n  focalfleet history 4711 --limit 5");
+  auto options = std::make_shared<HistoryOptions>();
+  command->add_option_function<std::uint32_t>(
+      "UNIT",
+      [options](const std::uint32_t& id) {
+        options->unit_id = id;
+        options->of_unit = true;
+      },
+      "Its unit_id (default: configurations of the fleet)");
+  command->add_option("--limit", options->limit, "Newest rows to show")->capture_default_str();
+  OnChosen(line, command, options, RunHistory);
+}
+
+}  // namespace
+
+void AddStatusCommands(CommandLine* line) {
+  AddStatus(line);
+  AddUnit(line);
+  AddState(line);
+  AddHistory(line);
+}
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,148 @@
+#include "daemon/cli/text_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <climits>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <string_view>
+
+namespace focalfleet::cli {
+namespace {
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) close(fd_);
+  }
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+tl::unexpected<Error> FailErrno(const std::string& path, const char* what, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  return Fail(full ? ErrorCode::kFull : ErrorCode::kUnavailable,
+              fmt::format("{}: {}: {}", path, what, std::strerror(error)));
+}
+
+// 0: all written, else errno.
+int WriteAll(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t n = write(fd, text.data(), text.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return 0;
+}
+
+/// Length of the UTF-8 sequence that begins at `at`, 0 where none does.
+std::size_t SequenceLength(std::string_view text, std::size_t at) {
+  const auto byte = [&](std::size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
+  };
+  const unsigned first = byte(at);
+  if (first != 0 && first < 0x80) return 1;
+  const std::size_t length = first >= 0xC2 && first < 0xE0   ? 2
+                             : first >= 0xE0 && first < 0xF0 ? 3
+                             : first >= 0xF0 && first < 0xF5 ? 4
+                                                             : 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(at + i) & 0xC0u) != 0x80) return 0;
+  }
+  const unsigned second = byte(at + 1);
+  const bool overlong = (first == 0xE0 && second < 0xA0) || (first == 0xF0 && second < 0x90);
+  const bool beyond = (first == 0xED && second >= 0xA0) || (first == 0xF4 && second >= 0x90);
+  return overlong || beyond ? 0 : length;
+}
+
+std::optional<std::size_t> FirstNonText(std::string_view text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = SequenceLength(text, at);
+    if (length == 0) return at;
+    at += length;
+  }
+  return std::nullopt;
+}
+
+Status WriteDirectly(const std::string& path, const std::string& text) {
+  const Descriptor file(open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.get() < 0) return FailErrno(path, "cannot be written", errno);
+  if (const int error = WriteAll(file.get(), text)) {
+    return FailErrno(path, "cannot be written", error);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> ReadFile(const std::string& path) {
+  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.get() < 0) return FailErrno(path, "cannot be read", errno);
+  std::string text;
+  for (;;) {
+    constexpr std::size_t kChunk = 1u << 20;
+    const std::size_t had = text.size();
+    text.resize(had + kChunk);
+    const ssize_t n = read(file.get(), text.data() + had, kChunk);
+    const int error = n < 0 ? errno : 0;
+    text.resize(had + (n > 0 ? static_cast<std::size_t>(n) : 0));
+    if (error == EINTR) continue;
+    if (error != 0) return FailErrno(path, "cannot be read", error);
+    if (n == 0) return text;
+    if (text.size() > kFileBytesMax) {
+      return Fail(ErrorCode::kInvalid,
+                  fmt::format("{}: larger than {} MiB, so not one of our files", path,
+                              kFileBytesMax >> 20));
+    }
+  }
+}
+
+Result<std::string> ReadTextFile(const std::string& path) {
+  FOCALFLEET_TRY_ASSIGN(std::string text, ReadFile(path));
+  if (const auto at = FirstNonText(text)) {
+    std::size_t row = 1;
+    for (std::size_t i = 0; i < *at; ++i) row += text[i] == '\n' ? 1u : 0u;
+    return Fail(
+        ErrorCode::kInvalid,
+        fmt::format("{}:{}: not a text file: byte 0x{:02x} at offset {}; a CSV file in UTF-8 "
+                    "is wanted",
+                    path, row, static_cast<unsigned char>(text[*at]), *at));
+  }
+  return text;
+}
+
+Status WriteFileAtomically(const std::string& path, const std::string& text) {
+  struct stat status {};
+  const bool exists = stat(path.c_str(), &status) == 0;
+  if (exists && !S_ISREG(status.st_mode)) return WriteDirectly(path, text);
+  // A symbolic link stays one: what it points to is replaced.
+  std::string place = path;
+  char resolved[PATH_MAX];
+  if (exists && realpath(path.c_str(), resolved) != nullptr) place = resolved;
+
+  const std::string beside = fmt::format("{}.{}.tmp", place, getpid());
+  const Descriptor file(open(beside.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC,
+                             exists ? status.st_mode & 07777 : 0666));
+  if (file.get() < 0) return FailErrno(path, "cannot be written", errno);
+  int error = WriteAll(file.get(), text);
+  if (error == 0 && fsync(file.get()) != 0) error = errno;
+  if (error == 0 && rename(beside.c_str(), place.c_str()) != 0) error = errno;
+  if (error != 0) {
+    unlink(beside.c_str());
+    return FailErrno(path, "cannot be written", error);
+  }
+  return {};
+}
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,221 @@
+// home, disable, enable, adopt, params: what an operator does to single units.
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "daemon/cli/client.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/progress_bar.h"
+#include "daemon/cli/table.h"
+#include "protocol/wire/messages.h"
+
+namespace focalfleet::cli {
+namespace {
+
+// The answer as it is, or `done` for people.
+ExitCode Tell(const Context& context, const tl::expected<Json, Failure>& answer,
+              const std::string& done) {
+  if (!answer) return Report(context, answer.error());
+  if (context.json) PrintJson(*answer);
+  Say(context, done);
+  return ExitCode::kOk;
+}
+
+CLI::Option* AddUnits(CLI::App* command, std::vector<std::uint32_t>* units) {
+  return command->add_option("UNIT", *units, "Their unit_ids");
+}
+
+// ---- home
+
+struct HomeOptions {
+  std::vector<std::uint32_t> units;
+  bool not_known = false;
+  bool wait = false;
+};
+
+ExitCode RunHome(const Context& context, const HomeOptions& options) {
+  if (options.units.empty() != options.not_known) {
+    return Report(context,
+                  {ErrorCode::kInvalid, "home: name units, or say --not-known (one of the two)"},
+                  ExitCode::kUsage);
+  }
+  Json args{{"wait", options.wait}};
+  if (options.not_known) {
+    args["not_known"] = true;
+  } else {
+    args["unit_ids"] = options.units;
+  }
+  ProgressBar bar(context);
+  const auto answer =
+      Ask(context, {.verb = "home",
+                    .args = args,
+                    .long_lasting = options.wait,
+                    .on_progress = [&bar](const Json& p) {
+                      bar.Show(NumberIn(p, "fraction"), "homing", TextIn(p, "state"));
+                    }});
+  bar.End();
+  if (!answer) return Report(context, answer.error());
+  if (context.json) PrintJson(*answer);
+  const Json& failed = ListIn(*answer, "unserved");
+  std::string text =
+      options.wait ? "homing is over" : "homing begins; `focalfleet status` shows it";
+  if (!failed.empty())
+    text += "\n" + DescribeRows(failed, {"unit_id", "outcome", "reason", "state"});
+  Say(context, text);
+  return failed.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
+}
+
+void AddHome(CommandLine* line) {
+  CLI::App* command = AddCommand(
+      &line->app, "home", "Drive units to their hard stops, so that their place is known",
+      "  focalfleet home 4711 4712 --wait\n  focalfleet home --not-known --wait");
+  auto options = std::make_shared<HomeOptions>();
+  AddUnits(command, &options->units);
+  command->add_flag("--not-known", options->not_known, "All units whose place is not known");
+  command->add_flag("--wait", options->wait, "Wait until it is over");
+  OnChosen(line, command, options, RunHome);
+}
+
+// ---- disable, enable, adopt
+
+struct EnableOptions {
+  std::vector<std::uint32_t> units;
+  std::string reason;
+};
+
+ExitCode RunDisable(const Context& context, const EnableOptions& options) {
+  return Tell(context,
+              Ask(context, {.verb = "disable",
+                            .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
+              fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
+}
+
+ExitCode RunEnable(const Context& context, const EnableOptions& options) {
+  return Tell(context, Ask(context, {.verb = "enable", .args = {{"unit_ids", options.units}}}),
+              fmt::format("{} enabled", Count(options.units.size(), "unit", "units")));
+}
+
+void AddEnable(CommandLine* line) {
+  CLI::App* disable = AddCommand(
+      &line->app, "disable", "Take units out: they stand where they are, obstacles to the others",
+      "  focalfleet disable 4711 --reason 'phi stalls'");
+  auto taken_out = std::make_shared<EnableOptions>();
+  AddUnits(disable, &taken_out->units)->required();
+  disable->add_option("--reason", taken_out->reason, "Why, for those who come after")->required();
+  OnChosen(line, disable, taken_out, RunDisable);
+
+  CLI::App* enable =
+      AddCommand(&line->app, "enable", "Take units in again", "  focalfleet enable 4711");
+  auto taken_in = std::make_shared<EnableOptions>();
+  AddUnits(enable, &taken_in->units)->required();
+  OnChosen(line, enable, taken_in, RunEnable);
+}
+
+struct AdoptOptions {
+  std::uint32_t unit_id = 0;
+};
+
+ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
+  return Tell(
+      context, Ask(context, {.verb = "adopt", .args = {{"unit_id", options.unit_id}}}),
+      fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id));
+}
+
+void AddAdopt(CommandLine* line) {
+  CLI::App* command = AddCommand(
+      &line->app, "adopt", "Accept the serial number that answers at a unit's place as its own",
+      "  focalfleet unit 4711    # shows both serial numbers\n  focalfleet adopt 4711");
+  auto options = std::make_shared<AdoptOptions>();
+  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  OnChosen(line, command, options, RunAdopt);
+}
+
+// ---- params
+
+struct ParamsOptions {
+  std::uint32_t unit_id = 0;
+  std::string action;
+  std::string axis;
+  std::string name;
+  std::optional<std::int32_t> value;
+};
+
+std::vector<std::string> ParameterNames() {
+  std::vector<std::string> names;
+  for (std::uint8_t i = 0; i < kParameterCount; ++i) {
+    names.emplace_back(focalfleet::Name(static_cast<Parameter>(i)));
+  }
+  return names;
+}
+
+ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
+  const Json args{{"unit_id", options.unit_id},
+                  {"axis", options.axis},
+                  {"parameter", options.name},
+                  {"value", *options.value}};
+  return Tell(context, Ask(context, {.verb = "params_set", .args = args}),
+              fmt::format("unit {}: {} {} = {}", options.unit_id, options.axis, options.name,
+                          *options.value));
+}
+
+// The rows of an answer, whichever member holds them, narrowed to one axis and name where given.
+Json Narrowed(const Json& answer, const ParamsOptions& options) {
+  Json rows = Json::array();
+  for (const Json& row : ListIn(answer, "parameters")) {
+    if (!options.axis.empty() && TextIn(row, "axis") != options.axis) continue;
+    if (!options.name.empty() && TextIn(row, "parameter") != options.name) continue;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+ExitCode RunParams(const Context& context, const ParamsOptions& options) {
+  const bool set = options.action == "set";
+  const bool complete = !options.axis.empty() && !options.name.empty() && options.value.has_value();
+  if (set != options.value.has_value() || (set && !complete)) {
+    return Report(context,
+                  {ErrorCode::kInvalid,
+                   "params: use `params UNIT`, `params UNIT get [AXIS [NAME]]` or `params UNIT set "
+                   "AXIS NAME VALUE`"},
+                  ExitCode::kUsage);
+  }
+  if (set) return SetParameter(context, options);
+  const auto answer = Ask(context, {.verb = "params", .args = {{"unit_id", options.unit_id}}});
+  if (!answer) return Report(context, answer.error());
+  const bool listed = answer->contains("parameters") && answer->at("parameters").is_array();
+  if (context.json) {
+    Json shown = *answer;
+    if (listed) shown["parameters"] = Narrowed(*answer, options);
+    PrintJson(shown);
+    return ExitCode::kOk;
+  }
+  Say(context, listed ? DescribeRows(Narrowed(*answer, options), {"axis", "parameter", "value"})
+                      : DescribeObject(*answer));
+  return ExitCode::kOk;
+}
+
+void AddParams(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "params", "Show or set the tuned parameters of a unit",
+                 "  focalfleet params 4711\n  focalfleet params 4711 get theta repeat\n"
+                 "  focalfleet params 4711 set theta repeat 54");
+  auto options = std::make_shared<ParamsOptions>();
+  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  OneOf(command->add_option("ACTION", options->action, "Show (default) or set"), {"get", "set"});
+  OneOf(command->add_option("AXIS", options->axis, "Which axis"), {"theta", "phi"});
+  OneOf(command->add_option("NAME", options->name, "Which parameter"), ParameterNames());
+  command->add_option("VALUE", options->value, "Its new value, a whole number");
+  OnChosen(line, command, options, RunParams);
+}
+
+}  // namespace
+
+void AddUnitCommands(CommandLine* line) {
+  AddHome(line);
+  AddEnable(line);
+  AddAdopt(line);
+  AddParams(line);
+}
+
+}  // namespace focalfleet::cli
