@@ -1,0 +1,61 @@
+// The fleet in the daemon's own process, for a first look and for tests: all buses share one
+// simulated world on the daemon's clock. It forgets where it stood when the daemon ends;
+// focalfleet-sim does not.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "daemon/ports/pollable_port.h"
+#include "fleet/layout.h"
+#include "sim/world.h"
+
+namespace focalfleet {
+
+class SimulatedFleet {
+ public:
+  /// Errors: kInvalid: the simulation cannot have such units.
+  static Result<std::shared_ptr<SimulatedFleet>> Create(sim::WorldConfig config);
+
+  bool Inject(BusId bus, const CanFrame& frame);
+  /// Lets the whole fleet go on to `now` and gives what this bus heard.
+  void Take(BusId bus, HostInstant now, std::vector<ReceivedFrame>* out);
+  [[nodiscard]] HostInstant NextEvent() const { return world_.NextEvent(); }
+  [[nodiscard]] bool dead(BusId bus) const { return world_.dead(bus); }
+  [[nodiscard]] sim::World& world() { return world_; }
+
+ private:
+  explicit SimulatedFleet(sim::WorldConfig config) : world_(std::move(config)) {}
+
+  sim::World world_;
+  std::vector<ReceivedFrame> delivered_;
+  std::unordered_map<BusId, std::vector<ReceivedFrame>> inbox_;
+};
+
+/// The units of a layout as the simulation describes them.
+std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout);
+
+class SimulatedPort : public PollablePort {
+ public:
+  SimulatedPort(std::shared_ptr<SimulatedFleet> fleet, BusId bus);
+
+  std::size_t Send(std::span<const CanFrame> frames) override;
+  void Receive(HostInstant now, std::vector<ReceivedFrame>* out) override;
+  [[nodiscard]] LinkState state() const override;
+  [[nodiscard]] int fd() const override { return -1; }
+  [[nodiscard]] HostInstant wake_at() const override { return fleet_->NextEvent(); }
+  [[nodiscard]] const PortCounters& counters() const override { return counters_; }
+  [[nodiscard]] const std::string& name() const override { return name_; }
+  [[nodiscard]] const std::string& trouble() const override { return trouble_; }
+
+ private:
+  std::shared_ptr<SimulatedFleet> fleet_;
+  BusId bus_;
+  PortCounters counters_;
+  std::string name_;
+  std::string trouble_;
+};
+
+}  // namespace focalfleet
