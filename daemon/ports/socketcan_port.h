@@ -10,6 +10,7 @@
 #include <linux/can.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/ports/pollable_port.h"
