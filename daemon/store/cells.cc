@@ -1,0 +1,62 @@
+#include "daemon/store/cells.h"
+
+namespace focalfleet::store_internal {
+
+void Cells::Fault(const std::string& what) {
+  if (error_) return;
+  std::string row;
+  for (int i = 0; i < key_columns_; ++i) {
+    const auto* value = sqlite3_column_text(statement_, i);
+    row += std::string(i == 0 ? "" : ", ") + sqlite3_column_name(statement_, i) + " " +
+           (value == nullptr ? "NULL" : reinterpret_cast<const char*>(value));
+  }
+  error_ = Error{ErrorCode::kInvalid, std::string(table_) + ", row " + row + ": " + what};
+}
+
+std::int64_t Cells::Integer(int column, std::int64_t low, std::int64_t high) {
+  const std::int64_t value = sqlite3_column_int64(statement_, column);
+  if (sqlite3_column_type(statement_, column) == SQLITE_INTEGER && value >= low && value <= high)
+      [[likely]] {
+    return error_ ? 0 : value;
+  }
+  const auto* text = sqlite3_column_text(statement_, column);
+  Fault(std::string(sqlite3_column_name(statement_, column)) + " is " +
+        (text == nullptr ? "NULL" : reinterpret_cast<const char*>(text)) + ", not in " +
+        std::to_string(low) + ".." + std::to_string(high));
+  return 0;
+}
+
+double Cells::Real(int column) {
+  switch (sqlite3_column_type(statement_, column)) {
+    case SQLITE_NULL:
+      return std::numeric_limits<double>::quiet_NaN();
+    case SQLITE_INTEGER:
+    case SQLITE_FLOAT:
+      return sqlite3_column_double(statement_, column);
+    default:
+      Fault(std::string(sqlite3_column_name(statement_, column)) + " is not a number");
+      return 0;
+  }
+}
+
+std::string Cells::Text(int column) {
+  if (sqlite3_column_type(statement_, column) != SQLITE_TEXT) {
+    Fault(std::string(sqlite3_column_name(statement_, column)) + " is not text");
+    return {};
+  }
+  const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+  return {text, static_cast<std::size_t>(sqlite3_column_bytes(statement_, column))};
+}
+
+AxisKnowledge Cells::Knowledge(int column) {
+  const AxisKnowledge knowledge{Code(column, Witness::kMeasured), Whole<std::int32_t>(column + 1),
+                                Whole<std::int32_t>(column + 2)};
+  if (const char* flaw = Flaw(knowledge)) Fault(flaw);
+  return knowledge;
+}
+
+void Cells::Require(bool condition, const char* what) {
+  if (!condition) Fault(what);
+}
+
+}  // namespace focalfleet::store_internal

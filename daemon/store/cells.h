@@ -1,0 +1,89 @@
+// One row that came out of SQLite, read column by column with a range for each. The first value
+// that is not what it must be is kept as an error that names table, row and column; the rest of the
+// row then reads as zero.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "daemon/store/sqlite.h"
+#include "daemon/wall_time.h"
+#include "fleet/knowledge.h"
+#include "fleet/records.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet::store_internal {
+
+class Cells {
+ public:
+  /// The first `key_columns` columns name the row in errors. Lifetime: until the statement's next
+  /// step.
+  Cells(const Statement& statement, const char* table, int key_columns)
+      : statement_(statement.get()), table_(table), key_columns_(key_columns) {}
+
+  std::int64_t Integer(int column, std::int64_t low, std::int64_t high);
+  double Real(int column);  // NULL: NaN
+  std::string Text(int column);
+  [[nodiscard]] bool IsNull(int column) const {
+    return sqlite3_column_type(statement_, column) == SQLITE_NULL;
+  }
+
+  template <class T>
+  T Whole(int column) {
+    using Limits = std::numeric_limits<T>;
+    constexpr std::int64_t kHigh = sizeof(T) == sizeof(std::int64_t)
+                                       ? std::numeric_limits<std::int64_t>::max()
+                                       : static_cast<std::int64_t>(Limits::max());
+    return static_cast<T>(Integer(column, static_cast<std::int64_t>(Limits::min()), kHigh));
+  }
+  template <class Enum>
+  Enum Code(int column, Enum last) {
+    return static_cast<Enum>(Integer(column, 0, static_cast<std::int64_t>(last)));
+  }
+  bool Flag(int column) { return Integer(column, 0, 1) == 1; }
+  SerialNumber Serial(int column) {  // of real hardware
+    return {
+        static_cast<std::uint32_t>(Integer(column, 1, std::numeric_limits<std::uint32_t>::max()))};
+  }
+  WallTime Time(int column) { return {Whole<std::int64_t>(column)}; }
+  Axis AxisAt(int column) { return Code(column, Axis::kPhi); }
+  /// witness, low, high in three columns from `column` on.
+  AxisKnowledge Knowledge(int column);
+  /// A condition across columns; `what` says what is wrong where it does not hold.
+  void Require(bool condition, const char* what);
+
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+ private:
+  void Fault(const std::string& what);
+
+  sqlite3_stmt* statement_;
+  const char* table_;
+  int key_columns_;
+  std::optional<Error> error_;
+};
+
+/// What a stored state of knowledge must satisfy, when written and when read: nullptr, or what is
+/// wrong.
+constexpr const char* Flaw(const AxisKnowledge& knowledge) {
+  if (knowledge.witness > Witness::kMeasured) return "its witness does not exist";
+  if (knowledge.witness == Witness::kUnknown) return nullptr;
+  if (knowledge.low > knowledge.high) return "low is above high";
+  if (knowledge.witness != Witness::kInterval && knowledge.low != knowledge.high) {
+    return "it claims one place and has two";
+  }
+  return nullptr;
+}
+
+inline constexpr Origin kLastOrigin = Origin::kHoming;
+inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
+inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
+inline constexpr Severity kLastSeverity = Severity::kError;
+inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
+
+/// The tables as the coordinator wants them, in one read transaction.
+Result<StoredFleet> LoadFleet(Connection& connection);
+
+}  // namespace focalfleet::store_internal

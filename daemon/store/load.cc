@@ -1,0 +1,160 @@
+#include <algorithm>
+
+#include "daemon/store/cells.h"
+
+namespace focalfleet::store_internal {
+namespace {
+
+// Steps `sql` to its end; `read` takes each row and leaves its faults in the cells.
+template <class Read>
+Status ForEach(Connection& connection, const char* table, int key_columns, const char* sql,
+               Read read) {
+  FOCALFLEET_TRY_ASSIGN(Statement statement, connection.Prepare(sql));
+  for (;;) {
+    const auto row = statement.Next();
+    if (!row) return tl::unexpected<Error>(connection.Named(row.error()));
+    if (!*row) return {};
+    Cells cells(statement, table, key_columns);
+    read(cells);
+    if (cells.error()) return tl::unexpected<Error>(connection.Named(*cells.error()));
+  }
+}
+
+Status LoadUnits(Connection& connection, StoredFleet* fleet) {
+  return ForEach(connection, "unit", 1,
+                 "SELECT unit_id, serial, enabled, reason FROM unit ORDER BY unit_id",
+                 [fleet](Cells& cells) {
+                   StoredFleet::StoredUnit unit;
+                   unit.unit = {cells.Whole<std::uint32_t>(0)};
+                   unit.serial = {cells.Whole<std::uint32_t>(1)};
+                   unit.enabled = cells.Flag(2);
+                   unit.reason = cells.Text(3);
+                   fleet->units.push_back(std::move(unit));
+                 });
+}
+
+// vector and turns say the same as low, once more: a row that disagrees with itself is not
+// believed.
+void CheckVector(Cells& cells, const AxisKnowledge& knowledge, std::uint16_t subdivision) {
+  const bool place = knowledge.witness >= Witness::kPredicted && subdivision != 0;
+  cells.Require(cells.IsNull(7) != place && cells.IsNull(8) != place,
+                "vector and turns do not belong to its witness");
+  if (!place || cells.error()) return;
+  const std::int64_t vector = cells.Integer(7, 0, subdivision - 1);
+  const std::int64_t turns = cells.Whole<std::int32_t>(8);
+  cells.Require(turns * subdivision + vector == knowledge.low,
+                "vector and turns disagree with low");
+}
+
+Status LoadVectors(Connection& connection, StoredFleet* fleet) {
+  bool half = false;  // theta of the last serial was read, phi not yet
+  FOCALFLEET_TRY(ForEach(connection, "axis_state", 2,
+                         "SELECT serial, axis, witness, low, high, move, subdivision, vector, "
+                         "turns, origin FROM axis_state "
+                         "ORDER BY serial, axis",
+                         [fleet, &half](Cells& cells) {
+                           const SerialNumber serial = cells.Serial(0);
+                           const Axis axis = cells.AxisAt(1);
+                           const AxisKnowledge knowledge = cells.Knowledge(2);
+                           const MoveId move{cells.Whole<std::uint16_t>(5)};
+                           const auto subdivision = cells.Whole<std::uint16_t>(6);
+                           const Origin origin = cells.Code(9, kLastOrigin);
+                           if (cells.error()) return;
+                           CheckVector(cells, knowledge, subdivision);
+                           if (axis == Axis::kTheta) {
+                             cells.Require(!half, "the serial number before it has no phi");
+                             fleet->vectors.push_back({serial, {}, {}, move, origin});
+                           }
+                           cells.Require(
+                               !fleet->vectors.empty() && fleet->vectors.back().serial == serial,
+                               "there is no theta of this serial number");
+                           if (cells.error()) return;
+                           VectorRow& row = fleet->vectors.back();
+                           cells.Require(row.move == move && row.origin == origin,
+                                         "theta and phi are of different moves");
+                           row.knowledge[Index(axis)] = knowledge;
+                           row.subdivision[Index(axis)] = subdivision;
+                           half = axis == Axis::kTheta;
+                         }));
+  if (!half) return {};
+  return tl::unexpected<Error>(connection.Named(
+      {ErrorCode::kInvalid, "axis_state, row serial " +
+                                std::to_string(fleet->vectors.back().serial.value) +
+                                ", axis 0: there is no phi of this serial number"}));
+}
+
+Status LoadOpenIntents(Connection& connection, StoredFleet* fleet) {
+  return ForEach(
+      connection, "intent", 1,
+      "SELECT entry, configuration, serial, unit_id, move, theta_from, phi_from, theta_to, phi_to, "
+      "theta_low, theta_high, phi_low, phi_high FROM intent WHERE end IS NULL ORDER BY entry",
+      [fleet](Cells& cells) {
+        const auto vectors = [&cells](int column) { return cells.Whole<std::int32_t>(column); };
+        IntentRow row;
+        row.configuration = cells.Whole<std::uint64_t>(1);
+        row.serial = cells.Serial(2);
+        row.unit = {cells.Whole<std::uint32_t>(3)};
+        row.move = {cells.Whole<std::uint16_t>(4)};
+        row.from = {vectors(5), vectors(6)};
+        row.to = {vectors(7), vectors(8)};
+        row.hull[0] = {Witness::kInterval, vectors(9), vectors(10)};
+        row.hull[1] = {Witness::kInterval, vectors(11), vectors(12)};
+        cells.Require(row.hull[0].low <= row.hull[0].high && row.hull[1].low <= row.hull[1].high,
+                      "low is above high");
+        fleet->open_intents.push_back(row);
+      });
+}
+
+Status LoadParameters(Connection& connection, StoredFleet* fleet) {
+  return ForEach(
+      connection, "parameter", 3,
+      "SELECT serial, axis, parameter, value, origin FROM parameter ORDER BY serial, axis, "
+      "parameter",
+      [fleet](Cells& cells) {
+        ParameterRow row;
+        row.serial = cells.Serial(0);
+        row.axis = cells.AxisAt(1);
+        row.parameter = cells.Code(2, kLastParameter);
+        row.value = cells.Whole<std::int32_t>(3);
+        row.origin = cells.Code(4, kLastOrigin);
+        fleet->parameters.push_back(row);
+      });
+}
+
+Status LoadNextIds(Connection& connection, StoredFleet* fleet) {
+  FOCALFLEET_TRY(
+      ForEach(connection, "meta", 1, "SELECT key, value FROM meta", [fleet](Cells& cells) {
+        const std::string key = cells.Text(0);
+        if (key == "next_move") {
+          fleet->next_move = {cells.Whole<std::uint16_t>(1)};
+        } else if (key == "next_configuration") {
+          fleet->next_configuration = cells.Whole<std::uint64_t>(1);
+        } else if (key == "next_alarm") {
+          fleet->next_alarm = cells.Whole<std::uint64_t>(1);
+        } else {
+          cells.Require(false, "nobody reads this key");
+        }
+      }));
+  return {};
+}
+
+Status LoadAll(Connection& connection, StoredFleet* fleet) {
+  FOCALFLEET_TRY(LoadUnits(connection, fleet));
+  FOCALFLEET_TRY(LoadVectors(connection, fleet));
+  FOCALFLEET_TRY(LoadOpenIntents(connection, fleet));
+  FOCALFLEET_TRY(LoadParameters(connection, fleet));
+  return LoadNextIds(connection, fleet);
+}
+
+}  // namespace
+
+Result<StoredFleet> LoadFleet(Connection& connection) {
+  StoredFleet fleet;
+  FOCALFLEET_TRY(connection.Execute("BEGIN"));
+  const Status loaded = LoadAll(connection, &fleet);
+  connection.Rollback();  // only read
+  if (!loaded) return tl::unexpected<Error>(loaded.error());
+  return fleet;
+}
+
+}  // namespace focalfleet::store_internal

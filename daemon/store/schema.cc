@@ -1,0 +1,248 @@
+#include "daemon/store/schema.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+namespace focalfleet::store_internal {
+namespace {
+
+// Codes are the enumerators of fleet/records.h and fleet/knowledge.h; the views spell them out for
+// people. Positions are vectors from the axis' zero; position = turns * subdivision + vector.
+constexpr const char* kVersion1 = R"sql(
+CREATE TABLE meta(
+  key TEXT PRIMARY KEY,
+  value INTEGER NOT NULL
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE unit(
+  unit_id INTEGER PRIMARY KEY,
+  serial INTEGER NOT NULL,      -- 0: nothing bound yet
+  enabled INTEGER NOT NULL,
+  reason TEXT NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+CREATE UNIQUE INDEX unit_serial ON unit(serial) WHERE serial <> 0;
+
+CREATE TABLE unit_history(
+  entry INTEGER PRIMARY KEY,
+  unit_id INTEGER NOT NULL,
+  serial INTEGER NOT NULL,
+  enabled INTEGER NOT NULL,
+  reason TEXT NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+CREATE INDEX unit_history_by_unit ON unit_history(unit_id);
+
+CREATE TABLE axis_state(
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  witness INTEGER NOT NULL,
+  low INTEGER NOT NULL,
+  high INTEGER NOT NULL,
+  vector INTEGER,               -- 0..subdivision-1, where the axis stands at one place
+  turns INTEGER,
+  subdivision INTEGER NOT NULL,
+  move INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(serial, axis)
+) STRICT, WITHOUT ROWID;
+
+-- Vectors that changed otherwise than by a motion; motions have their history in intent.
+CREATE TABLE axis_history(
+  entry INTEGER PRIMARY KEY,
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  witness INTEGER NOT NULL,
+  low INTEGER NOT NULL,
+  high INTEGER NOT NULL,
+  subdivision INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE intent(
+  entry INTEGER PRIMARY KEY,
+  configuration INTEGER NOT NULL,
+  unit_id INTEGER NOT NULL,
+  serial INTEGER NOT NULL,
+  move INTEGER NOT NULL,
+  theta_from INTEGER NOT NULL,
+  phi_from INTEGER NOT NULL,
+  theta_to INTEGER NOT NULL,
+  phi_to INTEGER NOT NULL,
+  theta_low INTEGER NOT NULL,   -- all that it may pass
+  theta_high INTEGER NOT NULL,
+  phi_low INTEGER NOT NULL,
+  phi_high INTEGER NOT NULL,
+  began_ns INTEGER NOT NULL,
+  ended_ns INTEGER,
+  end INTEGER,                  -- NULL: open
+  theta_end_witness INTEGER,
+  theta_end_low INTEGER,
+  theta_end_high INTEGER,
+  phi_end_witness INTEGER,
+  phi_end_low INTEGER,
+  phi_end_high INTEGER
+) STRICT;
+CREATE UNIQUE INDEX intent_open ON intent(serial, move) WHERE end IS NULL;
+CREATE INDEX intent_by_unit ON intent(unit_id);
+
+CREATE TABLE parameter(
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  parameter INTEGER NOT NULL,
+  value INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(serial, axis, parameter)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE parameter_history(
+  entry INTEGER PRIMARY KEY,
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  parameter INTEGER NOT NULL,
+  value INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+CREATE INDEX parameter_history_by_serial ON parameter_history(serial);
+
+CREATE TABLE configuration(
+  id INTEGER PRIMARY KEY,
+  source TEXT NOT NULL,
+  state INTEGER NOT NULL,
+  targeted INTEGER NOT NULL,
+  arrived INTEGER NOT NULL,
+  refused INTEGER NOT NULL,
+  failed INTEGER NOT NULL,
+  makespan_predicted_s REAL,    -- NULL: not a number
+  makespan_s REAL,
+  energy_J REAL,
+  peak_power_W REAL,
+  began_ns INTEGER NOT NULL,
+  changed_ns INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE alarm(
+  id INTEGER PRIMARY KEY,
+  severity INTEGER NOT NULL,
+  unit_id INTEGER,
+  bus_id INTEGER,
+  text TEXT NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+
+CREATE VIEW stand AS SELECT
+  unit.unit_id, axis_state.serial,
+  CASE axis WHEN 0 THEN 'theta' ELSE 'phi' END AS axis,
+  CASE witness WHEN 0 THEN 'unknown' WHEN 1 THEN 'interval' WHEN 2 THEN 'predicted'
+    WHEN 3 THEN 'reported' ELSE 'measured' END AS witness,
+  low, high, vector, turns, subdivision, move,
+  datetime(axis_state.at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM axis_state LEFT JOIN unit ON unit.serial = axis_state.serial;
+
+CREATE VIEW motion AS SELECT
+  unit_id, serial, configuration, move, theta_from, theta_to, phi_from, phi_to,
+  datetime(began_ns / 1000000000, 'unixepoch') AS began_utc,
+  datetime(ended_ns / 1000000000, 'unixepoch') AS ended_utc,
+  CASE end WHEN 0 THEN 'arrived' WHEN 1 THEN 'stopped' WHEN 2 THEN 'fault'
+    WHEN 3 THEN 'never_began' WHEN 4 THEN 'interrupted' WHEN 5 THEN 'homed' ELSE 'open' END AS end
+  FROM intent;
+
+PRAGMA application_id = 1179012180;
+)sql";
+static_assert(kApplicationId == 1179012180);
+
+constexpr const char* kMigrations[] = {kVersion1};
+
+constexpr std::size_t kHeaderBytes = 72;
+constexpr std::size_t kUserVersionAt = 60;
+constexpr std::size_t kApplicationIdAt = 68;
+
+std::int32_t BigEndian(const unsigned char* bytes) {
+  const std::uint32_t value = (std::uint32_t{bytes[0]} << 24) | (std::uint32_t{bytes[1]} << 16) |
+                              (std::uint32_t{bytes[2]} << 8) | std::uint32_t{bytes[3]};
+  return static_cast<std::int32_t>(value);
+}
+
+tl::unexpected<Error> NotOurs(const std::string& path) {
+  return Fail(ErrorCode::kInvalid, "store " + path + ": not a store of this program");
+}
+
+Status CheckVersion(const std::string& path, std::int32_t application_id, std::int32_t version,
+                    std::int32_t version_max) {
+  // 0 and 0: nothing was written yet, or the first step was cut short.
+  const bool blank = application_id == 0 && version == 0;
+  if ((application_id != kApplicationId && !blank) || version < 0) return NotOurs(path);
+  if (version > version_max) {
+    return Fail(ErrorCode::kNewer, "store " + path + " has version " + std::to_string(version) +
+                                       ", this program knows up to " + std::to_string(version_max) +
+                                       ": it was left as it is");
+  }
+  return {};
+}
+
+}  // namespace
+
+std::span<const char* const> Migrations() { return kMigrations; }
+
+Status InspectHeader(const std::string& path, std::int32_t version_max) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) {
+    if (errno == ENOENT) return {};
+    return Fail(ErrorCode::kUnavailable, "store " + path + ": " + std::strerror(errno));
+  }
+  std::array<unsigned char, kHeaderBytes> header{};
+  const ssize_t length = pread(descriptor, header.data(), header.size(), 0);
+  const int error = errno;
+  close(descriptor);
+  if (length < 0)
+    return Fail(ErrorCode::kUnavailable, "store " + path + ": " + std::strerror(error));
+  if (length == 0) return {};
+  constexpr std::string_view kMagic("SQLite format 3\0", 16);
+  if (static_cast<std::size_t>(length) < kHeaderBytes ||
+      std::memcmp(header.data(), kMagic.data(), kMagic.size()) != 0) {
+    return NotOurs(path);
+  }
+  return CheckVersion(path, BigEndian(&header[kApplicationIdAt]),
+                      BigEndian(&header[kUserVersionAt]), version_max);
+}
+
+Result<std::int32_t> InspectSchema(Connection& connection, std::int32_t version_max) {
+  FOCALFLEET_TRY_ASSIGN(const std::int64_t application_id,
+                        connection.Integer("PRAGMA application_id"));
+  FOCALFLEET_TRY_ASSIGN(const std::int64_t version, connection.Integer("PRAGMA user_version"));
+  FOCALFLEET_TRY(CheckVersion(connection.path(), static_cast<std::int32_t>(application_id),
+                              static_cast<std::int32_t>(version), version_max));
+  if (version == 0) {
+    FOCALFLEET_TRY_ASSIGN(const std::int64_t objects,
+                          connection.Integer("SELECT count(*) FROM sqlite_schema"));
+    if (objects != 0) return NotOurs(connection.path());
+  }
+  return static_cast<std::int32_t>(version);
+}
+
+Status Migrate(Connection& connection, std::int32_t version, std::span<const char* const> steps) {
+  for (std::size_t next = static_cast<std::size_t>(version); next < steps.size(); ++next) {
+    FOCALFLEET_TRY(connection.Execute("BEGIN IMMEDIATE"));
+    const std::string raise = "PRAGMA user_version = " + std::to_string(next + 1);
+    Status done = connection.Execute(steps[next]);
+    if (done) done = connection.Execute(raise.c_str());
+    if (done) done = connection.Execute("COMMIT");
+    if (!done) {
+      connection.Rollback();
+      done.error().text += ", while carrying the store over to version " + std::to_string(next + 1);
+      return done;
+    }
+  }
+  return {};
+}
+
+}  // namespace focalfleet::store_internal

@@ -1,0 +1,93 @@
+#include "daemon/store/sqlite.h"
+
+namespace focalfleet::store_internal {
+namespace {
+
+Error ErrorOf(sqlite3* db, int code) {
+  const int extended = db == nullptr ? code : sqlite3_extended_errcode(db);
+  const char* text = db == nullptr ? sqlite3_errstr(code) : sqlite3_errmsg(db);
+  return Error{CodeOf(code), std::string(text) + " (SQLite " + std::to_string(extended) + ")"};
+}
+
+}  // namespace
+
+ErrorCode CodeOf(int sqlite_code) {
+  switch (sqlite_code & 0xff) {
+    case SQLITE_FULL:
+      return ErrorCode::kFull;
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+    case SQLITE_CONSTRAINT:
+    case SQLITE_MISMATCH:
+    case SQLITE_RANGE:
+    case SQLITE_TOOBIG:
+    case SQLITE_ERROR:
+      return ErrorCode::kInvalid;
+    default:
+      return ErrorCode::kUnavailable;
+  }
+}
+
+Status Statement::Failed(int code) {
+  Error error = ErrorOf(db_, code);
+  sqlite3_reset(statement_.get());
+  return tl::unexpected<Error>(std::move(error));
+}
+
+Result<std::unique_ptr<Connection>> Connection::Open(const std::string& path, Mode mode,
+                                                     const char* vfs, int busy_wait_ms) {
+  auto connection = std::unique_ptr<Connection>(new Connection(path));
+  // One thread at a time uses a connection, so SQLite need not lock around every bind.
+  const int flags =
+      SQLITE_OPEN_NOMUTEX |
+      (mode == Mode::kWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
+  sqlite3* db = nullptr;
+  const int code = sqlite3_open_v2(path.c_str(), &db, flags, vfs);
+  connection->db_.reset(db);
+  if (code != SQLITE_OK) {
+    return tl::unexpected<Error>(connection->Named(ErrorOf(db, code)));
+  }
+  sqlite3_busy_timeout(db, busy_wait_ms);
+  // A file may come from anywhere: no functions with side effects from its schema, no writing of
+  // the schema.
+  sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  return connection;
+}
+
+Result<Statement> Connection::Prepare(std::string_view sql) {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v3(db(), sql.data(), static_cast<int>(sql.size()),
+                                      SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
+  if (code != SQLITE_OK) return tl::unexpected<Error>(Named(ErrorOf(db(), code)));
+  return Statement(db(), statement);
+}
+
+Status Connection::Execute(const char* sql) {
+  const int code = sqlite3_exec(db(), sql, nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) return tl::unexpected<Error>(Named(ErrorOf(db(), code)));
+  return {};
+}
+
+Result<std::int64_t> Connection::Integer(const char* sql) {
+  FOCALFLEET_TRY_ASSIGN(Statement statement, Prepare(sql));
+  const auto row = statement.Next();
+  if (!row) return tl::unexpected<Error>(Named(row.error()));
+  if (!*row)
+    return tl::unexpected<Error>(Named({ErrorCode::kInvalid, std::string(sql) + ": nothing"}));
+  return sqlite3_column_int64(statement.get(), 0);
+}
+
+void Connection::Rollback() {
+  // SQLite has undone it by itself after some errors; then there is nothing to do.
+  if (sqlite3_get_autocommit(db()) == 0) {
+    sqlite3_exec(db(), "ROLLBACK", nullptr, nullptr, nullptr);
+  }
+}
+
+Error Connection::Named(Error error) const {
+  error.text = "store " + path_ + ": " + error.text;
+  return error;
+}
+
+}  // namespace focalfleet::store_internal

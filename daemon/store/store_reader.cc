@@ -1,0 +1,188 @@
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "daemon/store/cells.h"
+#include "daemon/store/schema.h"
+#include "daemon/store/sqlite.h"
+#include "daemon/store/store.h"
+
+namespace focalfleet {
+
+using namespace store_internal;
+
+namespace {
+
+// `sql` ends in "LIMIT ?1" and may filter by ?2; `read` makes one entry of one row.
+template <class Entry, class Read>
+Result<std::vector<Entry>> Query(Connection& connection, const char* table, const char* sql,
+                                 std::uint32_t limit, std::optional<std::int64_t> filter,
+                                 Read read) {
+  FOCALFLEET_TRY_ASSIGN(Statement statement, connection.Prepare(sql));
+  statement.Bind(1, limit);
+  if (filter) statement.Bind(2, *filter);
+  std::vector<Entry> entries;
+  for (;;) {
+    const auto row = statement.Next();
+    if (!row) return tl::unexpected<Error>(connection.Named(row.error()));
+    if (!*row) return entries;
+    Cells cells(statement, table, 1);
+    entries.push_back(read(cells));
+    if (cells.error()) return tl::unexpected<Error>(connection.Named(*cells.error()));
+  }
+}
+
+std::optional<std::int64_t> Filter(std::optional<UnitId> unit) {
+  if (!unit) return std::nullopt;
+  return unit->value;
+}
+
+AxisKnowledge Hull(Cells& cells, int column) {
+  const AxisKnowledge hull{Witness::kInterval, cells.Whole<std::int32_t>(column),
+                           cells.Whole<std::int32_t>(column + 1)};
+  cells.Require(hull.low <= hull.high, "low is above high");
+  return hull;
+}
+
+MoveHistory ReadMove(Cells& cells) {
+  const auto vectors = [&cells](int column) { return cells.Whole<std::int32_t>(column); };
+  MoveHistory move;
+  move.configuration = cells.Whole<std::uint64_t>(1);
+  move.unit = {cells.Whole<std::uint32_t>(2)};
+  move.serial = cells.Serial(3);
+  move.move = {cells.Whole<std::uint16_t>(4)};
+  move.from = {vectors(5), vectors(6)};
+  move.to = {vectors(7), vectors(8)};
+  move.hull = {Hull(cells, 9), Hull(cells, 11)};
+  move.began = cells.Time(13);
+  if (cells.IsNull(15)) return move;
+  move.ended = cells.Time(14);
+  move.end = cells.Code(15, kLastIntentEnd);
+  // A unit whose knowledge was never written ends at no known place.
+  if (!cells.IsNull(16) && !cells.IsNull(19)) {
+    move.ended_at = UnitKnowledge{cells.Knowledge(16), cells.Knowledge(19)};
+  }
+  return move;
+}
+
+}  // namespace
+
+StoreReader::StoreReader() = default;
+StoreReader::~StoreReader() = default;
+
+Result<std::unique_ptr<StoreReader>> StoreReader::Open(const std::string& path,
+                                                       const StoreOptions& options) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) {
+    return Fail(ErrorCode::kUnavailable, "store " + path + ": " + std::strerror(errno));
+  }
+  auto reader = std::unique_ptr<StoreReader>(new StoreReader);
+  FOCALFLEET_TRY_ASSIGN(reader->connection_,
+                        Connection::Open(path, Connection::Mode::kRead, options.vfs,
+                                         static_cast<int>(options.busy_wait.count())));
+  const auto version_max = static_cast<std::int32_t>(Migrations().size());
+  FOCALFLEET_TRY_ASSIGN(const std::int32_t version,
+                        InspectSchema(*reader->connection_, version_max));
+  if (version < version_max) {
+    return Fail(ErrorCode::kUnavailable, "store " + path + " has version " +
+                                             std::to_string(version) +
+                                             ": the daemon carries it over when it starts");
+  }
+  return reader;
+}
+
+Result<StoredFleet> StoreReader::Load() { return LoadFleet(*connection_); }
+
+Result<std::vector<MoveHistory>> StoreReader::Moves(std::optional<UnitId> unit,
+                                                    std::uint32_t limit) {
+  static const std::string kColumns =
+      "SELECT entry, configuration, unit_id, serial, move, theta_from, phi_from, theta_to, phi_to, "
+      "theta_low, "
+      "theta_high, phi_low, phi_high, began_ns, ended_ns, end, theta_end_witness, theta_end_low, "
+      "theta_end_high, "
+      "phi_end_witness, phi_end_low, phi_end_high FROM intent ";
+  const std::string sql =
+      kColumns + (unit ? "WHERE unit_id = ?2 " : "") + "ORDER BY entry DESC LIMIT ?1";
+  return Query<MoveHistory>(*connection_, "intent", sql.c_str(), limit, Filter(unit), ReadMove);
+}
+
+Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(std::uint32_t limit) {
+  return Query<ConfigurationHistory>(
+      *connection_, "configuration",
+      "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
+      "makespan_s, energy_J, "
+      "peak_power_W, began_ns, changed_ns FROM configuration ORDER BY id DESC LIMIT ?1",
+      limit, std::nullopt, [](Cells& cells) {
+        ConfigurationHistory entry;
+        entry.row.id = cells.Whole<std::uint64_t>(0);
+        entry.row.source = cells.Text(1);
+        entry.row.state = cells.Code(2, kLastConfigurationState);
+        entry.row.targeted = cells.Whole<std::uint32_t>(3);
+        entry.row.arrived = cells.Whole<std::uint32_t>(4);
+        entry.row.refused = cells.Whole<std::uint32_t>(5);
+        entry.row.failed = cells.Whole<std::uint32_t>(6);
+        entry.row.makespan_predicted_s = cells.Real(7);
+        entry.row.makespan_s = cells.Real(8);
+        entry.row.energy_J = cells.Real(9);
+        entry.row.peak_power_W = cells.Real(10);
+        entry.began = cells.Time(11);
+        entry.changed = cells.Time(12);
+        return entry;
+      });
+}
+
+Result<std::vector<ParameterHistory>> StoreReader::Parameters(SerialNumber serial,
+                                                              std::uint32_t limit) {
+  return Query<ParameterHistory>(*connection_, "parameter_history",
+                                 "SELECT entry, serial, axis, parameter, value, origin, at_ns FROM "
+                                 "parameter_history WHERE serial = ?2 "
+                                 "ORDER BY entry DESC LIMIT ?1",
+                                 limit, serial.value, [](Cells& cells) {
+                                   ParameterHistory entry;
+                                   entry.row.serial = cells.Serial(1);
+                                   entry.row.axis = cells.AxisAt(2);
+                                   entry.row.parameter = cells.Code(3, kLastParameter);
+                                   entry.row.value = cells.Whole<std::int32_t>(4);
+                                   entry.row.origin = cells.Code(5, kLastOrigin);
+                                   entry.at = cells.Time(6);
+                                   return entry;
+                                 });
+}
+
+Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
+  return Query<AlarmHistory>(
+      *connection_, "alarm",
+      "SELECT id, severity, unit_id, bus_id, text, at_ns FROM alarm ORDER BY id DESC LIMIT ?1",
+      limit, std::nullopt, [](Cells& cells) {
+        AlarmHistory entry;
+        entry.row.id = cells.Whole<std::uint64_t>(0);
+        entry.row.severity = cells.Code(1, kLastSeverity);
+        if (!cells.IsNull(2)) entry.row.unit = UnitId{cells.Whole<std::uint32_t>(2)};
+        if (!cells.IsNull(3)) entry.row.bus = BusId{cells.Whole<std::uint32_t>(3)};
+        entry.row.text = cells.Text(4);
+        entry.at = cells.Time(5);
+        return entry;
+      });
+}
+
+Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit,
+                                                    std::uint32_t limit) {
+  static const std::string kColumns =
+      "SELECT entry, unit_id, serial, enabled, reason, at_ns FROM unit_history ";
+  const std::string sql =
+      kColumns + (unit ? "WHERE unit_id = ?2 " : "") + "ORDER BY entry DESC LIMIT ?1";
+  return Query<UnitHistory>(*connection_, "unit_history", sql.c_str(), limit, Filter(unit),
+                            [](Cells& cells) {
+                              UnitHistory entry;
+                              entry.unit = {cells.Whole<std::uint32_t>(1)};
+                              entry.serial = {cells.Whole<std::uint32_t>(2)};
+                              entry.enabled = cells.Flag(3);
+                              entry.reason = cells.Text(4);
+                              entry.at = cells.Time(5);
+                              return entry;
+                            });
+}
+
+}  // namespace focalfleet
