@@ -1,0 +1,26 @@
+// A focal plane out of nothing but a count and a pitch: units on a hexagonal lattice, nearest the
+// centre first, with the proportions of LAMOST (the fibre reaches 16.5 mm at 25.6 mm pitch, so that
+// the patrol discs leave no gap) and the gears of paper 1. Supplies and buses are compact regions
+// of the plate, as harnesses are.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "fleet/layout.h"
+
+namespace focalfleet {
+
+struct HexLayoutOptions {
+  std::uint32_t count = 0;
+  double pitch_mm = 25.6;
+  double arm_mm = 0;  // both arms; 0: as LAMOST's, 8.25 at 25.6 mm pitch
+  std::uint32_t units_per_bus = 100;
+  std::uint32_t units_per_rail = 500;
+};
+
+/// Exactly `count` units, ids from 1, nearest the centre first; nodes are given on each bus in that
+/// order. Frame: focal plane, the centre unit at 0, 0. Cost: O(n log n).
+std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options);
+
+}  // namespace focalfleet

@@ -1,0 +1,154 @@
+#include "fleet/kinematics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace focalfleet {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+// Rounding of a table's last digit at the end of a range must not cost a solution.
+constexpr double kRangeToleranceDeg = 1e-6;
+constexpr double kVectorToleranceDeg = 1e-9;
+// Near stretched and folded the distance hardly depends on phi, so a point within the reach
+// tolerance may ask for a phi this far outside the range; clamped, it is tried against the
+// tolerance itself.
+constexpr double kClampTryDeg = 3;
+
+std::vector<double> TurnsWithin(double angle_deg, const AxisGeometry& axis, double tolerance_deg) {
+  std::vector<double> turns;
+  const double first = std::ceil((axis.min_deg - tolerance_deg - angle_deg) / 360);
+  for (double k = first; angle_deg + 360 * k <= axis.max_deg + tolerance_deg; ++k)
+    turns.push_back(std::clamp(angle_deg + 360 * k, axis.min_deg, axis.max_deg));
+  return turns;
+}
+
+PointFp Moved(PointFp from, double length_mm, double direction_deg) {
+  return {from.x_mm + length_mm * std::cos(direction_deg * kDegree),
+          from.y_mm + length_mm * std::sin(direction_deg * kDegree)};
+}
+
+double DistanceAt(const Unit& unit, double phi_deg) {
+  const double a = unit.theta().arm_mm;
+  const double b = unit.phi().arm_mm;
+  const double c = std::cos((phi_deg + unit.phi().zero_deg) * kDegree);
+  return std::sqrt(std::max(0.0, a * a + b * b + 2 * a * b * c));
+}
+
+// Theta that points the fibre at a direction, for a given phi; without whole turns.
+double ThetaFor(const Unit& unit, double direction_deg, double phi_deg) {
+  const double p = (phi_deg + unit.phi().zero_deg) * kDegree;
+  const double lead = std::atan2(unit.phi().arm_mm * std::sin(p),
+                                 unit.theta().arm_mm + unit.phi().arm_mm * std::cos(p));
+  return direction_deg - lead / kDegree - unit.theta().zero_deg;
+}
+
+bool SamePlace(const AxisAngles& a, const AxisAngles& b) {
+  return std::abs(a.theta_deg - b.theta_deg) < kRangeToleranceDeg &&
+         std::abs(a.phi_deg - b.phi_deg) < kRangeToleranceDeg;
+}
+
+// Both signs of phi + phi_zero that give the distance, as the axis counts, whole turns included.
+std::vector<double> PhisFor(const Unit& unit, double distance_mm) {
+  const double a = unit.theta().arm_mm;
+  const double b = unit.phi().arm_mm;
+  const double c = (distance_mm * distance_mm - a * a - b * b) / (2 * a * b);
+  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kDegree;
+  std::vector<double> phis = TurnsWithin(bend_deg - unit.phi().zero_deg, unit.phi(), kClampTryDeg);
+  for (const double phi : TurnsWithin(-bend_deg - unit.phi().zero_deg, unit.phi(), kClampTryDeg))
+    phis.push_back(phi);
+  return phis;
+}
+
+}  // namespace
+
+SegmentFp ArmAt(const Unit& unit, const AxisAngles& angles) {
+  const double t = angles.theta_deg + unit.theta().zero_deg;
+  const double p = angles.phi_deg + unit.phi().zero_deg;
+  const PointFp elbow = Moved(unit.base_fp, unit.theta().arm_mm, t);
+  return {elbow, Moved(elbow, unit.phi().arm_mm, t + p)};
+}
+
+PointFp FibreAt(const Unit& unit, const AxisAngles& angles) { return ArmAt(unit, angles).b; }
+
+AxisAngles AnglesOf(const Unit& unit, const UnitDrive& drive, const Pose& pose) {
+  return {AngleDeg(pose[0], unit.axis[0], drive.axis[0]),
+          AngleDeg(pose[1], unit.axis[1], drive.axis[1])};
+}
+
+SegmentFp ArmAt(const Unit& unit, const UnitDrive& drive, const Pose& pose) {
+  return ArmAt(unit, AnglesOf(unit, drive, pose));
+}
+
+PointFp FibreAt(const Unit& unit, const UnitDrive& drive, const Pose& pose) {
+  return ArmAt(unit, drive, pose).b;
+}
+
+VectorRange RangeOf(const AxisGeometry& axis, const AxisDrive& drive) {
+  const double step = DegreesPerVector(axis, drive);
+  return {static_cast<std::int32_t>(std::ceil((axis.min_deg - kVectorToleranceDeg) / step)),
+          static_cast<std::int32_t>(std::floor((axis.max_deg + kVectorToleranceDeg) / step))};
+}
+
+std::int32_t NearestInRange(double angle_deg, const AxisGeometry& axis, const AxisDrive& drive) {
+  const VectorRange range = RangeOf(axis, drive);
+  const double inside = std::clamp(angle_deg, axis.min_deg, axis.max_deg);
+  return std::clamp(NearestVectors(inside, axis, drive), range.low,
+                    std::max(range.low, range.high));
+}
+
+bool InRange(const Unit& unit, const UnitDrive& drive, const Pose& pose) {
+  return std::all_of(std::begin(kAxes), std::end(kAxes), [&](Axis axis) {
+    const std::size_t k = Index(axis);
+    return RangeOf(unit.axis[k], drive.axis[k]).contains(pose[k]);
+  });
+}
+
+PatrolLimits PatrolOf(const Unit& unit) {
+  // The distance falls from stretched to folded and rises again, so its extremes are at the ends of
+  // the range or at the stretched and folded angles inside it.
+  const AxisGeometry& phi = unit.phi();
+  const double at_min = DistanceAt(unit, phi.min_deg);
+  const double at_max = DistanceAt(unit, phi.max_deg);
+  PatrolLimits limits{std::min(at_min, at_max), std::max(at_min, at_max)};
+  for (const double bend_deg : {0.0, 180.0})
+    for (const double inside : TurnsWithin(bend_deg - phi.zero_deg, phi, 0)) {
+      limits.min_mm = std::min(limits.min_mm, DistanceAt(unit, inside));
+      limits.max_mm = std::max(limits.max_mm, DistanceAt(unit, inside));
+    }
+  return limits;
+}
+
+std::vector<AxisAngles> AnglesFor(const Unit& unit, PointFp fibre_fp, double free_theta_deg) {
+  std::vector<AxisAngles> solutions;
+  const double distance = DistanceMm(unit.base_fp, fibre_fp);
+  if (!std::isfinite(distance)) return solutions;
+  const bool direction_is_free = distance < kReachToleranceMm / 2;
+  const double direction_deg =
+      std::atan2(fibre_fp.y_mm - unit.base_fp.y_mm, fibre_fp.x_mm - unit.base_fp.x_mm) / kDegree;
+  for (const double phi : PhisFor(unit, distance)) {
+    const double theta = ThetaFor(unit, direction_deg, phi);
+    const std::vector<double> thetas =
+        direction_is_free ? std::vector<double>{std::clamp(free_theta_deg, unit.theta().min_deg,
+                                                           unit.theta().max_deg)}
+                          : TurnsWithin(theta, unit.theta(), kClampTryDeg);
+    for (const double turned : thetas) {
+      const AxisAngles candidate{turned, phi};
+      const bool reaches = DistanceMm(FibreAt(unit, candidate), fibre_fp) <= kReachToleranceMm;
+      const bool known = std::any_of(solutions.begin(), solutions.end(),
+                                     [&](const AxisAngles& s) { return SamePlace(s, candidate); });
+      if (reaches && !known) solutions.push_back(candidate);
+    }
+  }
+  std::sort(solutions.begin(), solutions.end(), [](const AxisAngles& a, const AxisAngles& b) {
+    return a.phi_deg != b.phi_deg ? a.phi_deg < b.phi_deg : a.theta_deg < b.theta_deg;
+  });
+  return solutions;
+}
+
+std::vector<double> TurnsInRange(double angle_deg, const AxisGeometry& axis) {
+  return TurnsWithin(angle_deg, axis, kRangeToleranceDeg);
+}
+
+}  // namespace focalfleet

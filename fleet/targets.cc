@@ -1,0 +1,376 @@
+#include "fleet/targets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <unordered_map>
+
+#include "fleet/geometry/clearance.h"
+#include "fleet/kinematics.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet {
+namespace {
+
+std::string Number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.4f", value);
+  return text;
+}
+
+std::string At(const Targets& targets, const TargetRow& row) {
+  return targets.source + ":" + std::to_string(row.line) + ": unit " +
+         std::to_string(row.unit.value);
+}
+
+std::string RangeText(const AxisGeometry& axis) {
+  return Number(axis.min_deg) + ".." + Number(axis.max_deg) + " deg";
+}
+
+// Where a unit stands as far as anyone knows; folded where nobody does.
+AxisAngles StandsAt(const Unit& unit, const UnitDrive& drive, const UnitKnowledge* known) {
+  AxisAngles angles{(unit.theta().min_deg + unit.theta().max_deg) / 2, 180 - unit.phi().zero_deg};
+  if (known == nullptr) return angles;
+  const auto middle = [&](Axis axis, double otherwise_deg) {
+    const AxisKnowledge& k = (*known)[Index(axis)];
+    if (k.witness == Witness::kUnknown) return otherwise_deg;
+    const double step = DegreesPerVector(unit.axis[Index(axis)], drive.axis[Index(axis)]);
+    return (static_cast<double>(k.low) + static_cast<double>(k.high)) / 2 * step;
+  };
+  return {middle(Axis::kTheta, angles.theta_deg), middle(Axis::kPhi, angles.phi_deg)};
+}
+
+// Both axes turn at once, so the way is as long as the slower axis takes.
+struct Way {
+  double longest_s = 0;
+  double sum_s = 0;
+};
+Way WayTo(const Unit& unit, const UnitDrive& drive, const AxisAngles& from, const AxisAngles& to) {
+  const auto seconds = [&](Axis axis, double degrees) {
+    const std::size_t k = Index(axis);
+    return std::abs(degrees) / DegreesPerVector(unit.axis[k], drive.axis[k]) *
+           SecondsPerVector(drive.axis[k]);
+  };
+  const double theta_s = seconds(Axis::kTheta, to.theta_deg - from.theta_deg);
+  const double phi_s = seconds(Axis::kPhi, to.phi_deg - from.phi_deg);
+  return {std::max(theta_s, phi_s), theta_s + phi_s};
+}
+
+Result<std::vector<AxisAngles>> SolutionsFor(const TargetAngles& target, const Unit& unit,
+                                             const std::string& at) {
+  if (!std::isfinite(target.theta_deg) || !std::isfinite(target.phi_deg))
+    return Fail(ErrorCode::kInvalid, at + ": the target's angles are not finite numbers");
+  if (target.phi_deg < unit.phi().min_deg || target.phi_deg > unit.phi().max_deg)
+    return Fail(ErrorCode::kInvalid, at + ": phi_deg " + Number(target.phi_deg) +
+                                         " is out of its range " + RangeText(unit.phi()));
+  std::vector<AxisAngles> solutions;
+  for (const double theta_deg : TurnsInRange(target.theta_deg, unit.theta()))
+    solutions.push_back({theta_deg, target.phi_deg});
+  if (solutions.empty())
+    return Fail(ErrorCode::kInvalid, at + ": theta_deg " + Number(target.theta_deg) +
+                                         ", whole turns added, is out of its range " +
+                                         RangeText(unit.theta()));
+  return solutions;
+}
+
+Result<std::vector<AxisAngles>> SolutionsFor(PointFp target, const Unit& unit,
+                                             const std::string& at, double free_theta_deg) {
+  if (!std::isfinite(target.x_mm) || !std::isfinite(target.y_mm))
+    return Fail(ErrorCode::kInvalid, at + ": the target's place is not two finite numbers");
+  std::vector<AxisAngles> solutions = AnglesFor(unit, target, free_theta_deg);
+  if (!solutions.empty()) return solutions;
+  const PatrolLimits patrol = PatrolOf(unit);
+  const double distance = DistanceMm(target, unit.base_fp);
+  const std::string where = at + ": x_mm " + Number(target.x_mm) + ", y_mm " + Number(target.y_mm) +
+                            " is " + Number(distance) + " mm from its base ";
+  if (distance < patrol.min_mm || distance > patrol.max_mm)
+    return Fail(ErrorCode::kInvalid, where + "(out of patrol, its fibre reaches " +
+                                         Number(patrol.min_mm) + ".." + Number(patrol.max_mm) +
+                                         " mm)");
+  return Fail(ErrorCode::kInvalid, where + "in a direction out of range (theta " +
+                                       RangeText(unit.theta()) + ", phi " + RangeText(unit.phi()) +
+                                       ")");
+}
+
+// What one target leaves open: poses in the order of preference, nearest first.
+using Choice = std::vector<Pose>;
+
+Choice NearestFirst(const Unit& unit, const UnitDrive& drive, const AxisAngles& from,
+                    std::vector<AxisAngles> solutions) {
+  std::stable_sort(solutions.begin(), solutions.end(), [&](const auto& a, const auto& b) {
+    const Way way_a = WayTo(unit, drive, from, a);
+    const Way way_b = WayTo(unit, drive, from, b);
+    return way_a.longest_s != way_b.longest_s ? way_a.longest_s < way_b.longest_s
+                                              : way_a.sum_s < way_b.sum_s;
+  });
+  Choice choice;
+  for (const AxisAngles& s : solutions)
+    choice.push_back({NearestInRange(s.theta_deg, unit.theta(), drive.axis[0]),
+                      NearestInRange(s.phi_deg, unit.phi(), drive.axis[1])});
+  return choice;
+}
+
+// Where the nearest solution touches a neighbour's, another side of the elbow may not.
+class SideChooser {
+ public:
+  SideChooser(const Layout& layout, std::span<const UnitDrive> drives,
+              std::vector<std::optional<SegmentFp>> standing)
+      : layout_(layout), drives_(drives), arms_(std::move(standing)) {}
+
+  void Settle(const std::vector<Choice>& choices, std::vector<std::optional<Pose>>* poses) {
+    for (std::uint32_t i = 0; i < layout_.size(); ++i)
+      if ((*poses)[i]) arms_[i] = Arm(i, *(*poses)[i]);
+    constexpr int kPasses = 4;
+    for (int pass = 0; pass < kPasses; ++pass) {
+      bool changed = false;
+      for (std::uint32_t i = 0; i < layout_.size(); ++i)
+        if (choices[i].size() > 1) changed |= Improve(i, choices[i], &(*poses)[i]);
+      if (!changed) return;
+    }
+  }
+
+ private:
+  [[nodiscard]] SegmentFp Arm(std::uint32_t i, const Pose& pose) const {
+    return ArmAt(layout_.unit({i}), drives_[i], pose);
+  }
+
+  [[nodiscard]] int Touches(std::uint32_t i, const SegmentFp& arm) const {
+    int count = 0;
+    for (const PositionerIndex j : layout_.neighbours({i}))
+      if (arms_[j.value] && !IsClear(layout_, {{i}, arm}, {j, *arms_[j.value]}, 0)) ++count;
+    for (const Obstacle& obstacle : layout_.obstacles())
+      if (!IsClear(layout_, {{i}, arm}, obstacle, 0)) ++count;
+    return count;
+  }
+
+  bool Improve(std::uint32_t i, const Choice& choice, std::optional<Pose>* pose) {
+    int fewest = Touches(i, *arms_[i]);
+    if (fewest == 0) return false;
+    bool changed = false;
+    for (const Pose& other : choice) {
+      const SegmentFp arm = Arm(i, other);
+      const int touches = Touches(i, arm);
+      if (touches >= fewest) continue;
+      fewest = touches;
+      *pose = other;
+      arms_[i] = arm;
+      changed = true;
+    }
+    return changed;
+  }
+
+  const Layout& layout_;
+  std::span<const UnitDrive> drives_;
+  std::vector<std::optional<SegmentFp>> arms_;
+};
+
+}  // namespace
+
+Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
+                                                        const Layout& layout,
+                                                        std::span<const UnitDrive> drives,
+                                                        std::span<const UnitKnowledge> now) {
+  FOCALFLEET_CHECK(drives.size() == layout.size());
+  FOCALFLEET_CHECK(now.empty() || now.size() == layout.size());
+  std::vector<Choice> choices(layout.size());
+  std::vector<std::optional<Pose>> poses(layout.size());
+  std::unordered_map<UnitId, int> line_of;
+  for (const TargetRow& row : targets.rows) {
+    const std::string at = At(targets, row);
+    const std::optional<PositionerIndex> index = layout.Find(row.unit);
+    if (!index) return Fail(ErrorCode::kInvalid, at + ": unknown unit, the layout has none such");
+    if (const auto [it, fresh] = line_of.emplace(row.unit, row.line); !fresh)
+      return Fail(ErrorCode::kInvalid,
+                  at + ": named twice, first in line " + std::to_string(it->second));
+    const std::uint32_t i = index->value;
+    const Unit& unit = layout.unit(*index);
+    const AxisAngles from = StandsAt(unit, drives[i], now.empty() ? nullptr : &now[i]);
+    const auto* angles = std::get_if<TargetAngles>(&row.place);
+    FOCALFLEET_TRY_ASSIGN(
+        auto solutions, angles != nullptr
+                            ? SolutionsFor(*angles, unit, at)
+                            : SolutionsFor(std::get<PointFp>(row.place), unit, at, from.theta_deg));
+    choices[i] = NearestFirst(unit, drives[i], from, std::move(solutions));
+    poses[i] = choices[i].front();
+  }
+  std::vector<std::optional<SegmentFp>> standing(layout.size());
+  for (std::uint32_t i = 0; i < now.size(); ++i)
+    if (IsPlace(now[i])) standing[i] = ArmAt(layout.unit({i}), drives[i], PlaceOf(now[i]));
+  SideChooser(layout, drives, std::move(standing)).Settle(choices, &poses);
+  return poses;
+}
+
+namespace {
+
+// Drawn configurations keep this much more than "clear", so that what a planner bounds or rounds on
+// its way in and out of them has room.
+constexpr double kDrawGuardMm = 0.02;
+constexpr double kFoldedBendDeg = 120;
+constexpr int kTriesPerPlace = 64;
+constexpr int kTriesAmongFixed = 4096;
+constexpr std::size_t kEvictionsPerUnit = 50;
+
+// Sequential placing with local repair: a unit that finds no clear place in many tries takes one
+// that only movable neighbours stand in, and those are drawn anew.
+class ConfigurationDrawer {
+ public:
+  ConfigurationDrawer(const Layout& layout, std::span<const UnitDrive> drives, Rng rng)
+      : layout_(layout), drives_(drives), arms_(layout.size()), fixed_(layout.size()) {
+    const std::uint64_t seed = rng.Bits();
+    poses_.resize(layout.size());
+    for (std::uint32_t i = 0; i < layout.size(); ++i)
+      streams_.push_back(Rng::Stream(seed, "draw configuration", i));
+  }
+
+  void Fix(std::uint32_t i, const Pose& pose) {
+    Place(i, pose);
+    fixed_[i] = 1;
+  }
+
+  Status DrawAll() {
+    std::vector<std::uint32_t> waiting;  // taken from the back: disabled units first, ascending
+    for (const bool enabled : {true, false})
+      for (std::uint32_t i = Count(); i-- > 0;)
+        if (layout_.unit({i}).enabled == enabled && !fixed_[i]) waiting.push_back(i);
+    std::size_t evictions_left = kEvictionsPerUnit * layout_.size();
+    while (!waiting.empty()) {
+      const std::uint32_t i = waiting.back();
+      waiting.pop_back();
+      FOCALFLEET_TRY_ASSIGN(const std::vector<std::uint32_t> evicted, FindPlace(i));
+      for (const std::uint32_t j : evicted) {
+        if (evictions_left-- == 0) return NoRoom(i);
+        arms_[j].reset();
+        waiting.push_back(j);
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] const std::vector<Pose>& poses() const { return poses_; }
+
+ private:
+  [[nodiscard]] std::uint32_t Count() const { return static_cast<std::uint32_t>(layout_.size()); }
+
+  [[nodiscard]] Status NoRoom(std::uint32_t i) const {
+    return Fail(ErrorCode::kRefused, "unit " + std::to_string(layout_.unit({i}).id.value) +
+                                         " finds no place clear of what stands around it");
+  }
+
+  void Place(std::uint32_t i, const Pose& pose) {
+    poses_[i] = pose;
+    arms_[i] = ArmAt(layout_.unit({i}), drives_[i], pose);
+  }
+
+  // Uniform over the area that the fibre reaches: r^2 and direction are uniform.
+  Pose DrawEnabled(std::uint32_t i) {
+    const Unit& unit = layout_.unit({i});
+    const PatrolLimits patrol = PatrolOf(unit);
+    Rng& rng = streams_[i];
+    constexpr int kDirectionTries = 1000;
+    for (int k = 0; k < kDirectionTries; ++k) {
+      const double r =
+          std::sqrt(rng.Uniform(patrol.min_mm * patrol.min_mm, patrol.max_mm * patrol.max_mm));
+      const double direction = rng.Uniform(-std::numbers::pi, std::numbers::pi);
+      const PointFp point{unit.base_fp.x_mm + r * std::cos(direction),
+                          unit.base_fp.y_mm + r * std::sin(direction)};
+      const std::vector<AxisAngles> solutions = AnglesFor(unit, point);
+      if (solutions.empty()) continue;  // theta does not turn that far
+      return InVectors(i, solutions[rng.Below(solutions.size())]);
+    }
+    return DrawFolded(i);
+  }
+
+  Pose DrawFolded(std::uint32_t i) {
+    const Unit& unit = layout_.unit({i});
+    const AxisGeometry& phi = unit.phi();
+    double low = std::max(phi.min_deg, kFoldedBendDeg - phi.zero_deg);
+    const double high = std::min(phi.max_deg, 360 - kFoldedBendDeg - phi.zero_deg);
+    if (low > high) low = high;  // does not fold that far: as far as it goes
+    Rng& rng = streams_[i];
+    const double theta_deg = rng.Uniform(unit.theta().min_deg, unit.theta().max_deg);
+    return InVectors(i, {theta_deg, rng.Uniform(low, high)});
+  }
+
+  [[nodiscard]] Pose InVectors(std::uint32_t i, const AxisAngles& angles) const {
+    const Unit& unit = layout_.unit({i});
+    return {NearestInRange(angles.theta_deg, unit.theta(), drives_[i].axis[0]),
+            NearestInRange(angles.phi_deg, unit.phi(), drives_[i].axis[1])};
+  }
+
+  struct Contact {
+    bool with_fixed = false;
+    std::vector<std::uint32_t> with;
+  };
+  [[nodiscard]] Contact Contacts(std::uint32_t i, const SegmentFp& arm) const {
+    Contact contact;
+    for (const PositionerIndex j : layout_.neighbours({i})) {
+      if (!arms_[j.value]) continue;
+      if (IsClear(layout_, {{i}, arm}, {j, *arms_[j.value]}, kDrawGuardMm)) continue;
+      contact.with_fixed |= fixed_[j.value] != 0;
+      contact.with.push_back(j.value);
+    }
+    for (const Obstacle& obstacle : layout_.obstacles())
+      contact.with_fixed |= !IsClear(layout_, {{i}, arm}, obstacle, kDrawGuardMm);
+    return contact;
+  }
+
+  // Places unit i; who must leave for it.
+  Result<std::vector<std::uint32_t>> FindPlace(std::uint32_t i) {
+    const bool enabled = layout_.unit({i}).enabled;
+    std::optional<std::pair<Pose, std::vector<std::uint32_t>>> least;
+    for (int k = 0; k < kTriesAmongFixed && (k < kTriesPerPlace || !least); ++k) {
+      const Pose pose = enabled ? DrawEnabled(i) : DrawFolded(i);
+      Contact contact = Contacts(i, ArmAt(layout_.unit({i}), drives_[i], pose));
+      if (contact.with_fixed) continue;
+      if (!least || contact.with.size() < least->second.size())
+        least.emplace(pose, std::move(contact.with));
+      if (least->second.empty()) break;
+    }
+    if (!least) return tl::unexpected<Error>(NoRoom(i).error());
+    Place(i, least->first);
+    return std::move(least->second);
+  }
+
+  const Layout& layout_;
+  std::span<const UnitDrive> drives_;
+  std::vector<Rng> streams_;
+  std::vector<Pose> poses_;
+  std::vector<std::optional<SegmentFp>> arms_;  // of units that are placed
+  std::vector<std::uint8_t> fixed_;
+};
+
+Pose FoldedPose(const Unit& unit, const UnitDrive& drive) {
+  const AxisAngles angles = StandsAt(unit, drive, nullptr);
+  return {NearestInRange(angles.theta_deg, unit.theta(), drive.axis[0]),
+          NearestInRange(angles.phi_deg, unit.phi(), drive.axis[1])};
+}
+
+}  // namespace
+
+Result<std::vector<Pose>> DrawConfiguration(const Layout& layout, std::span<const UnitDrive> drives,
+                                            std::span<const std::optional<Pose>> standing,
+                                            Rng rng) {
+  FOCALFLEET_CHECK(drives.size() == layout.size());
+  FOCALFLEET_CHECK(standing.empty() || standing.size() == layout.size());
+  ConfigurationDrawer drawer(layout, drives, rng);
+  for (std::uint32_t i = 0; i < standing.size(); ++i)
+    if (standing[i]) drawer.Fix(i, *standing[i]);
+  FOCALFLEET_TRY(drawer.DrawAll());
+  return drawer.poses();
+}
+
+std::vector<Pose> FoldedConfiguration(const Layout& layout, std::span<const UnitDrive> drives) {
+  FOCALFLEET_CHECK(drives.size() == layout.size());
+  std::vector<std::optional<Pose>> standing(layout.size());
+  for (std::uint32_t i = 0; i < layout.size(); ++i)
+    if (layout.unit({i}).enabled) standing[i] = FoldedPose(layout.unit({i}), drives[i]);
+  if (auto drawn = DrawConfiguration(layout, drives, standing, Rng(0))) return *drawn;
+  // Something disabled has no clear place at all: folded is the least that it can be in the way.
+  std::vector<Pose> poses;
+  for (std::uint32_t i = 0; i < layout.size(); ++i)
+    poses.push_back(FoldedPose(layout.unit({i}), drives[i]));
+  return poses;
+}
+
+}  // namespace focalfleet
