@@ -35,16 +35,16 @@ void BusSchedule::Charge(HostInstant now, std::uint32_t bits) {
 
 HostInstant BusSchedule::ReadyAt(DurationNs horizon) const {
   if (waiting_ == 0) return kNever;
-  // Half a horizon is refilled at a time: frequent enough to keep the bus busy, rare enough to batch.
+  // Half a horizon is refilled at a time: frequent enough to keep the bus busy, rare enough to
+  // batch.
   return busy_until_ - DurationNs{horizon.ns / 2};
 }
 
 std::size_t BusSchedule::Drop(NodeId node) {
   std::size_t dropped = 0;
   for (auto& queue : queue_)
-    dropped += std::erase_if(queue, [&](const Entry& entry) {
-      return (entry.frame.id >> 11 & 255) == node.value;
-    });
+    dropped += std::erase_if(
+        queue, [&](const Entry& entry) { return (entry.frame.id >> 11 & 255) == node.value; });
   waiting_ -= dropped;
   return dropped;
 }

@@ -1,7 +1,7 @@
-// What may go onto one bus next. Frames wait here, not in the kernel, so that a stop or a start passes all of
-// them: at most `horizon` of bus time is handed to the port ahead of the bit clock. A request is charged with
-// the bits of its answer too, so an upload fills the bus without drowning the replies. Frames of one priority
-// leave in the order in which they came.
+// What may go onto one bus next. Frames wait here, not in the kernel, so that a stop or a start
+// passes all of them: at most `horizon` of bus time is handed to the port ahead of the bit clock. A
+// request is charged with the bits of its answer too, so an upload fills the bus without drowning
+// the replies. Frames of one priority leave in the order in which they came.
 #pragma once
 
 #include <array>
@@ -29,7 +29,8 @@ class BusSchedule {
   /// False where the queue is full (limits::kFramesPerBusQueued): the caller asks again later.
   [[nodiscard]] bool Enqueue(const Entry& entry);
 
-  /// Moves what fits before now + horizon to `frames`, and the units whose requests left to `asked`.
+  /// Moves what fits before now + horizon to `frames`, and the units whose requests left to
+  /// `asked`.
   void Release(HostInstant now, DurationNs horizon, BusId bus, std::vector<OutFrame>* frames,
                std::vector<PositionerIndex>* asked);
 
@@ -39,7 +40,8 @@ class BusSchedule {
   /// When Release has something to do again; kNever while the queue is empty.
   [[nodiscard]] HostInstant ReadyAt(DurationNs horizon) const;
 
-  /// Forgets what waits for one unit (it was stopped, or fell silent). Returns how many frames went.
+  /// Forgets what waits for one unit (it was stopped, or fell silent). Returns how many frames
+  /// went.
   std::size_t Drop(NodeId node);
 
   [[nodiscard]] std::size_t waiting() const { return waiting_; }

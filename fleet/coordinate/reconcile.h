@@ -1,15 +1,14 @@
-// After a restart or a lost link, what is a unit's position worth? The unit's FLASH, its mark `moving`, the
-// move that it began last, and what the store remembers are put side by side:
+// After a restart or a lost link, what is a unit's position worth? The unit's FLASH, its mark
+// `moving`, the move that it began last, and what the store remembers are put side by side:
 //
-//   mark set                                  the move was cut by a power loss: an interval over its hull
-//   mark clear, intent open, it began that    it ended by itself while nobody listened: reported
-//   mark clear, intent open, it did not       it never began: reported, if FLASH still says `from`
-//   no intent, FLASH equals the store         as good as before
-//   no intent, nothing stored                 first contact: reported
-//   anything else                             unknown: home it or measure it
+//   mark set                                  the move was cut by a power loss: an interval over
+//   its hull mark clear, intent open, it began that    it ended by itself while nobody listened:
+//   reported mark clear, intent open, it did not       it never began: reported, if FLASH still
+//   says `from` no intent, FLASH equals the store         as good as before no intent, nothing
+//   stored                 first contact: reported anything else unknown: home it or measure it
 //
-// The interval is half an electrical turn wider than the hull: at power-on the field pulls the rotor to the
-// stored vector, at most that far.
+// The interval is half an electrical turn wider than the hull: at power-on the field pulls the
+// rotor to the stored vector, at most that far.
 #pragma once
 
 #include <optional>

@@ -59,10 +59,10 @@ inline constexpr FunctionRow kFunctions[kFunctionCount] = {
     {Function::kParameterWrite, "parameter_write", 6},
 };
 
-constexpr const FunctionRow& Row(Function function) {
+constexpr const FunctionRow& InfoOf(Function function) {
   return kFunctions[static_cast<std::uint8_t>(function)];
 }
-constexpr const char* Name(Function function) { return Row(function).name; }
+constexpr const char* Name(Function function) { return InfoOf(function).name; }
 
 /// Where a frame goes to or comes from, and which exchange it belongs to. An answer repeats the sequence
 /// number of its request; a frame that a unit sends unasked carries 0.
@@ -80,7 +80,7 @@ struct Identifier {
 };
 
 constexpr std::uint32_t Pack(const Identifier& id) {
-  return static_cast<std::uint32_t>(Row(id.function).priority) << 26 |
+  return static_cast<std::uint32_t>(InfoOf(id.function).priority) << 26 |
          static_cast<std::uint32_t>(id.function) << 20 | (id.from_unit ? 1u << 19 : 0u) |
          static_cast<std::uint32_t>(id.address.node.value) << 11 |
          static_cast<std::uint32_t>(id.address.sequence) << 3 | (id.detail & 7u);

@@ -1,0 +1,424 @@
+#include "fleet/coordinate/contact.h"
+
+#include <algorithm>
+
+#include "fleet/coordinate/reconcile.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet {
+namespace {
+
+using enum UnitPhase;
+
+// The questions of an identification, in order.
+constexpr int kSteps = 6;
+HostMessage StepQuestion(int step) {
+  switch (step) {
+    case 0:
+      return IdentifyRequest{};
+    case 1:
+      return StatusRequest{.resume = true};
+    case 2:
+      return VectorRequest{Axis::kTheta};
+    case 3:
+      return VectorRequest{Axis::kPhi};
+    case 4:
+      return ParameterRead{Axis::kTheta, Parameter::kCounter1};
+    default:
+      return ParameterRead{Axis::kPhi, Parameter::kCounter1};
+  }
+}
+
+// A resting unit is asked for its health ten times less often than a moving one for its progress.
+constexpr std::int64_t kRestPollFactor = 10;
+
+}  // namespace
+
+bool Contact::Service(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  if (record.question) {
+    if (!core_.AskAgain(i)) NoAnswer(i);
+    return true;
+  }
+  const bool poll = core_.now >= record.next_poll;
+  switch (record.view.phase) {
+    case kAbsent:
+    case kSilent:
+      if (poll) {
+        record.next_poll = core_.now + core_.config.identify_period;
+        record.reading = {};
+        core_.Ask(i, StepQuestion(0));
+      } else {
+        core_.SetDue(i, record.next_poll);
+      }
+      return true;
+    case kIdentifying:
+      AskNext(i);
+      return true;
+    case kForeign:
+    case kFault:
+    case kReady:
+    case kMoving:
+    case kHoming:
+    case kSettling: {
+      if (!poll) {
+        core_.SetDue(i, record.next_poll);
+        return true;
+      }
+      const bool moves = IsUnderWay(record.view.phase);
+      record.next_poll = core_.now + core_.config.poll_period * (moves ? 1 : kRestPollFactor);
+      core_.Ask(i, StatusRequest{});
+      return true;
+    }
+    case kStaging:
+    case kConfirming:
+    case kArming:
+    case kArmed:
+      return false;
+  }
+  return false;
+}
+
+void Contact::AskNext(PositionerIndex i) {
+  const Reading& reading = core_.unit(i).reading;
+  if (reading.step < kSteps) {
+    core_.Ask(i, StepQuestion(reading.step));
+  } else {
+    Concluded(i);
+  }
+}
+
+void Contact::Identify(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  core_.Forget(i);
+  record.reading = {};
+  core_.SetPhase(i, kIdentifying);
+  AskNext(i);
+}
+
+void Contact::Lose(PositionerIndex i, UnitPhase phase, const std::string& reason, bool alarm) {
+  UnitRecord& record = core_.unit(i);
+  const UnitPhase before = record.view.phase;
+  const auto intent = core_.intents.find(record.view.serial);
+  if (intent != core_.intents.end() && phase == kSilent) {
+    // It may stand anywhere on its way; the intent stays open, so that its return can tell more.
+    const auto& drive = core_.drives[i.value].axis;
+    core_.Know(i, InterruptedHull(intent->second, {drive[0].subdivision, drive[1].subdivision}),
+               Origin::kMove);
+  }
+  core_.Forget(i);
+  core_.SetPhase(i, phase);
+  record.next_poll = core_.now + core_.config.identify_period;
+  core_.SetDue(i, record.next_poll);
+  if (alarm)
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) + " " + reason + " (was " + Name(before) + ")");
+  core_.Tell(i, UnitEventKind::kLost, reason);
+}
+
+void Contact::NoAnswer(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  core_.Forget(i);
+  record.asked_once = true;
+  switch (record.view.phase) {
+    case kAbsent:
+    case kSilent:
+      core_.SetDue(i, record.next_poll);
+      return;
+    case kIdentifying:
+      if (record.view.serial.value == 0) {
+        core_.SetPhase(i, kAbsent);
+        core_.SetDue(i, record.next_poll);
+        return;
+      }
+      [[fallthrough]];
+    default:
+      Lose(i, kSilent, "does not answer");
+  }
+}
+
+void Contact::LinkChanged(const LinkEvent& event) {
+  BusRecord* bus = core_.FindBus(event.bus);
+  if (bus == nullptr || bus->view.link == event.state) return;
+  const bool was_up = bus->view.link == LinkState::kUp;
+  bus->view.link = event.state;
+  const std::string name = "bus " + std::to_string(event.bus.value);
+  if (event.state == LinkState::kUp) {
+    core_.Raise(Severity::kInfo, {}, event.bus, name + " is up");
+    for (const PositionerIndex i : bus->units) {
+      core_.unit(i).next_poll = core_.now;
+      if (!core_.unit(i).question) core_.SetDue(i, core_.now);
+    }
+    return;
+  }
+  if (!was_up || event.state == LinkState::kPassive) return;
+  core_.Raise(Severity::kError, {}, event.bus,
+              name + " is " + Name(event.state) + "; its " + std::to_string(bus->units.size()) +
+                  " units cannot be reached");
+  for (const PositionerIndex i : bus->units) {
+    const UnitPhase phase = core_.unit(i).view.phase;
+    if (phase != kAbsent && phase != kSilent)
+      Lose(i, kSilent, name + " is " + Name(event.state), false);
+  }
+}
+
+void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
+  UnitRecord& record = core_.unit(i);
+  const std::uint8_t sequence = heard.address.sequence;
+  const auto answers = [&](Function function) { return core_.Answers(i, function, sequence); };
+
+  if (const auto* done = std::get_if<Done>(&heard.message)) {
+    OnDone(i, *done, sequence != 0 && answers(Function::kDone));
+  } else if (const auto* status = std::get_if<StatusReply>(&heard.message)) {
+    if (answers(Function::kStatus)) OnStatus(i, *status);
+  } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
+    if (!answers(Function::kIdentify)) return;
+    record.asked_once = true;
+    if (identity->protocol_version != kProtocolVersion) {
+      const bool known = record.view.serial == identity->serial;
+      record.view.serial = identity->serial;
+      if (known) return;  // said before
+      core_.Raise(Severity::kError, i, {},
+                  core_.NameOf(i) + " speaks protocol version " +
+                      std::to_string(identity->protocol_version) + ", not " +
+                      std::to_string(kProtocolVersion));
+      return;
+    }
+    record.view.serial = identity->serial;
+    if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
+    record.reading.step = 1;
+  } else if (const auto* vector = std::get_if<VectorReply>(&heard.message)) {
+    if (!answers(Function::kVector) || record.view.phase != kIdentifying) return;
+    record.reading.position[Index(vector->axis)] =
+        vector->turns * vector->subdivision + vector->vector;
+    record.reading.subdivision[Index(vector->axis)] = vector->subdivision;
+    ++record.reading.step;
+  } else if (const auto* parameter = std::get_if<ParameterReply>(&heard.message)) {
+    if (answers(parameter->written ? Function::kParameterWrite : Function::kParameterRead))
+      OnParameter(i, *parameter);
+  } else if (std::holds_alternative<FaultReply>(heard.message)) {
+    if (answers(Function::kFault)) Identify(i);  // asked only to clear it
+  }
+}
+
+void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  view.reported_state = status.state;
+  view.fault = status.fault;
+  view.move = status.move;
+  core_.Changed(i);
+  if (view.phase == kIdentifying) {
+    record.reading.status = status;
+    ++record.reading.step;
+    // A move that an earlier run staged and never started is taken back before anything else.
+    if (status.state == UnitState::kStaging || status.state == UnitState::kArmed)
+      core_.Ask(i, Stop{});
+    return;
+  }
+  if (IsUnderWay(view.phase)) {
+    OnMotionStatus(i, status);
+  } else if (status.restarted || (view.phase == kFault) != (status.state == UnitState::kFault)) {
+    if (view.phase == kReady && status.state == UnitState::kFault)
+      Lose(i, kFault, std::string("reports fault ") + Name(status.fault));
+    else
+      Identify(i);
+  }
+}
+
+void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
+  const auto intent = core_.intents.find(core_.unit(i).view.serial);
+  const bool began = intent != core_.intents.end() && status.move == intent->second.move;
+  const bool turns = status.state == UnitState::kMoving || status.state == UnitState::kHoming;
+  if (turns) return;
+  if (core_.unit(i).view.phase == kSettling) {
+    Identify(i);  // a motion of an earlier run has ended
+    return;
+  }
+  if (status.restarted || status.interrupted) {
+    Identify(i);
+    core_.Tell(i, UnitEventKind::kLost, "lost power in mid-move");
+    core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " lost power in mid-move");
+  } else if (!began) {
+    Identify(i);  // takes the move back, if it still holds one
+    core_.Tell(i, UnitEventKind::kNeverBegan, "did not begin to move");
+    core_.Raise(Severity::kWarning, i, {}, core_.NameOf(i) + " did not begin to move");
+  } else {
+    Identify(i);  // its own report was lost; its FLASH says where it stands
+  }
+}
+
+void Contact::OnDone(PositionerIndex i, const Done& done, bool answer) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  view.move = done.move;
+  if (view.phase == kMoving || view.phase == kHoming) {
+    const auto intent = core_.intents.find(view.serial);
+    if (intent != core_.intents.end() && intent->second.move == done.move) {
+      MotionEnded(i, done);
+    } else if (answer) {  // stopped before it began
+      Identify(i);
+      core_.Tell(i, UnitEventKind::kNeverBegan, "was stopped before it began");
+    }
+    return;
+  }
+  if (view.phase == kSettling) {
+    Identify(i);
+  } else if (IsLoaded(view.phase) && answer) {
+    core_.Forget(i);
+    core_.SetPhase(i, kReady);
+    core_.SetDue(i, record.next_poll = core_.now + core_.config.poll_period);
+    core_.Tell(i, UnitEventKind::kReady);
+  } else if (view.phase == kReady && done.outcome == Outcome::kFault) {
+    Lose(i, kFault, "reports a fault");
+  }
+}
+
+void Contact::MotionEnded(PositionerIndex i, const Done& done) {
+  UnitRecord& record = core_.unit(i);
+  const IntentRow intent = core_.intents.at(record.view.serial);
+  const bool fault = done.outcome == Outcome::kFault;
+  const bool arrived = done.position == intent.to && !fault;
+  core_.Forget(i);
+  record.view.reported_state = fault ? UnitState::kFault : UnitState::kRest;
+  core_.Know(i, Exactly(Witness::kReported, done.position),
+             done.outcome == Outcome::kHomed ? Origin::kHoming : Origin::kMove);
+  core_.EndIntent(i, fault                             ? IntentEnd::kFault
+                     : done.outcome == Outcome::kHomed ? IntentEnd::kHomed
+                     : arrived                         ? IntentEnd::kArrived
+                                                       : IntentEnd::kStopped);
+  if (fault) {
+    Lose(i, kFault, "stopped with a fault");
+    return;
+  }
+  core_.SetPhase(i, kReady);
+  record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, arrived || done.outcome == Outcome::kHomed ? UnitEventKind::kReady
+                                                           : UnitEventKind::kStopped);
+}
+
+void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
+  UnitRecord& record = core_.unit(i);
+  AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
+  if (reply.written) {
+    if (reply.answer != Answer::kOk) {
+      core_.Raise(
+          Severity::kWarning, i, {},
+          core_.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
+    } else if (record.view.phase != kIdentifying) {
+      core_.Note(ParameterRow{record.view.serial, reply.axis, reply.parameter, reply.value,
+                              Origin::kOperator});
+      if (reply.parameter == Parameter::kRepeat)
+        drive.repeat = static_cast<std::uint8_t>(reply.value);
+      if (reply.parameter == Parameter::kCounter1)
+        drive.counter1 = static_cast<std::uint16_t>(reply.value);
+      if (reply.parameter == Parameter::kPosition || reply.parameter == Parameter::kSubdivision)
+        Identify(i);
+    }
+    return;
+  }
+  if (record.view.phase != kIdentifying) return;
+  ++record.reading.step;
+  if (reply.parameter == Parameter::kCounter1 && reply.value != drive.counter1)
+    core_.Ask(i, ParameterWrite{reply.axis, Parameter::kCounter1, drive.counter1});
+}
+
+void Contact::Bind(PositionerIndex i) {
+  UnitView& view = core_.unit(i).view;
+  view.bound_serial = view.serial;
+  core_.place_of[view.serial] = i;
+  core_.Note(BindingRow{core_.layout.unit(i).id, view.serial});
+}
+
+void Contact::Concluded(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  const Reading& reading = record.reading;
+  record.next_poll = core_.now + core_.config.poll_period;
+  core_.SetDue(i, record.next_poll);
+  const auto place = core_.place_of.find(view.serial);
+  if (view.bound_serial.value == 0 && place == core_.place_of.end()) {
+    Bind(i);
+  } else if (view.bound_serial != view.serial) {
+    view.knowledge = {};
+    core_.SetPhase(i, kForeign);
+    core_.Raise(Severity::kWarning, i, {},
+                core_.NameOf(i) + " answers with serial number " +
+                    std::to_string(view.serial.value) + ", not " +
+                    std::to_string(view.bound_serial.value) +
+                    ": it is not moved until it is adopted");
+    core_.Tell(i, UnitEventKind::kLost, "has another serial number");
+    return;
+  }
+  StoreSays store;
+  if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end())
+    store.vector = it->second;
+  if (const auto it = core_.intents.find(view.serial); it != core_.intents.end()) {
+    store.intent = it->second;
+    if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
+      view.knowledge = it->second.hull;
+      core_.SetPhase(i, kSettling);
+      return;
+    }
+  } else if (reading.status.state == UnitState::kMoving ||
+             reading.status.state == UnitState::kHoming) {
+    view.knowledge = {};
+    core_.SetPhase(i, kSettling);
+    return;
+  }
+  const Reconciled result =
+      Reconcile({reading.status, reading.position, reading.subdivision}, store);
+  if (result.intent_end) core_.EndIntent(i, *result.intent_end);
+  if (!store.vector || store.vector->knowledge != result.knowledge)
+    core_.Know(i, result.knowledge, Origin::kMove);
+  view.knowledge = result.knowledge;
+  if (!IsPlace(result.knowledge) && (result.intent_end || !store.vector))
+    core_.Raise(
+        Severity::kWarning, i, {},
+        core_.NameOf(i) + ": position " + Name(result.knowledge[0].witness) + ", " + result.reason);
+  core_.SetPhase(i, reading.status.state == UnitState::kFault ? kFault : kReady);
+  core_.Tell(
+      i, reading.status.state == UnitState::kFault ? UnitEventKind::kLost : UnitEventKind::kReady,
+      reading.status.state == UnitState::kFault ? "is in fault" : "");
+}
+
+Status Contact::Adopt(PositionerIndex i) {
+  UnitView& view = core_.unit(i).view;
+  if (view.phase != kForeign)
+    return Fail(ErrorCode::kRefused,
+                core_.NameOf(i) + " has nothing to adopt: its phase is " + Name(view.phase));
+  if (const auto place = core_.place_of.find(view.serial);
+      place != core_.place_of.end() && place->second != i) {
+    // The hardware was moved here from another place; that place is empty now.
+    core_.unit(place->second).view.bound_serial = {};
+    core_.Note(BindingRow{core_.layout.unit(place->second).id, {}});
+  }
+  core_.place_of.erase(view.bound_serial);
+  Bind(i);
+  Identify(i);
+  return {};
+}
+
+void Contact::Enable(const EnableCommand& command) {
+  for (const PositionerIndex i : command.units) {
+    UnitView& view = core_.unit(i).view;
+    view.enabled = command.enabled;
+    view.disabled_reason = command.enabled ? "" : command.reason;
+    core_.Note(EnableRow{core_.layout.unit(i).id, command.enabled, command.reason});
+    core_.Changed(i);
+    if (command.enabled && view.phase == kFault) core_.Ask(i, FaultRequest{.clear = true});
+  }
+}
+
+Status Contact::WriteParameter(const WriteParameterCommand& command) {
+  const UnitPhase phase = core_.unit(command.unit).view.phase;
+  if (phase != kReady || core_.unit(command.unit).question)
+    return Fail(
+        ErrorCode::kRefused,
+        core_.NameOf(command.unit) + " takes parameters only at rest; its phase is " + Name(phase));
+  core_.Ask(command.unit, ParameterWrite{command.axis, command.parameter, command.value});
+  return {};
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,245 @@
+#include "fleet/coordinate/core.h"
+
+#include <algorithm>
+
+#include "protocol/base/check.h"
+#include "protocol/base/limits.h"
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+namespace {
+
+// What an answer of eight bytes takes on average; the schedule only needs it to be fair.
+constexpr std::uint32_t kAnswerBits = 145;
+constexpr DurationNs kQueueFullWait = Milliseconds(20);
+
+Function AnswerFunction(const CanFrame& question) {
+  const auto function = static_cast<Function>(question.id >> 20 & 63);
+  return function == Function::kStop ? Function::kDone : function;
+}
+
+}  // namespace
+
+Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
+           const CoordinatorConfig& config_in, StoredFleet stored)
+    : layout(*layout_in),
+      config(config_in),
+      drives(std::move(drives_in)),
+      units(layout_in->size()),
+      next_move(stored.next_move),
+      next_configuration(stored.next_configuration),
+      next_alarm(stored.next_alarm),
+      is_changed_(layout_in->size(), 0) {
+  FOCALFLEET_CHECK(drives.size() == units.size());
+  for (const BusId id : layout.buses())
+    buses.push_back(
+        {.id = id, .schedule = BusSchedule(config.bit_rate_bps), .view = {}, .units = {}});
+  for (std::uint32_t n = 0; n < units.size(); ++n) {
+    const Unit& unit = layout.units()[n];
+    units[n].view.enabled = unit.enabled;
+    if (!unit.enabled) units[n].view.disabled_reason = "disabled in the units file";
+    BusRecord* bus = FindBus(unit.bus);
+    units[n].bus = static_cast<std::size_t>(bus - buses.data());
+    bus->units.push_back({n});
+    SetDue({n}, {INT64_MIN});
+  }
+  for (const auto& row : stored.units) {
+    const auto i = layout.Find(row.unit);
+    if (!i) continue;  // a place that the present layout does not have keeps its rows
+    UnitView& view = unit(*i).view;
+    view.bound_serial = row.serial;
+    if (row.serial.value != 0) place_of[row.serial] = *i;
+    if (!row.enabled) {
+      view.enabled = false;
+      view.disabled_reason = row.reason;
+    }
+  }
+  for (const auto& row : stored.vectors) stored_vectors[row.serial] = row;
+  for (const auto& row : stored.open_intents) intents[row.serial] = row;
+  for (const auto& row : stored.parameters) {
+    const auto place = place_of.find(row.serial);
+    if (place == place_of.end()) continue;
+    AxisDrive& drive = drives[place->second.value].axis[Index(row.axis)];
+    if (row.parameter == Parameter::kRepeat) drive.repeat = static_cast<std::uint8_t>(row.value);
+    if (row.parameter == Parameter::kCounter1)
+      drive.counter1 = static_cast<std::uint16_t>(row.value);
+    if (row.parameter == Parameter::kSubdivision)
+      drive.subdivision = static_cast<std::uint16_t>(row.value);
+  }
+}
+
+std::string Core::NameOf(PositionerIndex i) const {
+  return "unit " + std::to_string(layout.unit(i).id.value);
+}
+
+BusRecord* Core::FindBus(BusId id) {
+  const auto it = std::lower_bound(buses.begin(), buses.end(), id,
+                                   [](const BusRecord& bus, BusId want) { return bus.id < want; });
+  return it != buses.end() && it->id == id ? &*it : nullptr;
+}
+
+void Core::SetPhase(PositionerIndex i, UnitPhase phase) {
+  UnitView& view = unit(i).view;
+  FOCALFLEET_CHECK(IsAllowed(view.phase, phase));
+  view.phase = phase;
+  Changed(i);
+}
+
+void Core::Changed(PositionerIndex i) {
+  if (is_changed_[i.value] != 0) return;
+  is_changed_[i.value] = 1;
+  out->changed.push_back(i);
+}
+
+void Core::SetDue(PositionerIndex i, HostInstant at) {
+  unit(i).due = at;
+  if (at != kNever) timers_.push({at, i});
+}
+
+std::optional<PositionerIndex> Core::NextDue() {
+  while (!timers_.empty() && timers_.top().at <= now) {
+    const Timer timer = timers_.top();
+    timers_.pop();
+    if (unit(timer.unit).due != timer.at) continue;  // re-set since
+    unit(timer.unit).due = kNever;
+    return timer.unit;
+  }
+  return std::nullopt;
+}
+
+void Core::Ask(PositionerIndex i, const HostMessage& message) {
+  UnitRecord& record = unit(i);
+  record.sequence =
+      record.sequence == 255 ? std::uint8_t{1} : static_cast<std::uint8_t>(record.sequence + 1);
+  const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
+  record.question = Question{message, AnswerFunction(frame), record.sequence, 0, kNever};
+  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+    record.question->deadline = now + kQueueFullWait;
+    SetDue(i, record.question->deadline);
+  } else {
+    SetDue(i, kNever);
+  }
+}
+
+bool Core::AskAgain(PositionerIndex i) {
+  UnitRecord& record = unit(i);
+  Question& question = *record.question;
+  if (question.tries++ >= limits::kRequestRetries) return false;
+  ++bus_of(i).view.retries;
+  const CanFrame frame = Encode(question.message, {layout.unit(i).node, question.sequence});
+  question.deadline = kNever;
+  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+    question.deadline = now + kQueueFullWait;
+    SetDue(i, question.deadline);
+  }
+  return true;
+}
+
+void Core::Forget(PositionerIndex i) {
+  unit(i).question.reset();
+  bus_of(i).schedule.Drop(layout.unit(i).node);
+}
+
+bool Core::Answers(PositionerIndex i, Function function, std::uint8_t sequence) {
+  UnitRecord& record = unit(i);
+  if (!record.question || record.question->answer_function != function ||
+      record.question->sequence != sequence)
+    return false;
+  record.question.reset();
+  SetDue(i, now);  // Service decides what comes next, unless the handler asks at once
+  return true;
+}
+
+void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
+  const CanFrame frame = Encode(message, {node, 0});
+  out->frames.push_back({buses[bus].id, frame});
+  buses[bus].schedule.Charge(now, FrameBits(frame));
+}
+
+void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,
+                 std::string text) {
+  AlarmRow row{
+      .id = next_alarm++, .severity = severity, .unit = {}, .bus = bus, .text = std::move(text)};
+  if (who) row.unit = layout.unit(*who).id;
+  Note(std::move(row));
+}
+
+void Core::Tell(PositionerIndex i, UnitEventKind kind, std::string reason) {
+  events.push_back({i, kind, std::move(reason)});
+}
+
+void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin) {
+  UnitRecord& record = unit(i);
+  record.view.knowledge = knowledge;
+  Changed(i);
+  VectorRow row{
+      .serial = record.view.serial,
+      .knowledge = knowledge,
+      .subdivision = {drives[i.value].axis[0].subdivision, drives[i.value].axis[1].subdivision},
+      .move = record.view.move,
+      .origin = origin};
+  stored_vectors[row.serial] = row;
+  Note(std::move(row));
+}
+
+void Core::EndIntent(PositionerIndex i, IntentEnd end) {
+  const auto it = intents.find(unit(i).view.serial);
+  if (it == intents.end()) return;
+  Note(IntentEndRow{it->second.serial, it->second.move, end});
+  intents.erase(it);
+}
+
+void Core::BeginStep(const Inputs& inputs, Effects* effects) {
+  out = effects;
+  now = inputs.now;
+  committed_through = inputs.committed_through;
+  store_failing = inputs.store_failing;
+  std::fill(is_changed_.begin(), is_changed_.end(), std::uint8_t{0});
+}
+
+void Core::Count(BusRecord* bus, std::uint32_t bits) {
+  bus->view.bits += bits;
+  bus->window_bits += bits;
+}
+
+void Core::CloseLoadWindow(BusRecord* bus) const {
+  if (bus->window_began == kNever) bus->window_began = now;
+  const DurationNs window = now - bus->window_began;
+  if (window < Milliseconds(1000)) return;
+  bus->view.load = static_cast<double>(bus->window_bits) /
+                   (window.seconds() * static_cast<double>(config.bit_rate_bps));
+  bus->view.load_max = std::max(bus->view.load_max, bus->view.load);
+  bus->window_began = now;
+  bus->window_bits = 0;
+}
+
+void Core::EndStep() {
+  for (BusRecord& bus : buses) {
+    if (now >= bus.clock_due) {
+      const auto host_us =
+          static_cast<std::uint64_t>(now.ns / 1000) & ((std::uint64_t{1} << 48) - 1);
+      if (bus.view.link == LinkState::kUp)
+        SendNow(static_cast<std::size_t>(&bus - buses.data()), Clock{host_us}, kBroadcastNode);
+      bus.clock_due = now + config.clock_period;
+    }
+    asked_.clear();
+    bus.schedule.Release(now, config.transmit_horizon, bus.id, &out->frames, &asked_);
+    for (const PositionerIndex i : asked_) {
+      if (!unit(i).question) continue;
+      unit(i).question->deadline = now + config.transmit_horizon + config.reply_wait;
+      SetDue(i, unit(i).question->deadline);
+    }
+    out->wake_at =
+        std::min({out->wake_at, bus.clock_due, bus.schedule.ReadyAt(config.transmit_horizon)});
+    CloseLoadWindow(&bus);
+  }
+  for (const OutFrame& sent : out->frames) {
+    BusRecord* bus = FindBus(sent.bus);
+    ++bus->view.frames_sent;
+    Count(bus, FrameBits(sent.frame));
+  }
+  if (!timers_.empty()) out->wake_at = std::min(out->wake_at, timers_.top().at);
+  if (!out->rows.empty()) out->batch = next_batch++;
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,156 @@
+// The state that every procedure of the coordinator shares, and the few things that one can do with
+// it: change a unit's phase (by the table), ask a unit something (with a deadline and bounded
+// retries), note a row for the store, raise an alarm, wake up later. It decides nothing; contact.h
+// and pursuit.h decide, and tell each other what happened to a unit through `events`, never by
+// calling back.
+//
+// Size: about 300 bytes a unit and 1 kB a bus; a step touches only the units that have something
+// due.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <queue>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "fleet/coordinate/bus_schedule.h"
+#include "fleet/coordinate/unit_phase.h"
+#include "fleet/coordinator.h"
+#include "protocol/wire/codec.h"
+
+namespace focalfleet {
+
+/// The one question that a unit has open. It is repeated with the same sequence number, so that the
+/// unit can tell a repeat from a new question, and an old answer is never taken for a new one.
+struct Question {
+  HostMessage message;
+  Function answer_function{};
+  std::uint8_t sequence = 0;
+  std::uint8_t tries = 0;
+  HostInstant deadline = kNever;  // set when the frame leaves
+};
+
+/// What has been read of a unit since it was last identified.
+struct Reading {
+  int step = 0;  // index of the next question, see contact.cc
+  StatusReply status;
+  Pose position{};
+  std::array<std::uint16_t, kAxisCount> subdivision{};
+};
+
+struct UnitRecord {
+  UnitView view;
+  std::size_t bus = 0;  // index into Core::buses
+  std::uint8_t sequence = 0;
+  std::optional<Question> question;
+  Reading reading;
+  HostInstant due = kNever;  // when Service has something to do
+  HostInstant next_poll{INT64_MIN};
+  bool asked_once = false;  // has had the chance to answer since start
+};
+
+struct BusRecord {
+  BusId id;
+  BusSchedule schedule;
+  BusView view;
+  HostInstant clock_due{INT64_MIN};
+  HostInstant window_began = kNever;  // of the second over which the load is taken
+  std::uint64_t window_bits = 0;
+  std::vector<PositionerIndex> units;
+};
+
+enum class UnitEventKind : std::uint8_t {
+  kReady,       // read anew, or its motion ended where it should: its knowledge is settled
+  kStopped,     // its motion ended before its end
+  kNeverBegan,  // did not start with the others
+  kLost,        // silent, restarted, foreign or faulty: not to be counted on
+};
+struct UnitEvent {
+  PositionerIndex unit;
+  UnitEventKind kind;
+  std::string reason;
+};
+
+class Core {
+ public:
+  Core(const Layout* layout, std::vector<UnitDrive> drives, const CoordinatorConfig& config,
+       StoredFleet stored);
+
+  // ---- who
+
+  [[nodiscard]] UnitRecord& unit(PositionerIndex i) { return units[i.value]; }
+  [[nodiscard]] BusRecord& bus_of(PositionerIndex i) { return buses[unit(i).bus]; }
+  [[nodiscard]] std::string NameOf(PositionerIndex i) const;  // "unit 12"
+  [[nodiscard]] BusRecord* FindBus(BusId id);
+
+  // ---- doing
+
+  void SetPhase(PositionerIndex i, UnitPhase phase);
+  void Changed(PositionerIndex i);
+  void SetDue(PositionerIndex i, HostInstant at);
+  /// Replaces any open question. Where the bus's queue is full the question is asked when it has
+  /// room.
+  void Ask(PositionerIndex i, const HostMessage& message);
+  void Forget(PositionerIndex i);  // its open question, and what waits for it on the bus
+  /// True where a retry went out; false where the last one is over: nobody answers.
+  [[nodiscard]] bool AskAgain(PositionerIndex i);
+  /// Frames past the queue: stops, starts, the clock.
+  void SendNow(std::size_t bus, const HostMessage& message, NodeId node);
+  void Note(Row row) { out->rows.push_back(std::move(row)); }
+  void Raise(Severity severity, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
+             std::string text);
+  void Tell(PositionerIndex i, UnitEventKind kind, std::string reason = {});
+
+  /// Knowledge of a unit that is settled now: kept here and in the store.
+  void Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin);
+  /// Closes the unit's open intent, if there is one.
+  void EndIntent(PositionerIndex i, IntentEnd end);
+
+  /// The batch number that this step's rows will carry.
+  [[nodiscard]] std::uint64_t batch_now() const { return next_batch; }
+
+  // ---- being driven
+
+  void BeginStep(const Inputs& inputs, Effects* effects);
+  /// Matches an answer to the open question; false: late, doubled, or never asked.
+  [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
+  void Count(BusRecord* bus, std::uint32_t bits);
+  void EndStep();
+  /// Units that are due at `now`, in the order of their times.
+  [[nodiscard]] std::optional<PositionerIndex> NextDue();
+
+  const Layout& layout;
+  const CoordinatorConfig config;
+  std::vector<UnitDrive> drives;
+  std::vector<UnitRecord> units;
+  std::vector<BusRecord> buses;
+  std::unordered_map<SerialNumber, VectorRow> stored_vectors;
+  std::unordered_map<SerialNumber, IntentRow> intents;  // open ones
+  std::unordered_map<SerialNumber, PositionerIndex> place_of;
+  std::vector<UnitEvent> events;
+  MoveId next_move{1};
+  std::uint64_t next_configuration = 1;
+  std::uint64_t next_alarm = 1;
+  std::uint64_t next_batch = 1;
+  std::uint64_t committed_through = 0;
+  bool store_failing = false;
+  HostInstant now;
+  Effects* out = nullptr;
+
+ private:
+  struct Timer {
+    HostInstant at;
+    PositionerIndex unit;
+    bool operator>(const Timer& o) const { return at != o.at ? at > o.at : unit > o.unit; }
+  };
+
+  void CloseLoadWindow(BusRecord* bus) const;
+
+  std::priority_queue<Timer, std::vector<Timer>, std::greater<>> timers_;
+  std::vector<PositionerIndex> asked_;
+  std::vector<std::uint8_t> is_changed_;
+};
+
+}  // namespace focalfleet

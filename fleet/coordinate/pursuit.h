@@ -1,0 +1,144 @@
+// A configuration is a goal, and this pursues it in rounds:
+//
+//   gathering -> planning -> uploading -> committing -> moving -> (next round, homing, or finished)
+//                   ^             |                        |
+//                   +-------------+------------------------+   somebody fell out: plan around it
+//
+// Nothing starts before every unit of the plan holds its move, and before the store holds the
+// intent of each. A unit that falls out before the start costs a new plan; one that falls out in
+// motion stops those whose way leads through where it may stand (UnitPlan::followers), and the next
+// round takes them on. Every round uses a new move id, so a unit that kept an old move never starts
+// with the others.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fleet/coordinate/contact.h"
+#include "fleet/coordinate/core.h"
+
+namespace focalfleet {
+
+class Pursuit {
+ public:
+  Pursuit(Core* core, Contact* contact);
+
+  Status Apply(std::uint64_t request, const ApplyCommand& command);
+  Status Home(std::uint64_t request, const HomeCommand& command);
+  void StopAll();
+  /// By the operator: it takes no further part in this goal.
+  void StopUnit(PositionerIndex i);
+
+  void OnPlan(const PlanDone& done);
+  void OnConfirm(PositionerIndex i, const ConfirmReply& reply);
+  void OnArm(PositionerIndex i, const ArmReply& reply);
+  void OnHomeReply(PositionerIndex i, const HomeReply& reply);
+  /// Takes what happened to units since the last call, then moves on if it can.
+  void Advance();
+
+  [[nodiscard]] const ConfigurationView& view() const { return view_; }
+  [[nodiscard]] bool busy() const { return state_ != State::kIdle; }
+  [[nodiscard]] HostInstant due() const { return due_; }
+  /// The plan that `i` is carrying out now, and when its clock of the plan began.
+  struct Course {
+    const UnitPlan* plan = nullptr;
+    HostInstant began;
+  };
+  [[nodiscard]] std::optional<Course> CourseOf(PositionerIndex i) const;
+
+ private:
+  enum class State : std::uint8_t {
+    kIdle,
+    kGathering,  // waiting until everybody has had the chance to answer
+    kPlanning,
+    kUploading,
+    kDisarming,  // somebody fell out before the start: the others give their moves back
+    kCommitting,
+    kMoving,
+    kHomeCommitting,
+    kHoming,
+    kReporting,  // all motion is over; the last rows are being written
+  };
+  /// Where a unit is in this round.
+  enum class Part : std::uint8_t { kNone, kWaiting, kUploading, kHolding, kMoving };
+
+  void Begin(std::uint64_t request, std::string source);
+  void Gather();
+  void GatherIfDue();
+  void BeginRound();
+  void TakePlan(const PlanDone& done);
+  void PumpUploads();
+  void Upload(PositionerIndex i);
+  void FallOut(PositionerIndex i, const std::string& reason);
+  void UploadsOver();
+  void Disarm();
+  void CommitRound();
+  void Start();
+  void RepeatStart();
+  void RoundOver();
+  void CommitHoming();
+  void StartHoming();
+  void FinishWhenDurable(ConfigurationState end);
+  void Finish();
+  void Exclude(PositionerIndex i);
+  void StopOne(PositionerIndex i, const std::string& reason);
+  void Take(const UnitEvent& event);
+  void Settled(PositionerIndex i);
+  void StopFollowers(PositionerIndex first, const std::string& reason);
+  void SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string reason = {});
+  void SetPart(PositionerIndex i, Part part);
+  void SetState(State state);
+  void JudgeTargets();
+  void ReportArrivals();
+  void Record();
+  [[nodiscard]] StagedMove StagedMoveOf(PositionerIndex i) const;
+  [[nodiscard]] IntentRow IntentOf(PositionerIndex i) const;
+  [[nodiscard]] IntentRow HomingIntentOf(PositionerIndex i) const;
+
+  static constexpr std::size_t kNoPlan = SIZE_MAX;
+
+  Core& core_;
+  Contact& contact_;
+  State state_ = State::kIdle;
+  ConfigurationView view_;
+  std::uint64_t request_ = 0;
+  bool fixed_ = false;
+  bool stopping_ = false;
+  ConfigurationState end_ = ConfigurationState::kDone;
+  std::vector<std::optional<Pose>> targets_;  // of the goal
+  std::vector<PositionerIndex> to_home_;
+  std::vector<std::uint8_t> excluded_;  // failed in this goal: stands still from then on
+  std::vector<std::uint8_t> missed_starts_;
+  std::string failure_;
+
+  // this round
+  std::uint64_t job_ = 0;
+  Plan plan_;
+  MoveId move_;
+  std::vector<std::size_t> plan_of_;  // by unit; kNoPlan
+  std::vector<Part> part_;
+  std::vector<std::uint8_t> stage_tries_;
+  std::array<std::uint32_t, 5> parts_{};              // how many units are in each part
+  std::vector<std::deque<PositionerIndex>> waiting_;  // by bus: to be uploaded
+  std::vector<std::uint32_t> uploading_;              // by bus
+  std::vector<PositionerIndex> homing_;
+  std::uint64_t commit_batch_ = 0;
+  HostInstant last_arrival_;
+  HostInstant start_repeat_ = kNever;
+  int start_repeats_ = 0;
+  HostInstant due_ = kNever;
+  HostInstant gather_until_ = kNever;
+  std::uint64_t frames_before_ = 0;
+
+  // arrivals that are not durable yet: not told before they are
+  struct Arrival {
+    std::uint64_t batch;
+    PositionerIndex unit;
+  };
+  std::deque<Arrival> arrivals_;
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,153 @@
+#include "fleet/coordinator.h"
+
+#include <algorithm>
+
+#include "fleet/coordinate/contact.h"
+#include "fleet/coordinate/core.h"
+#include "fleet/coordinate/pursuit.h"
+#include "protocol/base/check.h"
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+
+class Coordinator::Impl {
+ public:
+  Impl(const Layout* layout, std::vector<UnitDrive> drives, const CoordinatorConfig& config,
+       StoredFleet stored)
+      : core_(layout, std::move(drives), config, std::move(stored)),
+        contact_(&core_),
+        pursuit_(&core_, &contact_) {}
+
+  void Step(const Inputs& inputs, Effects* effects) {
+    core_.BeginStep(inputs, effects);
+    for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
+    for (const ReceivedFrame& received : inputs.frames) Hear(received);
+    for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
+    for (const Command& command : inputs.commands) Obey(command);
+    while (const auto due = core_.NextDue()) static_cast<void>(contact_.Service(*due));
+    pursuit_.Advance();
+    effects->wake_at = std::min(effects->wake_at, pursuit_.due());
+    core_.EndStep();
+  }
+
+  Core& core() { return core_; }
+  Pursuit& pursuit() { return pursuit_; }
+
+ private:
+  void Hear(const ReceivedFrame& received) {
+    BusRecord* bus = core_.FindBus(received.bus);
+    FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
+    ++bus->view.frames_received;
+    core_.Count(bus, FrameBits(received.frame));
+    const auto heard = DecodeUnit(received.frame);
+    if (!heard) {
+      // Another host may share the bus (a direct stop does): its frames are well formed and not for
+      // us.
+      if (!DecodeHost(received.frame)) ++bus->view.malformed;
+      return;
+    }
+    const auto i = core_.layout.Find(received.bus, heard->address.node);
+    if (!i) {
+      ++bus->view.malformed;  // nobody of ours has this node number
+      return;
+    }
+    const std::uint8_t sequence = heard->address.sequence;
+    if (const auto* confirm = std::get_if<ConfirmReply>(&heard->message)) {
+      if (core_.Answers(*i, Function::kConfirm, sequence)) pursuit_.OnConfirm(*i, *confirm);
+    } else if (const auto* arm = std::get_if<ArmReply>(&heard->message)) {
+      if (core_.Answers(*i, Function::kArm, sequence)) pursuit_.OnArm(*i, *arm);
+    } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
+      if (core_.Answers(*i, Function::kHome, sequence)) pursuit_.OnHomeReply(*i, *home);
+    } else {
+      contact_.Hear(*i, *heard);
+    }
+  }
+
+  void Obey(const Command& command) {
+    const Status status =
+        std::visit([&](const auto& what) { return Do(command.request, what); }, command.what);
+    const bool goes_on = std::holds_alternative<ApplyCommand>(command.what) ||
+                         std::holds_alternative<HomeCommand>(command.what);
+    if (!status) {
+      core_.out->replies.push_back({command.request, true, status.error(), {}});
+    } else if (!goes_on) {
+      core_.out->replies.push_back({command.request, true, {}, "done"});
+    }
+  }
+
+  Status Do(std::uint64_t request, const ApplyCommand& c) { return pursuit_.Apply(request, c); }
+  Status Do(std::uint64_t request, const HomeCommand& c) { return pursuit_.Home(request, c); }
+  Status Do(std::uint64_t, const StopCommand& c) {
+    if (c.unit) {
+      pursuit_.StopUnit(*c.unit);
+    } else {
+      pursuit_.StopAll();
+    }
+    return {};
+  }
+  Status Do(std::uint64_t, const EnableCommand& c) {
+    for (const PositionerIndex i : c.units) {
+      if (c.enabled && !core_.layout.unit(i).enabled)
+        return Fail(ErrorCode::kRefused,
+                    core_.NameOf(i) + " is disabled in the units file: change it there");
+      if (IsUnderWay(core_.unit(i).view.phase) || IsLoaded(core_.unit(i).view.phase))
+        return Fail(ErrorCode::kRefused, core_.NameOf(i) + " takes part in a configuration now");
+    }
+    contact_.Enable(c);
+    return {};
+  }
+  Status Do(std::uint64_t, const AdoptCommand& c) { return contact_.Adopt(c.unit); }
+  Status Do(std::uint64_t, const WriteParameterCommand& c) {
+    if (pursuit_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
+    return contact_.WriteParameter(c);
+  }
+
+  Core core_;
+  Contact contact_;
+  Pursuit pursuit_;
+};
+
+void Effects::Clear() {
+  batch = 0;
+  rows.clear();
+  frames.clear();
+  plan_job.reset();
+  replies.clear();
+  changed.clear();
+  wake_at = kNever;
+}
+
+Coordinator::Coordinator(const Layout* layout, std::vector<UnitDrive> drives,
+                         CoordinatorConfig config, StoredFleet stored)
+    : impl_(std::make_unique<Impl>(layout, std::move(drives), config, std::move(stored))) {}
+Coordinator::~Coordinator() = default;
+
+void Coordinator::Step(const Inputs& inputs, Effects* effects) { impl_->Step(inputs, effects); }
+
+const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->core().unit(i).view; }
+
+UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const {
+  const auto course = impl_->pursuit().CourseOf(i);
+  const UnitView& view = unit(i);
+  if (!course || view.phase != UnitPhase::kMoving) return view.knowledge;
+  UnitKnowledge predicted;
+  for (const Axis axis : kAxes)
+    predicted[Index(axis)] =
+        Exactly(Witness::kPredicted,
+                PositionAt(course->plan->from[Index(axis)], course->plan->path[Index(axis)],
+                           impl_->core().drives[i.value].axis[Index(axis)],
+                           (now - course->began).seconds()));
+  return predicted;
+}
+
+const BusView& Coordinator::bus(BusId bus) const {
+  const BusRecord* record = impl_->core().FindBus(bus);
+  FOCALFLEET_CHECK(record != nullptr);
+  return record->view;
+}
+
+const ConfigurationView& Coordinator::configuration() const { return impl_->pursuit().view(); }
+std::span<const UnitDrive> Coordinator::drives() const { return impl_->core().drives; }
+bool Coordinator::busy() const { return impl_->pursuit().busy(); }
+
+}  // namespace focalfleet
