@@ -4,7 +4,9 @@
 //
 // Priority comes first so that a stop passes everything that waits; the node is part of the identifier, so two
 // units never send the same one; the sequence number is there, not in the payload, so that all eight bytes
-// carry data and an answer names the question it belongs to.
+// carry data and an answer names the question it belongs to. Begin, segments and read-back of an upload have
+// one priority and ascending function numbers: a controller that sends its lowest waiting identifier first
+// still sends them in this order.
 #pragma once
 
 #include <cstdint>
@@ -19,9 +21,9 @@ enum class Function : std::uint8_t {
   kDone = 2,
   kClock = 3,
   kArm = 4,
-  kConfirm = 5,
-  kStageBegin = 6,
-  kStageSegment = 7,
+  kStageBegin = 5,
+  kStageSegment = 6,
+  kConfirm = 7,
   kHome = 8,
   kProgress = 9,
   kStatus = 10,
@@ -46,9 +48,9 @@ inline constexpr FunctionRow kFunctions[kFunctionCount] = {
     {Function::kDone, "done", 2},
     {Function::kClock, "clock", 2},
     {Function::kArm, "arm", 3},
-    {Function::kConfirm, "confirm", 3},
     {Function::kStageBegin, "stage_begin", 4},
     {Function::kStageSegment, "stage_segment", 4},
+    {Function::kConfirm, "confirm", 4},
     {Function::kHome, "home", 4},
     {Function::kProgress, "progress", 5},
     {Function::kStatus, "status", 5},
