@@ -1,0 +1,42 @@
+// Host time as the daemon tells it: the monotonic clock, times `speed` where a simulated fleet runs
+// faster than life. Daemon and focalfleet-sim agree on it without a word, because both scale the
+// same clock of one machine.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <ctime>
+
+#include "protocol/base/instants.h"
+
+namespace focalfleet {
+
+class HostClock {
+ public:
+  explicit HostClock(double speed = 1) : speed_(speed) {}
+
+  [[nodiscard]] HostInstant Now() const {
+    timespec now{};
+    ::clock_gettime(CLOCK_MONOTONIC, &now);
+    return FromMonotonic(now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec);
+  }
+  /// The reading of CLOCK_MONOTONIC, in ns, at which host time reaches `at`, rounded up.
+  [[nodiscard]] std::int64_t ToMonotonic(HostInstant at) const {
+    if (at == kNever) return at.ns;
+    return static_cast<std::int64_t>(std::ceil(static_cast<double>(at.ns) / speed_));
+  }
+  [[nodiscard]] HostInstant FromMonotonic(std::int64_t ns) const {
+    if (speed_ == 1) return {ns};
+    return {static_cast<std::int64_t>(static_cast<double>(ns) * speed_)};
+  }
+  /// What so much real time is in host time.
+  [[nodiscard]] DurationNs Real(DurationNs duration) const {
+    return {static_cast<std::int64_t>(static_cast<double>(duration.ns) * speed_)};
+  }
+  [[nodiscard]] double speed() const { return speed_; }
+
+ private:
+  double speed_;
+};
+
+}  // namespace focalfleet

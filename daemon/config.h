@@ -1,0 +1,68 @@
+// The daemon's configuration: one TOML file, every key with a default, a type and a range. A key
+// that nobody reads is an error, because a misspelt limit is a limit that is not there. Relative
+// paths are relative to the file. deploy/focalfleet.toml shows every key with its default.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fleet/coordinator.h"
+#include "fleet/drive.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+enum class PortKind : std::uint8_t { kUnix, kSocketCan, kSimulated };
+inline constexpr const char* kPortKindNames[] = {"unix", "socketcan", "simulated"};
+
+struct DaemonConfig {
+  struct Fleet {
+    std::string units = "units.csv";
+    std::string obstacles;    // empty: none
+    double clearance_mm = 0;  // 0: by the layout's pitch
+  } fleet;
+  struct Store {
+    std::string path = "focalfleet.db";
+  } store;
+  struct Control {
+    std::string socket = "control.sock";
+  } control;
+  struct Dds {
+    bool enabled = true;
+    std::uint32_t domain = 0;
+    double rate_hz = 10;  // at most so often is the status of changed units published
+    std::string config;   // Cyclone's XML file; empty: $CYCLONEDDS_URI, or loopback only
+  } dds;
+  struct Log {
+    std::string level = "info";
+    std::string file;  // empty: standard error
+  } log;
+  struct Bus {
+    PortKind port = PortKind::kUnix;
+    std::uint32_t bit_rate_bps = 1'000'000;
+    std::string unix_directory;           // where bus<ID>.sock are
+    std::vector<std::string> interfaces;  // by ascending bus id
+  } bus;
+  struct Clock {
+    double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
+  } clock;
+  UnitDrive drive;           // of units whose own parameters are not known
+  CoordinatorConfig timing;  // its bit rate is bus.bit_rate_bps
+  struct Simulated {
+    std::uint64_t seed = 1;
+    std::string spread = "nominal";
+  } simulated;
+};
+
+/// Errors: kUnavailable: the file cannot be read; kInvalid: the first thing wrong, as file:line:
+/// reason.
+Result<DaemonConfig> LoadConfig(const std::string& path);
+/// As LoadConfig, of a text that came from `path`.
+Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path);
+
+/// Every key with the value that holds, as TOML that reads back the same.
+std::string EffectiveConfig(const DaemonConfig& config);
+
+}  // namespace focalfleet
