@@ -1,0 +1,115 @@
+#include "daemon/dds/cyclone.h"
+
+#include <dds/dds.h>
+
+#include <cstdlib>
+#include <map>
+#include <memory>
+#include <mutex>
+
+namespace focalfleet::dds_internal {
+namespace {
+
+// A killed daemon is noticed after this long. 500 ms works on an idle machine; a machine that plans
+// for 5000 units on all its cores may keep Cyclone's lease thread waiting that long, and a living
+// daemon must not look dead.
+constexpr dds_duration_t kLease = DDS_MSECS(2000);
+
+struct Held {
+  dds_entity_t entity = 0;  // 0: Cyclone makes it by itself from $CYCLONEDDS_URI
+  std::uint32_t users = 0;
+};
+struct Domains {
+  std::mutex mutex;
+  std::map<std::uint32_t, Held> held;
+};
+// Mirrors what Cyclone itself keeps once a process.
+Domains& TheDomains() {
+  static Domains domains;
+  return domains;
+}
+
+struct DeleteQos {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+
+std::unique_ptr<dds_qos_t, DeleteQos> SharedQos() {
+  std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
+  // No time to block: a writer whose readers lag refuses the sample, and the tick goes on.
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
+  dds_qset_liveliness(qos.get(), DDS_LIVELINESS_AUTOMATIC, kLease);
+  dds_qset_writer_data_lifecycle(qos.get(), false);
+  return qos;
+}
+
+}  // namespace
+
+Entity::~Entity() {
+  if (handle_ > 0) dds_delete(handle_);
+}
+
+tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code) {
+  return Fail(ErrorCode::kUnavailable,
+              std::string("DDS: cannot ") + what + ": " + dds_strretcode(-code));
+}
+
+Result<Domain> Domain::Acquire(std::uint32_t id, const std::string& config_xml) {
+  Domains& domains = TheDomains();
+  const std::lock_guard lock(domains.mutex);
+  Held& held = domains.held[id];
+  if (held.users == 0) {
+    const bool from_environment = config_xml.empty() && std::getenv("CYCLONEDDS_URI") != nullptr;
+    if (!from_environment) {
+      const char* xml = config_xml.empty() ? kLoopbackConfig : config_xml.c_str();
+      held.entity = dds_create_domain(id, xml);
+      if (held.entity < 0) {
+        return DdsFailure("set up the domain (see its own message on stderr)",
+                          std::exchange(held.entity, 0));
+      }
+    }
+  }
+  ++held.users;
+  Domain domain;
+  domain.id_ = id;
+  domain.held_ = true;
+  return domain;
+}
+
+Domain::~Domain() {
+  if (!held_) return;
+  Domains& domains = TheDomains();
+  const std::lock_guard lock(domains.mutex);
+  Held& held = domains.held[id_];
+  if (--held.users == 0 && held.entity > 0) dds_delete(std::exchange(held.entity, 0));
+}
+
+Result<Entity> MakeParticipant(std::uint32_t domain) {
+  const dds_entity_t participant = dds_create_participant(domain, nullptr, nullptr);
+  if (participant < 0) return DdsFailure("join the domain", participant);
+  return Entity(participant);
+}
+
+Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& type,
+                         const char* name) {
+  const dds_entity_t topic = dds_create_topic(participant.get(), &type, name, nullptr, nullptr);
+  if (topic < 0) return DdsFailure(name, topic);
+  return topic;
+}
+
+Result<Handle> MakeWriter(const Entity& participant, Handle topic) {
+  const dds_entity_t writer =
+      dds_create_writer(participant.get(), topic, SharedQos().get(), nullptr);
+  if (writer < 0) return DdsFailure("make a writer", writer);
+  return writer;
+}
+
+Result<Handle> MakeReader(const Entity& participant, Handle topic) {
+  const dds_entity_t reader =
+      dds_create_reader(participant.get(), topic, SharedQos().get(), nullptr);
+  if (reader < 0) return DdsFailure("make a reader", reader);
+  return reader;
+}
+
+}  // namespace focalfleet::dds_internal

@@ -1,0 +1,70 @@
+// What publisher and reader share of Cyclone DDS: the domain with its configuration, entities that
+// delete themselves, the topics' names and the QoS that both ends ask for.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include "protocol/base/result.h"
+
+struct dds_topic_descriptor;
+
+namespace focalfleet::dds_internal {
+
+extern const char* const kLoopbackConfig;  // deploy/cyclonedds.xml
+
+using Handle = std::int32_t;  // dds_entity_t
+
+inline constexpr const char* kFleetTopic = "focalfleet/fleet_status";
+inline constexpr const char* kUnitTopic = "focalfleet/unit_status";
+inline constexpr const char* kBusTopic = "focalfleet/bus_status";
+inline constexpr const char* kConfigurationTopic = "focalfleet/configuration_progress";
+inline constexpr const char* kAlarmTopic = "focalfleet/alarm";
+
+/// Deletes its entity, and with it all that was made under it.
+class Entity {
+ public:
+  Entity() = default;
+  explicit Entity(Handle handle) : handle_(handle) {}
+  Entity(Entity&& other) noexcept : handle_(std::exchange(other.handle_, 0)) {}
+  Entity& operator=(Entity&& other) noexcept {
+    std::swap(handle_, other.handle_);
+    return *this;
+  }
+  ~Entity();
+  [[nodiscard]] Handle get() const { return handle_; }
+
+ private:
+  Handle handle_ = 0;
+};
+
+/// Holds a domain in this process. Cyclone configures a domain once a process, so publisher and
+/// reader of one process share it: the first one's configuration holds until the last is gone.
+class Domain {
+ public:
+  static Result<Domain> Acquire(std::uint32_t id, const std::string& config_xml);
+  Domain() = default;
+  Domain(Domain&& other) noexcept : id_(other.id_), held_(std::exchange(other.held_, false)) {}
+  Domain& operator=(Domain&& other) noexcept {
+    std::swap(id_, other.id_);
+    std::swap(held_, other.held_);
+    return *this;
+  }
+  ~Domain();
+
+ private:
+  std::uint32_t id_ = 0;
+  bool held_ = false;
+};
+
+/// The error of a DDS call that gave `code` < 0.
+[[nodiscard]] tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code);
+
+Result<Entity> MakeParticipant(std::uint32_t domain);
+Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& type,
+                         const char* name);
+Result<Handle> MakeWriter(const Entity& participant, Handle topic);
+Result<Handle> MakeReader(const Entity& participant, Handle topic);
+
+}  // namespace focalfleet::dds_internal

@@ -1,0 +1,239 @@
+#include "daemon/dds/sample_conversion.h"
+
+#include <cstring>
+#include <string_view>
+
+namespace focalfleet::dds_internal {
+namespace {
+
+// The codes that the IDL documents are our enumerators.
+static_assert(focalfleet_WITNESS_MEASURED == static_cast<int>(Witness::kMeasured));
+static_assert(focalfleet_PHASE_SILENT == static_cast<int>(UnitPhase::kSilent));
+static_assert(focalfleet_PHASE_MOVING == static_cast<int>(UnitPhase::kMoving));
+static_assert(focalfleet_STATE_HOST_LOST == static_cast<int>(UnitState::kHostLost));
+static_assert(focalfleet_FAULT_DRIVER == static_cast<int>(FaultCode::kDriver));
+static_assert(focalfleet_OUTCOME_FAILED == static_cast<int>(TargetOutcome::kFailed));
+static_assert(focalfleet_LINK_DOWN == static_cast<int>(LinkState::kDown));
+static_assert(focalfleet_CONFIGURATION_FAILED == static_cast<int>(ConfigurationState::kFailed));
+static_assert(focalfleet_SEVERITY_ERROR == static_cast<int>(Severity::kError));
+static_assert(sizeof(focalfleet_FleetStatus::units_by_phase) / sizeof(std::uint32_t) ==
+              kUnitPhaseCount);
+static_assert(sizeof(focalfleet_FleetStatus::units_by_witness) / sizeof(std::uint32_t) ==
+              kWitnessCount);
+
+constexpr Witness kLastWitness = Witness::kMeasured;
+constexpr UnitPhase kLastPhase = static_cast<UnitPhase>(kUnitPhaseCount - 1);
+constexpr UnitState kLastUnitState = static_cast<UnitState>(kUnitStateCount - 1);
+constexpr FaultCode kLastFault = static_cast<FaultCode>(kFaultCodeCount - 1);
+constexpr TargetOutcome kLastOutcome = TargetOutcome::kFailed;
+constexpr LinkState kLastLink = LinkState::kDown;
+constexpr ConfigurationState kLastState = ConfigurationState::kFailed;
+constexpr Severity kLastSeverity = Severity::kError;
+
+template <class Enum>
+constexpr std::uint8_t Code(Enum value) {
+  return static_cast<std::uint8_t>(value);
+}
+
+template <class Enum>
+bool Take(std::uint8_t code, Enum last, Enum* value) {
+  *value = static_cast<Enum>(code);
+  return code <= static_cast<std::uint8_t>(last);
+}
+
+template <std::size_t kSize>
+void CopyText(std::string_view text, char (&out)[kSize]) {
+  std::size_t length = std::min(text.size(), text.find('\0'));
+  if (length > kSize - 1) {
+    length = kSize - 1;
+    // Not inside a character: its bytes after the first are 10xxxxxx.
+    while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xc0u) == 0x80u) --length;
+  }
+  std::memcpy(out, text.data(), length);
+  std::memset(out + length, 0, kSize - length);
+}
+
+template <std::size_t kSize>
+std::string TextOf(const char (&text)[kSize]) {
+  return {text, strnlen(text, kSize)};
+}
+
+}  // namespace
+
+const char* Flaw(const UnitStatusValue& value) {
+  if (value.witness[0] > kLastWitness || value.witness[1] > kLastWitness) return "witness";
+  if (value.phase > kLastPhase) return "phase";
+  if (value.reported_state > kLastUnitState) return "reported state";
+  if (value.fault > kLastFault) return "fault";
+  if (value.outcome > kLastOutcome) return "outcome";
+  return nullptr;
+}
+const char* Flaw(const BusStatusValue& value) {
+  return value.view.link > kLastLink ? "link" : nullptr;
+}
+const char* Flaw(const ConfigurationProgressValue& value) {
+  return value.view.state > kLastState ? "state" : nullptr;
+}
+const char* Flaw(const AlarmValue& value) {
+  return value.row.severity > kLastSeverity ? "severity" : nullptr;
+}
+
+void ToSample(const UnitStatusValue& value, focalfleet_UnitStatus* sample) {
+  sample->time_ns = value.at.ns;
+  sample->theta_low_deg = value.low_deg[0];
+  sample->theta_high_deg = value.high_deg[0];
+  sample->phi_low_deg = value.low_deg[1];
+  sample->phi_high_deg = value.high_deg[1];
+  sample->x_fp_mm = value.x_fp_mm;
+  sample->y_fp_mm = value.y_fp_mm;
+  sample->theta_target_deg = value.target_deg[0];
+  sample->phi_target_deg = value.target_deg[1];
+  sample->unit_id = value.unit.value;
+  sample->serial = value.serial.value;
+  sample->bound_serial = value.bound_serial.value;
+  sample->bus_id = value.bus.value;
+  sample->move = value.move.value;
+  sample->node_id = value.node.value;
+  sample->phase = Code(value.phase);
+  sample->theta_witness = Code(value.witness[0]);
+  sample->phi_witness = Code(value.witness[1]);
+  sample->reported_state = Code(value.reported_state);
+  sample->fault = Code(value.fault);
+  sample->outcome = Code(value.outcome);
+  sample->enabled = value.enabled;
+}
+
+void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample) {
+  sample->time_ns = value.at.ns;
+  sample->frames_sent = value.view.frames_sent;
+  sample->frames_received = value.view.frames_received;
+  sample->bits = value.view.bits;
+  sample->malformed = value.view.malformed;
+  sample->retries = value.view.retries;
+  sample->load = value.view.load;
+  sample->load_max = value.view.load_max;
+  sample->bus_id = value.bus.value;
+  sample->link = Code(value.view.link);
+}
+
+void ToSample(const FleetStatusValue& value, focalfleet_FleetStatus* sample) {
+  sample->time_ns = value.at.ns;
+  sample->started_ns = value.started.ns;
+  sample->configuration = value.configuration;
+  sample->bus_load_max = value.bus_load_max;
+  sample->units = value.units;
+  sample->enabled = value.enabled;
+  std::memcpy(sample->units_by_phase, value.units_by_phase.data(), sizeof sample->units_by_phase);
+  std::memcpy(sample->units_by_witness, value.units_by_witness.data(),
+              sizeof sample->units_by_witness);
+  sample->busy = value.busy;
+  sample->store_failing = value.store_failing;
+  CopyText(value.version, sample->version);
+}
+
+void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationProgress* sample) {
+  sample->time_ns = value.at.ns;
+  sample->id = value.view.id;
+  sample->makespan_predicted_s = value.view.makespan_predicted_s;
+  sample->makespan_s = value.view.makespan_s;
+  sample->energy_J = value.view.energy_J;
+  sample->peak_power_W = value.view.peak_power_W;
+  sample->frames = value.view.frames;
+  sample->round = value.view.round;
+  sample->targeted = value.view.targeted;
+  sample->arrived = value.view.arrived;
+  sample->refused = value.view.refused;
+  sample->failed = value.view.failed;
+  sample->state = Code(value.view.state);
+  CopyText(value.view.source, sample->source);
+}
+
+void ToSample(const AlarmValue& value, focalfleet_Alarm* sample) {
+  sample->time_ns = value.at.ns;
+  sample->alarm_id = value.row.id;
+  sample->unit_id = value.row.unit ? value.row.unit->value : focalfleet_UNIT_NONE;
+  sample->bus_id = value.row.bus ? value.row.bus->value : focalfleet_BUS_NONE;
+  sample->severity = Code(value.row.severity);
+  CopyText(value.row.text, sample->text);
+}
+
+bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value) {
+  value->at = {sample.time_ns};
+  value->low_deg = {sample.theta_low_deg, sample.phi_low_deg};
+  value->high_deg = {sample.theta_high_deg, sample.phi_high_deg};
+  value->x_fp_mm = sample.x_fp_mm;
+  value->y_fp_mm = sample.y_fp_mm;
+  value->target_deg = {sample.theta_target_deg, sample.phi_target_deg};
+  value->unit = {sample.unit_id};
+  value->serial = {sample.serial};
+  value->bound_serial = {sample.bound_serial};
+  value->bus = {sample.bus_id};
+  value->node = {sample.node_id};
+  value->move = {sample.move};
+  value->enabled = sample.enabled;
+  return Take(sample.phase, kLastPhase, &value->phase) &&
+         Take(sample.theta_witness, kLastWitness, &value->witness[0]) &&
+         Take(sample.phi_witness, kLastWitness, &value->witness[1]) &&
+         Take(sample.reported_state, kLastUnitState, &value->reported_state) &&
+         Take(sample.fault, kLastFault, &value->fault) &&
+         Take(sample.outcome, kLastOutcome, &value->outcome);
+}
+
+bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value) {
+  value->at = {sample.time_ns};
+  value->view.frames_sent = sample.frames_sent;
+  value->view.frames_received = sample.frames_received;
+  value->view.bits = sample.bits;
+  value->view.malformed = sample.malformed;
+  value->view.retries = sample.retries;
+  value->view.load = sample.load;
+  value->view.load_max = sample.load_max;
+  value->bus = {sample.bus_id};
+  return Take(sample.link, kLastLink, &value->view.link);
+}
+
+bool FromSample(const focalfleet_FleetStatus& sample, FleetStatusValue* value) {
+  value->at = {sample.time_ns};
+  value->started = {sample.started_ns};
+  value->configuration = sample.configuration;
+  value->bus_load_max = sample.bus_load_max;
+  value->units = sample.units;
+  value->enabled = sample.enabled;
+  std::memcpy(value->units_by_phase.data(), sample.units_by_phase, sizeof sample.units_by_phase);
+  std::memcpy(value->units_by_witness.data(), sample.units_by_witness,
+              sizeof sample.units_by_witness);
+  value->busy = sample.busy;
+  value->store_failing = sample.store_failing;
+  value->version = TextOf(sample.version);
+  return true;
+}
+
+bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationProgressValue* value) {
+  value->at = {sample.time_ns};
+  value->view.id = sample.id;
+  value->view.makespan_predicted_s = sample.makespan_predicted_s;
+  value->view.makespan_s = sample.makespan_s;
+  value->view.energy_J = sample.energy_J;
+  value->view.peak_power_W = sample.peak_power_W;
+  value->view.frames = sample.frames;
+  value->view.round = sample.round;
+  value->view.targeted = sample.targeted;
+  value->view.arrived = sample.arrived;
+  value->view.refused = sample.refused;
+  value->view.failed = sample.failed;
+  value->view.source = TextOf(sample.source);
+  return Take(sample.state, kLastState, &value->view.state);
+}
+
+bool FromSample(const focalfleet_Alarm& sample, AlarmValue* value) {
+  value->at = {sample.time_ns};
+  value->row.id = sample.alarm_id;
+  value->row.unit.reset();
+  value->row.bus.reset();
+  if (sample.unit_id != focalfleet_UNIT_NONE) value->row.unit = UnitId{sample.unit_id};
+  if (sample.bus_id != focalfleet_BUS_NONE) value->row.bus = BusId{sample.bus_id};
+  value->row.text = TextOf(sample.text);
+  return Take(sample.severity, kLastSeverity, &value->row.severity);
+}
+
+}  // namespace focalfleet::dds_internal
