@@ -1,0 +1,95 @@
+#include "fleet/coordinate/bus_schedule.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/base/limits.h"
+#include "protocol/wire/codec.h"
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr BusId kBus{3};
+constexpr std::uint32_t kBitRate = 1'000'000;
+constexpr HostInstant kNow{1'000'000'000};
+
+CanFrame Frame(const HostMessage& message, std::uint8_t node = 1) {
+  return Encode(message, {NodeId{node}, 1});
+}
+
+struct Released {
+  std::vector<OutFrame> frames;
+  std::vector<PositionerIndex> asked;
+};
+Released Release(BusSchedule* schedule, HostInstant now, DurationNs horizon = Milliseconds(4)) {
+  Released released;
+  schedule->Release(now, horizon, kBus, &released.frames, &released.asked);
+  return released;
+}
+
+TEST(BusSchedule, UrgentFramesPassAllThatWait) {
+  BusSchedule schedule(kBitRate);
+  ASSERT_TRUE(schedule.Enqueue({Frame(StatusRequest{}), 0, {}}));
+  ASSERT_TRUE(schedule.Enqueue({Frame(Confirm{{1}}), 0, {}}));
+  ASSERT_TRUE(schedule.Enqueue({Frame(Stop{}), 0, {}}));
+  const auto released = Release(&schedule, kNow);
+  ASSERT_EQ(released.frames.size(), 3u);
+  EXPECT_EQ(released.frames[0].frame, Frame(Stop{}));
+  EXPECT_EQ(released.frames[1].frame, Frame(Confirm{{1}}));
+}
+
+TEST(BusSchedule, ReleasesNoMoreThanTheHorizonTakes) {
+  BusSchedule schedule(kBitRate);
+  const CanFrame frame = Frame(StageSegment{Axis::kPhi, 0, {100, 200, 108}});
+  for (int n = 0; n < 500; ++n) ASSERT_TRUE(schedule.Enqueue({frame, 0, {}}));
+  const DurationNs one = BitTime(FrameBits(frame), kBitRate);
+  std::size_t sent = 0;
+  HostInstant now = kNow;
+  for (; schedule.waiting() != 0; now = schedule.ReadyAt(Milliseconds(4))) {
+    const std::size_t batch = Release(&schedule, now).frames.size();
+    EXPECT_LE(one * static_cast<std::int64_t>(batch), Milliseconds(4) + one);
+    sent += batch;
+  }
+  EXPECT_EQ(sent, 500u);
+  // The bus was kept busy: no longer than the frames take, and not faster than they fit.
+  EXPECT_GE(now - kNow + Milliseconds(4), one * 499);
+}
+
+TEST(BusSchedule, ChargesTheAnswerWithTheQuestion) {
+  BusSchedule with(kBitRate);
+  BusSchedule without(kBitRate);
+  for (int n = 0; n < 100; ++n) {
+    ASSERT_TRUE(with.Enqueue({Frame(StatusRequest{}), 145, {}}));
+    ASSERT_TRUE(without.Enqueue({Frame(StatusRequest{}), 0, {}}));
+  }
+  EXPECT_LT(Release(&with, kNow).frames.size(), Release(&without, kNow).frames.size() / 2 + 1);
+}
+
+TEST(BusSchedule, FullQueueRefusesAndTakesAgainWhenThereIsRoom) {
+  BusSchedule schedule(kBitRate);
+  for (std::uint32_t n = 0; n < limits::kFramesPerBusQueued; ++n)
+    ASSERT_TRUE(schedule.Enqueue({Frame(StatusRequest{}), 0, {}}));
+  EXPECT_FALSE(schedule.Enqueue({Frame(StatusRequest{}), 0, {}}));
+  Release(&schedule, kNow);
+  EXPECT_TRUE(schedule.Enqueue({Frame(StatusRequest{}), 0, {}}));
+}
+
+TEST(BusSchedule, DropForgetsOneNodeOnly) {
+  BusSchedule schedule(kBitRate);
+  for (const std::uint8_t node : {1, 2, 1, 3})
+    ASSERT_TRUE(schedule.Enqueue({Frame(StatusRequest{}, node), 0, {}}));
+  EXPECT_EQ(schedule.Drop(NodeId{1}), 2u);
+  EXPECT_EQ(schedule.waiting(), 2u);
+}
+
+TEST(BusSchedule, NamesWhoseQuestionLeft) {
+  BusSchedule schedule(kBitRate);
+  ASSERT_TRUE(schedule.Enqueue({Frame(StatusRequest{}), 145, PositionerIndex{42}}));
+  const auto released = Release(&schedule, kNow);
+  ASSERT_EQ(released.asked.size(), 1u);
+  EXPECT_EQ(released.asked[0].value, 42u);
+  EXPECT_EQ(schedule.ReadyAt(Milliseconds(4)), kNever);
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,102 @@
+// Every combination of what a unit can say and what the store can remember, against the rule as a
+// person would say it: never a place that is not certain, never less than what is certain.
+#include "fleet/coordinate/reconcile.h"
+
+#include <gtest/gtest.h>
+
+namespace focalfleet {
+namespace {
+
+constexpr MoveId kOurs{7};
+constexpr MoveId kEarlier{6};
+constexpr Pose kFrom{100, 200};
+constexpr Pose kTo{-300, 900};
+constexpr Pose kElsewhere{41, 42};
+
+UnitSays Unit(bool interrupted, MoveId last, Pose position) {
+  UnitSays says{.status = {.interrupted = interrupted, .move = last}, .position = position};
+  says.subdivision = {96, 96};
+  return says;
+}
+
+VectorRow Stored(UnitKnowledge knowledge) {
+  return {.knowledge = knowledge, .subdivision = {96, 96}};
+}
+
+IntentRow Intent() {
+  IntentRow row{.move = kOurs, .from = kFrom, .to = kTo};
+  row.hull = {AxisKnowledge{Witness::kInterval, -300, 150},
+              AxisKnowledge{Witness::kInterval, 200, 950}};
+  return row;
+}
+
+TEST(Reconcile, EveryCombinationIsTruthful) {
+  for (const bool interrupted : {false, true})
+    for (const bool began : {false, true})
+      for (const Pose position : {kFrom, kTo, kElsewhere})
+        for (const bool intent : {false, true}) {
+          StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom))};
+          if (intent) store.intent = Intent();
+          const Reconciled result =
+              Reconcile(Unit(interrupted, began ? kOurs : kEarlier, position), store);
+          const bool place = IsPlace(result.knowledge);
+          if (interrupted) {
+            EXPECT_FALSE(place);
+            EXPECT_EQ(result.knowledge[0].witness == Witness::kInterval, intent && began);
+          } else if (intent && began) {
+            EXPECT_TRUE(place);  // it ended by itself; its own word counts
+          } else {
+            EXPECT_EQ(place, position == kFrom);
+          }
+          if (place) {
+            EXPECT_EQ(PlaceOf(result.knowledge), position);
+          } else {
+            EXPECT_STRNE(result.reason, "");
+          }
+          EXPECT_EQ(result.intent_end.has_value(), intent);
+        }
+}
+
+TEST(Reconcile, IntentEndsAsWhatHappened) {
+  const StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom)), .intent = Intent()};
+  EXPECT_EQ(Reconcile(Unit(false, kOurs, kTo), store).intent_end, IntentEnd::kArrived);
+  EXPECT_EQ(Reconcile(Unit(false, kOurs, kElsewhere), store).intent_end, IntentEnd::kStopped);
+  EXPECT_EQ(Reconcile(Unit(false, kEarlier, kFrom), store).intent_end, IntentEnd::kNeverBegan);
+  EXPECT_EQ(Reconcile(Unit(true, kOurs, kFrom), store).intent_end, IntentEnd::kInterrupted);
+}
+
+TEST(Reconcile, IntervalIsTheHullAndHalfAnElectricalTurn) {
+  const StoreSays store{.vector = Stored(Exactly(Witness::kReported, kFrom)), .intent = Intent()};
+  const auto knowledge = Reconcile(Unit(true, kOurs, kFrom), store).knowledge;
+  EXPECT_EQ(knowledge[0], (AxisKnowledge{Witness::kInterval, -348, 198}));
+  EXPECT_EQ(knowledge[1], (AxisKnowledge{Witness::kInterval, 152, 998}));
+}
+
+TEST(Reconcile, IntervalStaysUntilHomedWhateverFlashSays) {
+  UnitKnowledge interval{AxisKnowledge{Witness::kInterval, 0, 500},
+                         AxisKnowledge{Witness::kInterval, 3, 4}};
+  const StoreSays store{.vector = Stored(interval)};
+  for (const bool interrupted : {false, true})
+    EXPECT_EQ(Reconcile(Unit(interrupted, kOurs, kTo), store).knowledge, interval);
+}
+
+TEST(Reconcile, MeasuredStaysMeasuredWhileNothingMoved) {
+  const StoreSays store{.vector = Stored(Exactly(Witness::kMeasured, kFrom))};
+  EXPECT_EQ(Reconcile(Unit(false, kEarlier, kFrom), store).knowledge[0].witness,
+            Witness::kMeasured);
+}
+
+TEST(Reconcile, FirstContactIsReportedUnlessInterrupted) {
+  EXPECT_EQ(Reconcile(Unit(false, {}, kTo), {}).knowledge, Exactly(Witness::kReported, kTo));
+  EXPECT_FALSE(IsPlace(Reconcile(Unit(true, {}, kTo), {}).knowledge));
+}
+
+TEST(Reconcile, OtherSubdivisionIsUnknown) {
+  UnitSays says = Unit(false, kEarlier, kFrom);
+  says.subdivision = {96, 48};
+  EXPECT_FALSE(
+      IsPlace(Reconcile(says, {.vector = Stored(Exactly(Witness::kReported, kFrom))}).knowledge));
+}
+
+}  // namespace
+}  // namespace focalfleet

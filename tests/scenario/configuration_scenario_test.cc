@@ -1,0 +1,375 @@
+// A configuration from command to rest on the in-process fleet: all well, and one thing wrong at a
+// time.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "tests/scenario/in_process_fleet.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet::testing {
+namespace {
+
+InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
+
+// Until somebody moves, and then a little longer: in the middle of the motion.
+void RunIntoMotion(InProcessFleet* fleet, DurationNs further) {
+  ASSERT_TRUE(fleet->RunUntil(
+      [&] { return fleet->coordinator().configuration().state == ConfigurationState::kMoving; },
+      Seconds(60)));
+  fleet->Run(further);
+}
+
+// The first unit that moves at `now` and for some time to come.
+PositionerIndex SomebodyMoving(InProcessFleet* fleet) {
+  for (std::uint32_t n = 0; n < fleet->layout().size(); ++n)
+    if (fleet->world().Truth(n).state == UnitState::kMoving) return {n};
+  ADD_FAILURE() << "nobody moves";
+  return {0};
+}
+
+bool HasAlarm(const InProcessFleet& fleet, const std::string& part) {
+  auto& alarms = const_cast<InProcessFleet&>(fleet).store().alarms;
+  return std::any_of(alarms.begin(), alarms.end(), [&](const AlarmRow& alarm) {
+    return alarm.text.find(part) != std::string::npos;
+  });
+}
+
+void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than) {
+  EXPECT_GE(fleet->CountOutcome(TargetOutcome::kArrived), fleet->layout().size() - others_than);
+  fleet->ExpectStoreTellsTheTruth("at the end");
+  EXPECT_TRUE(fleet->store().fleet.open_intents.empty());
+}
+
+TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet(Small(seed));
+    const auto request = fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+    EXPECT_EQ(fleet.coordinator().configuration().arrived, 37u);
+    EXPECT_EQ(fleet.coordinator().configuration().round, 1u);
+    ASSERT_TRUE(fleet.LastReply(request));
+    EXPECT_TRUE(fleet.LastReply(request)->last);
+    ExpectOthersArrive(&fleet, 0);
+    EXPECT_TRUE(fleet.store().alarms.empty());
+  }
+}
+
+TEST(Configuration, SecondOneStartsFromWhereTheFirstEnded) {
+  InProcessFleet fleet(Small(5));
+  for (const std::uint64_t seed : {10, 11, 12}) {
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+  }
+  fleet.ExpectStoreTellsTheTruth("after three configurations");
+}
+
+TEST(Configuration, NothingStartsBeforeTheIntentIsDurable) {
+  auto options = Small(6);
+  options.commit_delay = Seconds(3);
+  InProcessFleet fleet(options);
+  fleet.ApplyRandom(6);
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] {
+        for (std::size_t n = 0; n < fleet.layout().size(); ++n)
+          if (fleet.world().Truth(n).moves_begun != 0) return true;
+        return false;
+      },
+      Seconds(120)));
+  EXPECT_EQ(fleet.store().begun.size(), fleet.store().fleet.open_intents.size());
+  EXPECT_GE(fleet.store().begun.size(), 30u);
+}
+
+TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
+  InProcessFleet fleet(Small(7));
+  fleet.Run(Seconds(5));
+  fleet.ApplyRandom(7);
+  fleet.Run(Milliseconds(25));
+  fleet.store_fails = true;
+  fleet.Run(Seconds(30));
+  for (std::size_t n = 0; n < fleet.layout().size(); ++n)
+    EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u);
+  fleet.store_fails = false;
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+  fleet.store_fails = true;
+  const auto refused = fleet.ApplyRandom(8);
+  fleet.Run(Seconds(1));
+  ASSERT_TRUE(fleet.LastReply(refused));
+  EXPECT_TRUE(fleet.LastReply(refused)->error);
+}
+
+TEST(Configuration, WhileOneRunsAnotherIsRefused) {
+  InProcessFleet fleet(Small(9));
+  fleet.ApplyRandom(9);
+  RunIntoMotion(&fleet, Seconds(1));
+  const auto second = fleet.ApplyRandom(10);
+  fleet.Run(Seconds(1));
+  ASSERT_TRUE(fleet.LastReply(second));
+  ASSERT_TRUE(fleet.LastReply(second)->error);
+  EXPECT_EQ(fleet.LastReply(second)->error->code, ErrorCode::kRefused);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+}
+
+TEST(Configuration, SilentUnitIsNamedAndTheOthersArrive) {
+  InProcessFleet fleet(Small(11));
+  fleet.Run(Seconds(2));
+  fleet.world().faults(fleet.id(4))->silent = true;
+  fleet.ApplyRandom(11);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  const UnitView& view = fleet.coordinator().unit({4});
+  EXPECT_EQ(view.outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(view.phase, UnitPhase::kSilent);
+  EXPECT_NE(view.outcome_reason, "");
+  EXPECT_TRUE(HasAlarm(fleet, "unit 5 does not answer"));
+  ExpectOthersArrive(&fleet, 4);  // its neighbours' targets may be blocked by where it stands
+}
+
+TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
+  InProcessFleet fleet(Small(12));
+  fleet.world().faults(fleet.id(0))->deaf = true;
+  fleet.ApplyRandom(12);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({0}).outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(fleet.coordinator().unit({0}).phase, UnitPhase::kAbsent);
+  // Nobody knows where it stands, so its six neighbours keep out of its whole reach.
+  EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
+}
+
+TEST(Configuration, LateAndDoubledAnswersAreNoTrouble) {
+  InProcessFleet fleet(Small(13));
+  for (std::uint32_t n = 0; n < 37; ++n) {
+    fleet.world().faults(fleet.id(n))->late = Milliseconds(n * 2);  // up to past the deadline
+    fleet.world().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
+  }
+  fleet.ApplyRandom(13);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+TEST(Configuration, WrongReadBackIsRetriedThenNamed) {
+  InProcessFleet fleet(Small(14));
+  fleet.world().faults(fleet.id(7))->wrong_digest = true;
+  fleet.ApplyRandom(14);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({7}).outcome, TargetOutcome::kFailed);
+  EXPECT_NE(fleet.coordinator().unit({7}).outcome_reason.find("read-back"), std::string::npos);
+  EXPECT_EQ(fleet.world().Truth(std::size_t{7}).moves_begun, 0u);
+  ExpectOthersArrive(&fleet, 4);
+}
+
+TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
+  InProcessFleet fleet(Small(15));
+  fleet.world().faults(fleet.id(3))->in_motion = sim::UnitFaults::InMotion{.after = Seconds(2)};
+  fleet.ApplyRandom(15);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({3}).outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kFault);
+  EXPECT_EQ(fleet.coordinator().unit({3}).knowledge[0].witness, Witness::kReported);
+  ExpectOthersArrive(&fleet, 4);
+}
+
+TEST(Configuration, LostDoneReportsAreAskedFor) {
+  InProcessFleet fleet(Small(16));
+  for (const std::uint32_t n : {1u, 8u, 20u}) fleet.world().faults(fleet.id(n))->mute_done = true;
+  fleet.ApplyRandom(16);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+TEST(Configuration, FramesLostAtRandomDelayButDoNotFail) {
+  for (const std::uint64_t seed : {17, 18, 19}) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet(Small(seed));
+    for (const BusId bus : fleet.layout().buses()) {
+      fleet.world().faults(bus)->drop = 0.02;
+      fleet.world().faults(bus)->duplicate = 0.02;
+    }
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    ExpectOthersArrive(&fleet, 2);
+  }
+}
+
+TEST(Configuration, DeadBusTakesOnlyItsUnits) {
+  InProcessFleet fleet(Small(20));
+  fleet.Run(Seconds(2));
+  const BusId dead = fleet.layout().buses()[1];
+  fleet.world().KillBus(dead);
+  fleet.ApplyRandom(20);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  for (std::uint32_t n = 0; n < 37; ++n) {
+    const UnitView& view = fleet.coordinator().unit({n});
+    if (fleet.layout().units()[n].bus == dead) {
+      EXPECT_EQ(view.outcome, TargetOutcome::kFailed) << n;
+      EXPECT_EQ(view.phase, UnitPhase::kSilent) << n;
+      EXPECT_TRUE(IsPlace(view.knowledge)) << n;  // it stood still, and that is known
+    }
+  }
+  EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 15u);
+  fleet.world().ReviveBus(dead);
+  fleet.Run(Seconds(10));
+  fleet.ApplyRandom(21);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+TEST(Configuration, PowerCutInMidMoveLeavesAnIntervalThatHoldsTheTruth) {
+  InProcessFleet fleet(Small(22));
+  fleet.ApplyRandom(22);
+  RunIntoMotion(&fleet, Seconds(2));
+  const PositionerIndex victim = SomebodyMoving(&fleet);
+  fleet.world().PowerCut(fleet.id(victim.value));
+  fleet.Run(Seconds(3));
+  fleet.world().PowerOn(fleet.id(victim.value));
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.Run(Seconds(15));
+  const UnitView& view = fleet.coordinator().unit(victim);
+  EXPECT_EQ(view.knowledge[0].witness, Witness::kInterval);
+  EXPECT_EQ(view.phase, UnitPhase::kReady);
+  fleet.ExpectStoreTellsTheTruth("after the power cut");
+
+  // It is refused by name until it is homed, and then it arrives.
+  fleet.ApplyRandom(22);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit(victim).outcome, TargetOutcome::kRefused);
+  fleet.Send({1000, HomeCommand{{victim}}});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit(victim).knowledge[0].witness, Witness::kReported)
+      << fleet.coordinator().unit(victim).outcome_reason;
+  fleet.ExpectStoreTellsTheTruth("after homing");
+  fleet.ApplyRandom(22);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+TEST(Configuration, StopOfAllLeavesEveryUnitAtAKnownPlace) {
+  InProcessFleet fleet(Small(23));
+  fleet.ApplyRandom(23);
+  RunIntoMotion(&fleet, Seconds(3));
+  fleet.Send({900, StopCommand{}});
+  ASSERT_TRUE(fleet.RunUntilIdle(Seconds(10)));
+  EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kStopped);
+  for (std::uint32_t n = 0; n < 37; ++n) {
+    EXPECT_TRUE(IsPlace(fleet.coordinator().unit({n}).knowledge)) << n;
+    EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << n;
+  }
+  fleet.ExpectStoreTellsTheTruth("after the stop");
+  fleet.ApplyRandom(23);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+TEST(Configuration, StopInEveryStateEndsTheConfiguration) {
+  for (int ms = 0; ms < 1500; ms += 50) {
+    InProcessFleet fleet(Small(24));
+    fleet.Run(Seconds(1));
+    fleet.ApplyRandom(24);
+    fleet.Run(Milliseconds(ms));
+    fleet.Send({900, StopCommand{}});
+    ASSERT_TRUE(fleet.RunUntilIdle(Seconds(10))) << ms;
+    fleet.Run(Seconds(2));
+    for (std::uint32_t n = 0; n < 37; ++n)
+      EXPECT_EQ(fleet.world().Truth(n).state, UnitState::kRest) << ms << " ms, row " << n;
+    fleet.ExpectStoreTellsTheTruth(std::to_string(ms) + " ms");
+  }
+}
+
+TEST(Configuration, StopOfOneUnitLetsTheOthersArrive) {
+  InProcessFleet fleet(Small(25));
+  fleet.ApplyRandom(25);
+  RunIntoMotion(&fleet, Seconds(1));
+  const PositionerIndex one = SomebodyMoving(&fleet);
+  fleet.Send({900, StopCommand{one}});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit(one).outcome, TargetOutcome::kFailed);
+  EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge));
+  ExpectOthersArrive(&fleet, 4);
+}
+
+TEST(Configuration, ForeignHardwareIsNotMovedUntilAdopted) {
+  InProcessFleet fleet(Small(26));
+  fleet.ApplyRandom(26);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.world().faults(fleet.id(2))->foreign_serial = SerialNumber{99'999};
+  fleet.Restart();
+  fleet.ApplyRandom(27);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({2}).phase, UnitPhase::kForeign);
+  EXPECT_EQ(fleet.coordinator().unit({2}).outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(fleet.coordinator().unit({2}).knowledge[0].witness, Witness::kUnknown);
+  EXPECT_EQ(fleet.world().Truth(std::size_t{2}).moves_begun, 1u);
+  fleet.Send({901, AdoptCommand{{2}}});
+  fleet.Run(Seconds(2));
+  EXPECT_EQ(fleet.coordinator().unit({2}).phase, UnitPhase::kReady);
+  fleet.ApplyRandom(27);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+}
+
+TEST(Configuration, DisabledUnitIsPassedOverByName) {
+  InProcessFleet fleet(Small(28));
+  fleet.Run(Seconds(2));
+  fleet.Send({902, EnableCommand{{{5}}, false, "fibre broken"}});
+  fleet.ApplyRandom(28);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({5}).outcome, TargetOutcome::kRefused);
+  EXPECT_NE(fleet.coordinator().unit({5}).outcome_reason.find("fibre broken"), std::string::npos);
+  EXPECT_EQ(fleet.world().Truth(std::size_t{5}).moves_begun, 0u);
+  ExpectOthersArrive(&fleet, 4);
+}
+
+TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet({.count = 19, .seed = seed});
+    Rng rng = Rng::Stream(seed, "kill");
+    fleet.ApplyRandom(seed);
+    fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 40'000))));
+    const bool cut = rng.Uniform() < 0.5;
+    const UnitId victim = fleet.id(static_cast<std::uint32_t>(rng.Below(19)));
+    if (cut) fleet.world().PowerCut(victim);
+    fleet.Restart();
+    if (cut) {
+      fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 5000))));
+      fleet.world().PowerOn(victim);
+    }
+    fleet.Run(Seconds(120));
+    fleet.ExpectStoreTellsTheTruth("after the kill");
+    std::vector<PositionerIndex> lost;
+    for (std::uint32_t n = 0; n < 19; ++n) {
+      const UnitView& view = fleet.coordinator().unit({n});
+      EXPECT_EQ(view.phase, UnitPhase::kReady) << n;
+      if (IsPlace(view.knowledge)) continue;
+      EXPECT_TRUE(cut && fleet.id(n) == victim) << "row " << n << " lost power? no";
+      lost.push_back({n});
+    }
+    if (!lost.empty()) {
+      fleet.Send({903, HomeCommand{lost}});
+      ASSERT_TRUE(fleet.RunUntilIdle());
+    }
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    ExpectOthersArrive(&fleet, 0);
+  }
+}
+
+TEST(Configuration, SameSeedSameFrames) {
+  std::uint64_t digests[2];
+  for (auto& digest : digests) {
+    InProcessFleet fleet(Small(31));
+    for (const BusId bus : fleet.layout().buses()) fleet.world().faults(bus)->drop = 0.01;
+    fleet.ApplyRandom(31);
+    EXPECT_TRUE(fleet.RunUntilIdle());
+    digest = fleet.digest();
+  }
+  EXPECT_EQ(digests[0], digests[1]);
+}
+
+}  // namespace
+}  // namespace focalfleet::testing

@@ -1,0 +1,235 @@
+#include "tests/scenario/in_process_fleet.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fleet/hex_layout.h"
+#include "fleet/plan/job.h"
+#include "fleet/targets.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet::testing {
+namespace {
+
+// Between two steps at least this much time passes, as between two turns of the daemon's loop.
+constexpr DurationNs kTurn = Microseconds(200);
+
+// At rest the rotor lags the field by the angle whose sine is load over stall torque, 15 degrees of
+// 360 at 1.8 V; a motion that was cut anywhere may leave it up to a quarter of an electrical turn
+// behind.
+constexpr double kLagVectorsMax = 24;
+
+sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDrive& drive) {
+  sim::UnitDescription described{.id = unit.id,
+                                 .bus = unit.bus,
+                                 .node = unit.node,
+                                 .serial = {},
+                                 .base_x_mm = unit.base_fp.x_mm,
+                                 .base_y_mm = unit.base_fp.y_mm,
+                                 .axis = {},
+                                 .enabled = unit.enabled};
+  for (const Axis axis : kAxes) {
+    const AxisGeometry& g = unit.axis[Index(axis)];
+    described.axis[Index(axis)] = {
+        g.arm_mm,  g.zero_deg, g.gear,
+        g.min_deg, g.max_deg,  AngleDeg(pose[Index(axis)], g, drive.axis[Index(axis)])};
+  }
+  return described;
+}
+
+}  // namespace
+
+void MemoryStore::Commit(const std::vector<Row>& rows) {
+  for (const Row& any : rows) {
+    if (const auto* vector = std::get_if<VectorRow>(&any)) {
+      std::erase_if(fleet.vectors,
+                    [&](const VectorRow& row) { return row.serial == vector->serial; });
+      fleet.vectors.push_back(*vector);
+    } else if (const auto* intent = std::get_if<IntentRow>(&any)) {
+      fleet.open_intents.push_back(*intent);
+      begun.push_back(*intent);
+    } else if (const auto* end = std::get_if<IntentEndRow>(&any)) {
+      std::erase_if(fleet.open_intents, [&](const IntentRow& row) {
+        return row.serial == end->serial && row.move == end->move;
+      });
+      ended.push_back(*end);
+    } else if (const auto* binding = std::get_if<BindingRow>(&any)) {
+      std::erase_if(fleet.units, [&](const auto& row) { return row.unit == binding->unit; });
+      fleet.units.push_back({binding->unit, binding->serial, true, {}});
+    } else if (const auto* alarm = std::get_if<AlarmRow>(&any)) {
+      alarms.push_back(*alarm);
+      fleet.next_alarm = alarm->id + 1;
+    } else if (const auto* next = std::get_if<NextMoveRow>(&any)) {
+      fleet.next_move = next->next;
+    } else if (const auto* configuration = std::get_if<ConfigurationRow>(&any)) {
+      configurations.push_back(*configuration);
+      fleet.next_configuration = configuration->id + 1;
+    } else if (const auto* enable = std::get_if<EnableRow>(&any)) {
+      for (auto& row : fleet.units)
+        if (row.unit == enable->unit) row.enabled = enable->enabled, row.reason = enable->reason;
+    } else if (const auto* parameter = std::get_if<ParameterRow>(&any)) {
+      fleet.parameters.push_back(*parameter);
+    }
+  }
+}
+
+const VectorRow* MemoryStore::Vector(SerialNumber serial) const {
+  for (const VectorRow& row : fleet.vectors)
+    if (row.serial == serial) return &row;
+  return nullptr;
+}
+
+InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
+  auto layout = Layout::Create(
+      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus}), {});
+  FOCALFLEET_CHECK(layout.has_value());
+  layout_ = std::make_unique<Layout>(std::move(*layout));
+  drives_.assign(layout_->size(), UnitDrive{});
+  const auto start = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(options.seed, "start"));
+  FOCALFLEET_CHECK(start.has_value());
+  sim::WorldConfig config{.units = {}, .seed = options.seed, .spread = options.spread};
+  for (std::uint32_t n = 0; n < layout_->size(); ++n)
+    config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
+  config.start = now_;
+  FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
+  world_ = std::make_unique<sim::World>(std::move(config));
+  Restart();
+}
+
+void InProcessFleet::Restart() {
+  commits_.clear();  // what was not durable is gone
+  planning_.clear();
+  commands_.clear();
+  committed_through_ = 0;
+  coordinator_ =
+      std::make_unique<Coordinator>(layout_.get(), drives_, options_.config, store_.fleet);
+  wake_at_ = now_;
+}
+
+void InProcessFleet::StepOnce() {
+  heard_.clear();
+  world_->AdvanceTo(now_, &heard_);
+  std::vector<PlanDone> plans;
+  while (!planning_.empty() && planning_.front().at <= now_) {
+    plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
+    planning_.pop_front();
+  }
+  while (!store_fails && !commits_.empty() && commits_.front().at <= now_) {
+    store_.Commit(commits_.front().rows);
+    committed_through_ = commits_.front().batch;
+    commits_.pop_front();
+  }
+  effects_.Clear();
+  coordinator_->Step({.now = now_,
+                      .frames = heard_,
+                      .links = {},
+                      .commands = commands_,
+                      .plans = plans,
+                      .committed_through = committed_through_,
+                      .store_failing = store_fails},
+                     &effects_);
+  commands_.clear();
+  Perform(effects_);
+}
+
+void InProcessFleet::Perform(const Effects& effects) {
+  if (!effects.rows.empty())
+    commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});
+  for (const OutFrame& out : effects.frames) {
+    world_->Inject(out.bus, out.frame, now_);
+    for (const std::uint64_t word : {std::uint64_t{out.bus.value}, std::uint64_t{out.frame.id},
+                                     static_cast<std::uint64_t>(now_.ns)})
+      digest_ = (digest_ ^ word) * 0x100000001b3u;
+    for (const std::uint8_t byte : out.frame.payload()) digest_ = (digest_ ^ byte) * 0x100000001b3u;
+  }
+  if (effects.plan_job) planning_.push_back({now_ + options_.plan_delay, *effects.plan_job});
+  replies_.insert(replies_.end(), effects.replies.begin(), effects.replies.end());
+  wake_at_ = effects.wake_at;
+}
+
+bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limit) {
+  const HostInstant end = now_ + limit;
+  for (;;) {
+    StepOnce();
+    if (done()) return true;
+    HostInstant next = std::min(wake_at_, world_->NextEvent());
+    if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
+    if (!planning_.empty()) next = std::min(next, planning_.front().at);
+    if (!commands_.empty()) next = now_;
+    next = std::max(next, now_ + kTurn);
+    if (next > end) {
+      now_ = end;
+      StepOnce();
+      return done();
+    }
+    now_ = next;
+  }
+}
+
+void InProcessFleet::Run(DurationNs duration) {
+  RunUntil([] { return false; }, duration);
+}
+
+bool InProcessFleet::RunUntilIdle(DurationNs limit) {
+  return RunUntil([&] { return commands_.empty() && !coordinator_->busy(); }, limit);
+}
+
+void InProcessFleet::Send(Command command) { commands_.push_back(std::move(command)); }
+
+std::uint64_t InProcessFleet::Apply(std::vector<std::optional<Pose>> targets) {
+  const std::uint64_t request = next_request_++;
+  Send({request, ApplyCommand{"test", std::move(targets), false}});
+  return request;
+}
+
+std::uint64_t InProcessFleet::ApplyRandom(std::uint64_t seed) {
+  std::vector<std::optional<Pose>> standing(layout_->size());
+  const auto poses = DrawConfiguration(*layout_, drives_, standing, Rng::Stream(seed, "targets"));
+  FOCALFLEET_CHECK(poses.has_value());
+  return Apply({poses->begin(), poses->end()});
+}
+
+std::optional<ReplyEffect> InProcessFleet::LastReply(std::uint64_t request) const {
+  for (auto it = replies_.rbegin(); it != replies_.rend(); ++it)
+    if (it->request == request) return *it;
+  return std::nullopt;
+}
+
+std::uint32_t InProcessFleet::CountOutcome(TargetOutcome outcome) const {
+  std::uint32_t count = 0;
+  for (std::uint32_t n = 0; n < layout_->size(); ++n)
+    count += coordinator_->unit({n}).outcome == outcome ? 1 : 0;
+  return count;
+}
+
+std::vector<Pose> InProcessFleet::TruePoses() const {
+  std::vector<Pose> poses;
+  for (std::size_t n = 0; n < layout_->size(); ++n) {
+    const sim::UnitTruth truth = world_->Truth(n);
+    poses.push_back({static_cast<std::int32_t>(std::lround(truth.vectors[0])),
+                     static_cast<std::int32_t>(std::lround(truth.vectors[1]))});
+  }
+  return poses;
+}
+
+void InProcessFleet::ExpectStoreTellsTheTruth(const std::string& when) const {
+  for (std::size_t n = 0; n < layout_->size(); ++n) {
+    const UnitView& view = coordinator_->unit({static_cast<std::uint32_t>(n)});
+    const VectorRow* row = store_.Vector(view.serial);
+    const sim::UnitTruth truth = world_->Truth(n);
+    EXPECT_EQ(truth.begun_twice, 0u) << when << ": unit " << truth.id.value;
+    ASSERT_NE(row, nullptr) << when << ": unit " << truth.id.value;
+    for (const Axis axis : kAxes) {
+      const AxisKnowledge& known = row->knowledge[Index(axis)];
+      if (known.witness == Witness::kUnknown) continue;
+      EXPECT_GE(truth.vectors[Index(axis)], known.low - kLagVectorsMax)
+          << when << ": unit " << truth.id.value << " " << Name(axis) << " " << Name(known.witness);
+      EXPECT_LE(truth.vectors[Index(axis)], known.high + kLagVectorsMax)
+          << when << ": unit " << truth.id.value << " " << Name(axis) << " " << Name(known.witness);
+    }
+  }
+}
+
+}  // namespace focalfleet::testing

@@ -1,0 +1,112 @@
+// The whole fleet in one process and on virtual time: the real coordinator, the real planner, the
+// simulated world, and a store in memory that commits after a delay, can fail, and outlives the
+// coordinator. What a scenario test drives. The same options and seed give the same run, bit for
+// bit.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "fleet/coordinator.h"
+#include "fleet/layout.h"
+#include "sim/world.h"
+
+namespace focalfleet::testing {
+
+/// Rows as the store would hold them; a restart begins from `fleet`.
+struct MemoryStore {
+  StoredFleet fleet;
+  std::vector<IntentEndRow> ended;
+  std::vector<IntentRow> begun;  // all intents that were ever durable
+  std::vector<AlarmRow> alarms;
+  std::vector<ConfigurationRow> configurations;
+
+  void Commit(const std::vector<Row>& rows);
+  [[nodiscard]] const VectorRow* Vector(SerialNumber serial) const;
+};
+
+class InProcessFleet {
+ public:
+  struct Options {
+    std::uint32_t count = 37;
+    std::uint32_t units_per_bus = 10;
+    std::uint64_t seed = 1;
+    DurationNs commit_delay = Milliseconds(5);
+    DurationNs plan_delay = Milliseconds(20);
+    CoordinatorConfig config;
+    sim::Spread spread = sim::Spread::kNominal;
+  };
+
+  explicit InProcessFleet(const Options& options);
+
+  /// Virtual time passes; the coordinator steps whenever it has something to do.
+  void Run(DurationNs duration);
+  /// True as soon as `done` is; false when `limit` has passed.
+  bool RunUntil(const std::function<bool()>& done, DurationNs limit);
+  /// Until no configuration is under way. Default limit: no configuration of these sizes takes
+  /// longer.
+  bool RunUntilIdle(DurationNs limit = Seconds(900));
+
+  void Send(Command command);
+  /// Applies a random configuration that is clear of what stands; returns its request number.
+  std::uint64_t ApplyRandom(std::uint64_t seed);
+  std::uint64_t Apply(std::vector<std::optional<Pose>> targets);
+
+  /// kill -9 and a new start: nothing of the coordinator survives but the store; the world goes on.
+  void Restart();
+
+  [[nodiscard]] std::optional<ReplyEffect> LastReply(std::uint64_t request) const;
+  /// Fails the running test where a unit's true angle is not where the store says it is.
+  void ExpectStoreTellsTheTruth(const std::string& when) const;
+  [[nodiscard]] std::uint32_t CountOutcome(TargetOutcome outcome) const;
+  [[nodiscard]] std::vector<Pose> TruePoses() const;  // nearest vectors
+  [[nodiscard]] UnitId id(std::uint32_t n) const { return layout_->units()[n].id; }
+
+  [[nodiscard]] HostInstant now() const { return now_; }
+  [[nodiscard]] Coordinator& coordinator() { return *coordinator_; }
+  [[nodiscard]] sim::World& world() { return *world_; }
+  [[nodiscard]] const Layout& layout() const { return *layout_; }
+  [[nodiscard]] MemoryStore& store() { return store_; }
+  [[nodiscard]] std::uint64_t digest() const { return digest_; }
+
+  bool store_fails = false;
+
+ private:
+  void StepOnce();
+  void Perform(const Effects& effects);
+
+  struct Commit {
+    HostInstant at;
+    std::uint64_t batch;
+    std::vector<Row> rows;
+  };
+  struct Planning {
+    HostInstant at;
+    PlanJob job;
+  };
+
+  Options options_;
+  std::unique_ptr<Layout> layout_;
+  std::vector<UnitDrive> drives_;
+  std::unique_ptr<sim::World> world_;
+  std::unique_ptr<Coordinator> coordinator_;
+  MemoryStore store_;
+  HostInstant now_{Seconds(1).ns};
+  HostInstant wake_at_{0};
+  std::deque<Commit> commits_;
+  std::deque<Planning> planning_;
+  std::uint64_t committed_through_ = 0;
+  std::vector<Command> commands_;
+  std::vector<ReplyEffect> replies_;
+  std::vector<ReceivedFrame> heard_;
+  Effects effects_;
+  std::uint64_t next_request_ = 1;
+  std::uint64_t digest_ = 0xcbf29ce484222325u;
+};
+
+}  // namespace focalfleet::testing
