@@ -1,5 +1,6 @@
-// Planted misbehaviour, for tests and load testers. Each is switched on by name and stays until it is switched
-// off; none of them is chance: chance (of a bus that loses frames) is drawn from the world's seed.
+// Planted misbehaviour, for tests and load testers. Each is switched on by name and stays until it
+// is switched off; none of them is chance: chance (of a bus that loses frames) is drawn from the
+// world's seed.
 #pragma once
 
 #include <cstdint>

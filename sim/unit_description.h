@@ -1,6 +1,6 @@
-// One positioner as its maker describes it: where it sits, how long its arms are, where it answers. The
-// simulation's own words; it shares nothing with the coordinator's layout, so a mistake in one is seen by
-// the other.
+// One positioner as its maker describes it: where it sits, how long its arms are, where it answers.
+// The simulation's own words; it shares nothing with the coordinator's layout, so a mistake in one
+// is seen by the other.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct AxisDescription {
   double gear = 1;      // motor revolutions per output revolution
   double min_deg = 0;   // range of the axis' own angle
   double max_deg = 0;
-  /// Where it stands at first; none: folded (DefaultPose in metrology.h). Snapped to a whole vector.
+  /// Where it stands at first; none: folded (FirstPoseDeg in spread.h). Snapped to a whole vector.
   std::optional<double> angle_deg;
 };
 

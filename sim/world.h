@@ -1,17 +1,20 @@
-// The simulated fleet: every unit on every bus, on virtual time. It is what is true in a test. The host speaks
-// to it in frames alone; the truth (shaft angles, fibre positions) is for tests and reports, and nothing that
-// the coordinator may look at.
+// The simulated fleet: every unit on every bus, on virtual time. It is what is true in a test. The
+// host speaks to it in frames alone; the truth (shaft angles, fibre positions) is for tests and
+// reports, and nothing that the coordinator may look at.
 //
-// It runs from event to event (a frame's end, a motion's begin or end, a host given up), never in steps of
-// time: motion in between is a closed form. 5000 units at rest cost nothing but the frames they are sent.
+// It runs from event to event (a frame's end, a motion's begin or end, a host given up), never in
+// steps of time: motion in between is a closed form. 5000 units at rest cost nothing but the frames
+// they are sent.
 //
 //   world.Inject(bus, frame, now);                 the host's controller takes a frame
-//   world.AdvanceTo(t, &received);                 what the host hears up to and including t, in order
-//   world.NextEvent()                              when the world would next do something by itself
+//   world.AdvanceTo(t, &received);                 what the host hears up to and including t, in
+//   order world.NextEvent()                              when the world would next do something by
+//   itself
 //
-// One controller per bus on the host's side, with a mailbox for every waiting frame: of the frames that wait
-// anywhere on a bus the lowest identifier goes first, and of equal ones the first come. A `confirm` therefore
-// passes segments that still wait; who needs an order keeps frames back until the ones before are through.
+// One controller per bus on the host's side, with a mailbox for every waiting frame: of the frames
+// that wait anywhere on a bus the lowest identifier goes first, and of equal ones the first come. A
+// `confirm` therefore passes segments that still wait; who needs an order keeps frames back until
+// the ones before are through.
 #pragma once
 
 #include <array>
@@ -25,25 +28,16 @@
 #include "protocol/base/instants.h"
 #include "protocol/base/result.h"
 #include "protocol/link/frame_port.h"
+#include "sim/axis/axis_memory.h"
+#include "sim/bus/bus.h"
 #include "sim/faults.h"
+#include "sim/spread.h"
 #include "sim/unit/flash.h"
 #include "sim/unit_description.h"
 
 namespace focalfleet::sim {
 
-/// Nominal: quantisation and load-angle lag. Real: also the spread measured on robots in service.
-enum class Spread : std::uint8_t { kNominal, kReal };
-
-/// What a unit's mechanics remember while its power is off; with FLASH all that outlives the process.
-struct AxisMemory {
-  double rotor_turns = 0;   // motor turns from the axis' zero
-  double output_deg = 0;    // behind gear and play
-  double scatter_deg = 0;   // present step scatter of the output
-  double rotor_reference_turns = 0;
-  double output_reference_deg = 0;
-  std::uint64_t moves = 0;  // scatter draws so far
-  bool operator==(const AxisMemory&) const = default;
-};
+/// What outlives the process: as found by a later run.
 struct UnitMemory {
   UnitId id;
   Flash flash;
@@ -55,21 +49,23 @@ struct WorldConfig {
   std::uint64_t seed = 1;
   Spread spread = Spread::kNominal;
   std::uint32_t bit_rate_bps = 1'000'000;
-  HostInstant start{0};                     // power-on of all units
+  HostInstant start{0};  // power-on of all units
   FactoryDrive drive;
-  double clock_error_max = 50e-6;           // of each unit's clock, drawn evenly from -max..max
+  double clock_error_max = 50e-6;              // of each unit's clock, drawn evenly from -max..max
   DurationNs answer_delay = Microseconds(30);  // a frame heard to its answer in the mailbox
   /// False where a real bus arbitrates and takes its time: frames pass at once, in order.
   bool bit_clock = true;
-  std::vector<UnitMemory> memory;           // of an earlier run, matched by unit id
+  std::vector<UnitMemory> memory;  // of an earlier run, matched by unit id
 };
 
 /// True things about one unit, at World::now().
 struct UnitTruth {
   UnitId id;
   std::array<double, kAxisCount> angle_deg{};  // of the output shaft
-  std::array<double, kAxisCount> vectors{};    // the same in vectors from the axis' zero, with fractions
-  std::array<std::int32_t, kAxisCount> applied{};  // what its firmware believes: the vector applied now
+  std::array<double, kAxisCount>
+      vectors{};  // the same in vectors from the axis' zero, with fractions
+  std::array<std::int32_t, kAxisCount>
+      applied{};    // what its firmware believes: the vector applied now
   double x_mm = 0;  // fibre, focal-plane frame
   double y_mm = 0;
   UnitState state = UnitState::kRest;
@@ -79,16 +75,6 @@ struct UnitTruth {
   std::uint32_t moves_begun = 0;
   MoveId last_move;
   std::uint32_t begun_twice = 0;  // a move begun that was begun before: must stay 0
-};
-
-struct BusCounters {
-  std::uint64_t host_frames = 0;   // through the wire
-  std::uint64_t unit_frames = 0;
-  std::uint64_t bits = 0;          // exact, stuff bits included
-  DurationNs busy{0};
-  std::uint64_t dropped = 0;       // by a planted fault or because the bus is dead
-  std::uint64_t refused = 0;       // no mailbox left
-  std::uint32_t waiting_max = 0;   // most frames that ever waited at once
 };
 
 /// One frame as the wire carried it, for whoever listens beside the host.
@@ -111,12 +97,12 @@ class World {
   World& operator=(const World&) = delete;
   ~World();
 
-  /// The host's frame waits for the bus from `at` on (now, where `at` has passed). False: no mailbox left,
-  /// the bus is dead or there is none of that number; the frame is lost and counted.
+  /// The host's frame waits for the bus from `at` on (now, where `at` has passed). False: no
+  /// mailbox left, the bus is dead or there is none of that number; the frame is lost and counted.
   bool Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32_t client = 0);
 
-  /// Lets time pass. Appends what the host hears to `delivered`, and every frame of every bus to `wire`
-  /// where that is given, both in order of time.
+  /// Lets time pass. Appends what the host hears to `delivered`, and every frame of every bus to
+  /// `wire` where that is given, both in order of time.
   void AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
                  std::vector<WireFrame>* wire = nullptr);
 
@@ -128,7 +114,7 @@ class World {
 
   void PowerCut(UnitId unit);  // at once, whatever it does
   void PowerOn(UnitId unit);
-  void KillBus(BusId bus);     // what waits is lost
+  void KillBus(BusId bus);  // what waits is lost
   void ReviveBus(BusId bus);
   [[nodiscard]] bool dead(BusId bus) const;
   /// Frames that wait or are on their way on this bus.

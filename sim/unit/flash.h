@@ -1,7 +1,7 @@
-// What survives power-off. The motor has no encoder: the stored vector is applied first at power-on, so that
-// rotor and field agree, and turns say which of the gear*range electrical turns that is. The mark `moving` is
-// set before the first step and cleared together with the final vectors, so that a cut in mid-move can never
-// look like rest.
+// What survives power-off. The motor has no encoder: the stored vector is applied first at
+// power-on, so that rotor and field agree, and turns say which of the gear*range electrical turns
+// that is. The mark `moving` is set before the first step and cleared together with the final
+// vectors, so that a cut in mid-move can never look like rest.
 #pragma once
 
 #include <array>
