@@ -76,7 +76,7 @@ TEST(BusSchedule, FullQueueRefusesAndTakesAgainWhenThereIsRoom) {
 
 TEST(BusSchedule, DropForgetsOneNodeOnly) {
   BusSchedule schedule(kBitRate);
-  for (const std::uint8_t node : {1, 2, 1, 3})
+  for (const std::uint8_t node : std::initializer_list<std::uint8_t>{1, 2, 1, 3})
     ASSERT_TRUE(schedule.Enqueue({Frame(StatusRequest{}, node), 0, {}}));
   EXPECT_EQ(schedule.Drop(NodeId{1}), 2u);
   EXPECT_EQ(schedule.waiting(), 2u);
