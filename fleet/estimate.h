@@ -3,13 +3,32 @@
 // by wave mode. Summed over the motors that run, per supply rail and in total, it is a curve over the plan.
 #pragma once
 
+#include <cmath>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
+#include "fleet/drive.h"
 #include "fleet/layout.h"
 #include "fleet/plan/plan.h"
 
 namespace focalfleet {
+
+/// A segment's drive: its own repeat, the rest as tuned.
+constexpr AxisDrive AsSent(const Segment& segment, const AxisDrive& tuned) {
+  return {tuned.counter1, segment.repeat, tuned.subdivision};
+}
+
+/// When a segment runs, by the unit's nominal clock. Units: s after the start signal.
+struct SegmentTime {
+  double t0_s = 0;
+  double t1_s = 0;
+};
+inline SegmentTime TimeOf(const Segment& segment, const AxisDrive& tuned) {
+  // Divided, not multiplied: gives the double nearest to the decimal time, which prints short.
+  const double t0_s = segment.start_ticks / 1e4;
+  return {t0_s, t0_s + std::abs(segment.delta) * SecondsPerVector(AsSent(segment, tuned))};
+}
 
 /// The motor and bridge that an estimate assumes (paper 1; flux and load: fitted to its critical n = 37).
 struct MotorModel {
@@ -29,6 +48,19 @@ struct MotorPower {
   double switching_W = 0;
   [[nodiscard]] double total_W() const { return winding_W + mechanical_W + switching_W; }
 };
+/// Power of a motor that turns steadily in step with its field. Source: paper 1 eqs. 5 to 7 with Ld = Lq = L
+/// and one pole pair. The bus gives a voltage vector of fixed length V = v_bus / sqrt(3) (the largest
+/// fundamental of linear SVPWM), turning at w = 2 pi / (subdivision * time of a vector):
+///
+///   torque T = load + viscous * w        Iq = T / (1.5 flux)
+///   V^2 = (r Id - w L Iq)^2 + (r Iq + w L Id + w flux)^2, of both Id the larger: the rotor lags the field
+///   winding = 1.5 r (Id^2 + Iq^2)        mechanical = T w
+///
+/// so in the open loop the current hardly depends on the load: what the load does not take heats the winding.
+/// Where no Id is real the field cannot pull the load; then Iq is what it can pull at most.
+/// switching = edges * 0.5 v_bus |I| (rise + fall) * carrier, an upper bound: every edge of the three legs in a
+/// carrier period (4 asymmetric, 4 five-segment, 6 seven-segment) is charged with both times and the
+/// amplitude. Cost: O(1).
 MotorPower SteadyPower(const MotorModel& motor, const AxisDrive& drive, WaveMode mode, double v_bus_V);
 
 /// Power as steps: `power_W` holds from `t_s` to the next step's; the last is 0.
@@ -50,6 +82,8 @@ struct PlanEstimate {
   std::vector<RailCurve> rails;  // ascending by rail
 };
 
+/// Shape: `drives` (n). Powers are summed as whole nanowatts, so every curve ends at exactly 0 and does not
+/// depend on the order of its moves. Cost: O(s log s) for s segments.
 PlanEstimate Estimate(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives,
                       const MotorModel& motor);
 

@@ -44,6 +44,10 @@ struct Unit {
   BusId bus = kNoBus;
   NodeId node = kNoNode;
   bool enabled = true;  // false: stands where it is, an obstacle
+  // Places along the harness and grouping: kept for who asks, nothing in here depends on them.
+  std::optional<std::uint32_t> rail_slot;
+  std::optional<std::uint32_t> bus_slot;
+  std::optional<std::uint32_t> group;
 
   [[nodiscard]] const AxisGeometry& theta() const { return axis[Index(Axis::kTheta)]; }
   [[nodiscard]] const AxisGeometry& phi() const { return axis[Index(Axis::kPhi)]; }

@@ -1,0 +1,109 @@
+// A CSV table as the project's files use it: one header line, then one row a line. Lines that start
+// with `#` are comments; a cell may be quoted ("" is a quote within); lines may end in CRLF; an
+// empty cell or `nan` is a missing value. ECSV of astropy reads too, also with its usual blanks
+// instead of commas.
+//
+// Parsing is total: any bytes give a table or an Error that names file, line, column and reason. A
+// file that was cut short is refused where that shows: a row with too few cells, an open quote, a
+// last line without its newline. (A file cut exactly between two lines cannot be told from a whole
+// one.)
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+class CsvTable {
+ public:
+  /// Errors: kInvalid: empty, not text, no header, a column twice, a row of another width, cut
+  /// short.
+  static Result<CsvTable> Parse(std::string_view text, std::string file);
+
+  [[nodiscard]] const std::string& file() const { return file_; }
+  [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
+  [[nodiscard]] std::optional<std::size_t> Find(std::string_view column) const;
+  [[nodiscard]] std::size_t size() const { return lines_.size(); }  // rows
+  /// Line of the file in which the row begins, from 1.
+  [[nodiscard]] int line(std::size_t row) const { return lines_[row]; }
+  [[nodiscard]] const std::string& cell(std::size_t row, std::size_t column) const {
+    return cells_[row * columns_.size() + column];
+  }
+
+  /// Errors: kInvalid, names the columns that are missing and those that are there.
+  [[nodiscard]] Status Require(std::initializer_list<std::string_view> columns) const;
+  /// Columns that are not among `known`, for telling that they were passed over.
+  [[nodiscard]] std::vector<std::string> Others(
+      std::initializer_list<std::string_view> known) const;
+  [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
+
+ private:
+  friend class CsvParser;
+  std::string file_;
+  int header_line_ = 0;
+  std::vector<std::string> columns_;
+  std::vector<int> lines_;
+  std::vector<std::string> cells_;  // Shape: (rows, columns), flat
+};
+
+struct IntegerBounds {
+  std::int64_t low = 0;
+  std::int64_t high = 0;
+};
+
+/// One row's cells as values. The first cell that is wrong is remembered and the values read after
+/// it mean nothing, so a reader takes all that it needs and asks once: `if (auto e = row.error())
+/// return ...`.
+class CsvRow {
+ public:
+  CsvRow(const CsvTable& table, std::size_t row) : table_(table), row_(row) {}
+
+  [[nodiscard]] bool Has(std::string_view column) const;  // the column is there and not missing
+  double Number(std::string_view column);                 // finite, must be there
+  std::optional<double> NumberIfAny(std::string_view column);
+  std::int64_t Integer(std::string_view column, IntegerBounds bounds);
+  std::optional<std::int64_t> IntegerIfAny(std::string_view column, IntegerBounds bounds);
+  /// The cell as it stands, without the blanks around it; empty where there is none.
+  std::string Text(std::string_view column) const;
+
+  void Reject(std::string_view column, const std::string& reason);
+  [[nodiscard]] int line() const { return table_.line(row_); }
+  [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+
+ private:
+  const CsvTable& table_;
+  std::size_t row_;
+  std::optional<Error> error_;
+};
+
+/// The shortest decimal text that reads back as the same number; empty for one that is not finite.
+std::string NumberText(double value);
+
+/// Builds a table line by line; text is quoted where it must be.
+class CsvWriter {
+ public:
+  explicit CsvWriter(std::span<const std::string_view> columns);
+  CsvWriter(std::initializer_list<std::string_view> columns);
+  CsvWriter& Number(double value);  // not finite: a missing value
+  CsvWriter& Integer(std::int64_t value);
+  CsvWriter& Text(std::string_view value);
+  CsvWriter& Missing();
+  void EndRow();
+  [[nodiscard]] std::string Take() { return std::move(text_); }
+
+ private:
+  void Separate();
+  std::string text_;
+  bool row_is_empty_ = true;
+};
+
+}  // namespace focalfleet
