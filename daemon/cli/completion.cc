@@ -227,7 +227,11 @@ _focalfleet() {
     *) compadd -- ${(s:,:)expect} ;;
   esac
 }
-if [[ ${funcstack[1]} == _focalfleet ]]; then _focalfleet "$@"; else compdef _focalfleet focalfleet; fi
+if (( ${funcstack[(I)_focalfleet]} )); then
+  _focalfleet "$@"  # loaded by the first tab, which still waits for its answer
+elif (( $+functions[compdef] )); then
+  compdef _focalfleet focalfleet
+fi
 )zsh";
 
 struct CompletionOptions {

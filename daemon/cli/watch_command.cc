@@ -1,0 +1,327 @@
+// watch: the fleet as DDS tells it, drawn over and over on a terminal, or one JSON object a change.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <csignal>
+#include <map>
+
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/progress_bar.h"
+#include "daemon/cli/table.h"
+#include "daemon/dds/status_reader.h"
+
+namespace focalfleet::cli {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+struct WatchOptions {
+  std::uint32_t domain = 0;
+  bool once = false;
+  double wait_s = 5;
+};
+
+// All that came so far: DDS tells what changed, a picture needs the whole.
+struct Picture {
+  std::optional<FleetStatusValue> fleet;
+  std::optional<ConfigurationProgressValue> configuration;
+  std::map<BusId, BusStatusValue> buses;
+  std::map<UnitId, UnitStatusValue> units;
+  std::map<std::uint64_t, AlarmValue> alarms;  // the newest kAlarmsShown
+};
+constexpr std::size_t kAlarmsShown = 8;
+constexpr std::size_t kUnitsShown = 12;
+
+void Absorb(const StatusUpdate& update, Picture* picture) {
+  if (update.fleet) picture->fleet = update.fleet;
+  if (update.configuration) picture->configuration = update.configuration;
+  for (const BusStatusValue& bus : update.buses) picture->buses[bus.bus] = bus;
+  for (const UnitStatusValue& unit : update.units) picture->units[unit.unit] = unit;
+  for (const AlarmValue& alarm : update.alarms) picture->alarms[alarm.row.id] = alarm;
+  while (picture->alarms.size() > kAlarmsShown) picture->alarms.erase(picture->alarms.begin());
+}
+
+bool WholeFleetIsThere(const Picture& picture) {
+  return picture.fleet && picture.units.size() >= picture.fleet->units;
+}
+
+// ---- JSON
+
+Json Counts(const FleetStatusValue& fleet) {
+  Json phases = Json::object();
+  for (std::uint8_t i = 0; i < kUnitPhaseCount; ++i) {
+    if (fleet.units_by_phase[i] != 0) {
+      phases[Name(static_cast<UnitPhase>(i))] = fleet.units_by_phase[i];
+    }
+  }
+  Json witnesses = Json::object();
+  for (std::size_t i = 0; i < kWitnessCount; ++i) {
+    witnesses[Name(static_cast<Witness>(i))] = fleet.units_by_witness[i];
+  }
+  return {{"time", ToIso8601(fleet.at)},
+          {"version", fleet.version},
+          {"units", fleet.units},
+          {"enabled", fleet.enabled},
+          {"phases", phases},
+          {"witnesses", witnesses},
+          {"configuration", fleet.configuration},
+          {"bus_load_max", fleet.bus_load_max},
+          {"busy", fleet.busy},
+          {"store_failing", fleet.store_failing}};
+}
+
+Json JsonOf(const ConfigurationProgressValue& value) {
+  const ConfigurationView& view = value.view;
+  return {{"time", ToIso8601(value.at)},
+          {"id", view.id},
+          {"source", view.source},
+          {"state", Name(view.state)},
+          {"round", view.round},
+          {"targeted", view.targeted},
+          {"arrived", view.arrived},
+          {"refused", view.refused},
+          {"failed", view.failed},
+          {"makespan_predicted_s", view.makespan_predicted_s},
+          {"makespan_s", view.makespan_s},
+          {"energy_J", view.energy_J},
+          {"peak_power_W", view.peak_power_W},
+          {"frames", view.frames}};
+}
+
+Json JsonOf(const UnitStatusValue& unit) {
+  Json row{
+      {"time", ToIso8601(unit.at)}, {"unit_id", unit.unit.value},    {"serial", unit.serial.value},
+      {"bus_id", unit.bus.value},   {"node_id", unit.node.value},    {"phase", Name(unit.phase)},
+      {"fault", Name(unit.fault)},  {"outcome", Name(unit.outcome)}, {"enabled", unit.enabled},
+      {"x_mm", unit.x_fp_mm},       {"y_mm", unit.y_fp_mm}};
+  for (const Axis axis : kAxes) {
+    const std::string name = Name(axis);
+    row[name + "_witness"] = Name(unit.witness[Index(axis)]);
+    row[name + "_low_deg"] = unit.low_deg[Index(axis)];
+    row[name + "_high_deg"] = unit.high_deg[Index(axis)];
+    row[name + "_target_deg"] = unit.target_deg[Index(axis)];
+  }
+  return row;
+}
+
+Json JsonOf(const BusStatusValue& bus) {
+  return {{"time", ToIso8601(bus.at)},
+          {"bus_id", bus.bus.value},
+          {"link", Name(bus.view.link)},
+          {"load", bus.view.load},
+          {"load_max", bus.view.load_max},
+          {"frames_sent", bus.view.frames_sent},
+          {"frames_received", bus.view.frames_received},
+          {"malformed", bus.view.malformed},
+          {"retries", bus.view.retries}};
+}
+
+const char* Name(Severity severity) {
+  constexpr std::array<const char*, 3> kNames = {"info", "warning", "error"};
+  return kNames[static_cast<std::size_t>(severity)];
+}
+
+Json JsonOf(const AlarmValue& alarm) {
+  Json row{{"time", ToIso8601(alarm.at)},
+           {"id", alarm.row.id},
+           {"severity", Name(alarm.row.severity)},
+           {"text", alarm.row.text}};
+  if (alarm.row.unit) row["unit_id"] = alarm.row.unit->value;
+  if (alarm.row.bus) row["bus_id"] = alarm.row.bus->value;
+  return row;
+}
+
+template <class Values>
+Json Rows(const Values& values) {
+  Json rows = Json::array();
+  for (const auto& value : values) rows.push_back(JsonOf(value));
+  return rows;
+}
+
+// What came, in one object; members without news are left out.
+Json JsonOf(const StatusUpdate& update) {
+  Json object = Json::object();
+  if (update.fleet) object["fleet"] = Counts(*update.fleet);
+  if (update.configuration) object["configuration"] = JsonOf(*update.configuration);
+  if (!update.units.empty()) object["units"] = Rows(update.units);
+  if (!update.buses.empty()) object["buses"] = Rows(update.buses);
+  if (!update.alarms.empty()) object["alarms"] = Rows(update.alarms);
+  return object;
+}
+
+StatusUpdate Whole(const Picture& picture) {
+  StatusUpdate whole{.fleet = picture.fleet, .configuration = picture.configuration};
+  for (const auto& [id, unit] : picture.units) whole.units.push_back(unit);
+  for (const auto& [id, bus] : picture.buses) whole.buses.push_back(bus);
+  for (const auto& [id, alarm] : picture.alarms) whole.alarms.push_back(alarm);
+  return whole;
+}
+
+// ---- for people
+
+std::string DescribeFleet(const FleetStatusValue& fleet, bool colour_on) {
+  std::string phases;
+  for (std::uint8_t i = 0; i < kUnitPhaseCount; ++i) {
+    if (fleet.units_by_phase[i] == 0) continue;
+    phases += fmt::format("{}{} {}", phases.empty() ? "" : ", ", fleet.units_by_phase[i],
+                          Name(static_cast<UnitPhase>(i)));
+  }
+  std::string witnesses;
+  for (std::size_t i = kWitnessCount; i-- > 0;) {
+    if (fleet.units_by_witness[i] == 0) continue;
+    witnesses += fmt::format("{}{} {}", witnesses.empty() ? "" : ", ", fleet.units_by_witness[i],
+                             Name(static_cast<Witness>(i)));
+  }
+  return fmt::format("{}  focalfleetd {}  {}{}\nunits      {}, {} enabled: {}\npositions  {}\n",
+                     ToIso8601(fleet.at), fleet.version,
+                     fleet.busy ? Paint(colour_on, Colour::kYellow, "busy")
+                                : Paint(colour_on, Colour::kGreen, "idle"),
+                     fleet.store_failing ? Paint(colour_on, Colour::kRed, "  STORE FAILING") : "",
+                     fleet.units, fleet.enabled, phases, witnesses);
+}
+
+std::string DescribeProgress(const ConfigurationProgressValue& value) {
+  const ConfigurationView& view = value.view;
+  const double fraction = view.targeted == 0 ? 0 : double{1.0 * view.arrived} / view.targeted;
+  return fmt::format("configuration {} ({}): {}, round {}\n{}\n", view.id, view.source,
+                     Name(view.state), view.round,
+                     DrawBar(fraction,
+                             fmt::format("{} of {} arrived, {} refused, {} failed", view.arrived,
+                                         view.targeted, view.refused, view.failed),
+                             100));
+}
+
+std::string DescribeBuses(const Picture& picture, bool colour_on) {
+  std::size_t up = 0;
+  double load = 0;
+  std::string troubled;
+  for (const auto& [id, bus] : picture.buses) {
+    load = std::max(load, bus.view.load);
+    if (bus.view.link == LinkState::kUp) {
+      ++up;
+    } else {
+      troubled += fmt::format("  bus {}: {}\n", id.value,
+                              Paint(colour_on, Colour::kRed, Name(bus.view.link)));
+    }
+  }
+  return fmt::format("buses      {} of {} up, load now up to {:.0f} %\n{}", up,
+                     picture.buses.size(), 100 * load, troubled);
+}
+
+// Only units that want an eye: not at rest in good order, or with a fault.
+std::string DescribeUnits(const Picture& picture) {
+  std::vector<std::vector<std::string>> rows{{"unit", "phase", "fault", "theta", "phi", "outcome"}};
+  std::size_t more = 0;
+  for (const auto& [id, unit] : picture.units) {
+    const bool fine = (unit.phase == UnitPhase::kReady || unit.phase == UnitPhase::kMoving) &&
+                      unit.fault == FaultCode::kNone && unit.witness[0] >= Witness::kPredicted &&
+                      unit.witness[1] >= Witness::kPredicted;
+    if (fine || !unit.enabled) continue;
+    if (rows.size() > kUnitsShown) {
+      ++more;
+      continue;
+    }
+    rows.push_back({fmt::format("{}", id.value), Name(unit.phase), Name(unit.fault),
+                    Name(unit.witness[0]), Name(unit.witness[1]), Name(unit.outcome)});
+  }
+  if (rows.size() == 1) return "";
+  return AlignColumns(rows) + (more == 0 ? "\n" : fmt::format("\nand {} more\n", more));
+}
+
+std::string DescribeAlarms(const Picture& picture, bool colour_on) {
+  std::string text;
+  for (const auto& [id, alarm] : picture.alarms) {
+    const Colour colour = alarm.row.severity == Severity::kError ? Colour::kRed : Colour::kYellow;
+    text += fmt::format("{}  {}  {}\n", ToIso8601(alarm.at),
+                        Paint(colour_on, colour, Name(alarm.row.severity)), alarm.row.text);
+  }
+  return text;
+}
+
+void Draw(const Context& context, const Picture& picture, bool over) {
+  std::string text;
+  if (picture.fleet) text += DescribeFleet(*picture.fleet, context.colour_out);
+  text += DescribeBuses(picture, context.colour_out);
+  if (picture.configuration) text += DescribeProgress(*picture.configuration);
+  text += DescribeUnits(picture) + DescribeAlarms(picture, context.colour_out);
+  if (over) text = "\033[H\033[2J" + text;
+  fmt::print("{}", text);
+  std::fflush(stdout);
+}
+
+// ---- the loop
+
+ExitCode NobodyPublishes(const Context& context, const WatchOptions& options, bool seen) {
+  return Report(
+      context,
+      {ErrorCode::kUnavailable,
+       seen ? std::string("the daemon is gone from DDS")
+            : fmt::format("no daemon publishes on DDS domain {} after {:.1f} s; is focalfleetd "
+                          "running with [dds] enabled, and is $CYCLONEDDS_URI the same here?",
+                          options.domain, options.wait_s)},
+      seen ? ExitCode::kBroken : ExitCode::kNoDaemon);
+}
+
+volatile std::sig_atomic_t interrupted = 0;
+
+ExitCode Loop(const Context& context, const WatchOptions& options, StatusReader* reader) {
+  const auto begun = steady_clock::now();
+  const auto patience = std::chrono::duration<double>(options.wait_s);
+  Picture picture;
+  StatusUpdate update;
+  while (interrupted == 0) {
+    const auto came = reader->Wait(milliseconds(200));
+    if (!came) return Report(context, came.error(), ExitCode::kBroken);
+    if (const auto taken = reader->Take(&update); !taken) {
+      return Report(context, taken.error(), ExitCode::kBroken);
+    }
+    Absorb(update, &picture);
+    const bool late = steady_clock::now() - begun > patience;
+    if (late && !picture.fleet) return NobodyPublishes(context, options, reader->writer_seen());
+    if (picture.fleet && !reader->writer_alive()) return NobodyPublishes(context, options, true);
+    if (options.once) {
+      // What is late is left out rather than waited for without end.
+      if (!picture.fleet || (!late && !WholeFleetIsThere(picture))) continue;
+      if (context.json) {
+        PrintJson(JsonOf(Whole(picture)));
+      } else {
+        Draw(context, picture, false);
+      }
+      return ExitCode::kOk;
+    }
+    if (update.count() == 0) continue;
+    if (context.json) {
+      PrintJson(JsonOf(update));
+    } else {
+      Draw(context, picture, context.terminal_out);
+    }
+  }
+  return ExitCode::kOk;
+}
+
+ExitCode RunWatch(const Context& context, const WatchOptions& options) {
+  std::signal(SIGINT, [](int) { interrupted = 1; });
+  auto reader = StatusReader::Create({.dds = {.domain = options.domain, .config_xml = ""}});
+  if (!reader) return Report(context, reader.error(), ExitCode::kNoDaemon);
+  return Loop(context, options, reader->get());
+}
+
+}  // namespace
+
+void AddWatchCommand(CommandLine* line) {
+  CLI::App* command = AddCommand(&line->app, "watch", "Watch the fleet live, through DDS",
+                                 "  focalfleet watch\n  focalfleet watch --once\n"
+                                 "  focalfleet watch --json | jq -c .fleet");
+  auto options = std::make_shared<WatchOptions>();
+  command->add_option("--domain", options->domain, "DDS domain")->capture_default_str();
+  command->add_flag("--once", options->once, "Show the whole fleet once and end");
+  command
+      ->add_option("--wait", options->wait_s,
+                   "Seconds to wait for a daemon, and with --once for all units")
+      ->capture_default_str();
+  OnChosen(line, command, options, RunWatch);
+}
+
+}  // namespace focalfleet::cli

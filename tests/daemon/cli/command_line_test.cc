@@ -1,0 +1,183 @@
+// What holds for every command: the exit codes of wrong usage, help, JSON, and completion for all
+// of the tree.
+#include "daemon/cli/command_line.h"
+
+#include <gmock/gmock.h>
+
+#include "daemon/cli/completion.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using cli::CompletionNode;
+using cli::CompletionValue;
+using test::Focalfleet;
+using test::RunProgram;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
+
+std::vector<CompletionNode> Nodes() { return cli::WalkCommands(cli::MakeCommandLine()->app); }
+
+std::vector<std::string> Words(const std::string& path) {
+  return path.empty() ? std::vector<std::string>{} : CLI::detail::split(path, ' ');
+}
+
+// What bash would offer after these words; the last one is being typed.
+std::vector<std::string> BashOffers(std::vector<std::string> words) {
+  std::vector<std::string> command = {
+      "bash",
+      "--norc",
+      "-c",
+      "source <(\"$1\" completion bash); shift; COMP_WORDS=(focalfleet \"$@\"); "
+      "COMP_CWORD=$#; _focalfleet; printf '%s\\n' \"${COMPREPLY[@]}\"",
+      "bash",
+      FOCALFLEET_PROGRAM};
+  command.insert(command.end(), words.begin(), words.end());
+  const auto result = RunProgram(command);
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  return CLI::detail::split(result.out, '\n');
+}
+
+TEST(CommandLine, HelpOfEveryCommandShowsExamplesAndEndsWell) {
+  for (const CompletionNode& node : Nodes()) {
+    auto words = Words(node.path);
+    words.emplace_back("--help");
+    const auto result = Focalfleet(words);
+    EXPECT_EQ(result.exit, 0) << node.path;
+    EXPECT_THAT(result.out, HasSubstr(node.commands.empty() ? "Examples:" : "Usage:")) << node.path;
+    EXPECT_THAT(result.err, IsEmpty()) << node.path;
+  }
+}
+
+TEST(CommandLine, HelpListsTheExitCodes) {
+  EXPECT_THAT(Focalfleet({"--help"}).out, HasSubstr("4  the daemon cannot be reached"));
+}
+
+TEST(CommandLine, VersionNamesTheProgram) {
+  const auto result = Focalfleet({"--version"});
+  EXPECT_EQ(result.exit, 0);
+  EXPECT_THAT(result.out, ::testing::StartsWith("focalfleet "));
+}
+
+TEST(CommandLine, EveryCommandRefusesAnUnknownOptionAsWrongUsage) {
+  for (const CompletionNode& node : Nodes()) {
+    auto words = Words(node.path);
+    words.emplace_back("--no-such-option");
+    const auto result = Focalfleet(words);
+    EXPECT_EQ(result.exit, 2) << node.path;
+    EXPECT_THAT(result.out, IsEmpty()) << node.path;
+    EXPECT_THAT(result.err, HasSubstr("error:")) << node.path;
+  }
+}
+
+TEST(CommandLine, NoCommandAndAnUnknownCommandAreWrongUsage) {
+  EXPECT_EQ(Focalfleet({}).exit, 2);
+  EXPECT_EQ(Focalfleet({"teleport"}).exit, 2);
+}
+
+TEST(CommandLine, WrongUsageIsJsonWhereJsonWasAskedFor) {
+  const auto result = Focalfleet({"--json", "unit", "not-a-number"});
+  EXPECT_EQ(result.exit, 2);
+  const Json told = Json::parse(result.out, nullptr, false);
+  ASSERT_TRUE(told.is_object()) << result.out;
+  EXPECT_EQ(told["exit"], 2);
+  EXPECT_EQ(told["error"]["code"], "invalid");
+}
+
+TEST(CommandLine, GlobalOptionsStandBeforeOrAfterTheCommand) {
+  const auto before = Focalfleet({"--socket", "/nowhere/s", "--json", "status"});
+  const auto after = Focalfleet({"status", "--json", "--socket", "/nowhere/s"});
+  EXPECT_EQ(before.exit, 4);
+  EXPECT_EQ(after.exit, 4);
+  EXPECT_EQ(before.out, after.out);
+  EXPECT_THAT(before.out, HasSubstr("/nowhere/s"));
+}
+
+TEST(CommandLine, TheSocketComesFromTheEnvironmentWhereNoneIsGiven) {
+  const auto result =
+      RunProgram({FOCALFLEET_PROGRAM, "status"}, {{"FOCALFLEET_SOCKET", "/elsewhere/sock"}});
+  EXPECT_EQ(result.exit, 4);
+  EXPECT_THAT(result.err, HasSubstr("/elsewhere/sock"));
+}
+
+TEST(CommandLine, PrintsNoColourIntoAPipe) {
+  EXPECT_THAT(Focalfleet({"status", "--socket", "/nowhere/s"}).err,
+              ::testing::Not(HasSubstr("\033")));
+}
+
+TEST(Completion, BashOffersEverySubcommandAndOptionOfTheTree) {
+  for (const CompletionNode& node : Nodes()) {
+    std::vector<std::string> commands;
+    for (const auto& child : node.commands) commands.push_back(child.word);
+    std::vector<std::string> options;
+    for (const auto& option : node.options) {
+      for (const std::string& name : option.names) {
+        if (name.rfind("--", 0) == 0) options.push_back(name);
+      }
+    }
+    auto words = Words(node.path);
+    words.emplace_back("");
+    if (!commands.empty()) {
+      EXPECT_THAT(BashOffers(words), IsSupersetOf(commands)) << node.path;
+    }
+    words.back() = "--";
+    EXPECT_THAT(BashOffers(words), ::testing::UnorderedElementsAreArray(options)) << node.path;
+  }
+}
+
+TEST(Completion, BashOffersFilesAndWordsWhereTheTreeTakesThem) {
+  const test::ScratchDirectory scratch;
+  const std::string file = scratch.Put("targets with blank.csv", "");
+  for (const CompletionNode& node : Nodes()) {
+    for (const auto& option : node.options) {
+      auto words = Words(node.path);
+      words.push_back(option.names.front());
+      if (option.value.kind == CompletionValue::Kind::kWords) {
+        words.emplace_back("");
+        EXPECT_EQ(BashOffers(words), option.value.words) << node.path << " " << words[0];
+      }
+      if (option.value.kind == CompletionValue::Kind::kFile) {
+        words.push_back(scratch / "targ");
+        EXPECT_THAT(BashOffers(words), ::testing::ElementsAre(file)) << node.path;
+      }
+    }
+  }
+  EXPECT_THAT(BashOffers({"apply", scratch / "t"}), ::testing::ElementsAre(file));
+}
+
+TEST(Completion, BashPassesOverOptionValuesAndCountsArguments) {
+  EXPECT_EQ(BashOffers({"--socket", "status", "params", "17", "get", "--json", ""}),
+            (std::vector<std::string>{"theta", "phi"}));
+}
+
+TEST(Completion, ZshScriptNamesEverySubcommandAndOptionOfTheTree) {
+  const auto result = Focalfleet({"completion", "zsh"});
+  ASSERT_EQ(result.exit, 0);
+  EXPECT_THAT(result.out, ::testing::StartsWith("#compdef focalfleet\n"));
+  for (const CompletionNode& node : Nodes()) {
+    EXPECT_THAT(result.out, HasSubstr("'/" + node.path + "'"));
+    for (const auto& child : node.commands) EXPECT_THAT(result.out, HasSubstr(child.word + ":"));
+    for (const auto& option : node.options) {
+      for (const std::string& name : option.names) EXPECT_THAT(result.out, HasSubstr(name + ":"));
+    }
+  }
+}
+
+TEST(Documentation, NamesEveryCommandAndOptionOfTheTree) {
+  const std::string text = test::Slurp(FOCALFLEET_SOURCE_DIR "/docs/cli.md");
+  for (const CompletionNode& node : Nodes()) {
+    if (!node.path.empty()) {
+      EXPECT_THAT(text, HasSubstr("`" + node.path)) << node.path;
+    }
+    for (const auto& option : node.options) {
+      EXPECT_THAT(text, HasSubstr(option.names.front())) << node.path;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,268 @@
+// The commands that speak to the daemon, as processes of their own, against scripted answers.
+#include <gmock/gmock.h>
+
+#include "tests/daemon/cli/fake_daemon.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using test::FakeAnswer;
+using test::FakeDaemon;
+using test::Focalfleet;
+using test::ProgramResult;
+using test::ScratchDirectory;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr const char* kTargets = "unit_id,x_mm,y_mm\n1,0.5,0.25\n2,26.0,0.5\n";
+
+Json Configuration(const std::string& state, std::uint64_t arrived, std::uint64_t failed) {
+  Json c{{"id", 7},
+         {"source", "t.csv"},
+         {"state", state},
+         {"round", 1},
+         {"targeted", 2},
+         {"arrived", arrived},
+         {"refused", 0},
+         {"failed", failed},
+         {"makespan_predicted_s", 12.5},
+         {"makespan_s", 12.75},
+         {"energy_J", 3.5},
+         {"peak_power_W", 0.5},
+         {"frames", 420},
+         {"unserved", Json::array()}};
+  if (failed != 0) {
+    c["unserved"].push_back(
+        {{"unit_id", 2}, {"outcome", "failed"}, {"reason", "no answer"}, {"state", "silent"}});
+  }
+  return c;
+}
+
+Json Status() {
+  return {{"version", "0.1.0"},
+          {"units", 2},
+          {"enabled", 2},
+          {"phases", {{"ready", 2}}},
+          {"witnesses", {{"reported", 2}}},
+          {"busy", false},
+          {"store", {{"path", "fleet.db"}, {"failing", false}}},
+          {"configuration", Configuration("done", 2, 0)},
+          {"buses",
+           {{{"bus_id", 0}, {"link", "up"}, {"load", 0.1}, {"load_max", 0.2}},
+            {{"bus_id", 1}, {"link", "off"}, {"load", 0.0}, {"load_max", 0.375}}}},
+          {"bus_load_max", 0.375}};
+}
+
+class DaemonCommands : public ::testing::Test {
+ protected:
+  ProgramResult Ask(std::vector<std::string> words, std::map<std::string, FakeAnswer> answers) {
+    FakeDaemon daemon(scratch_ / "sock", std::move(answers));
+    words.insert(words.end(), {"--socket", daemon.path()});
+    ProgramResult result = Focalfleet(words);
+    requests_ = daemon.requests();
+    return result;
+  }
+  ProgramResult Apply(std::vector<std::string> more, FakeAnswer answer) {
+    std::vector<std::string> words = {"apply", scratch_.Put("t.csv", kTargets)};
+    words.insert(words.end(), more.begin(), more.end());
+    return Ask(words, {{"apply", std::move(answer)}, {"status", {.result = Status()}}});
+  }
+
+  ScratchDirectory scratch_;
+  std::vector<ControlRequest> requests_;
+};
+
+TEST_F(DaemonCommands, ApplySendsTheFileAndItsName) {
+  const auto result = Apply({"--fixed"}, {.result = Json{{"configuration", 7}}});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  ASSERT_EQ(requests_.size(), 1u);
+  EXPECT_EQ(requests_[0].args["targets_csv"], kTargets);
+  EXPECT_EQ(requests_[0].args["source"], scratch_ / "t.csv");
+  EXPECT_EQ(requests_[0].args["fixed"], true);
+  EXPECT_EQ(requests_[0].args["wait"], false);
+  EXPECT_THAT(result.out, HasSubstr("configuration 7 accepted"));
+}
+
+TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
+  const auto result = Apply({"--wait", "--json"}, {.result = Configuration("done", 2, 0)});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  const Json told = Json::parse(result.out, nullptr, false);
+  ASSERT_TRUE(told.is_object()) << result.out;
+  const Json expected{{"configuration", 7},
+                      {"state", "done"},
+                      {"units", 2},
+                      {"targeted", 2},
+                      {"arrived", 2},
+                      {"refused", 0},
+                      {"failed", 0},
+                      {"makespan_predicted_s", 12.5},
+                      {"makespan_s", 12.75},
+                      {"energy_J", 3.5},
+                      {"peak_power_W", 0.5},
+                      {"frames", 420},
+                      {"bus_load_max", 0.375},
+                      {"unserved", Json::array()}};
+  EXPECT_EQ(told, expected);
+}
+
+TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
+  const auto json = Apply({"--wait", "--json"}, {.result = Configuration("done", 1, 1)});
+  EXPECT_EQ(json.exit, 3);
+  EXPECT_EQ(
+      Json::parse(json.out, nullptr, false)["unserved"],
+      Json::parse(R"([{"unit_id":2,"outcome":"failed","reason":"no answer","state":"silent"}])"));
+  const auto text = Apply({"--wait"}, {.result = Configuration("done", 1, 1)});
+  EXPECT_EQ(text.exit, 3);
+  EXPECT_THAT(text.out, HasSubstr("unit 2: failed: no answer (now silent)"));
+}
+
+TEST_F(DaemonCommands, ApplyWaitEndsWithFiveWhereItWasStoppedOrFailed) {
+  EXPECT_EQ(Apply({"--wait"}, {.result = Configuration("stopped", 1, 0)}).exit, 5);
+  EXPECT_EQ(Apply({"--wait"}, {.result = Configuration("failed", 0, 1)}).exit, 5);
+}
+
+TEST_F(DaemonCommands, ApplyShowsProgressInPlainLinesIntoAPipeAndNoneWithQuiet) {
+  FakeAnswer answer{
+      .progress =
+          {{{"state", "uploading"}, {"round", 1}, {"fraction", 0.0}},
+           {{"state", "moving"}, {"round", 1}, {"fraction", 0.5}, {"arrived", 1}, {"targeted", 2}}},
+      .result = Configuration("done", 2, 0)};
+  const auto loud = Apply({"--wait"}, answer);
+  EXPECT_THAT(loud.err, HasSubstr("  0 %  round 1: uploading"));
+  EXPECT_THAT(loud.err, HasSubstr(" 50 %  round 1: moving  1 of 2 arrived\n"));
+  EXPECT_THAT(loud.err, Not(HasSubstr("\r")));
+  const auto quiet = Apply({"--wait", "--quiet"}, answer);
+  EXPECT_THAT(quiet.err, IsEmpty());
+  EXPECT_THAT(quiet.out, IsEmpty());
+}
+
+TEST_F(DaemonCommands, ApplyTellsWhatTheDaemonRefused) {
+  const auto result =
+      Apply({"--wait"},
+            {.result = Fail(ErrorCode::kInvalid, "t.csv:3: unit 2: named twice (first in row 2)")});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.out, IsEmpty());
+  EXPECT_THAT(result.err, HasSubstr("t.csv:3: unit 2: named twice"));
+}
+
+TEST_F(DaemonCommands, ApplyEndsWithFiveWhereTheDaemonGoesAwayOnTheWay) {
+  const auto result = Apply({"--wait"}, {.hang_up = true});
+  EXPECT_EQ(result.exit, 5);
+  EXPECT_THAT(result.err, HasSubstr("whether `apply` took effect is not known"));
+}
+
+TEST_F(DaemonCommands, ApplyDoesNotAskTheDaemonAboutAFileThatIsNoText) {
+  const std::string binary = scratch_.Put("b.csv", std::string("unit_id,x_mm\n1,\0", 16) + "\xff");
+  const auto result = Ask({"apply", binary}, {});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.err, HasSubstr("b.csv:2: not a text file: byte 0x00"));
+  EXPECT_THAT(requests_, IsEmpty());
+  const auto missing = Ask({"apply", scratch_ / "none.csv"}, {});
+  EXPECT_EQ(missing.exit, 1);
+  EXPECT_THAT(missing.err, HasSubstr("none.csv: cannot be read: No such file"));
+}
+
+TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
+  const auto text = Ask({"status"}, {{"status", {.result = Status()}}});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("2, 2 enabled: 2 ready"));
+  EXPECT_THAT(text.out, HasSubstr("1 of 2 up, highest load 38 %"));
+  EXPECT_THAT(text.out, HasSubstr("bus 1: off"));
+  EXPECT_THAT(text.out, Not(HasSubstr("bus 0: up")));
+  EXPECT_THAT(Ask({"status", "--buses"}, {{"status", {.result = Status()}}}).out,
+              HasSubstr("bus 0: up"));
+  const auto json = Ask({"status", "--json"}, {{"status", {.result = Status()}}});
+  EXPECT_EQ(Json::parse(json.out, nullptr, false), Status());
+}
+
+TEST_F(DaemonCommands, StatusSurvivesAnAnswerWithoutTheExpectedMembers) {
+  const auto result = Ask({"status"}, {{"status", {.result = Json{{"units", "many"}}}}});
+  EXPECT_EQ(result.exit, 0) << result.err;
+}
+
+TEST_F(DaemonCommands, StopNamesAUnitOrNone) {
+  EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, Json::object());
+  EXPECT_EQ(Ask({"stop", "17"}, {{"stop", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 17}}));
+}
+
+TEST_F(DaemonCommands, StopPointsToTheDirectWayWhereNoDaemonAnswers) {
+  const auto result = Focalfleet({"stop", "--socket", scratch_ / "nobody"});
+  EXPECT_EQ(result.exit, 4);
+  EXPECT_THAT(result.err, HasSubstr("stop --direct"));
+}
+
+TEST_F(DaemonCommands, HomeWantsUnitsOrNotKnownButNotBoth) {
+  EXPECT_EQ(Ask({"home"}, {{"home", {}}}).exit, 2);
+  EXPECT_EQ(Ask({"home", "1", "--not-known"}, {{"home", {}}}).exit, 2);
+  EXPECT_EQ(Ask({"home", "1", "2", "--wait"}, {{"home", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {1, 2}}, {"wait", true}}));
+  EXPECT_EQ(Ask({"home", "--not-known"}, {{"home", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"not_known", true}, {"wait", false}}));
+}
+
+TEST_F(DaemonCommands, DisableWantsAReason) {
+  EXPECT_EQ(Ask({"disable", "1"}, {{"disable", {}}}).exit, 2);
+  EXPECT_EQ(Ask({"disable", "1", "3", "--reason", "phi stalls"}, {{"disable", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {1, 3}}, {"reason", "phi stalls"}}));
+  EXPECT_EQ(Ask({"enable", "3"}, {{"enable", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {3}}}));
+}
+
+TEST_F(DaemonCommands, AdoptUnitAndHistoryAskForTheirUnit) {
+  EXPECT_EQ(Ask({"adopt", "9"}, {{"adopt", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 9}}));
+  const auto unit = Ask({"unit", "9"}, {{"unit", {.result = Json{{"phase", "ready"}}}}});
+  EXPECT_THAT(unit.out, HasSubstr("phase  ready"));
+  const auto history =
+      Ask({"history", "9", "--limit", "3"},
+          {{"history", {.result = Json{{"moves", {{{"move", 4}, {"end", "arrived"}}}}}}}});
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 9}, {"limit", 3}}));
+  EXPECT_THAT(history.out, HasSubstr("arrived"));
+  EXPECT_EQ(Ask({"history"}, {{"history", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"limit", 20}}));
+}
+
+TEST_F(DaemonCommands, ParamsSetTakesNegativeValuesAndWantsAllOfThem) {
+  EXPECT_EQ(Ask({"params", "9", "set", "theta", "position", "-500"}, {{"params_set", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args,
+            (Json{{"unit_id", 9}, {"axis", "theta"}, {"parameter", "position"}, {"value", -500}}));
+  EXPECT_EQ(Ask({"params", "9", "set", "theta", "position"}, {{"params_set", {}}}).exit, 2);
+  EXPECT_EQ(Ask({"params", "9", "get", "theta", "repeat", "5"}, {{"params", {}}}).exit, 2);
+  EXPECT_EQ(Ask({"params", "9", "get", "theta", "speed"}, {{"params", {}}}).exit, 2);
+}
+
+Json StateRow(std::uint32_t unit, const std::string& witness) {
+  return {{"unit_id", unit},        {"theta_witness", witness},  {"theta_low_deg", -1.5},
+          {"theta_high_deg", -1.5}, {"phi_witness", "reported"}, {"phi_low_deg", 179.25},
+          {"phi_high_deg", 179.25}};
+}
+
+TEST_F(DaemonCommands, StateWritesWhereEveryUnitStands) {
+  const Json rows{{"rows", {StateRow(1, "reported"), StateRow(2, "measured")}}};
+  const auto result =
+      Ask({"state", "--out", scratch_ / "state.csv"}, {{"state", {.result = rows}}});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_EQ(test::Slurp(scratch_ / "state.csv"),
+            "unit_id,theta_deg,phi_deg\n1,-1.500000,179.250000\n2,-1.500000,179.250000\n");
+}
+
+TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToWriteThemAsMissing) {
+  const Json rows{{"rows", {StateRow(1, "reported"), StateRow(2, "interval")}}};
+  const auto refused = Ask({"state", "--out", scratch_ / "s.csv"}, {{"state", {.result = rows}}});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.err, HasSubstr("2 (theta interval, phi reported)"));
+  EXPECT_THAT(scratch_.List(), Not(::testing::Contains("s.csv")));
+  const auto told =
+      Ask({"state", "--out", scratch_ / "s.csv", "--allow-unknown"}, {{"state", {.result = rows}}});
+  EXPECT_EQ(told.exit, 3);
+  EXPECT_EQ(test::Slurp(scratch_ / "s.csv"),
+            "unit_id,theta_deg,phi_deg\n1,-1.500000,179.250000\n2,nan,nan\n");
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,73 @@
+#include "tests/daemon/cli/fake_daemon.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <stdexcept>
+
+namespace focalfleet::test {
+
+FakeDaemon::FakeDaemon(const std::string& path, std::map<std::string, FakeAnswer> answers)
+    : path_(path), answers_(std::move(answers)) {
+  auto server = LineServer::Create(path);
+  if (!server) throw std::runtime_error(server.error().text);
+  server_.emplace(std::move(*server));
+  if (pipe2(quit_, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+  thread_ = std::thread([this] { Serve(); });
+}
+
+FakeDaemon::~FakeDaemon() {
+  close(quit_[1]);
+  thread_.join();
+  close(quit_[0]);
+}
+
+std::vector<ControlRequest> FakeDaemon::requests() const {
+  const std::lock_guard lock(mutex_);
+  return requests_;
+}
+
+void FakeDaemon::Serve() {
+  for (;;) {
+    std::array<pollfd, 2> polls{pollfd{server_->fd(), POLLIN, 0}, pollfd{quit_[0], POLLIN, 0}};
+    poll(polls.data(), polls.size(), -1);
+    if (polls[1].revents != 0) return;
+    std::vector<IncomingLine> lines;
+    server_->Service(&lines);
+    for (const IncomingLine& line : lines) {
+      if (!AnswerLine(line)) {
+        server_.reset();
+        return;
+      }
+    }
+  }
+}
+
+bool FakeDaemon::AnswerLine(const IncomingLine& line) {
+  const auto request = DecodeRequest(line.text);
+  if (!request) {
+    server_->Answer(line.client, EncodeError(0, request.error()));
+    return true;
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    requests_.push_back(*request);
+  }
+  const auto found = answers_.find(request->verb);
+  if (found == answers_.end()) {
+    server_->Answer(line.client, EncodeError(request->id, {ErrorCode::kInvalid, "no such verb"}));
+    return true;
+  }
+  const FakeAnswer& answer = found->second;
+  for (const Json& progress : answer.progress) {
+    server_->Progress(line.client, EncodeProgress(request->id, progress));
+  }
+  if (answer.hang_up) return false;
+  server_->Answer(line.client, answer.result ? EncodeResult(request->id, *answer.result)
+                                             : EncodeError(request->id, answer.result.error()));
+  return true;
+}
+
+}  // namespace focalfleet::test

@@ -1,0 +1,50 @@
+// The daemon's end of the control socket with scripted answers, on a thread of its own; what it was
+// asked is kept.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/control/line_server.h"
+#include "daemon/control/messages.h"
+
+namespace focalfleet::test {
+
+struct FakeAnswer {
+  std::vector<Json> progress;
+  Result<Json> result = Json::object();
+  bool hang_up = false;  // closes everything instead of answering
+};
+
+class FakeDaemon {
+ public:
+  /// Verbs without an answer are refused.
+  FakeDaemon(const std::string& path, std::map<std::string, FakeAnswer> answers);
+  FakeDaemon(const FakeDaemon&) = delete;
+  FakeDaemon& operator=(const FakeDaemon&) = delete;
+  ~FakeDaemon();
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// In the order in which they came.
+  [[nodiscard]] std::vector<ControlRequest> requests() const;
+
+ private:
+  void Serve();
+  bool AnswerLine(const IncomingLine& line);  // false: hang up
+
+  std::string path_;
+  std::map<std::string, FakeAnswer> answers_;
+  std::optional<LineServer> server_;
+  mutable std::mutex mutex_;
+  std::vector<ControlRequest> requests_;
+  int quit_[2] = {-1, -1};  // a pipe; its closing ends the thread
+  std::thread thread_;
+};
+
+}  // namespace focalfleet::test

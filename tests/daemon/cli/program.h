@@ -1,0 +1,44 @@
+// Runs a program to its end and keeps what it said, as an operator's shell would.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace focalfleet::test {
+
+struct ProgramResult {
+  int exit = -1;  // negative: the signal that ended it
+  std::string out;
+  std::string err;
+};
+
+/// stdin is empty. `environment` is added to this process' own; NO_COLOR and the socket's variable
+/// are not passed on.
+ProgramResult RunProgram(const std::vector<std::string>& arguments,
+                         const std::vector<std::pair<std::string, std::string>>& environment = {});
+
+/// Runs the focalfleet executable of this build.
+ProgramResult Focalfleet(std::vector<std::string> arguments);
+
+/// A directory of its own, removed with all that is in it.
+class ScratchDirectory {
+ public:
+  ScratchDirectory();
+  ScratchDirectory(const ScratchDirectory&) = delete;
+  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
+  ~ScratchDirectory();
+  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// Writes a file and returns its path.
+  [[nodiscard]] std::string Put(const std::string& name, const std::string& text) const;
+  /// Names of all that is in it, sorted.
+  [[nodiscard]] std::vector<std::string> List() const;
+
+ private:
+  std::string path_;
+};
+
+std::string Slurp(const std::string& path);
+
+}  // namespace focalfleet::test
