@@ -141,7 +141,7 @@ std::vector<std::string> CodeLines(const std::string& text) {
     char quote = 0;
     const bool include = line.find("#include") != std::string::npos;
     for (std::size_t i = 0; i < line.size(); ++i) {
-      const std::string_view rest = std::string_view(line).substr(i);
+      const std::string_view rest{line.data() + i, line.size() - i};
       if (in_block) {
         if (StartsWith(rest, "*/")) in_block = false, ++i;
       } else if (quote != 0) {
@@ -267,7 +267,7 @@ Complaints NothingIsLeftOver(const Files& files) {
     for (std::size_t i = 0; i < lines.size(); ++i) {
       const std::size_t at = lines[i].find(todo);
       if (ContainsWord(lines[i], todo) && lines[i].compare(at + 4, 2, "(#") != 0)
-        out.push_back(At(file, i, todo + " without an issue number: " + todo + "(#12)"));
+        out.push_back(At(file, i, todo + " without an issue number"));
       if (ContainsWord(lines[i], fixme)) out.push_back(At(file, i, fixme));
       for (const std::string& path : machine_paths)
         if (lines[i].find(path) != std::string::npos)

@@ -29,19 +29,19 @@ class Writer {
   CanFrame frame_;
 };
 
-std::uint32_t Unsigned(const CanFrame& frame, int at, int bytes) {
+std::uint32_t Unsigned(const CanFrame& frame, std::size_t at, std::size_t bytes) {
   std::uint32_t value = 0;
-  for (int i = 0; i < bytes; ++i)
-    value |= static_cast<std::uint32_t>(frame.data[static_cast<std::size_t>(at + i)]) << (8 * i);
+  for (std::size_t i = 0; i < bytes; ++i)
+    value |= static_cast<std::uint32_t>(frame.data[at + i]) << (8 * i);
   return value;
 }
-std::uint16_t U16(const CanFrame& frame, int at) {
+std::uint16_t U16(const CanFrame& frame, std::size_t at) {
   return static_cast<std::uint16_t>(Unsigned(frame, at, 2));
 }
-std::int32_t S24(const CanFrame& frame, int at) {
+std::int32_t S24(const CanFrame& frame, std::size_t at) {
   return static_cast<std::int32_t>(Unsigned(frame, at, 3) << 8) >> 8;
 }
-std::int32_t S32(const CanFrame& frame, int at) {
+std::int32_t S32(const CanFrame& frame, std::size_t at) {
   return static_cast<std::int32_t>(Unsigned(frame, at, 4));
 }
 
@@ -57,7 +57,9 @@ std::uint8_t Detail(Axis axis) { return static_cast<std::uint8_t>(axis); }
 
 struct HostEncoder {
   Address to;
-  [[nodiscard]] Writer Begin(Function f, std::uint8_t detail = 0) const { return {f, false, to, detail}; }
+  [[nodiscard]] Writer Begin(Function f, std::uint8_t detail = 0) const {
+    return {f, false, to, detail};
+  }
 
   CanFrame operator()(const Stop&) const { return Begin(Function::kStop).frame(); }
   CanFrame operator()(const Start& m) const {
@@ -66,7 +68,9 @@ struct HostEncoder {
   CanFrame operator()(const Clock& m) const {
     return Begin(Function::kClock).Unsigned(m.host_us, 6).frame();
   }
-  CanFrame operator()(const ClockRequest&) const { return Begin(Function::kClock, kRequestBit).frame(); }
+  CanFrame operator()(const ClockRequest&) const {
+    return Begin(Function::kClock, kRequestBit).frame();
+  }
   CanFrame operator()(const Arm& m) const {
     return Begin(Function::kArm).Unsigned(m.move.value, 2).Unsigned(m.digest, 4).frame();
   }
@@ -118,7 +122,9 @@ struct HostEncoder {
 
 struct UnitEncoder {
   Address from;
-  [[nodiscard]] Writer Begin(Function f, std::uint8_t detail = 0) const { return {f, true, from, detail}; }
+  [[nodiscard]] Writer Begin(Function f, std::uint8_t detail = 0) const {
+    return {f, true, from, detail};
+  }
 
   CanFrame operator()(const Done& m) const {
     return Begin(Function::kDone, static_cast<std::uint8_t>(m.outcome))
@@ -158,8 +164,8 @@ struct UnitEncoder {
         .frame();
   }
   CanFrame operator()(const StatusReply& m) const {
-    const auto flags = (m.interrupted ? kInterruptedFlag : 0u) | (m.host_lost ? kHostLostFlag : 0u) |
-                       (m.restarted ? kRestartedFlag : 0u);
+    const auto flags = (m.interrupted ? kInterruptedFlag : 0u) |
+                       (m.host_lost ? kHostLostFlag : 0u) | (m.restarted ? kRestartedFlag : 0u);
     return Begin(Function::kStatus)
         .Unsigned(static_cast<std::uint8_t>(m.state), 1)
         .Unsigned(static_cast<std::uint8_t>(m.fault), 1)
@@ -271,7 +277,9 @@ Decoded<HostMessage> DecodeHostBody(const CanFrame& frame, const Opened& open) {
     case Function::kStop:
       return check(0).map([] { return HostMessage{Stop{}}; });
     case Function::kStart:
-      return check(5).map([&] { return HostMessage{Start{{U16(frame, 0)}, Unsigned(frame, 2, 3)}}; });
+      return check(5).map([&] {
+        return HostMessage{Start{{U16(frame, 0)}, Unsigned(frame, 2, 3)}};
+      });
     case Function::kClock:
       if (open.detail == kRequestBit)
         return check(0, kRequestBit).map([] { return HostMessage{ClockRequest{}}; });
@@ -304,7 +312,8 @@ Decoded<HostMessage> DecodeHostBody(const CanFrame& frame, const Opened& open) {
       const bool write = open.function == Function::kParameterWrite;
       if (auto ok = check(write ? 5 : 1, 1); !ok) return tl::unexpected(ok.error());
       Parameter parameter{};
-      if (!Valid(frame.data[0], kParameterCount, &parameter)) return tl::unexpected(Malformed::kValue);
+      if (!Valid(frame.data[0], kParameterCount, &parameter))
+        return tl::unexpected(Malformed::kValue);
       const auto axis = static_cast<Axis>(open.detail);
       if (write) return ParameterWrite{axis, parameter, S32(frame, 1)};
       return ParameterRead{axis, parameter};
@@ -329,84 +338,88 @@ Decoded<UnitMessage> DecodeStatus(const CanFrame& frame) {
   return m;
 }
 
+Decoded<UnitMessage> DecodeConfirm(const CanFrame& frame) {
+  ConfirmReply m{.move = {U16(frame, 0)},
+                 .digest = Unsigned(frame, 2, 4),
+                 .segments = {static_cast<std::uint8_t>(frame.data[6] & 15),
+                              static_cast<std::uint8_t>(frame.data[6] >> 4)}};
+  if (!Valid(frame.data[7], kAnswerCount, &m.answer)) return tl::unexpected(Malformed::kValue);
+  return m;
+}
+
+Decoded<UnitMessage> DecodeVector(const CanFrame& frame, Axis axis) {
+  const VectorReply m{
+      .axis = axis, .vector = U16(frame, 0), .subdivision = U16(frame, 2), .turns = S32(frame, 4)};
+  const std::int64_t position = std::int64_t{m.turns} * m.subdivision + m.vector;
+  if (m.subdivision == 0 || m.vector >= m.subdivision || position > limits::kPositionMax ||
+      position < -limits::kPositionMax)
+    return tl::unexpected(Malformed::kValue);
+  return m;
+}
+
+Decoded<UnitMessage> DecodeFault(const CanFrame& frame) {
+  FaultReply m{.move = {U16(frame, 2)}, .count = U16(frame, 4)};
+  if (!Valid(frame.data[0], kFaultCodeCount, &m.code) || !Valid(frame.data[1], 2, &m.axis))
+    return tl::unexpected(Malformed::kValue);
+  return m;
+}
+
+Decoded<UnitMessage> DecodeParameter(const CanFrame& frame, const Opened& open) {
+  ParameterReply m{.written = open.function == Function::kParameterWrite,
+                   .axis = static_cast<Axis>(open.detail),
+                   .value = S32(frame, 2)};
+  if (!Valid(frame.data[0], kParameterCount, &m.parameter) ||
+      !Valid(frame.data[1], kAnswerCount, &m.answer))
+    return tl::unexpected(Malformed::kValue);
+  return m;
+}
+
+// An answer to Arm and to Home: the move and what became of the request.
+template <class Reply>
+Decoded<UnitMessage> DecodeAnswer(const CanFrame& frame) {
+  Reply m{.move = {U16(frame, 0)}};
+  if (!Valid(frame.data[2], kAnswerCount, &m.answer)) return tl::unexpected(Malformed::kValue);
+  return m;
+}
+
 Decoded<UnitMessage> DecodeUnitBody(const CanFrame& frame, const Opened& open) {
   const auto check = [&](std::uint8_t length, std::uint8_t detail_max = 0) {
     return Check(frame, open, {length, detail_max});
   };
-  const auto bad = tl::unexpected(Malformed::kValue);
   switch (open.function) {
     case Function::kDone:
       return check(8, kOutcomeCount - 1).map([&] {
-        return UnitMessage{Done{static_cast<Outcome>(open.detail),
-                                {S24(frame, 0), S24(frame, 3)},
-                                {U16(frame, 6)}}};
+        return UnitMessage{Done{
+            static_cast<Outcome>(open.detail), {S24(frame, 0), S24(frame, 3)}, {U16(frame, 6)}}};
       });
     case Function::kProgress:
       return check(8, kUnitStateCount - 1).map([&] {
-        return UnitMessage{ProgressReply{static_cast<UnitState>(open.detail),
-                                         {S24(frame, 0), S24(frame, 3)},
-                                         {U16(frame, 6)}}};
+        return UnitMessage{ProgressReply{
+            static_cast<UnitState>(open.detail), {S24(frame, 0), S24(frame, 3)}, {U16(frame, 6)}}};
       });
     case Function::kClock:
       return check(4).map([&] { return UnitMessage{ClockReply{Unsigned(frame, 0, 4)}}; });
     case Function::kArm:
-    case Function::kHome: {
-      if (auto ok = check(3); !ok) return tl::unexpected(ok.error());
-      Answer answer{};
-      if (!Valid(frame.data[2], kAnswerCount, &answer)) return bad;
-      if (open.function == Function::kArm) return ArmReply{{U16(frame, 0)}, answer};
-      return HomeReply{{U16(frame, 0)}, answer};
-    }
-    case Function::kConfirm: {
-      if (auto ok = check(8); !ok) return tl::unexpected(ok.error());
-      ConfirmReply m{.move = {U16(frame, 0)},
-                     .digest = Unsigned(frame, 2, 4),
-                     .segments = {static_cast<std::uint8_t>(frame.data[6] & 15),
-                                  static_cast<std::uint8_t>(frame.data[6] >> 4)}};
-      if (!Valid(frame.data[7], kAnswerCount, &m.answer)) return bad;
-      return m;
-    }
+      return check(3).and_then([&] { return DecodeAnswer<ArmReply>(frame); });
+    case Function::kHome:
+      return check(3).and_then([&] { return DecodeAnswer<HomeReply>(frame); });
+    case Function::kConfirm:
+      return check(8).and_then([&] { return DecodeConfirm(frame); });
     case Function::kStatus:
-      if (auto ok = check(8); !ok) return tl::unexpected(ok.error());
-      return DecodeStatus(frame);
-    case Function::kVector: {
-      if (auto ok = check(8, 1); !ok) return tl::unexpected(ok.error());
-      const VectorReply m{.axis = static_cast<Axis>(open.detail),
-                          .vector = U16(frame, 0),
-                          .subdivision = U16(frame, 2),
-                          .turns = S32(frame, 4)};
-      const std::int64_t position = std::int64_t{m.turns} * m.subdivision + m.vector;
-      if (m.subdivision == 0 || m.vector >= m.subdivision || position > limits::kPositionMax ||
-          position < -limits::kPositionMax)
-        return bad;
-      return m;
-    }
-    case Function::kFault: {
-      if (auto ok = check(6); !ok) return tl::unexpected(ok.error());
-      FaultReply m{.move = {U16(frame, 2)}, .count = U16(frame, 4)};
-      if (!Valid(frame.data[0], kFaultCodeCount, &m.code) || !Valid(frame.data[1], 2, &m.axis))
-        return bad;
-      return m;
-    }
+      return check(8).and_then([&] { return DecodeStatus(frame); });
+    case Function::kVector:
+      return check(8, 1).and_then(
+          [&] { return DecodeVector(frame, static_cast<Axis>(open.detail)); });
+    case Function::kFault:
+      return check(6).and_then([&] { return DecodeFault(frame); });
     case Function::kIdentify:
       return check(8).map([&] {
-        return UnitMessage{IdentifyReply{{Unsigned(frame, 0, 4)},
-                                         frame.data[4],
-                                         frame.data[5],
-                                         frame.data[6],
-                                         frame.data[7]}};
+        return UnitMessage{IdentifyReply{
+            {Unsigned(frame, 0, 4)}, frame.data[4], frame.data[5], frame.data[6], frame.data[7]}};
       });
     case Function::kParameterRead:
-    case Function::kParameterWrite: {
-      if (auto ok = check(6, 1); !ok) return tl::unexpected(ok.error());
-      ParameterReply m{.written = open.function == Function::kParameterWrite,
-                       .axis = static_cast<Axis>(open.detail),
-                       .value = S32(frame, 2)};
-      if (!Valid(frame.data[0], kParameterCount, &m.parameter) ||
-          !Valid(frame.data[1], kAnswerCount, &m.answer))
-        return bad;
-      return m;
-    }
+    case Function::kParameterWrite:
+      return check(6, 1).and_then([&] { return DecodeParameter(frame, open); });
     case Function::kStop:
     case Function::kStart:
     case Function::kStageBegin:

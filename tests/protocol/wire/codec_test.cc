@@ -133,10 +133,10 @@ std::vector<Golden> GoldenHostFrames() {
       {"083152E0#060504030201", host(Clock{0x010203040506})},
       {"083152E1#", host(ClockRequest{})},
       {"0C4152E0#3412EFBEADDE", host(Arm{{0x1234}, 0xDEADBEEF})},
-      {"0C5152E0#3412", host(Confirm{{0x1234}})},
-      {"106152E0#3412030F02", host(StageBegin{{0x1234}, {3, 15}, WaveMode::kSevenSegment})},
-      {"107152E0#05010203FEFFFF6C", host(StageSegment{Axis::kTheta, 5, {0x030201, -2, 108}})},
-      {"107152E1#0000000001000025", host(StageSegment{Axis::kPhi, 0, {0, 1, 37}})},
+      {"107152E0#3412", host(Confirm{{0x1234}})},
+      {"105152E0#3412030F02", host(StageBegin{{0x1234}, {3, 15}, WaveMode::kSevenSegment})},
+      {"106152E0#05010203FEFFFF6C", host(StageSegment{Axis::kTheta, 5, {0x030201, -2, 108}})},
+      {"106152E1#0000000001000025", host(StageSegment{Axis::kPhi, 0, {0, 1, 37}})},
       {"108152E0#3412", host(Home{{0x1234}})},
       {"149152E0#", host(ProgressRequest{})},
       {"14A152E0#", host(StatusRequest{false})},
@@ -157,7 +157,7 @@ std::vector<Golden> GoldenUnitFrames() {
       {"082952E2#FFFFFF0201003412", unit(Done{Outcome::kFault, {-1, 0x102}, {0x1234}})},
       {"083952E0#04030201", unit(ClockReply{0x01020304})},
       {"0C4952E0#341205", unit(ArmReply{{0x1234}, Answer::kBegunBefore})},
-      {"0C5952E0#3412EFBEADDE3F02",
+      {"107952E0#3412EFBEADDE3F02",
        unit(ConfirmReply{{0x1234}, 0xDEADBEEF, {15, 3}, Answer::kIncomplete})},
       {"108952E0#341207", unit(HomeReply{{0x1234}, Answer::kInterrupted})},
       {"149952E3#000080FFFF7F3412",
@@ -312,8 +312,8 @@ TEST(Codec, EnumeratorsAreCheckedOverAll256Values) {
 
 TEST(Codec, DetailBitsAreCheckedForEveryFunction) {
   // Highest detail that each function takes, by direction; -1: no such message.
-  const int host_max[kFunctionCount] = {0, 0, -1, 1, 0, 0, 0, 1, 0, 0, 1, 1, 1, 0, 1, 1};
-  const int unit_max[kFunctionCount] = {-1, -1, 3, 0, 0, 0, -1, -1, 0, 6, 0, 1, 0, 0, 1, 1};
+  const int host_max[kFunctionCount] = {0, 0, -1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1, 1};
+  const int unit_max[kFunctionCount] = {-1, -1, 3, 0, 0, -1, -1, 0, 0, 6, 0, 1, 0, 0, 1, 1};
   for (std::uint32_t f = 0; f < kFunctionCount; ++f) {
     int host_seen = -1;
     int unit_seen = -1;

@@ -24,7 +24,7 @@ TEST(Identifier, TableNumbersEqualTheirIndex) {
 
 // A written-down promise: firmware in the field is built on these numbers.
 TEST(Identifier, PrioritiesAreAsDocumented) {
-  const int priorities[kFunctionCount] = {0, 1, 2, 2, 3, 3, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6};
+  const int priorities[kFunctionCount] = {0, 1, 2, 2, 3, 4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6};
   for (std::uint32_t i = 0; i < kFunctionCount; ++i)
     EXPECT_EQ(kFunctions[i].priority, priorities[i]) << kFunctions[i].name;
 }
@@ -63,6 +63,18 @@ TEST(Identifier, ABroadcastStopWinsAgainstAllButStopsOfSingleUnits) {
       EXPECT_LT(stop, Encode(host, {{0}, 0}).id);
     }
     EXPECT_LT(stop, Encode(testing::RandomUnit(rng), {{0}, 0}).id);
+  }
+}
+
+// A controller may send its lowest waiting identifier first, whatever came first.
+TEST(Identifier, AnUploadsFramesKeepTheirOrderUnderArbitration) {
+  for (unsigned i = 0; i < 256; ++i) {
+    const Address first{{9}, static_cast<std::uint8_t>(i)};
+    const Address next{{9}, static_cast<std::uint8_t>(i + 1)};  // wraps: 0 follows 255
+    const std::uint32_t begin = Encode(HostMessage{StageBegin{{1}, {}, {}}}, first).id;
+    const std::uint32_t segment = Encode(HostMessage{StageSegment{}}, next).id;
+    EXPECT_LT(begin, segment);
+    EXPECT_LT(segment, Encode(HostMessage{Confirm{{1}}}, first).id);
   }
 }
 
