@@ -1,5 +1,5 @@
-// A plan: for every unit that moves, exactly the segments that go on the bus. What is proven is what is
-// sent: times are whole 100 us ticks after the start signal, ways are whole vectors.
+// A plan: for every unit that moves, exactly the segments that go on the bus. What is proven is
+// what is sent: times are whole 100 us ticks after the start signal, ways are whole vectors.
 #pragma once
 
 #include <cstdint>
@@ -19,11 +19,14 @@ struct UnitPlan {
   Pose to{};
   WaveMode mode = WaveMode::kAsymmetric;
   std::array<AxisPath, kAxisCount> path;
-  /// Units whose later motion enters space that this one must first have left: if this one ends early, they
-  /// must be stopped before `begins_s` (their own first such motion), or they may touch it.
+  /// Units whose later motion enters space that this one must first have left: if this one ends
+  /// early, they must be stopped before `begins_s` (their own first such motion), or they may touch
+  /// it.
   struct Follower {
     PositionerIndex unit;
     double begins_s = 0;  // seconds after the start signal
+    double left_s =
+        0;  // this one has left all of it by then: if it ends later, the other may go on
   };
   std::vector<Follower> followers;
 };
@@ -43,14 +46,15 @@ struct Unserved {
 };
 
 struct Plan {
-  std::vector<UnitPlan> moves;      // ascending by unit; only units that move
-  std::vector<Unserved> unserved;   // ascending by unit
-  double makespan_s = 0;            // start signal to the last vector, by nominal clocks
+  std::vector<UnitPlan> moves;     // ascending by unit; only units that move
+  std::vector<Unserved> unserved;  // ascending by unit
+  double makespan_s = 0;           // start signal to the last vector, by nominal clocks
 };
 
-/// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so far.
-/// Cost: O(segments).
-std::int32_t PositionAt(std::int32_t from, const AxisPath& path, const AxisDrive& drive, double t_s);
+/// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so
+/// far. Cost: O(segments).
+std::int32_t PositionAt(std::int32_t from, const AxisPath& path, const AxisDrive& drive,
+                        double t_s);
 
 /// End of the last segment of both axes, seconds after the start signal.
 double EndOf(const UnitPlan& plan, const UnitDrive& drive);

@@ -1,12 +1,14 @@
-// From any collision-free start to any collision-free target, provably clear, without sampling in time.
+// From any collision-free start to any collision-free target, provably clear, without sampling in
+// time.
 //
-// The idea: first find an order in which the units could go one at a time, each along a path whose swept
-// region is clear of everything that stands still meanwhile. That order is then run in parallel under one
-// rule: of two moves whose swept regions overlap, the later in the order begins after the earlier has ended
-// (with a margin for start skew and clock error). docs/adr/ has the proof that this is enough, whatever the
-// speeds. Each unit makes up to three moves: retract into its own cell, turn inside it, extend; cells are
-// discs that no other unit's cell touches, so turning is free. Where a straight retraction is blocked, a path
-// is searched in the unit's own (theta, phi) square with the others standing.
+// The idea: first find an order in which the units could go one at a time, each along a path whose
+// swept region is clear of everything that stands still meanwhile. That order is then run in
+// parallel under one rule: of two moves whose swept regions overlap, the later in the order begins
+// after the earlier has ended (with a margin for start skew and clock error). docs/adr/ has the
+// proof that this is enough, whatever the speeds. Each unit makes up to three moves: retract into
+// its own cell, turn inside it, extend; cells are discs that no other unit's cell touches, so
+// turning is free. Where a straight retraction is blocked, a path is searched in the unit's own
+// (theta, phi) square with the others standing.
 #pragma once
 
 #include <optional>
@@ -22,28 +24,30 @@ namespace focalfleet {
 
 struct PlanRequest {
   const Layout* layout = nullptr;
-  std::span<const UnitDrive> drives;            // Shape: (n), by PositionerIndex
-  std::span<const UnitKnowledge> start;         // Shape: (n)
+  std::span<const UnitDrive> drives;             // Shape: (n), by PositionerIndex
+  std::span<const UnitKnowledge> start;          // Shape: (n)
   std::span<const std::optional<Pose>> targets;  // Shape: (n); none: ends where it stood
-  /// Units that must not move whatever the targets say: disabled, silent, faulty. Non-zero is frozen. Shape: (n).
+  /// Units that must not move whatever the targets say: disabled, silent, faulty. Non-zero is
+  /// frozen. Shape: (n).
   std::span<const std::uint8_t> frozen;
 };
 
 struct PlanOptions {
-  bool fixed = false;             // units without a target may not even step aside
-  double start_skew_s = 0.020;    // any unit may start this early or late
-  double clock_error = 0.005;     // and its clock may run this fast or slow
+  bool fixed = false;           // units without a target may not even step aside
+  double start_skew_s = 0.020;  // any unit may start this early or late
+  double clock_error = 0.005;   // and its clock may run this fast or slow
 };
 
-/// A plan that serves every unit that can be served; the others are in Plan::unserved with the reason.
-/// Errors: kInvalid where the start or the targets collide (all pairs named), or an array has the wrong size.
-/// Cost: O(n) for bounded neighbourhoods, a fraction of a second for 5000 units; path searches come on top.
+/// A plan that serves every unit that can be served; the others are in Plan::unserved with the
+/// reason. Errors: kInvalid where the start or the targets collide (all pairs named), or an array
+/// has the wrong size. Cost: O(n) for bounded neighbourhoods, a fraction of a second for 5000
+/// units; path searches come on top.
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options);
 
-/// Targets that send the neighbours of `homing` out of every place that its arm may pass on its way home: phi
-/// to its upper stop first, from anywhere that its knowledge allows, then theta to its lower stop. Units that
-/// stand clear already get no target. Shape: (n).
-/// Errors: kRefused, names what stands in the way and cannot move.
+/// Targets that send the neighbours of `homing` out of every place that its arm may pass on its way
+/// home: phi to its upper stop first, from anywhere that its knowledge allows, then theta to its
+/// lower stop. Units that stand clear already get no target. Shape: (n). Errors: kRefused, names
+/// what stands in the way and cannot move.
 Result<std::vector<std::optional<Pose>>> MakeWayForHoming(const PlanRequest& request,
                                                           PositionerIndex homing);
 

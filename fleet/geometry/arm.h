@@ -1,0 +1,102 @@
+// The part of a unit that can touch others, and when two of them are clear for good.
+// The arm is the segment from elbow to fibre. Where both angles of a unit vary within a box
+// [theta] x [phi], no point of the arm is farther from where it is in the box's middle than
+//     R * d_theta + L2 * d_phi
+// (half-widths of the box in radians, R the farthest point of the arm from the base, L2 the phi
+// arm): turning by an angle moves a point by at most its radius times the angle. So one distance of
+// two segments decides about two whole boxes of poses, or the boxes are halved and asked again.
+// Nothing is sampled: "clear" holds for every pose in the boxes; "not clear" may be said of boxes
+// that are clear by less than a few micrometres.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "fleet/drive.h"
+#include "fleet/geometry/segment.h"
+#include "fleet/layout.h"
+
+namespace focalfleet {
+
+/// All poses between two corners, both included. Units: vectors.
+struct PoseBox {
+  Pose low{};
+  Pose high{};
+  static constexpr PoseBox Of(const Pose& p) { return {p, p}; }
+  static constexpr PoseBox Between(const Pose& a, const Pose& b) {
+    PoseBox box;
+    for (std::size_t k = 0; k < kAxisCount; ++k) {
+      box.low[k] = a[k] < b[k] ? a[k] : b[k];
+      box.high[k] = a[k] < b[k] ? b[k] : a[k];
+    }
+    return box;
+  }
+  [[nodiscard]] constexpr bool Contains(const Pose& p) const {
+    return low[0] <= p[0] && p[0] <= high[0] && low[1] <= p[1] && p[1] <= high[1];
+  }
+  constexpr bool operator==(const PoseBox&) const = default;
+};
+
+/// One unit's kinematics with everything that does not change computed once.
+class ArmGeometry {
+ public:
+  ArmGeometry() = default;
+  ArmGeometry(const Unit& unit, const UnitDrive& drive);
+
+  /// The phi arm, `a` the elbow and `b` the fibre.
+  [[nodiscard]] SegmentFp At(const Pose& pose) const;
+  /// Largest and smallest distance of the fibre from the base over a range of phi. Units: vectors,
+  /// mm.
+  [[nodiscard]] double FibreRadiusMax(std::int32_t phi_low, std::int32_t phi_high) const;
+  /// Angle between theta arm and phi arm: 0 stretched out, pi folded back. Units: rad.
+  [[nodiscard]] double Fold(std::int32_t phi) const { return phi_zero_rad_ + phi * phi_step_rad_; }
+
+  [[nodiscard]] const PointFp& base_fp() const { return base_; }
+  [[nodiscard]] double theta_arm_mm() const { return theta_arm_mm_; }
+  [[nodiscard]] double phi_arm_mm() const { return phi_arm_mm_; }
+  [[nodiscard]] double half_width_mm() const { return half_width_mm_; }
+  [[nodiscard]] double phi_zero_rad() const { return phi_zero_rad_; }
+  /// Radians a vector. Shape: (axes).
+  [[nodiscard]] double step_rad(Axis axis) const {
+    return axis == Axis::kTheta ? theta_step_rad_ : phi_step_rad_;
+  }
+  /// Every pose that the axes' ranges allow.
+  [[nodiscard]] const PoseBox& range() const { return range_; }
+  /// Bound on how far any point of the arm moves for these changes of the angles. Units: vectors,
+  /// mm.
+  [[nodiscard]] double TravelBound(double theta_vectors, double phi_vectors) const {
+    return (theta_arm_mm_ + phi_arm_mm_) * theta_vectors * theta_step_rad_ +
+           phi_arm_mm_ * phi_vectors * phi_step_rad_;
+  }
+
+ private:
+  friend class SweepTest;
+  PointFp base_;
+  double theta_arm_mm_ = 0;
+  double phi_arm_mm_ = 0;
+  double half_width_mm_ = 0;
+  double theta_zero_rad_ = 0;
+  double phi_zero_rad_ = 0;
+  double theta_step_rad_ = 0;
+  double phi_step_rad_ = 0;
+  PoseBox range_;
+};
+
+/// A segment with a radius of its own beyond the half-widths: a standing arm (0), a disc (both ends
+/// equal), or one piece of the cover of all poses that a unit may have.
+struct Capsule {
+  SegmentFp line;
+  double radius_mm = 0;
+};
+
+/// True: every pose of `a` in `box_a` stays farther than `need_mm` from every pose of `b` in
+/// `box_b`. Cost: at most `budget` distances; more would be needed only where the two nearly touch:
+/// then false.
+bool SweepsClear(const ArmGeometry& a, const PoseBox& box_a, const ArmGeometry& b,
+                 const PoseBox& box_b, double need_mm, int budget = 3000);
+
+/// The same against something that stands still.
+bool SweepClearOf(const ArmGeometry& a, const PoseBox& box_a, const Capsule& standing,
+                  double need_mm, int budget = 3000);
+
+}  // namespace focalfleet

@@ -1,0 +1,168 @@
+#include "fleet/plan/path_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace focalfleet {
+
+bool BoxClear(const ArmGeometry& arm, const PoseBox& box, std::span<const Blocker> blockers,
+              std::uint32_t* by, int budget) {
+  for (const Blocker& blocker : blockers) {
+    if (SweepClearOf(arm, box, blocker.capsule, blocker.need_mm, budget)) continue;
+    if (by != nullptr) *by = blocker.by;
+    return false;
+  }
+  return true;
+}
+
+void PathSearch::SetUp(const Question& question) {
+  q_ = question;
+  const double grid_rad = q_.grid_deg * std::numbers::pi / 180;
+  for (const Axis axis : kAxes) {
+    const std::size_t k = Index(axis);
+    step_[k] =
+        std::max(1, static_cast<std::int32_t>(std::lround(grid_rad / q_.arm->step_rad(axis))));
+    // The grid's origin is the start itself, so that the first node is exact.
+    low_[k] = -((q_.from[k] - q_.within.low[k]) / step_[k]);
+    count_[k] = (q_.within.high[k] - q_.from[k]) / step_[k] - low_[k] + 1;
+  }
+  nodes_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]), Node{});
+  open_.clear();
+  reached_.clear();
+  reached_nodes_.clear();
+}
+
+Pose PathSearch::PoseOf(std::int32_t node) const {
+  const std::int32_t a = node / count_[1] + low_[0];
+  const std::int32_t b = node % count_[1] + low_[1];
+  return {q_.from[0] + a * step_[0], q_.from[1] + b * step_[1]};
+}
+
+double PathSearch::ClearanceAt(std::int32_t index) {
+  Node& node = nodes_[static_cast<std::size_t>(index)];
+  if (!node.known) {
+    double least = std::numeric_limits<float>::max();
+    const SegmentFp line = q_.arm->At(PoseOf(index));
+    for (const Blocker& b : q_.blockers)
+      least = std::min(least, DistanceMm(line, b.capsule.line) - b.capsule.radius_mm - b.need_mm);
+    // Rounded down: a clearance must never be overstated.
+    node.clearance = std::nextafter(static_cast<float>(least), -1e30f);
+    node.known = true;
+  }
+  return static_cast<double>(node.clearance);
+}
+
+bool PathSearch::EdgeClear(std::int32_t a, std::int32_t b) {
+  const double at_a = ClearanceAt(a);
+  const double at_b = ClearanceAt(b);
+  if (at_a <= 0 || at_b <= 0) return false;
+  const Pose pa = PoseOf(a);
+  const Pose pb = PoseOf(b);
+  const double travel = q_.arm->TravelBound(std::abs(pa[0] - pb[0]), std::abs(pa[1] - pb[1]));
+  if (at_a + at_b > travel) return true;
+  return BoxClear(*q_.arm, PoseBox::Between(pa, pb), q_.blockers, nullptr, 300);
+}
+
+std::int64_t PathSearch::Estimate(const Pose& pose) const {
+  std::int64_t farthest = 0;
+  if (!q_.goal) return farthest;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    const std::int32_t below = q_.goal->low[k] - pose[k];
+    const std::int32_t above = pose[k] - q_.goal->high[k];
+    farthest = std::max<std::int64_t>({farthest, below, above});
+  }
+  return farthest;
+}
+
+void PathSearch::Expand(std::int32_t node) {
+  const std::int32_t a = node / count_[1];
+  const std::int32_t b = node % count_[1];
+  for (std::int32_t da = -1; da <= 1; ++da) {
+    for (std::int32_t db = -1; db <= 1; ++db) {
+      if ((da == 0 && db == 0) || a + da < 0 || a + da >= count_[0] || b + db < 0 ||
+          b + db >= count_[1])
+        continue;
+      const std::int32_t next = node + da * count_[1] + db;
+      Node& there = nodes_[static_cast<std::size_t>(next)];
+      if (there.done) continue;
+      const std::int32_t cost = nodes_[static_cast<std::size_t>(node)].cost +
+                                std::max(std::abs(da) * step_[0], std::abs(db) * step_[1]);
+      if (there.cost >= 0 && there.cost <= cost) continue;
+      if (!EdgeClear(node, next)) continue;
+      there.cost = cost;
+      there.came_from = node;
+      open_.push_back({cost + Estimate(PoseOf(next)), next});
+      std::push_heap(open_.begin(), open_.end());
+    }
+  }
+}
+
+/// The nearest pose of the goal, where it is not more than a grid step away and the way there is
+/// clear.
+std::optional<Pose> PathSearch::EndNear(const Pose& pose) const {
+  if (!q_.goal) return std::nullopt;
+  Pose end = pose;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    end[k] = std::clamp(pose[k], q_.goal->low[k], q_.goal->high[k]);
+    if (std::abs(end[k] - pose[k]) > step_[k]) return std::nullopt;
+  }
+  if (!BoxClear(*q_.arm, PoseBox::Between(pose, end), q_.blockers, nullptr)) return std::nullopt;
+  return end;
+}
+
+std::vector<Pose> PathSearch::Find(const Question& question) {
+  SetUp(question);
+  const std::int32_t start = -low_[0] * count_[1] - low_[1];
+  if (ClearanceAt(start) <= 0) return {};
+  nodes_[static_cast<std::size_t>(start)].cost = 0;
+  open_.push_back({Estimate(q_.from), start});
+  while (!open_.empty()) {
+    std::pop_heap(open_.begin(), open_.end());
+    const std::int32_t node = open_.back().node;
+    open_.pop_back();
+    Node& here = nodes_[static_cast<std::size_t>(node)];
+    if (here.done) continue;
+    here.done = true;
+    const Pose pose = PoseOf(node);
+    reached_.push_back(pose);
+    reached_nodes_.push_back(node);
+    if (const std::optional<Pose> end = EndNear(pose)) {
+      std::vector<Pose> way = Trace(node);
+      if (way.back() != *end) way.push_back(*end);
+      return Shorten(std::move(way));
+    }
+    Expand(node);
+  }
+  return {};
+}
+
+std::vector<Pose> PathSearch::WayTo(std::size_t reached_index) const {
+  return Shorten(Trace(reached_nodes_[reached_index]));
+}
+
+std::vector<Pose> PathSearch::Trace(std::int32_t node) const {
+  std::vector<Pose> way;
+  for (; node >= 0; node = nodes_[static_cast<std::size_t>(node)].came_from)
+    way.push_back(PoseOf(node));
+  std::reverse(way.begin(), way.end());
+  return way;
+}
+
+std::vector<Pose> PathSearch::Shorten(std::vector<Pose> way) const {
+  if (way.size() <= 2) return way;
+  std::vector<Pose> corners{way.front()};
+  std::size_t at = 0;
+  while (at + 1 < way.size()) {
+    std::size_t next = way.size() - 1;
+    while (next > at + 1 &&
+           !BoxClear(*q_.arm, PoseBox::Between(way[at], way[next]), q_.blockers, nullptr, 400))
+      --next;
+    corners.push_back(way[next]);
+    at = next;
+  }
+  return corners;
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,330 @@
+#include "fleet/plan/planner.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "fleet/plan/retreat.h"
+#include "fleet/plan/scene.h"
+#include "fleet/plan/schedule.h"
+
+namespace focalfleet {
+namespace {
+
+/// Each attempt takes at least one unit out of the served ones or lets at least one step aside; a
+/// fleet in which more goes wrong than this is planned with what can be served without any stepping
+/// aside.
+constexpr int kAttemptsMax = 60;
+
+class Planner {
+ public:
+  Planner(const PlanRequest& request, const PlanOptions& options)
+      : request_(request),
+        options_(options),
+        layout_(*request.layout),
+        scene_(layout_, request.drives, request.start),
+        surroundings_(&scene_) {}
+
+  Result<Plan> Run();
+
+ private:
+  enum class Standing : std::uint8_t { kServed, kStays };
+
+  Status Check();
+  void NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
+                      const char* what, std::string* text) const;
+  void Classify();
+  void Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by);
+  void DropCollidingTargets();
+  [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
+  bool Attempt(std::vector<Piece>* order);
+  bool TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order);
+  std::vector<Pose> TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to);
+  void GiveWay();
+  bool LetStepAside(std::uint32_t stuck);
+  [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
+
+  const PlanRequest& request_;
+  const PlanOptions& options_;
+  const Layout& layout_;
+  Scene scene_;
+  Surroundings surroundings_;
+  std::vector<Pose> start_;
+  std::vector<Pose> goal_;
+  std::vector<std::uint8_t> movable_;
+  std::vector<std::uint8_t> served_;
+  std::vector<std::uint8_t> aside_;
+  std::vector<std::uint8_t> movers_;
+  std::vector<std::uint32_t> stuck_;
+  std::vector<std::uint32_t> blames_;  // beside stuck_
+  std::vector<Unserved> unserved_;
+};
+
+Status CheckShapes(const PlanRequest& request) {
+  if (request.layout == nullptr) return Fail(ErrorCode::kInvalid, "a plan needs a layout");
+  const std::size_t n = request.layout->size();
+  if (request.drives.size() == n && request.start.size() == n && request.targets.size() == n &&
+      request.frozen.size() == n)
+    return {};
+  return Fail(ErrorCode::kInvalid,
+              "drives, start, targets and frozen must have one row for each of the " +
+                  std::to_string(n) + " units");
+}
+
+std::string UnitName(const Layout& layout, std::uint32_t unit) {
+  return std::to_string(layout.unit({unit}).id.value);
+}
+
+void Planner::Classify() {
+  const std::size_t n = layout_.size();
+  start_.resize(n);
+  goal_.resize(n);
+  movable_.assign(n, 0);
+  served_.assign(n, 0);
+  aside_.assign(n, 0);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const bool enabled = layout_.unit({i}).enabled;
+    const bool frozen = request_.frozen[i] != 0;
+    const bool place = scene_.is_place(i);
+    start_[i] = place ? PlaceOf(request_.start[i]) : Pose{};
+    goal_[i] = start_[i];
+    movable_[i] = enabled && !frozen && place ? 1 : 0;
+    if (!request_.targets[i]) continue;
+    if (movable_[i] != 0) {
+      served_[i] = 1;
+      goal_[i] = *request_.targets[i];
+    } else if (!enabled) {
+      Unserve(i, UnservedWhy::kDisabled, kNobody);
+    } else if (!place) {
+      Unserve(i, UnservedWhy::kUnknownPlace, kNobody);
+    } else if (*request_.targets[i] != start_[i]) {
+      Unserve(i, UnservedWhy::kBlocked, i);
+    }
+  }
+}
+
+void Planner::Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by) {
+  served_[unit] = 0;
+  goal_[unit] = start_[unit];
+  Unserved unserved{{unit}, why, std::nullopt};
+  if (by != kNobody) unserved.by = PositionerIndex{by};
+  unserved_.push_back(unserved);
+}
+
+void Planner::NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
+                             const char* what, std::string* text) const {
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (counts[i] == 0) continue;
+    for (const NeighbourNeed& near : scene_.neighbours(i)) {
+      if (near.unit < i || counts[near.unit] == 0) continue;
+      const double distance =
+          DistanceMm(scene_.arm(i).At(poses[i]), scene_.arm(near.unit).At(poses[near.unit]));
+      const double need = scene_.FullNeed(i, near.unit);
+      if (distance >= need - kClearTolerance_mm) continue;
+      std::array<char, 160> line{};
+      std::snprintf(line.data(), line.size(),
+                    "%s%s of units %s and %s are %.4f mm apart, %.4f mm needed",
+                    text->empty() ? "" : "; ", what, UnitName(layout_, i).c_str(),
+                    UnitName(layout_, near.unit).c_str(), distance, need);
+      *text += line.data();
+    }
+  }
+}
+
+Status Planner::Check() {
+  std::string text;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (served_[i] == 0 || scene_.arm(i).range().Contains(goal_[i])) continue;
+    text += (text.empty() ? "the target of unit " : "; the target of unit ") +
+            UnitName(layout_, i) + " is outside its axes' ranges";
+  }
+  NameCollisions(start_, movable_, "the starts", &text);
+  NameCollisions(goal_, served_, "the targets", &text);
+  if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
+  return {};
+}
+
+bool Planner::CollidesWith(std::uint32_t unit, std::uint32_t* by) const {
+  const ArmGeometry& arm = scene_.arm(unit);
+  const SegmentFp line = arm.At(goal_[unit]);
+  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+    if (!scene_.is_place(near.unit) || served_[near.unit] != 0) continue;
+    *by = near.unit;
+    const double least = scene_.FullNeed(unit, near.unit) - kClearTolerance_mm;
+    if (DistanceMm(line, scene_.arm(near.unit).At(goal_[near.unit])) < least) return true;
+  }
+  for (const StandingThing& thing : scene_.standing(unit)) {
+    if (thing.in_cell && scene_.InCell(unit, goal_[unit])) continue;
+    *by = thing.by;
+    if (DistanceMm(line, thing.capsule.line) < thing.capsule.radius_mm + thing.least_mm)
+      return true;
+  }
+  return false;
+}
+
+/// A target that would touch what stands is not served; its unit then stands too, so others may
+/// follow.
+void Planner::DropCollidingTargets() {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+      std::uint32_t by = kNobody;
+      if (served_[i] == 0 || goal_[i] == start_[i] || !CollidesWith(i, &by)) continue;
+      Unserve(i, UnservedWhy::kTargetCollides, by);
+      changed = true;
+    }
+  }
+}
+
+/// The way from one pose to another without leaving the cell. Empty: none.
+std::vector<Pose> Planner::TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to) {
+  const ArmGeometry& arm = scene_.arm(unit);
+  const Pose& from = in.poses()[unit];
+  const std::span<const Blocker> around = surroundings_.Around(unit, in.lines(), in.poses(), true);
+  if (BoxClear(arm, PoseBox::Between(from, to), around, nullptr)) return {from, to};
+  PathSearch::Question question;
+  question.arm = &arm;
+  question.blockers = around;
+  question.from = from;
+  question.within = arm.range();
+  question.within.low[0] = std::min(question.within.low[0], from[0]);
+  question.within.high[0] = std::max(question.within.high[0], from[0]);
+  question.within.low[1] = scene_.cell(unit).low;
+  question.within.high[1] = scene_.cell(unit).high;
+  question.goal = PoseBox::Of(to);
+  for (const double grid_deg : {3.0, 1.0}) {
+    question.grid_deg = grid_deg;
+    std::vector<Pose> way = surroundings_.search().Find(question);
+    if (!way.empty()) return way;
+  }
+  return {};
+}
+
+bool Planner::TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order) {
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (movers_[i] == 0 || in.poses()[i] == out.poses()[i]) continue;
+    const std::vector<Pose> way = TurnInCell(i, in, out.poses()[i]);
+    if (way.empty()) stuck_.push_back(i);
+    for (std::size_t k = 1; k < way.size(); ++k)
+      if (way[k] != way[k - 1]) order->push_back({i, way[k - 1], way[k]});
+  }
+  return stuck_.empty();
+}
+
+/// One whole try: in, turn, out. False: stuck_ says who could not.
+bool Planner::Attempt(std::vector<Piece>* order) {
+  order->clear();
+  stuck_.clear();
+  movers_.assign(scene_.size(), 0);
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    movers_[i] = movable_[i] != 0 && (goal_[i] != start_[i] || aside_[i] != 0) ? 1 : 0;
+  Retreat in(&scene_, &surroundings_, start_, movers_);
+  in.Run();
+  Retreat out(&scene_, &surroundings_, goal_, movers_);
+  out.Run();
+  stuck_ = in.stuck();
+  stuck_.insert(stuck_.end(), out.stuck().begin(), out.stuck().end());
+  if (stuck_.empty()) {
+    *order = in.pieces();
+    TurnAll(in, out, order);
+    for (auto piece = out.pieces().rbegin(); piece != out.pieces().rend(); ++piece)
+      order->push_back({piece->unit, piece->to, piece->from});
+    const std::vector<std::uint32_t> too_many = UnitsWithTooManyPieces(*order, scene_.size());
+    stuck_.insert(stuck_.end(), too_many.begin(), too_many.end());
+  }
+  std::sort(stuck_.begin(), stuck_.end());
+  stuck_.erase(std::unique(stuck_.begin(), stuck_.end()), stuck_.end());
+  return stuck_.empty();
+}
+
+/// Who stands in the straight way of a stuck unit; kNobody where that cannot be told or is an
+/// obstacle.
+std::uint32_t Planner::Blames(std::uint32_t unit) const {
+  const ArmGeometry& arm = scene_.arm(unit);
+  const PhiSpan& cell = scene_.cell(unit);
+  if (!scene_.HasCell(unit)) return kNobody;
+  for (const std::vector<Pose>* poses : {&start_, &goal_}) {
+    Pose end = (*poses)[unit];
+    end[1] = std::clamp(end[1], cell.low, cell.high);
+    const PoseBox box = PoseBox::Between((*poses)[unit], end);
+    for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+      if (!scene_.is_place(near.unit)) continue;
+      const Capsule there{scene_.arm(near.unit).At((*poses)[near.unit]), 0};
+      if (!SweepClearOf(arm, box, there, near.need_mm)) return near.unit;
+    }
+    for (const StandingThing& thing : scene_.standing(unit))
+      if (!SweepClearOf(arm, box, thing.capsule, thing.need_mm)) return thing.by;
+  }
+  return kNobody;
+}
+
+bool Planner::LetStepAside(std::uint32_t stuck) {
+  bool added = false;
+  for (const NeighbourNeed& near : scene_.neighbours(stuck)) {
+    const std::uint32_t j = near.unit;
+    if (movable_[j] == 0 || movers_[j] != 0 || aside_[j] != 0 || !scene_.HasCell(j)) continue;
+    if (options_.fixed && !request_.targets[j]) continue;
+    aside_[j] = 1;
+    added = true;
+  }
+  return added;
+}
+
+/// After a failed attempt: those that stand may step aside; where nobody is left to ask, the stuck
+/// unit stays.
+void Planner::GiveWay() {
+  bool added = false;
+  for (const std::uint32_t i : stuck_) added = LetStepAside(i) || added;
+  if (added) return;
+  std::vector<std::uint8_t> given_up(scene_.size(), 0);
+  for (const std::uint32_t i : stuck_) {
+    // One of each cluster at a time: with it standing still the others may find a way.
+    const auto near = scene_.neighbours(i);
+    if (std::any_of(near.begin(), near.end(),
+                    [&](const NeighbourNeed& n) { return given_up[n.unit] != 0; }))
+      continue;
+    given_up[i] = 1;
+    const std::uint32_t by = Blames(i);
+    if (served_[i] != 0 && goal_[i] != start_[i])
+      Unserve(i, UnservedWhy::kBlocked, by);
+    else
+      movable_[i] = 0;
+    aside_[i] = 0;
+  }
+}
+
+Result<Plan> Planner::Run() {
+  Classify();
+  FOCALFLEET_TRY(Check());
+  std::vector<Piece> order;
+  bool done = false;
+  for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
+    DropCollidingTargets();
+    scene_.AllowFor(start_);
+    scene_.AllowFor(goal_);
+    done = Attempt(&order);
+    if (!done) GiveWay();
+  }
+  if (!done) {
+    order.clear();
+    for (std::uint32_t i = 0; i < scene_.size(); ++i)
+      if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, kNobody);
+  }
+  const std::vector<Piece> pieces = CutPieces(order, scene_);
+  FOCALFLEET_TRY_ASSIGN(Plan plan, Schedule(pieces, scene_, request_.drives, options_));
+  std::sort(unserved_.begin(), unserved_.end(),
+            [](const Unserved& a, const Unserved& b) { return a.unit < b.unit; });
+  plan.unserved = std::move(unserved_);
+  return plan;
+}
+
+}  // namespace
+
+Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
+  FOCALFLEET_TRY(CheckShapes(request));
+  return Planner(request, options).Run();
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,94 @@
+// One at a time: an order in which all movers of a configuration can go into their cells, each
+// along a way that is clear of all others as they stand at that moment. Run from the starts it is
+// the way in; run from the targets and read backwards it is the way out again.
+//
+// The usual way is straight: phi folds back just as far as the cell needs, theta stands. Rounds
+// take all units that are free now, so that chains of waiting stay short. A unit whose end would
+// shut in a neighbour that is free waits for it. Where a round finds nobody free, it tries in this
+// order: a way around (path search), folding or turning neighbours that are in their cells already
+// out of the way, and yielding: one that cannot get into its cell goes where it lets another one
+// pass.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fleet/plan/path_search.h"
+#include "fleet/plan/scene.h"
+
+namespace focalfleet {
+
+/// One leg of one unit: both axes go from one pose to the other, in any manner inside the box
+/// between them.
+struct Piece {
+  std::uint32_t unit = 0;
+  Pose from{};
+  Pose to{};
+  [[nodiscard]] PoseBox box() const { return PoseBox::Between(from, to); }
+};
+
+/// Scratch that outlives one plan step: what stands around one unit, and the search.
+class Surroundings {
+ public:
+  explicit Surroundings(const Scene* scene) : scene_(scene) {}
+
+  /// Everything near `unit` with the others at `poses`. With `in_cell_only` units inside their own
+  /// cells are left out: for ways that never leave this unit's own cell.
+  std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
+                                  std::span<const Pose> poses, bool in_cell_only);
+  PathSearch& search() { return search_; }
+
+ private:
+  const Scene* scene_;
+  PathSearch search_;
+  std::vector<Blocker> blockers_;
+};
+
+class Retreat {
+ public:
+  Retreat(const Scene* scene, Surroundings* surroundings, std::span<const Pose> poses,
+          std::span<const std::uint8_t> movers);
+
+  /// Takes as many movers as it can into their cells.
+  void Run();
+
+  [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
+  /// Where everybody stands in the end. Shape: (n).
+  [[nodiscard]] const std::vector<Pose>& poses() const { return poses_; }
+  [[nodiscard]] const std::vector<SegmentFp>& lines() const { return lines_; }
+  /// Movers that did not get into their cells; ascending.
+  [[nodiscard]] const std::vector<std::uint32_t>& stuck() const { return waiting_; }
+
+ private:
+  [[nodiscard]] Pose StraightEnd(std::uint32_t unit) const;
+  bool StraightClear(std::uint32_t unit);
+  [[nodiscard]] bool StraightClearOf(std::uint32_t unit, const NeighbourNeed& near,
+                                     const SegmentFp& line) const;
+  int ShutIn(std::uint32_t unit) const;
+  bool StraightRound();
+  bool GoAround(double grid_deg);
+  bool MakeRoom();
+  bool MakeRoomFor(std::uint32_t unit);
+  bool Turn(std::uint32_t neighbour, const NeighbourNeed& need, std::uint32_t unit);
+  bool Yield();
+  bool YieldTo(std::uint32_t unit, std::uint32_t other);
+  void Go(std::uint32_t unit, std::span<const Pose> way);
+  void DropArrived();
+  [[nodiscard]] bool Waits(std::uint32_t unit) const { return waits_[unit] != 0; }
+
+  const Scene* scene_;
+  Surroundings* surroundings_;
+  std::vector<Pose> poses_;
+  std::vector<SegmentFp> lines_;
+  std::vector<std::uint8_t> movers_;
+  std::vector<std::uint8_t> waits_;
+  std::vector<std::uint32_t> waiting_;
+  std::vector<Piece> pieces_;
+  enum class Known : std::uint8_t { kNo, kClear, kBlocked };
+  std::vector<Known> straight_;        // as far as nothing near has moved since
+  std::vector<double> searched_deg_;   // finest grid on which a search failed since then; 0: none
+  std::vector<std::uint8_t> favours_;  // turns and yields made for others
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,105 @@
+// What a plan is made in: every unit's arm, how far each pair of neighbours must stay apart, the
+// cell of each unit, and what stands still whatever happens.
+//
+// Cells. Discs around the bases, so small that an arm inside its own cell is clear of every arm
+// inside another: half-width and clearance are taken off the distance of two bases and the rest is
+// shared. A unit whose elbow needs more than its half gets more, as long as its neighbours can
+// spare it. Where that fails the unit has no cell (radius 0) and cannot be moved by cells.
+//
+// Needs. A pair is planned with the full distance and a guard against rounding; where the two start
+// or end nearer than that (the rule allows 2 um less) the pair's need is lowered to just below what
+// it has.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fleet/geometry/arm.h"
+#include "fleet/knowledge.h"
+#include "fleet/layout.h"
+
+namespace focalfleet {
+
+inline constexpr std::uint32_t kNobody = 0xffffffffu;
+/// Two units that are this much nearer than half-widths plus clearance still count as clear.
+inline constexpr double kClearTolerance_mm = 2e-3;
+
+struct NeighbourNeed {
+  std::uint32_t unit = 0;
+  double need_mm = 0;  // segments of the two must be farther apart than this
+};
+
+/// Something that never moves, seen from one unit.
+struct StandingThing {
+  Capsule capsule;
+  double need_mm = 0;
+  double least_mm = 0;         // what the rule asks at the very least
+  std::uint32_t by = kNobody;  // the unit that it stands for; kNobody: a fixed obstacle
+  bool in_cell = false;        // that unit is in its cell wherever it is
+};
+
+/// Whole vectors of phi, both ends included; empty where low > high.
+struct PhiSpan {
+  std::int32_t low = 0;
+  std::int32_t high = -1;
+};
+
+class Scene {
+ public:
+  Scene(const Layout& layout, std::span<const UnitDrive> drives,
+        std::span<const UnitKnowledge> start);
+
+  [[nodiscard]] std::size_t size() const { return arms_.size(); }
+  [[nodiscard]] const Layout& layout() const { return *layout_; }
+  [[nodiscard]] const ArmGeometry& arm(std::uint32_t unit) const { return arms_[unit]; }
+  [[nodiscard]] std::span<const NeighbourNeed> neighbours(std::uint32_t unit) const {
+    return {needs_.data() + needs_begin_[unit], needs_begin_[unit + 1] - needs_begin_[unit]};
+  }
+  /// Fixed obstacles in reach, and covers of all poses that units of uncertain place may have.
+  [[nodiscard]] std::span<const StandingThing> standing(std::uint32_t unit) const {
+    return {standing_.data() + standing_begin_[unit],
+            standing_begin_[unit + 1] - standing_begin_[unit]};
+  }
+  /// The values of phi around "folded back" for which the arm is inside its cell, whatever theta.
+  [[nodiscard]] const PhiSpan& cell(std::uint32_t unit) const { return cells_[unit]; }
+  [[nodiscard]] bool HasCell(std::uint32_t unit) const {
+    return cells_[unit].low <= cells_[unit].high;
+  }
+  [[nodiscard]] bool InCell(std::uint32_t unit, const PoseBox& box) const {
+    return cells_[unit].low <= box.low[1] && box.high[1] <= cells_[unit].high;
+  }
+  [[nodiscard]] bool InCell(std::uint32_t unit, const Pose& pose) const {
+    return InCell(unit, PoseBox::Of(pose));
+  }
+  [[nodiscard]] bool is_place(std::uint32_t unit) const { return is_place_[unit] != 0; }
+
+  /// Half-widths and clearance of a pair, exactly as the rule says.
+  [[nodiscard]] double FullNeed(std::uint32_t a, std::uint32_t b) const {
+    return arms_[a].half_width_mm() + arms_[b].half_width_mm() + layout_->clearance_mm();
+  }
+  /// Lowers the needs of pairs that stand nearer than planned needs in this configuration.
+  void AllowFor(std::span<const Pose> poses);
+
+ private:
+  void FindCells();
+  void FindStanding(std::span<const UnitKnowledge> start);
+
+  const Layout* layout_;
+  std::vector<ArmGeometry> arms_;
+  std::vector<PhiSpan> cells_;
+  std::vector<std::uint8_t> is_place_;
+  std::vector<std::uint32_t> needs_begin_;
+  std::vector<NeighbourNeed> needs_;
+  std::vector<std::uint32_t> standing_begin_;
+  std::vector<StandingThing> standing_;
+};
+
+/// Capsules that cover the arm in every pose of the box, each at most `slack_mm` too wide where 400
+/// of them are enough for that.
+std::vector<Capsule> CoverOf(const ArmGeometry& arm, const PoseBox& box, double slack_mm);
+
+/// The box of all poses that this knowledge allows.
+PoseBox BoxOf(const ArmGeometry& arm, const UnitKnowledge& knowledge);
+
+}  // namespace focalfleet

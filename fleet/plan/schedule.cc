@@ -1,0 +1,209 @@
+#include "fleet/plan/schedule.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "protocol/base/limits.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::int64_t kCountsPerTick = 14'400;
+static_assert(static_cast<double>(kCountsPerTick) == kTimerHz * 100e-6);
+constexpr double kGrain_deg = 15;
+
+using AxisCounts = std::array<std::uint32_t, kAxisCount>;
+
+void Count(const Piece& piece, AxisCounts* counts) {
+  for (std::size_t k = 0; k < kAxisCount; ++k)
+    if (piece.from[k] != piece.to[k]) ++(*counts)[k];
+}
+
+std::vector<AxisCounts> CountAll(std::span<const Piece> order, std::size_t units) {
+  std::vector<AxisCounts> counts(units);
+  for (const Piece& piece : order) Count(piece, &counts[piece.unit]);
+  return counts;
+}
+
+class Scheduler {
+ public:
+  Scheduler(std::span<const Piece> order, const Scene& scene, std::span<const UnitDrive> drives,
+            const PlanOptions& options)
+      : order_(order), scene_(scene), drives_(drives), options_(options) {}
+
+  Result<Plan> Run();
+
+ private:
+  struct Timed {
+    std::uint32_t piece = 0;
+    std::int64_t begin = 0;
+    std::int64_t end = 0;
+  };
+  struct Wait {  // `later` begins after one of `earlier` has ended
+    std::uint32_t earlier = 0;
+    std::uint32_t later = 0;
+    std::int64_t left = 0;
+    std::int64_t begins = 0;
+  };
+
+  /// First count at which a piece may begin that must not meet one that ends at `end`.
+  [[nodiscard]] std::int64_t After(std::int64_t end) const {
+    const double error = options_.clock_error;
+    const double skew = options_.start_skew_s * kTimerHz;
+    const double ended_at_last = static_cast<double>(end) / (1 - error) + skew;
+    return static_cast<std::int64_t>((ended_at_last + skew) / (1 - error)) + kCountsPerTick;
+  }
+  [[nodiscard]] bool Meet(const Piece& a, const Piece& b, double need_mm) const {
+    if (scene_.InCell(a.unit, a.box()) && scene_.InCell(b.unit, b.box())) return false;
+    return !SweepsClear(scene_.arm(a.unit), a.box(), scene_.arm(b.unit), b.box(), need_mm, 2000);
+  }
+  Timed Lay(std::uint32_t index, std::int64_t earliest);
+  void Collect(Plan* plan);
+
+  std::span<const Piece> order_;
+  const Scene& scene_;
+  std::span<const UnitDrive> drives_;
+  const PlanOptions& options_;
+  std::vector<std::vector<Timed>> laid_;  // per unit
+  std::vector<UnitPlan> plans_;           // per unit
+  std::vector<std::array<std::int64_t, kAxisCount>> axis_end_;
+  std::vector<Wait> waits_;
+};
+
+/// Gives a piece its segments; a leg that goes on without pause lengthens the segment before it.
+Scheduler::Timed Scheduler::Lay(std::uint32_t index, std::int64_t earliest) {
+  const Piece& piece = order_[index];
+  UnitPlan& plan = plans_[piece.unit];
+  if (laid_[piece.unit].empty()) plan.from = piece.from;
+  plan.to = piece.to;
+  Timed timed{index, earliest, earliest};
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    const std::int32_t delta = piece.to[k] - piece.from[k];
+    if (delta == 0) continue;
+    const AxisDrive& drive = drives_[piece.unit].axis[k];
+    const std::int64_t lasts =
+        static_cast<std::int64_t>(std::abs(delta)) * drive.repeat * drive.counter1;
+    std::int64_t& end = axis_end_[piece.unit][k];
+    AxisPath& path = plan.path[k];
+    const std::span<const Segment> before = path.segments();
+    if (!before.empty() && end == earliest && (before.back().delta > 0) == (delta > 0)) {
+      AxisPath longer;
+      for (const Segment& s : before.first(before.size() - 1)) longer.Append(s);
+      Segment last = before.back();
+      last.delta += delta;
+      longer.Append(last);
+      path = longer;
+      end += lasts;
+    } else {
+      const std::int64_t tick = (earliest + kCountsPerTick - 1) / kCountsPerTick;
+      path.Append({static_cast<std::uint32_t>(tick), delta, drive.repeat});
+      end = tick * kCountsPerTick + lasts;
+    }
+    timed.end = std::max(timed.end, end);
+  }
+  return timed;
+}
+
+Result<Plan> Scheduler::Run() {
+  laid_.resize(scene_.size());
+  plans_.resize(scene_.size());
+  axis_end_.resize(scene_.size(), {-1, -1});
+  for (std::uint32_t index = 0; index < order_.size(); ++index) {
+    const Piece& piece = order_[index];
+    std::int64_t earliest = laid_[piece.unit].empty() ? 0 : laid_[piece.unit].back().end;
+    const std::size_t first_wait = waits_.size();
+    for (const NeighbourNeed& near : scene_.neighbours(piece.unit)) {
+      for (const Timed& other : laid_[near.unit]) {
+        if (!Meet(piece, order_[other.piece], near.need_mm)) continue;
+        earliest = std::max(earliest, After(other.end));
+        waits_.push_back({near.unit, piece.unit, other.end, 0});
+      }
+    }
+    if (earliest / kCountsPerTick + 1 > static_cast<std::int64_t>(limits::kOffsetTicksMax))
+      return Fail(ErrorCode::kRefused, "the motion would take longer than a start offset can say");
+    const Timed timed = Lay(index, earliest);
+    for (std::size_t k = first_wait; k < waits_.size(); ++k) waits_[k].begins = timed.begin;
+    laid_[piece.unit].push_back(timed);
+  }
+  Plan plan;
+  Collect(&plan);
+  return plan;
+}
+
+void Scheduler::Collect(Plan* plan) {
+  std::sort(waits_.begin(), waits_.end(), [](const Wait& a, const Wait& b) {
+    return std::tie(a.earlier, a.later, a.begins) < std::tie(b.earlier, b.later, b.begins);
+  });
+  std::size_t next = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    std::vector<UnitPlan::Follower> followers;
+    for (; next < waits_.size() && waits_[next].earlier == i; ++next) {
+      const Wait& wait = waits_[next];
+      const double left_s = static_cast<double>(wait.left) / kTimerHz;
+      if (!followers.empty() && followers.back().unit.value == wait.later) {
+        followers.back().left_s = std::max(followers.back().left_s, left_s);
+        continue;
+      }
+      followers.push_back({{wait.later}, static_cast<double>(wait.begins) / kTimerHz, left_s});
+    }
+    if (laid_[i].empty()) continue;
+    UnitPlan& unit = plans_[i];
+    unit.unit = {i};
+    unit.mode = drives_[i].mode;
+    unit.followers = std::move(followers);
+    plan->makespan_s = std::max(plan->makespan_s, EndOf(unit, drives_[i]));
+    plan->moves.push_back(std::move(unit));
+  }
+}
+
+}  // namespace
+
+std::vector<Piece> CutPieces(std::span<const Piece> order, const Scene& scene) {
+  std::vector<AxisCounts> counts = CountAll(order, scene.size());
+  std::vector<Piece> cut;
+  cut.reserve(order.size() * 3);
+  for (const Piece& piece : order) {
+    const bool theta = piece.from[0] != piece.to[0];
+    const bool phi = piece.from[1] != piece.to[1];
+    std::int32_t parts = 1;
+    if (theta != phi) {
+      const std::size_t k = theta ? 0 : 1;
+      const double length_deg = std::abs(piece.to[k] - piece.from[k]) *
+                                scene.arm(piece.unit).step_rad(kAxes[k]) * 180 / std::numbers::pi;
+      const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrain_deg));
+      const auto spare = static_cast<std::int32_t>(limits::kSegmentsPerAxis) -
+                         static_cast<std::int32_t>(counts[piece.unit][k]);
+      // Half of what is spare: the way out must find some too.
+      parts = std::clamp(wanted, 1, 1 + std::max(0, (spare + 1) / 2));
+      counts[piece.unit][k] += static_cast<std::uint32_t>(parts - 1);
+    }
+    Pose at = piece.from;
+    for (std::int32_t part = 1; part <= parts; ++part) {
+      Pose next = piece.to;
+      for (std::size_t k = 0; k < kAxisCount; ++k)
+        next[k] = piece.from[k] +
+                  static_cast<std::int32_t>(static_cast<std::int64_t>(piece.to[k] - piece.from[k]) *
+                                            part / parts);
+      if (next != at) cut.push_back({piece.unit, at, next});
+      at = next;
+    }
+  }
+  return cut;
+}
+
+std::vector<std::uint32_t> UnitsWithTooManyPieces(std::span<const Piece> order, std::size_t units) {
+  const std::vector<AxisCounts> counts = CountAll(order, units);
+  std::vector<std::uint32_t> too_many;
+  for (std::uint32_t i = 0; i < units; ++i)
+    if (std::max(counts[i][0], counts[i][1]) > limits::kSegmentsPerAxis) too_many.push_back(i);
+  return too_many;
+}
+
+Result<Plan> Schedule(std::span<const Piece> order, const Scene& scene,
+                      std::span<const UnitDrive> drives, const PlanOptions& options) {
+  return Scheduler(order, scene, drives, options).Run();
+}
+
+}  // namespace focalfleet

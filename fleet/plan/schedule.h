@@ -1,0 +1,31 @@
+// From one at a time to all at once. The pieces come in an order in which they are clear one after
+// the other; here each gets its time under one rule: of two pieces of different units whose swept
+// boxes are not clear of each other, the later in the order begins only after the earlier has
+// ended, whatever the start skew and the clocks. docs/adr/0003-one-at-a-time-then-parallel.md
+// proves that this is enough. Times are kept in timer counts (1 / 144 MHz), in which a vector is a
+// whole number; segments begin on ticks.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fleet/plan/plan.h"
+#include "fleet/plan/planner.h"
+#include "fleet/plan/retreat.h"
+#include "fleet/plan/scene.h"
+
+namespace focalfleet {
+
+/// Cuts long legs of one axis, so that followers wait for less; a unit's segments stay within
+/// limits::kSegmentsPerAxis. The order stays.
+std::vector<Piece> CutPieces(std::span<const Piece> order, const Scene& scene);
+
+/// Units whose pieces need more segments than one staged move holds; ascending.
+std::vector<std::uint32_t> UnitsWithTooManyPieces(std::span<const Piece> order, std::size_t units);
+
+/// Pre: no unit has too many pieces.
+/// Errors: kRefused where the motion would not end within the offsets that the wire can carry.
+Result<Plan> Schedule(std::span<const Piece> order, const Scene& scene,
+                      std::span<const UnitDrive> drives, const PlanOptions& options);
+
+}  // namespace focalfleet
