@@ -1,0 +1,449 @@
+#include "daemon/store/store.h"
+
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <fstream>
+#include <iterator>
+
+#include "daemon/store/schema.h"
+#include "tests/daemon/store/store_fixture.h"
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::Intent;
+using testing::StoreTest;
+using testing::Vector;
+
+constexpr WallTime kEight{1'700'000'000'000'000'000};
+constexpr WallTime kNine{1'700'003'600'000'000'000};
+
+std::string Bytes(const std::string& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(WallTime, PrintsIso8601InUtc) {
+  EXPECT_EQ(ToIso8601(kEight), "2023-11-14T22:13:20.000Z");
+  EXPECT_EQ(ToIso8601({0}), "1970-01-01T00:00:00.000Z");
+  EXPECT_EQ(ToIso8601({-1'000'000}), "1969-12-31T23:59:59.999Z");
+}
+
+TEST_F(StoreTest, NewStoreIsEmpty) {
+  auto store = OpenStore();
+  const auto fleet = store->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_TRUE(fleet->units.empty());
+  EXPECT_TRUE(fleet->vectors.empty());
+  EXPECT_TRUE(fleet->open_intents.empty());
+  EXPECT_EQ(fleet->next_move.value, 1);
+  EXPECT_EQ(fleet->next_configuration, 1u);
+  EXPECT_EQ(fleet->next_alarm, 1u);
+}
+
+TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
+  VectorRow half_known = Vector(7001, Witness::kMeasured, -1, 96, 12, Origin::kCampaign);
+  half_known.knowledge[1] = {Witness::kInterval, -500, 700};
+  half_known.subdivision = {96, 64};
+  const VectorRow unknown{{7002}, {}, {}, {}, Origin::kFactory};
+  const IntentRow intent = Intent(12, 7001, 13, {5, -6}, {-7, 8});
+  const std::vector<Row> rows = {
+      BindingRow{{12}, {7001}},
+      EnableRow{{13}, false, "arm bent"},
+      half_known,
+      unknown,
+      intent,
+      ParameterRow{{7001}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
+      NextMoveRow{{14}},
+      ConfigurationRow{5, "night.csv", ConfigurationState::kMoving, 5000, 3, 2, 1, 22.5,
+                       std::nan(""), 1.25, 9.0},
+      AlarmRow{9, Severity::kError, UnitId{12}, BusId{3}, "over_temperature"}};
+  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+
+  const auto fleet = OpenStore()->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  ASSERT_EQ(fleet->units.size(), 2u);
+  EXPECT_EQ(fleet->units[0].serial.value, 7001u);
+  EXPECT_TRUE(fleet->units[0].enabled);
+  EXPECT_EQ(fleet->units[1].unit.value, 13u);
+  EXPECT_FALSE(fleet->units[1].enabled);
+  EXPECT_EQ(fleet->units[1].reason, "arm bent");
+  ASSERT_EQ(fleet->vectors.size(), 2u);
+  EXPECT_EQ(fleet->vectors[0].knowledge, half_known.knowledge);
+  EXPECT_EQ(fleet->vectors[0].subdivision, half_known.subdivision);
+  EXPECT_EQ(fleet->vectors[0].move.value, 12);
+  EXPECT_EQ(fleet->vectors[0].origin, Origin::kCampaign);
+  EXPECT_EQ(fleet->vectors[1].knowledge[0].witness, Witness::kUnknown);
+  ASSERT_EQ(fleet->open_intents.size(), 1u);
+  EXPECT_EQ(fleet->open_intents[0].from, intent.from);
+  EXPECT_EQ(fleet->open_intents[0].to, intent.to);
+  EXPECT_EQ(fleet->open_intents[0].hull, intent.hull);
+  EXPECT_EQ(fleet->open_intents[0].unit.value, 12u);
+  ASSERT_EQ(fleet->parameters.size(), 1u);
+  EXPECT_EQ(fleet->parameters[0].value, 37);
+  EXPECT_EQ(fleet->next_move.value, 14);
+  EXPECT_EQ(fleet->next_configuration, 6u);
+  EXPECT_EQ(fleet->next_alarm, 10u);
+}
+
+TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
+  auto store = OpenStore();
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{Vector(1, Witness::kReported, -1, 193)}, kEight));
+  Sql("CREATE TEMP TABLE t(ok INTEGER CHECK(ok)); INSERT INTO t SELECT vector = 95 AND turns = -1 "
+      "FROM axis_state WHERE axis = 0; INSERT INTO t SELECT vector = 1 AND turns = 2 FROM "
+      "axis_state "
+      "WHERE axis = 1;");
+}
+
+TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
+  auto store = OpenStore();
+  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
+  // The end stands before the vectors in the batch, and still tells where they are.
+  testing::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
+                                                     Vector(40, Witness::kReported, 10, 20)},
+                                    kNine));
+  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 2, {10, 20}, {0, 0})}, kNine));
+
+  EXPECT_EQ(store->Load()->open_intents.size(), 1u);
+  const auto moves = OpenReader()->Moves(UnitId{4}, 10);
+  ASSERT_TRUE(moves) << moves.error().text;
+  ASSERT_EQ(moves->size(), 2u);
+  EXPECT_EQ((*moves)[0].move.value, 2);
+  EXPECT_FALSE((*moves)[0].ended);
+  EXPECT_EQ((*moves)[1].end, IntentEnd::kArrived);
+  EXPECT_EQ((*moves)[1].began, kEight);
+  EXPECT_EQ((*moves)[1].ended, kNine);
+  EXPECT_EQ((*moves)[1].ended_at, Exactly(Witness::kReported, Pose{10, 20}));
+  EXPECT_EQ((*moves)[1].hull[1].high, 20);
+  EXPECT_TRUE(OpenReader()->Moves(UnitId{5}, 10)->empty());
+  EXPECT_EQ(OpenReader()->Moves({}, 1)->size(), 1u);
+}
+
+TEST_F(StoreTest, AnIntentEndsOnceAndCanBeWrittenTwice) {
+  auto store = OpenStore();
+  const std::vector<Row> begin = {Intent(4, 40, 1, {0, 0}, {10, 20})};
+  testing::ExpectDone(store->Commit(begin, kEight));
+  testing::ExpectDone(store->Commit(begin, kEight));
+  EXPECT_EQ(store->Load()->open_intents.size(), 1u);
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kFault}}, kEight));
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived}}, kNine));
+  const auto moves = OpenReader()->Moves({}, 10);
+  ASSERT_EQ(moves->size(), 1u);
+  EXPECT_EQ((*moves)[0].end, IntentEnd::kFault);
+  EXPECT_FALSE((*moves)[0].ended_at);
+}
+
+TEST_F(StoreTest, ASerialNumberSitsAtOnePlace) {
+  auto store = OpenStore();
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{BindingRow{{1}, {11}}, BindingRow{{2}, {22}}}, kEight));
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{BindingRow{{1}, {22}}, BindingRow{{2}, {11}}}, kNine));
+  const auto units = store->Load()->units;
+  ASSERT_EQ(units.size(), 2u);
+  EXPECT_EQ(units[0].serial.value, 22u);
+  EXPECT_EQ(units[1].serial.value, 11u);
+  const auto history = OpenReader()->Units(UnitId{2}, 10);
+  ASSERT_EQ(history->size(), 3u);  // bound, taken away, bound
+  EXPECT_EQ((*history)[0].serial.value, 11u);
+  EXPECT_EQ((*history)[1].serial.value, 0u);
+}
+
+TEST_F(StoreTest, ParametersAndPlacesKeepTheirHistory) {
+  auto store = OpenStore();
+  ParameterRow row{{7}, Axis::kTheta, Parameter::kRepeat, 108, Origin::kFactory};
+  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kEight));
+  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));  // nothing new
+  row.value = 37;
+  row.origin = Origin::kTuning;
+  testing::ExpectDone(store->Commit(std::vector<Row>{row, EnableRow{{3}, false, "spare"}}, kNine));
+  testing::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{3}, true, "mended"}}, kNine));
+
+  const auto parameters = OpenReader()->Parameters({7}, 10);
+  ASSERT_EQ(parameters->size(), 2u);
+  EXPECT_EQ((*parameters)[0].row.value, 37);
+  EXPECT_EQ((*parameters)[0].row.origin, Origin::kTuning);
+  EXPECT_EQ((*parameters)[1].at, kEight);
+  const auto units = OpenReader()->Units({}, 10);
+  ASSERT_EQ(units->size(), 2u);
+  EXPECT_EQ((*units)[0].reason, "mended");
+  EXPECT_FALSE((*units)[1].enabled);
+}
+
+TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
+  auto store = OpenStore();
+  ConfigurationRow row;
+  row.source = "a.csv";
+  for (row.id = 1; row.id <= 3; ++row.id) {
+    testing::ExpectDone(store->Commit(
+        std::vector<Row>{row, AlarmRow{row.id, Severity::kWarning, {}, BusId{2}, "x\0y"}}, kEight));
+  }
+  row.id = 3;
+  row.state = ConfigurationState::kDone;
+  row.makespan_s = std::nan("");
+  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));
+  const auto configurations = OpenReader()->Configurations(2);
+  ASSERT_EQ(configurations->size(), 2u);
+  EXPECT_EQ((*configurations)[0].row.id, 3u);
+  EXPECT_EQ((*configurations)[0].row.state, ConfigurationState::kDone);
+  EXPECT_TRUE(std::isnan((*configurations)[0].row.makespan_s));
+  EXPECT_EQ((*configurations)[0].began, kEight);
+  EXPECT_EQ((*configurations)[0].changed, kNine);
+  const auto alarms = OpenReader()->Alarms(10);
+  ASSERT_EQ(alarms->size(), 3u);
+  EXPECT_EQ((*alarms)[0].row.id, 3u);
+  EXPECT_EQ((*alarms)[0].row.bus, BusId{2});
+  EXPECT_FALSE((*alarms)[0].row.unit);
+}
+
+TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
+  auto store = OpenStore();
+  testing::ExpectDone(store->Commit(
+      std::vector<Row>{Intent(1, 1, 1, {0, 0}, {1, 1}), Intent(2, 2, 1, {0, 0}, {1, 1}),
+                       IntentEndRow{{1}, {1}, IntentEnd::kArrived},
+                       ConfigurationRow{.id = 8, .source = "", .state = ConfigurationState::kDone},
+                       AlarmRow{9, Severity::kInfo, {}, {}, ""}},
+      kEight));
+  EXPECT_EQ(store->Prune(kEight, 100), 0u);
+  EXPECT_EQ(store->Prune(kNine, 100), 3u);
+  const auto fleet = store->Load();
+  EXPECT_EQ(fleet->open_intents.size(), 1u);
+  EXPECT_EQ(fleet->next_configuration, 9u);
+  EXPECT_EQ(fleet->next_alarm, 10u);
+}
+
+TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
+  auto store = OpenStore();
+  VectorRow two_places = Vector(1, Witness::kReported, 5, 5);
+  two_places.knowledge[0].high = 6;
+  VectorRow turned = Vector(1, Witness::kInterval, 5, 5);
+  turned.knowledge[1] = {Witness::kInterval, 3, 2};
+  VectorRow no_witness = Vector(1, static_cast<Witness>(5), 5, 5);
+  IntentRow turned_hull = Intent(1, 1, 1, {0, 0}, {1, 1});
+  turned_hull.hull[0] = {Witness::kInterval, 3, 2};
+  const std::vector<Row> wrong = {
+      two_places,
+      turned,
+      no_witness,
+      turned_hull,
+      Vector(0, Witness::kReported, 5, 5),
+      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(6)),
+      IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
+      ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
+      ConfigurationRow{.id = 1, .source = "", .state = static_cast<ConfigurationState>(6)},
+      AlarmRow{1, static_cast<Severity>(3), {}, {}, ""},
+      AlarmRow{UINT64_MAX, Severity::kInfo, {}, {}, ""}};
+  for (const Row& row : wrong) {
+    const Status status =
+        store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1), row}, kEight);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::kInvalid);
+  }
+  EXPECT_TRUE(store->Load()->vectors.empty());  // not even the good rows beside them
+  EXPECT_EQ(store->counters().failed, std::size(wrong));
+  testing::ExpectDone(
+      store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1)}, kEight));
+  EXPECT_EQ(store->Load()->vectors.size(), 1u);
+}
+
+struct Garbage {
+  const char* sql;
+  const char* told;
+};
+
+class StoreGarbage : public StoreTest, public ::testing::WithParamInterface<Garbage> {};
+
+TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
+  testing::ExpectDone(OpenStore()->Commit(
+      std::vector<Row>{BindingRow{{12}, {7}}, Vector(7, Witness::kReported, 10, 20),
+                       Intent(12, 7, 3, {0, 0}, {1, 1}),
+                       ParameterRow{{7}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
+                       NextMoveRow{{4}}},
+      kEight));
+  Sql(GetParam().sql);
+  auto store = OpenStore();
+  const auto fleet = store->Load();
+  ASSERT_FALSE(fleet);
+  EXPECT_EQ(fleet.error().code, ErrorCode::kInvalid);
+  EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().told));
+  // The store is not stuck in the read.
+  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Rows, StoreGarbage,
+    ::testing::Values(
+        Garbage{"UPDATE axis_state SET witness = 9 WHERE axis = 1",
+                "axis_state, row serial 7, axis 1: witness is 9, not in 0..4"},
+        Garbage{"UPDATE axis_state SET low = 9 WHERE axis = 0", "row serial 7, axis 0"},
+        Garbage{"UPDATE axis_state SET low = 11, high = 11 WHERE axis = 0",
+                "vector and turns disagree with low"},
+        Garbage{"UPDATE axis_state SET low = 99999999999, high = 99999999999",
+                "low is 99999999999"},
+        Garbage{"UPDATE axis_state SET vector = NULL", "vector and turns do not belong"},
+        Garbage{"UPDATE axis_state SET vector = 96", "vector is 96"},
+        Garbage{"UPDATE axis_state SET subdivision = 70000", "subdivision is 70000"},
+        Garbage{"UPDATE axis_state SET origin = 6", "origin is 6"},
+        Garbage{"UPDATE axis_state SET move = 65536", "move is 65536"},
+        Garbage{"UPDATE axis_state SET axis = 2 WHERE axis = 1", "axis is 2"},
+        Garbage{"UPDATE axis_state SET move = 7 WHERE axis = 1", "of different moves"},
+        Garbage{"DELETE FROM axis_state WHERE axis = 1", "no phi"},
+        Garbage{"DELETE FROM axis_state WHERE axis = 0", "no theta"},
+        Garbage{"UPDATE unit SET serial = -1", "unit, row unit_id 12: serial is -1"},
+        Garbage{"UPDATE unit SET enabled = 2", "enabled is 2"},
+        Garbage{"UPDATE unit SET unit_id = 4294967296", "unit_id is 4294967296"},
+        Garbage{"UPDATE intent SET theta_low = 5", "intent, row entry 1: low is above high"},
+        Garbage{"UPDATE intent SET serial = 0", "serial is 0"},
+        Garbage{"UPDATE intent SET configuration = -3", "configuration is -3"},
+        Garbage{"UPDATE parameter SET parameter = 9", "parameter is 9"},
+        Garbage{"UPDATE parameter SET value = 2147483648", "value is 2147483648"},
+        Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
+        Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
+
+TEST_F(StoreTest, GarbageInHistoryIsAnErrorToo) {
+  testing::ExpectDone(OpenStore()->Commit(
+      std::vector<Row>{
+          Intent(12, 7, 3, {0, 0}, {1, 1}), IntentEndRow{{7}, {3}, IntentEnd::kArrived},
+          Vector(7, Witness::kReported, 1, 1), AlarmRow{1, Severity::kInfo, {}, {}, ""}},
+      kEight));
+  Sql("UPDATE intent SET end = 77; UPDATE alarm SET severity = 3");
+  auto reader = OpenReader();
+  EXPECT_THAT(reader->Moves({}, 9).error().text, HasSubstr("end is 77"));
+  EXPECT_THAT(reader->Alarms(9).error().text, HasSubstr("severity is 3"));
+}
+
+TEST_F(StoreTest, ASecondWriterIsRefusedAndTheFirstNamed) {
+  auto store = OpenStore();
+  const auto second = Store::Open(Path());
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kRefused);
+  EXPECT_THAT(second.error().text, HasSubstr("process " + std::to_string(getpid())));
+  // By another name of the same file, too.
+  std::filesystem::create_symlink(Path(), folder_.File("link.db"));
+  EXPECT_EQ(Store::Open(folder_.File("link.db")).error().code, ErrorCode::kRefused);
+  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
+  store.reset();
+  EXPECT_EQ(OpenStore()->Load()->vectors.size(), 1u);
+}
+
+TEST_F(StoreTest, TheLockEndsWithItsProcess) {
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    auto store = Store::Open(Path());
+    const char word = store ? 'y' : 'n';
+    _exit(write(ready[1], &word, 1) == 1 ? (pause(), 0) : 1);
+  }
+  char word = 0;
+  ASSERT_EQ(read(ready[0], &word, 1), 1);
+  EXPECT_EQ(word, 'y');
+  EXPECT_THAT(Store::Open(Path()).error().text, HasSubstr("process " + std::to_string(child)));
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  EXPECT_TRUE(Store::Open(Path()));
+  close(ready[0]);
+  close(ready[1]);
+}
+
+TEST_F(StoreTest, AReaderSeesWholeBatchesBesideTheWriter) {
+  auto store = OpenStore();
+  auto reader = OpenReader();
+  for (std::uint32_t k = 1; k <= 50; ++k) {
+    testing::ExpectDone(store->Commit(testing::Batch(k, 20), kEight));
+    const auto fleet = reader->Load();
+    ASSERT_TRUE(fleet) << fleet.error().text;
+    EXPECT_EQ(testing::BatchIn(*fleet, 20), k);
+  }
+  store.reset();
+  EXPECT_EQ(testing::BatchIn(*reader->Load(), 20), 50u);  // and after it
+  EXPECT_EQ(testing::BatchIn(*OpenReader()->Load(), 20), 50u);
+}
+
+TEST_F(StoreTest, ANewerStoreIsLeftAsItIs) {
+  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  Sql("PRAGMA user_version = 99");
+  const std::string before = Bytes(Path());
+  const auto store = Store::Open(Path());
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().code, ErrorCode::kNewer);
+  EXPECT_THAT(store.error().text, HasSubstr("version 99"));
+  EXPECT_EQ(Bytes(Path()), before);
+  EXPECT_FALSE(std::filesystem::exists(Path() + "-wal"));
+  EXPECT_EQ(StoreReader::Open(Path()).error().code, ErrorCode::kNewer);
+  EXPECT_EQ(Bytes(Path()), before);
+}
+
+TEST_F(StoreTest, ANewerStoreIsSeenInItsWalToo) {
+  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  // A later version that was killed before its WAL reached the file.
+  const pid_t child = fork();
+  if (child == 0) {
+    sqlite3* db = nullptr;
+    sqlite3_open(Path().c_str(), &db);
+    sqlite3_exec(db, "PRAGMA user_version = 99", nullptr, nullptr, nullptr);
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  const std::string before = Bytes(Path());
+  const std::string wal = Bytes(Path() + "-wal");
+  ASSERT_FALSE(wal.empty());
+  EXPECT_EQ(Store::Open(Path()).error().code, ErrorCode::kNewer);
+  EXPECT_EQ(Bytes(Path()), before);
+  EXPECT_EQ(Bytes(Path() + "-wal"), wal);
+}
+
+TEST_F(StoreTest, WhatIsNoStoreIsRefusedAndLeftAlone) {
+  for (const std::string& content : {std::string("unit_id,x_mm\n1,2\n"),
+                                     std::string("SQLite format 3"), std::string(5000, '\xff')}) {
+    std::ofstream(Path(), std::ios::binary) << content;
+    const auto store = Store::Open(Path());
+    ASSERT_FALSE(store);
+    EXPECT_EQ(store.error().code, ErrorCode::kInvalid);
+    EXPECT_THAT(store.error().text, HasSubstr("not a store"));
+    EXPECT_EQ(Bytes(Path()), content);
+  }
+  std::filesystem::remove(Path());
+  Sql("CREATE TABLE foreign_table(x)");
+  const std::string before = Bytes(Path());
+  EXPECT_THAT(Store::Open(Path()).error().text, HasSubstr("not a store"));
+  EXPECT_EQ(Bytes(Path()), before);
+}
+
+TEST_F(StoreTest, AnEmptyFileBecomesAStore) {
+  std::ofstream(Path()).close();
+  EXPECT_TRUE(OpenStore()->Load());
+}
+
+TEST_F(StoreTest, DamagedPagesAreAnError) {
+  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 200), kEight));
+  std::string content = Bytes(Path());
+  for (std::size_t i = 4096; i < content.size(); ++i) content[i] = static_cast<char>(i * 37);
+  std::ofstream(Path(), std::ios::binary) << content;
+  const auto store = Store::Open(Path());
+  if (store) {
+    EXPECT_FALSE((*store)->Load());
+  } else {
+    EXPECT_EQ(store.error().code, ErrorCode::kInvalid);
+  }
+}
+
+TEST_F(StoreTest, AMissingFolderIsUnavailable) {
+  EXPECT_EQ(Store::Open(folder_.File("none/fleet.db")).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(StoreReader::Open(folder_.File("none.db")).error().code, ErrorCode::kUnavailable);
+}
+
+TEST_F(StoreTest, AnEmptyBatchIsNoTransaction) {
+  auto store = OpenStore();
+  testing::ExpectDone(store->Commit({}, kEight));
+  EXPECT_EQ(store->counters().transactions, 0u);
+}
+
+}  // namespace
+}  // namespace focalfleet
