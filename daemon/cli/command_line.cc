@@ -49,12 +49,12 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   app.fallthrough();  // a global option may stand after the command, too
   app.require_subcommand(1);
   AddGlobalOptions(line.get());
-  // AddLayoutCommand(line.get());
-  // AddTargetsCommand(line.get());
-  // AddPlanCommand(line.get());
+  AddLayoutCommand(line.get());
+  AddTargetsCommand(line.get());
+  AddPlanCommand(line.get());
   AddApplyCommand(line.get());
   AddStatusCommands(line.get());
-  // AddWatchCommand(line.get());
+  AddWatchCommand(line.get());
   AddStopCommand(line.get());
   AddUnitCommands(line.get());
   AddCompletionCommand(line.get());

@@ -1,0 +1,84 @@
+// layout hex: a focal plane out of nothing but a count and a pitch.
+
+#include <fmt/format.h>
+
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/text_file.h"
+#include "fleet/files/layout_file.h"
+#include "fleet/hex_layout.h"
+#include "protocol/base/limits.h"
+
+namespace focalfleet::cli {
+namespace {
+
+struct LayoutOptions {
+  HexLayoutOptions hex;
+  std::vector<double> gears;  // none, one for both axes, or theta and phi
+  std::string out;
+};
+
+ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
+  std::vector<Unit> units = MakeHexLayout(options.hex);
+  if (!options.gears.empty()) {
+    for (Unit& unit : units) {
+      unit.axis[0].gear = options.gears.front();
+      unit.axis[1].gear = options.gears.back();
+    }
+  }
+  // The same judge as at every later reading: a layout that it would refuse is not written.
+  const auto layout = Layout::Create(units, {});
+  if (!layout) return Report(context, layout.error());
+  const std::string text = WriteUnits(layout->units());
+  if (const auto written = WriteFileAtomically(options.out, text); !written) {
+    return Report(context, written.error());
+  }
+  const std::size_t buses = layout->buses().size();
+  if (context.json) {
+    PrintJson({{"units", layout->size()},
+               {"buses", buses},
+               {"pitch_mm", layout->pitch_mm()},
+               {"clearance_mm", layout->clearance_mm()},
+               {"out", options.out}});
+  }
+  Say(context, fmt::format("{}: {} on {}, pitch {:g} mm", options.out,
+                           Count(layout->size(), "unit", "units"), Count(buses, "bus", "buses"),
+                           layout->pitch_mm()));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddLayoutCommand(CommandLine* line) {
+  CLI::App* layout = line->app.add_subcommand("layout", "Make the file of a focal plane");
+  layout->require_subcommand(1);
+  CLI::App* command =
+      AddCommand(layout, "hex", "Units on a hexagonal lattice, nearest the centre first",
+                 "  focalfleet layout hex --count 5000 --pitch-mm 25.6 --out units.csv");
+  auto options = std::make_shared<LayoutOptions>();
+  command->add_option("--count", options->hex.count, "How many units")
+      ->required()
+      ->check(CLI::Range(1u, limits::kUnits).description(""));
+  const auto positive = CLI::PositiveNumber.description("");
+  command->add_option("--pitch-mm", options->hex.pitch_mm, "Distance of neighbours")
+      ->check(positive)
+      ->capture_default_str();
+  command
+      ->add_option("--arm-mm", options->hex.arm_mm,
+                   "Length of each arm (default: by the pitch, 8.25 at 25.6)")
+      ->check(positive);
+  command
+      ->add_option("--gear", options->gears,
+                   "Motor turns per axis turn, for both axes or theta phi")
+      ->expected(1, 2)
+      ->check(positive);
+  command->add_option("--units-per-bus", options->hex.units_per_bus, "Units on one CAN bus")
+      ->check(CLI::Range(1u, limits::kNodesPerBus).description(""))
+      ->capture_default_str();
+  command->add_option("--units-per-rail", options->hex.units_per_rail, "Units on one supply rail")
+      ->check(CLI::Range(1u, limits::kUnits).description(""))
+      ->capture_default_str();
+  AddFile(command, "--out", &options->out, "units.csv to write")->required();
+  OnChosen(line, command, options, RunLayoutHex);
+}
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,42 @@
+// What the commands that work on files share: the focal plane as units.csv and obstacles.csv give
+// it, with the nominal drive, because no store says what was tuned.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/cli/context.h"
+#include "fleet/drive.h"
+#include "fleet/layout.h"
+#include "protocol/base/result.h"
+
+namespace CLI {
+class App;
+}
+
+namespace focalfleet::cli {
+
+struct FleetFiles {
+  std::string units;
+  std::string obstacles;    // empty: none
+  double clearance_mm = 0;  // 0: by the pitch
+};
+
+/// --units, --obstacles, --clearance-mm.
+void AddFleetFiles(CLI::App* command, FleetFiles* files);
+
+struct OfflineFleet {
+  Layout layout;
+  std::vector<UnitDrive> drives;  // Shape: (n)
+};
+
+/// Tells on stderr which columns of units.csv were passed over.
+/// Errors: kUnavailable, kInvalid with file:line.
+Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files);
+
+/// Shape: (n); none: the file does not name the unit. Errors: as LoadFleet.
+Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
+                                                   const OfflineFleet& fleet);
+
+}  // namespace focalfleet::cli
