@@ -1,16 +1,16 @@
-// The one transition function of the fleet: Step(inputs) -> effects. It holds what is known of every unit and
-// bus, and what is being done about it; it has no clock, thread, file, socket or log. The shell polls,
-// calls Step, and performs the effects in this order:
+// The one transition function of the fleet: Step(inputs) -> effects. It holds what is known of
+// every unit and bus, and what is being done about it; it has no clock, thread, file, socket or
+// log. The shell polls, calls Step, and performs the effects in this order:
 //
 //   rows     -> store     one transaction for the batch; then Inputs::committed_through says so
-//   frames   -> buses     stop frames at once; the start signal is only emitted after the intent's commit
-//   plan_job -> planner   RunPlanJob on a thread of its own; the answer comes back as PlanDone
-//   changed  -> DDS       the last value wins
+//   frames   -> buses     stop frames at once; the start signal is only emitted after the intent's
+//   commit plan_job -> planner   RunPlanJob on a thread of its own; the answer comes back as
+//   PlanDone changed  -> DDS       the last value wins
 //
-// A configuration is a goal, pursued in rounds: plan from where everything stands, stage, confirm by read-back,
-// arm, commit the intent, start, watch. A unit that falls out at any step is named and frozen, and the next
-// round plans around it; units held back to protect it go on then. The number of rounds is bounded.
-// docs/way_of_a_move.md follows one move through here.
+// A configuration is a goal, pursued in rounds: plan from where everything stands, stage, confirm
+// by read-back, arm, commit the intent, start, watch. A unit that falls out at any step is named
+// and frozen, and the next round plans around it; units held back to protect it go on then. The
+// number of rounds is bounded. docs/way_of_a_move.md follows one move through here.
 #pragma once
 
 #include <cstdint>
@@ -48,6 +48,8 @@ struct StopCommand {
 };
 struct HomeCommand {
   std::vector<PositionerIndex> units;
+  bool unproven =
+      false;  // the operator takes it on himself: home also where a neighbour may be in the way
 };
 struct EnableCommand {
   std::vector<PositionerIndex> units;
@@ -74,7 +76,8 @@ struct Command {
 struct PlanDone {
   std::uint64_t job = 0;
   Result<Plan> plan;
-  std::vector<PositionerIndex> homing;  // units that may home at once when `plan` has been carried out
+  std::vector<PositionerIndex>
+      homing;  // units that may home at once when `plan` has been carried out
 };
 
 struct Inputs {
@@ -100,7 +103,9 @@ struct PlanJob {
   std::vector<std::optional<Pose>> targets;
   std::vector<std::uint8_t> frozen;
   PlanOptions options;
-  std::vector<PositionerIndex> to_home;  // not empty: plan the next wave of homing, `targets` is empty
+  std::vector<PositionerIndex>
+      to_home;            // not empty: plan the next wave of homing, `targets` is empty
+  bool unproven = false;  // of homing, see HomeCommand
 };
 
 struct ReplyEffect {
@@ -136,9 +141,9 @@ enum class UnitPhase : std::uint8_t {
   kArmed,
   kMoving,
   kHoming,
-  kSettling,     // its motion should be over; being asked
+  kSettling,  // its motion should be over; being asked
   kFault,
-  kSilent,       // answered before, does not now
+  kSilent,  // answered before, does not now
 };
 inline constexpr std::uint8_t kUnitPhaseCount = 13;
 const char* Name(UnitPhase phase);
@@ -152,16 +157,16 @@ constexpr const char* Name(TargetOutcome outcome) {
 
 struct UnitView {
   UnitPhase phase = UnitPhase::kAbsent;
-  UnitKnowledge knowledge;         // while it moves: the hull
-  SerialNumber serial;             // that answers; 0: none yet
-  SerialNumber bound_serial;       // that belongs here; 0: none yet
+  UnitKnowledge knowledge;    // while it moves: the hull
+  SerialNumber serial;        // that answers; 0: none yet
+  SerialNumber bound_serial;  // that belongs here; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;
   bool enabled = true;
   std::string disabled_reason;
   TargetOutcome outcome = TargetOutcome::kNone;
-  std::string outcome_reason;      // why refused or failed, for people
+  std::string outcome_reason;  // why refused or failed, for people
   std::optional<Pose> target;
 };
 
@@ -169,11 +174,11 @@ struct BusView {
   LinkState link = LinkState::kUp;
   std::uint64_t frames_sent = 0;
   std::uint64_t frames_received = 0;
-  std::uint64_t bits = 0;          // both directions, exact
+  std::uint64_t bits = 0;  // both directions, exact
   std::uint64_t malformed = 0;
   std::uint64_t retries = 0;
-  double load = 0;                 // of the last second
-  double load_max = 0;             // highest second since the configuration began
+  double load = 0;      // of the last second
+  double load_max = 0;  // highest second since the configuration began
 };
 
 struct ConfigurationView {
@@ -191,19 +196,21 @@ struct ConfigurationView {
   double peak_power_W = 0;          // predicted
   std::uint64_t frames = 0;         // both directions, all buses, since it began
   HostInstant began;
-  HostInstant started;              // start signal of this round; kNever before it
+  HostInstant started;  // start signal of this round; kNever before it
 };
 
 struct CoordinatorConfig {
   std::uint32_t bit_rate_bps = 1'000'000;
-  DurationNs reply_wait = Milliseconds(50);        // one request's answer; then a retry
+  DurationNs reply_wait = Milliseconds(50);         // one request's answer; then a retry
   DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again
-  DurationNs poll_period = Milliseconds(1000);     // progress of each moving unit; health of each resting one x10
+  DurationNs poll_period =
+      Milliseconds(1000);  // progress of each moving unit; health of each resting one x10
   DurationNs clock_period = Milliseconds(500);
-  DurationNs start_delay = Milliseconds(250);      // start frame to start instant, all buses
-  DurationNs settle_margin = Milliseconds(500);    // after the predicted end before a unit is asked
-  DurationNs transmit_horizon = Milliseconds(4);   // how far ahead of the bit clock frames are released
-  DurationNs silence_limit = Milliseconds(3000);   // without an answer: silent
+  DurationNs start_delay = Milliseconds(250);    // start frame to start instant, all buses
+  DurationNs settle_margin = Milliseconds(500);  // after the predicted end before a unit is asked
+  DurationNs transmit_horizon =
+      Milliseconds(4);  // how far ahead of the bit clock frames are released
+  DurationNs silence_limit = Milliseconds(3000);  // without an answer: silent
 };
 
 class Coordinator {

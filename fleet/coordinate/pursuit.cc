@@ -31,6 +31,7 @@ Pursuit::Pursuit(Core* core, Contact* contact)
       contact_(*contact),
       excluded_(core->units.size(), 0),
       missed_starts_(core->units.size(), 0),
+      before_(core->units.size()),
       plan_of_(core->units.size(), kNoPlan),
       part_(core->units.size(), Part::kNone),
       stage_tries_(core->units.size(), 0),
@@ -83,7 +84,12 @@ Status Pursuit::Home(std::uint64_t request, const HomeCommand& command) {
   std::sort(to_home_.begin(), to_home_.end());
   to_home_.erase(std::unique(to_home_.begin(), to_home_.end()), to_home_.end());
   fixed_ = false;
+  unproven_ = command.unproven;
   Begin(request, "home");
+  if (unproven_)
+    core_.Raise(Severity::kWarning, {}, {},
+                "homing of " + std::to_string(command.units.size()) +
+                    " units without proof that their neighbours are out of the way, as commanded");
   view_.targeted = static_cast<std::uint32_t>(to_home_.size());
   for (const PositionerIndex i : to_home_) SetOutcome(i, TargetOutcome::kPending);
   Record();
@@ -138,6 +144,7 @@ void Pursuit::BeginRound() {
   PlanJob job{
       .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
   job.options.fixed = fixed_;
+  job.unproven = unproven_;
   bool any = !to_home_.empty();
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
@@ -357,11 +364,30 @@ IntentRow Pursuit::IntentOf(PositionerIndex i) const {
   return row;
 }
 
+void Pursuit::Intend(PositionerIndex i, const IntentRow& intent) {
+  before_[i.value] = core_.unit(i).view.knowledge;
+  core_.intents[intent.serial] = intent;
+  core_.Note(intent);
+  // From here on the store must not claim the old place: the unit may be anywhere on its way.
+  core_.Know(i, intent.hull, Origin::kMove);
+}
+
+void Pursuit::TakeBackIntents() {
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    if (!before_[n]) continue;
+    const PositionerIndex i{n};
+    // Who was lost meanwhile keeps its intent: its return decides.
+    if (core_.unit(i).view.phase == kArmed || core_.unit(i).view.phase == kReady) {
+      core_.EndIntent(i, IntentEnd::kNeverBegan);
+      core_.Know(i, *before_[n], Origin::kMove);
+    }
+    before_[n].reset();
+  }
+}
+
 void Pursuit::CommitRound() {
   for (const UnitPlan& move : plan_.moves) {
-    const IntentRow row = IntentOf(move.unit);
-    core_.intents[row.serial] = row;
-    core_.Note(row);
+    Intend(move.unit, IntentOf(move.unit));
   }
   core_.Note(NextMoveRow{core_.next_move});
   view_.state = ConfigurationState::kMoving;
@@ -378,7 +404,7 @@ void Pursuit::Start() {
     UnitRecord& unit = core_.unit(move.unit);
     SetPart(move.unit, Part::kMoving);
     core_.SetPhase(move.unit, kMoving);
-    unit.view.knowledge = core_.intents.at(unit.view.serial).hull;
+    before_[move.unit.value].reset();
     // Spread over a poll period, so that a bus never hears all its units at once.
     unit.next_poll = view_.started + core_.config.poll_period +
                      DurationNs{core_.config.poll_period.ns * (move.unit.value % 97) / 97};
@@ -468,9 +494,7 @@ void Pursuit::CommitHoming() {
   move_ = core_.next_move;
   core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
   for (const PositionerIndex i : homing_) {
-    const IntentRow row = HomingIntentOf(i);
-    core_.intents[row.serial] = row;
-    core_.Note(row);
+    Intend(i, HomingIntentOf(i));
   }
   core_.Note(NextMoveRow{core_.next_move});
   view_.state = ConfigurationState::kMoving;
@@ -486,7 +510,7 @@ void Pursuit::StartHoming() {
     plan_of_[i.value] = kNoPlan;
     SetPart(i, Part::kMoving);
     core_.SetPhase(i, kHoming);
-    core_.unit(i).view.knowledge = core_.intents.at(core_.unit(i).view.serial).hull;
+    before_[i.value].reset();
     core_.unit(i).next_poll = core_.now + core_.config.poll_period;
     core_.Ask(i, focalfleet::Home{move_});
   }
@@ -526,11 +550,11 @@ void Pursuit::StopAll() {
       break;
     case State::kUploading:
     case State::kCommitting:
-      for (const UnitPlan& move : plan_.moves) core_.EndIntent(move.unit, IntentEnd::kNeverBegan);
+      TakeBackIntents();
       Disarm();
       break;
     case State::kHomeCommitting:
-      for (const PositionerIndex i : homing_) core_.EndIntent(i, IntentEnd::kNeverBegan);
+      TakeBackIntents();
       FinishWhenDurable(ConfigurationState::kStopped);
       break;
     case State::kIdle:
@@ -586,7 +610,7 @@ void Pursuit::Advance() {
       if (count(Part::kHolding) == plan_.moves.size()) {
         Start();
       } else {  // somebody fell out while the store wrote
-        for (const UnitPlan& move : plan_.moves) core_.EndIntent(move.unit, IntentEnd::kNeverBegan);
+        TakeBackIntents();
         Disarm();
       }
       break;

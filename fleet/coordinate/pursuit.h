@@ -76,6 +76,8 @@ class Pursuit {
   void UploadsOver();
   void Disarm();
   void CommitRound();
+  void Intend(PositionerIndex i, const IntentRow& intent);
+  void TakeBackIntents();
   void Start();
   void RepeatStart();
   void RoundOver();
@@ -106,6 +108,7 @@ class Pursuit {
   ConfigurationView view_;
   std::uint64_t request_ = 0;
   bool fixed_ = false;
+  bool unproven_ = false;
   bool stopping_ = false;
   ConfigurationState end_ = ConfigurationState::kDone;
   std::vector<std::optional<Pose>> targets_;  // of the goal
@@ -113,6 +116,8 @@ class Pursuit {
   std::vector<std::uint8_t> excluded_;  // failed in this goal: stands still from then on
   std::vector<std::uint8_t> missed_starts_;
   std::string failure_;
+  std::vector<std::optional<UnitKnowledge>>
+      before_;  // what was known before an intent not yet begun
 
   // this round
   std::uint64_t job_ = 0;

@@ -1,6 +1,7 @@
 #include "fleet/plan/job.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace focalfleet {
 namespace {
@@ -17,11 +18,20 @@ bool NeighbourOfAny(const Layout& layout, PositionerIndex unit,
   });
 }
 
-PlanDone PlanHomingWave(const PlanJob& job, PlanRequest request) {
+// The moves that let one unit home, or why there are none.
+Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Pose>>& way,
+                        PlanRequest request, const PlanOptions& options) {
+  request.targets = way;
+  FOCALFLEET_TRY_ASSIGN(Plan plan, MakePlan(request, options));
+  if (plan.unserved.empty()) return plan;
+  return Fail(ErrorCode::kRefused, "unit " + std::to_string(request.layout->unit(unit).id.value) +
+                                       " cannot home: its neighbours find no way to step aside");
+}
+
+PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
   PlanDone done{job.job, Plan{}, {}};
-  std::optional<PositionerIndex> crowded;  // the first that needs others to step aside
-  std::vector<std::optional<Pose>> way;
   Error refusal;
+  std::vector<std::pair<PositionerIndex, std::vector<std::optional<Pose>>>> crowded;
   for (const PositionerIndex unit : job.to_home) {
     if (NeighbourOfAny(*request.layout, unit, done.homing)) continue;
     auto targets = MakeWayForHoming(request, unit);
@@ -29,23 +39,25 @@ PlanDone PlanHomingWave(const PlanJob& job, PlanRequest request) {
       refusal = targets.error();
     } else if (!AnyTarget(*targets)) {
       done.homing.push_back(unit);
-    } else if (!crowded) {
-      crowded = unit;
-      way = std::move(*targets);
+    } else if (done.homing.empty()) {
+      crowded.emplace_back(unit, std::move(*targets));
     }
   }
   if (!done.homing.empty()) return done;
-  if (!crowded) {
-    done.plan = tl::unexpected(refusal);
-    return done;
+  for (const auto& [unit, way] : crowded) {
+    done.plan = PlanWayFor(unit, way, request, job.options);
+    if (done.plan) {
+      done.homing = {unit};
+      return done;
+    }
+    refusal = done.plan.error();
   }
-  request.targets = way;
-  done.plan = MakePlan(request, job.options);
-  done.homing = {*crowded};
-  if (done.plan && !done.plan->unserved.empty())
-    done.plan = Fail(ErrorCode::kRefused,
-                     "unit " + std::to_string(request.layout->unit(*crowded).id.value) +
-                         " cannot home: its neighbours find no way to step aside");
+  if (job.unproven) {
+    done.plan = Plan{};
+    done.homing = {job.to_home.front()};
+  } else {
+    done.plan = tl::unexpected(refusal);
+  }
   return done;
 }
 

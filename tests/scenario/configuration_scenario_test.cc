@@ -36,14 +36,28 @@ bool HasAlarm(const InProcessFleet& fleet, const std::string& part) {
   });
 }
 
+std::string Unserved(InProcessFleet& fleet) {
+  std::string text;
+  for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
+    const UnitView& view = fleet.coordinator().unit({n});
+    if (view.outcome != TargetOutcome::kArrived)
+      text += "unit " + std::to_string(fleet.id(n).value) + " " + Name(view.phase) + ", " +
+              Name(view.knowledge[0].witness) + ": " + Name(view.outcome) + " " +
+              view.outcome_reason + "\n";
+  }
+  return text;
+}
+
 void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than) {
-  EXPECT_GE(fleet->CountOutcome(TargetOutcome::kArrived), fleet->layout().size() - others_than);
+  fleet->Run(Milliseconds(100));  // the last batch becomes durable
+  EXPECT_GE(fleet->CountOutcome(TargetOutcome::kArrived), fleet->layout().size() - others_than)
+      << Unserved(*fleet);
   fleet->ExpectStoreTellsTheTruth("at the end");
   EXPECT_TRUE(fleet->store().fleet.open_intents.empty());
 }
 
 TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1u, 2u, 3u}) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet(Small(seed));
     const auto request = fleet.ApplyRandom(seed);
@@ -60,7 +74,7 @@ TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
 
 TEST(Configuration, SecondOneStartsFromWhereTheFirstEnded) {
   InProcessFleet fleet(Small(5));
-  for (const std::uint64_t seed : {10, 11, 12}) {
+  for (const std::uint64_t seed : {10u, 11u, 12u}) {
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
@@ -183,7 +197,7 @@ TEST(Configuration, LostDoneReportsAreAskedFor) {
 }
 
 TEST(Configuration, FramesLostAtRandomDelayButDoNotFail) {
-  for (const std::uint64_t seed : {17, 18, 19}) {
+  for (const std::uint64_t seed : {17u, 18u, 19u}) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet(Small(seed));
     for (const BusId bus : fleet.layout().buses()) {
@@ -259,6 +273,7 @@ TEST(Configuration, StopOfAllLeavesEveryUnitAtAKnownPlace) {
     EXPECT_TRUE(IsPlace(fleet.coordinator().unit({n}).knowledge)) << n;
     EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << n;
   }
+  fleet.Run(Milliseconds(100));
   fleet.ExpectStoreTellsTheTruth("after the stop");
   fleet.ApplyRandom(23);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -325,6 +340,7 @@ TEST(Configuration, DisabledUnitIsPassedOverByName) {
 }
 
 TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
+  int unproven = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet({.count = 19, .seed = seed});
@@ -352,11 +368,20 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
     if (!lost.empty()) {
       fleet.Send({903, HomeCommand{lost}});
       ASSERT_TRUE(fleet.RunUntilIdle());
+      // With the coordinator dead nobody was held back for it: a neighbour may stand where it may
+      // stand, and then no way home can be proven. That is said, and left to the operator.
+      if (fleet.CountOutcome(TargetOutcome::kArrived) != lost.size()) {
+        ++unproven;
+        fleet.Send({904, HomeCommand{lost, true}});
+        ASSERT_TRUE(fleet.RunUntilIdle());
+      }
+      EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), lost.size()) << Unserved(fleet);
     }
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
     ExpectOthersArrive(&fleet, 0);
   }
+  EXPECT_LE(unproven, 10);
 }
 
 TEST(Configuration, SameSeedSameFrames) {

@@ -200,7 +200,7 @@ std::optional<ReplyEffect> InProcessFleet::LastReply(std::uint64_t request) cons
 std::uint32_t InProcessFleet::CountOutcome(TargetOutcome outcome) const {
   std::uint32_t count = 0;
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
-    count += coordinator_->unit({n}).outcome == outcome ? 1 : 0;
+    if (coordinator_->unit({n}).outcome == outcome) ++count;
   return count;
 }
 
