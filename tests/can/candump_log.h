@@ -1,0 +1,29 @@
+// What `candump -l` writes, line by line: "(1436509052.249713) vcan0 1ABCDEF0#0011223344". Only
+// 29-bit data frames are focalfleet's; the rest is told apart from lines that are no candump at
+// all.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "protocol/wire/can_frame.h"
+
+namespace focalfleet::testing {
+
+struct LoggedFrame {
+  std::int64_t at_us = 0;
+  std::string interface;
+  CanFrame frame;
+};
+
+struct CandumpLog {
+  std::vector<LoggedFrame> frames;
+  int foreign = 0;  // 11-bit, remote, CAN FD and error frames
+};
+
+/// Errors: kInvalid, names the line.
+Result<CandumpLog> ParseCandump(const std::string& text);
+
+}  // namespace focalfleet::testing

@@ -1,0 +1,172 @@
+// SocketCanPort on real interfaces: run by with-can with vcan0 and vcan1 up. Without them there is
+// nothing to test.
+#include "daemon/ports/socketcan_port.h"
+
+#include <gtest/gtest.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <net/if.h>
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "protocol/wire/codec.h"
+#include "tests/protocol/random_messages.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr int kPatienceMs = 10'000;  // a hang ends here; nothing is timed
+
+std::unique_ptr<SocketCanPort> Open(const char* interface) {
+  auto port = SocketCanPort::Create({.bus = {3}, .interface = interface});
+  EXPECT_TRUE(port) << port.error().text;
+  return port ? std::move(*port) : nullptr;
+}
+
+std::vector<CanFrame> Receive(SocketCanPort& port, std::size_t count) {
+  std::vector<ReceivedFrame> in;
+  while (in.size() < count) {
+    pollfd wait{port.fd(), POLLIN, 0};
+    if (poll(&wait, 1, kPatienceMs) <= 0) break;
+    port.Receive(HostInstant{1}, &in);
+  }
+  std::vector<CanFrame> frames;
+  for (const ReceivedFrame& received : in) {
+    EXPECT_EQ(received.bus, BusId{3});
+    frames.push_back(received.frame);
+  }
+  return frames;
+}
+
+void RaiseInterface(const char* interface, bool up) {
+  const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+  ifreq request{};
+  std::strcpy(request.ifr_name, interface);
+  ASSERT_EQ(ioctl(fd, SIOCGIFFLAGS, &request), 0);
+  request.ifr_flags =
+      static_cast<short>(up ? request.ifr_flags | IFF_UP : request.ifr_flags & ~IFF_UP);
+  ASSERT_EQ(ioctl(fd, SIOCSIFFLAGS, &request), 0);
+  close(fd);
+}
+
+// A socket of somebody else on the bus, who may write what we never would.
+class Stranger {
+ public:
+  explicit Stranger(const char* interface) : fd_(socket(PF_CAN, SOCK_RAW, CAN_RAW)) {
+    sockaddr_can address{};
+    address.can_family = AF_CAN;
+    address.can_ifindex = static_cast<int>(if_nametoindex(interface));
+    const auto* raw = static_cast<const sockaddr*>(static_cast<const void*>(&address));
+    EXPECT_EQ(bind(fd_, raw, sizeof address), 0);
+  }
+  Stranger(const Stranger&) = delete;
+  Stranger& operator=(const Stranger&) = delete;
+  ~Stranger() { close(fd_); }
+  void Write(std::uint32_t id, std::uint8_t length) const {
+    can_frame frame{};
+    frame.can_id = id;
+    frame.can_dlc = length;
+    EXPECT_EQ(write(fd_, &frame, sizeof frame), static_cast<ssize_t>(sizeof frame));
+  }
+
+ private:
+  int fd_;
+};
+
+TEST(SocketCanPort, CarriesEveryMessageBitByBitInOrder) {
+  const auto a = Open("vcan0");
+  const auto b = Open("vcan0");
+  ASSERT_TRUE(a && b);
+  Rng rng(1);
+  std::vector<CanFrame> sent;
+  for (std::uint8_t i = 0; i < 200; ++i) {
+    sent.push_back(Encode(testing::RandomHost(rng), {{i}, i}));
+    sent.push_back(Encode(testing::RandomUnit(rng), {{i}, i}));
+  }
+  ASSERT_EQ(a->Send(sent), sent.size());
+  const auto received = Receive(*b, sent.size());
+  ASSERT_EQ(received.size(), sent.size());
+  for (std::size_t i = 0; i < sent.size(); ++i) {
+    EXPECT_EQ(received[i].id, sent[i].id);
+    EXPECT_TRUE(std::equal(sent[i].payload().begin(), sent[i].payload().end(),
+                           received[i].payload().begin(), received[i].payload().end()));
+  }
+}
+
+TEST(SocketCanPort, DoesNotHearItself) {
+  const auto a = Open("vcan0");
+  const auto b = Open("vcan0");
+  ASSERT_TRUE(a && b);
+  const CanFrame from_a{0x111, 1, {1}};
+  const CanFrame from_b{0x222, 1, {2}};
+  ASSERT_EQ(a->Send({&from_a, 1}), 1u);
+  ASSERT_EQ(b->Send({&from_b, 1}), 1u);
+  const auto heard = Receive(*a, 1);
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_EQ(heard[0].id, 0x222u);
+}
+
+TEST(SocketCanPort, InterfacesAreSeparateBuses) {
+  const auto zero = Open("vcan0");
+  const auto one = Open("vcan1");
+  const auto listener = Open("vcan1");
+  ASSERT_TRUE(zero && one && listener);
+  const CanFrame wrong{0x111, 0, {}};
+  const CanFrame right{0x222, 0, {}};
+  ASSERT_EQ(zero->Send({&wrong, 1}), 1u);
+  ASSERT_EQ(one->Send({&right, 1}), 1u);
+  const auto heard = Receive(*listener, 1);
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_EQ(heard[0].id, 0x222u);
+}
+
+TEST(SocketCanPort, ForeignFramesNeverReachTheCore) {
+  const auto port = Open("vcan0");
+  ASSERT_TRUE(port);
+  const Stranger stranger("vcan0");
+  stranger.Write(0x123, 2);                                // 11-bit
+  stranger.Write(0x123 | CAN_EFF_FLAG | CAN_RTR_FLAG, 2);  // remote
+  stranger.Write(0x456 | CAN_EFF_FLAG, 2);                 // ours
+  const auto heard = Receive(*port, 1);
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_EQ(heard[0].id, 0x456u);
+}
+
+TEST(SocketCanPort, ADownInterfaceIsALinkStateAndComesBack) {
+  const auto port = Open("vcan1");
+  const auto peer = Open("vcan1");
+  ASSERT_TRUE(port && peer);
+  EXPECT_EQ(port->state(), LinkState::kUp);
+  RaiseInterface("vcan1", false);
+  std::vector<ReceivedFrame> in;
+  const CanFrame frame{0x111, 0, {}};
+  EXPECT_EQ(port->Send({&frame, 1}), 0u) << "refused, the caller keeps it";
+  port->Receive(HostInstant{1}, &in);
+  EXPECT_EQ(port->state(), LinkState::kDown);
+  EXPECT_FALSE(port->trouble().empty());
+  RaiseInterface("vcan1", true);
+  HostInstant now{1};
+  for (int i = 0; i < 100 && port->state() != LinkState::kUp; ++i) {
+    now = now + Milliseconds(250);  // the port's retries follow the instants that it is given
+    port->Receive(now, &in);
+    peer->Receive(now, &in);
+  }
+  EXPECT_EQ(port->state(), LinkState::kUp);
+  EXPECT_EQ(port->Send({&frame, 1}), 1u);
+}
+
+TEST(SocketCanPort, AMissingInterfaceIsNamed) {
+  const auto port = SocketCanPort::Create({.bus = {0}, .interface = "vcan77"});
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().code, ErrorCode::kUnavailable);
+  EXPECT_NE(port.error().text.find("vcan77"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace focalfleet
