@@ -1,0 +1,29 @@
+// A DDS domain that no other test of this machine uses: the first whose lock file is free. Held
+// until the process ends. 20..99 keeps Cyclone's ports (7400 + 250 * domain) below the ephemeral
+// ones.
+#pragma once
+
+#include <fcntl.h>
+#include <sys/file.h>
+
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+
+namespace focalfleet::testing {
+
+inline std::uint32_t OwnDomain() {
+  static const std::uint32_t domain = [] {
+    for (std::uint32_t candidate = 20; candidate < 100; ++candidate) {
+      const std::string path = "/tmp/focalfleet_dds_domain_" + std::to_string(candidate) + ".lock";
+      const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+      if (descriptor >= 0 && flock(descriptor, LOCK_EX | LOCK_NB) == 0) return candidate;
+    }
+    std::fprintf(stderr, "no free DDS domain\n");
+    std::abort();
+  }();
+  return domain;
+}
+
+}  // namespace focalfleet::testing
