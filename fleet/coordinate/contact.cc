@@ -218,7 +218,8 @@ void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
   }
   if (IsUnderWay(view.phase)) {
     OnMotionStatus(i, status);
-  } else if (status.restarted || (view.phase == kFault) != (status.state == UnitState::kFault)) {
+  } else if (status.restarted || status.host_lost ||
+             (view.phase == kFault) != (status.state == UnitState::kFault)) {
     if (view.phase == kReady && status.state == UnitState::kFault)
       Lose(i, kFault, std::string("reports fault ") + Name(status.fault));
     else

@@ -16,7 +16,8 @@ using enum UnitPhase;
 constexpr std::uint32_t kUploadsPerBus = 16;
 constexpr DurationNs kGatherStep = Milliseconds(50);
 constexpr int kStartRepeats = 2;
-constexpr std::uint8_t kMissedStartsMax = 1;  // a second time in one goal is no accident
+constexpr std::uint8_t kStrikesMax =
+    1;  // a second refusal or missed start in one goal is no accident
 
 std::uint64_t FramesOf(const Core& core) {
   std::uint64_t frames = 0;
@@ -30,7 +31,7 @@ Pursuit::Pursuit(Core* core, Contact* contact)
     : core_(*core),
       contact_(*contact),
       excluded_(core->units.size(), 0),
-      missed_starts_(core->units.size(), 0),
+      strikes_(core->units.size(), 0),
       before_(core->units.size()),
       plan_of_(core->units.size(), kNoPlan),
       part_(core->units.size(), Part::kNone),
@@ -106,7 +107,7 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
            .began = core_.now,
            .started = kNever};
   std::fill(excluded_.begin(), excluded_.end(), std::uint8_t{0});
-  std::fill(missed_starts_.begin(), missed_starts_.end(), std::uint8_t{0});
+  std::fill(strikes_.begin(), strikes_.end(), std::uint8_t{0});
   frames_before_ = FramesOf(core_);
   for (BusRecord& bus : core_.buses) bus.view.load_max = 0;
   Gather();
@@ -309,8 +310,7 @@ void Pursuit::OnArm(PositionerIndex i, const ArmReply& reply) {
 
 void Pursuit::FallOut(PositionerIndex i, const std::string& reason) {
   core_.Forget(i);
-  SetOutcome(i, TargetOutcome::kFailed, reason);
-  Exclude(i);
+  Strike(i, reason);
   core_.Raise(Severity::kWarning, i, {}, core_.NameOf(i) + " " + reason);
   if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];
   SetPart(i, Part::kNone);
@@ -640,10 +640,7 @@ void Pursuit::Take(const UnitEvent& event) {
       Settled(i);
       break;
     case UnitEventKind::kNeverBegan:
-      if (++missed_starts_[i.value] > kMissedStartsMax) {
-        SetOutcome(i, TargetOutcome::kFailed, "does not begin to move");
-        Exclude(i);
-      }
+      Strike(i, "does not begin to move");
       StopFollowers(i, core_.NameOf(i) + " stands in its way");
       break;  // settled when it has been read again
     case UnitEventKind::kLost:
@@ -726,6 +723,12 @@ void Pursuit::FinishWhenDurable(ConfigurationState end) {
   end_ = end;
   due_ = core_.now;
   SetState(State::kReporting);
+}
+
+void Pursuit::Strike(PositionerIndex i, const std::string& reason) {
+  if (strikes_[i.value]++ < kStrikesMax) return;
+  SetOutcome(i, TargetOutcome::kFailed, reason);
+  Exclude(i);
 }
 
 void Pursuit::Exclude(PositionerIndex i) { excluded_[i.value] = 1; }

@@ -86,6 +86,7 @@ class Pursuit {
   void FinishWhenDurable(ConfigurationState end);
   void Finish();
   void Exclude(PositionerIndex i);
+  void Strike(PositionerIndex i, const std::string& reason);
   void StopOne(PositionerIndex i, const std::string& reason);
   void Take(const UnitEvent& event);
   void Settled(PositionerIndex i);
@@ -114,7 +115,7 @@ class Pursuit {
   std::vector<std::optional<Pose>> targets_;  // of the goal
   std::vector<PositionerIndex> to_home_;
   std::vector<std::uint8_t> excluded_;  // failed in this goal: stands still from then on
-  std::vector<std::uint8_t> missed_starts_;
+  std::vector<std::uint8_t> strikes_;
   std::string failure_;
   std::vector<std::optional<UnitKnowledge>>
       before_;  // what was known before an intent not yet begun
