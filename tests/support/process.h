@@ -1,0 +1,44 @@
+// A child process of a test: started with its output in a file, killed at the latest when it goes
+// out of scope, so that no failing test leaves one behind.
+#pragma once
+
+#include <sys/types.h>
+
+#include <string>
+#include <vector>
+
+namespace focalfleet::testing {
+
+class Process {
+ public:
+  /// Pre: arguments[0] is a path. Output and errors are appended to `log`.
+  Process(const std::vector<std::string>& arguments, const std::string& log);
+  Process(Process&& other) noexcept : pid_(other.pid_) { other.pid_ = -1; }
+  Process& operator=(Process&& other) noexcept;
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+  ~Process();
+
+  void Signal(int number) const;
+  /// Waits for its end: exit status, or 128 + signal.
+  int Wait();
+  [[nodiscard]] bool running();
+
+ private:
+  pid_t pid_ = -1;
+};
+
+/// Lets real time pass for another process's sake.
+void Pause(int milliseconds);
+
+/// Polls `done` every 10 ms; false where `limit_ms` ran out.
+template <class Predicate>
+bool WaitUntil(const Predicate& done, int limit_ms) {
+  for (int waited = 0; waited < limit_ms; waited += 10) {
+    if (done()) return true;
+    Pause(10);
+  }
+  return done();
+}
+
+}  // namespace focalfleet::testing
