@@ -12,20 +12,24 @@ namespace {
 
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
-/// A box of poses as middle and half-widths, in radians.
+/// A part of a sweep: middle and half-widths in radians. While `half_along` is not 0 it is the part
+/// of a band around the fraction `along` and is halved there; once that is shorter than the band is
+/// wide it is a box, and its wider side is halved.
 struct Cell {
   double theta = 0;
   double fold = 0;
   double half_theta = 0;
   double half_fold = 0;
+  double along = 0;
+  double half_along = 0;
 };
 
 struct CellPlace {
-  SegmentFp line;
-  double by_theta_mm =
-      0;  // how far any point of the arm gets from `line` because of theta, and of phi
-  double by_phi_mm = 0;
+  SegmentFp line;          // the arm in the middle of the cell
+  double by_theta_mm = 0;  // how far any point of the arm gets from there because of theta
+  double by_phi_mm = 0;    // and because of phi
   [[nodiscard]] double travel_mm() const { return by_theta_mm + by_phi_mm; }
+  [[nodiscard]] double largest_mm() const { return std::max(by_theta_mm, by_phi_mm); }
 };
 
 /// Below this the boxes count as one pose: closer than this to touching is "not clear".
@@ -73,63 +77,10 @@ double ArmGeometry::FibreRadiusMax(std::int32_t phi_low, std::int32_t phi_high) 
 
 class SweepTest {
  public:
+  class Mover;
   SweepTest(double need_mm, int budget) : need_mm_(need_mm), budget_(budget) {}
-
-  bool BothClear(const ArmGeometry& a, const PoseBox& box_a, const ArmGeometry& b,
-                 const PoseBox& box_b) {
-    std::array<Pair, kStackSize> stack;
-    std::size_t size = 0;
-    Pair first{MiddleOf(a, box_a), MiddleOf(b, box_b), {}, {}};
-    first.place_a = Place(a, first.a);
-    first.place_b = Place(b, first.b);
-    stack[size++] = first;
-    while (size > 0) {
-      Pair pair = stack[--size];
-      const double travel = pair.place_a.travel_mm() + pair.place_b.travel_mm();
-      switch (Judge(SquaredDistance(pair.place_a.line, pair.place_b.line), travel)) {
-        case Verdict::kClear:
-          continue;
-        case Verdict::kTouch:
-          return false;
-        case Verdict::kAskAgain:
-          break;
-      }
-      if (size + 2 > kStackSize) return false;
-      const bool split_a = Largest(pair.place_a) >= Largest(pair.place_b);
-      const ArmGeometry& arm = split_a ? a : b;
-      const auto [lower, upper] =
-          Halves(split_a ? pair.a : pair.b, split_a ? pair.place_a : pair.place_b);
-      for (const Cell& half : {lower, upper}) {
-        Pair& next = stack[size++] = pair;
-        (split_a ? next.a : next.b) = half;
-        (split_a ? next.place_a : next.place_b) = Place(arm, half);
-      }
-    }
-    return true;
-  }
-
-  bool ClearOf(const ArmGeometry& a, const PoseBox& box_a, const SegmentFp& standing) {
-    std::array<Cell, kStackSize> stack;
-    std::size_t size = 0;
-    stack[size++] = MiddleOf(a, box_a);
-    while (size > 0) {
-      const Cell cell = stack[--size];
-      const CellPlace place = Place(a, cell);
-      switch (Judge(SquaredDistance(place.line, standing), place.travel_mm())) {
-        case Verdict::kClear:
-          continue;
-        case Verdict::kTouch:
-          return false;
-        case Verdict::kAskAgain:
-          break;
-      }
-      if (size + 2 > kStackSize) return false;
-      const auto [lower, upper] = Halves(cell, place);
-      stack[size++] = lower;
-      stack[size++] = upper;
-    }
-    return true;
-  }
+  bool BothClear(const Mover& a, const Mover& b);
+  bool ClearOf(const Mover& a, const SegmentFp& standing);
 
  private:
   struct Pair {
@@ -147,69 +98,135 @@ class SweepTest {
     return travel_mm < kResolution_mm || --budget_ < 0 ? Verdict::kTouch : Verdict::kAskAgain;
   }
 
-  static Cell MiddleOf(const ArmGeometry& arm, const PoseBox& box) {
-    const double middle_theta = (static_cast<double>(box.low[0]) + box.high[0]) / 2;
-    const double middle_phi = (static_cast<double>(box.low[1]) + box.high[1]) / 2;
-    return {arm.theta_zero_rad_ + middle_theta * arm.theta_step_rad_,
-            arm.phi_zero_rad_ + middle_phi * arm.phi_step_rad_,
-            (static_cast<double>(box.high[0]) - box.low[0]) / 2 * arm.theta_step_rad_,
-            (static_cast<double>(box.high[1]) - box.low[1]) / 2 * arm.phi_step_rad_};
-  }
-
-  static CellPlace Place(const ArmGeometry& arm, const Cell& cell) {
-    CellPlace place;
-    const double beyond = cell.theta + cell.fold;
-    const double ex = arm.theta_arm_mm_ * std::cos(cell.theta);
-    const double ey = arm.theta_arm_mm_ * std::sin(cell.theta);
-    const double fx = ex + arm.phi_arm_mm_ * std::cos(beyond);
-    const double fy = ey + arm.phi_arm_mm_ * std::sin(beyond);
-    place.line = {{arm.base_.x_mm + ex, arm.base_.y_mm + ey},
-                  {arm.base_.x_mm + fx, arm.base_.y_mm + fy}};
-    place.by_phi_mm = arm.phi_arm_mm_ * cell.half_fold;
-    const double radius =
-        std::max(arm.theta_arm_mm_, std::sqrt(fx * fx + fy * fy) + place.by_phi_mm);
-    place.by_theta_mm = radius * cell.half_theta;
-    return place;
-  }
-
-  static double Largest(const CellPlace& place) {
-    return std::max(place.by_theta_mm, place.by_phi_mm);
-  }
-
-  static std::pair<Cell, Cell> Halves(const Cell& cell, const CellPlace& place) {
-    Cell lower = cell;
-    if (place.by_theta_mm >= place.by_phi_mm) {
-      lower.half_theta /= 2;
-      Cell upper = lower;
-      lower.theta -= lower.half_theta;
-      upper.theta += lower.half_theta;
-      return {lower, upper};
-    }
-    lower.half_fold /= 2;
-    Cell upper = lower;
-    lower.fold -= lower.half_fold;
-    upper.fold += lower.half_fold;
-    return {lower, upper};
-  }
-
   double need_mm_;
   int budget_;
 };
 
-bool SweepsClear(const ArmGeometry& a, const PoseBox& box_a, const ArmGeometry& b,
-                 const PoseBox& box_b, double need_mm, int budget) {
-  const double dx = a.base_fp().x_mm - b.base_fp().x_mm;
-  const double dy = a.base_fp().y_mm - b.base_fp().y_mm;
-  const double reach = need_mm +
-                       std::max(a.theta_arm_mm(), a.FibreRadiusMax(box_a.low[1], box_a.high[1])) +
-                       std::max(b.theta_arm_mm(), b.FibreRadiusMax(box_b.low[1], box_b.high[1]));
-  if (dx * dx + dy * dy > reach * reach) return true;
-  return SweepTest(need_mm, budget).BothClear(a, box_a, b, box_b);
+/// One arm and its sweep, cut into cells on demand.
+class SweepTest::Mover {
+ public:
+  Mover(const ArmGeometry& arm, const Sweep& sweep)
+      : arm_(arm),
+        theta_(arm.theta_zero_rad_ + sweep.from[0] * arm.theta_step_rad_),
+        fold_(arm.Fold(sweep.from[1])),
+        theta_way_((static_cast<double>(sweep.to[0]) - sweep.from[0]) * arm.theta_step_rad_),
+        fold_way_((static_cast<double>(sweep.to[1]) - sweep.from[1]) * arm.phi_step_rad_),
+        half_band_(sweep.out_of_step / 2) {}
+
+  [[nodiscard]] Cell Whole() const { return PartOf(0.5, 0.5); }
+
+  [[nodiscard]] std::pair<Cell, Cell> Halves(const Cell& cell, const CellPlace& place) const {
+    if (cell.half_along > 0) {
+      const double quarter = cell.half_along / 2;
+      return {PartOf(cell.along - quarter, quarter), PartOf(cell.along + quarter, quarter)};
+    }
+    Cell lower = cell;
+    Cell upper = cell;
+    if (place.by_theta_mm >= place.by_phi_mm) {
+      lower.half_theta = upper.half_theta = cell.half_theta / 2;
+      lower.theta -= lower.half_theta;
+      upper.theta += upper.half_theta;
+    } else {
+      lower.half_fold = upper.half_fold = cell.half_fold / 2;
+      lower.fold -= lower.half_fold;
+      upper.fold += upper.half_fold;
+    }
+    return {lower, upper};
+  }
+
+  [[nodiscard]] CellPlace Place(const Cell& cell) const {
+    CellPlace place;
+    const double beyond = cell.theta + cell.fold;
+    const double ex = arm_.theta_arm_mm_ * std::cos(cell.theta);
+    const double ey = arm_.theta_arm_mm_ * std::sin(cell.theta);
+    const double fx = ex + arm_.phi_arm_mm_ * std::cos(beyond);
+    const double fy = ey + arm_.phi_arm_mm_ * std::sin(beyond);
+    const PointFp& base = arm_.base_;
+    place.line = {{base.x_mm + ex, base.y_mm + ey}, {base.x_mm + fx, base.y_mm + fy}};
+    place.by_phi_mm = arm_.phi_arm_mm_ * cell.half_fold;
+    const double radius =
+        std::max(arm_.theta_arm_mm_, std::sqrt(fx * fx + fy * fy) + place.by_phi_mm);
+    place.by_theta_mm = radius * cell.half_theta;
+    return place;
+  }
+
+ private:
+  [[nodiscard]] Cell PartOf(double along, double half) const {
+    const double low = std::max(0.0, along - half - half_band_);
+    const double high = std::min(1.0, along + half + half_band_);
+    const double middle = (low + high) / 2;
+    const double half_width = (high - low) / 2;
+    return {theta_ + middle * theta_way_,
+            fold_ + middle * fold_way_,
+            half_width * std::abs(theta_way_),
+            half_width * std::abs(fold_way_),
+            along,
+            half > half_band_ ? half : 0};
+  }
+
+  const ArmGeometry& arm_;
+  double theta_;
+  double fold_;
+  double theta_way_;
+  double fold_way_;
+  double half_band_;
+};
+
+bool SweepTest::BothClear(const Mover& a, const Mover& b) {
+  std::array<Pair, kStackSize> stack;
+  std::size_t size = 0;
+  const Cell whole_a = a.Whole();
+  const Cell whole_b = b.Whole();
+  stack[size++] = {whole_a, whole_b, a.Place(whole_a), b.Place(whole_b)};
+  while (size > 0) {
+    const Pair pair = stack[--size];
+    const double travel = pair.place_a.travel_mm() + pair.place_b.travel_mm();
+    const Verdict verdict = Judge(SquaredDistance(pair.place_a.line, pair.place_b.line), travel);
+    if (verdict == Verdict::kClear) continue;
+    if (verdict == Verdict::kTouch || size + 2 > kStackSize) return false;
+    if (pair.place_a.largest_mm() >= pair.place_b.largest_mm()) {
+      const auto [lower, upper] = a.Halves(pair.a, pair.place_a);
+      stack[size++] = {lower, pair.b, a.Place(lower), pair.place_b};
+      stack[size++] = {upper, pair.b, a.Place(upper), pair.place_b};
+    } else {
+      const auto [lower, upper] = b.Halves(pair.b, pair.place_b);
+      stack[size++] = {pair.a, lower, pair.place_a, b.Place(lower)};
+      stack[size++] = {pair.a, upper, pair.place_a, b.Place(upper)};
+    }
+  }
+  return true;
 }
 
-bool SweepClearOf(const ArmGeometry& a, const PoseBox& box_a, const Capsule& standing,
-                  double need_mm, int budget) {
-  return SweepTest(need_mm + standing.radius_mm, budget).ClearOf(a, box_a, standing.line);
+bool SweepTest::ClearOf(const Mover& a, const SegmentFp& standing) {
+  std::array<Cell, kStackSize> stack;
+  std::size_t size = 0;
+  stack[size++] = a.Whole();
+  while (size > 0) {
+    const Cell cell = stack[--size];
+    const CellPlace place = a.Place(cell);
+    const Verdict verdict = Judge(SquaredDistance(place.line, standing), place.travel_mm());
+    if (verdict == Verdict::kClear) continue;
+    if (verdict == Verdict::kTouch || size + 2 > kStackSize) return false;
+    const auto [lower, upper] = a.Halves(cell, place);
+    stack[size++] = lower;
+    stack[size++] = upper;
+  }
+  return true;
+}
+
+bool SweepsClear(const ArmGeometry& a, const Sweep& sweep_a, const ArmGeometry& b,
+                 const Sweep& sweep_b, double need_mm, int budget) {
+  const auto radius = [](const ArmGeometry& arm, const PoseBox& box) {
+    return std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(box.low[1], box.high[1]));
+  };
+  const double reach = need_mm + radius(a, sweep_a.box()) + radius(b, sweep_b.box());
+  if (SquaredDistance(a.base_fp(), b.base_fp()) > reach * reach) return true;
+  return SweepTest(need_mm, budget).BothClear({a, sweep_a}, {b, sweep_b});
+}
+
+bool SweepClearOf(const ArmGeometry& a, const Sweep& sweep, const Capsule& standing, double need_mm,
+                  int budget) {
+  return SweepTest(need_mm + standing.radius_mm, budget).ClearOf({a, sweep}, standing.line);
 }
 
 }  // namespace focalfleet

@@ -89,14 +89,26 @@ struct Capsule {
   double radius_mm = 0;
 };
 
-/// True: every pose of `a` in `box_a` stays farther than `need_mm` from every pose of `b` in
-/// `box_b`. Cost: at most `budget` distances; more would be needed only where the two nearly touch:
-/// then false.
-bool SweepsClear(const ArmGeometry& a, const PoseBox& box_a, const ArmGeometry& b,
-                 const PoseBox& box_b, double need_mm, int budget = 3000);
+/// A set of poses that one leg of a way may pass. The axes go from one pose to the other, theta has
+/// covered a fraction f of its way and phi a fraction g of its own, with |f - g| <= `out_of_step`:
+/// 1 is the whole box between the poses, less is a band around its diagonal.
+struct Sweep {
+  Pose from{};
+  Pose to{};
+  double out_of_step = 1;
+  static constexpr Sweep Of(const Pose& p) { return {p, p, 1}; }
+  static constexpr Sweep Of(const PoseBox& box) { return {box.low, box.high, 1}; }
+  [[nodiscard]] constexpr PoseBox box() const { return PoseBox::Between(from, to); }
+};
+
+/// True: every pose of `a` in `sweep_a` stays farther than `need_mm` from every pose of `b` in
+/// `sweep_b`.
+/// Cost: at most `budget` distances; more would be needed only where the two nearly touch: false.
+bool SweepsClear(const ArmGeometry& a, const Sweep& sweep_a, const ArmGeometry& b,
+                 const Sweep& sweep_b, double need_mm, int budget = 3000);
 
 /// The same against something that stands still.
-bool SweepClearOf(const ArmGeometry& a, const PoseBox& box_a, const Capsule& standing,
-                  double need_mm, int budget = 3000);
+bool SweepClearOf(const ArmGeometry& a, const Sweep& sweep, const Capsule& standing, double need_mm,
+                  int budget = 3000);
 
 }  // namespace focalfleet

@@ -60,7 +60,8 @@ void WayMaker::FindSwept() {
 bool WayMaker::ClearOfSwept(std::uint32_t unit, const PoseBox& box, double need_mm) const {
   return std::all_of(swept_.begin(), swept_.end(), [&](const PoseBox& swept) {
     if (scene_.InCell(unit, box) && scene_.InCell(homing_, swept)) return true;
-    return SweepsClear(scene_.arm(homing_), swept, scene_.arm(unit), box, need_mm, kBudget);
+    return SweepsClear(scene_.arm(homing_), Sweep::Of(swept), scene_.arm(unit), Sweep::Of(box),
+                       need_mm, kBudget);
   });
 }
 
@@ -125,7 +126,8 @@ Status WayMaker::CheckObstacles() const {
   for (const StandingThing& thing : scene_.standing(homing_)) {
     if (thing.by != kNobody) continue;
     for (const PoseBox& swept : swept_)
-      if (!SweepClearOf(scene_.arm(homing_), swept, thing.capsule, thing.need_mm, kBudget))
+      if (!SweepClearOf(scene_.arm(homing_), Sweep::Of(swept), thing.capsule, thing.need_mm,
+                        kBudget))
         return Fail(ErrorCode::kRefused,
                     "unit " + std::to_string(request_.layout->unit({homing_}).id.value) +
                         " cannot home: a fixed obstacle is in reach of its arm");

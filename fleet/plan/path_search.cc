@@ -7,14 +7,35 @@
 
 namespace focalfleet {
 
-bool BoxClear(const ArmGeometry& arm, const PoseBox& box, std::span<const Blocker> blockers,
-              std::uint32_t* by, int budget) {
+bool SweepClear(const ArmGeometry& arm, const Sweep& sweep, std::span<const Blocker> blockers,
+                std::uint32_t* by, int budget) {
   for (const Blocker& blocker : blockers) {
-    if (SweepClearOf(arm, box, blocker.capsule, blocker.need_mm, budget)) continue;
+    if (SweepClearOf(arm, sweep, blocker.capsule, blocker.need_mm, budget)) continue;
     if (by != nullptr) *by = blocker.by;
     return false;
   }
   return true;
+}
+
+std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDrive& drive) {
+  InStep step;
+  std::array<double, kAxisCount> lasts_s{};
+  std::array<double, kAxisCount> vectors{};
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    vectors[k] = std::abs(to[k] - from[k]);
+    if (vectors[k] == 0) return std::nullopt;
+    step.repeat[k] = drive.axis[k].repeat;
+    lasts_s[k] = vectors[k] * SecondsPerVector(drive.axis[k]);
+  }
+  const std::size_t quick = lasts_s[0] < lasts_s[1] ? 0 : 1;
+  const double stretch = lasts_s[1 - quick] / lasts_s[quick];
+  const double repeat = std::round(drive.axis[quick].repeat * stretch);
+  if (repeat > std::numeric_limits<std::uint8_t>::max()) return std::nullopt;
+  step.repeat[quick] = static_cast<std::uint8_t>(repeat);
+  const double together = repeat / drive.axis[quick].repeat / stretch;
+  // One vector of either axis besides: within it nobody says how the angle grows.
+  step.out_of_step = std::abs(1 - together) + 1 / vectors[0] + 1 / vectors[1];
+  return step;
 }
 
 void PathSearch::SetUp(const Question& question) {
@@ -62,7 +83,7 @@ bool PathSearch::EdgeClear(std::int32_t a, std::int32_t b) {
   const Pose pb = PoseOf(b);
   const double travel = q_.arm->TravelBound(std::abs(pa[0] - pb[0]), std::abs(pa[1] - pb[1]));
   if (at_a + at_b > travel) return true;
-  return BoxClear(*q_.arm, PoseBox::Between(pa, pb), q_.blockers, nullptr, 300);
+  return SweepClear(*q_.arm, {pa, pb}, q_.blockers, nullptr, 300);
 }
 
 std::int64_t PathSearch::Estimate(const Pose& pose) const {
@@ -108,11 +129,11 @@ std::optional<Pose> PathSearch::EndNear(const Pose& pose) const {
     end[k] = std::clamp(pose[k], q_.goal->low[k], q_.goal->high[k]);
     if (std::abs(end[k] - pose[k]) > step_[k]) return std::nullopt;
   }
-  if (!BoxClear(*q_.arm, PoseBox::Between(pose, end), q_.blockers, nullptr)) return std::nullopt;
+  if (!SweepClear(*q_.arm, {pose, end}, q_.blockers, nullptr)) return std::nullopt;
   return end;
 }
 
-std::vector<Pose> PathSearch::Find(const Question& question) {
+Way PathSearch::Find(const Question& question) {
   SetUp(question);
   const std::int32_t start = -low_[0] * count_[1] - low_[1];
   if (ClearanceAt(start) <= 0) return {};
@@ -131,14 +152,14 @@ std::vector<Pose> PathSearch::Find(const Question& question) {
     if (const std::optional<Pose> end = EndNear(pose)) {
       std::vector<Pose> way = Trace(node);
       if (way.back() != *end) way.push_back(*end);
-      return Shorten(std::move(way));
+      return Shorten(way);
     }
     Expand(node);
   }
   return {};
 }
 
-std::vector<Pose> PathSearch::WayTo(std::size_t reached_index) const {
+Way PathSearch::WayTo(std::size_t reached_index) const {
   return Shorten(Trace(reached_nodes_[reached_index]));
 }
 
@@ -150,16 +171,27 @@ std::vector<Pose> PathSearch::Trace(std::int32_t node) const {
   return way;
 }
 
-std::vector<Pose> PathSearch::Shorten(std::vector<Pose> way) const {
-  if (way.size() <= 2) return way;
-  std::vector<Pose> corners{way.front()};
+/// The leg from one corner to another, in whatever manner is clear. None: neither is.
+std::optional<Waypoint> PathSearch::Leg(const Pose& from, const Pose& to) const {
+  constexpr int kBudget = 400;
+  if (SweepClear(*q_.arm, {from, to}, q_.blockers, nullptr, kBudget)) return Waypoint{to};
+  const std::optional<InStep> step = KeepInStep(from, to, *q_.drive);
+  if (!step || step->out_of_step >= 1) return std::nullopt;
+  const Sweep band{from, to, step->out_of_step};
+  if (!SweepClear(*q_.arm, band, q_.blockers, nullptr, kBudget)) return std::nullopt;
+  return Waypoint{to, step->out_of_step};
+}
+
+/// Each leg as far along the way as it can go.
+Way PathSearch::Shorten(const std::vector<Pose>& way) const {
+  Way corners{{way.front()}};
   std::size_t at = 0;
   while (at + 1 < way.size()) {
     std::size_t next = way.size() - 1;
-    while (next > at + 1 &&
-           !BoxClear(*q_.arm, PoseBox::Between(way[at], way[next]), q_.blockers, nullptr, 400))
-      --next;
-    corners.push_back(way[next]);
+    std::optional<Waypoint> leg = Leg(way[at], way[next]);
+    while (!leg && next > at + 1) leg = Leg(way[at], way[--next]);
+    // Neighbours on the grid are clear of each other already.
+    corners.push_back(leg ? *leg : Waypoint{way[next]});
     at = next;
   }
   return corners;

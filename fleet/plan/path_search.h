@@ -4,6 +4,7 @@
 // whose clearance exceeds what the arm can travel along the edge proves the whole edge.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -20,12 +21,28 @@ struct Blocker {
   std::uint32_t by = 0;
 };
 
+/// A corner of a way and how the leg to it is made: the axes each in their own time, or in step.
+struct Waypoint {
+  Pose pose{};
+  double out_of_step = 1;  // as in Sweep, of the leg that ends here
+};
+using Way = std::vector<Waypoint>;
+
+/// How both axes of a unit can begin and end a leg together: the one with less to do takes more
+/// carrier periods a vector. None where that is beyond what a vector may take.
+struct InStep {
+  std::array<std::uint8_t, kAxisCount> repeat{};
+  double out_of_step = 1;
+};
+std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDrive& drive);
+
 class PathSearch {
  public:
   /// Where the way may go and where it shall end: any pose in `goal`; none: explore all that can be
   /// reached.
   struct Question {
     const ArmGeometry* arm = nullptr;
+    const UnitDrive* drive = nullptr;
     std::span<const Blocker> blockers;
     Pose from{};
     PoseBox within;
@@ -33,16 +50,15 @@ class PathSearch {
     double grid_deg = 3;
   };
 
-  /// Corners of the way, `from` first; the boxes between consecutive corners are clear of all
-  /// blockers. Empty: none on this grid. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180
-  /// / grid_deg).
-  std::vector<Pose> Find(const Question& question);
+  /// Corners of the way, `from` first; the legs between them are clear of all blockers. Empty: none
+  /// on this grid. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180 / grid_deg).
+  Way Find(const Question& question);
 
   /// All poses that the last Find reached, if it found no way; nearest first. Lifetime: until the
   /// next Find.
   [[nodiscard]] const std::vector<Pose>& reached() const { return reached_; }
   /// The way to one of them. Empty: not reached.
-  std::vector<Pose> WayTo(std::size_t reached_index) const;
+  Way WayTo(std::size_t reached_index) const;
 
  private:
   struct Node {
@@ -66,7 +82,8 @@ class PathSearch {
   void SetUp(const Question& question);
   [[nodiscard]] std::int64_t Estimate(const Pose& pose) const;
   [[nodiscard]] std::vector<Pose> Trace(std::int32_t node) const;
-  [[nodiscard]] std::vector<Pose> Shorten(std::vector<Pose> way) const;
+  [[nodiscard]] Way Shorten(const std::vector<Pose>& way) const;
+  [[nodiscard]] std::optional<Waypoint> Leg(const Pose& from, const Pose& to) const;
 
   Question q_;
   std::int32_t step_[kAxisCount]{};
@@ -78,9 +95,9 @@ class PathSearch {
   std::vector<std::int32_t> reached_nodes_;
 };
 
-/// Every pose of the box is clear of all blockers. `by` (may be null) receives the first that it is
-/// not clear of.
-bool BoxClear(const ArmGeometry& arm, const PoseBox& box, std::span<const Blocker> blockers,
-              std::uint32_t* by, int budget = 3000);
+/// Every pose of the sweep is clear of all blockers. `by` (may be null) receives the first that it
+/// is not clear of.
+bool SweepClear(const ArmGeometry& arm, const Sweep& sweep, std::span<const Blocker> blockers,
+                std::uint32_t* by, int budget = 3000);
 
 }  // namespace focalfleet

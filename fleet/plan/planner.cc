@@ -41,7 +41,7 @@ class Planner {
   [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
   bool Attempt(std::vector<Piece>* order);
   bool TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order);
-  std::vector<Pose> TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to);
+  Way TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to);
   void GiveWay();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
@@ -179,13 +179,14 @@ void Planner::DropCollidingTargets() {
 }
 
 /// The way from one pose to another without leaving the cell. Empty: none.
-std::vector<Pose> Planner::TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to) {
+Way Planner::TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to) {
   const ArmGeometry& arm = scene_.arm(unit);
   const Pose& from = in.poses()[unit];
   const std::span<const Blocker> around = surroundings_.Around(unit, in.lines(), in.poses(), true);
-  if (BoxClear(arm, PoseBox::Between(from, to), around, nullptr)) return {from, to};
+  if (SweepClear(arm, {from, to}, around, nullptr)) return {{from}, {to}};
   PathSearch::Question question;
   question.arm = &arm;
+  question.drive = &request_.drives[unit];
   question.blockers = around;
   question.from = from;
   question.within = arm.range();
@@ -196,7 +197,7 @@ std::vector<Pose> Planner::TurnInCell(std::uint32_t unit, const Retreat& in, con
   question.goal = PoseBox::Of(to);
   for (const double grid_deg : {3.0, 1.0}) {
     question.grid_deg = grid_deg;
-    std::vector<Pose> way = surroundings_.search().Find(question);
+    Way way = surroundings_.search().Find(question);
     if (!way.empty()) return way;
   }
   return {};
@@ -205,10 +206,11 @@ std::vector<Pose> Planner::TurnInCell(std::uint32_t unit, const Retreat& in, con
 bool Planner::TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order) {
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
     if (movers_[i] == 0 || in.poses()[i] == out.poses()[i]) continue;
-    const std::vector<Pose> way = TurnInCell(i, in, out.poses()[i]);
+    const Way way = TurnInCell(i, in, out.poses()[i]);
     if (way.empty()) stuck_.push_back(i);
     for (std::size_t k = 1; k < way.size(); ++k)
-      if (way[k] != way[k - 1]) order->push_back({i, way[k - 1], way[k]});
+      if (way[k].pose != way[k - 1].pose)
+        order->push_back({i, {way[k - 1].pose, way[k].pose, way[k].out_of_step}});
   }
   return stuck_.empty();
 }
@@ -220,9 +222,9 @@ bool Planner::Attempt(std::vector<Piece>* order) {
   movers_.assign(scene_.size(), 0);
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     movers_[i] = movable_[i] != 0 && (goal_[i] != start_[i] || aside_[i] != 0) ? 1 : 0;
-  Retreat in(&scene_, &surroundings_, start_, movers_);
+  Retreat in(&scene_, request_.drives, &surroundings_, start_, movers_);
   in.Run();
-  Retreat out(&scene_, &surroundings_, goal_, movers_);
+  Retreat out(&scene_, request_.drives, &surroundings_, goal_, movers_);
   out.Run();
   stuck_ = in.stuck();
   stuck_.insert(stuck_.end(), out.stuck().begin(), out.stuck().end());
@@ -230,7 +232,8 @@ bool Planner::Attempt(std::vector<Piece>* order) {
     *order = in.pieces();
     TurnAll(in, out, order);
     for (auto piece = out.pieces().rbegin(); piece != out.pieces().rend(); ++piece)
-      order->push_back({piece->unit, piece->to, piece->from});
+      order->push_back(
+          {piece->unit, {piece->sweep.to, piece->sweep.from, piece->sweep.out_of_step}});
     const std::vector<std::uint32_t> too_many = UnitsWithTooManyPieces(*order, scene_.size());
     stuck_.insert(stuck_.end(), too_many.begin(), too_many.end());
   }
@@ -248,14 +251,14 @@ std::uint32_t Planner::Blames(std::uint32_t unit) const {
   for (const std::vector<Pose>* poses : {&start_, &goal_}) {
     Pose end = (*poses)[unit];
     end[1] = std::clamp(end[1], cell.low, cell.high);
-    const PoseBox box = PoseBox::Between((*poses)[unit], end);
+    const Sweep sweep{(*poses)[unit], end};
     for (const NeighbourNeed& near : scene_.neighbours(unit)) {
       if (!scene_.is_place(near.unit)) continue;
       const Capsule there{scene_.arm(near.unit).At((*poses)[near.unit]), 0};
-      if (!SweepClearOf(arm, box, there, near.need_mm)) return near.unit;
+      if (!SweepClearOf(arm, sweep, there, near.need_mm)) return near.unit;
     }
     for (const StandingThing& thing : scene_.standing(unit))
-      if (!SweepClearOf(arm, box, thing.capsule, thing.need_mm)) return thing.by;
+      if (!SweepClearOf(arm, sweep, thing.capsule, thing.need_mm)) return thing.by;
   }
   return kNobody;
 }

@@ -28,9 +28,10 @@ std::span<const Blocker> Surroundings::Around(std::uint32_t unit, std::span<cons
   return blockers_;
 }
 
-Retreat::Retreat(const Scene* scene, Surroundings* surroundings, std::span<const Pose> poses,
-                 std::span<const std::uint8_t> movers)
+Retreat::Retreat(const Scene* scene, std::span<const UnitDrive> drives, Surroundings* surroundings,
+                 std::span<const Pose> poses, std::span<const std::uint8_t> movers)
     : scene_(scene),
+      drives_(drives),
       surroundings_(surroundings),
       poses_(poses.begin(), poses.end()),
       lines_(poses.size()),
@@ -67,10 +68,10 @@ Pose Retreat::StraightEnd(std::uint32_t unit) const {
 
 bool Retreat::StraightClear(std::uint32_t unit) {
   if (straight_[unit] == Known::kNo) {
-    const PoseBox box = PoseBox::Between(poses_[unit], StraightEnd(unit));
+    const Sweep sweep{poses_[unit], StraightEnd(unit)};
     const bool clear = scene_->HasCell(unit) &&
-                       BoxClear(scene_->arm(unit), box,
-                                surroundings_->Around(unit, lines_, poses_, false), nullptr);
+                       SweepClear(scene_->arm(unit), sweep,
+                                  surroundings_->Around(unit, lines_, poses_, false), nullptr);
     straight_[unit] = clear ? Known::kClear : Known::kBlocked;
   }
   return straight_[unit] == Known::kClear;
@@ -78,8 +79,8 @@ bool Retreat::StraightClear(std::uint32_t unit) {
 
 bool Retreat::StraightClearOf(std::uint32_t unit, const NeighbourNeed& near,
                               const SegmentFp& line) const {
-  return SweepClearOf(scene_->arm(unit), PoseBox::Between(poses_[unit], StraightEnd(unit)),
-                      {line, 0}, near.need_mm);
+  return SweepClearOf(scene_->arm(unit), {poses_[unit], StraightEnd(unit)}, {line, 0},
+                      near.need_mm);
 }
 
 /// How many waiting neighbours this unit would block at the end of its straight way, and does not
@@ -110,13 +111,11 @@ bool Retreat::StraightRound() {
       }
       continue;
     }
-    const std::array way{poses_[i], StraightEnd(i)};
-    Go(i, way);
+    GoStraight(i);
     moved = true;
   }
   if (!moved && least_harmful != kNobody) {
-    const std::array way{poses_[least_harmful], StraightEnd(least_harmful)};
-    Go(least_harmful, way);
+    GoStraight(least_harmful);
     moved = true;
   }
   return moved;
@@ -130,6 +129,7 @@ bool Retreat::GoAround(double grid_deg) {
     const ArmGeometry& arm = scene_->arm(i);
     PathSearch::Question question;
     question.arm = &arm;
+    question.drive = &drives_[i];
     question.blockers = surroundings_->Around(i, lines_, poses_, false);
     question.from = poses_[i];
     question.within = arm.range();
@@ -142,7 +142,7 @@ bool Retreat::GoAround(double grid_deg) {
     goal.high[1] = scene_->cell(i).high;
     question.goal = goal;
     question.grid_deg = grid_deg;
-    const std::vector<Pose> way = surroundings_->search().Find(question);
+    const Way way = surroundings_->search().Find(question);
     searched_deg_[i] = grid_deg;
     if (way.empty()) continue;
     Go(i, way);
@@ -187,10 +187,10 @@ bool Retreat::Turn(std::uint32_t neighbour, const NeighbourNeed& need, std::uint
         fold};
     if (there[0] < arm.range().low[0] || there[0] > arm.range().high[0]) continue;
     if (!StraightClearOf(unit, need, arm.At(there))) continue;
-    const PoseBox box = PoseBox::Between(poses_[neighbour], there);
-    if (!BoxClear(arm, box, surroundings_->Around(neighbour, lines_, poses_, true), nullptr))
+    const Sweep sweep{poses_[neighbour], there};
+    if (!SweepClear(arm, sweep, surroundings_->Around(neighbour, lines_, poses_, true), nullptr))
       continue;
-    const std::array way{poses_[neighbour], there};
+    const std::array way{Waypoint{poses_[neighbour]}, Waypoint{there}};
     Go(neighbour, way);
     ++favours_[neighbour];
     return true;
@@ -217,6 +217,7 @@ bool Retreat::YieldTo(std::uint32_t unit, std::uint32_t other) {
   const ArmGeometry& arm = scene_->arm(unit);
   PathSearch::Question question;
   question.arm = &arm;
+  question.drive = &drives_[unit];
   question.blockers = surroundings_->Around(unit, lines_, poses_, false);
   question.from = poses_[unit];
   question.within = arm.range();
@@ -229,7 +230,7 @@ bool Retreat::YieldTo(std::uint32_t unit, std::uint32_t other) {
   const std::vector<Pose>& reached = surroundings_->search().reached();
   for (std::size_t k = 0; k < reached.size(); ++k) {
     if (!StraightClearOf(other, back, arm.At(reached[k]))) continue;
-    const std::vector<Pose> way = surroundings_->search().WayTo(k);
+    const Way way = surroundings_->search().WayTo(k);
     ++favours_[unit];
     Go(unit, way);
     return true;
@@ -237,11 +238,17 @@ bool Retreat::YieldTo(std::uint32_t unit, std::uint32_t other) {
   return false;
 }
 
-void Retreat::Go(std::uint32_t unit, std::span<const Pose> way) {
+void Retreat::GoStraight(std::uint32_t unit) {
+  const std::array way{Waypoint{poses_[unit]}, Waypoint{StraightEnd(unit)}};
+  Go(unit, way);
+}
+
+void Retreat::Go(std::uint32_t unit, std::span<const Waypoint> way) {
   for (std::size_t k = 1; k < way.size(); ++k)
-    if (way[k] != way[k - 1]) pieces_.push_back({unit, way[k - 1], way[k]});
-  poses_[unit] = way.back();
-  lines_[unit] = scene_->arm(unit).At(way.back());
+    if (way[k].pose != way[k - 1].pose)
+      pieces_.push_back({unit, {way[k - 1].pose, way[k].pose, way[k].out_of_step}});
+  poses_[unit] = way.back().pose;
+  lines_[unit] = scene_->arm(unit).At(way.back().pose);
   if (scene_->InCell(unit, poses_[unit])) waits_[unit] = 0;
   straight_[unit] = Known::kNo;
   searched_deg_[unit] = 0;

@@ -19,13 +19,10 @@
 
 namespace focalfleet {
 
-/// One leg of one unit: both axes go from one pose to the other, in any manner inside the box
-/// between them.
+/// One leg of one unit.
 struct Piece {
   std::uint32_t unit = 0;
-  Pose from{};
-  Pose to{};
-  [[nodiscard]] PoseBox box() const { return PoseBox::Between(from, to); }
+  Sweep sweep;
 };
 
 /// Scratch that outlives one plan step: what stands around one unit, and the search.
@@ -47,8 +44,8 @@ class Surroundings {
 
 class Retreat {
  public:
-  Retreat(const Scene* scene, Surroundings* surroundings, std::span<const Pose> poses,
-          std::span<const std::uint8_t> movers);
+  Retreat(const Scene* scene, std::span<const UnitDrive> drives, Surroundings* surroundings,
+          std::span<const Pose> poses, std::span<const std::uint8_t> movers);
 
   /// Takes as many movers as it can into their cells.
   void Run();
@@ -73,11 +70,13 @@ class Retreat {
   bool Turn(std::uint32_t neighbour, const NeighbourNeed& need, std::uint32_t unit);
   bool Yield();
   bool YieldTo(std::uint32_t unit, std::uint32_t other);
-  void Go(std::uint32_t unit, std::span<const Pose> way);
+  void Go(std::uint32_t unit, std::span<const Waypoint> way);
+  void GoStraight(std::uint32_t unit);
   void DropArrived();
   [[nodiscard]] bool Waits(std::uint32_t unit) const { return waits_[unit] != 0; }
 
   const Scene* scene_;
+  std::span<const UnitDrive> drives_;
   Surroundings* surroundings_;
   std::vector<Pose> poses_;
   std::vector<SegmentFp> lines_;

@@ -18,13 +18,22 @@ using AxisCounts = std::array<std::uint32_t, kAxisCount>;
 
 void Count(const Piece& piece, AxisCounts* counts) {
   for (std::size_t k = 0; k < kAxisCount; ++k)
-    if (piece.from[k] != piece.to[k]) ++(*counts)[k];
+    if (piece.sweep.from[k] != piece.sweep.to[k]) ++(*counts)[k];
 }
 
 std::vector<AxisCounts> CountAll(std::span<const Piece> order, std::size_t units) {
   std::vector<AxisCounts> counts(units);
   for (const Piece& piece : order) Count(piece, &counts[piece.unit]);
   return counts;
+}
+
+AxisPath Lengthened(const AxisPath& path, std::int32_t by) {
+  AxisPath longer;
+  for (Segment segment : path.segments()) {
+    if (longer.size() + 1 == path.size()) segment.delta += by;
+    longer.Append(segment);
+  }
+  return longer;
 }
 
 class Scheduler {
@@ -56,8 +65,8 @@ class Scheduler {
     return static_cast<std::int64_t>((ended_at_last + skew) / (1 - error)) + kCountsPerTick;
   }
   [[nodiscard]] bool Meet(const Piece& a, const Piece& b, double need_mm) const {
-    if (scene_.InCell(a.unit, a.box()) && scene_.InCell(b.unit, b.box())) return false;
-    return !SweepsClear(scene_.arm(a.unit), a.box(), scene_.arm(b.unit), b.box(), need_mm, 2000);
+    if (scene_.InCell(a.unit, a.sweep.box()) && scene_.InCell(b.unit, b.sweep.box())) return false;
+    return !SweepsClear(scene_.arm(a.unit), a.sweep, scene_.arm(b.unit), b.sweep, need_mm, 2000);
   }
   Timed Lay(std::uint32_t index, std::int64_t earliest);
   void Collect(Plan* plan);
@@ -75,30 +84,29 @@ class Scheduler {
 /// Gives a piece its segments; a leg that goes on without pause lengthens the segment before it.
 Scheduler::Timed Scheduler::Lay(std::uint32_t index, std::int64_t earliest) {
   const Piece& piece = order_[index];
+  const Sweep& sweep = piece.sweep;
+  const UnitDrive& drive = drives_[piece.unit];
   UnitPlan& plan = plans_[piece.unit];
-  if (laid_[piece.unit].empty()) plan.from = piece.from;
-  plan.to = piece.to;
+  if (laid_[piece.unit].empty()) plan.from = sweep.from;
+  plan.to = sweep.to;
+  std::optional<InStep> in_step;
+  if (sweep.out_of_step < 1) in_step = KeepInStep(sweep.from, sweep.to, drive);
   Timed timed{index, earliest, earliest};
   for (std::size_t k = 0; k < kAxisCount; ++k) {
-    const std::int32_t delta = piece.to[k] - piece.from[k];
+    const std::int32_t delta = sweep.to[k] - sweep.from[k];
     if (delta == 0) continue;
-    const AxisDrive& drive = drives_[piece.unit].axis[k];
+    const std::uint8_t repeat = in_step ? in_step->repeat[k] : drive.axis[k].repeat;
     const std::int64_t lasts =
-        static_cast<std::int64_t>(std::abs(delta)) * drive.repeat * drive.counter1;
+        static_cast<std::int64_t>(std::abs(delta)) * repeat * drive.axis[k].counter1;
     std::int64_t& end = axis_end_[piece.unit][k];
-    AxisPath& path = plan.path[k];
-    const std::span<const Segment> before = path.segments();
-    if (!before.empty() && end == earliest && (before.back().delta > 0) == (delta > 0)) {
-      AxisPath longer;
-      for (const Segment& s : before.first(before.size() - 1)) longer.Append(s);
-      Segment last = before.back();
-      last.delta += delta;
-      longer.Append(last);
-      path = longer;
+    const std::span<const Segment> before = plan.path[k].segments();
+    if (!in_step && end == earliest && !before.empty() && before.back().repeat == repeat &&
+        (before.back().delta > 0) == (delta > 0)) {
+      plan.path[k] = Lengthened(plan.path[k], delta);
       end += lasts;
     } else {
       const std::int64_t tick = (earliest + kCountsPerTick - 1) / kCountsPerTick;
-      path.Append({static_cast<std::uint32_t>(tick), delta, drive.repeat});
+      plan.path[k].Append({static_cast<std::uint32_t>(tick), delta, repeat});
       end = tick * kCountsPerTick + lasts;
     }
     timed.end = std::max(timed.end, end);
@@ -158,6 +166,25 @@ void Scheduler::Collect(Plan* plan) {
   }
 }
 
+/// Into how many parts a leg is cut; only legs of one axis are. The unit's counts grow by what it
+/// takes.
+std::int32_t PartsOf(const Piece& piece, const Scene& scene, AxisCounts* counts) {
+  const Sweep& sweep = piece.sweep;
+  const bool theta = sweep.from[0] != sweep.to[0];
+  const bool phi = sweep.from[1] != sweep.to[1];
+  if (theta == phi) return 1;
+  const std::size_t k = theta ? 0 : 1;
+  const double length_deg = std::abs(sweep.to[k] - sweep.from[k]) *
+                            scene.arm(piece.unit).step_rad(kAxes[k]) * 180 / std::numbers::pi;
+  const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrain_deg));
+  const auto spare =
+      static_cast<std::int32_t>(limits::kSegmentsPerAxis) - static_cast<std::int32_t>((*counts)[k]);
+  // Half of what is spare: the way out must find some too.
+  const std::int32_t parts = std::clamp(wanted, 1, 1 + std::max(0, (spare + 1) / 2));
+  (*counts)[k] += static_cast<std::uint32_t>(parts - 1);
+  return parts;
+}
+
 }  // namespace
 
 std::vector<Piece> CutPieces(std::span<const Piece> order, const Scene& scene) {
@@ -165,28 +192,16 @@ std::vector<Piece> CutPieces(std::span<const Piece> order, const Scene& scene) {
   std::vector<Piece> cut;
   cut.reserve(order.size() * 3);
   for (const Piece& piece : order) {
-    const bool theta = piece.from[0] != piece.to[0];
-    const bool phi = piece.from[1] != piece.to[1];
-    std::int32_t parts = 1;
-    if (theta != phi) {
-      const std::size_t k = theta ? 0 : 1;
-      const double length_deg = std::abs(piece.to[k] - piece.from[k]) *
-                                scene.arm(piece.unit).step_rad(kAxes[k]) * 180 / std::numbers::pi;
-      const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrain_deg));
-      const auto spare = static_cast<std::int32_t>(limits::kSegmentsPerAxis) -
-                         static_cast<std::int32_t>(counts[piece.unit][k]);
-      // Half of what is spare: the way out must find some too.
-      parts = std::clamp(wanted, 1, 1 + std::max(0, (spare + 1) / 2));
-      counts[piece.unit][k] += static_cast<std::uint32_t>(parts - 1);
-    }
-    Pose at = piece.from;
+    const Sweep& sweep = piece.sweep;
+    const std::int32_t parts = PartsOf(piece, scene, &counts[piece.unit]);
+    Pose at = sweep.from;
     for (std::int32_t part = 1; part <= parts; ++part) {
-      Pose next = piece.to;
-      for (std::size_t k = 0; k < kAxisCount; ++k)
-        next[k] = piece.from[k] +
-                  static_cast<std::int32_t>(static_cast<std::int64_t>(piece.to[k] - piece.from[k]) *
-                                            part / parts);
-      if (next != at) cut.push_back({piece.unit, at, next});
+      Pose next = sweep.to;
+      for (std::size_t k = 0; k < kAxisCount; ++k) {
+        const std::int64_t way = sweep.to[k] - sweep.from[k];
+        next[k] = sweep.from[k] + static_cast<std::int32_t>(way * part / parts);
+      }
+      if (next != at) cut.push_back({piece.unit, {at, next, sweep.out_of_step}});
       at = next;
     }
   }
