@@ -1,0 +1,290 @@
+#include "daemon/control_desk.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "fleet/files/targets_file.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::uint64_t kHistoryRowsMax = 1000;
+
+Result<PositionerIndex> UnitArgument(const Json& args, const Layout& layout) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t id, UnsignedArgument(args, "unit_id"));
+  if (id <= std::numeric_limits<std::uint32_t>::max())
+    if (const auto i = layout.Find(UnitId{static_cast<std::uint32_t>(id)})) return *i;
+  return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
+}
+
+Result<Axis> AxisArgument(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "axis"));
+  for (const Axis axis : kAxes)
+    if (name == Name(axis)) return axis;
+  return Fail(ErrorCode::kInvalid, "there is no axis '" + name + "'; they are theta and phi");
+}
+
+Result<Parameter> ParameterArgument(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "parameter"));
+  for (std::uint8_t p = 0; p < kParameterCount; ++p)
+    if (name == Name(static_cast<Parameter>(p))) return static_cast<Parameter>(p);
+  return Fail(ErrorCode::kInvalid, "there is no parameter '" + name + "'");
+}
+
+Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
+  FOCALFLEET_TRY_ASSIGN(const std::string csv, TextArgument(args, "targets_csv"));
+  FOCALFLEET_TRY_ASSIGN(const bool fixed, FlagArgumentOr(args, "fixed", false));
+  // First, because it is the answer that the operator needs whatever is in the file.
+  if (view.coordinator->busy())
+    return Fail(ErrorCode::kRefused, "configuration " +
+                                         std::to_string(view.coordinator->configuration().id) +
+                                         " is under way: stop it or wait until it ends");
+  FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(csv, source));
+  std::vector<UnitKnowledge> now;
+  now.reserve(view.layout->size());
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n)
+    now.push_back(view.coordinator->unit({n}).knowledge);
+  ApplyCommand command{.source = source, .targets = {}, .fixed = fixed};
+  FOCALFLEET_TRY_ASSIGN(command.targets,
+                        ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
+  return command;
+}
+
+/// Units whose place is not known and that can be homed now.
+std::vector<PositionerIndex> NotKnown(const FleetView& view) {
+  std::vector<PositionerIndex> units;
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
+    const UnitView& unit = view.coordinator->unit({n});
+    if (unit.enabled && unit.phase == UnitPhase::kReady && !IsPlace(unit.knowledge))
+      units.push_back({n});
+  }
+  return units;
+}
+
+Result<HomeCommand> HomeOf(const Json& args, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const bool not_known, FlagArgumentOr(args, "not_known", false));
+  if (not_known) {
+    HomeCommand command{NotKnown(view)};
+    if (command.units.empty())
+      return Fail(ErrorCode::kRefused, "every unit that could be homed knows where it stands");
+    return command;
+  }
+  FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "unit_ids"));
+  FOCALFLEET_TRY_ASSIGN(auto units, FindUnits(*view.layout, ids));
+  return HomeCommand{std::move(units)};
+}
+
+Result<StopCommand> StopOf(const Json& args, const FleetView& view) {
+  if (!args.contains("unit_id")) return StopCommand{};
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(args, *view.layout));
+  return StopCommand{i};
+}
+
+Result<EnableCommand> EnableOf(const Json& args, const FleetView& view, bool enabled) {
+  FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "unit_ids"));
+  FOCALFLEET_TRY_ASSIGN(auto units, FindUnits(*view.layout, ids));
+  EnableCommand command{.units = std::move(units), .enabled = enabled, .reason = {}};
+  if (enabled) return command;
+  FOCALFLEET_TRY_ASSIGN(command.reason, TextArgument(args, "reason"));
+  if (command.reason.empty())
+    return Fail(ErrorCode::kInvalid, "say why: whoever finds the unit disabled will ask");
+  return command;
+}
+
+Result<WriteParameterCommand> WriteOf(const Json& args, const FleetView& view) {
+  WriteParameterCommand command;
+  FOCALFLEET_TRY_ASSIGN(command.unit, UnitArgument(args, *view.layout));
+  FOCALFLEET_TRY_ASSIGN(command.axis, AxisArgument(args));
+  FOCALFLEET_TRY_ASSIGN(command.parameter, ParameterArgument(args));
+  FOCALFLEET_TRY_ASSIGN(const std::int64_t value, IntegerArgument(args, "value"));
+  if (value < std::numeric_limits<std::int32_t>::min() ||
+      value > std::numeric_limits<std::int32_t>::max())
+    return Fail(ErrorCode::kInvalid, "argument 'value' must fit 32 bits");
+  command.value = static_cast<std::int32_t>(value);
+  return command;
+}
+
+template <class T>
+Result<Command> Wrapped(Result<T> what) {
+  if (!what) return tl::unexpected<Error>(std::move(what).error());
+  Command command;
+  command.what = std::move(*what);
+  return command;
+}
+
+/// The newest value of each axis and parameter; `history` is newest first.
+Json NewestOf(const std::vector<ParameterHistory>& history) {
+  std::vector<ParameterHistory> newest;
+  for (const ParameterHistory& entry : history) {
+    const bool known = std::ranges::any_of(newest, [&](const ParameterHistory& other) {
+      return other.row.axis == entry.row.axis && other.row.parameter == entry.row.parameter;
+    });
+    if (!known) newest.push_back(entry);
+  }
+  return HistoryJson(newest);
+}
+
+}  // namespace
+
+Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
+                                               const std::vector<std::uint32_t>& ids) {
+  if (ids.empty()) return Fail(ErrorCode::kInvalid, "no unit named");
+  std::vector<PositionerIndex> units;
+  units.reserve(ids.size());
+  for (const std::uint32_t id : ids) {
+    const auto i = layout.Find(UnitId{id});
+    if (!i) return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
+    units.push_back(*i);
+  }
+  return units;
+}
+
+Result<Command> CommandOf(const ControlRequest& request, const FleetView& view) {
+  const std::string& verb = request.verb;
+  const Json& args = request.args;
+  if (verb == "apply") return Wrapped(ApplyOf(args, view));
+  if (verb == "stop") return Wrapped(StopOf(args, view));
+  if (verb == "home") return Wrapped(HomeOf(args, view));
+  if (verb == "disable") return Wrapped(EnableOf(args, view, false));
+  if (verb == "enable") return Wrapped(EnableOf(args, view, true));
+  if (verb == "adopt") {
+    FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(args, *view.layout));
+    return Wrapped(Result<AdoptCommand>(AdoptCommand{i}));
+  }
+  if (verb == "params_set") return Wrapped(WriteOf(args, view));
+  return Fail(ErrorCode::kInvalid, "there is no verb '" + verb + "'");
+}
+
+void ControlDesk::Service(const FleetView& view, std::vector<Command>* commands) {
+  lines_.clear();
+  server_.Service(&lines_);
+  for (const IncomingLine& line : lines_) Handle(view, line, commands);
+}
+
+void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
+                         std::vector<Command>* commands) {
+  const auto request = DecodeRequest(line.text);
+  Pending pending{.client = line.client, .id = request ? request->id : 0};
+  if (!request) return Answer(pending, tl::unexpected<Error>(request.error()));
+  if (request->verb == "state") {
+    // Spliced in as text; the frame around it is the one that EncodeResult makes.
+    std::string answer = EncodeResult(request->id, nullptr);
+    const std::size_t place = answer.find("null");
+    answer.replace(place, 4, StateText(view));
+    server_.Answer(line.client, answer);
+    return;
+  }
+  if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
+  pending.pursues = request->verb == "apply" || request->verb == "home";
+  const auto wait = FlagArgumentOr(request->args, "wait", false);
+  if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
+  pending.wait = *wait && pending.pursues;
+  auto command = CommandOf(*request, view);
+  if (!command) {
+    options_.log(request->verb + " refused: " + command.error().text);
+    return Answer(pending, tl::unexpected<Error>(command.error()));
+  }
+  options_.log(request->verb + " commanded");
+  command->request = next_request_++;
+  pending_.emplace(command->request, pending);
+  waiting_ += pending.wait ? 1u : 0u;
+  commands->push_back(std::move(*command));
+}
+
+std::optional<Result<Json>> ControlDesk::Ask(const FleetView& view, const ControlRequest& request) {
+  if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
+  if (request.verb == "unit") return AskUnit(view, request);
+  if (request.verb == "params") return AskParameters(view, request);
+  if (request.verb == "history") return AskHistory(view, request);
+  return std::nullopt;
+}
+
+Result<Json> ControlDesk::AskUnit(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  return UnitJson(view, i);
+}
+
+Result<Json> ControlDesk::AskParameters(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  const UnitView& unit = view.coordinator->unit(i);
+  const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kHistoryRowsMax));
+  const Json known = UnitJson(view, i);
+  Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
+  for (const char* axis : {"theta", "phi"})
+    for (const char* name : {"counter1", "repeat", "subdivision"})
+      drive[std::string(axis) + "_" + name] = known[axis][name];
+  return Json{{"unit_id", view.layout->unit(i).id.value},
+              {"serial", serial.value},
+              {"drive", std::move(drive)},  // what holds now, whether stored or by default
+              {"parameters", NewestOf(history)},
+              {"history", HistoryJson(history)}};
+}
+
+Result<Json> ControlDesk::AskHistory(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "limit", 20));
+  const auto limit = static_cast<std::uint32_t>(std::min(asked, kHistoryRowsMax));
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  if (!request.args.contains("unit_id")) {
+    FOCALFLEET_TRY_ASSIGN(const auto configurations, reader->Configurations(limit));
+    FOCALFLEET_TRY_ASSIGN(const auto alarms, reader->Alarms(limit));
+    return Json{{"configurations", HistoryJson(configurations)}, {"alarms", HistoryJson(alarms)}};
+  }
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  const UnitId id = view.layout->unit(i).id;
+  FOCALFLEET_TRY_ASSIGN(const auto moves, reader->Moves(id, limit));
+  FOCALFLEET_TRY_ASSIGN(const auto places, reader->Units(id, limit));
+  return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+}
+
+Result<StoreReader*> ControlDesk::Reader() {
+  if (reader_ == nullptr) {
+    FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(options_.store_path));
+  }
+  return reader_.get();
+}
+
+void ControlDesk::Answer(const Pending& pending, const Result<Json>& result) {
+  server_.Answer(pending.client, result ? EncodeResult(pending.id, *result)
+                                        : EncodeError(pending.id, result.error()));
+}
+
+void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
+  const auto it = pending_.find(reply.request);
+  if (it == pending_.end()) return;
+  const Pending pending = it->second;
+  // The first word on a configuration is that it began; who waits wants the last.
+  if (!reply.last && pending.wait) return;
+  pending_.erase(it);
+  waiting_ -= pending.wait ? 1u : 0u;
+  if (reply.error) {
+    options_.log("refused or failed: " + reply.error->text);
+    return Answer(pending, tl::unexpected<Error>(*reply.error));
+  }
+  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text}});
+  if (!pending.wait)
+    return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});
+  Answer(pending, ConfigurationJson(view));
+}
+
+void ControlDesk::ShowProgress(const FleetView& view) {
+  if (waiting_ == 0 || view.now < progress_at_) return;
+  progress_at_ = view.now + options_.progress_period;
+  const Json progress = ProgressJson(view);
+  for (const auto& [request, pending] : pending_)
+    if (pending.wait) server_.Progress(pending.client, EncodeProgress(pending.id, progress));
+}
+
+void ControlDesk::Close() {
+  for (const auto& [request, pending] : pending_)
+    Answer(pending,
+           Fail(ErrorCode::kUnavailable,
+                "the daemon ends; what moves goes on by itself and is read at the next start"));
+  pending_.clear();
+  waiting_ = 0;
+}
+
+}  // namespace focalfleet

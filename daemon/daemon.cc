@@ -1,0 +1,204 @@
+#include "daemon/daemon.h"
+
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <atomic>
+#include <memory>
+#include <utility>
+
+#include "daemon/event_loop.h"
+#include "daemon/fleet_setup.h"
+#include "daemon/log.h"
+#include "daemon/status_outlet.h"
+#include "daemon/store/store.h"
+#include "fleet/plan/job.h"
+
+namespace focalfleet {
+namespace {
+
+double ProcessCpuSeconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// What the store's thread counts, for the core thread to show.
+struct SharedCounters {
+  std::atomic<std::uint64_t> transactions{0};
+  std::atomic<std::uint64_t> rows{0};
+};
+
+class Daemon {
+ public:
+  explicit Daemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
+
+  Status Start();
+  Status Run();
+
+ private:
+  Status StartThreads();
+  StoreThread::Sinks StoreSinks();
+  Status OpenDesk();
+  Status OpenStatus();
+  ShellFacts Facts() const;
+
+  DaemonConfig config_;
+  HostClock clock_;
+  WallTime started_ = WallTime::Now();
+  SharedCounters counters_;
+  std::unique_ptr<Layout> layout_;
+  std::unique_ptr<Store> store_;
+  std::unique_ptr<StatusOutlet> outlet_;  // none: DDS is off
+  std::unique_ptr<StatusFeed> feed_;
+  std::unique_ptr<EventSignal> signal_;
+  std::unique_ptr<Coordinator> coordinator_;
+  std::unique_ptr<BusLines> lines_;
+  std::unique_ptr<StoreThread> store_thread_;
+  std::unique_ptr<PlannerThread> planner_;
+  std::unique_ptr<ControlDesk> desk_;
+  std::unique_ptr<EventLoop> loop_;
+};
+
+Status Daemon::Start() {
+  FOCALFLEET_TRY_ASSIGN(Layout layout, LoadLayout(config_.fleet));
+  layout_ = std::make_unique<Layout>(std::move(layout));
+  FOCALFLEET_TRY_ASSIGN(store_, Store::Open(config_.store.path));
+  FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
+  FOCALFLEET_TRY(OpenDesk());
+  FOCALFLEET_TRY_ASSIGN(auto ports, OpenPorts(config_, *layout_, clock_));
+  const auto buses = layout_->buses();
+  lines_ =
+      std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
+  FOCALFLEET_TRY(OpenStatus());
+  coordinator_ = std::make_unique<Coordinator>(
+      layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
+      std::move(stored));
+  return StartThreads();
+}
+
+Status Daemon::OpenDesk() {
+  FOCALFLEET_TRY_ASSIGN(LineServer server, LineServer::Create(config_.control.socket));
+  desk_ = std::make_unique<ControlDesk>(
+      std::move(server),
+      ControlDesk::Options{.progress_period = clock_.Real(Milliseconds(200)),
+                           .facts = [this] { return Facts(); },
+                           .log = [](const std::string& text) { spdlog::info("{}", text); },
+                           .store_path = config_.store.path});
+  return {};
+}
+
+Status Daemon::OpenStatus() {
+  if (!config_.dds.enabled) return {};
+  const std::string xml = config_.dds.config.empty() ? "" : "file://" + config_.dds.config;
+  FOCALFLEET_TRY_ASSIGN(auto publisher,
+                        StatusPublisher::Create({.domain = config_.dds.domain, .config_xml = xml}));
+  outlet_ = std::make_unique<StatusOutlet>(std::move(publisher));
+  feed_ = std::make_unique<StatusFeed>(
+      layout_->size(),
+      StatusFeed::Options{
+          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = started_},
+      clock_);
+  return {};
+}
+
+StoreThread::Sinks Daemon::StoreSinks() {
+  StoreThread::Sinks sinks;
+  sinks.commit = [this](std::span<const Row> rows, WallTime at) {
+    Status done = store_->Commit(rows, at);
+    counters_.transactions = store_->counters().transactions;
+    counters_.rows = store_->counters().rows;
+    return done;
+  };
+  sinks.publish = [this](const StatusBatch& status) {
+    return outlet_ != nullptr && outlet_->Publish(status);
+  };
+  sinks.alarm = [this](const AlarmValue& alarm) {
+    if (outlet_ != nullptr) outlet_->Publish(alarm);
+  };
+  sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
+  return sinks;
+}
+
+Status Daemon::StartThreads() {
+  FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
+  signal_ = std::make_unique<EventSignal>(std::move(signal));
+  FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(planner_, PlannerThread::Create(
+                                      [layout = layout_.get()](const PlannerWork& work) {
+                                        return RunPlanJob(work.job, *layout, work.drives);
+                                      },
+                                      signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
+                                                  .coordinator = coordinator_.get(),
+                                                  .lines = lines_.get(),
+                                                  .desk = desk_.get(),
+                                                  .planner = planner_.get(),
+                                                  .store = store_thread_.get(),
+                                                  .feed = feed_.get(),
+                                                  .threads = signal_.get(),
+                                                  .clock = clock_}));
+  return {};
+}
+
+Status Daemon::Run() {
+  spdlog::info("focalfleetd {} is ready: {} units on {} buses, store {}, control {}", Version(),
+               layout_->size(), layout_->buses().size(), config_.store.path,
+               config_.control.socket);
+  loop_->Run();
+  if (coordinator_->busy())
+    spdlog::warn(
+        "configuration {} was under way: units that move finish by themselves and are asked at the "
+        "next start",
+        coordinator_->configuration().id);
+  desk_->Close();
+  const Status stored = store_thread_->Finish();
+  if (stored)
+    spdlog::info("ended, all is stored");
+  else
+    spdlog::error("ended with rows that could not be stored: {}", stored.error().text);
+  return stored;
+}
+
+ShellFacts Daemon::Facts() const {
+  ShellFacts facts;
+  facts.version = Version();
+  facts.started = started_;
+  facts.store_path = config_.store.path;
+  facts.store_failing = store_thread_->failing();
+  facts.batches_waiting = store_thread_->waiting();
+  facts.store.transactions = counters_.transactions;
+  facts.store.rows = counters_.rows;
+  facts.dds_enabled = outlet_ != nullptr;
+  if (outlet_ != nullptr) {
+    facts.dds_samples = outlet_->samples();
+    facts.dds_bytes = outlet_->bytes();
+  }
+  facts.steps = loop_->steps();
+  facts.cpu_s = ProcessCpuSeconds();
+  facts.buses = lines_->Facts();
+  return facts;
+}
+
+}  // namespace
+
+const char* Version() { return FOCALFLEET_VERSION; }
+
+Status RunDaemon(const DaemonConfig& config) {
+  EventLoop::BlockSignals();
+  FOCALFLEET_TRY(OpenLog(config.log));
+  Daemon daemon(config);
+  FOCALFLEET_TRY(daemon.Start());
+  return daemon.Run();
+}
+
+Result<std::string> CheckDaemon(const DaemonConfig& config) {
+  FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
+  return "# " + std::to_string(layout.size()) + " units on " +
+         std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
+}
+
+}  // namespace focalfleet

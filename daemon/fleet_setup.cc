@@ -1,0 +1,105 @@
+#include "daemon/fleet_setup.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "daemon/ports/simulated_port.h"
+#include "daemon/ports/socketcan_port.h"
+#include "daemon/ports/unix_port.h"
+#include "fleet/files/layout_file.h"
+#include "fleet/files/obstacles_file.h"
+
+namespace focalfleet {
+namespace {
+
+using Ports = std::vector<std::unique_ptr<PollablePort>>;
+
+/// In real time; a link that is gone is looked for so often.
+constexpr DurationNs kRetryPeriod = Milliseconds(200);
+
+Result<std::string> ReadText(const std::string& path) {
+  std::error_code failed;
+  if (std::filesystem::is_directory(path, failed))
+    return Fail(ErrorCode::kUnavailable, path + " is a directory");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return Fail(ErrorCode::kUnavailable, "cannot read " + path);
+  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  if (file.bad()) return Fail(ErrorCode::kUnavailable, "cannot read " + path);
+  return text;
+}
+
+Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {
+  Ports ports;
+  for (const BusId bus : layout.buses()) {
+    const auto path = std::filesystem::path(config.bus.unix_directory) /
+                      ("bus" + std::to_string(bus.value) + ".sock");
+    FOCALFLEET_TRY_ASSIGN(auto port, UnixPort::Create({.bus = bus,
+                                                       .path = path.string(),
+                                                       .retry_period = clock.Real(kRetryPeriod)}));
+    ports.push_back(std::move(port));
+  }
+  return ports;
+}
+
+Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
+                            const HostClock& clock) {
+  const std::size_t interfaces = config.bus.interfaces.size();
+  if (interfaces != layout.buses().size())
+    return Fail(ErrorCode::kInvalid, "bus.interfaces names " + std::to_string(interfaces) +
+                                         " interfaces, but " + config.fleet.units + " has " +
+                                         std::to_string(layout.buses().size()) + " buses");
+  Ports ports;
+  for (std::size_t b = 0; b < interfaces; ++b) {
+    FOCALFLEET_TRY_ASSIGN(auto port,
+                          SocketCanPort::Create({.bus = layout.buses()[b],
+                                                 .interface = config.bus.interfaces[b],
+                                                 .retry_period = clock.Real(kRetryPeriod)}));
+    ports.push_back(std::move(port));
+  }
+  return ports;
+}
+
+Result<Ports> OpenSimulated(const DaemonConfig& config, const Layout& layout,
+                            const HostClock& clock) {
+  sim::WorldConfig world;
+  world.units = DescribeUnits(layout);
+  world.seed = config.simulated.seed;
+  world.spread = config.simulated.spread == "real" ? sim::Spread::kReal : sim::Spread::kNominal;
+  world.bit_rate_bps = config.bus.bit_rate_bps;
+  world.start = clock.Now();
+  FOCALFLEET_TRY_ASSIGN(const auto fleet, SimulatedFleet::Create(std::move(world)));
+  Ports ports;
+  for (const BusId bus : layout.buses())
+    ports.push_back(std::make_unique<SimulatedPort>(fleet, bus));
+  return ports;
+}
+
+}  // namespace
+
+Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
+  Layout::Options options{.clearance_mm = fleet.clearance_mm, .obstacles = {}};
+  if (!fleet.obstacles.empty()) {
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.obstacles));
+    FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(text, fleet.obstacles));
+  }
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.units));
+  return ReadLayout(text, fleet.units, std::move(options));
+}
+
+Result<Ports> OpenPorts(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {
+  switch (config.bus.port) {
+    case PortKind::kUnix:
+      return OpenUnix(config, layout, clock);
+    case PortKind::kSocketCan:
+      return OpenSocketCan(config, layout, clock);
+    case PortKind::kSimulated:
+      return OpenSimulated(config, layout, clock);
+  }
+  return Fail(ErrorCode::kInvalid, "no such port");
+}
+
+}  // namespace focalfleet

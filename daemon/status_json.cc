@@ -1,0 +1,297 @@
+#include "daemon/status_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "fleet/kinematics.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr const char* kSeverities[] = {"info", "warning", "error"};
+
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json UnservedJson(const FleetView& view) {
+  Json unserved = Json::array();
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
+    const UnitView& unit = view.coordinator->unit({n});
+    if (unit.outcome != TargetOutcome::kRefused && unit.outcome != TargetOutcome::kFailed) continue;
+    unserved.push_back({{"unit_id", view.layout->unit({n}).id.value},
+                        {"outcome", Name(unit.outcome)},
+                        {"reason", unit.outcome_reason},
+                        {"state", Name(unit.phase)}});
+  }
+  return unserved;
+}
+
+Json BusJson(const FleetView& view, BusId bus, const ShellFacts::Bus& shell) {
+  const BusView& seen = view.coordinator->bus(bus);
+  return {{"bus_id", bus.value},
+          {"link", Name(seen.link)},
+          {"load", seen.load},
+          {"load_max", seen.load_max},
+          {"frames_sent", seen.frames_sent},
+          {"frames_received", seen.frames_received},
+          {"bits", seen.bits},
+          {"malformed", seen.malformed},
+          {"retries", seen.retries},
+          {"port", shell.port},
+          {"trouble", shell.trouble},
+          {"waiting", shell.waiting},
+          {"rejected", shell.counters.rejected},
+          {"lost", shell.counters.lost},
+          {"link_errors", shell.counters.link_errors},
+          {"reconnects", shell.counters.reconnects},
+          {"refused", shell.outbox.refused},
+          {"stale", shell.outbox.stale},
+          {"late_starts", shell.outbox.late_starts}};
+}
+
+Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& knowledge,
+              std::size_t a) {
+  const Unit& unit = view.layout->unit(i);
+  const UnitView& seen = view.coordinator->unit(i);
+  const AxisDrive& drive = view.coordinator->drives()[i.value].axis[a];
+  const bool known = knowledge[a].witness != Witness::kUnknown;
+  const auto degrees = [&](std::int32_t vectors) { return AngleDeg(vectors, unit.axis[a], drive); };
+  return {{"witness", Name(knowledge[a].witness)},
+          {"low_deg", known ? Json(degrees(knowledge[a].low)) : Json(nullptr)},
+          {"high_deg", known ? Json(degrees(knowledge[a].high)) : Json(nullptr)},
+          {"low_vectors", known ? Json(knowledge[a].low) : Json(nullptr)},
+          {"high_vectors", known ? Json(knowledge[a].high) : Json(nullptr)},
+          {"target_deg", seen.target ? Json(degrees((*seen.target)[a])) : Json(nullptr)},
+          {"target_vectors", seen.target ? Json((*seen.target)[a]) : Json(nullptr)},
+          {"min_deg", unit.axis[a].min_deg},
+          {"max_deg", unit.axis[a].max_deg},
+          {"gear", unit.axis[a].gear},
+          {"counter1", drive.counter1},
+          {"repeat", drive.repeat},
+          {"subdivision", drive.subdivision}};
+}
+
+/// How far along, 0..1: by time while it moves, by arrivals in the end.
+double FractionOf(const ConfigurationView& view, HostInstant now) {
+  if (view.state == ConfigurationState::kDone) return 1;
+  const double arrived = view.targeted > 0 ? double(view.arrived) / view.targeted : 0;
+  if (view.started == kNever || view.makespan_predicted_s <= 0) return arrived;
+  const double elapsed_s = view.makespan_s + std::max(0.0, (now - view.started).seconds());
+  return std::clamp(elapsed_s / view.makespan_predicted_s, arrived, 1.0);
+}
+
+}  // namespace
+
+Json ConfigurationJson(const FleetView& view) {
+  const ConfigurationView& c = view.coordinator->configuration();
+  return {{"id", c.id},
+          {"source", c.source},
+          {"state", Name(c.state)},
+          {"round", c.round},
+          {"targeted", c.targeted},
+          {"arrived", c.arrived},
+          {"refused", c.refused},
+          {"failed", c.failed},
+          {"makespan_predicted_s", Number(c.makespan_predicted_s)},
+          {"makespan_s", Number(c.makespan_s)},
+          {"energy_J", Number(c.energy_J)},
+          {"peak_power_W", Number(c.peak_power_W)},
+          {"frames", c.frames},
+          {"bus_load_max", HighestBusLoad(view)},
+          {"unserved", UnservedJson(view)}};
+}
+
+Json ProgressJson(const FleetView& view) {
+  const ConfigurationView& c = view.coordinator->configuration();
+  return {{"id", c.id},
+          {"state", Name(c.state)},
+          {"round", c.round},
+          {"targeted", c.targeted},
+          {"arrived", c.arrived},
+          {"refused", c.refused},
+          {"failed", c.failed},
+          {"frames", c.frames},
+          {"makespan_predicted_s", Number(c.makespan_predicted_s)},
+          {"fraction", FractionOf(c, view.now)}};
+}
+
+Json StatusJson(const FleetView& view, const ShellFacts& facts) {
+  const FleetCounts counts = CountFleet(view);
+  Json phases = Json::object();
+  for (std::size_t p = 0; p < counts.by_phase.size(); ++p)
+    phases[Name(static_cast<UnitPhase>(p))] = counts.by_phase[p];
+  Json witnesses = Json::object();
+  for (std::size_t w = 0; w < counts.by_witness.size(); ++w)
+    witnesses[Name(static_cast<Witness>(w))] = counts.by_witness[w];
+  Json buses = Json::array();
+  for (std::size_t b = 0; b < facts.buses.size(); ++b)
+    buses.push_back(BusJson(view, view.layout->buses()[b], facts.buses[b]));
+  return {{"version", facts.version},
+          {"time", ToIso8601(view.at)},
+          {"started", ToIso8601(facts.started)},
+          {"units", view.layout->size()},
+          {"enabled", counts.enabled},
+          {"phases", std::move(phases)},
+          {"witnesses", std::move(witnesses)},
+          {"busy", view.coordinator->busy()},
+          {"store",
+           {{"path", facts.store_path},
+            {"failing", facts.store_failing},
+            {"waiting", facts.batches_waiting},
+            {"transactions", facts.store.transactions},
+            {"rows", facts.store.rows}}},
+          {"dds",
+           {{"enabled", facts.dds_enabled},
+            {"samples", facts.dds_samples},
+            {"bytes", facts.dds_bytes}}},
+          {"process", {{"cpu_s", facts.cpu_s}, {"steps", facts.steps}}},
+          {"configuration", ConfigurationJson(view)},
+          {"buses", std::move(buses)},
+          {"bus_load_max", HighestBusLoad(view)}};
+}
+
+Json UnitJson(const FleetView& view, PositionerIndex i) {
+  const Unit& unit = view.layout->unit(i);
+  const UnitView& seen = view.coordinator->unit(i);
+  const UnitDrive& drive = view.coordinator->drives()[i.value];
+  const UnitKnowledge knowledge = view.coordinator->KnowledgeAt(i, view.now);
+  const UnitStatusValue status = SnapshotUnit(view, i);
+  Json target = {{"x_mm", nullptr}, {"y_mm", nullptr}};
+  if (seen.target) {
+    const PointFp fibre = FibreAt(unit, drive, *seen.target);
+    target = {{"x_mm", fibre.x_mm}, {"y_mm", fibre.y_mm}};
+  }
+  return {{"unit_id", unit.id.value},
+          {"phase", Name(seen.phase)},
+          {"serial", seen.serial.value},
+          {"bound_serial", seen.bound_serial.value},
+          {"bus_id", unit.bus.value},
+          {"node_id", unit.node.value},
+          {"rail_id", unit.rail.value},
+          {"reported_state", Name(seen.reported_state)},
+          {"fault", Name(seen.fault)},
+          {"move", seen.move.value},
+          {"enabled", seen.enabled},
+          {"disabled_reason", seen.disabled_reason},
+          {"outcome", Name(seen.outcome)},
+          {"reason", seen.outcome_reason},
+          {"x_mm", Number(status.x_fp_mm)},
+          {"y_mm", Number(status.y_fp_mm)},
+          {"target", std::move(target)},
+          {"mode", Name(drive.mode)},
+          {"v_bus_V", drive.v_bus_V},
+          {"theta", AxisJson(view, i, knowledge, Index(Axis::kTheta))},
+          {"phi", AxisJson(view, i, knowledge, Index(Axis::kPhi))}};
+}
+
+std::string StateText(const FleetView& view) {
+  fmt::memory_buffer text;
+  auto out = std::back_inserter(text);
+  const auto number = [&](const char* name, double value) {
+    if (std::isfinite(value))
+      fmt::format_to(out, ",\"{}\":{}", name, value);
+    else
+      fmt::format_to(out, ",\"{}\":null", name);
+  };
+  fmt::format_to(out, "{{\"rows\":[");
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
+    const UnitStatusValue unit = SnapshotUnit(view, {n});
+    fmt::format_to(out, "{}{{\"unit_id\":{},\"phase\":\"{}\"", n == 0 ? "" : ",", unit.unit.value,
+                   Name(unit.phase));
+    for (const Axis axis : kAxes) {
+      const char* name = Name(axis);
+      const std::size_t a = Index(axis);
+      fmt::format_to(out, ",\"{}_witness\":\"{}\"", name, Name(unit.witness[a]));
+      number(fmt::format("{}_low_deg", name).c_str(), unit.low_deg[a]);
+      number(fmt::format("{}_high_deg", name).c_str(), unit.high_deg[a]);
+    }
+    number("x_mm", unit.x_fp_mm);
+    number("y_mm", unit.y_fp_mm);
+    fmt::format_to(out, "}}");
+  }
+  fmt::format_to(out, "]}}");
+  return fmt::to_string(text);
+}
+
+Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
+  Json rows = Json::array();
+  for (const auto& [row, began, changed] : configurations)
+    rows.push_back({{"id", row.id},
+                    {"source", row.source},
+                    {"state", Name(row.state)},
+                    {"began", ToIso8601(began)},
+                    {"changed", ToIso8601(changed)},
+                    {"targeted", row.targeted},
+                    {"arrived", row.arrived},
+                    {"refused", row.refused},
+                    {"failed", row.failed},
+                    {"makespan_predicted_s", Number(row.makespan_predicted_s)},
+                    {"makespan_s", Number(row.makespan_s)},
+                    {"energy_J", Number(row.energy_J)},
+                    {"peak_power_W", Number(row.peak_power_W)}});
+  return rows;
+}
+
+Json HistoryJson(const std::vector<MoveHistory>& moves) {
+  Json rows = Json::array();
+  for (const MoveHistory& move : moves) {
+    Json row = {{"began", ToIso8601(move.began)},
+                {"ended", move.ended ? Json(ToIso8601(*move.ended)) : Json(nullptr)},
+                {"end", move.end ? Json(Name(*move.end)) : Json("open")},
+                {"configuration", move.configuration},
+                {"unit_id", move.unit.value},
+                {"serial", move.serial.value},
+                {"move", move.move.value}};
+    for (const Axis axis : kAxes) {
+      const std::size_t a = Index(axis);
+      const std::string name = Name(axis);
+      row[name + "_from_vectors"] = move.from[a];
+      row[name + "_to_vectors"] = move.to[a];
+      if (!move.ended_at) continue;
+      row[name + "_witness"] = Name((*move.ended_at)[a].witness);
+      row[name + "_low_vectors"] = (*move.ended_at)[a].low;
+      row[name + "_high_vectors"] = (*move.ended_at)[a].high;
+    }
+    rows.push_back(std::move(row));
+  }
+  return rows;
+}
+
+Json HistoryJson(const std::vector<ParameterHistory>& parameters) {
+  Json rows = Json::array();
+  for (const auto& [row, at] : parameters)
+    rows.push_back({{"axis", Name(row.axis)},
+                    {"parameter", Name(row.parameter)},
+                    {"value", row.value},
+                    {"origin", Name(row.origin)},
+                    {"serial", row.serial.value},
+                    {"at", ToIso8601(at)}});
+  return rows;
+}
+
+Json HistoryJson(const std::vector<AlarmHistory>& alarms) {
+  Json rows = Json::array();
+  for (const auto& [row, at] : alarms)
+    rows.push_back({{"at", ToIso8601(at)},
+                    {"id", row.id},
+                    {"severity", kSeverities[static_cast<std::size_t>(row.severity)]},
+                    {"unit_id", row.unit ? Json(row.unit->value) : Json(nullptr)},
+                    {"bus_id", row.bus ? Json(row.bus->value) : Json(nullptr)},
+                    {"text", row.text}});
+  return rows;
+}
+
+Json HistoryJson(const std::vector<UnitHistory>& units) {
+  Json rows = Json::array();
+  for (const UnitHistory& unit : units)
+    rows.push_back({{"at", ToIso8601(unit.at)},
+                    {"unit_id", unit.unit.value},
+                    {"serial", unit.serial.value},
+                    {"enabled", unit.enabled},
+                    {"reason", unit.reason}});
+  return rows;
+}
+
+}  // namespace focalfleet
