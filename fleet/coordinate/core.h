@@ -13,6 +13,7 @@
 #include <queue>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "fleet/coordinate/bus_schedule.h"
@@ -98,7 +99,10 @@ class Core {
   [[nodiscard]] bool AskAgain(PositionerIndex i);
   /// Frames past the queue: stops, starts, the clock.
   void SendNow(std::size_t bus, const HostMessage& message, NodeId node);
-  void Note(Row row) { out->rows.push_back(std::move(row)); }
+  template <class AnyRow>
+  void Note(AnyRow&& row) {
+    out->rows.emplace_back(std::forward<AnyRow>(row));
+  }
   void Raise(Severity severity, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
              std::string text);
   void Tell(PositionerIndex i, UnitEventKind kind, std::string reason = {});
