@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numbers>
 
 namespace focalfleet {
 namespace {
@@ -54,7 +52,7 @@ void Retreat::Run() {
     if (waiting_.empty()) return;
     bool moved = false;
     for (const double grid_deg : kGrids_deg) moved = moved || GoAround(grid_deg);
-    moved = moved || MakeRoom() || Yield();
+    moved = moved || MakeRoom();
     DropArrived();
     if (!moved) return;
   }
@@ -126,22 +124,11 @@ bool Retreat::GoAround(double grid_deg) {
   for (const std::uint32_t i : waiting_) {
     if (!Waits(i) || !scene_->HasCell(i)) continue;
     if (searched_deg_[i] > 0 && searched_deg_[i] <= grid_deg) continue;
-    const ArmGeometry& arm = scene_->arm(i);
-    PathSearch::Question question;
-    question.arm = &arm;
-    question.drive = &drives_[i];
-    question.blockers = surroundings_->Around(i, lines_, poses_, false);
-    question.from = poses_[i];
-    question.within = arm.range();
-    for (std::size_t k = 0; k < kAxisCount; ++k) {
-      question.within.low[k] = std::min(question.within.low[k], poses_[i][k]);
-      question.within.high[k] = std::max(question.within.high[k], poses_[i][k]);
-    }
+    PathSearch::Question question = QuestionFor(i, grid_deg);
     PoseBox goal = question.within;
     goal.low[1] = scene_->cell(i).low;
     goal.high[1] = scene_->cell(i).high;
     question.goal = goal;
-    question.grid_deg = grid_deg;
     const Way way = surroundings_->search().Find(question);
     searched_deg_[i] = grid_deg;
     if (way.empty()) continue;
@@ -151,91 +138,64 @@ bool Retreat::GoAround(double grid_deg) {
   return moved;
 }
 
+/// Some neighbour of a waiting unit goes where it no longer blocks the straight way. Those that are
+/// in their cells first try to stay there.
 bool Retreat::MakeRoom() {
-  bool moved = false;
-  for (const std::uint32_t i : waiting_) moved = MakeRoomFor(i) || moved;
-  return moved;
-}
-
-/// Neighbours that are in their cells turn there until they no longer block the straight way of
-/// `unit`.
-bool Retreat::MakeRoomFor(std::uint32_t unit) {
-  bool moved = false;
-  if (!scene_->HasCell(unit)) return false;
-  for (const NeighbourNeed& near : scene_->neighbours(unit)) {
-    const std::uint32_t j = near.unit;
-    if (movers_[j] == 0 || Waits(j) || favours_[j] >= kFavoursMax) continue;
-    if (StraightClearOf(unit, near, lines_[j])) continue;
-    moved = Turn(j, near, unit) || moved;
-  }
-  return moved;
-}
-
-bool Retreat::Turn(std::uint32_t neighbour, const NeighbourNeed& need, std::uint32_t unit) {
-  constexpr int kDirections = 24;
-  const ArmGeometry& arm = scene_->arm(neighbour);
-  const PhiSpan& cell = scene_->cell(neighbour);
-  const auto folded = static_cast<std::int32_t>(
-      std::lround((std::numbers::pi - arm.phi_zero_rad()) / arm.step_rad(Axis::kPhi)));
-  const std::int32_t fold = std::clamp(folded, cell.low, cell.high);
-  const double turn = 2 * std::numbers::pi / arm.step_rad(Axis::kTheta);
-  for (int k = 0; k < kDirections; ++k) {
-    // Nearest directions first, alternating sides.
-    const int side = k % 2 == 0 ? k / 2 : -(k + 1) / 2;
-    const Pose there{
-        poses_[neighbour][0] + static_cast<std::int32_t>(std::lround(turn * side / kDirections)),
-        fold};
-    if (there[0] < arm.range().low[0] || there[0] > arm.range().high[0]) continue;
-    if (!StraightClearOf(unit, need, arm.At(there))) continue;
-    const Sweep sweep{poses_[neighbour], there};
-    if (!SweepClear(arm, sweep, surroundings_->Around(neighbour, lines_, poses_, true), nullptr))
-      continue;
-    const std::array way{Waypoint{poses_[neighbour]}, Waypoint{there}};
-    Go(neighbour, way);
-    ++favours_[neighbour];
-    return true;
+  for (const bool stay_in_cell : {true, false}) {
+    bool moved = false;
+    for (const std::uint32_t i : waiting_) {
+      if (!scene_->HasCell(i)) continue;
+      for (const NeighbourNeed& near : scene_->neighbours(i)) {
+        if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
+        if (StraightClearOf(i, near, lines_[near.unit])) continue;
+        for (const double grid_deg : kGrids_deg)
+          if (GiveWay(near, i, grid_deg, stay_in_cell)) {
+            moved = true;
+            break;
+          }
+      }
+    }
+    if (moved) return true;
   }
   return false;
 }
 
-bool Retreat::Yield() {
-  for (const std::uint32_t i : waiting_) {
-    if (favours_[i] >= kFavoursMax) continue;
-    for (const NeighbourNeed& near : scene_->neighbours(i))
-      if (Waits(near.unit) && scene_->HasCell(near.unit) && YieldTo(i, near.unit)) return true;
+/// `near` goes to the nearest place where it no longer blocks the straight way of `waiting`.
+bool Retreat::GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
+                      bool stay_in_cell) {
+  const std::uint32_t unit = near.unit;
+  const bool in_cell = stay_in_cell && scene_->InCell(unit, poses_[unit]);
+  PathSearch::Question question = QuestionFor(unit, grid_deg);
+  if (in_cell) {
+    question.within.low[1] = scene_->cell(unit).low;
+    question.within.high[1] = scene_->cell(unit).high;
   }
-  return false;
-}
-
-/// `unit` goes to the nearest place where it no longer blocks the straight way of `other`.
-bool Retreat::YieldTo(std::uint32_t unit, std::uint32_t other) {
-  const NeighbourNeed* need = nullptr;
-  for (const NeighbourNeed& near : scene_->neighbours(unit))
-    if (near.unit == other) need = &near;
-  const NeighbourNeed back{unit, need->need_mm};
-  if (StraightClearOf(other, back, lines_[unit])) return false;
-  const ArmGeometry& arm = scene_->arm(unit);
-  PathSearch::Question question;
-  question.arm = &arm;
-  question.drive = &drives_[unit];
-  question.blockers = surroundings_->Around(unit, lines_, poses_, false);
-  question.from = poses_[unit];
-  question.within = arm.range();
-  for (std::size_t k = 0; k < kAxisCount; ++k) {
-    question.within.low[k] = std::min(question.within.low[k], poses_[unit][k]);
-    question.within.high[k] = std::max(question.within.high[k], poses_[unit][k]);
-  }
-  question.grid_deg = kGrids_deg.back();
   surroundings_->search().Find(question);
   const std::vector<Pose>& reached = surroundings_->search().reached();
   for (std::size_t k = 0; k < reached.size(); ++k) {
-    if (!StraightClearOf(other, back, arm.At(reached[k]))) continue;
+    if (!StraightClearOf(waiting, near, question.arm->At(reached[k]))) continue;
     const Way way = surroundings_->search().WayTo(k);
     ++favours_[unit];
     Go(unit, way);
     return true;
   }
   return false;
+}
+
+/// All around the unit as it is now; where to is for the caller to say.
+PathSearch::Question Retreat::QuestionFor(std::uint32_t unit, double grid_deg) {
+  PathSearch::Question question;
+  question.arm = &scene_->arm(unit);
+  question.drive = &drives_[unit];
+  question.blockers = surroundings_->Around(unit, lines_, poses_, false);
+  question.from = poses_[unit];
+  question.within = question.arm->range();
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    question.within.low[k] = std::min(question.within.low[k], poses_[unit][k]);
+    question.within.high[k] = std::max(question.within.high[k], poses_[unit][k]);
+  }
+  question.grid_deg = grid_deg;
+  return question;
 }
 
 void Retreat::GoStraight(std::uint32_t unit) {
@@ -249,7 +209,9 @@ void Retreat::Go(std::uint32_t unit, std::span<const Waypoint> way) {
       pieces_.push_back({unit, {way[k - 1].pose, way[k].pose, way[k].out_of_step}});
   poses_[unit] = way.back().pose;
   lines_[unit] = scene_->arm(unit).At(way.back().pose);
-  if (scene_->InCell(unit, poses_[unit])) waits_[unit] = 0;
+  const bool waits = !scene_->InCell(unit, poses_[unit]);
+  if (waits && waits_[unit] == 0) newly_waiting_.push_back(unit);
+  waits_[unit] = waits ? 1 : 0;
   straight_[unit] = Known::kNo;
   searched_deg_[unit] = 0;
   for (const NeighbourNeed& near : scene_->neighbours(unit)) {
@@ -260,6 +222,11 @@ void Retreat::Go(std::uint32_t unit, std::span<const Waypoint> way) {
 
 void Retreat::DropArrived() {
   std::erase_if(waiting_, [this](std::uint32_t i) { return !Waits(i); });
+  // A unit that left its cell again for another's sake.
+  waiting_.insert(waiting_.end(), newly_waiting_.begin(), newly_waiting_.end());
+  newly_waiting_.clear();
+  std::sort(waiting_.begin(), waiting_.end());
+  waiting_.erase(std::unique(waiting_.begin(), waiting_.end()), waiting_.end());
 }
 
 }  // namespace focalfleet

@@ -4,10 +4,10 @@
 //
 // The usual way is straight: phi folds back just as far as the cell needs, theta stands. Rounds
 // take all units that are free now, so that chains of waiting stay short. A unit whose end would
-// shut in a neighbour that is free waits for it. Where a round finds nobody free, it tries in this
-// order: a way around (path search), folding or turning neighbours that are in their cells already
-// out of the way, and yielding: one that cannot get into its cell goes where it lets another one
-// pass.
+// shut in a neighbour that is free waits for it. Where a round finds nobody free it tries a way
+// around (path search); where there is none, a neighbour goes where it no longer blocks a straight
+// way, inside its cell if it is there already and finds room, otherwise anywhere. How often one
+// does that for others is bounded.
 #pragma once
 
 #include <cstdint>
@@ -66,10 +66,9 @@ class Retreat {
   bool StraightRound();
   bool GoAround(double grid_deg);
   bool MakeRoom();
-  bool MakeRoomFor(std::uint32_t unit);
-  bool Turn(std::uint32_t neighbour, const NeighbourNeed& need, std::uint32_t unit);
-  bool Yield();
-  bool YieldTo(std::uint32_t unit, std::uint32_t other);
+  bool GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
+               bool stay_in_cell);
+  PathSearch::Question QuestionFor(std::uint32_t unit, double grid_deg);
   void Go(std::uint32_t unit, std::span<const Waypoint> way);
   void GoStraight(std::uint32_t unit);
   void DropArrived();
@@ -83,6 +82,7 @@ class Retreat {
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint8_t> waits_;
   std::vector<std::uint32_t> waiting_;
+  std::vector<std::uint32_t> newly_waiting_;
   std::vector<Piece> pieces_;
   enum class Known : std::uint8_t { kNo, kClear, kBlocked };
   std::vector<Known> straight_;        // as far as nothing near has moved since
