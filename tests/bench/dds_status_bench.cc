@@ -1,0 +1,86 @@
+// What does StatusPublisher cost beside a bare publisher in C? Both publish the whole fleet at a
+// fixed rate to one reader process; compared is the CPU time of the publisher's process, in pairs
+// that alternate, so that a machine that is busy with something else is so for both.
+//   dds_status_bench [--units 5000] [--cycles 60] [--hz 10] [--pairs 5]
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "tests/bench/options.h"
+#include "tests/daemon/dds/client_process.h"
+#include "tests/daemon/dds/own_domain.h"
+
+namespace {
+
+using focalfleet::bench::Median;
+using focalfleet::bench::Option;
+using focalfleet::testing::ClientProcess;
+using focalfleet::testing::OwnDomain;
+
+struct Load {
+  int units;
+  int cycles;
+  int hz;
+};
+
+struct Outcome {
+  double cpu_s = 0;
+  unsigned long sent = 0;
+  unsigned long received = 0;
+};
+
+Outcome Run(const char* publisher_program, const Load& load) {
+  const std::string domain = std::to_string(OwnDomain());
+  ClientProcess subscriber({SUBSCRIBER, domain});
+  if (subscriber.Line() != "ready") std::abort();
+  ClientProcess publisher({publisher_program, domain, std::to_string(load.units),
+                           std::to_string(load.cycles), std::to_string(load.hz)});
+  Outcome outcome;
+  if (std::sscanf(publisher.Line().c_str(), "%lf %lu", &outcome.cpu_s, &outcome.sent) != 2 ||
+      publisher.Finish() != 0) {
+    std::fprintf(stderr, "%s failed\n", publisher_program);
+    std::exit(1);
+  }
+  outcome.received = std::strtoul(subscriber.Line().c_str(), nullptr, 10);
+  return outcome;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Load load{Option(argc, argv, "--units", 5000), Option(argc, argv, "--cycles", 60),
+                  Option(argc, argv, "--hz", 10)};
+  const int pairs = Option(argc, argv, "--pairs", 5);
+  setenv("CYCLONEDDS_URI", LOOPBACK_URI, 1);
+  std::vector<double> bare;
+  std::vector<double> ours;
+  std::vector<double> ratios;
+  for (int pair = 0; pair < pairs; ++pair) {
+    // Who goes first alternates, too.
+    const Outcome first = Run(pair % 2 == 0 ? BARE_PUBLISHER : FLEET_PUBLISHER, load);
+    const Outcome second = Run(pair % 2 == 0 ? FLEET_PUBLISHER : BARE_PUBLISHER, load);
+    const Outcome& b = pair % 2 == 0 ? first : second;
+    const Outcome& o = pair % 2 == 0 ? second : first;
+    if (o.sent != b.sent || o.received == 0 || b.received == 0) {
+      std::fprintf(stderr, "sent %lu and %lu, received %lu and %lu\n", b.sent, o.sent, b.received,
+                   o.received);
+      return 1;
+    }
+    bare.push_back(b.cpu_s);
+    ours.push_back(o.cpu_s);
+    ratios.push_back(o.cpu_s / b.cpu_s);
+    std::printf(
+        "pair %d: bare %.3f s (received %.2f %%), ours %.3f s (received %.2f %%), ratio %.3f\n",
+        pair + 1, b.cpu_s, 100.0 * static_cast<double>(b.received) / static_cast<double>(b.sent),
+        o.cpu_s, 100.0 * static_cast<double>(o.received) / static_cast<double>(o.sent),
+        ratios.back());
+    std::fflush(stdout);
+  }
+  std::printf(
+      "dds_status: %d units, %d cycles at %d Hz: CPU median bare %.3f s, ours %.3f s, "
+      "ratio of medians %.3f, median ratio %.3f\n",
+      load.units, load.cycles, load.hz, Median(bare), Median(ours), Median(ours) / Median(bare),
+      Median(ratios));
+  return 0;
+}

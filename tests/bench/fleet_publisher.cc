@@ -1,0 +1,54 @@
+// bare_publisher's task, through StatusPublisher:   fleet_publisher DOMAIN UNITS CYCLES HZ
+#include <sys/resource.h>
+
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <thread>
+#include <vector>
+
+#include "daemon/dds/status_publisher.h"
+
+namespace {
+
+double CpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+         1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace focalfleet;
+  if (argc != 5) return 2;
+  const int cycles = std::atoi(argv[3]);
+  const std::chrono::nanoseconds period(1'000'000'000 / std::atoi(argv[4]));
+  auto publisher =
+      StatusPublisher::Create({.domain = static_cast<std::uint32_t>(std::atoi(argv[1]))});
+  if (!publisher) {
+    std::fprintf(stderr, "%s\n", publisher.error().text.c_str());
+    return 1;
+  }
+  while ((*publisher)->unit_readers() == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+
+  std::vector<UnitStatusValue> units(static_cast<std::size_t>(std::atoi(argv[2])));
+  const double before = CpuSeconds();
+  const auto began = std::chrono::steady_clock::now();
+  for (int cycle = 0; cycle < cycles; ++cycle) {
+    for (std::size_t i = 0; i < units.size(); ++i) {
+      units[i].unit = {static_cast<std::uint32_t>(i + 1)};
+      units[i].at = {cycle};
+      units[i].low_deg[0] = cycle * 0.25;
+      units[i].phase = UnitPhase::kMoving;
+    }
+    if ((*publisher)->Publish(units) != units.size()) return 1;
+    (*publisher)->Flush();
+    std::this_thread::sleep_until(began + (cycle + 1) * period);
+  }
+  std::printf("%.6f %lu\n", CpuSeconds() - before,
+              static_cast<unsigned long>((*publisher)->counters().samples));
+  return 0;
+}
