@@ -1,0 +1,315 @@
+#include "daemon/simulator/command_line.h"
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cstdio>
+#include <functional>
+#include <map>
+
+#include "daemon/cli/exit_code.h"
+#include "daemon/cli/text_file.h"
+#include "daemon/control/line_client.h"
+#include "daemon/simulator/simulator.h"
+
+namespace focalfleet::simulator {
+namespace {
+
+using cli::ExitCode;
+
+constexpr std::size_t kNumbersMax = 100'000;
+
+constexpr const char* kExitCodes =
+    "Exit codes:\n"
+    "  0  done\n"
+    "  1  refused or failed; stderr says why\n"
+    "  2  wrong usage\n"
+    "  4  nobody answers at the control socket";
+
+int Complain(const Error& error, ExitCode code) {
+  std::fprintf(stderr, "focalfleet-sim: %s\n", error.text.c_str());
+  return static_cast<int>(code);
+}
+
+template <class Number>
+bool Parse(std::string_view text, Number* number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::vector<std::string> Split(const std::string& text, char separator) {
+  std::vector<std::string> pieces;
+  std::size_t begin = 0;
+  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
+    end = text.find(separator, begin);
+    pieces.push_back(text.substr(begin, end == std::string::npos ? end : end - begin));
+  }
+  return pieces;
+}
+
+/// All that any subcommand takes, as CLI11 fills it in.
+struct Given {
+  SimulatorOptions run;
+  std::string buses_text;
+  std::string control;
+  std::string units_text;
+  std::string bus_numbers_text;
+  std::string out;
+  std::string targets;
+  std::string code;
+  std::string axis = "theta";
+  double seconds = -1;
+  double after_s = -1;
+  bool off = false;
+  bool json = false;
+};
+
+/// Asks the running simulation; `on_result` says what came of it.
+int Ask(const Given& given, const ControlRequest& request,
+        const std::function<int(const Json&)>& on_result) {
+  auto client = LineClient::Connect(given.control);
+  if (!client) return Complain(client.error(), ExitCode::kNoDaemon);
+  const auto result = client->Call(request.verb, request.args);
+  if (!result)
+    return Complain(result.error(), client->connected() ? ExitCode::kRefused : ExitCode::kNoDaemon);
+  return on_result(*result);
+}
+
+int AskSimply(const Given& given, const ControlRequest& request) {
+  return Ask(given, request, [&](const Json& result) {
+    if (given.json) std::printf("%s\n", result.dump().c_str());
+    return static_cast<int>(ExitCode::kOk);
+  });
+}
+
+int AskAboutUnits(const Given& given, const char* verb, Json args) {
+  const auto units = ParseNumbers(given.units_text);
+  if (!units) return Complain(units.error(), ExitCode::kUsage);
+  args["units"] = *units;
+  return AskSimply(given, {0, verb, std::move(args)});
+}
+
+int SetBuses(const Given& given, const char* verb) {
+  const auto buses = ParseNumbers(given.bus_numbers_text);
+  if (!buses) return Complain(buses.error(), ExitCode::kUsage);
+  return AskSimply(given, {0, verb, {{"buses", *buses}}});
+}
+
+int TellTruth(const Given& given) {
+  Json args = Json::object();
+  if (!given.targets.empty()) {
+    const auto text = cli::ReadTextFile(given.targets);
+    if (!text) return Complain(text.error(), ExitCode::kRefused);
+    args = {{"targets_csv", *text}, {"targets_name", given.targets}};
+  }
+  return Ask(given, {0, "truth", args}, [&](const Json& result) {
+    if (!given.out.empty()) {
+      const auto written = cli::WriteFileAtomically(given.out, result.value("csv", ""));
+      if (!written) return Complain(written.error(), ExitCode::kRefused);
+    }
+    if (given.json) {
+      Json summary = result;
+      summary.erase("csv");
+      std::printf("%s\n", summary.dump().c_str());
+    } else if (result.contains("targets")) {
+      const Json& errors = result["targets"];
+      std::printf("%llu units compared, worst is unit %u with %.1f um\n",
+                  errors.value("units", 0ull), errors.value("worst_unit_id", 0u),
+                  errors.value("max_um", 0.0));
+      std::printf("true position %.1f um rms\n", errors.value("rms_um", 0.0));
+    } else if (given.out.empty()) {
+      std::fputs(result.value("csv", "").c_str(), stdout);
+    }
+    return static_cast<int>(ExitCode::kOk);
+  });
+}
+
+int Run(Given* given, const CLI::App& app) {
+  if (given->run.units_path.empty()) {
+    std::fprintf(stderr, "focalfleet-sim: --units is required (see %s --help)\n",
+                 app.get_name().c_str());
+    return static_cast<int>(ExitCode::kUsage);
+  }
+  if (given->run.unix_directory.empty() == given->buses_text.empty()) {
+    std::fputs("focalfleet-sim: either --unix-directory or --bus is required\n", stderr);
+    return static_cast<int>(ExitCode::kUsage);
+  }
+  if (!given->buses_text.empty()) {
+    auto interfaces = ParseInterfaces(given->buses_text);
+    if (!interfaces) return Complain(interfaces.error(), ExitCode::kUsage);
+    given->run.interfaces = std::move(*interfaces);
+  }
+  given->run.control_path = given->control;
+  const auto ran = RunSimulator(given->run);
+  return ran ? static_cast<int>(ExitCode::kOk) : Complain(ran.error(), ExitCode::kRefused);
+}
+
+void AddRunOptions(CLI::App* app, Given* given) {
+  SimulatorOptions& run = given->run;
+  app->add_option("--units", run.units_path, "units.csv: the fleet");
+  app->add_option("--state", run.state_path,
+                  "state.csv: where the axes stand at first; folded without");
+  app->add_option("--unix-directory", run.unix_directory,
+                  "one UNIX socket a bus, bus<ID>.sock, in this directory");
+  app->add_option("--bus", given->buses_text,
+                  "SocketCAN interfaces by ascending bus_id: vcan0,vcan1 or vcan0...vcan49");
+  app->add_option("--control", given->control, "control socket for the subcommands");
+  app->add_option("--flash", run.flash_path,
+                  "what survives power-off: read at the start where it is, written at the end");
+  app->add_option("--speed", run.speed, "times faster than life")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  app->add_option("--seed", run.seed, "of all chance")->capture_default_str();
+  app->add_option("--spread", run.spread,
+                  "nominal: units as described; real: the spread of service")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Spread>{
+          {"nominal", sim::Spread::kNominal}, {"real", sim::Spread::kReal}}));
+  app->add_option("--bit-rate", run.bit_rate_bps, "bit/s of the simulated buses")
+      ->check(CLI::Range(10'000, 1'000'000))
+      ->capture_default_str();
+}
+
+struct Subcommand {
+  CLI::App* app;
+  std::function<int()> run;
+};
+
+CLI::App* AddSubcommand(CLI::App* app, Given* given, const char* name, const char* what) {
+  CLI::App* sub = app->add_subcommand(name, what);
+  sub->add_option("--control", given->control, "control socket of the running simulation")
+      ->required();
+  sub->add_flag("--json", given->json, "the result as one line of JSON");
+  return sub;
+}
+
+CLI::App* AddUnitsSubcommand(CLI::App* app, Given* given, const char* name, const char* what) {
+  CLI::App* sub = AddSubcommand(app, given, name, what);
+  sub->add_option("--units", given->units_text, "unit ids: 1,2,5-9")->required();
+  return sub;
+}
+
+std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
+  CLI::App* truth = AddSubcommand(app, given, "truth", "where all axes and fibres truly are");
+  truth->add_option("--out", given->out, "truth.csv; without it and --targets: to stdout");
+  truth->add_option("--targets", given->targets, "targets.csv: compare the named units with it");
+  CLI::App* cut = AddUnitsSubcommand(app, given, "power-cut", "cut the power of units, now");
+  cut->add_option("--seconds", given->seconds, "power comes back after so much of the fleet's time")
+      ->check(CLI::Range(0.0, 86'400.0));
+  CLI::App* on = AddUnitsSubcommand(app, given, "power-on", "give units their power back");
+  CLI::App* fault = AddUnitsSubcommand(app, given, "fault", "let units fail");
+  fault
+      ->add_option("--code", given->code,
+                   "over_temperature, under_voltage, over_current, flash, driver")
+      ->required();
+  fault->add_option("--axis", given->axis, "theta or phi")->capture_default_str();
+  fault->add_option("--after", given->after_s, "not now: so many seconds into the next motion")
+      ->check(CLI::Range(0.0, 86'400.0));
+  CLI::App* silence =
+      AddUnitsSubcommand(app, given, "silence", "units act as told and say nothing");
+  silence->add_flag("--off", given->off, "they speak again");
+  CLI::App* kill = AddSubcommand(app, given, "kill-bus", "nothing passes on these buses any more");
+  kill->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
+  CLI::App* revive = AddSubcommand(app, given, "revive-bus", "these buses work again");
+  revive->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
+  CLI::App* status = AddSubcommand(app, given, "status", "counters of all buses, as JSON");
+  CLI::App* quit =
+      AddSubcommand(app, given, "quit", "end the simulation; it writes its FLASH file");
+
+  return {{truth, [given] { return TellTruth(*given); }},
+          {cut,
+           [given] {
+             Json args = Json::object();
+             if (given->seconds >= 0) args["seconds"] = given->seconds;
+             return AskAboutUnits(*given, "power_cut", args);
+           }},
+          {on, [given] { return AskAboutUnits(*given, "power_on", Json::object()); }},
+          {fault,
+           [given] {
+             Json args = {{"code", given->code}, {"axis", given->axis}};
+             if (given->after_s >= 0) args["after_s"] = given->after_s;
+             return AskAboutUnits(*given, "fault", args);
+           }},
+          {silence,
+           [given] {
+             return AskAboutUnits(*given, "silence", {{"off", given->off}});
+           }},
+          {kill, [given] { return SetBuses(*given, "kill_bus"); }},
+          {revive, [given] { return SetBuses(*given, "revive_bus"); }},
+          {status,
+           [given] {
+             given->json = true;
+             return AskSimply(*given, {0, "status", Json::object()});
+           }},
+          {quit, [given] {
+             return AskSimply(*given, {0, "quit", Json::object()});
+           }}};
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> ParseInterfaces(const std::string& text) {
+  std::vector<std::string> names;
+  for (const std::string& piece : Split(text, ',')) {
+    const std::size_t dots = piece.find("...");
+    if (dots == std::string::npos) {
+      if (piece.empty()) return Fail(ErrorCode::kInvalid, "--bus: an interface name is empty");
+      names.push_back(piece);
+      continue;
+    }
+    const std::string first = piece.substr(0, dots);
+    const std::string last = piece.substr(dots + 3);
+    const std::size_t digits = first.find_last_not_of("0123456789") + 1;
+    const std::string stem = first.substr(0, digits);
+    unsigned low = 0;
+    unsigned high = 0;
+    if (stem.empty() || last.substr(0, digits) != stem || !Parse(first.substr(digits), &low) ||
+        !Parse(last.substr(digits), &high) || high < low || high - low >= kNumbersMax)
+      return Fail(ErrorCode::kInvalid, "--bus: '" + piece + "' is no range such as vcan0...vcan49");
+    for (unsigned i = low; i <= high; ++i) names.push_back(stem + std::to_string(i));
+  }
+  return names;
+}
+
+Result<std::vector<std::uint32_t>> ParseNumbers(const std::string& text) {
+  std::vector<std::uint32_t> numbers;
+  for (const std::string& piece : Split(text, ',')) {
+    const std::size_t dash = piece.find('-');
+    std::uint32_t low = 0;
+    std::uint32_t high = 0;
+    const bool one = dash == std::string::npos && Parse(piece, &low);
+    if (one) high = low;
+    const bool range = dash != std::string::npos && Parse(piece.substr(0, dash), &low) &&
+                       Parse(piece.substr(dash + 1), &high);
+    if ((!one && !range) || high < low || high - low >= kNumbersMax)
+      return Fail(ErrorCode::kInvalid,
+                  "'" + piece + "' is neither a number nor a range such as 5-9");
+    for (std::uint64_t i = low; i <= high; ++i) numbers.push_back(static_cast<std::uint32_t>(i));
+    if (numbers.size() > kNumbersMax) return Fail(ErrorCode::kInvalid, "too many numbers");
+  }
+  return numbers;
+}
+
+int Main(int argc, char** argv) {
+  Given given;
+  CLI::App app{
+      "The simulated fleet: answers on UNIX sockets or SocketCAN interfaces as units do, until "
+      "SIGTERM.\n"
+      "Says `ready` when all of them are open.",
+      "focalfleet-sim"};
+  app.footer(kExitCodes);
+  app.set_version_flag("--version", FOCALFLEET_VERSION);
+  app.require_subcommand(0, 1);
+  AddRunOptions(&app, &given);
+  const std::vector<Subcommand> subcommands = AddSubcommands(&app, &given);
+  // The one library here that throws; what it throws ends here.
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
+                                : static_cast<int>(ExitCode::kUsage);
+  }
+  for (const Subcommand& subcommand : subcommands)
+    if (subcommand.app->parsed()) return subcommand.run();
+  return Run(&given, app);
+}
+
+}  // namespace focalfleet::simulator

@@ -1,0 +1,31 @@
+// focalfleet-sim as a process: a simulated world on the scaled monotonic clock, doors to its buses,
+// a control socket, and a FLASH file that is read at the start and written at the end. One thread;
+// it sleeps until the world's next event, a frame, a control line or a signal.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/world.h"
+
+namespace focalfleet::simulator {
+
+struct SimulatorOptions {
+  std::string units_path;
+  std::string state_path;               // empty: folded
+  std::string unix_directory;           // either this,
+  std::vector<std::string> interfaces;  // or these, in ascending order of bus_id
+  std::string control_path;             // empty: none
+  std::string flash_path;               // empty: forgotten at the end
+  double speed = 1;
+  std::uint64_t seed = 1;
+  sim::Spread spread = sim::Spread::kNominal;
+  std::uint32_t bit_rate_bps = 1'000'000;
+};
+
+/// Runs until SIGTERM, SIGINT or the verb `quit`; says `ready` on stdout when everything is open.
+/// Errors: what could not be read, opened or, at the end, written.
+Status RunSimulator(const SimulatorOptions& options);
+
+}  // namespace focalfleet::simulator

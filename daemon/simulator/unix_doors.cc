@@ -1,0 +1,205 @@
+#include "daemon/simulator/unix_doors.h"
+
+#include <sys/epoll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+
+#include "daemon/control/unix_address.h"
+#include "daemon/ports/socket_frames.h"
+
+namespace focalfleet::simulator {
+namespace {
+
+/// More frames than this wait on a bus: its clients are not read until half of them are through.
+constexpr std::size_t kPauseFrames = 2048;
+/// Some seconds of a saturated bus; who is so far behind does not read at all.
+constexpr std::size_t kClientFramesMax = 65'536;
+constexpr std::uint64_t kListenerTag = std::uint64_t{1} << 32;
+
+bool SomebodyAnswers(const UnixAddress& address) {
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd < 0) return false;
+  const bool answered = ::connect(fd, address.get(), address.length()) == 0 || errno == EAGAIN;
+  ::close(fd);
+  return answered;
+}
+
+tl::unexpected<Error> Unavailable(const std::string& path, const char* what) {
+  return Fail(ErrorCode::kUnavailable, path + ": " + what + ": " + std::strerror(errno));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<UnixDoors>> UnixDoors::Create(const Options& options) {
+  std::error_code failed;
+  std::filesystem::create_directories(options.directory, failed);
+  if (failed)
+    return Fail(ErrorCode::kUnavailable,
+                options.directory + ": cannot make the directory: " + failed.message());
+  const int epoll = ::epoll_create1(EPOLL_CLOEXEC);
+  if (epoll < 0) return Unavailable(options.directory, "no epoll");
+  std::unique_ptr<UnixDoors> doors(new UnixDoors(epoll));
+  for (const BusId bus : options.buses)
+    FOCALFLEET_TRY(
+        doors->Listen(options.directory + "/bus" + std::to_string(bus.value) + ".sock", bus));
+  return doors;
+}
+
+UnixDoors::~UnixDoors() {
+  for (const auto& [id, client] : clients_) ::close(client.fd);
+  for (const Listener& listener : listeners_) {
+    ::close(listener.fd);
+    ::unlink(listener.path.c_str());
+  }
+  ::close(epoll_);
+}
+
+Status UnixDoors::Listen(const std::string& path, BusId bus) {
+  FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
+  if (SomebodyAnswers(address))
+    return Fail(ErrorCode::kRefused, path + " is in use: another simulation answers there");
+  ::unlink(path.c_str());
+  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (fd < 0) return Unavailable(path, "no socket");
+  if (::bind(fd, address.get(), address.length()) != 0 || ::chmod(path.c_str(), 0660) != 0 ||
+      ::listen(fd, 16) != 0) {
+    const auto error = Unavailable(path, "cannot listen");
+    ::close(fd);
+    return error;
+  }
+  epoll_event event{};
+  event.events = EPOLLIN;
+  event.data.u64 = kListenerTag | listeners_.size();
+  listeners_.push_back({bus, path, fd});
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) return Unavailable(path, "cannot watch");
+  return {};
+}
+
+void UnixDoors::Accept(std::size_t listener) {
+  for (;;) {
+    const int fd =
+        ::accept4(listeners_[listener].fd, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    if (fd < 0) {
+      if ((errno == EMFILE || errno == ENFILE) && !told_no_descriptors_) {
+        told_no_descriptors_ = true;
+        std::fprintf(stderr, "focalfleet-sim: no descriptors left for another client of %s\n",
+                     listeners_[listener].path.c_str());
+      }
+      return;
+    }
+    const std::uint32_t id = next_client_++;
+    Client& client = clients_[id];
+    client.id = id;
+    client.bus = listener;
+    client.fd = fd;
+    clients_of_bus_[listeners_[listener].bus].push_back(id);
+    Watch(client, EPOLL_CTL_ADD);
+  }
+}
+
+void UnixDoors::Watch(const Client& client, int operation) const {
+  epoll_event event{};
+  event.events = (client.reading ? EPOLLIN : 0u) | (client.waiting.empty() ? 0u : EPOLLOUT);
+  event.data.u64 = client.id;
+  ::epoll_ctl(epoll_, operation, client.fd, &event);
+}
+
+void UnixDoors::Drop(std::uint32_t id, const std::string& why) {
+  const auto found = clients_.find(id);
+  if (found == clients_.end()) return;
+  const Listener& listener = listeners_[found->second.bus];
+  if (!why.empty())
+    std::fprintf(stderr, "focalfleet-sim: dropped a client of %s: %s\n", listener.path.c_str(),
+                 why.c_str());
+  ::close(found->second.fd);
+  std::erase(clients_of_bus_[listener.bus], id);
+  clients_.erase(found);
+}
+
+void UnixDoors::Read(Client* client, HostInstant now, sim::World* world) {
+  const BusId bus = listeners_[client->bus].bus;
+  std::vector<ReceivedFrame> received;
+  PortCounters counters;
+  const BatchReceived batch = ReceiveFrames(client->fd, {bus, now, {}}, &received, &counters);
+  for (const ReceivedFrame& frame : received) world->Inject(bus, frame.frame, now, client->id);
+  if (counters.rejected > 0)
+    std::fprintf(stderr, "focalfleet-sim: bus %u: %llu packets are no extended CAN data frames\n",
+                 bus.value, static_cast<unsigned long long>(counters.rejected));
+  if (batch.closed) return Drop(client->id, "");
+  if (batch.error != 0 && batch.error != ECONNRESET)
+    return Drop(client->id, std::strerror(batch.error));
+  if (batch.error == ECONNRESET) Drop(client->id, "");
+}
+
+void UnixDoors::Write(Client* client) {
+  while (!client->waiting.empty()) {
+    std::array<CanFrame, 64> batch{};
+    const std::size_t count = std::min(batch.size(), client->waiting.size());
+    std::copy_n(client->waiting.begin(), count, batch.begin());
+    const BatchSent sent = SendFrames(client->fd, {batch.data(), count});
+    client->waiting.erase(client->waiting.begin(),
+                          client->waiting.begin() + static_cast<std::ptrdiff_t>(sent.taken));
+    if (sent.error == EAGAIN || sent.error == ENOBUFS) return;
+    // Gone: that is found, and cleared away, when it is next read.
+    if (sent.error != 0) return client->waiting.clear();
+  }
+}
+
+void UnixDoors::Exchange(HostInstant now, sim::World* world) {
+  std::array<epoll_event, 64> events{};
+  const int count = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < count; ++i) {
+    const epoll_event& event = events[static_cast<std::size_t>(i)];
+    if ((event.data.u64 & kListenerTag) != 0) {
+      Accept(event.data.u64 & ~kListenerTag);
+      continue;
+    }
+    const auto id = static_cast<std::uint32_t>(event.data.u64);
+    const auto found = clients_.find(id);
+    if (found == clients_.end()) continue;
+    if ((event.events & EPOLLOUT) != 0) {
+      Write(&found->second);
+      if (found->second.waiting.empty()) Watch(found->second, EPOLL_CTL_MOD);
+    }
+    if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) Read(&found->second, now, world);
+  }
+  SetPace(world);
+}
+
+void UnixDoors::SetPace(sim::World* world) {
+  for (auto& [id, client] : clients_) {
+    const std::size_t waiting = world->waiting(listeners_[client.bus].bus);
+    const bool reading = client.reading ? waiting <= kPauseFrames : waiting < kPauseFrames / 2;
+    if (reading == client.reading) continue;
+    client.reading = reading;
+    Watch(client, EPOLL_CTL_MOD);
+  }
+}
+
+void UnixDoors::Carry(std::span<const sim::WireFrame> frames) {
+  for (const sim::WireFrame& frame : frames) {
+    const auto found = clients_of_bus_.find(frame.bus);
+    if (found == clients_of_bus_.end()) continue;
+    for (const std::uint32_t id : found->second)
+      if (frame.from_unit || frame.client != id) clients_[id].waiting.push_back(frame.frame);
+  }
+  std::vector<std::uint32_t> late;
+  for (auto& [id, client] : clients_) {
+    if (client.waiting.empty()) continue;
+    Write(&client);
+    if (client.waiting.size() > kClientFramesMax) late.push_back(id);
+    if (!client.waiting.empty()) Watch(client, EPOLL_CTL_MOD);
+  }
+  for (const std::uint32_t id : late)
+    Drop(id, "it does not read, and " + std::to_string(kClientFramesMax) + " frames wait for it");
+}
+
+}  // namespace focalfleet::simulator

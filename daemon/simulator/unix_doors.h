@@ -1,0 +1,67 @@
+// One SOCK_SEQPACKET socket a bus, <directory>/bus<ID>.sock; a packet is one `struct can_frame`.
+// Any number of clients: a frame of one goes onto the simulated bus, and when it has won
+// arbitration to the units and to all other clients. While a bus has many frames waiting its
+// clients are not read, so that they feel the bus' pace; a client that does not read what it is
+// sent is dropped, which is said on stderr.
+#pragma once
+
+#include <deque>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/simulator/bus_doors.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet::simulator {
+
+class UnixDoors : public BusDoors {
+ public:
+  struct Options {
+    std::string directory;
+    std::vector<BusId> buses;
+  };
+  /// Listens on every bus. The directory is made where it is missing; a socket file that nobody
+  /// answers on is left from a crash and replaced. Errors: kRefused where somebody answers there;
+  /// kUnavailable; both name the path.
+  static Result<std::unique_ptr<UnixDoors>> Create(const Options& options);
+  ~UnixDoors() override;
+
+  [[nodiscard]] int fd() const override { return epoll_; }
+  [[nodiscard]] HostInstant wake_at() const override { return kNever; }
+  void Exchange(HostInstant now, sim::World* world) override;
+  void Carry(std::span<const sim::WireFrame> frames) override;
+
+ private:
+  struct Listener {
+    BusId bus;
+    std::string path;
+    int fd = -1;
+  };
+  struct Client {
+    std::uint32_t id = 0;
+    std::size_t bus = 0;  // in listeners_
+    int fd = -1;
+    bool reading = true;
+    std::deque<CanFrame> waiting;
+  };
+
+  explicit UnixDoors(int epoll) : epoll_(epoll) {}
+  Status Listen(const std::string& path, BusId bus);
+  void Accept(std::size_t listener);
+  void Read(Client* client, HostInstant now, sim::World* world);
+  void Write(Client* client);
+  void Watch(const Client& client, int operation) const;
+  void Drop(std::uint32_t id, const std::string& why);
+  void SetPace(sim::World* world);
+
+  int epoll_;
+  std::vector<Listener> listeners_;
+  std::map<BusId, std::vector<std::uint32_t>> clients_of_bus_;
+  std::map<std::uint32_t, Client> clients_;
+  std::uint32_t next_client_ = 1;
+  bool told_no_descriptors_ = false;
+};
+
+}  // namespace focalfleet::simulator

@@ -1,0 +1,176 @@
+#include "daemon/simulator/verbs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string>
+
+#include "daemon/simulator/truth_report.h"
+#include "fleet/files/targets_file.h"
+
+namespace focalfleet::simulator {
+namespace {
+
+constexpr double kSecondsMax = 86'400;
+
+Result<double> SecondsOr(const Json& args, const char* name, double otherwise) {
+  const auto found = args.find(name);
+  if (found == args.end()) return otherwise;
+  if (!found->is_number() || !(found->get<double>() >= 0) || found->get<double>() > kSecondsMax)
+    return Fail(ErrorCode::kInvalid, std::string(name) + " is not a number of 0..86400 seconds");
+  return found->get<double>();
+}
+
+std::optional<FaultCode> FaultNamed(const std::string& name) {
+  for (std::uint8_t i = 1; i < kFaultCodeCount; ++i)
+    if (name == Name(static_cast<FaultCode>(i))) return static_cast<FaultCode>(i);
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<Json> Verbs::Do(const ControlRequest& request) {
+  if (request.verb == "truth") return Truth(request.args);
+  if (request.verb == "power_cut") return PowerCut(request.args);
+  if (request.verb == "power_on") return PowerOn(request.args);
+  if (request.verb == "fault") return RaiseFault(request.args);
+  if (request.verb == "silence") return Silence(request.args);
+  if (request.verb == "kill_bus") return SetBuses(request.args, false);
+  if (request.verb == "revive_bus") return SetBuses(request.args, true);
+  if (request.verb == "status") return StatusOfAll();
+  if (request.verb == "quit") {
+    quit_ = true;
+    return Json::object();
+  }
+  return Fail(ErrorCode::kInvalid, "focalfleet-sim has no verb '" + request.verb + "'");
+}
+
+Result<std::vector<UnitId>> Verbs::Units(const Json& args) const {
+  FOCALFLEET_TRY_ASSIGN(const auto numbers, UnsignedListArgument(args, "units"));
+  std::vector<UnitId> units;
+  for (const std::uint32_t number : numbers) {
+    if (!world_->Find(UnitId{number}))
+      return Fail(ErrorCode::kInvalid, "no unit " + std::to_string(number) + " in this fleet");
+    units.push_back({number});
+  }
+  if (units.empty()) return Fail(ErrorCode::kInvalid, "no units are named");
+  return units;
+}
+
+Result<Json> Verbs::Truth(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgumentOr(args, "targets_csv", ""));
+  FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgumentOr(args, "targets_name", "targets"));
+  std::uint64_t begun_twice = 0;
+  std::uint64_t at_work = 0;
+  for (std::size_t row = 0; row < world_->units().size(); ++row) {
+    const sim::UnitTruth truth = world_->Truth(row);
+    begun_twice += truth.begun_twice;
+    if (truth.state == UnitState::kMoving || truth.state == UnitState::kHoming) ++at_work;
+  }
+  Json result = {{"csv", TruthCsv(*world_)},
+                 {"units", world_->units().size()},
+                 {"moving", at_work},
+                 {"begun_twice", begun_twice}};
+  if (text.empty()) return result;
+  FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, name));
+  FOCALFLEET_TRY_ASSIGN(const TrueErrors errors, CompareWithTargets(*world_, targets));
+  result["targets"] = {{"units", errors.units},
+                       {"disabled", errors.disabled},
+                       {"rms_um", errors.rms_um},
+                       {"max_um", errors.max_um},
+                       {"worst_unit_id", errors.worst.value}};
+  return result;
+}
+
+Result<Json> Verbs::PowerCut(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
+  FOCALFLEET_TRY_ASSIGN(const double seconds, SecondsOr(args, "seconds", -1));
+  for (const UnitId unit : units) {
+    world_->PowerCut(unit);
+    std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.unit == unit; });
+    if (seconds >= 0) power_returns_.push_back({world_->now() + Seconds(seconds), unit});
+  }
+  return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::PowerOn(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
+  for (const UnitId unit : units) {
+    std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.unit == unit; });
+    world_->PowerOn(unit);
+  }
+  return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::RaiseFault(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
+  FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "code"));
+  FOCALFLEET_TRY_ASSIGN(const std::string axis_name, TextArgumentOr(args, "axis", "theta"));
+  FOCALFLEET_TRY_ASSIGN(const double after_s, SecondsOr(args, "after_s", -1));
+  const auto code = FaultNamed(name);
+  if (!code) return Fail(ErrorCode::kInvalid, "no fault is called '" + name + "'");
+  if (axis_name != "theta" && axis_name != "phi")
+    return Fail(ErrorCode::kInvalid, "no axis is called '" + axis_name + "'");
+  const Axis axis = axis_name == "phi" ? Axis::kPhi : Axis::kTheta;
+  for (const UnitId unit : units) {
+    if (after_s < 0) {
+      world_->RaiseFault(unit, *code, axis);
+    } else {
+      world_->faults(unit)->in_motion = {Seconds(after_s), *code, axis};
+    }
+  }
+  return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::Silence(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
+  FOCALFLEET_TRY_ASSIGN(const bool off, FlagArgumentOr(args, "off", false));
+  for (const UnitId unit : units) world_->faults(unit)->silent = !off;
+  return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::SetBuses(const Json& args, bool alive) {
+  FOCALFLEET_TRY_ASSIGN(const auto numbers, UnsignedListArgument(args, "buses"));
+  for (const std::uint32_t number : numbers)
+    if (world_->faults(BusId{number}) == nullptr)
+      return Fail(ErrorCode::kInvalid, "no bus " + std::to_string(number) + " in this fleet");
+  for (const std::uint32_t number : numbers) {
+    if (alive) {
+      world_->ReviveBus(BusId{number});
+    } else {
+      world_->KillBus(BusId{number});
+    }
+  }
+  return Json{{"buses", numbers.size()}};
+}
+
+Json Verbs::StatusOfAll() const {
+  Json buses = Json::array();
+  for (const BusId bus : world_->buses()) {
+    const sim::BusCounters& c = world_->counters(bus);
+    buses.push_back({{"bus_id", bus.value},
+                     {"dead", world_->dead(bus)},
+                     {"host_frames", c.host_frames},
+                     {"unit_frames", c.unit_frames},
+                     {"bits", c.bits},
+                     {"busy_s", c.busy.seconds()},
+                     {"dropped", c.dropped},
+                     {"refused", c.refused},
+                     {"waiting_max", c.waiting_max}});
+  }
+  return {{"units", world_->units().size()}, {"now_ns", world_->now().ns}, {"buses", buses}};
+}
+
+void Verbs::Tick(HostInstant now) {
+  for (const PowerReturn& back : power_returns_)
+    if (back.at <= now) world_->PowerOn(back.unit);
+  std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.at <= now; });
+}
+
+HostInstant Verbs::wake_at() const {
+  HostInstant soonest = kNever;
+  for (const PowerReturn& back : power_returns_) soonest = std::min(soonest, back.at);
+  return soonest;
+}
+
+}  // namespace focalfleet::simulator
