@@ -58,21 +58,42 @@ std::string FaultOf(const AxisGeometry& axis, const std::string& name) {
   return {};
 }
 
-// Bases sorted into square cells, about one unit each, so that whoever is near is found in a few
-// cells.
+struct Box {
+  PointFp low;
+  PointFp high;
+  [[nodiscard]] double width_mm() const { return high.x_mm - low.x_mm; }
+  [[nodiscard]] double height_mm() const { return high.y_mm - low.y_mm; }
+};
+
+Box BoxOf(const std::vector<Unit>& units) {
+  Box box{units.front().base_fp, units.front().base_fp};
+  for (const Unit& unit : units) {
+    const PointFp p = unit.base_fp;
+    box.low = {std::min(box.low.x_mm, p.x_mm), std::min(box.low.y_mm, p.y_mm)};
+    box.high = {std::max(box.high.x_mm, p.x_mm), std::max(box.high.y_mm, p.y_mm)};
+  }
+  return box;
+}
+
+// About one unit a cell; a plate with one far stray, or all on a line, must not cost cells without
+// end.
+double CellMm(const Box& box, std::size_t count) {
+  const auto units = static_cast<double>(count);
+  const double cells_per_side_max = 2 * std::sqrt(units) + 2;
+  return std::max({std::sqrt(box.width_mm() * box.height_mm() / units),
+                   box.width_mm() / cells_per_side_max, box.height_mm() / cells_per_side_max,
+                   kNearestMinMm});
+}
+
+// Bases sorted into square cells, so that whoever is near is found in a few cells.
 class Grid {
  public:
-  Grid(const std::vector<Unit>& units, double cell_mm) : units_(units), cell_mm_(cell_mm) {
-    low_ = high_ = units.front().base_fp;
-    for (const Unit& unit : units) {
-      low_ = {std::min(low_.x_mm, unit.base_fp.x_mm), std::min(low_.y_mm, unit.base_fp.y_mm)};
-      high_ = {std::max(high_.x_mm, unit.base_fp.x_mm), std::max(high_.y_mm, unit.base_fp.y_mm)};
-    }
-    // A plate with one far stray must not cost cells without end.
-    const double cells_per_side_max = 2 * std::sqrt(static_cast<double>(units.size())) + 2;
-    cell_mm_ = std::max({cell_mm_, Width() / cells_per_side_max, Height() / cells_per_side_max});
-    columns_ = static_cast<std::size_t>(Width() / cell_mm_) + 1;
-    rows_ = static_cast<std::size_t>(Height() / cell_mm_) + 1;
+  explicit Grid(const std::vector<Unit>& units)
+      : units_(units),
+        box_(BoxOf(units)),
+        cell_mm_(CellMm(box_, units.size())),
+        columns_(static_cast<std::size_t>(box_.width_mm() / cell_mm_) + 1),
+        rows_(static_cast<std::size_t>(box_.height_mm() / cell_mm_) + 1) {
     begin_.assign(columns_ * rows_ + 1, 0);
     for (const Unit& unit : units) ++begin_[CellOf(unit.base_fp) + 1];
     for (std::size_t c = 1; c < begin_.size(); ++c) begin_[c] += begin_[c - 1];
@@ -84,8 +105,8 @@ class Grid {
   /// Calls `visit(j)` for every unit whose base is in a cell within `radius_mm` of the point's.
   template <class Visit>
   void ForNear(PointFp p, double radius_mm, Visit visit) const {
-    const auto [column0, column1] = Range(p.x_mm - low_.x_mm, radius_mm, columns_);
-    const auto [row0, row1] = Range(p.y_mm - low_.y_mm, radius_mm, rows_);
+    const auto [column0, column1] = Range(p.x_mm - box_.low.x_mm, radius_mm, columns_);
+    const auto [row0, row1] = Range(p.y_mm - box_.low.y_mm, radius_mm, rows_);
     for (std::size_t row = row0; row <= row1; ++row)
       for (std::size_t k = begin_[row * columns_ + column0];
            k < begin_[row * columns_ + column1 + 1]; ++k)
@@ -94,7 +115,7 @@ class Grid {
 
   /// Distance from unit i's base to the nearest other one.
   [[nodiscard]] std::pair<double, std::uint32_t> Nearest(std::uint32_t i) const {
-    const double everywhere = Width() + Height() + cell_mm_;
+    const double everywhere = box_.width_mm() + box_.height_mm() + cell_mm_;
     for (double radius = cell_mm_;; radius *= 2) {
       double best2 = std::numeric_limits<double>::infinity();
       std::uint32_t who = i;
@@ -111,11 +132,9 @@ class Grid {
   }
 
  private:
-  [[nodiscard]] double Width() const { return high_.x_mm - low_.x_mm; }
-  [[nodiscard]] double Height() const { return high_.y_mm - low_.y_mm; }
   [[nodiscard]] std::size_t CellOf(PointFp p) const {
-    const auto column = static_cast<std::size_t>((p.x_mm - low_.x_mm) / cell_mm_);
-    const auto row = static_cast<std::size_t>((p.y_mm - low_.y_mm) / cell_mm_);
+    const auto column = static_cast<std::size_t>((p.x_mm - box_.low.x_mm) / cell_mm_);
+    const auto row = static_cast<std::size_t>((p.y_mm - box_.low.y_mm) / cell_mm_);
     return std::min(row, rows_ - 1) * columns_ + std::min(column, columns_ - 1);
   }
   [[nodiscard]] std::pair<std::size_t, std::size_t> Range(double offset_mm, double radius_mm,
@@ -127,25 +146,13 @@ class Grid {
   }
 
   const std::vector<Unit>& units_;
+  Box box_;
   double cell_mm_;
-  PointFp low_;
-  PointFp high_;
-  std::size_t columns_ = 1;
-  std::size_t rows_ = 1;
+  std::size_t columns_;
+  std::size_t rows_;
   std::vector<std::uint32_t> begin_;
   std::vector<std::uint32_t> member_;
 };
-
-double EvenCellMm(const std::vector<Unit>& units) {
-  PointFp low = units.front().base_fp;
-  PointFp high = low;
-  for (const Unit& unit : units) {
-    low = {std::min(low.x_mm, unit.base_fp.x_mm), std::min(low.y_mm, unit.base_fp.y_mm)};
-    high = {std::max(high.x_mm, unit.base_fp.x_mm), std::max(high.y_mm, unit.base_fp.y_mm)};
-  }
-  const double area = (high.x_mm - low.x_mm) * (high.y_mm - low.y_mm);
-  return std::max(std::sqrt(area / static_cast<double>(units.size())), kNearestMinMm);
-}
 
 double MedianOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -275,7 +282,7 @@ Status Layout::MeasurePitch(double clearance_mm) {
   if (units_.size() == 1) {
     nearest_mm_[0] = 2 * (units_[0].theta().arm_mm + units_[0].phi().arm_mm);
   } else {
-    const Grid grid(units_, EvenCellMm(units_));
+    const Grid grid(units_);
     for (std::uint32_t i = 0; i < units_.size(); ++i) {
       const auto [distance, who] = grid.Nearest(i);
       if (distance < kNearestMinMm)
@@ -295,7 +302,7 @@ Status Layout::MeasurePitch(double clearance_mm) {
 Status Layout::FindNeighbours() {
   double reach_max = 0;
   for (const Unit& unit : units_) reach_max = std::max(reach_max, unit.reach_mm());
-  const Grid grid(units_, EvenCellMm(units_));
+  const Grid grid(units_);
   neighbour_begin_.assign(1, 0);
   for (std::uint32_t i = 0; i < units_.size(); ++i) {
     const Unit& unit = units_[i];

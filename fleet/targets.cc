@@ -165,6 +165,33 @@ class SideChooser {
   std::vector<std::optional<SegmentFp>> arms_;
 };
 
+// Two fibres wanted where their arms touch is the author's error, so it is told with the author's
+// lines.
+Status CheckClear(const Targets& targets, const Layout& layout, std::span<const UnitDrive> drives,
+                  std::span<const std::optional<Pose>> poses) {
+  constexpr double kToleranceMm = 0.002;  // "2 um less is still clear"
+  std::unordered_map<std::uint32_t, const TargetRow*> row_of;
+  for (const TargetRow& row : targets.rows) {
+    const PositionerIndex i = *layout.Find(row.unit);
+    if (!layout.unit(i).enabled) continue;
+    const ArmOf arm{i, ArmAt(layout.unit(i), drives[i.value], *poses[i.value])};
+    for (const PositionerIndex j : layout.neighbours(i)) {
+      const auto earlier = row_of.find(j.value);
+      if (earlier == row_of.end()) continue;
+      const ArmOf other{j, ArmAt(layout.unit(j), drives[j.value], *poses[j.value])};
+      if (IsClear(layout, arm, other, -kToleranceMm)) continue;
+      return Fail(ErrorCode::kInvalid,
+                  At(targets, row) + ": its target collides with that of unit " +
+                      std::to_string(earlier->second->unit.value) + " in line " +
+                      std::to_string(earlier->second->line) + ": their arms would be " +
+                      Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
+                      Number(ClearDistanceMm(layout, i, j)) + " mm are needed");
+    }
+    row_of.emplace(i.value, &row);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
@@ -198,6 +225,7 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
   for (std::uint32_t i = 0; i < now.size(); ++i)
     if (IsPlace(now[i])) standing[i] = ArmAt(layout.unit({i}), drives[i], PlaceOf(now[i]));
   SideChooser(layout, drives, std::move(standing)).Settle(choices, &poses);
+  FOCALFLEET_TRY(CheckClear(targets, layout, drives, poses));
   return poses;
 }
 

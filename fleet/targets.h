@@ -35,7 +35,8 @@ struct Targets {
 };
 
 /// The pose for each unit, none where no target names it. Shape: (n).
-/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of range.
+/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of range, two
+/// targets of enabled units that collide.
 /// Disabled units' targets are resolved too; the planner passes them over by name.
 Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets, const Layout& layout,
                                                         std::span<const UnitDrive> drives,

@@ -12,9 +12,9 @@
 //   itself
 //
 // One controller per bus on the host's side, with a mailbox for every waiting frame: of the frames
-// that wait anywhere on a bus the lowest identifier goes first, and of equal ones the first come. A
-// `confirm` therefore passes segments that still wait; who needs an order keeps frames back until
-// the ones before are through.
+// that wait anywhere on a bus the lowest identifier goes first, and of equal ones the first come.
+// An `arm` therefore passes an upload that still waits; begin, segments and read-back of an upload
+// keep their order by their identifiers.
 #pragma once
 
 #include <array>

@@ -23,7 +23,10 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
   auto answer = client->Call(question.verb, question.args, options);
   if (answer) return std::move(*answer);
   if (client->connected()) {
-    return tl::unexpected<Failure>(Failure{ExitCode::kRefused, answer.error()});
+    // "Unavailable" from a daemon that listens: it began, and something that it needs gave way.
+    const bool broken = answer.error().code == ErrorCode::kUnavailable;
+    return tl::unexpected<Failure>(
+        Failure{broken ? ExitCode::kBroken : ExitCode::kRefused, answer.error()});
   }
   return tl::unexpected<Failure>(
       Failure{ExitCode::kBroken,

@@ -16,6 +16,7 @@
 #include "daemon/cli/text_file.h"
 #include "daemon/ports/socketcan_port.h"
 #include "daemon/ports/unix_port.h"
+#include "fleet/files/layout_file.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet::cli {
@@ -95,7 +96,7 @@ std::string BesideConfig(const std::string& config, const std::string& path) {
 }
 
 Result<std::vector<BusPlace>> BusesOf(const toml::table& table, const std::string& config) {
-  const auto port = table["bus"]["port"].value<std::string>();
+  const auto port = table["bus"]["port"].value_or(std::string("unix"));
   if (port == "unix") {
     const auto directory = table["bus"]["unix_directory"].value<std::string>();
     if (!directory || directory->empty()) {
@@ -104,10 +105,11 @@ Result<std::vector<BusPlace>> BusesOf(const toml::table& table, const std::strin
     return UnixBuses(BesideConfig(config, *directory), config);
   }
   if (port == "socketcan") return CanBuses(table, config);
-  return Fail(ErrorCode::kInvalid,
-              fmt::format("{}: [bus] port: {}; only the buses of \"unix\" and \"socketcan\" can be "
-                          "reached without the daemon",
-                          config, port ? fmt::format("\"{}\"", *port) : "not given"));
+  return Fail(
+      ErrorCode::kInvalid,
+      fmt::format("{}: [bus] port: \"{}\"; only the buses of \"unix\" and \"socketcan\" can be "
+                  "reached without the daemon",
+                  config, port));
 }
 
 Result<toml::table> ReadConfig(const std::string& config) {
@@ -119,6 +121,37 @@ Result<toml::table> ReadConfig(const std::string& config) {
                             std::string(parsed.error().description())));
   }
   return std::move(parsed).table();
+}
+
+struct Aim {
+  std::vector<BusPlace> places;
+  NodeId node = kBroadcastNode;
+};
+
+// One unit: its bus alone. Interfaces stand in the order of ascending bus ids; a socket's name says
+// its bus.
+Result<Aim> AimAtUnit(const toml::table& table, UnitId id, const std::string& config, Aim all) {
+  const std::string path =
+      BesideConfig(config, table["fleet"]["units"].value_or(std::string("units.csv")));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, path, {}));
+  const auto i = layout.Find(id);
+  if (!i) return Fail(ErrorCode::kInvalid, fmt::format("{}: there is no unit {}", path, id.value));
+  const Unit& unit = layout.unit(*i);
+  for (BusPlace& place : all.places) {
+    const bool ranked = !place.unix_socket && place.bus.value < layout.buses().size();
+    if (ranked) place.bus = layout.buses()[place.bus.value];
+    if (place.bus == unit.bus) return Aim{{std::move(place)}, unit.node};
+  }
+  return Fail(ErrorCode::kUnavailable,
+              fmt::format("{}: bus {} of unit {} is not there", config, unit.bus.value, id.value));
+}
+
+Result<Aim> AimAt(const toml::table& table, const DirectStopRequest& request) {
+  Aim all;
+  FOCALFLEET_TRY_ASSIGN(all.places, BusesOf(table, request.config));
+  if (!request.unit) return all;
+  return AimAtUnit(table, *request.unit, request.config, std::move(all));
 }
 
 // ---- the buses
@@ -175,16 +208,16 @@ void SendStop(std::vector<OpenBus>* buses, const CanFrame& frame) {
 
 Result<std::vector<DirectStopBus>> DirectStop(const DirectStopRequest& request) {
   FOCALFLEET_TRY_ASSIGN(const toml::table table, ReadConfig(request.config));
-  FOCALFLEET_TRY_ASSIGN(const auto places, BusesOf(table, request.config));
+  FOCALFLEET_TRY_ASSIGN(const Aim aim, AimAt(table, request));
 
   std::vector<DirectStopBus> report;
   std::vector<OpenBus> buses;
-  for (const BusPlace& place : places) {
+  for (const BusPlace& place : aim.places) {
     auto port = OpenPort(place);
     report.push_back({.name = place.place, .trouble = port ? "" : port.error().text});
     buses.push_back({.port = port ? std::move(*port) : nullptr});
   }
-  const CanFrame frame = Encode(HostMessage(Stop{}), {kBroadcastNode, kSequence});
+  const CanFrame frame = Encode(HostMessage(Stop{}), {aim.node, kSequence});
   const HostInstant end = Now() + kListen;
   for (int i = 0; i < kTimesSent; ++i) {
     SendStop(&buses, frame);

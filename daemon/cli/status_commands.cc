@@ -133,12 +133,13 @@ StateFile MakeStateFile(const Json& rows) {
     const std::uint64_t id = CountIn(row, "unit_id");
     const std::string theta = TextIn(row, "theta_witness");
     const std::string phi = TextIn(row, "phi_witness");
-    ++file.rows;
     if (IsPlaceWitness(theta) && IsPlaceWitness(phi)) {
-      file.csv += fmt::format("{},{:.6f},{:.6f}\n", id, NumberIn(row, "theta_low_deg"),
+      ++file.rows;
+      file.csv += fmt::format("{},{},{}\n", id, NumberIn(row, "theta_low_deg"),
                               NumberIn(row, "phi_low_deg"));
     } else {
-      file.csv += fmt::format("{},nan,nan\n", id);
+      // No row rather than a guess: a reader then knows that the place is not known.
+      file.csv += fmt::format("# unit {} left out: theta {}, phi {}\n", id, theta, phi);
       file.unknown.push_back({{"unit_id", id}, {"theta", theta}, {"phi", phi}});
     }
   }
@@ -186,8 +187,7 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
     Say(context, fmt::format("{}: {}", options.out, Count(file.rows, "unit", "units")));
   }
   if (file.unknown.empty()) return ExitCode::kOk;
-  if (!context.json)
-    fmt::print(stderr, "focalfleet: written as nan: {}\n", NameUnknown(file.unknown));
+  if (!context.json) fmt::print(stderr, "focalfleet: left out: {}\n", NameUnknown(file.unknown));
   return ExitCode::kSomeUnserved;
 }
 
@@ -199,7 +199,7 @@ void AddState(CommandLine* line) {
   auto options = std::make_shared<StateOptions>();
   AddFile(command, "--out", &options->out, "File to write (default: stdout)");
   command->add_flag("--allow-unknown", options->allow_unknown,
-                    "Write units of unknown place as nan, instead of refusing");
+                    "Leave out units of unknown place (a comment names each), instead of refusing");
   OnChosen(line, command, options, RunState);
 }
 
@@ -220,9 +220,9 @@ ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
   std::string text;
   for (const auto& [name, rows] : history->items()) {
     if (!rows.is_array() || rows.empty()) continue;
-    text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n\n",
-                        Paint(context.colour_out, Colour::kBold, name),
-                        DescribeRows(rows, {"at", "time", "id", "unit_id", "configuration"}));
+    text += fmt::format(
+        "{}{}\n{}", text.empty() ? "" : "\n\n", Paint(context.colour_out, Colour::kBold, name),
+        DescribeRows(rows, {"at", "began", "ended", "end", "id", "unit_id", "configuration"}));
   }
   Say(context, text.empty() ? "nothing yet" : text);
   return ExitCode::kOk;

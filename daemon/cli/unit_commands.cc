@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
+#include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "protocol/wire/messages.h"
@@ -47,23 +48,23 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
     args["unit_ids"] = options.units;
   }
   ProgressBar bar(context);
-  const auto answer =
-      Ask(context, {.verb = "home",
-                    .args = args,
-                    .long_lasting = options.wait,
-                    .on_progress = [&bar](const Json& p) {
-                      bar.Show(NumberIn(p, "fraction"), "homing", TextIn(p, "state"));
-                    }});
+  const auto answer = Ask(context, {.verb = "home",
+                                    .args = args,
+                                    .long_lasting = options.wait,
+                                    .on_progress = [&bar](const Json& p) {
+                                      bar.Show(NumberIn(p, "fraction"), TextIn(p, "state"),
+                                               fmt::format("{} of {} homed", CountIn(p, "arrived"),
+                                                           CountIn(p, "targeted")));
+                                    }});
   bar.End();
   if (!answer) return Report(context, answer.error());
   if (context.json) PrintJson(*answer);
-  const Json& failed = ListIn(*answer, "unserved");
-  std::string text =
-      options.wait ? "homing is over" : "homing begins; `focalfleet status` shows it";
-  if (!failed.empty())
-    text += "\n" + DescribeRows(failed, {"unit_id", "outcome", "reason", "state"});
-  Say(context, text);
-  return failed.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
+  if (!options.wait) {
+    Say(context, "homing begins; `focalfleet status` shows how it goes");
+    return ExitCode::kOk;
+  }
+  Say(context, DescribeConfiguration(*answer, context.colour_out));
+  return ExitCodeOf(*answer);
 }
 
 void AddHome(CommandLine* line) {
@@ -159,13 +160,29 @@ ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
                           *options.value));
 }
 
-// The rows of an answer, whichever member holds them, narrowed to one axis and name where given.
-Json Narrowed(const Json& answer, const ParamsOptions& options) {
+// What was stored or set, then what holds by default, narrowed to one axis and name where given.
+Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   Json rows = Json::array();
+  const auto wanted = [&](const std::string& axis, const std::string& name) {
+    return (options.axis.empty() || options.axis == axis) &&
+           (options.name.empty() || options.name == name);
+  };
   for (const Json& row : ListIn(answer, "parameters")) {
-    if (!options.axis.empty() && TextIn(row, "axis") != options.axis) continue;
-    if (!options.name.empty() && TextIn(row, "parameter") != options.name) continue;
-    rows.push_back(row);
+    if (wanted(TextIn(row, "axis"), TextIn(row, "parameter"))) rows.push_back(row);
+  }
+  const Json& drive = ObjectIn(answer, "drive");
+  for (const Axis axis : kAxes) {
+    for (const std::string& name : ParameterNames()) {
+      const std::string key = std::string(focalfleet::Name(axis)) + "_" + name;
+      const bool stored = std::any_of(rows.begin(), rows.end(), [&](const Json& row) {
+        return TextIn(row, "axis") == focalfleet::Name(axis) && TextIn(row, "parameter") == name;
+      });
+      if (stored || !drive.contains(key) || !wanted(focalfleet::Name(axis), name)) continue;
+      rows.push_back({{"axis", focalfleet::Name(axis)},
+                      {"parameter", name},
+                      {"value", drive[key]},
+                      {"origin", "default"}});
+    }
   }
   return rows;
 }
@@ -183,15 +200,14 @@ ExitCode RunParams(const Context& context, const ParamsOptions& options) {
   if (set) return SetParameter(context, options);
   const auto answer = Ask(context, {.verb = "params", .args = {{"unit_id", options.unit_id}}});
   if (!answer) return Report(context, answer.error());
-  const bool listed = answer->contains("parameters") && answer->at("parameters").is_array();
+  const Json rows = ParameterRows(*answer, options);
   if (context.json) {
     Json shown = *answer;
-    if (listed) shown["parameters"] = Narrowed(*answer, options);
+    shown["parameters"] = rows;
     PrintJson(shown);
-    return ExitCode::kOk;
   }
-  Say(context, listed ? DescribeRows(Narrowed(*answer, options), {"axis", "parameter", "value"})
-                      : DescribeObject(*answer));
+  Say(context, rows.empty() ? "nothing is known of it: neither set nor read from the unit"
+                            : DescribeRows(rows, {"axis", "parameter", "value", "origin"}));
   return ExitCode::kOk;
 }
 

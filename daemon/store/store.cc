@@ -23,13 +23,10 @@ struct Statements {
 
 namespace {
 
+// Replaces the row as a whole: ON CONFLICT DO UPDATE reads it first, and costs a fifth more.
 constexpr const char* kAxis =
-    "INSERT INTO axis_state(serial, axis, witness, low, high, vector, turns, subdivision, move, "
-    "origin, at_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11) ON CONFLICT(serial, axis) DO UPDATE SET "
-    "witness = ?3, low = ?4, high = ?5, vector = ?6, turns = ?7, subdivision = ?8, move = ?9, "
-    "origin = ?10, "
-    "at_ns = ?11";
+    "INSERT OR REPLACE INTO axis_state(serial, axis, witness, low, high, vector, turns, "
+    "subdivision, move, origin, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
 constexpr const char* kAxisChanged =
     "INSERT INTO axis_history(serial, axis, witness, low, high, subdivision, origin, at_ns) "
     "SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS(SELECT 1 FROM axis_state WHERE serial "

@@ -9,6 +9,8 @@
 namespace focalfleet {
 namespace {
 
+constexpr const char* kMissing = "the value is missing (empty or nan)";
+
 std::string Lower(std::string_view text) {
   std::string lower(text);
   for (char& c : lower)
@@ -238,19 +240,18 @@ void CsvRow::Reject(std::string_view column, const std::string& reason) {
   if (!error_) error_ = table_.ErrorAt(row_, "column " + std::string(column) + ": " + reason);
 }
 
-bool CsvRow::Has(std::string_view column) const {
+std::string_view CsvRow::Cell(std::string_view column) const {
   const auto index = table_.Find(column);
-  return index && !IsMissing(Trimmed(table_.cell(row_, *index)));
+  return index ? Trimmed(table_.cell(row_, *index)) : std::string_view();
 }
 
-std::string CsvRow::Text(std::string_view column) const {
-  const auto index = table_.Find(column);
-  return index ? std::string(Trimmed(table_.cell(row_, *index))) : std::string();
-}
+bool CsvRow::Has(std::string_view column) const { return !IsMissing(Cell(column)); }
+
+std::string CsvRow::Text(std::string_view column) const { return std::string(Cell(column)); }
 
 std::optional<double> CsvRow::NumberIfAny(std::string_view column) {
-  if (!Has(column)) return std::nullopt;
-  const std::string cell = Text(column);
+  const std::string_view cell = Cell(column);
+  if (IsMissing(cell)) return std::nullopt;
   const std::optional<double> value = ParseNumber(cell);
   if (!value) {
     Reject(column, Quoted(cell) + " is not a number");
@@ -263,18 +264,19 @@ std::optional<double> CsvRow::NumberIfAny(std::string_view column) {
 }
 
 double CsvRow::Number(std::string_view column) {
-  if (!Has(column)) Reject(column, "the value is missing (empty or nan)");
-  return NumberIfAny(column).value_or(0);
+  const std::optional<double> value = NumberIfAny(column);
+  if (!value) Reject(column, kMissing);  // keeps an earlier error about the same cell
+  return value.value_or(0);
 }
 
 std::optional<std::int64_t> CsvRow::IntegerIfAny(std::string_view column, IntegerBounds bounds) {
   const std::optional<double> value = NumberIfAny(column);
   if (!value) return std::nullopt;
   if (*value != std::floor(*value)) {
-    Reject(column, Quoted(Text(column)) + " is not a whole number");
+    Reject(column, Quoted(Cell(column)) + " is not a whole number");
   } else if (*value < static_cast<double>(bounds.low) ||
              *value > static_cast<double>(bounds.high)) {
-    Reject(column, Quoted(Text(column)) + " is not between " + std::to_string(bounds.low) +
+    Reject(column, Quoted(Cell(column)) + " is not between " + std::to_string(bounds.low) +
                        " and " + std::to_string(bounds.high));
   } else {
     return static_cast<std::int64_t>(*value);
@@ -283,8 +285,9 @@ std::optional<std::int64_t> CsvRow::IntegerIfAny(std::string_view column, Intege
 }
 
 std::int64_t CsvRow::Integer(std::string_view column, IntegerBounds bounds) {
-  if (!Has(column)) Reject(column, "the value is missing (empty or nan)");
-  return IntegerIfAny(column, bounds).value_or(bounds.low);
+  const std::optional<std::int64_t> value = IntegerIfAny(column, bounds);
+  if (!value) Reject(column, kMissing);
+  return value.value_or(bounds.low);
 }
 
 std::string NumberText(double value) {

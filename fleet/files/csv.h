@@ -73,13 +73,16 @@ class CsvRow {
   std::int64_t Integer(std::string_view column, IntegerBounds bounds);
   std::optional<std::int64_t> IntegerIfAny(std::string_view column, IntegerBounds bounds);
   /// The cell as it stands, without the blanks around it; empty where there is none.
-  std::string Text(std::string_view column) const;
+  [[nodiscard]] std::string Text(std::string_view column) const;
 
   void Reject(std::string_view column, const std::string& reason);
   [[nodiscard]] int line() const { return table_.line(row_); }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
 
  private:
+  // Without the blanks around it; empty where the column is not there.
+  [[nodiscard]] std::string_view Cell(std::string_view column) const;
+
   const CsvTable& table_;
   std::size_t row_;
   std::optional<Error> error_;

@@ -87,12 +87,12 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
     CsvRow row(table, k);
     const Unit unit = ReadUnit(&row);
     if (row.error()) return tl::unexpected<Error>(*row.error());
-    const std::string name = "unit " + std::to_string(unit.id.value);
+    const std::string name = "unit " + std::to_string(unit.id.value) + ": ";
     if (const std::string fault = FaultOf(unit); !fault.empty())
-      return tl::unexpected<Error>(table.ErrorAt(k, name + ": " + fault));
+      return tl::unexpected<Error>(table.ErrorAt(k, name + fault));
     if (const auto [it, fresh] = line_of.emplace(unit.id, row.line()); !fresh)
       return tl::unexpected<Error>(
-          table.ErrorAt(k, name + ": is there twice, first in line " + std::to_string(it->second)));
+          table.ErrorAt(k, name + "is there twice, first in line " + std::to_string(it->second)));
     units.units.push_back(unit);
     units.lines.push_back(row.line());
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "fleet/files/csv.h"
 #include "protocol/base/check.h"
@@ -71,10 +72,11 @@ Status CheckJoins(const std::string& file, const std::vector<PlanRow>& rows) {
     const PlanRow& before = rows[order[k - 1]];
     const PlanRow& later = rows[order[k]];
     if (before.unit != later.unit || before.axis != later.axis) continue;
-    if (const std::string fault = JoinFault(before, later); !fault.empty())
-      return Fail(ErrorCode::kInvalid, file + ":" + std::to_string(later.line) + ": unit " +
-                                           std::to_string(later.unit.value) + " " +
-                                           Name(later.axis) + ": " + fault);
+    const std::string fault = JoinFault(before, later);
+    if (fault.empty()) continue;
+    std::string text = file + ":" + std::to_string(later.line) + ": unit ";
+    text += std::to_string(later.unit.value) + " " + Name(later.axis) + ": " + fault;
+    return Fail(ErrorCode::kInvalid, std::move(text));
   }
   return {};
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "protocol/base/rng.h"
 #include "tests/support/seed.h"
@@ -118,7 +119,7 @@ TEST(Kinematics, ARoundedPointOnTheBorderIsReached) {
 
 TEST(Kinematics, NoPointOfNaN) {
   EXPECT_TRUE(AnglesFor(LamostUnit(), {std::nan(""), 0}).empty());
-  EXPECT_TRUE(AnglesFor(LamostUnit(), {INFINITY, 0}).empty());
+  EXPECT_TRUE(AnglesFor(LamostUnit(), {std::numeric_limits<double>::infinity(), 0}).empty());
 }
 
 TEST(Kinematics, WholeVectorsStayWithinTheRange) {

@@ -154,6 +154,36 @@ TEST_F(DaemonCommands, ApplyEndsWithFiveWhereTheDaemonGoesAwayOnTheWay) {
   EXPECT_THAT(result.err, HasSubstr("whether `apply` took effect is not known"));
 }
 
+TEST_F(DaemonCommands, ApplyEndsWithFiveWhereTheDaemonEndsOnTheWay) {
+  const auto result =
+      Apply({"--wait"}, {.result = Fail(ErrorCode::kUnavailable, "the daemon ends")});
+  EXPECT_EQ(result.exit, 5);
+}
+
+TEST_F(DaemonCommands, HomeWaitEndsAsItsUnitsDid) {
+  const auto good =
+      Ask({"home", "1", "2", "--wait"}, {{"home", {.result = Configuration("done", 2, 0)}}});
+  EXPECT_EQ(good.exit, 0);
+  const auto bad =
+      Ask({"home", "1", "2", "--wait"}, {{"home", {.result = Configuration("done", 1, 1)}}});
+  EXPECT_EQ(bad.exit, 3);
+  EXPECT_THAT(bad.out, HasSubstr("unit 2: failed: no answer"));
+}
+
+TEST_F(DaemonCommands, ParamsShowWhatWasSetAndWhatHoldsByDefault) {
+  const Json answer{
+      {"drive", {{"theta_repeat", 54}, {"phi_repeat", 108}, {"mode", "asymmetric"}}},
+      {"parameters",
+       {{{"axis", "theta"}, {"parameter", "repeat"}, {"value", 54}, {"origin", "operator"}}}}};
+  const auto text = Ask({"params", "9"}, {{"params", {.result = answer}}});
+  EXPECT_THAT(text.out, HasSubstr("theta  repeat     54     operator"));
+  EXPECT_THAT(text.out, HasSubstr("phi    repeat     108    default"));
+  const auto json =
+      Ask({"params", "9", "get", "phi", "repeat", "--json"}, {{"params", {.result = answer}}});
+  EXPECT_EQ(Json::parse(json.out, nullptr, false)["parameters"],
+            Json::parse(R"([{"axis":"phi","parameter":"repeat","value":108,"origin":"default"}])"));
+}
+
 TEST_F(DaemonCommands, ApplyDoesNotAskTheDaemonAboutAFileThatIsNoText) {
   const std::string binary = scratch_.Put("b.csv", std::string("unit_id,x_mm\n1,\0", 16) + "\xff");
   const auto result = Ask({"apply", binary}, {});
@@ -199,7 +229,7 @@ TEST_F(DaemonCommands, StopPointsToTheDirectWayWhereNoDaemonAnswers) {
 TEST_F(DaemonCommands, HomeWantsUnitsOrNotKnownButNotBoth) {
   EXPECT_EQ(Ask({"home"}, {{"home", {}}}).exit, 2);
   EXPECT_EQ(Ask({"home", "1", "--not-known"}, {{"home", {}}}).exit, 2);
-  EXPECT_EQ(Ask({"home", "1", "2", "--wait"}, {{"home", {}}}).exit, 0);
+  Ask({"home", "1", "2", "--wait"}, {{"home", {.result = Configuration("done", 2, 0)}}});
   EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {1, 2}}, {"wait", true}}));
   EXPECT_EQ(Ask({"home", "--not-known"}, {{"home", {}}}).exit, 0);
   EXPECT_EQ(requests_.at(0).args, (Json{{"not_known", true}, {"wait", false}}));
@@ -248,10 +278,10 @@ TEST_F(DaemonCommands, StateWritesWhereEveryUnitStands) {
       Ask({"state", "--out", scratch_ / "state.csv"}, {{"state", {.result = rows}}});
   EXPECT_EQ(result.exit, 0) << result.err;
   EXPECT_EQ(test::Slurp(scratch_ / "state.csv"),
-            "unit_id,theta_deg,phi_deg\n1,-1.500000,179.250000\n2,-1.500000,179.250000\n");
+            "unit_id,theta_deg,phi_deg\n1,-1.5,179.25\n2,-1.5,179.25\n");
 }
 
-TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToWriteThemAsMissing) {
+TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToLeaveThemOut) {
   const Json rows{{"rows", {StateRow(1, "reported"), StateRow(2, "interval")}}};
   const auto refused = Ask({"state", "--out", scratch_ / "s.csv"}, {{"state", {.result = rows}}});
   EXPECT_EQ(refused.exit, 1);
@@ -261,7 +291,8 @@ TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToWriteThemAsMissing) 
       Ask({"state", "--out", scratch_ / "s.csv", "--allow-unknown"}, {{"state", {.result = rows}}});
   EXPECT_EQ(told.exit, 3);
   EXPECT_EQ(test::Slurp(scratch_ / "s.csv"),
-            "unit_id,theta_deg,phi_deg\n1,-1.500000,179.250000\n2,nan,nan\n");
+            "unit_id,theta_deg,phi_deg\n1,-1.5,179.25\n# unit 2 left out: theta interval, phi "
+            "reported\n");
 }
 
 }  // namespace
