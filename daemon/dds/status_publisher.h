@@ -30,7 +30,7 @@ struct DdsOptions {
 struct PublisherCounters {
   std::uint64_t samples = 0;
   std::uint64_t payload_bytes = 0;  // serialised samples, without RTPS and UDP headers
-  std::uint64_t deferred = 0;       // refused because a reader lagged; the caller offers them again
+  std::uint64_t deferred = 0;       // refused for lack of room; the caller offers them again
 };
 
 class StatusPublisher {
@@ -41,10 +41,12 @@ class StatusPublisher {
   StatusPublisher& operator=(const StatusPublisher&) = delete;
   ~StatusPublisher();
 
-  /// How many of `units` were taken, from the front. Fewer than all: a reader lags and the buffers
-  /// are full; offer the rest again, or newer values of them. Leaves at Flush. Errors (of every
-  /// Publish): kInvalid: a code outside its enum (a reader would drop the sample silently), named,
-  /// nothing was written; kUnavailable: DDS failed. Cost: no allocation of ours.
+  /// How many of `units` were taken, from the front; they leave at Flush. With keep-last, Cyclone
+  /// 0.10.2 takes all: a reader that lags misses values in between, never the last one. A DDS that
+  /// refuses for lack of room would take fewer; offer the rest again, or newer values of them.
+  /// Errors (of every Publish): kInvalid: a code outside its enum, named, nothing was written;
+  /// kUnavailable: DDS failed.
+  /// Cost: no allocation of ours.
   Result<std::size_t> Publish(std::span<const UnitStatusValue> units);
   Result<std::size_t> Publish(std::span<const BusStatusValue> buses);
   Status Publish(const FleetStatusValue& fleet);

@@ -1,7 +1,7 @@
 // What must not be lost, in one SQLite file. A batch of rows is one transaction: WAL with
 // synchronous=FULL, so that a batch which Commit acknowledged is there after kill -9 and after a
-// power cut, and one which it did not is there wholly or not at all. Measured: 10,000 axes a commit
-// cost 12 ms of CPU, 1.1 times a bare loop.
+// power cut, and one which it did not is there wholly or not at all. 10,000 axes a commit cost
+// about what a bare sqlite3 loop does (tests/bench/store_bench.cc).
 //
 // One process writes: it holds a lock on `<path>.lock` for as long as it lives. Any number may read
 // beside it through StoreReader (WAL readers do not hold up the writer), each on a connection of
@@ -60,10 +60,11 @@ class Store {
   /// All that the coordinator needs to go on. Errors: kInvalid names table, row and value.
   Result<StoredFleet> Load();
 
-  /// `rows` are durable, all of them, in order. An intent's end is written last, with the place at
-  /// which the batch leaves the unit. Writing the same batch again changes nothing. Errors: kFull:
-  /// no space; kUnavailable: the disk or file fails; kInvalid: a row holds a code that does not
-  /// exist. In each case nothing of the batch was written and a later Commit may succeed.
+  /// `rows` are durable, all of them, in order; but ends of intents are written last, with the
+  /// place at which the batch leaves the unit. A batch that failed may be offered again.
+  /// Errors: kFull: no space; kUnavailable: the disk or file fails; kInvalid: a row could not be
+  /// read back (a code that does not exist, one place with two positions). Nothing of the batch
+  /// was written then, and a later Commit may succeed.
   /// Cost: one prepared statement a row (two for a VectorRow), no allocation, one fsync.
   Status Commit(std::span<const Row> rows, WallTime now);
 
