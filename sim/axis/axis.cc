@@ -116,7 +116,7 @@ void AxisModel::FollowPiece(const FieldPath::Piece& piece, double now_ns, bool s
   }
   double extra = 0;
   if (!settled) {
-    const double share = LoadShare(moment->output_deg);
+    const double share = LoadShare(field_turns + static_cast<double>(moment->offset_turns));
     const double settling_ns = motor_->settling_s() * 1e9;
     const double ran_ns = std::min(now_ns, piece.end_ns()) - piece.begin_ns;
     const double since_ns = std::max(0.0, now_ns - piece.end_ns());
@@ -134,7 +134,7 @@ void AxisModel::Drag(const Pull& pull, Moment* moment) const {
   const double sign = pull.up ? 1 : -1;
   const double stop = sign * (pull.up ? stop_high_turns_ : stop_low_turns_);
   double field = sign * (pull.field_turns + static_cast<double>(moment->offset_turns));
-  const double lag = motor_->StaticLagTurns(LoadShare(moment->output_deg)) + pull.extra_lag_turns;
+  const double lag = motor_->StaticLagTurns(LoadShare(sign * field)) + pull.extra_lag_turns;
   double rotor = std::max(sign * moment->rotor_turns, field - lag);
   if (field - lag > stop) {
     const double slipped = std::max(0.0, std::ceil(field - stop - 0.5));
@@ -149,22 +149,28 @@ void AxisModel::Drag(const Pull& pull, Moment* moment) const {
 void AxisModel::LockOn(double field_turns, Moment* moment) const {
   moment->offset_turns = std::llround(moment->rotor_turns - field_turns);
   const double agreed = field_turns + static_cast<double>(moment->offset_turns);
-  const double lag = motor_->StaticLagTurns(LoadShare(moment->output_deg));
+  const double lag = motor_->StaticLagTurns(LoadShare(agreed));
   const double rotor = std::clamp(moment->rotor_turns, agreed - lag, agreed + lag);
   Turn(std::clamp(rotor, stop_low_turns_, stop_high_turns_), moment);
 }
 
+double AxisModel::DrivenDeg(double rotor_turns) const {
+  return memory_.output_reference_deg +
+         (rotor_turns - memory_.rotor_reference_turns) * 360 * traits_.grip / traits_.gear;
+}
+
 void AxisModel::Turn(double rotor_turns, Moment* moment) const {
   moment->rotor_turns = rotor_turns;
-  const double driven_deg =
-      memory_.output_reference_deg +
-      (rotor_turns - memory_.rotor_reference_turns) * 360 * traits_.grip / traits_.gear;
+  const double driven_deg = DrivenDeg(rotor_turns);
   const double half = traits_.backlash_deg / 2;
   moment->output_deg = std::clamp(moment->output_deg, driven_deg - half, driven_deg + half);
 }
 
-double AxisModel::LoadShare(double output_deg) const {
-  return 1 + motor_->parameters().load_variation * SinDeg(output_deg + traits_.load_phase_deg);
+// The load where a rotor without lag would stand: it varies over a whole output turn, so the lag
+// makes no difference to it.
+double AxisModel::LoadShare(double rotor_turns) const {
+  return 1 + motor_->parameters().load_variation *
+                 SinDeg(DrivenDeg(rotor_turns) + traits_.load_phase_deg);
 }
 
 double AxisModel::ScatterDeg(HostInstant at) const {

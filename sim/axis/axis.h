@@ -89,7 +89,8 @@ class AxisModel {
   void Drag(const Pull& pull, Moment* moment) const;
   void Turn(double rotor_turns, Moment* moment) const;
   void LockOn(double field_turns, Moment* moment) const;
-  [[nodiscard]] double LoadShare(double output_deg) const;
+  [[nodiscard]] double LoadShare(double rotor_turns) const;
+  [[nodiscard]] double DrivenDeg(double rotor_turns) const;
   [[nodiscard]] double ScatterDeg(HostInstant at) const;
   void Fold(HostInstant at, bool settled);
 
