@@ -1,0 +1,118 @@
+// A fleet to plan for in tests: layout, where everybody stands and shall go; and what every plan
+// must keep.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "fleet/hex_layout.h"
+#include "fleet/plan/planner.h"
+#include "fleet/targets.h"
+#include "protocol/base/limits.h"
+#include "tests/fleet/plan/plan_rows.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet::testing {
+
+struct PlanningFleet {
+  Layout layout;
+  std::vector<UnitDrive> drives;
+  std::vector<UnitKnowledge> start;
+  std::vector<std::optional<Pose>> targets;
+  std::vector<std::uint8_t> frozen;
+
+  [[nodiscard]] PlanRequest request() const {
+    return {
+        .layout = &layout, .drives = drives, .start = start, .targets = targets, .frozen = frozen};
+  }
+  void StandAt(const std::vector<Pose>& poses) {
+    for (std::size_t i = 0; i < poses.size(); ++i) start[i] = Exactly(Witness::kReported, poses[i]);
+  }
+};
+
+inline PlanningFleet FleetOf(std::vector<Unit> units, Layout::Options options = {}) {
+  auto layout = Layout::Create(std::move(units), std::move(options));
+  EXPECT_TRUE(layout) << layout.error().text;
+  const std::size_t n = layout->size();
+  PlanningFleet fleet{std::move(*layout), std::vector<UnitDrive>(n), std::vector<UnitKnowledge>(n),
+                      std::vector<std::optional<Pose>>(n), std::vector<std::uint8_t>(n, 0)};
+  for (UnitKnowledge& k : fleet.start) k = Exactly(Witness::kReported, Pose{});
+  return fleet;
+}
+
+inline PlanningFleet HexFleet(std::uint32_t count, Layout::Options options = {}) {
+  return FleetOf(MakeHexLayout({.count = count}), std::move(options));
+}
+
+/// Random start and, for every unit that may move, a random target; both clear.
+inline void DrawStartAndTargets(PlanningFleet* fleet, std::uint64_t seed) {
+  const std::size_t n = fleet->layout.size();
+  std::vector<std::optional<Pose>> standing(n);
+  const auto start =
+      DrawConfiguration(fleet->layout, fleet->drives, standing, Rng::Stream(seed, "start"));
+  ASSERT_TRUE(start) << start.error().text;
+  fleet->StandAt(*start);
+  const auto stands = [&](std::uint32_t i) {
+    return !fleet->layout.unit({i}).enabled || fleet->frozen[i] != 0;
+  };
+  for (std::uint32_t i = 0; i < n; ++i)
+    if (stands(i)) standing[i] = (*start)[i];
+  const auto target =
+      DrawConfiguration(fleet->layout, fleet->drives, standing, Rng::Stream(seed, "target"));
+  ASSERT_TRUE(target) << target.error().text;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    fleet->targets[i].reset();
+    if (!stands(i)) fleet->targets[i] = (*target)[i];
+  }
+}
+
+inline bool IsUnserved(const Plan& plan, std::uint32_t unit) {
+  for (const Unserved& u : plan.unserved)
+    if (u.unit.value == unit) return true;
+  return false;
+}
+
+inline const UnitPlan* MoveOf(const Plan& plan, std::uint32_t unit) {
+  for (const UnitPlan& move : plan.moves)
+    if (move.unit.value == unit) return &move;
+  return nullptr;
+}
+
+/// The checker's verdict on a plan.
+inline CheckReport Witnessed(const PlanningFleet& fleet, const Plan& plan,
+                             CheckOptions options = {}) {
+  options.clearance_mm = fleet.layout.clearance_mm();
+  return CheckPlan(CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+                   CheckedRows(plan, fleet.layout, fleet.drives), CheckedObstacles(fleet.layout),
+                   options);
+}
+
+/// What holds of every plan: clear at all times, and everybody ends at the target or where it
+/// stood.
+inline void ExpectSound(const PlanningFleet& fleet, const Plan& plan,
+                        const CheckOptions& options = {}) {
+  const CheckReport report = Witnessed(fleet, plan, options);
+  EXPECT_TRUE(report.ok()) << report.Text();
+  std::vector<Pose> ends;
+  for (const UnitKnowledge& k : fleet.start) ends.push_back(PlaceOf(k));
+  for (const UnitPlan& move : plan.moves) {
+    EXPECT_EQ(move.from, ends[move.unit.value]);
+    Pose at = move.from;
+    for (std::size_t k = 0; k < kAxisCount; ++k) {
+      EXPECT_LE(move.path[k].size(), limits::kSegmentsPerAxis);
+      for (const Segment& segment : move.path[k].segments()) at[k] += segment.delta;
+    }
+    EXPECT_EQ(move.to, at);
+    EXPECT_LE(EndOf(move, fleet.drives[move.unit.value]), plan.makespan_s);
+    ends[move.unit.value] = at;
+  }
+  for (std::uint32_t i = 0; i < ends.size(); ++i) {
+    const bool served = fleet.targets[i] && !IsUnserved(plan, i);
+    EXPECT_EQ(ends[i], served ? *fleet.targets[i] : PlaceOf(fleet.start[i])) << "unit index " << i;
+  }
+}
+
+}  // namespace focalfleet::testing
