@@ -62,14 +62,19 @@ TEST(Layout, OneUnitAlonePitchesTwiceItsReach) {
 TEST(Layout, NeighboursAreExactlyThoseWhoseReachesOverlap) {
   const std::uint64_t seed = testing::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
-  for (const double spread : {1.0, 0.001}) {  // an even plate; all but on a line
+  struct Plate {
+    double height_mm;
+    double stray_mm;
+  };
+  for (const Plate& plate : {Plate{600, 600}, Plate{0.6, 0.6}, Plate{600, 90'000}}) {
     Rng rng(seed);
     std::vector<Unit> units;
     for (std::uint32_t i = 0; i < 400; ++i) {
-      units.push_back(UnitAt(i + 1, rng.Uniform(0, 600), rng.Uniform(0, 600 * spread)));
-      units.back().axis[0].arm_mm = rng.Uniform(1, 12);
+      units.push_back(UnitAt(i + 1, rng.Uniform(0, 600), rng.Uniform(0, plate.height_mm)));
+      units.back().axis[0].arm_mm = rng.Uniform(1, plate.height_mm > 1 ? 40 : 4);
+      units.back().axis[1].arm_mm = 4;
     }
-    units.push_back(UnitAt(9999, 90'000, -90'000));  // a stray
+    units.push_back(UnitAt(9999, plate.stray_mm, -plate.stray_mm));
     const auto layout = Layout::Create(units, {});
     ASSERT_TRUE(layout) << layout.error().text;
     for (std::uint32_t i = 0; i < layout->size(); ++i) {
