@@ -1,6 +1,7 @@
-// From what an astronomer asks for to where two axes shall stand. A target is a point of the focal plane or
-// two angles; a point has up to two solutions (elbow left or right) and theta any whole turn in its range:
-// the one nearest to where the unit stands is taken. Also draws random configurations for load tests.
+// From what an astronomer asks for to where two axes shall stand. A target is a point of the focal
+// plane or two angles; a point has up to two solutions (elbow left or right) and theta any whole
+// turn in its range: the one nearest to where the unit stands is taken. Also draws random
+// configurations for load tests.
 #pragma once
 
 #include <optional>
@@ -35,26 +36,28 @@ struct Targets {
 };
 
 /// The pose for each unit, none where no target names it. Shape: (n).
-/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of range, two
-/// targets of enabled units that collide.
+/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of
+/// range, two targets of enabled units that collide.
 /// Disabled units' targets are resolved too; the planner passes them over by name.
-Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets, const Layout& layout,
+Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
+                                                        const Layout& layout,
                                                         std::span<const UnitDrive> drives,
                                                         std::span<const UnitKnowledge> now);
 
-struct PoseFp {  // a whole configuration that is free of collisions
+struct PoseFp {             // a whole configuration that is free of collisions
   std::vector<Pose> poses;  // Shape: (n)
 };
 
-/// A random configuration in which all pairs (and obstacles) are clear: enabled units uniform over their
-/// patrol area; disabled units random with the arm folded back to phi + phi_zero >= 120 degrees.
-/// Where `standing` is given, units that it fixes keep that pose and the others are drawn around them.
+/// A random configuration in which all pairs (and obstacles) are clear: enabled units uniform over
+/// their patrol area; disabled units random with the arm folded back to phi + phi_zero >= 120
+/// degrees. Where `standing` is given, units that it fixes keep that pose and the others are drawn
+/// around them.
 /// Errors: kRefused where some unit finds no clear place.
 Result<std::vector<Pose>> DrawConfiguration(const Layout& layout, std::span<const UnitDrive> drives,
                                             std::span<const std::optional<Pose>> standing, Rng rng);
 
-/// Every unit folded back: theta in the middle of its range, phi as near to 180 degrees as it gets; disabled
-/// units as DrawConfiguration draws them.
+/// Every unit folded back: theta in the middle of its range, phi as near to 180 degrees as it gets;
+/// disabled units as DrawConfiguration draws them.
 std::vector<Pose> FoldedConfiguration(const Layout& layout, std::span<const UnitDrive> drives);
 
 }  // namespace focalfleet
