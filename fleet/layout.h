@@ -1,7 +1,8 @@
-// The focal plane as it is believed to be: where each unit sits, how long its arms are, which supply and bus
-// feed it. Frames: _fp is the focal plane in mm, seen from the sky side, angles counter-clockwise.
-// A unit's moving part is its phi arm, the segment from elbow to fibre, with a half-width; two units can only
-// touch when their reaches overlap, so neighbours are found once, in a grid, in O(n).
+// The focal plane as it is believed to be: where each unit sits, how long its arms are, which
+// supply and bus feed it. Frames: _fp is the focal plane in mm, seen from the sky side, angles
+// counter-clockwise. A unit's moving part is its phi arm, the segment from elbow to fibre, with a
+// half-width; two units can only touch when their reaches overlap, so neighbours are found once, in
+// a grid, in O(n).
 #pragma once
 
 #include <array>
@@ -39,7 +40,7 @@ struct Unit {
   UnitId id;
   PointFp base_fp;
   std::array<AxisGeometry, kAxisCount> axis;
-  double arm_half_width_mm = 0;  // Create fills in 0.08 of the nearest neighbour's distance where it is 0
+  double arm_half_width_mm = 0;  // 0: Create takes 0.08 of the nearest neighbour's distance
   RailId rail;
   BusId bus = kNoBus;
   NodeId node = kNoNode;
@@ -63,8 +64,8 @@ struct Obstacle {
   double radius_mm = 0;
 };
 
-/// Why this unit by itself cannot be (a number that is not finite, an arm without length, an empty range),
-/// or an empty text. Bus, node and neighbours are not looked at.
+/// Why this unit by itself cannot be (a number that is not finite, an arm without length, an empty
+/// range), or an empty text. Bus, node and neighbours are not looked at.
 std::string FaultOf(const Unit& unit);
 
 class Layout {
@@ -74,9 +75,9 @@ class Layout {
     std::vector<Obstacle> obstacles;
   };
 
-  /// Checks the units (unique ids, finite numbers, positive arms, min < max, unique bus and node, limits) and
-  /// finds pitch, half-widths and neighbours. Units without a bus are spread in order, 100 a bus,
-  /// on buses above all that were given (from 0 where none was).
+  /// Checks the units (unique ids, finite numbers, positive arms, min < max, unique bus and node,
+  /// limits) and finds pitch, half-widths and neighbours. Units without a bus are spread in order,
+  /// 100 a bus, on buses above all that were given (from 0 where none was).
   /// Errors: kInvalid, names the unit. Cost: O(n) for an even plate.
   static Result<Layout> Create(std::vector<Unit> units, Options options);
 

@@ -44,10 +44,6 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
                                                         std::span<const UnitDrive> drives,
                                                         std::span<const UnitKnowledge> now);
 
-struct PoseFp {             // a whole configuration that is free of collisions
-  std::vector<Pose> poses;  // Shape: (n)
-};
-
 /// A random configuration in which all pairs (and obstacles) are clear: enabled units uniform over
 /// their patrol area; disabled units random with the arm folded back to phi + phi_zero >= 120
 /// degrees. Where `standing` is given, units that it fixes keep that pose and the others are drawn

@@ -188,6 +188,18 @@ TEST(ResolveTargets, NamesFileLineUnitAndReason) {
               HasSubstr("in a direction out of range"));
 }
 
+TEST(ResolveTargets, RefusesTwoTargetsThatTouchUnlessOneIsPassedOver) {
+  auto units = MakeHexLayout({.count = 2});
+  const double toward = std::atan2(units[1].base_fp.y_mm, units[1].base_fp.x_mm) * 57.29578;
+  const std::vector<TargetRow> rows = {Row(2, TargetAngles{toward + 180, 0}, 2),
+                                       Row(1, TargetAngles{toward, 0}, 3)};
+  EXPECT_THAT(ErrorOf(FleetOf(units), rows),
+              HasSubstr("night.csv:3: unit 1: its target collides with that of unit 2 in line 2: "
+                        "their arms would be 0.0000 mm apart, 4.4032 mm are needed"));
+  units[1].enabled = false;
+  EXPECT_EQ(ErrorOf(FleetOf(units), rows), "");
+}
+
 TEST(DrawConfiguration, IsClearInRangeAndTheSameForTheSameSeed) {
   const std::uint64_t seed = testing::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
