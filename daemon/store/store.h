@@ -77,7 +77,6 @@ class Store {
 
  private:
   Store();
-  Status Write(const Row& row, WallTime now);
   Status Rollback(Error why);
 
   std::string path_;
