@@ -36,16 +36,16 @@ constexpr double SquaredDistance(PointFp p, const SegmentFp& s) {
 inline double DistanceMm(PointFp p, const SegmentFp& s) { return std::sqrt(SquaredDistance(p, s)); }
 
 /// Twice the signed area of the triangle: positive where a, b, c turn counter-clockwise.
-constexpr double Turn(PointFp a, PointFp b, PointFp c) {
+constexpr double DoubleArea(PointFp a, PointFp b, PointFp c) {
   return (b.x_mm - a.x_mm) * (c.y_mm - a.y_mm) - (b.y_mm - a.y_mm) * (c.x_mm - a.x_mm);
 }
 
 /// Strictly crossing; segments that only touch have distance 0 by their end points anyway.
 constexpr bool Crosses(const SegmentFp& s, const SegmentFp& t) {
-  const double s1 = Turn(t.a, t.b, s.a);
-  const double s2 = Turn(t.a, t.b, s.b);
-  const double t1 = Turn(s.a, s.b, t.a);
-  const double t2 = Turn(s.a, s.b, t.b);
+  const double s1 = DoubleArea(t.a, t.b, s.a);
+  const double s2 = DoubleArea(t.a, t.b, s.b);
+  const double t1 = DoubleArea(s.a, s.b, t.a);
+  const double t2 = DoubleArea(s.a, s.b, t.b);
   return ((s1 > 0 && s2 < 0) || (s1 < 0 && s2 > 0)) && ((t1 > 0 && t2 < 0) || (t1 < 0 && t2 > 0));
 }
 
