@@ -294,33 +294,57 @@ Complaints HeadersGuardThemselves(const Files& files) {
   return out;
 }
 
-// Explicit file lists mean that a forgotten file is neither built nor tested: every source and
-// every public header stands in the CMakeLists.txt of its folder or of one above.
+// The words of a CMakeLists.txt: what stands between blanks, quotes and parentheses.
+std::vector<std::string> CMakeWords(const std::string& text) {
+  std::vector<std::string> words(1);
+  for (const std::string& line : Lines(text)) {
+    for (const char c : line.substr(0, line.find('#'))) {
+      const bool separates = std::string_view(" ()\"").find(c) != std::string_view::npos;
+      if (!separates) words.back() += c;
+      if (separates && !words.back().empty()) words.emplace_back();
+    }
+    words.emplace_back();
+  }
+  return words;
+}
+
+void ReplacePrefix(std::string* text, std::string_view prefix, const std::string& by) {
+  if (StartsWith(*text, prefix)) *text = by + text->substr(prefix.size());
+}
+
+// Files that a CMakeLists.txt names, from the repository's root. `${program}.c` of a foreach stands
+// for every word of the file with that ending.
+std::set<std::string> FilesNamedBy(const File& list) {
+  const std::string folder = list.path.substr(0, list.path.rfind('/') + 1);
+  const auto words = CMakeWords(list.text);
+  std::set<std::string> named;
+  const auto add = [&](std::string word) {
+    ReplacePrefix(&word, "${CMAKE_CURRENT_SOURCE_DIR}/", "");
+    const bool from_root = StartsWith(word, "${PROJECT_SOURCE_DIR}/");
+    ReplacePrefix(&word, "${PROJECT_SOURCE_DIR}/", "");
+    named.insert(fs::path((from_root ? "" : folder) + word).lexically_normal().generic_string());
+  };
+  for (const std::string& word : words) {
+    add(word);
+    const std::size_t brace = word.find('}');
+    if (!StartsWith(word, "${") || brace == std::string::npos || word[brace + 1] != '.') continue;
+    for (const std::string& stem : words) add(stem + word.substr(brace + 1));
+  }
+  return named;
+}
+
+// Explicit file lists mean that a forgotten file is neither built nor tested: every source, and
+// every header of a library, stands in a CMakeLists.txt.
 Complaints EverySourceIsBuilt(const Files& files) {
+  std::set<std::string> named;
+  for (const File& list : files)
+    if (EndsWith(list.path, "/CMakeLists.txt")) named.merge(FilesNamedBy(list));
   Complaints out;
   for (const File& file : files) {
     const bool source = EndsWith(file.path, ".cc") || EndsWith(file.path, ".c");
     const bool library_header = EndsWith(file.path, ".h") && IsPure(file.path);
-    if (!source && !library_header) continue;
-    bool listed = false;
-    for (const File& list : files) {
-      if (!EndsWith(list.path, "CMakeLists.txt")) continue;
-      const std::string folder = list.path.substr(0, list.path.rfind('/') + 1);
-      if (list.path.find('/') == std::string::npos || !StartsWith(file.path, folder)) continue;
-      const std::string name = file.path.substr(folder.size());
-      for (std::size_t at = list.text.find(name); at != std::string::npos && !listed;
-           at = list.text.find(name, at + 1)) {
-        const char before = at == 0 ? ' ' : list.text[at - 1];
-        const std::size_t end = at + name.size();
-        const char after = end == list.text.size() ? ' ' : list.text[end];
-        listed =
-            !IsWordCharacter(before) && before != '.' && before != '/' && !IsWordCharacter(after);
-        // ${CMAKE_CURRENT_SOURCE_DIR}/name and the like count too.
-        if (before == '/' && at >= 2 && list.text[at - 2] == '}') listed = true;
-      }
-      if (listed) break;
-    }
-    if (!listed) out.push_back(file.path + ": stands in no CMakeLists.txt");
+    if ((source || library_header) && named.count(file.path) == 0)
+      out.push_back(file.path + ": stands in no CMakeLists.txt");
   }
   return out;
 }
@@ -494,7 +518,14 @@ TEST(TidyRules, UnlistedSourcesAreCaught) {
   EXPECT_EQ(found("fleet/a.cc", "fleet/CMakeLists.txt", "SOURCES data.cc"), 1u);
   EXPECT_EQ(found("fleet/a.cc", "sim/CMakeLists.txt", "SOURCES a.cc"), 1u);
   EXPECT_EQ(found("fleet/a.h", "fleet/CMakeLists.txt", "HEADERS b.h"), 1u);
+  EXPECT_EQ(found("fleet/a.cc", "fleet/CMakeLists.txt", "SOURCES # a.cc"), 1u) << "a comment";
   EXPECT_EQ(found("tests/can/a.c", "tests/can/CMakeLists.txt", "add_executable(a a.c)"), 0u);
+  EXPECT_EQ(found("tests/a/b.cc", "tests/c/CMakeLists.txt", "SOURCES ../a/b.cc"), 0u);
+  EXPECT_EQ(found("tests/a/b.cc", "tests/c/CMakeLists.txt", "${PROJECT_SOURCE_DIR}/tests/a/b.cc"),
+            0u);
+  const char* loop = "foreach(x one two)\n  add_executable(${x} ${x}.c)\nendforeach()\n";
+  EXPECT_EQ(found("tests/one.c", "tests/CMakeLists.txt", loop), 0u);
+  EXPECT_EQ(found("tests/three.c", "tests/CMakeLists.txt", loop), 1u);
 }
 
 TEST(TidyRules, FoldersWithoutAReadmeAreCaught) {
