@@ -18,8 +18,7 @@ std::unique_ptr<Connection> Open(const std::string& path, const char* vfs = null
 
 TEST_F(StoreTest, MigrationsCarryAStoreOverStepByStep) {
   const char* const steps[] = {
-      "CREATE TABLE place(id INTEGER PRIMARY KEY, deg REAL) STRICT; INSERT INTO place VALUES(1, "
-      "1.5)",
+      "CREATE TABLE place(id INTEGER PRIMARY KEY, deg REAL) STRICT; INSERT INTO place VALUES(1, 2)",
       "ALTER TABLE place ADD COLUMN turns INTEGER NOT NULL DEFAULT 7",
       "UPDATE place SET turns = turns + 1"};
   auto connection = Open(Path());
