@@ -53,7 +53,8 @@ class Observatory {
     std::filesystem::create_directories(directory_);
     Write("units.csv", WriteUnits(layout_.units()));
     const auto start = DrawConfiguration(layout_, drives_, {}, Rng::Stream(seed, "start"));
-    Write("state.csv", WriteState(layout_, drives_, *start));
+    Write("state.csv", WriteState(layout_, drives_,
+                                  std::vector<std::optional<Pose>>(start->begin(), start->end())));
     // Deadlines are of the fleet's time; what real processes need does not shrink with it.
     Write("focalfleet.toml",
           "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
