@@ -201,7 +201,8 @@ struct ConfigurationView {
 
 struct CoordinatorConfig {
   std::uint32_t bit_rate_bps = 1'000'000;
-  DurationNs reply_wait = Milliseconds(50);         // one request's answer; then a retry
+  DurationNs reply_wait =
+      Milliseconds(50);  // one request's answer; repeats wait 2, 4, 8, 16 times that
   DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again
   DurationNs poll_period =
       Milliseconds(1000);  // progress of each moving unit; health of each resting one x10

@@ -226,7 +226,10 @@ void Core::EndStep() {
     bus.schedule.Release(now, config.transmit_horizon, bus.id, &out->frames, &asked_);
     for (const PositionerIndex i : asked_) {
       if (!unit(i).question) continue;
-      unit(i).question->deadline = now + config.transmit_horizon + config.reply_wait;
+      // Each repeat waits twice as long as the one before: a host that was held up for a moment
+      // must not take the silence for its units'.
+      const std::int64_t patience = std::int64_t{1} << unit(i).question->tries;
+      unit(i).question->deadline = now + config.transmit_horizon + config.reply_wait * patience;
       SetDue(i, unit(i).question->deadline);
     }
     out->wake_at =
