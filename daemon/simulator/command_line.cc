@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cstdio>
 #include <functional>
-#include <map>
 
 #include "daemon/cli/exit_code.h"
 #include "daemon/cli/text_file.h"
@@ -49,6 +48,7 @@ std::vector<std::string> Split(const std::string& text, char separator) {
 /// All that any subcommand takes, as CLI11 fills it in.
 struct Given {
   SimulatorOptions run;
+  std::string spread = "nominal";
   std::string buses_text;
   std::string control;
   std::string units_text;
@@ -139,6 +139,7 @@ int Run(Given* given, const CLI::App& app) {
     given->run.interfaces = std::move(*interfaces);
   }
   given->run.control_path = given->control;
+  given->run.spread = given->spread == "real" ? sim::Spread::kReal : sim::Spread::kNominal;
   const auto ran = RunSimulator(given->run);
   return ran ? static_cast<int>(ExitCode::kOk) : Complain(ran.error(), ExitCode::kRefused);
 }
@@ -159,10 +160,10 @@ void AddRunOptions(CLI::App* app, Given* given) {
       ->check(CLI::Range(0.01, 1000.0))
       ->capture_default_str();
   app->add_option("--seed", run.seed, "of all chance")->capture_default_str();
-  app->add_option("--spread", run.spread,
+  app->add_option("--spread", given->spread,
                   "nominal: units as described; real: the spread of service")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, sim::Spread>{
-          {"nominal", sim::Spread::kNominal}, {"real", sim::Spread::kReal}}));
+      ->check(CLI::IsMember({"nominal", "real"}))
+      ->capture_default_str();
   app->add_option("--bit-rate", run.bit_rate_bps, "bit/s of the simulated buses")
       ->check(CLI::Range(10'000, 1'000'000))
       ->capture_default_str();

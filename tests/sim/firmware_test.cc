@@ -413,6 +413,7 @@ TEST(Firmware, HomingThatIsStoppedKnowsItsPlaceOnlyBeforeTheStop) {
   ASSERT_EQ(late.state(), UnitState::kHoming);
   EXPECT_EQ(late.Ask<Done>(Stop{})->outcome, Outcome::kStopped);
   EXPECT_TRUE(late.Ask<StatusReply>(StatusRequest{})->interrupted);
+  EXPECT_TRUE(late.flash().moving) << "the mark stays until the place is known again";
   EXPECT_EQ(late.StageAndArm(BenchMove(kNew, 10, -10)), Answer::kInterrupted);
 }
 
@@ -586,6 +587,7 @@ TEST(Firmware, AnInterruptedUnitMovesAgainWhenBothPositionsAreSet) {
     EXPECT_NEAR(rig.flash().axis[Index(axis)].position(), measured, 6);
   }
   EXPECT_FALSE(rig.Ask<StatusReply>(StatusRequest{})->interrupted);
+  EXPECT_FALSE(rig.flash().moving);
   EXPECT_EQ(rig.StageAndArm(BenchMove(kNew, 10, 10)), Answer::kOk);
 }
 

@@ -8,6 +8,7 @@
 
 #include "protocol/base/rng.h"
 #include "protocol/wire/frame_bits.h"
+#include "sim/metrology.h"
 #include "tests/sim/rig.h"
 #include "tests/support/seed.h"
 
@@ -243,6 +244,22 @@ TEST(World, ClocksRunAsFastAsDrawn) {
   }
   EXPECT_LT(low, 0.997);
   EXPECT_GT(high, 1.003);
+}
+
+TEST(Metrology, SeesFibresWithItsOwnError) {
+  Rig rig(FleetOf(10, 100));
+  Rng rng(5);
+  const auto exact = Expose(rig.world(), {}, &rng);
+  const auto seen = Expose(rig.world(), {.centroid_sigma_mm = 0.002}, &rng);
+  ASSERT_EQ(seen.size(), 1000u);
+  double squares = 0;
+  for (std::size_t row = 0; row < 1000; ++row) {
+    EXPECT_EQ(exact[row].x_mm, rig.world().Truth(row).x_mm);
+    EXPECT_EQ(exact[row].unit, rig.world().units()[row].id);
+    squares += std::pow(seen[row].x_mm - exact[row].x_mm, 2) +
+               std::pow(seen[row].y_mm - exact[row].y_mm, 2);
+  }
+  EXPECT_NEAR(std::sqrt(squares / 2000), 0.002, 5 * 0.002 / std::sqrt(4000.0));
 }
 
 TEST(World, RefusesUnitsThatCannotBe) {

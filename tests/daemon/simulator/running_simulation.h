@@ -1,0 +1,69 @@
+// focalfleet-sim as a child process, and a client on one of its buses. Both wait for what they wait
+// for, with a limit; nothing sleeps.
+#pragma once
+
+#include <sys/types.h>
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocol/wire/codec.h"
+
+namespace focalfleet::testing {
+
+class RunningSimulation {
+ public:
+  /// Starts it and waits for `ready`.
+  explicit RunningSimulation(std::vector<std::string> arguments);
+  RunningSimulation(const RunningSimulation&) = delete;
+  RunningSimulation& operator=(const RunningSimulation&) = delete;
+  ~RunningSimulation();
+
+  [[nodiscard]] bool ready() const { return ready_; }
+  /// SIGTERM, and its exit code.
+  int Terminate();
+  /// Waits for an end that something else brought about.
+  int Wait();
+  [[nodiscard]] pid_t pid() const { return pid_; }
+
+ private:
+  pid_t pid_ = -1;
+  bool ready_ = false;
+};
+
+class BusClient {
+ public:
+  explicit BusClient(const std::string& path);
+  BusClient(const BusClient&) = delete;
+  BusClient& operator=(const BusClient&) = delete;
+  ~BusClient();
+
+  [[nodiscard]] bool connected() const { return connected_; }
+  void Send(std::uint8_t node, const HostMessage& message, std::uint8_t sequence = 1);
+  /// The next frame, from whomever; none after 20 s.
+  std::optional<CanFrame> Receive();
+  /// The next message of a unit.
+  template <class M>
+  std::optional<M> ReceiveFromUnit() {
+    const auto frame = Receive();
+    if (!frame) return std::nullopt;
+    const auto decoded = DecodeUnit(*frame);
+    if (!decoded || !std::holds_alternative<M>(decoded->message)) return std::nullopt;
+    return std::get<M>(decoded->message);
+  }
+
+ private:
+  int fd_ = -1;
+  bool connected_ = false;
+};
+
+struct Said {
+  int exit = -1;
+  std::string out;
+  std::string err;
+};
+/// Runs focalfleet-sim to its end.
+Said RunToEnd(std::vector<std::string> arguments);
+
+}  // namespace focalfleet::testing
