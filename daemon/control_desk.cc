@@ -65,15 +65,16 @@ std::vector<PositionerIndex> NotKnown(const FleetView& view) {
 
 Result<HomeCommand> HomeOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const bool not_known, FlagArgumentOr(args, "not_known", false));
+  FOCALFLEET_TRY_ASSIGN(const bool unproven, FlagArgumentOr(args, "unproven", false));
   if (not_known) {
-    HomeCommand command{NotKnown(view)};
+    HomeCommand command{NotKnown(view), unproven};
     if (command.units.empty())
       return Fail(ErrorCode::kRefused, "every unit that could be homed knows where it stands");
     return command;
   }
   FOCALFLEET_TRY_ASSIGN(const auto ids, UnsignedListArgument(args, "unit_ids"));
   FOCALFLEET_TRY_ASSIGN(auto units, FindUnits(*view.layout, ids));
-  return HomeCommand{std::move(units)};
+  return HomeCommand{std::move(units), unproven};
 }
 
 Result<StopCommand> StopOf(const Json& args, const FleetView& view) {
@@ -124,6 +125,10 @@ Json NewestOf(const std::vector<ParameterHistory>& history) {
     if (!known) newest.push_back(entry);
   }
   return HistoryJson(newest);
+}
+
+bool HasMoved(const ConfigurationView& configuration) {
+  return configuration.started != kNever || configuration.makespan_s > 0;
 }
 
 }  // namespace
@@ -257,12 +262,18 @@ void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
   if (it == pending_.end()) return;
   const Pending pending = it->second;
   // The first word on a configuration is that it began; who waits wants the last.
+  it->second.began = true;
   if (!reply.last && pending.wait) return;
   pending_.erase(it);
   waiting_ -= pending.wait ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
-    return Answer(pending, tl::unexpected<Error>(*reply.error));
+    // An error means that nothing happened. What failed on the way is a summary with a reason.
+    if (!pending.began || !HasMoved(view.coordinator->configuration()))
+      return Answer(pending, tl::unexpected<Error>(*reply.error));
+    Json summary = ConfigurationJson(view);
+    summary["error"] = reply.error->text;
+    return Answer(pending, summary);
   }
   if (!pending.pursues) return Answer(pending, Json{{"text", reply.text}});
   if (!pending.wait)

@@ -32,6 +32,7 @@ CLI::Option* AddUnits(CLI::App* command, std::vector<std::uint32_t>* units) {
 struct HomeOptions {
   std::vector<std::uint32_t> units;
   bool not_known = false;
+  bool unproven = false;
   bool wait = false;
 };
 
@@ -41,7 +42,7 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
                   {ErrorCode::kInvalid, "home: name units, or say --not-known (one of the two)"},
                   ExitCode::kUsage);
   }
-  Json args{{"wait", options.wait}};
+  Json args{{"wait", options.wait}, {"unproven", options.unproven}};
   if (options.not_known) {
     args["not_known"] = true;
   } else {
@@ -74,6 +75,8 @@ void AddHome(CommandLine* line) {
   auto options = std::make_shared<HomeOptions>();
   AddUnits(command, &options->units);
   command->add_flag("--not-known", options->not_known, "All units whose place is not known");
+  command->add_flag("--unproven", options->unproven,
+                    "Home also where no way can be proven clear of the neighbours: your word for it");
   command->add_flag("--wait", options->wait, "Wait until it is over");
   OnChosen(line, command, options, RunHome);
 }
