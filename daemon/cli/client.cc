@@ -2,9 +2,24 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+
 #include "daemon/control/line_client.h"
 
 namespace focalfleet::cli {
+namespace {
+
+// Progress comes several times a second; a daemon that is silent for so long hangs.
+constexpr DurationNs kHangs = Seconds(120);
+
+bool ChangesNothing(const std::string& verb) {
+  constexpr std::array<const char*, 5> kQuestions = {"status", "unit", "state", "history",
+                                                     "params"};
+  return std::find(kQuestions.begin(), kQuestions.end(), verb) != kQuestions.end();
+}
+
+}  // namespace
 
 tl::expected<Json, Failure> Ask(const Context& context, const Question& question) {
   const std::string path = context.SocketPath();
@@ -18,7 +33,7 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
                              client.error().text)}});
   }
   LineClient::CallOptions options;
-  if (question.long_lasting) options.silence_max.reset();
+  if (question.long_lasting) options.silence_max = kHangs;
   options.on_progress = question.on_progress;
   auto answer = client->Call(question.verb, question.args, options);
   if (answer) return std::move(*answer);
@@ -27,6 +42,14 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
     const bool broken = answer.error().code == ErrorCode::kUnavailable;
     return tl::unexpected<Failure>(
         Failure{broken ? ExitCode::kBroken : ExitCode::kRefused, answer.error()});
+  }
+  if (ChangesNothing(question.verb)) {
+    return tl::unexpected<Failure>(
+        Failure{ExitCode::kNoDaemon,
+                {ErrorCode::kUnavailable,
+                 fmt::format("{}; the daemon may hang (`focalfleet stop --direct` stops the units "
+                             "without it)",
+                             answer.error().text)}});
   }
   return tl::unexpected<Failure>(
       Failure{ExitCode::kBroken,

@@ -1,6 +1,7 @@
-// One question to the daemon, and what its failure means to the caller: nobody there is exit code
-// 4, an answer that says no is 1, and a connection that breaks after the question went out is 5,
-// because nobody can say then whether it took effect.
+// One request to the daemon, and what its failure means to the caller: nobody there is exit code
+// 4, an answer that says no is 1. Where the connection breaks or stays silent after the request
+// went out, a mere question ends with 4, too; a command ends with 5, because nobody can say then
+// whether it took effect.
 #pragma once
 
 #include <functional>
@@ -15,7 +16,8 @@ namespace focalfleet::cli {
 struct Question {
   std::string verb;
   Json args = Json::object();
-  bool long_lasting = false;  // silence is no failure: the daemon answers when the motion is over
+  bool long_lasting = false;  // answered when the motion is over; progress says until then that
+                              // the daemon lives
   std::function<void(const Json&)> on_progress;
 };
 

@@ -167,7 +167,7 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
         context,
         {ErrorCode::kRefused,
          fmt::format("the place of {} is not known: {}; wait until they rest, home them "
-                     "(`focalfleet home --not-known`), or write them as nan with "
+                     "(`focalfleet home --not-known`), or leave them out with "
                      "--allow-unknown",
                      Count(file.unknown.size(), "unit", "units"), NameUnknown(file.unknown))});
   }
@@ -222,7 +222,8 @@ ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
     if (!rows.is_array() || rows.empty()) continue;
     text += fmt::format(
         "{}{}\n{}", text.empty() ? "" : "\n\n", Paint(context.colour_out, Colour::kBold, name),
-        DescribeRows(rows, {"at", "began", "ended", "end", "id", "unit_id", "configuration"}));
+        DescribeRows(rows, {"began", "ended", "at", "id", "unit_id", "source", "state", "end",
+                            "targeted", "arrived", "refused", "failed", "configuration", "move"}));
   }
   Say(context, text.empty() ? "nothing yet" : text);
   return ExitCode::kOk;

@@ -208,6 +208,12 @@ TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
   EXPECT_EQ(Json::parse(json.out, nullptr, false), Status());
 }
 
+TEST_F(DaemonCommands, AQuestionThatIsNotAnsweredMeansThatNoDaemonIsThere) {
+  const auto result = Ask({"status", "--json"}, {{"status", {.hang_up = true}}});
+  EXPECT_EQ(result.exit, 4);
+  EXPECT_EQ(Json::parse(result.out, nullptr, false)["exit"], 4);
+}
+
 TEST_F(DaemonCommands, StatusSurvivesAnAnswerWithoutTheExpectedMembers) {
   const auto result = Ask({"status"}, {{"status", {.result = Json{{"units", "many"}}}}});
   EXPECT_EQ(result.exit, 0) << result.err;

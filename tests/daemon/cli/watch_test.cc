@@ -11,8 +11,8 @@ namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using testing::OwnDomain;
 using ::testing::HasSubstr;
+using testing::OwnDomain;
 
 UnitStatusValue UnitAt(std::uint32_t id, UnitPhase phase) {
   UnitStatusValue unit;
