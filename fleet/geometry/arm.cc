@@ -98,6 +98,11 @@ class SweepTest {
     return travel_mm < kResolution_mm || --budget_ < 0 ? Verdict::kTouch : Verdict::kAskAgain;
   }
 
+  Verdict Judge(const Pair& pair) {
+    return Judge(SquaredDistance(pair.place_a.line, pair.place_b.line),
+                 pair.place_a.travel_mm() + pair.place_b.travel_mm());
+  }
+
   double need_mm_;
   int budget_;
 };
@@ -173,15 +178,17 @@ class SweepTest::Mover {
 };
 
 bool SweepTest::BothClear(const Mover& a, const Mover& b) {
-  std::array<Pair, kStackSize> stack;
-  std::size_t size = 0;
   const Cell whole_a = a.Whole();
   const Cell whole_b = b.Whole();
-  stack[size++] = {whole_a, whole_b, a.Place(whole_a), b.Place(whole_b)};
+  const Pair whole{whole_a, whole_b, a.Place(whole_a), b.Place(whole_b)};
+  // Most pairs are far apart: they shall not pay for the stack.
+  if (Judge(whole) == Verdict::kClear) return true;
+  std::array<Pair, kStackSize> stack;
+  std::size_t size = 0;
+  stack[size++] = whole;
   while (size > 0) {
     const Pair pair = stack[--size];
-    const double travel = pair.place_a.travel_mm() + pair.place_b.travel_mm();
-    const Verdict verdict = Judge(SquaredDistance(pair.place_a.line, pair.place_b.line), travel);
+    const Verdict verdict = Judge(pair);
     if (verdict == Verdict::kClear) continue;
     if (verdict == Verdict::kTouch || size + 2 > kStackSize) return false;
     if (pair.place_a.largest_mm() >= pair.place_b.largest_mm()) {
@@ -198,9 +205,14 @@ bool SweepTest::BothClear(const Mover& a, const Mover& b) {
 }
 
 bool SweepTest::ClearOf(const Mover& a, const SegmentFp& standing) {
+  const Cell whole = a.Whole();
+  const CellPlace whole_place = a.Place(whole);
+  if (Judge(SquaredDistance(whole_place.line, standing), whole_place.travel_mm()) ==
+      Verdict::kClear)
+    return true;
   std::array<Cell, kStackSize> stack;
   std::size_t size = 0;
-  stack[size++] = a.Whole();
+  stack[size++] = whole;
   while (size > 0) {
     const Cell cell = stack[--size];
     const CellPlace place = a.Place(cell);

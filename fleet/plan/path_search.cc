@@ -38,6 +38,15 @@ std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDri
   return step;
 }
 
+PoseBox RangeAround(const ArmGeometry& arm, const Pose& pose) {
+  PoseBox box = arm.range();
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    box.low[k] = std::min(box.low[k], pose[k]);
+    box.high[k] = std::max(box.high[k], pose[k]);
+  }
+  return box;
+}
+
 void PathSearch::SetUp(const Question& question) {
   q_ = question;
   const double grid_rad = q_.grid_deg * std::numbers::pi / 180;
@@ -51,6 +60,7 @@ void PathSearch::SetUp(const Question& question) {
   }
   nodes_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]), Node{});
   open_.clear();
+  last_touched_ = 0;
   reached_.clear();
   reached_nodes_.clear();
 }
@@ -61,28 +71,45 @@ Pose PathSearch::PoseOf(std::int32_t node) const {
   return {q_.from[0] + a * step_[0], q_.from[1] + b * step_[1]};
 }
 
-double PathSearch::ClearanceAt(std::int32_t index) {
+double PathSearch::ExactClearance(std::int32_t index) {
   Node& node = nodes_[static_cast<std::size_t>(index)];
-  if (!node.known) {
-    double least = std::numeric_limits<float>::max();
-    const SegmentFp line = q_.arm->At(PoseOf(index));
-    for (const Blocker& b : q_.blockers)
-      least = std::min(least, DistanceMm(line, b.capsule.line) - b.capsule.radius_mm - b.need_mm);
-    // Rounded down: a clearance must never be overstated.
-    node.clearance = std::nextafter(static_cast<float>(least), -1e30f);
-    node.known = true;
+  if (node.exact) return static_cast<double>(node.clearance);
+  const SegmentFp line = q_.arm->At(PoseOf(index));
+  const auto clearance = [&](const Blocker& b) {
+    return DistanceMm(line, b.capsule.line) - b.capsule.radius_mm - b.need_mm;
+  };
+  double least = std::numeric_limits<float>::max();
+  if (last_touched_ < q_.blockers.size()) least = clearance(q_.blockers[last_touched_]);
+  for (std::size_t k = 0; k < q_.blockers.size() && least > 0; ++k) {
+    const double here = clearance(q_.blockers[k]);
+    if (here <= 0) last_touched_ = k;  // not clear is all that matters then
+    least = std::min(least, here);
   }
+  // Rounded down: a clearance must never be overstated.
+  node.clearance = std::nextafter(static_cast<float>(least), -1e30f);
+  node.exact = true;
   return static_cast<double>(node.clearance);
 }
 
+/// Every pose of the edge is within its travel of both ends, counted from the one and the other; so
+/// it is clear where the clearances of the ends sum up to more. What an end has, the other has less
+/// the travel.
 bool PathSearch::EdgeClear(std::int32_t a, std::int32_t b) {
-  const double at_a = ClearanceAt(a);
-  const double at_b = ClearanceAt(b);
-  if (at_a <= 0 || at_b <= 0) return false;
   const Pose pa = PoseOf(a);
   const Pose pb = PoseOf(b);
   const double travel = q_.arm->TravelBound(std::abs(pa[0] - pb[0]), std::abs(pa[1] - pb[1]));
-  if (at_a + at_b > travel) return true;
+  Node& there = nodes_[static_cast<std::size_t>(b)];
+  double here_mm = static_cast<double>(nodes_[static_cast<std::size_t>(a)].clearance);
+  if (here_mm <= travel) here_mm = ExactClearance(a);
+  if (here_mm <= 0) return false;
+  if (here_mm > travel) {
+    const auto left = std::nextafter(static_cast<float>(here_mm - travel), -1e30f);
+    if (!there.exact) there.clearance = std::max(there.clearance, left);
+    return !there.exact || there.clearance > 0;
+  }
+  const double there_mm = ExactClearance(b);
+  if (there_mm <= 0) return false;
+  if (here_mm + there_mm > travel) return true;
   return SweepClear(*q_.arm, {pa, pb}, q_.blockers, nullptr, 300);
 }
 
@@ -136,7 +163,7 @@ std::optional<Pose> PathSearch::EndNear(const Pose& pose) const {
 Way PathSearch::Find(const Question& question) {
   SetUp(question);
   const std::int32_t start = -low_[0] * count_[1] - low_[1];
-  if (ClearanceAt(start) <= 0) return {};
+  if (ExactClearance(start) <= 0) return {};
   nodes_[static_cast<std::size_t>(start)].cost = 0;
   open_.push_back({Estimate(q_.from), start});
   while (!open_.empty()) {

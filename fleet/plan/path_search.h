@@ -36,6 +36,12 @@ struct InStep {
 };
 std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDrive& drive);
 
+/// Everything that the axes' ranges allow, and where the unit stands should that be outside.
+PoseBox RangeAround(const ArmGeometry& arm, const Pose& pose);
+
+/// Coarse first: most ways are wide.
+inline constexpr std::array kSearchGrids_deg{3.0, 1.0};
+
 class PathSearch {
  public:
   /// Where the way may go and where it shall end: any pose in `goal`; none: explore all that can be
@@ -64,8 +70,8 @@ class PathSearch {
   struct Node {
     std::int32_t cost = -1;  // vectors of the slower axis, summed; -1: not seen
     std::int32_t came_from = -1;
-    float clearance = 0;
-    bool known = false;
+    float clearance = -1;  // at least this much, exactly this much where `exact`
+    bool exact = false;
     bool done = false;
   };
   struct Open {
@@ -75,7 +81,7 @@ class PathSearch {
   };
 
   [[nodiscard]] Pose PoseOf(std::int32_t node) const;
-  double ClearanceAt(std::int32_t node);
+  double ExactClearance(std::int32_t node);
   bool EdgeClear(std::int32_t a, std::int32_t b);
   void Expand(std::int32_t node);
   [[nodiscard]] std::optional<Pose> EndNear(const Pose& pose) const;
@@ -90,6 +96,7 @@ class PathSearch {
   std::int32_t low_[kAxisCount]{};  // grid index of the lowest pose within
   std::int32_t count_[kAxisCount]{};
   std::vector<Node> nodes_;
+  std::size_t last_touched_ = 0;  // blocker; the next node is likely to touch the same one
   std::vector<Open> open_;
   std::vector<Pose> reached_;
   std::vector<std::int32_t> reached_nodes_;

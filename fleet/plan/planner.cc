@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
+#include "fleet/plan/midway.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
@@ -30,8 +31,6 @@ class Planner {
   Result<Plan> Run();
 
  private:
-  enum class Standing : std::uint8_t { kServed, kStays };
-
   Status Check();
   void NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
                       const char* what, std::string* text) const;
@@ -40,9 +39,10 @@ class Planner {
   void DropCollidingTargets();
   [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
   bool Attempt(std::vector<Piece>* order);
-  bool TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order);
-  Way TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to);
   void GiveWay();
+  void Abandon(std::uint32_t unit);
+  bool CanEver(std::uint32_t unit);
+  bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
 
@@ -56,6 +56,8 @@ class Planner {
   std::vector<std::uint8_t> movable_;
   std::vector<std::uint8_t> served_;
   std::vector<std::uint8_t> aside_;
+  std::vector<std::uint8_t> by_itself_;  // goes from start to target in one way, not by its cell
+  std::vector<std::uint8_t> hopeful_;    // CanEver was asked and said yes
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
   std::vector<std::uint32_t> blames_;  // beside stuck_
@@ -84,6 +86,8 @@ void Planner::Classify() {
   movable_.assign(n, 0);
   served_.assign(n, 0);
   aside_.assign(n, 0);
+  by_itself_.assign(n, 0);
+  hopeful_.assign(n, 0);
   for (std::uint32_t i = 0; i < n; ++i) {
     const bool enabled = layout_.unit({i}).enabled;
     const bool frozen = request_.frozen[i] != 0;
@@ -178,43 +182,6 @@ void Planner::DropCollidingTargets() {
   }
 }
 
-/// The way from one pose to another without leaving the cell. Empty: none.
-Way Planner::TurnInCell(std::uint32_t unit, const Retreat& in, const Pose& to) {
-  const ArmGeometry& arm = scene_.arm(unit);
-  const Pose& from = in.poses()[unit];
-  const std::span<const Blocker> around = surroundings_.Around(unit, in.lines(), in.poses(), true);
-  if (SweepClear(arm, {from, to}, around, nullptr)) return {{from}, {to}};
-  PathSearch::Question question;
-  question.arm = &arm;
-  question.drive = &request_.drives[unit];
-  question.blockers = around;
-  question.from = from;
-  question.within = arm.range();
-  question.within.low[0] = std::min(question.within.low[0], from[0]);
-  question.within.high[0] = std::max(question.within.high[0], from[0]);
-  question.within.low[1] = scene_.cell(unit).low;
-  question.within.high[1] = scene_.cell(unit).high;
-  question.goal = PoseBox::Of(to);
-  for (const double grid_deg : {3.0, 1.0}) {
-    question.grid_deg = grid_deg;
-    Way way = surroundings_.search().Find(question);
-    if (!way.empty()) return way;
-  }
-  return {};
-}
-
-bool Planner::TurnAll(const Retreat& in, const Retreat& out, std::vector<Piece>* order) {
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (movers_[i] == 0 || in.poses()[i] == out.poses()[i]) continue;
-    const Way way = TurnInCell(i, in, out.poses()[i]);
-    if (way.empty()) stuck_.push_back(i);
-    for (std::size_t k = 1; k < way.size(); ++k)
-      if (way[k].pose != way[k - 1].pose)
-        order->push_back({i, {way[k - 1].pose, way[k].pose, way[k].out_of_step}});
-  }
-  return stuck_.empty();
-}
-
 /// One whole try: in, turn, out. False: stuck_ says who could not.
 bool Planner::Attempt(std::vector<Piece>* order) {
   order->clear();
@@ -222,15 +189,21 @@ bool Planner::Attempt(std::vector<Piece>* order) {
   movers_.assign(scene_.size(), 0);
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     movers_[i] = movable_[i] != 0 && (goal_[i] != start_[i] || aside_[i] != 0) ? 1 : 0;
-  Retreat in(&scene_, request_.drives, &surroundings_, start_, movers_);
+  std::vector<std::uint8_t> by_cell = movers_;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    if (by_itself_[i] != 0) by_cell[i] = 0;
+  Retreat in(&scene_, request_.drives, &surroundings_, start_, by_cell);
   in.Run();
-  Retreat out(&scene_, request_.drives, &surroundings_, goal_, movers_);
+  Retreat out(&scene_, request_.drives, &surroundings_, goal_, by_cell);
   out.Run();
   stuck_ = in.stuck();
   stuck_.insert(stuck_.end(), out.stuck().begin(), out.stuck().end());
   if (stuck_.empty()) {
+    Midway turn(&scene_, request_.drives, &surroundings_, in.poses(), out.poses());
+    turn.Run();
+    stuck_ = turn.stuck();
     *order = in.pieces();
-    TurnAll(in, out, order);
+    order->insert(order->end(), turn.pieces().begin(), turn.pieces().end());
     for (auto piece = out.pieces().rbegin(); piece != out.pieces().rend(); ++piece)
       order->push_back(
           {piece->unit, {piece->sweep.to, piece->sweep.from, piece->sweep.out_of_step}});
@@ -275,26 +248,74 @@ bool Planner::LetStepAside(std::uint32_t stuck) {
   return added;
 }
 
-/// After a failed attempt: those that stand may step aside; where nobody is left to ask, the stuck
-/// unit stays.
+void Planner::Abandon(std::uint32_t unit) {
+  if (served_[unit] != 0 && goal_[unit] != start_[unit])
+    Unserve(unit, UnservedWhy::kBlocked, Blames(unit));
+  else
+    movable_[unit] = 0;
+  aside_[unit] = 0;
+  by_itself_[unit] = 0;
+}
+
+/// False: even if all that can move were away, no way leads from the start to the target.
+bool Planner::CanEver(std::uint32_t unit) {
+  if (goal_[unit] == start_[unit]) return true;
+  std::vector<std::uint8_t> immovable(scene_.size());
+  std::vector<SegmentFp> lines(scene_.size());
+  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+    immovable[near.unit] = movable_[near.unit] == 0 ? 1 : 0;
+    lines[near.unit] = scene_.arm(near.unit).At(start_[near.unit]);
+  }
+  PathSearch::Question question;
+  question.arm = &scene_.arm(unit);
+  question.drive = &request_.drives[unit];
+  question.blockers = surroundings_.AroundOf(unit, lines, immovable);
+  question.from = start_[unit];
+  question.within = RangeAround(*question.arm, question.from);
+  question.goal = PoseBox::Of(goal_[unit]);
+  return std::any_of(kSearchGrids_deg.begin(), kSearchGrids_deg.end(), [&](double grid_deg) {
+    question.grid_deg = grid_deg;
+    return !surroundings_.search().Find(question).empty();
+  });
+}
+
+/// Gives up on stuck units that no order of moves can help. True: there was one.
+bool Planner::AbandonHopeless() {
+  bool any = false;
+  for (const std::uint32_t i : stuck_) {
+    if (hopeful_[i] != 0) continue;
+    if (CanEver(i)) {
+      hopeful_[i] = 1;
+      continue;
+    }
+    Abandon(i);
+    any = true;
+  }
+  return any;
+}
+
+/// After a failed attempt. What is hopeless is given up at once. Those that stand may step aside;
+/// where nobody is left to ask, the stuck unit tries it by itself; where that has been tried, near
+/// it or by itself, that unit is given up and stays.
 void Planner::GiveWay() {
+  if (AbandonHopeless()) return;
   bool added = false;
   for (const std::uint32_t i : stuck_) added = LetStepAside(i) || added;
   if (added) return;
-  std::vector<std::uint8_t> given_up(scene_.size(), 0);
+  // One of each cluster at a time: with it changed the others may find a way.
+  std::vector<std::uint8_t> changed(scene_.size(), 0);
   for (const std::uint32_t i : stuck_) {
-    // One of each cluster at a time: with it standing still the others may find a way.
     const auto near = scene_.neighbours(i);
-    if (std::any_of(near.begin(), near.end(),
-                    [&](const NeighbourNeed& n) { return given_up[n.unit] != 0; }))
-      continue;
-    given_up[i] = 1;
-    const std::uint32_t by = Blames(i);
-    if (served_[i] != 0 && goal_[i] != start_[i])
-      Unserve(i, UnservedWhy::kBlocked, by);
+    const auto is_changed = [&](const NeighbourNeed& n) { return changed[n.unit] != 0; };
+    if (changed[i] != 0 || std::any_of(near.begin(), near.end(), is_changed)) continue;
+    const auto alone = std::find_if(
+        near.begin(), near.end(), [&](const NeighbourNeed& n) { return by_itself_[n.unit] != 0; });
+    const std::uint32_t which = by_itself_[i] != 0 || alone == near.end() ? i : alone->unit;
+    changed[which] = 1;
+    if (by_itself_[which] != 0 || goal_[which] == start_[which])
+      Abandon(which);
     else
-      movable_[i] = 0;
-    aside_[i] = 0;
+      by_itself_[which] = 1;
   }
 }
 

@@ -7,7 +7,6 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint8_t kFavoursMax = 3;
-constexpr std::array kGrids_deg{3.0, 1.0};
 
 }  // namespace
 
@@ -23,6 +22,18 @@ std::span<const Blocker> Surroundings::Around(std::uint32_t unit, std::span<cons
     if (in_cell_only && thing.in_cell) continue;
     blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
   }
+  return blockers_;
+}
+
+std::span<const Blocker> Surroundings::AroundOf(std::uint32_t unit,
+                                                std::span<const SegmentFp> lines,
+                                                std::span<const std::uint8_t> these) {
+  blockers_.clear();
+  for (const NeighbourNeed& near : scene_->neighbours(unit))
+    if (scene_->is_place(near.unit) && these[near.unit] != 0)
+      blockers_.push_back({{lines[near.unit], 0}, near.need_mm, near.unit});
+  for (const StandingThing& thing : scene_->standing(unit))
+    blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
   return blockers_;
 }
 
@@ -51,7 +62,7 @@ void Retreat::Run() {
     while (StraightRound()) DropArrived();
     if (waiting_.empty()) return;
     bool moved = false;
-    for (const double grid_deg : kGrids_deg) moved = moved || GoAround(grid_deg);
+    for (const double grid_deg : kSearchGrids_deg) moved = moved || GoAround(grid_deg);
     moved = moved || MakeRoom();
     DropArrived();
     if (!moved) return;
@@ -148,7 +159,7 @@ bool Retreat::MakeRoom() {
       for (const NeighbourNeed& near : scene_->neighbours(i)) {
         if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
         if (StraightClearOf(i, near, lines_[near.unit])) continue;
-        for (const double grid_deg : kGrids_deg)
+        for (const double grid_deg : kSearchGrids_deg)
           if (GiveWay(near, i, grid_deg, stay_in_cell)) {
             moved = true;
             break;
@@ -189,11 +200,7 @@ PathSearch::Question Retreat::QuestionFor(std::uint32_t unit, double grid_deg) {
   question.drive = &drives_[unit];
   question.blockers = surroundings_->Around(unit, lines_, poses_, false);
   question.from = poses_[unit];
-  question.within = question.arm->range();
-  for (std::size_t k = 0; k < kAxisCount; ++k) {
-    question.within.low[k] = std::min(question.within.low[k], poses_[unit][k]);
-    question.within.high[k] = std::max(question.within.high[k], poses_[unit][k]);
-  }
+  question.within = RangeAround(*question.arm, poses_[unit]);
   question.grid_deg = grid_deg;
   return question;
 }

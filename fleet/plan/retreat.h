@@ -34,6 +34,9 @@ class Surroundings {
   /// cells are left out: for ways that never leave this unit's own cell.
   std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
                                   std::span<const Pose> poses, bool in_cell_only);
+  /// Only what is in `these` of the units, and the standing things.
+  std::span<const Blocker> AroundOf(std::uint32_t unit, std::span<const SegmentFp> lines,
+                                    std::span<const std::uint8_t> these);
   PathSearch& search() { return search_; }
 
  private:

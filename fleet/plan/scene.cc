@@ -147,22 +147,23 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
   standing_begin_.push_back(0);
   for (std::uint32_t i = 0; i < size(); ++i) {
     const ArmGeometry& arm = arms_[i];
+    const double reach = arm.theta_arm_mm() + arm.phi_arm_mm();
     for (const Obstacle& obstacle : layout_->obstacles()) {
       const double need =
           arm.half_width_mm() + obstacle.radius_mm + layout_->clearance_mm() + kGuard_mm;
-      const double reach = arm.theta_arm_mm() + arm.phi_arm_mm() + need;
-      const double dx = obstacle.centre_fp.x_mm - arm.base_fp().x_mm;
-      const double dy = obstacle.centre_fp.y_mm - arm.base_fp().y_mm;
-      if (dx * dx + dy * dy > reach * reach) continue;
       const PointFp& c = obstacle.centre_fp;
+      if (DistanceMm(arm.base_fp(), c) > reach + need) continue;
       const double least = need - kGuard_mm - kClearTolerance_mm;
       standing_.push_back({{{c, c}, 0}, need, least, kNobody, false});
     }
     for (const NeighbourNeed& near : neighbours(i)) {
       if (is_place_[near.unit] != 0) continue;
       const bool in_cell = InCell(near.unit, BoxOf(arms_[near.unit], start[near.unit]));
-      for (const Capsule& capsule : covers[near.unit])
+      for (const Capsule& capsule : covers[near.unit]) {
+        if (DistanceMm(arm.base_fp(), capsule.line) > reach + near.need_mm + capsule.radius_mm)
+          continue;
         standing_.push_back({capsule, near.need_mm, near.need_mm, near.unit, in_cell});
+      }
     }
     standing_begin_.push_back(static_cast<std::uint32_t>(standing_.size()));
   }
