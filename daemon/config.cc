@@ -28,8 +28,8 @@ struct Range {
 };
 constexpr Range<std::int64_t> kMillisecondRange{1, 3'600'000};
 
-/// The one list of keys. `visit` is a reader or a writer; both see every key once, in the order of
-/// the file.
+/// The one list of keys, in two parts. `visit` is a reader or a writer; both see every key once, in
+/// the order of the file.
 template <class Config, class Visitor>
 void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("fleet");
@@ -62,6 +62,10 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Whole("repeat", &axis->repeat, {1, 255});
   visit->Whole("subdivision", &axis->subdivision, {6, 65'535});
   visit->Index("mode", &c->drive.mode, kModes);
+}
+
+template <class Config, class Visitor>
+void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Section("timing");
   visit->Wait("reply_wait_ms", &c->timing.reply_wait);
   visit->Wait("identify_period_ms", &c->timing.identify_period);
@@ -73,6 +77,14 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("simulated");
   visit->Whole("seed", &c->simulated.seed, {0, std::numeric_limits<std::int64_t>::max()});
   visit->Choice("spread", &c->simulated.spread, kSpreads);
+}
+
+/// A simulated fleet that runs faster than life does not make our own processes faster: waits that
+/// have to cover them stay what they are in real time.
+void ScaleDefaults(double speed, CoordinatorConfig* timing) {
+  for (DurationNs* wait :
+       {&timing->reply_wait, &timing->start_delay, &timing->settle_margin, &timing->silence_limit})
+    *wait = Seconds(wait->seconds() * std::max(1.0, speed));
 }
 
 std::string ListOf(std::span<const char* const> names) {
@@ -289,7 +301,10 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   DaemonConfig config;
   Reader reader(parsed.table(), path);
   VisitKeys(&config, &reader);
+  ScaleDefaults(config.clock.speed, &config.timing);
+  VisitTimingKeys(&config, &reader);
   reader.CheckUnknown();
+  FOCALFLEET_TRY(reader.Verdict());  // a misspelt key is the likely reason of what is missing below
   CheckTogether(config, &reader);
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
@@ -311,6 +326,7 @@ Result<DaemonConfig> LoadConfig(const std::string& path) {
 std::string EffectiveConfig(const DaemonConfig& config) {
   Writer writer;
   VisitKeys(&config, &writer);
+  VisitTimingKeys(&config, &writer);
   return writer.text();
 }
 

@@ -54,6 +54,7 @@ class ControlDesk {
     std::uint64_t id = 0;  // of the client's request
     bool wait = false;
     bool pursues = false;  // apply or home: its summary is the configuration
+    bool began = false;    // and the coordinator took it up
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);

@@ -197,6 +197,7 @@ Status RunDaemon(const DaemonConfig& config) {
 
 Result<std::string> CheckDaemon(const DaemonConfig& config) {
   FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
+  FOCALFLEET_TRY(CheckInterfaces(config, layout));
   return "# " + std::to_string(layout.size()) + " units on " +
          std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
 }

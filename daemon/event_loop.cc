@@ -43,15 +43,16 @@ spdlog::level::level_enum LevelOf(Severity severity) {
   return spdlog::level::err;
 }
 
-std::string Where(const AlarmRow& alarm) {
+/// Most alarms name their unit or bus themselves.
+std::string TextOf(const AlarmRow& alarm) {
   std::string where;
-  if (alarm.bus) where += "bus " + std::to_string(alarm.bus->value) + ": ";
-  if (alarm.unit) where += "unit " + std::to_string(alarm.unit->value) + ": ";
-  return where;
+  if (alarm.bus) where = "bus " + std::to_string(alarm.bus->value);
+  if (alarm.unit) where = "unit " + std::to_string(alarm.unit->value);
+  return where.empty() || alarm.text.starts_with(where) ? alarm.text : where + ": " + alarm.text;
 }
 
 void LogRow(const AlarmRow& alarm) {
-  spdlog::log(LevelOf(alarm.severity), "alarm {}: {}{}", alarm.id, Where(alarm), alarm.text);
+  spdlog::log(LevelOf(alarm.severity), "alarm {}: {}", alarm.id, TextOf(alarm));
 }
 void LogRow(const ConfigurationRow& row) {
   spdlog::info(

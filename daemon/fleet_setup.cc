@@ -47,13 +47,9 @@ Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const H
 
 Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
                             const HostClock& clock) {
-  const std::size_t interfaces = config.bus.interfaces.size();
-  if (interfaces != layout.buses().size())
-    return Fail(ErrorCode::kInvalid, "bus.interfaces names " + std::to_string(interfaces) +
-                                         " interfaces, but " + config.fleet.units + " has " +
-                                         std::to_string(layout.buses().size()) + " buses");
+  FOCALFLEET_TRY(CheckInterfaces(config, layout));
   Ports ports;
-  for (std::size_t b = 0; b < interfaces; ++b) {
+  for (std::size_t b = 0; b < config.bus.interfaces.size(); ++b) {
     FOCALFLEET_TRY_ASSIGN(auto port,
                           SocketCanPort::Create({.bus = layout.buses()[b],
                                                  .interface = config.bus.interfaces[b],
@@ -88,6 +84,16 @@ Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
   }
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.units));
   return ReadLayout(text, fleet.units, std::move(options));
+}
+
+Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {
+  if (config.bus.port != PortKind::kSocketCan) return {};
+  const std::size_t interfaces = config.bus.interfaces.size();
+  if (interfaces != layout.buses().size())
+    return Fail(ErrorCode::kInvalid, "bus.interfaces names " + std::to_string(interfaces) +
+                                         " interfaces, but " + config.fleet.units + " has " +
+                                         std::to_string(layout.buses().size()) + " buses");
+  return {};
 }
 
 Result<Ports> OpenPorts(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {

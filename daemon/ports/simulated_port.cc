@@ -24,6 +24,11 @@ void SimulatedFleet::Take(BusId bus, HostInstant now, std::vector<ReceivedFrame>
   mine.clear();
 }
 
+HostInstant SimulatedFleet::NextEvent(BusId bus) const {
+  const auto it = inbox_.find(bus);
+  return it != inbox_.end() && !it->second.empty() ? HostInstant{0} : world_.NextEvent();
+}
+
 std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
   std::vector<sim::UnitDescription> units;
   units.reserve(layout.size());

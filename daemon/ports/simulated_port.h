@@ -22,7 +22,9 @@ class SimulatedFleet {
   bool Inject(BusId bus, const CanFrame& frame);
   /// Lets the whole fleet go on to `now` and gives what this bus heard.
   void Take(BusId bus, HostInstant now, std::vector<ReceivedFrame>* out);
-  [[nodiscard]] HostInstant NextEvent() const { return world_.NextEvent(); }
+  /// When this bus next has something to say; at once where it was heard already, asking for
+  /// another.
+  [[nodiscard]] HostInstant NextEvent(BusId bus) const;
   [[nodiscard]] bool dead(BusId bus) const { return world_.dead(bus); }
   [[nodiscard]] sim::World& world() { return world_; }
 
@@ -45,7 +47,7 @@ class SimulatedPort : public PollablePort {
   void Receive(HostInstant now, std::vector<ReceivedFrame>* out) override;
   [[nodiscard]] LinkState state() const override;
   [[nodiscard]] int fd() const override { return -1; }
-  [[nodiscard]] HostInstant wake_at() const override { return fleet_->NextEvent(); }
+  [[nodiscard]] HostInstant wake_at() const override { return fleet_->NextEvent(bus_); }
   [[nodiscard]] const PortCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& trouble() const override { return trouble_; }

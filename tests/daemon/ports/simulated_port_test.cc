@@ -1,0 +1,79 @@
+#include "daemon/ports/simulated_port.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/wire/codec.h"
+
+namespace focalfleet {
+namespace {
+
+Layout TwoUnitsOnTwoBuses() {
+  std::vector<Unit> units(2);
+  for (std::uint32_t n = 0; n < 2; ++n) {
+    units[n].id = UnitId{n + 1};
+    units[n].base_fp = {25.6 * n, 0};
+    units[n].axis = {AxisGeometry{7.4, 0, 890, -190, 190}, AxisGeometry{7.4, 0, 890, 0, 190}};
+    units[n].bus = BusId{n};
+    units[n].node = NodeId{1};
+  }
+  return Layout::Create(std::move(units), {}).value();
+}
+
+TEST(SimulatedPort, UnitAnswersOnItsOwnBus) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  const auto fleet = SimulatedFleet::Create(std::move(config)).value();
+  SimulatedPort zero(fleet, BusId{0});
+  SimulatedPort one(fleet, BusId{1});
+  const std::vector<CanFrame> ask{Encode(HostMessage(IdentifyRequest{}), {kBroadcastNode, 9})};
+  EXPECT_EQ(zero.Send(ask), 1u);
+  EXPECT_NE(zero.wake_at(), kNever) << "the frame is on its way";
+  std::vector<ReceivedFrame> received;
+  zero.Receive(HostInstant{} + Milliseconds(100), &received);
+  one.Receive(HostInstant{} + Milliseconds(100), &received);
+  ASSERT_EQ(received.size(), 1u);
+  EXPECT_EQ(received[0].bus, BusId{0});
+  EXPECT_TRUE(DecodeUnit(received[0].frame));
+}
+
+TEST(SimulatedPort, WhatWasHeardWhileAnotherBusWasAskedIsDueAtOnce) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  const auto fleet = SimulatedFleet::Create(std::move(config)).value();
+  SimulatedPort zero(fleet, BusId{0});
+  SimulatedPort one(fleet, BusId{1});
+  const std::vector<CanFrame> ask{Encode(HostMessage(IdentifyRequest{}), {kBroadcastNode, 9})};
+  EXPECT_EQ(one.Send(ask), 1u);
+  const HostInstant later = HostInstant{} + Milliseconds(100);
+  std::vector<ReceivedFrame> received;
+  zero.Receive(later, &received);
+  EXPECT_TRUE(received.empty());
+  EXPECT_LE(one.wake_at(), later);
+  one.Receive(later, &received);
+  EXPECT_EQ(received.size(), 1u);
+}
+
+TEST(SimulatedPort, RefusesUnitsThatTheSimulationCannotHave) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  config.units[1].id = config.units[0].id;
+  EXPECT_FALSE(SimulatedFleet::Create(std::move(config)));
+}
+
+TEST(SimulatedPort, ADeadBusIsDownAndTakesNothing) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  const auto fleet = SimulatedFleet::Create(std::move(config)).value();
+  SimulatedPort port(fleet, BusId{0});
+  EXPECT_EQ(port.state(), LinkState::kUp);
+  fleet->world().KillBus(BusId{0});
+  EXPECT_EQ(port.state(), LinkState::kDown);
+  EXPECT_EQ(port.Send(std::vector<CanFrame>{CanFrame{}}), 0u);
+}
+
+}  // namespace
+}  // namespace focalfleet

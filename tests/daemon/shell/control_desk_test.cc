@@ -1,0 +1,107 @@
+#include "daemon/control_desk.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <variant>
+
+#include "tests/daemon/control/scratch.h"
+#include "tests/daemon/shell/small_fleet.h"
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+
+Result<Command> Try(const SmallFleet& fleet, const std::string& verb, const Json& args) {
+  return CommandOf({.id = 1, .verb = verb, .args = args}, fleet.View());
+}
+std::string ErrorOf(const SmallFleet& fleet, const std::string& verb, const Json& args) {
+  const auto command = Try(fleet, verb, args);
+  EXPECT_FALSE(command);
+  return command ? "" : command.error().text;
+}
+
+TEST(ControlDesk, MakesCommandsOfVerbs) {
+  const SmallFleet fleet;
+  const auto stop = Try(fleet, "stop", Json::object());
+  ASSERT_TRUE(stop);
+  EXPECT_FALSE(std::get<StopCommand>(stop->what).unit);
+  EXPECT_EQ(std::get<StopCommand>(Try(fleet, "stop", {{"unit_id", 2}})->what).unit,
+            PositionerIndex{1});
+  const auto disable = Try(fleet, "disable", {{"unit_ids", {1, 3}}, {"reason", "stalls"}});
+  ASSERT_TRUE(disable);
+  EXPECT_EQ(std::get<EnableCommand>(disable->what).units.size(), 2u);
+  EXPECT_FALSE(std::get<EnableCommand>(disable->what).enabled);
+  const auto write = Try(
+      fleet, "params_set",
+      {{"unit_id", 1}, {"axis", "phi"}, {"parameter", Name(Parameter::kRepeat)}, {"value", 54}});
+  ASSERT_TRUE(write) << write.error().text;
+  EXPECT_EQ(std::get<WriteParameterCommand>(write->what).axis, Axis::kPhi);
+  EXPECT_EQ(std::get<WriteParameterCommand>(write->what).value, 54);
+  EXPECT_TRUE(Try(fleet, "adopt", {{"unit_id", 1}}));
+  EXPECT_TRUE(Try(fleet, "enable", {{"unit_ids", {1}}}));
+  EXPECT_TRUE(Try(fleet, "home", {{"unit_ids", {1}}}));
+}
+
+TEST(ControlDesk, ResolvesTargets) {
+  const SmallFleet fleet;
+  const auto apply = Try(fleet, "apply",
+                         {{"source", "t.csv"},
+                          {"targets_csv", "unit_id,theta_deg,phi_deg\n2,10,90\n"},
+                          {"fixed", true}});
+  ASSERT_TRUE(apply) << apply.error().text;
+  const auto& command = std::get<ApplyCommand>(apply->what);
+  EXPECT_TRUE(command.fixed);
+  ASSERT_EQ(command.targets.size(), 3u);
+  EXPECT_FALSE(command.targets[0]);
+  EXPECT_TRUE(command.targets[1]);
+}
+
+TEST(ControlDesk, NamesWhatIsWrong) {
+  const SmallFleet fleet;
+  EXPECT_THAT(ErrorOf(fleet, "dance", Json::object()), HasSubstr("no verb 'dance'"));
+  EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", 99}}), HasSubstr("no unit 99"));
+  EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", 5'000'000'000}}),
+              HasSubstr("no unit 5000000000"));
+  EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", "1"}}), HasSubstr("unit_id"));
+  EXPECT_THAT(ErrorOf(fleet, "disable", {{"unit_ids", {1}}}), HasSubstr("reason"));
+  EXPECT_THAT(ErrorOf(fleet, "disable", {{"unit_ids", {1}}, {"reason", ""}}), HasSubstr("why"));
+  EXPECT_THAT(ErrorOf(fleet, "enable", {{"unit_ids", Json::array()}}), HasSubstr("no unit named"));
+  EXPECT_THAT(ErrorOf(fleet, "home", {{"not_known", true}}), HasSubstr("knows where it stands"));
+  EXPECT_THAT(
+      ErrorOf(fleet, "apply",
+              {{"source", "t.csv"}, {"targets_csv", "unit_id,theta_deg,phi_deg\n77,10,90\n"}}),
+      HasSubstr("t.csv:2"));
+  EXPECT_THAT(ErrorOf(fleet, "params_set",
+                      {{"unit_id", 1}, {"axis", "psi"}, {"parameter", "repeat"}, {"value", 1}}),
+              HasSubstr("no axis 'psi'"));
+  EXPECT_THAT(ErrorOf(fleet, "params_set",
+                      {{"unit_id", 1}, {"axis", "phi"}, {"parameter", "colour"}, {"value", 1}}),
+              HasSubstr("no parameter 'colour'"));
+}
+
+TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
+  const SmallFleet fleet;
+  const Json state = Json::parse(StateText(fleet.View()), nullptr, false);
+  ASSERT_TRUE(state.is_object());
+  ASSERT_EQ(state["rows"].size(), 3u);
+  EXPECT_EQ(state["rows"][1]["unit_id"], 2);
+  EXPECT_EQ(state["rows"][1]["theta_witness"], "unknown");
+  EXPECT_TRUE(state["rows"][1]["theta_low_deg"].is_null());
+}
+
+TEST(StatusJson, StatusCountsEveryUnitOnce) {
+  const SmallFleet fleet;
+  ShellFacts facts;
+  facts.buses.resize(1);
+  const Json status = StatusJson(fleet.View(), facts);
+  EXPECT_EQ(status["units"], 3);
+  EXPECT_EQ(status["phases"]["absent"], 3);
+  EXPECT_EQ(status["witnesses"]["unknown"], 3);
+  EXPECT_EQ(status["buses"].size(), 1u);
+  EXPECT_EQ(status["configuration"]["unserved"].size(), 0u);
+}
+
+}  // namespace
+}  // namespace focalfleet

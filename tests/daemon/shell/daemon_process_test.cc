@@ -1,0 +1,202 @@
+// The real focalfleetd, started, asked and ended.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "daemon/control/line_client.h"
+#include "tests/daemon/control/scratch.h"
+#include "tests/support/process.h"
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using testing::Process;
+using testing::WaitUntil;
+
+constexpr int kPatienceMs = 30'000;  // a hang ends here; nothing is timed
+
+class FocalfleetdTest : public ::testing::Test {
+ protected:
+  FocalfleetdTest() {
+    std::ofstream(scratch_ / "units.csv")
+        << "unit_id,base_x_mm,base_y_mm,arm_theta_mm,arm_phi_mm,theta_zero_deg,phi_zero_deg,theta_"
+           "gear,"
+           "phi_gear,theta_min_deg,theta_max_deg,phi_min_deg,phi_max_deg,bus_id,node_id\n"
+           "1,0,0,7.4,7.4,0,0,890,890,-190,190,0,190,0,1\n"
+           "2,25.6,0,7.4,7.4,0,0,890,890,-190,190,0,190,1,1\n";
+    Configure("[bus]\nport = \"simulated\"\n");
+  }
+  void Configure(const std::string& text) const {
+    std::ofstream(scratch_ / "f.toml") << "[dds]\nenabled = false\n" << text;
+  }
+  [[nodiscard]] Process Start(const std::string& log = "log") const {
+    return Process({FOCALFLEETD, "--config", scratch_ / "f.toml"}, scratch_ / log);
+  }
+  [[nodiscard]] int Run(const std::vector<std::string>& arguments) const {
+    std::vector<std::string> all{FOCALFLEETD};
+    all.insert(all.end(), arguments.begin(), arguments.end());
+    return Process(all, scratch_ / "log").Wait();
+  }
+  [[nodiscard]] std::string Log(const std::string& log = "log") const {
+    std::ifstream file(scratch_ / log);
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+  }
+  [[nodiscard]] Result<Json> Ask(const std::string& verb, const Json& args = Json::object()) const {
+    FOCALFLEET_TRY_ASSIGN(LineClient client, LineClient::Connect(scratch_ / "control.sock"));
+    return client.Call(verb, args);
+  }
+  [[nodiscard]] bool Answers() const {
+    return WaitUntil([&] { return Ask("status").has_value(); }, kPatienceMs);
+  }
+  [[nodiscard]] bool Ready() const {
+    return WaitUntil(
+        [&] {
+          const auto status = Ask("status");
+          return status && (*status)["phases"]["ready"] == 2;
+        },
+        kPatienceMs);
+  }
+
+  const Scratch scratch_;
+};
+
+TEST_F(FocalfleetdTest, EndsCleanlyOnSigterm) {
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  daemon.Signal(SIGTERM);
+  EXPECT_EQ(daemon.Wait(), 0) << Log();
+  EXPECT_NE(::access((scratch_ / "control.sock").c_str(), F_OK), 0) << "the socket is gone";
+  EXPECT_THAT(Log(), HasSubstr("all is stored"));
+}
+
+TEST_F(FocalfleetdTest, GoesOnAfterSighup) {
+  auto daemon = Start();
+  ASSERT_TRUE(Answers()) << Log();
+  daemon.Signal(SIGHUP);
+  EXPECT_TRUE(Answers());
+  EXPECT_TRUE(daemon.running());
+}
+
+TEST_F(FocalfleetdTest, MovesAUnitAndSaysSo) {
+  Configure("[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n");
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  auto client = LineClient::Connect(scratch_ / "control.sock");
+  ASSERT_TRUE(client);
+  int progress = 0;
+  const auto done =
+      client->Call("apply",
+                   {{"source", "t.csv"},
+                    {"targets_csv", "unit_id,theta_deg,phi_deg\n1,20,150\n"},
+                    {"wait", true}},
+                   {.silence_max = Seconds(60), .on_progress = [&](const Json&) { ++progress; }});
+  ASSERT_TRUE(done) << done.error().text << "\n" << Log();
+  EXPECT_EQ((*done)["state"], "done");
+  EXPECT_EQ((*done)["arrived"], 1) << done->dump(1);
+  EXPECT_GT(progress, 0);
+  const auto unit = Ask("unit", {{"unit_id", 1}});
+  ASSERT_TRUE(unit);
+  EXPECT_EQ((*unit)["theta"]["witness"], "reported");
+  EXPECT_NEAR((*unit)["theta"]["low_deg"].get<double>(), 20, 0.01);
+  const auto history = Ask("history", {{"unit_id", 1}});
+  ASSERT_TRUE(history) << history.error().text;
+  EXPECT_EQ((*history)["moves"][0]["end"], "arrived") << history->dump(1);
+  const auto refused = Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,20,999\n"}});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalid);
+}
+
+TEST_F(FocalfleetdTest, ASecondOneOnTheSameStoreIsRefused) {
+  const auto first = Start();
+  ASSERT_TRUE(Answers()) << Log();
+  EXPECT_EQ(Start("second").Wait(), 1);
+  EXPECT_THAT(Log("second"), HasSubstr("focalfleet.db"));
+  EXPECT_TRUE(Answers()) << "the first one is unharmed";
+}
+
+TEST_F(FocalfleetdTest, ASecondOneOnTheSameSocketIsRefused) {
+  const auto first = Start();
+  ASSERT_TRUE(Answers()) << Log();
+  Configure("[bus]\nport = \"simulated\"\n[store]\npath = \"other.db\"\n");
+  EXPECT_EQ(Start("second").Wait(), 1);
+  EXPECT_THAT(Log("second"), HasSubstr("in use"));
+  EXPECT_TRUE(Answers()) << "the first one is unharmed";
+}
+
+TEST_F(FocalfleetdTest, StartsAgainAfterItWasKilled) {
+  {
+    auto first = Start();
+    ASSERT_TRUE(Answers()) << Log();
+    first.Signal(SIGKILL);
+    EXPECT_EQ(first.Wait(), 128 + SIGKILL);
+  }
+  auto second = Start();
+  EXPECT_TRUE(Answers()) << Log();
+  second.Signal(SIGINT);
+  EXPECT_EQ(second.Wait(), 0);
+}
+
+TEST_F(FocalfleetdTest, NamesAMissingInterface) {
+  Configure("[bus]\nport = \"socketcan\"\ninterfaces = [\"nocan0\", \"nocan1\"]\n");
+  EXPECT_EQ(Start().Wait(), 1);
+  EXPECT_THAT(Log(), HasSubstr("nocan0"));
+  Configure("[bus]\nport = \"socketcan\"\ninterfaces = [\"nocan0\"]\n");
+  EXPECT_EQ(Start("count").Wait(), 1);
+  EXPECT_THAT(Log("count"), HasSubstr("1 interfaces"));
+}
+
+TEST_F(FocalfleetdTest, WaitsForBusesThatAreNotThereYet) {
+  Configure("[bus]\nport = \"unix\"\nunix_directory = \".\"\n");
+  auto daemon = Start();
+  ASSERT_TRUE(Answers()) << Log();
+  const auto status = Ask("status");
+  ASSERT_TRUE(status);
+  EXPECT_EQ((*status)["buses"][0]["link"], "down");
+  EXPECT_THAT((*status)["buses"][0]["trouble"].get<std::string>(), HasSubstr("cannot connect"));
+  daemon.Signal(SIGTERM);
+  EXPECT_EQ(daemon.Wait(), 0) << Log();
+}
+
+TEST_F(FocalfleetdTest, SaysWhatIsWrongWithItsFilesAndTouchesNothing) {
+  Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"none.csv\"\n");
+  EXPECT_EQ(Start("a").Wait(), 1);
+  EXPECT_THAT(Log("a"), HasSubstr("none.csv"));
+  Configure("[buss]\n");
+  EXPECT_EQ(Start("b").Wait(), 1);
+  EXPECT_THAT(Log("b"), HasSubstr("f.toml:3: unknown key 'buss'"));
+  EXPECT_NE(::access((scratch_ / "focalfleet.db").c_str(), F_OK), 0);
+}
+
+TEST_F(FocalfleetdTest, CheckShowsTheEffectiveConfigurationAndStartsNothing) {
+  EXPECT_EQ(Run({"--config", scratch_ / "f.toml", "--check"}), 0);
+  EXPECT_THAT(Log(), HasSubstr("2 units on 2 buses"));
+  EXPECT_THAT(Log(), HasSubstr("reply_wait_ms = "));
+  EXPECT_NE(::access((scratch_ / "focalfleet.db").c_str(), F_OK), 0);
+}
+
+TEST_F(FocalfleetdTest, WrongUsageIsTwoAndHelpIsZero) {
+  EXPECT_EQ(Run({}), 2);
+  EXPECT_EQ(Run({"--no-such-option"}), 2);
+  EXPECT_EQ(Run({"--help"}), 0);
+  EXPECT_EQ(Run({"--version"}), 0);
+  EXPECT_THAT(Log(), HasSubstr("Exit codes"));
+}
+
+TEST_F(FocalfleetdTest, StopAlwaysWorks) {
+  auto daemon = Start();
+  ASSERT_TRUE(Answers()) << Log();
+  EXPECT_TRUE(Ask("stop"));
+  EXPECT_TRUE(Ask("stop", {{"unit_id", 2}}));
+  EXPECT_FALSE(Ask("stop", {{"unit_id", 3}}));
+}
+
+}  // namespace
+}  // namespace focalfleet
