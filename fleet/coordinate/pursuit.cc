@@ -145,6 +145,7 @@ void Pursuit::BeginRound() {
   PlanJob job{
       .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
   job.options.fixed = fixed_;
+  job.options.lead_apart = true;
   job.unproven = unproven_;
   bool any = !to_home_.empty();
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
@@ -195,6 +196,8 @@ void Pursuit::OnPlan(const PlanDone& done) {
 
 void Pursuit::TakePlan(const PlanDone& done) {
   plan_ = *done.plan;
+  if (!plan_.too_near.empty())
+    core_.Raise(Severity::kWarning, {}, {}, plan_.too_near + ": they may touch, and are led apart");
   homing_ = done.homing;
   const bool stale = std::any_of(plan_.moves.begin(), plan_.moves.end(), [&](const UnitPlan& move) {
     const UnitView& view = core_.unit(move.unit).view;

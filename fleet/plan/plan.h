@@ -48,7 +48,8 @@ struct Unserved {
 struct Plan {
   std::vector<UnitPlan> moves;     // ascending by unit; only units that move
   std::vector<Unserved> unserved;  // ascending by unit
-  double makespan_s = 0;           // start signal to the last vector, by nominal clocks
+  std::string too_near;   // with PlanOptions::lead_apart: the pairs that are led apart, for people
+  double makespan_s = 0;  // start signal to the last vector, by nominal clocks
 };
 
 /// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so

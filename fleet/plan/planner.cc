@@ -62,6 +62,7 @@ class Planner {
   std::vector<std::uint32_t> stuck_;
   std::vector<std::uint32_t> blames_;  // beside stuck_
   std::vector<Unserved> unserved_;
+  std::string too_near_;  // pairs that start nearer than allowed, by name
 };
 
 Status CheckShapes(const PlanRequest& request) {
@@ -144,7 +145,7 @@ Status Planner::Check() {
     text += (text.empty() ? "the target of unit " : "; the target of unit ") +
             UnitName(layout_, i) + " is outside its axes' ranges";
   }
-  NameCollisions(start_, movable_, "the starts", &text);
+  NameCollisions(start_, movable_, "the starts", options_.lead_apart ? &too_near_ : &text);
   NameCollisions(goal_, served_, "the targets", &text);
   if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
   return {};
@@ -338,6 +339,7 @@ Result<Plan> Planner::Run() {
   }
   const std::vector<Piece> pieces = CutPieces(order, scene_);
   FOCALFLEET_TRY_ASSIGN(Plan plan, Schedule(pieces, scene_, request_.drives, options_));
+  plan.too_near = too_near_;
   std::sort(unserved_.begin(), unserved_.end(),
             [](const Unserved& a, const Unserved& b) { return a.unit < b.unit; });
   plan.unserved = std::move(unserved_);

@@ -33,7 +33,10 @@ struct PlanRequest {
 };
 
 struct PlanOptions {
-  bool fixed = false;           // units without a target may not even step aside
+  bool fixed = false;  // units without a target may not even step aside
+  /// Pairs that start nearer than allowed (a unit was cut short while its neighbour went on) are no
+  /// error: they are never brought nearer, and named in Plan::too_near.
+  bool lead_apart = false;
   double start_skew_s = 0.020;  // any unit may start this early or late
   double clock_error = 0.005;   // and its clock may run this fast or slow
 };

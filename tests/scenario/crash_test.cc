@@ -140,7 +140,11 @@ class Observatory {
              return entry.second.state == "moving" || entry.second.state == "homing";
            });
   }
+  /// Everybody rests, has been read anew, and the last batch is durable.
   bool Settled() {
+    const auto reader = StoreReader::Open(Path("fleet.db"));
+    const auto stored = reader ? (*reader)->Load() : tl::unexpected<Error>(reader.error());
+    if (!stored || !stored->open_intents.empty()) return false;
     const auto status = Ask("status", Json::object());
     return status && !status->value("busy", true) &&
            status->value("phases", Json::object()).value("ready", 0u) == kUnits && AllAtRest();
@@ -257,12 +261,14 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
 
     if (!not_known.empty()) {
       static_cast<void>(observatory.Ask("home", {{"not_known", true}, {"wait", true}}));
+      ASSERT_TRUE(WaitUntil([&] { return observatory.Settled(); }, kPatienceMs));
       if (!ExpectStoreTellsTheTruth(&observatory).empty()) {
         // Nobody was held back while the daemon was dead: no way home can be proven; the operator
         // decides.
         ++unproven;
         ASSERT_TRUE(
             observatory.Ask("home", {{"not_known", true}, {"unproven", true}, {"wait", true}}));
+        ASSERT_TRUE(WaitUntil([&] { return observatory.Settled(); }, kPatienceMs));
       }
     }
     Json all = targets;
@@ -270,6 +276,7 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
     const auto completed = observatory.Ask("apply", all);
     ASSERT_TRUE(completed) << completed.error().text;
     EXPECT_EQ(completed->value("arrived", 0u), kUnits) << completed->dump();
+    ASSERT_TRUE(WaitUntil([&] { return observatory.Settled(); }, kPatienceMs));
     EXPECT_TRUE(ExpectStoreTellsTheTruth(&observatory).empty());
     if (HasFailure()) break;
   }
