@@ -33,7 +33,7 @@ struct CellPlace {
 };
 
 /// Below this the boxes count as one pose: closer than this to touching is "not clear".
-constexpr double kResolution_mm = 2e-5;
+constexpr double kResolutionMm = 2e-5;
 constexpr std::size_t kStackSize = 160;  // four halvings of 40 bits each are more than int32 has
 
 }  // namespace
@@ -95,7 +95,7 @@ class SweepTest {
     const double enough = need_mm_ + travel_mm;
     if (distance_squared > enough * enough) return Verdict::kClear;
     if (distance_squared <= need_mm_ * need_mm_) return Verdict::kTouch;
-    return travel_mm < kResolution_mm || --budget_ < 0 ? Verdict::kTouch : Verdict::kAskAgain;
+    return travel_mm < kResolutionMm || --budget_ < 0 ? Verdict::kTouch : Verdict::kAskAgain;
   }
 
   Verdict Judge(const Pair& pair) {

@@ -15,7 +15,7 @@ namespace focalfleet {
 namespace {
 
 /// A stop may give way, and stands where the range says only as well as it was measured.
-constexpr double kBeyondStop_deg = 1;
+constexpr double kBeyondStopDeg = 1;
 constexpr int kBudget = 40'000;
 
 class WayMaker {
@@ -32,7 +32,7 @@ class WayMaker {
   [[nodiscard]] bool ClearOfSwept(std::uint32_t unit, const PoseBox& box, double need_mm) const;
   [[nodiscard]] bool ClearOfOthers(std::uint32_t unit, const Pose& pose) const;
   [[nodiscard]] std::optional<Pose> NearestPlace(std::uint32_t unit, double need_mm) const;
-  Status CheckObstacles() const;
+  [[nodiscard]] Status CheckObstacles() const;
   Status Refuse(std::uint32_t unit, const char* why) const;
 
   const PlanRequest& request_;
@@ -46,7 +46,7 @@ void WayMaker::FindSwept() {
   std::array<std::int32_t, kAxisCount> beyond{};
   for (const Axis axis : kAxes)
     beyond[Index(axis)] = static_cast<std::int32_t>(
-        std::ceil(kBeyondStop_deg * std::numbers::pi / 180 / arm.step_rad(axis)));
+        std::ceil(kBeyondStopDeg * std::numbers::pi / 180 / arm.step_rad(axis)));
   PoseBox anywhere = BoxOf(arm, request_.start[homing_]);
   const std::int32_t upper_stop = std::max(arm.range().high[1], anywhere.high[1]) + beyond[1];
   swept_[0] = anywhere;

@@ -45,7 +45,8 @@ Way Midway::WayOf(std::uint32_t unit, bool in_cell) {
   if (in_cell && !(scene_->InCell(unit, from) && scene_->InCell(unit, to))) return {};
   const ArmGeometry& arm = scene_->arm(unit);
   PathSearch::Question question;
-  question.blockers = surroundings_->Around(unit, lines_, poses_, in_cell);
+  question.blockers = surroundings_->Around(
+      unit, lines_, poses_, in_cell ? Surroundings::Who::kOutOfCell : Surroundings::Who::kAll);
   if (SweepClear(arm, {from, to}, question.blockers, nullptr)) return {{from}, {to}};
   question.arm = &arm;
   question.drive = &drives_[unit];
@@ -56,7 +57,7 @@ Way Midway::WayOf(std::uint32_t unit, bool in_cell) {
     question.within.high[1] = scene_->cell(unit).high;
   }
   question.goal = PoseBox::Of(to);
-  for (const double grid_deg : kSearchGrids_deg) {
+  for (const double grid_deg : kSearchGridsDeg) {
     question.grid_deg = grid_deg;
     Way way = surroundings_->search().Find(question);
     if (!way.empty()) return way;

@@ -40,7 +40,7 @@ std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDri
 PoseBox RangeAround(const ArmGeometry& arm, const Pose& pose);
 
 /// Coarse first: most ways are wide.
-inline constexpr std::array kSearchGrids_deg{3.0, 1.0};
+inline constexpr std::array kSearchGridsDeg{3.0, 1.0};
 
 class PathSearch {
  public:
@@ -64,7 +64,7 @@ class PathSearch {
   /// next Find.
   [[nodiscard]] const std::vector<Pose>& reached() const { return reached_; }
   /// The way to one of them. Empty: not reached.
-  Way WayTo(std::size_t reached_index) const;
+  [[nodiscard]] Way WayTo(std::size_t reached_index) const;
 
  private:
   struct Node {
@@ -81,7 +81,7 @@ class PathSearch {
   };
 
   [[nodiscard]] Pose PoseOf(std::int32_t node) const;
-  double ExactClearance(std::int32_t node);
+  double ExactClearance(std::int32_t index);
   bool EdgeClear(std::int32_t a, std::int32_t b);
   void Expand(std::int32_t node);
   [[nodiscard]] std::optional<Pose> EndNear(const Pose& pose) const;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <numbers>
 
 #include "fleet/plan/midway.h"
@@ -19,14 +20,22 @@ namespace {
 /// aside.
 constexpr int kAttemptsMax = 60;
 
+std::vector<Pose> StartsOf(const PlanRequest& request) {
+  std::vector<Pose> starts;
+  starts.reserve(request.start.size());
+  for (const UnitKnowledge& k : request.start) starts.push_back(IsPlace(k) ? PlaceOf(k) : Pose{});
+  return starts;
+}
+
 class Planner {
  public:
   Planner(const PlanRequest& request, const PlanOptions& options)
       : request_(request),
         options_(options),
         layout_(*request.layout),
+        start_(StartsOf(request)),
         scene_(layout_, request.drives, request.start),
-        surroundings_(&scene_) {}
+        surroundings_(&scene_, start_) {}
 
   Result<Plan> Run();
 
@@ -49,9 +58,9 @@ class Planner {
   const PlanRequest& request_;
   const PlanOptions& options_;
   const Layout& layout_;
+  const std::vector<Pose> start_;  // of units without a place: meaningless
   Scene scene_;
   Surroundings surroundings_;
-  std::vector<Pose> start_;
   std::vector<Pose> goal_;
   std::vector<std::uint8_t> movable_;
   std::vector<std::uint8_t> served_;
@@ -60,7 +69,6 @@ class Planner {
   std::vector<std::uint8_t> hopeful_;    // CanEver was asked and said yes
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
-  std::vector<std::uint32_t> blames_;  // beside stuck_
   std::vector<Unserved> unserved_;
   std::string too_near_;  // pairs that start nearer than allowed, by name
 };
@@ -82,8 +90,7 @@ std::string UnitName(const Layout& layout, std::uint32_t unit) {
 
 void Planner::Classify() {
   const std::size_t n = layout_.size();
-  start_.resize(n);
-  goal_.resize(n);
+  goal_ = start_;
   movable_.assign(n, 0);
   served_.assign(n, 0);
   aside_.assign(n, 0);
@@ -93,8 +100,6 @@ void Planner::Classify() {
     const bool enabled = layout_.unit({i}).enabled;
     const bool frozen = request_.frozen[i] != 0;
     const bool place = scene_.is_place(i);
-    start_[i] = place ? PlaceOf(request_.start[i]) : Pose{};
-    goal_[i] = start_[i];
     movable_[i] = enabled && !frozen && place ? 1 : 0;
     if (!request_.targets[i]) continue;
     if (movable_[i] != 0) {
@@ -127,7 +132,7 @@ void Planner::NameCollisions(std::span<const Pose> poses, std::span<const std::u
       const double distance =
           DistanceMm(scene_.arm(i).At(poses[i]), scene_.arm(near.unit).At(poses[near.unit]));
       const double need = scene_.FullNeed(i, near.unit);
-      if (distance >= need - kClearTolerance_mm) continue;
+      if (distance >= need - kClearToleranceMm) continue;
       std::array<char, 160> line{};
       std::snprintf(line.data(), line.size(),
                     "%s%s of units %s and %s are %.4f mm apart, %.4f mm needed",
@@ -157,7 +162,7 @@ bool Planner::CollidesWith(std::uint32_t unit, std::uint32_t* by) const {
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
     if (!scene_.is_place(near.unit) || served_[near.unit] != 0) continue;
     *by = near.unit;
-    const double least = scene_.FullNeed(unit, near.unit) - kClearTolerance_mm;
+    const double least = scene_.FullNeed(unit, near.unit) - kClearToleranceMm;
     if (DistanceMm(line, scene_.arm(near.unit).At(goal_[near.unit])) < least) return true;
   }
   for (const StandingThing& thing : scene_.standing(unit)) {
@@ -183,6 +188,10 @@ void Planner::DropCollidingTargets() {
   }
 }
 
+Piece BackOf(const Piece& piece) {
+  return {piece.unit, {piece.sweep.to, piece.sweep.from, piece.sweep.out_of_step}};
+}
+
 /// One whole try: in, turn, out. False: stuck_ says who could not.
 bool Planner::Attempt(std::vector<Piece>* order) {
   order->clear();
@@ -205,9 +214,8 @@ bool Planner::Attempt(std::vector<Piece>* order) {
     stuck_ = turn.stuck();
     *order = in.pieces();
     order->insert(order->end(), turn.pieces().begin(), turn.pieces().end());
-    for (auto piece = out.pieces().rbegin(); piece != out.pieces().rend(); ++piece)
-      order->push_back(
-          {piece->unit, {piece->sweep.to, piece->sweep.from, piece->sweep.out_of_step}});
+    std::transform(out.pieces().rbegin(), out.pieces().rend(), std::back_inserter(*order),
+                   [](const Piece& piece) { return BackOf(piece); });
     const std::vector<std::uint32_t> too_many = UnitsWithTooManyPieces(*order, scene_.size());
     stuck_.insert(stuck_.end(), too_many.begin(), too_many.end());
   }
@@ -262,19 +270,16 @@ void Planner::Abandon(std::uint32_t unit) {
 bool Planner::CanEver(std::uint32_t unit) {
   if (goal_[unit] == start_[unit]) return true;
   std::vector<std::uint8_t> immovable(scene_.size());
-  std::vector<SegmentFp> lines(scene_.size());
-  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+  for (const NeighbourNeed& near : scene_.neighbours(unit))
     immovable[near.unit] = movable_[near.unit] == 0 ? 1 : 0;
-    lines[near.unit] = scene_.arm(near.unit).At(start_[near.unit]);
-  }
   PathSearch::Question question;
   question.arm = &scene_.arm(unit);
   question.drive = &request_.drives[unit];
-  question.blockers = surroundings_.AroundOf(unit, lines, immovable);
+  question.blockers = surroundings_.AroundOf(unit, immovable);
   question.from = start_[unit];
   question.within = RangeAround(*question.arm, question.from);
   question.goal = PoseBox::Of(goal_[unit]);
-  return std::any_of(kSearchGrids_deg.begin(), kSearchGrids_deg.end(), [&](double grid_deg) {
+  return std::any_of(kSearchGridsDeg.begin(), kSearchGridsDeg.end(), [&](double grid_deg) {
     question.grid_deg = grid_deg;
     return !surroundings_.search().Find(question).empty();
   });
@@ -327,8 +332,9 @@ Result<Plan> Planner::Run() {
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
     DropCollidingTargets();
-    scene_.AllowFor(start_);
+    scene_.AllowFor(start_, options_.lead_apart);
     scene_.AllowFor(goal_);
+    if (options_.lead_apart) scene_.LeadApart(start_);
     done = Attempt(&order);
     if (!done) GiveWay();
   }

@@ -11,27 +11,31 @@ constexpr std::uint8_t kFavoursMax = 3;
 }  // namespace
 
 std::span<const Blocker> Surroundings::Around(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                              std::span<const Pose> poses, bool in_cell_only) {
+                                              std::span<const Pose> poses, Who who) {
   blockers_.clear();
+  const bool at_start = poses[unit] == start_[unit];
   for (const NeighbourNeed& near : scene_->neighbours(unit)) {
-    if (!scene_->is_place(near.unit)) continue;
-    if (in_cell_only && scene_->InCell(near.unit, poses[near.unit])) continue;
-    blockers_.push_back({{lines[near.unit], 0}, near.need_mm, near.unit});
+    const std::uint32_t j = near.unit;
+    if (!scene_->is_place(j)) continue;
+    if (who == Who::kOutOfCell && scene_->InCell(j, poses[j])) continue;
+    const bool both_at_start = at_start && poses[j] == start_[j];
+    blockers_.push_back({{lines[j], 0}, both_at_start ? near.at_start_mm : near.need_mm, j});
   }
   for (const StandingThing& thing : scene_->standing(unit)) {
-    if (in_cell_only && thing.in_cell) continue;
+    if (who == Who::kOutOfCell && thing.in_cell) continue;
     blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
   }
   return blockers_;
 }
 
 std::span<const Blocker> Surroundings::AroundOf(std::uint32_t unit,
-                                                std::span<const SegmentFp> lines,
                                                 std::span<const std::uint8_t> these) {
   blockers_.clear();
-  for (const NeighbourNeed& near : scene_->neighbours(unit))
-    if (scene_->is_place(near.unit) && these[near.unit] != 0)
-      blockers_.push_back({{lines[near.unit], 0}, near.need_mm, near.unit});
+  for (const NeighbourNeed& near : scene_->neighbours(unit)) {
+    if (!scene_->is_place(near.unit) || these[near.unit] == 0) continue;
+    const SegmentFp line = scene_->arm(near.unit).At(start_[near.unit]);
+    blockers_.push_back({{line, 0}, near.at_start_mm, near.unit});
+  }
   for (const StandingThing& thing : scene_->standing(unit))
     blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
   return blockers_;
@@ -62,7 +66,7 @@ void Retreat::Run() {
     while (StraightRound()) DropArrived();
     if (waiting_.empty()) return;
     bool moved = false;
-    for (const double grid_deg : kSearchGrids_deg) moved = moved || GoAround(grid_deg);
+    for (const double grid_deg : kSearchGridsDeg) moved = moved || GoAround(grid_deg);
     moved = moved || MakeRoom();
     DropArrived();
     if (!moved) return;
@@ -78,9 +82,10 @@ Pose Retreat::StraightEnd(std::uint32_t unit) const {
 bool Retreat::StraightClear(std::uint32_t unit) {
   if (straight_[unit] == Known::kNo) {
     const Sweep sweep{poses_[unit], StraightEnd(unit)};
-    const bool clear = scene_->HasCell(unit) &&
-                       SweepClear(scene_->arm(unit), sweep,
-                                  surroundings_->Around(unit, lines_, poses_, false), nullptr);
+    const bool clear =
+        scene_->HasCell(unit) &&
+        SweepClear(scene_->arm(unit), sweep,
+                   surroundings_->Around(unit, lines_, poses_, Surroundings::Who::kAll), nullptr);
     straight_[unit] = clear ? Known::kClear : Known::kBlocked;
   }
   return straight_[unit] == Known::kClear;
@@ -154,21 +159,24 @@ bool Retreat::GoAround(double grid_deg) {
 bool Retreat::MakeRoom() {
   for (const bool stay_in_cell : {true, false}) {
     bool moved = false;
-    for (const std::uint32_t i : waiting_) {
-      if (!scene_->HasCell(i)) continue;
-      for (const NeighbourNeed& near : scene_->neighbours(i)) {
-        if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
-        if (StraightClearOf(i, near, lines_[near.unit])) continue;
-        for (const double grid_deg : kSearchGrids_deg)
-          if (GiveWay(near, i, grid_deg, stay_in_cell)) {
-            moved = true;
-            break;
-          }
-      }
-    }
+    for (const std::uint32_t i : waiting_) moved = MakeRoomFor(i, stay_in_cell) || moved;
     if (moved) return true;
   }
   return false;
+}
+
+bool Retreat::MakeRoomFor(std::uint32_t unit, bool stay_in_cell) {
+  if (!scene_->HasCell(unit)) return false;
+  bool moved = false;
+  for (const NeighbourNeed& near : scene_->neighbours(unit)) {
+    if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
+    if (StraightClearOf(unit, near, lines_[near.unit])) continue;
+    moved =
+        std::any_of(kSearchGridsDeg.begin(), kSearchGridsDeg.end(),
+                    [&](double grid_deg) { return GiveWay(near, unit, grid_deg, stay_in_cell); }) ||
+        moved;
+  }
+  return moved;
 }
 
 /// `near` goes to the nearest place where it no longer blocks the straight way of `waiting`.
@@ -198,7 +206,7 @@ PathSearch::Question Retreat::QuestionFor(std::uint32_t unit, double grid_deg) {
   PathSearch::Question question;
   question.arm = &scene_->arm(unit);
   question.drive = &drives_[unit];
-  question.blockers = surroundings_->Around(unit, lines_, poses_, false);
+  question.blockers = surroundings_->Around(unit, lines_, poses_, Surroundings::Who::kAll);
   question.from = poses_[unit];
   question.within = RangeAround(*question.arm, poses_[unit]);
   question.grid_deg = grid_deg;

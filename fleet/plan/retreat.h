@@ -28,19 +28,23 @@ struct Piece {
 /// Scratch that outlives one plan step: what stands around one unit, and the search.
 class Surroundings {
  public:
-  explicit Surroundings(const Scene* scene) : scene_(scene) {}
+  /// `start` outlives this. Shape: (n).
+  Surroundings(const Scene* scene, std::span<const Pose> start) : scene_(scene), start_(start) {}
 
-  /// Everything near `unit` with the others at `poses`. With `in_cell_only` units inside their own
-  /// cells are left out: for ways that never leave this unit's own cell.
+  enum class Who : std::uint8_t {
+    kAll,
+    kOutOfCell,  // without units inside their own cells: for ways that never leave the own one
+  };
+  /// Everything near `unit` with the others at `poses`. Lifetime: until the next call.
   std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                  std::span<const Pose> poses, bool in_cell_only);
-  /// Only what is in `these` of the units, and the standing things.
-  std::span<const Blocker> AroundOf(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                    std::span<const std::uint8_t> these);
+                                  std::span<const Pose> poses, Who who);
+  /// Only the units in `these`, as they start, and the standing things. Shape: (n).
+  std::span<const Blocker> AroundOf(std::uint32_t unit, std::span<const std::uint8_t> these);
   PathSearch& search() { return search_; }
 
  private:
   const Scene* scene_;
+  std::span<const Pose> start_;
   PathSearch search_;
   std::vector<Blocker> blockers_;
 };
@@ -65,10 +69,11 @@ class Retreat {
   bool StraightClear(std::uint32_t unit);
   [[nodiscard]] bool StraightClearOf(std::uint32_t unit, const NeighbourNeed& near,
                                      const SegmentFp& line) const;
-  int ShutIn(std::uint32_t unit) const;
+  [[nodiscard]] int ShutIn(std::uint32_t unit) const;
   bool StraightRound();
   bool GoAround(double grid_deg);
   bool MakeRoom();
+  bool MakeRoomFor(std::uint32_t unit, bool stay_in_cell);
   bool GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
                bool stay_in_cell);
   PathSearch::Question QuestionFor(std::uint32_t unit, double grid_deg);

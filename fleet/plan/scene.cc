@@ -9,10 +9,10 @@ namespace focalfleet {
 namespace {
 
 /// Beyond what the rule asks: covers the rounding of the sums that decide, thousands of times over.
-constexpr double kGuard_mm = 2e-4;
+constexpr double kGuardMm = 2e-4;
 /// A pair that starts or ends nearer than planned is planned this much nearer still, so that
 /// leaving is clear.
-constexpr double kStartSlack_mm = 1.5e-4;
+constexpr double kStartSlackMm = 1.5e-4;
 constexpr std::size_t kCoverMax = 400;
 
 double BaseDistance(const ArmGeometry& a, const ArmGeometry& b) {
@@ -102,8 +102,10 @@ Scene::Scene(const Layout& layout, std::span<const UnitDrive> drives,
     is_place_[i] = IsPlace(start[i]) ? 1 : 0;
   }
   for (std::uint32_t i = 0; i < n; ++i) {
-    for (const PositionerIndex j : layout.neighbours({i}))
-      needs_.push_back({j.value, FullNeed(i, j.value) + kGuard_mm});
+    for (const PositionerIndex j : layout.neighbours({i})) {
+      const double need_mm = FullNeed(i, j.value) + kGuardMm;
+      needs_.push_back({j.value, need_mm, need_mm});
+    }
     needs_begin_.push_back(static_cast<std::uint32_t>(needs_.size()));
   }
   FindCells();
@@ -118,7 +120,7 @@ void Scene::FindCells() {
     return BaseDistance(arms_[i], arms_[near.unit]) - near.need_mm;
   };
   for (std::uint32_t i = 0; i < n; ++i) {
-    least[i] = FoldedRadius(arms_[i]) + kGuard_mm;
+    least[i] = FoldedRadius(arms_[i]) + kGuardMm;
     double radius = arms_[i].theta_arm_mm() + arms_[i].phi_arm_mm();
     for (const NeighbourNeed& near : neighbours(i)) {
       const double wider = arms_[near.unit].half_width_mm() - arms_[i].half_width_mm();
@@ -140,20 +142,20 @@ void Scene::FindCells() {
 }
 
 void Scene::FindStanding(std::span<const UnitKnowledge> start) {
-  constexpr double kCoverSlack_mm = 0.05;
+  constexpr double kCoverSlackMm = 0.05;
   std::vector<std::vector<Capsule>> covers(size());
   for (std::uint32_t i = 0; i < size(); ++i)
-    if (is_place_[i] == 0) covers[i] = CoverOf(arms_[i], BoxOf(arms_[i], start[i]), kCoverSlack_mm);
+    if (is_place_[i] == 0) covers[i] = CoverOf(arms_[i], BoxOf(arms_[i], start[i]), kCoverSlackMm);
   standing_begin_.push_back(0);
   for (std::uint32_t i = 0; i < size(); ++i) {
     const ArmGeometry& arm = arms_[i];
     const double reach = arm.theta_arm_mm() + arm.phi_arm_mm();
     for (const Obstacle& obstacle : layout_->obstacles()) {
       const double need =
-          arm.half_width_mm() + obstacle.radius_mm + layout_->clearance_mm() + kGuard_mm;
+          arm.half_width_mm() + obstacle.radius_mm + layout_->clearance_mm() + kGuardMm;
       const PointFp& c = obstacle.centre_fp;
       if (DistanceMm(arm.base_fp(), c) > reach + need) continue;
-      const double least = need - kGuard_mm - kClearTolerance_mm;
+      const double least = need - kGuardMm - kClearToleranceMm;
       standing_.push_back({{{c, c}, 0}, need, least, kNobody, false});
     }
     for (const NeighbourNeed& near : neighbours(i)) {
@@ -169,22 +171,39 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
   }
 }
 
-void Scene::AllowFor(std::span<const Pose> poses) {
+void Scene::AllowFor(std::span<const Pose> poses, bool however_near) {
   for (std::uint32_t i = 0; i < size(); ++i) {
     if (is_place_[i] == 0) continue;
     const SegmentFp line = arms_[i].At(poses[i]);
     for (std::uint32_t k = needs_begin_[i]; k < needs_begin_[i + 1]; ++k) {
       NeighbourNeed& near = needs_[k];
       if (is_place_[near.unit] == 0) continue;
-      const double least = FullNeed(i, near.unit) - kClearTolerance_mm;
+      const double least = however_near ? -1 : FullNeed(i, near.unit) - kClearToleranceMm;
       const double distance = DistanceMm(line, arms_[near.unit].At(poses[near.unit]));
-      near.need_mm = std::max(least, std::min(near.need_mm, distance - kStartSlack_mm));
+      near.need_mm = std::max(least, std::min(near.need_mm, distance - kStartSlackMm));
+      near.at_start_mm = std::min(near.at_start_mm, near.need_mm);
     }
     for (std::uint32_t k = standing_begin_[i]; k < standing_begin_[i + 1]; ++k) {
       StandingThing& thing = standing_[k];
       if (thing.by != kNobody) continue;
       const double distance = DistanceMm(line, thing.capsule.line);
-      thing.need_mm = std::max(thing.least_mm, std::min(thing.need_mm, distance - kStartSlack_mm));
+      thing.need_mm = std::max(thing.least_mm, std::min(thing.need_mm, distance - kStartSlackMm));
+    }
+  }
+}
+
+void Scene::LeadApart(std::span<const Pose> poses) {
+  // Arms nearer than this may have crossed: which way is apart is then anybody's guess.
+  constexpr double kCrossedMm = 0.2;
+  for (std::uint32_t i = 0; i < size(); ++i) {
+    if (is_place_[i] == 0) continue;
+    const SegmentFp line = arms_[i].At(poses[i]);
+    for (std::uint32_t k = needs_begin_[i]; k < needs_begin_[i + 1]; ++k) {
+      NeighbourNeed& near = needs_[k];
+      if (is_place_[near.unit] == 0) continue;
+      const double distance = DistanceMm(line, arms_[near.unit].At(poses[near.unit]));
+      if (distance > kCrossedMm)
+        near.at_start_mm = std::min(near.at_start_mm, distance - kStartSlackMm);
     }
   }
 }

@@ -23,11 +23,13 @@ namespace focalfleet {
 
 inline constexpr std::uint32_t kNobody = 0xffffffffu;
 /// Two units that are this much nearer than half-widths plus clearance still count as clear.
-inline constexpr double kClearTolerance_mm = 2e-3;
+inline constexpr double kClearToleranceMm = 2e-3;
 
 struct NeighbourNeed {
   std::uint32_t unit = 0;
   double need_mm = 0;  // segments of the two must be farther apart than this
+  /// And while both still are where they start; less only where they are to be led apart.
+  double at_start_mm = 0;
 };
 
 /// Something that never moves, seen from one unit.
@@ -78,8 +80,13 @@ class Scene {
   [[nodiscard]] double FullNeed(std::uint32_t a, std::uint32_t b) const {
     return arms_[a].half_width_mm() + arms_[b].half_width_mm() + layout_->clearance_mm();
   }
-  /// Lowers the needs of pairs that stand nearer than planned needs in this configuration.
-  void AllowFor(std::span<const Pose> poses);
+  /// Lowers the needs of pairs that stand nearer than planned needs in this configuration: by the
+  /// rule's tolerance, or `however_near` they are, so that they can be led apart.
+  void AllowFor(std::span<const Pose> poses, bool however_near = false);
+  /// From now on pairs that start nearer than the rule allows may leave each other: on the first
+  /// way of either they are never brought nearer. Pairs that cross are not helped. Shape: (n), the
+  /// starts.
+  void LeadApart(std::span<const Pose> poses);
 
  private:
   void FindCells();

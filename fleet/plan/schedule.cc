@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kCountsPerTick = 14'400;
 static_assert(static_cast<double>(kCountsPerTick) == kTimerHz * 100e-6);
-constexpr double kGrain_deg = 15;
+constexpr double kGrainDeg = 15;
 
 using AxisCounts = std::array<std::uint32_t, kAxisCount>;
 
@@ -176,7 +176,7 @@ std::int32_t PartsOf(const Piece& piece, const Scene& scene, AxisCounts* counts)
   const std::size_t k = theta ? 0 : 1;
   const double length_deg = std::abs(sweep.to[k] - sweep.from[k]) *
                             scene.arm(piece.unit).step_rad(kAxes[k]) * 180 / std::numbers::pi;
-  const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrain_deg));
+  const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrainDeg));
   const auto spare =
       static_cast<std::int32_t>(limits::kSegmentsPerAxis) - static_cast<std::int32_t>((*counts)[k]);
   // Half of what is spare: the way out must find some too.

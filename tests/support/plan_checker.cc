@@ -11,10 +11,10 @@ namespace focalfleet::testing {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-constexpr double kQuantum_mm = 1e-3;
-constexpr double kJoin_deg = 1e-6;
-constexpr double kRange_deg = 1e-6;
-constexpr double kJoin_s = 1e-9;
+constexpr double kQuantumMm = 1e-3;
+constexpr double kJoinDeg = 1e-6;
+constexpr double kRangeDeg = 1e-6;
+constexpr double kJoinS = 1e-9;
 
 using Point = std::complex<double>;
 
@@ -139,7 +139,7 @@ class Checker {
  private:
   void FillIn();
   void Lay();
-  void LayUnit(std::size_t unit, std::vector<CheckedRow> rows);
+  void LayUnit(std::size_t i, std::vector<CheckedRow> rows);
   bool CheckAxis(const CheckedUnit& unit, int axis, const std::vector<CheckedRow>& rows);
   void CheckPairs();
   void CheckPair(std::size_t i, std::size_t j, double need_mm);
@@ -211,12 +211,12 @@ bool Checker::CheckAxis(const CheckedUnit& unit, int axis, const std::vector<Che
       fault = "a value is not finite";
     else if (row.t1_s < row.t0_s)
       fault = "ends before it begins";
-    else if (row.t0_s < until - kJoin_s)
+    else if (row.t0_s < until - kJoinS)
       fault = "overlaps the row before";
-    else if (std::abs(row.from_deg - at) > kJoin_deg)
+    else if (std::abs(row.from_deg - at) > kJoinDeg)
       fault = "does not join up with where the axis stands";
-    else if (row.to_deg < std::min(a.min_deg, a.start_deg) - kRange_deg ||
-             row.to_deg > std::max(a.max_deg, a.start_deg) + kRange_deg)
+    else if (row.to_deg < std::min(a.min_deg, a.start_deg) - kRangeDeg ||
+             row.to_deg > std::max(a.max_deg, a.start_deg) + kRangeDeg)
       fault = "leaves the axis' range";
     else if (row.t1_s == row.t0_s && row.from_deg != row.to_deg)
       fault = "jumps";
@@ -311,7 +311,7 @@ void Checker::WalkPair(std::size_t i, std::size_t j, double need_mm, Clock ci, C
       t = std::max(change, std::nextafter(t, 1e18));
       continue;
     }
-    const double step = std::max(distance - floor_mm, kQuantum_mm) / speed;
+    const double step = std::max(distance - floor_mm, kQuantumMm) / speed;
     t = std::max(std::min(t + step, change), std::nextafter(t, 1e18));
   }
 }
@@ -355,7 +355,7 @@ void Checker::WalkObstacle(std::size_t i, const CheckedObstacle& obstacle, doubl
     const double change = a.NextChange();
     const double speed = a.SpeedBound();
     if (speed <= 0 && change > 1e17) return;
-    const double step = speed > 0 ? std::max(distance - floor_mm, kQuantum_mm) / speed : 1e18;
+    const double step = speed > 0 ? std::max(distance - floor_mm, kQuantumMm) / speed : 1e18;
     t = std::max(std::min(t + step, change), std::nextafter(t, 1e18));
   }
 }
@@ -481,6 +481,7 @@ CheckReport CheckPlanFiles(const std::string& units_path, const std::string& sta
     unit.axis[1].start_deg = Number(r, "phi_deg", NAN);
   }
   std::vector<CheckedRow> rows;
+  rows.reserve(row_records.size());
   for (const Record& r : row_records) {
     const auto axis = r.find("axis");
     rows.push_back({Id(r, "unit_id"), axis != r.end() && axis->second == "phi" ? 1 : 0,
@@ -488,6 +489,7 @@ CheckReport CheckPlanFiles(const std::string& units_path, const std::string& sta
                     Number(r, "to_deg", NAN)});
   }
   std::vector<CheckedObstacle> obstacles;
+  obstacles.reserve(obstacle_records.size());
   for (const Record& r : obstacle_records)
     obstacles.push_back({Id(r, "obstacle_id"), Number(r, "x_mm", 0), Number(r, "y_mm", 0),
                          Number(r, "radius_mm", 0)});

@@ -322,6 +322,26 @@ TEST(Planner, RefusesAStartThatCollides) {
   EXPECT_THAT(plan.error().text, HasSubstr("the starts of units 11 and 22"));
 }
 
+TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
+  // Two arms side by side, 0.8 mm nearer than allowed.
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
+  fleet.StandAt({PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5)});
+  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120)};
+  const auto refused = MakePlan(fleet.request(), {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("the starts of units 11 and 22"));
+  const auto plan = MakePlan(fleet.request(), {.fixed = false, .lead_apart = true});
+  ASSERT_TRUE(plan) << plan.error().text;
+  EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
+  EXPECT_TRUE(plan->unserved.empty());
+  // Never nearer than they start, by the checker's own distance.
+  const auto before = focalfleet::testing::Witnessed(fleet, {});
+  ASSERT_LT(before.worst_margin_mm, -0.1);
+  CheckOptions options;
+  options.tolerance_mm = -before.worst_margin_mm + 2e-4;
+  ExpectSound(fleet, *plan, options);
+}
+
 TEST(Planner, RefusesATargetOutOfRangeAndArraysOfTheWrongSize) {
   PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
   fleet.StandAt({PoseDeg(fleet, 0, 90, 170), PoseDeg(fleet, 1, 90, 170)});
