@@ -30,6 +30,7 @@ Colour ColourOf(ExitCode exit) {
 ExitCode ExitCodeOf(const Json& configuration) {
   const std::string state = TextIn(configuration, "state");
   if (state == "stopped" || state == "failed") return ExitCode::kBroken;
+  if (!TextIn(configuration, "error").empty()) return ExitCode::kBroken;
   const bool all = CountIn(configuration, "refused") == 0 &&
                    CountIn(configuration, "failed") == 0 &&
                    CountIn(configuration, "arrived") == CountIn(configuration, "targeted");
@@ -50,6 +51,9 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
                       Shown(c, "makespan_s", "s", 1), Shown(c, "makespan_predicted_s", "s", 1),
                       Shown(c, "energy_J", "J", 1), Shown(c, "peak_power_W", "W", 1),
                       CountIn(c, "frames"));
+  if (const std::string error = TextIn(c, "error"); !error.empty()) {
+    text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
+  }
   const Json& unserved = ListIn(c, "unserved");
   if (unserved.empty()) return text;
   text += "\n";
@@ -76,6 +80,10 @@ Json ApplySummary(const Json& configuration, const Json& status) {
   }
   summary["bus_load_max"] =
       NumberIn(configuration, "bus_load_max", NumberIn(status, "bus_load_max"));
+  // Only where it failed on the way: the reason.
+  if (const std::string error = TextIn(configuration, "error"); !error.empty()) {
+    summary["error"] = {{"code", "unavailable"}, {"text", error}};
+  }
   summary["unserved"] = Json::array();
   for (const Json& unit : ListIn(configuration, "unserved")) {
     summary["unserved"].push_back({{"unit_id", CountIn(unit, "unit_id")},

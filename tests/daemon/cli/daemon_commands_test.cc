@@ -124,6 +124,16 @@ TEST_F(DaemonCommands, ApplyWaitEndsWithFiveWhereItWasStoppedOrFailed) {
   EXPECT_EQ(Apply({"--wait"}, {.result = Configuration("failed", 0, 1)}).exit, 5);
 }
 
+TEST_F(DaemonCommands, ApplyWaitTellsWhatWentWrongOnTheWay) {
+  Json configuration = Configuration("failed", 1, 0);
+  configuration["error"] = "the store cannot be written";
+  const auto text = Apply({"--wait"}, {.result = configuration});
+  EXPECT_EQ(text.exit, 5);
+  EXPECT_THAT(text.out, HasSubstr("the store cannot be written"));
+  const auto json = Apply({"--wait", "--json"}, {.result = configuration});
+  EXPECT_EQ(Json::parse(json.out, nullptr, false)["error"]["text"], "the store cannot be written");
+}
+
 TEST_F(DaemonCommands, ApplyShowsProgressInPlainLinesIntoAPipeAndNoneWithQuiet) {
   FakeAnswer answer{
       .progress =
@@ -236,9 +246,11 @@ TEST_F(DaemonCommands, HomeWantsUnitsOrNotKnownButNotBoth) {
   EXPECT_EQ(Ask({"home"}, {{"home", {}}}).exit, 2);
   EXPECT_EQ(Ask({"home", "1", "--not-known"}, {{"home", {}}}).exit, 2);
   Ask({"home", "1", "2", "--wait"}, {{"home", {.result = Configuration("done", 2, 0)}}});
-  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {1, 2}}, {"wait", true}}));
+  EXPECT_EQ(requests_.at(0).args,
+            (Json{{"unit_ids", {1, 2}}, {"wait", true}, {"unproven", false}}));
   EXPECT_EQ(Ask({"home", "--not-known"}, {{"home", {}}}).exit, 0);
-  EXPECT_EQ(requests_.at(0).args, (Json{{"not_known", true}, {"wait", false}}));
+  EXPECT_EQ(requests_.at(0).args,
+            (Json{{"not_known", true}, {"wait", false}, {"unproven", false}}));
 }
 
 TEST_F(DaemonCommands, DisableWantsAReason) {
