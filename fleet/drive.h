@@ -1,7 +1,8 @@
-// How vectors, angles and time belong together. One vector turns the motor's field by 360/subdivision
-// degrees and lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1, section "Open loop
-// regulating process"): with 500, n = 108, 96 and a gear of 337 * 45/17 a turn of the axis takes 32.11 s
-// and one vector is 4.2 mdeg. Everything that goes on the bus is whole vectors.
+// How vectors, angles and time belong together. One vector turns the motor's field by
+// 360/subdivision degrees and lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1,
+// section "Open loop regulating process"): with 500, n = 108, 96 and a gear of 337 * 45/17 a turn
+// of the axis takes 32.11 s and one vector is 4.2 mdeg. Everything that goes on the bus is whole
+// vectors.
 #pragma once
 
 #include <array>
@@ -38,7 +39,8 @@ constexpr double DegreesPerVector(const AxisGeometry& axis, const AxisDrive& dri
 constexpr double SecondsPerVector(const AxisDrive& drive) {
   return drive.repeat * static_cast<double>(drive.counter1) / kTimerHz;
 }
-inline std::int32_t NearestVectors(double angle_deg, const AxisGeometry& axis, const AxisDrive& drive) {
+inline std::int32_t NearestVectors(double angle_deg, const AxisGeometry& axis,
+                                   const AxisDrive& drive) {
   return static_cast<std::int32_t>(std::lround(angle_deg / DegreesPerVector(axis, drive)));
 }
 inline double AngleDeg(std::int32_t vectors, const AxisGeometry& axis, const AxisDrive& drive) {

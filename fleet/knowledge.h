@@ -1,6 +1,7 @@
-// What the coordinator may claim about where a unit stands. A number alone lies: it must say who saw it.
-// measured (a camera), reported (the unit's own vectors after a clean end), predicted (the plan, while it
-// moves), interval (a move was cut short: somewhere in low..high), unknown (nobody can say).
+// What the coordinator may claim about where a unit stands. A number alone lies: it must say who
+// saw it. measured (a camera), reported (the unit's own vectors after a clean end), predicted (the
+// plan, while it moves), interval (a move was cut short: somewhere in low..high), unknown (nobody
+// can say).
 #pragma once
 
 #include <array>

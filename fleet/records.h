@@ -1,6 +1,6 @@
-// What must not be lost, as rows: the coordinator hands them out as effects, the store writes them in order
-// in one transaction a batch, and at start hands back what it holds. Vectors and parameters belong to the
-// serial number; the place on the plate (unit) only binds one.
+// What must not be lost, as rows: the coordinator hands them out as effects, the store writes them
+// in order in one transaction a batch, and at start hands back what it holds. Vectors and
+// parameters belong to the serial number; the place on the plate (unit) only binds one.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +30,8 @@ struct VectorRow {
   Origin origin = Origin::kFactory;
 };
 
-/// "This unit is about to move": durable before any start signal; low..high is all that it may pass.
+/// "This unit is about to move": durable before any start signal; low..high is all that it may
+/// pass.
 struct IntentRow {
   std::uint64_t configuration = 0;
   SerialNumber serial;
@@ -42,7 +43,14 @@ struct IntentRow {
 };
 
 /// The intent's end, kept as history.
-enum class IntentEnd : std::uint8_t { kArrived, kStopped, kFault, kNeverBegan, kInterrupted, kHomed };
+enum class IntentEnd : std::uint8_t {
+  kArrived,
+  kStopped,
+  kFault,
+  kNeverBegan,
+  kInterrupted,
+  kHomed
+};
 constexpr const char* Name(IntentEnd end) {
   constexpr const char* kNames[] = {"arrived",     "stopped",     "fault",
                                     "never_began", "interrupted", "homed"};
@@ -73,7 +81,14 @@ struct ParameterRow {
   Origin origin = Origin::kOperator;
 };
 
-enum class ConfigurationState : std::uint8_t { kPlanning, kUploading, kMoving, kDone, kStopped, kFailed };
+enum class ConfigurationState : std::uint8_t {
+  kPlanning,
+  kUploading,
+  kMoving,
+  kDone,
+  kStopped,
+  kFailed
+};
 constexpr const char* Name(ConfigurationState state) {
   constexpr const char* kNames[] = {"planning", "uploading", "moving", "done", "stopped", "failed"};
   return kNames[static_cast<std::size_t>(state)];
@@ -118,8 +133,8 @@ struct StoredFleet {
     bool enabled = true;
     std::string reason;
   };
-  std::vector<StoredUnit> units;       // places that have a binding or were disabled
-  std::vector<VectorRow> vectors;      // by serial
+  std::vector<StoredUnit> units;   // places that have a binding or were disabled
+  std::vector<VectorRow> vectors;  // by serial
   std::vector<IntentRow> open_intents;
   std::vector<ParameterRow> parameters;
   MoveId next_move{1};

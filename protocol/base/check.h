@@ -1,15 +1,17 @@
-// FOCALFLEET_CHECK: the third kind of trouble, a bug in our own reasoning. It is always on, prints what was
-// believed and where, and aborts: a restart is safe, because the store holds the intent before anything
-// moves. Data from outside (a frame, a file, a row) never meets a CHECK before it met a validator.
+// FOCALFLEET_CHECK: the third kind of trouble, a bug in our own reasoning. It is always on, prints
+// what was believed and where, and aborts: a restart is safe, because the store holds the intent
+// before anything moves. Data from outside (a frame, a file, a row) never meets a CHECK before it
+// met a validator.
 #pragma once
 
 #include <cstdio>
 #include <cstdlib>
 
-#define FOCALFLEET_CHECK(condition)                                                               \
-  do {                                                                                            \
-    if (!(condition)) [[unlikely]] {                                                              \
-      std::fprintf(stderr, "focalfleet: %s:%d: check failed: %s\n", __FILE__, __LINE__, #condition); \
-      std::abort();                                                                               \
-    }                                                                                             \
+#define FOCALFLEET_CHECK(condition)                                                     \
+  do {                                                                                  \
+    if (!(condition)) [[unlikely]] {                                                    \
+      std::fprintf(stderr, "focalfleet: %s:%d: check failed: %s\n", __FILE__, __LINE__, \
+                   #condition);                                                         \
+      std::abort();                                                                     \
+    }                                                                                   \
   } while (false)

@@ -1,7 +1,7 @@
 // Who is who. Five kinds of integer that must never be swapped silently, so each is its own type.
-// A unit is one positioner with two axes; unit_id is the operators' number for a place on the plate;
-// (bus, node) is where it answers; the serial number is the hardware that sits there. Vectors and tuned
-// parameters belong to the serial number.
+// A unit is one positioner with two axes; unit_id is the operators' number for a place on the
+// plate; (bus, node) is where it answers; the serial number is the hardware that sits there.
+// Vectors and tuned parameters belong to the serial number.
 #pragma once
 
 #include <compare>
@@ -18,7 +18,7 @@ struct StrongId {
   constexpr auto operator<=>(const StrongId&) const = default;
 };
 
-using UnitId = StrongId<struct UnitIdTag, std::uint32_t>;              // operators' number
+using UnitId = StrongId<struct UnitIdTag, std::uint32_t>;               // operators' number
 using PositionerIndex = StrongId<struct PositionerTag, std::uint32_t>;  // row in the layout, 0..n-1
 using BusId = StrongId<struct BusIdTag, std::uint32_t>;
 using RailId = StrongId<struct RailIdTag, std::uint32_t>;

@@ -1,6 +1,6 @@
-// Time has types, never a bare number. HostInstant: nanoseconds of the coordinator's monotonic clock
-// (virtual in tests; scaled where a simulated fleet runs faster than life). DeviceTicks: 100 us counts of
-// one unit's own clock. The wall clock lives in daemon/ only.
+// Time has types, never a bare number. HostInstant: nanoseconds of the coordinator's monotonic
+// clock (virtual in tests; scaled where a simulated fleet runs faster than life). DeviceTicks: 100
+// us counts of one unit's own clock. The wall clock lives in daemon/ only.
 #pragma once
 
 #include <compare>

@@ -1,5 +1,5 @@
-// Every maximum of the system, and the relations between them. A loop, a queue or a table without an entry
-// here has no business in the core.
+// Every maximum of the system, and the relations between them. A loop, a queue or a table without
+// an entry here has no business in the core.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@ namespace focalfleet::limits {
 
 inline constexpr std::uint32_t kUnits = 32'768;
 inline constexpr std::uint32_t kBuses = 512;
-inline constexpr std::uint32_t kNodesPerBus = 128;   // electrical: a CAN segment carries no more
-inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of one staged move; two 4-bit counts on the wire
+inline constexpr std::uint32_t kNodesPerBus = 128;     // electrical: a CAN segment carries no more
+inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of a move; two 4-bit counts on the wire
 inline constexpr std::uint32_t kNeighboursPerUnit = 256;  // whose reach overlaps; 6 to 30 are usual
-inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;  // vectors from zero; 24 bits on the wire
+inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;       // vectors; 24 bits on the wire
 inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each: 28 minutes
 inline constexpr std::uint32_t kRequestRetries = 4;  // waits double: 31 times the first in all
 inline constexpr std::uint32_t kStageRetries = 3;
@@ -23,7 +23,8 @@ inline constexpr std::uint32_t kFramesPerStep = 65'536;
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
 static_assert(kNodesPerBus < 255, "255 is the broadcast address");
 static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
-// A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8 segments.
+// A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8
+// segments.
 static_assert(kFramesPerBusQueued >= kNodesPerBus * (1 + 2 * 8));
 
 }  // namespace focalfleet::limits

@@ -1,5 +1,6 @@
-// Result<T>: an operation that can fail for reasons outside our reasoning. An Error is a code that some
-// caller acts on, a sentence for people, and nothing else. Device misbehaviour is not an Error: it is data.
+// Result<T>: an operation that can fail for reasons outside our reasoning. An Error is a code that
+// some caller acts on, a sentence for people, and nothing else. Device misbehaviour is not an
+// Error: it is data.
 #pragma once
 
 #include <cstdint>
@@ -36,16 +37,16 @@ using Status = Result<void>;
 #define FOCALFLEET_CONCAT(a, b) FOCALFLEET_CONCAT_INNER(a, b)
 
 /// Evaluates `expr` (a Result or Status) and returns its error from the enclosing function.
-#define FOCALFLEET_TRY(expr)                                                           \
-  do {                                                                                 \
-    if (auto focalfleet_status = (expr); !focalfleet_status)                           \
+#define FOCALFLEET_TRY(expr)                                                            \
+  do {                                                                                  \
+    if (auto focalfleet_status = (expr); !focalfleet_status)                            \
       return tl::unexpected<::focalfleet::Error>(std::move(focalfleet_status).error()); \
   } while (false)
 
 /// As FOCALFLEET_TRY, and binds the value: FOCALFLEET_TRY_ASSIGN(const auto plan, MakePlan(...));
 #define FOCALFLEET_TRY_ASSIGN(lhs, expr) \
   FOCALFLEET_TRY_ASSIGN_INNER(FOCALFLEET_CONCAT(focalfleet_result_, __LINE__), lhs, expr)
-#define FOCALFLEET_TRY_ASSIGN_INNER(result, lhs, expr)                      \
-  auto result = (expr);                                                     \
+#define FOCALFLEET_TRY_ASSIGN_INNER(result, lhs, expr)                                \
+  auto result = (expr);                                                               \
   if (!result) return tl::unexpected<::focalfleet::Error>(std::move(result).error()); \
   lhs = std::move(*result)

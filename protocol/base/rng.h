@@ -1,6 +1,7 @@
-// Chance as an argument. The generator is xoshiro256** seeded by splitmix64, and the distributions are our
-// own, because the standard ones differ between libraries and the same seed must give the same bits.
-// Sub-streams are keyed by (seed, purpose, index): a new draw in one place does not shift the others.
+// Chance as an argument. The generator is xoshiro256** seeded by splitmix64, and the distributions
+// are our own, because the standard ones differ between libraries and the same seed must give the
+// same bits. Sub-streams are keyed by (seed, purpose, index): a new draw in one place does not
+// shift the others.
 #pragma once
 
 #include <array>
@@ -18,7 +19,8 @@ class Rng {
   }
 
   /// An independent stream for one purpose and one index (a unit, a bus, a campaign).
-  static constexpr Rng Stream(std::uint64_t seed, std::string_view purpose, std::uint64_t index = 0) {
+  static constexpr Rng Stream(std::uint64_t seed, std::string_view purpose,
+                              std::uint64_t index = 0) {
     std::uint64_t hash = 0xcbf29ce484222325u;  // FNV-1a of the purpose
     for (const char c : purpose) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
     std::uint64_t mixed = seed;
@@ -52,7 +54,8 @@ class Rng {
     }
   }
 
-  /// Standard normal (Marsaglia's polar method; no cached second value, so a draw has no hidden state).
+  /// Standard normal (Marsaglia's polar method; no cached second value, so a draw has no hidden
+  /// state).
   double Normal() {
     for (;;) {
       const double u = Uniform(-1, 1);

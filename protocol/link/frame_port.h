@@ -1,6 +1,6 @@
-// The door between the coordinator and a bus. SocketCAN, a UNIX socket and the in-process simulated bus are
-// three implementations; the core cannot tell which. A port never blocks: what it cannot take now it
-// refuses, and the caller keeps it.
+// The door between the coordinator and a bus. SocketCAN, a UNIX socket and the in-process simulated
+// bus are three implementations; the core cannot tell which. A port never blocks: what it cannot
+// take now it refuses, and the caller keeps it.
 #pragma once
 
 #include <span>

@@ -1,7 +1,7 @@
-// Values <-> frames. Encode is total; decode is total over all frames: any identifier and any bytes give a
-// message or a Malformed that says which rule was broken, never an assertion. No heap, no clock, no I/O.
-// Everything is little-endian; reserved bits and bytes are zero and checked, so that a later version can
-// give them a meaning without being misread by this one.
+// Values <-> frames. Encode is total; decode is total over all frames: any identifier and any bytes
+// give a message or a Malformed that says which rule was broken, never an assertion. No heap, no
+// clock, no I/O. Everything is little-endian; reserved bits and bytes are zero and checked, so that
+// a later version can give them a meaning without being misread by this one.
 #pragma once
 
 #include <tl/expected.hpp>
@@ -22,8 +22,8 @@ enum class Malformed : std::uint8_t {
   kDirection,   // a host frame where a unit's was expected, or no such message in this direction
   kNode,        // an answer from the broadcast address
   kLength,
-  kValue,       // an enumerator, count or range
-  kReserved,    // a bit that must be zero
+  kValue,     // an enumerator, count or range
+  kReserved,  // a bit that must be zero
 };
 const char* Name(Malformed malformed);
 

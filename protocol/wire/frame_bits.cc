@@ -3,7 +3,8 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint32_t kUnstuffedTail = 1 + 1 + 1 + 7 + 3;  // CRC del., ACK, ACK del., EOF, intermission
+// CRC delimiter, ACK slot, ACK delimiter, end of frame, intermission.
+constexpr std::uint32_t kUnstuffedTail = 1 + 1 + 1 + 7 + 3;
 
 // Walks the stuffed part of a frame bit by bit: CRC and stuff bits grow as the wire would see them.
 class BitWalk {

@@ -2,11 +2,11 @@
 //
 //   28..26 priority   25..20 function   19 from unit   18..11 node   10..3 sequence   2..0 detail
 //
-// Priority comes first so that a stop passes everything that waits; the node is part of the identifier, so two
-// units never send the same one; the sequence number is there, not in the payload, so that all eight bytes
-// carry data and an answer names the question it belongs to. Begin, segments and read-back of an upload have
-// one priority and ascending function numbers: a controller that sends its lowest waiting identifier first
-// still sends them in this order.
+// Priority comes first so that a stop passes everything that waits; the node is part of the
+// identifier, so two units never send the same one; the sequence number is there, not in the
+// payload, so that all eight bytes carry data and an answer names the question it belongs to.
+// Begin, segments and read-back of an upload have one priority and ascending function numbers: a
+// controller that sends its lowest waiting identifier first still sends them in this order.
 #pragma once
 
 #include <cstdint>
@@ -66,8 +66,8 @@ constexpr const FunctionRow& InfoOf(Function function) {
 }
 constexpr const char* Name(Function function) { return InfoOf(function).name; }
 
-/// Where a frame goes to or comes from, and which exchange it belongs to. An answer repeats the sequence
-/// number of its request; a frame that a unit sends unasked carries 0.
+/// Where a frame goes to or comes from, and which exchange it belongs to. An answer repeats the
+/// sequence number of its request; a frame that a unit sends unasked carries 0.
 struct Address {
   NodeId node;
   std::uint8_t sequence = 0;

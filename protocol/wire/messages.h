@@ -1,6 +1,7 @@
-// Every message of a unit's life, as values. Positions are whole vectors counted from the axis' zero (one
-// vector turns the motor's field by 360/subdivision degrees); times are 100 us ticks of the unit's clock.
-// Field widths on the wire are noted where they are narrower than the type; docs/protocol.md has the bytes.
+// Every message of a unit's life, as values. Positions are whole vectors counted from the axis'
+// zero (one vector turns the motor's field by 360/subdivision degrees); times are 100 us ticks of
+// the unit's clock. Field widths on the wire are noted where they are narrower than the type;
+// docs/protocol.md has the bytes.
 #pragma once
 
 #include <array>
@@ -18,8 +19,8 @@ inline constexpr std::uint8_t kProtocolVersion = 1;
 /// What a unit is doing. Sent in three bits.
 enum class UnitState : std::uint8_t {
   kRest = 0,
-  kStaging = 1,   // has (part of) a move, not armed
-  kArmed = 2,     // will begin at the start signal
+  kStaging = 1,  // has (part of) a move, not armed
+  kArmed = 2,    // will begin at the start signal
   kMoving = 3,
   kHoming = 4,
   kFault = 5,     // stopped by a fault; takes no motion until the fault is cleared
@@ -58,14 +59,15 @@ enum class Answer : std::uint8_t {
 inline constexpr std::uint8_t kAnswerCount = 8;
 const char* Name(Answer answer);
 
-/// What a unit keeps per axis in FLASH. kHostTimeoutMs is the unit's (both axes show the same value).
+/// What a unit keeps per axis in FLASH. kHostTimeoutMs is the unit's (both axes show the same
+/// value).
 enum class Parameter : std::uint8_t {
-  kCounter1 = 0,       // timer counts per carrier period (V_counter1)
-  kRepeat = 1,         // carrier periods per vector (n), the tuned default
-  kSubdivision = 2,    // vectors per electrical turn
-  kMode = 3,           // WaveMode
-  kPosition = 4,       // vectors; writing it sets where the axis believes to stand (rest only)
-  kMinPosition = 5,    // vectors; a staged move outside is refused
+  kCounter1 = 0,     // timer counts per carrier period (V_counter1)
+  kRepeat = 1,       // carrier periods per vector (n), the tuned default
+  kSubdivision = 2,  // vectors per electrical turn
+  kMode = 3,         // WaveMode
+  kPosition = 4,     // vectors; writing it sets where the axis believes to stand (rest only)
+  kMinPosition = 5,  // vectors; a staged move outside is refused
   kMaxPosition = 6,
   kHomePosition = 7,   // vectors at the hard stop that homing drives to
   kHostTimeoutMs = 8,  // silence of the host after which the unit is on its own
@@ -73,8 +75,8 @@ enum class Parameter : std::uint8_t {
 inline constexpr std::uint8_t kParameterCount = 9;
 const char* Name(Parameter parameter);
 
-/// One straight piece of an axis' path: from `start_ticks` after the start signal, `delta` vectors one by
-/// one, each shown for repeat * counter1 timer counts.
+/// One straight piece of an axis' path: from `start_ticks` after the start signal, `delta` vectors
+/// one by one, each shown for repeat * counter1 timer counts.
 struct Segment {
   std::uint32_t start_ticks = 0;  // 24 bits
   std::int32_t delta = 0;         // vectors, 24 bits
@@ -89,7 +91,8 @@ struct Start {   // broadcast: armed units of `move` begin `delay_ticks` after t
   MoveId move;
   std::uint32_t delay_ticks = 0;  // 24 bits
 };
-struct Clock {  // broadcast: the host's time; also the sign that a host is there
+/// Broadcast: the host's time; also the sign that a host is there.
+struct Clock {
   std::uint64_t host_us = 0;  // 48 bits
 };
 struct ClockRequest {};
@@ -134,17 +137,16 @@ struct ParameterWrite {
   std::int32_t value = 0;
 };
 
-using HostMessage =
-    std::variant<Stop, Start, Clock, ClockRequest, Arm, Confirm, StageBegin, StageSegment, Home,
-                 ProgressRequest, StatusRequest, VectorRequest, FaultRequest, IdentifyRequest,
-                 ParameterRead, ParameterWrite>;
+using HostMessage = std::variant<Stop, Start, Clock, ClockRequest, Arm, Confirm, StageBegin,
+                                 StageSegment, Home, ProgressRequest, StatusRequest, VectorRequest,
+                                 FaultRequest, IdentifyRequest, ParameterRead, ParameterWrite>;
 
 // ---- unit to host
 
 struct Done {  // a motion ended, or the answer to a stop: where the axes stand
   Outcome outcome = Outcome::kArrived;
   std::array<std::int32_t, kAxisCount> position{};  // vectors, 24 bits each
-  MoveId move;  // the last one begun
+  MoveId move;                                      // the last one begun
 };
 struct ClockReply {
   std::uint32_t ticks = 0;  // the unit's clock, low 32 bits
@@ -173,16 +175,16 @@ struct StatusReply {
   FaultCode fault = FaultCode::kNone;
   bool interrupted = false;  // FLASH's mark `moving` was set at power-on: the position is not known
   bool host_lost = false;
-  bool restarted = false;    // powered on since the last StatusRequest with resume
+  bool restarted = false;  // powered on since the last StatusRequest with resume
   std::uint8_t progress_percent = 0;
-  MoveId move;               // the last one begun; 0: none
+  MoveId move;  // the last one begun; 0: none
   std::uint16_t moves_begun = 0;
 };
 struct VectorReply {  // FLASH of one axis
   Axis axis = Axis::kTheta;
   std::uint16_t vector = 0;  // 0..subdivision-1
   std::uint16_t subdivision = 0;
-  std::int32_t turns = 0;    // whole electrical turns
+  std::int32_t turns = 0;  // whole electrical turns
 };
 struct FaultReply {
   FaultCode code = FaultCode::kNone;
@@ -205,7 +207,8 @@ struct ParameterReply {  // to a read and to a write: the value that now holds
   std::int32_t value = 0;
 };
 
-using UnitMessage = std::variant<Done, ClockReply, ArmReply, ConfirmReply, HomeReply, ProgressReply,
-                                 StatusReply, VectorReply, FaultReply, IdentifyReply, ParameterReply>;
+using UnitMessage =
+    std::variant<Done, ClockReply, ArmReply, ConfirmReply, HomeReply, ProgressReply, StatusReply,
+                 VectorReply, FaultReply, IdentifyReply, ParameterReply>;
 
 }  // namespace focalfleet

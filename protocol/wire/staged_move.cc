@@ -27,7 +27,8 @@ std::uint32_t Digest(const StagedMove& move) {
   const auto& theta = move.path[Index(Axis::kTheta)];
   const auto& phi = move.path[Index(Axis::kPhi)];
   std::uint32_t crc = 0xffffffffu;
-  crc = Extend(crc, Encode(HostMessage{StageBegin{move.move, {theta.size(), phi.size()}, move.mode}}, {}));
+  crc = Extend(
+      crc, Encode(HostMessage{StageBegin{move.move, {theta.size(), phi.size()}, move.mode}}, {}));
   for (const Axis axis : kAxes) {
     std::uint8_t index = 0;
     for (const Segment& segment : move.path[Index(axis)].segments())
