@@ -75,8 +75,9 @@ void AddHome(CommandLine* line) {
   auto options = std::make_shared<HomeOptions>();
   AddUnits(command, &options->units);
   command->add_flag("--not-known", options->not_known, "All units whose place is not known");
-  command->add_flag("--unproven", options->unproven,
-                    "Home also where no way can be proven clear of the neighbours: your word for it");
+  command->add_flag(
+      "--unproven", options->unproven,
+      "Home also where no way can be proven clear of the neighbours: your word for it");
   command->add_flag("--wait", options->wait, "Wait until it is over");
   OnChosen(line, command, options, RunHome);
 }
