@@ -332,7 +332,7 @@ Result<Plan> Planner::Run() {
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
     DropCollidingTargets();
-    scene_.AllowFor(start_, options_.lead_apart);
+    scene_.AllowFor(start_);
     scene_.AllowFor(goal_);
     if (options_.lead_apart) scene_.LeadApart(start_);
     done = Attempt(&order);

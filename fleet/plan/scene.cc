@@ -171,14 +171,14 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
   }
 }
 
-void Scene::AllowFor(std::span<const Pose> poses, bool however_near) {
+void Scene::AllowFor(std::span<const Pose> poses) {
   for (std::uint32_t i = 0; i < size(); ++i) {
     if (is_place_[i] == 0) continue;
     const SegmentFp line = arms_[i].At(poses[i]);
     for (std::uint32_t k = needs_begin_[i]; k < needs_begin_[i + 1]; ++k) {
       NeighbourNeed& near = needs_[k];
       if (is_place_[near.unit] == 0) continue;
-      const double least = however_near ? -1 : FullNeed(i, near.unit) - kClearToleranceMm;
+      const double least = FullNeed(i, near.unit) - kClearToleranceMm;
       const double distance = DistanceMm(line, arms_[near.unit].At(poses[near.unit]));
       near.need_mm = std::max(least, std::min(near.need_mm, distance - kStartSlackMm));
       near.at_start_mm = std::min(near.at_start_mm, near.need_mm);

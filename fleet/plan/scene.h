@@ -80,9 +80,9 @@ class Scene {
   [[nodiscard]] double FullNeed(std::uint32_t a, std::uint32_t b) const {
     return arms_[a].half_width_mm() + arms_[b].half_width_mm() + layout_->clearance_mm();
   }
-  /// Lowers the needs of pairs that stand nearer than planned needs in this configuration: by the
-  /// rule's tolerance, or `however_near` they are, so that they can be led apart.
-  void AllowFor(std::span<const Pose> poses, bool however_near = false);
+  /// Lowers the needs of pairs that stand nearer than planned needs in this configuration, by no
+  /// more than the rule's tolerance.
+  void AllowFor(std::span<const Pose> poses);
   /// From now on pairs that start nearer than the rule allows may leave each other: on the first
   /// way of either they are never brought nearer. Pairs that cross are not helped. Shape: (n), the
   /// starts.

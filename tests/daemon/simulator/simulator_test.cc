@@ -91,7 +91,7 @@ TEST(SimulatorMemory, RefusesWhatIsCutOrSpoilt) {
     return memory ? std::string("taken") : memory.error().text;
   };
   EXPECT_EQ(spoil("\"repeat\": 108", "\"repeat\": 0"),
-            "flash.json: unit number 1 in it: 'theta.repeat' is missing or out of range");
+            "flash.json: unit number 1 in it: 'phi.repeat' is missing or out of range");
   EXPECT_EQ(spoil("\"version\": 1", "\"version\": 2"),
             "flash.json: was written by a later version of focalfleet-sim");
   EXPECT_NE(spoil("\"serial\"", "\"sorial\""), "taken");
@@ -137,9 +137,10 @@ class Simulation : public ::testing::Test {
   Simulation() { Put(units(), kUnits); }
   [[nodiscard]] std::string units() const { return scratch_ / "units.csv"; }
   [[nodiscard]] std::string control() const { return scratch_ / "c"; }
-  [[nodiscard]] std::vector<std::string> Arguments(std::vector<std::string> more = {}) const {
+  [[nodiscard]] std::vector<std::string> Arguments(std::vector<std::string> more = {},
+                                                   const char* speed = "20") const {
     std::vector<std::string> all = {"--units",   units(),   "--unix-directory", scratch_.path(),
-                                    "--control", control(), "--speed",          "20"};
+                                    "--control", control(), "--speed",          speed};
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
@@ -189,9 +190,12 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
 TEST_F(Simulation, FlashSurvivesItsEnd) {
   const std::string flash = scratch_ / "flash.json";
   {
-    RunningSimulation simulation(Arguments({"--flash", flash}));
+    // Homing takes most of a minute at the pace of life: it is still under way at the end.
+    RunningSimulation simulation(Arguments({"--flash", flash}, "1"));
     ASSERT_TRUE(simulation.ready());
     BusClient bus(scratch_ / "bus3.sock");
+    bus.Send(2, StatusRequest{true});
+    ASSERT_TRUE(bus.ReceiveFromUnit<StatusReply>());
     bus.Send(2, Home{{77}}, 9);
     EXPECT_EQ(bus.ReceiveFromUnit<HomeReply>()->answer, Answer::kOk);
     EXPECT_EQ(simulation.Terminate(), 0);

@@ -1,0 +1,253 @@
+// Pursuit, from the intent to rest: start, homing, and every kind of stop.
+
+#include <algorithm>
+
+#include "fleet/coordinate/pursuit.h"
+
+namespace focalfleet {
+namespace {
+
+using enum UnitPhase;
+
+constexpr int kStartRepeats = 2;
+
+}  // namespace
+
+// ---- moving
+
+IntentRow Pursuit::IntentOf(PositionerIndex i) const {
+  const UnitPlan& plan = plan_.moves[plan_of_[i.value]];
+  IntentRow row{.configuration = view_.id,
+                .serial = core_.units[i.value].view.serial,
+                .unit = core_.layout.unit(i).id,
+                .move = move_,
+                .from = plan.from,
+                .to = plan.to,
+                .hull = {}};
+  for (const Axis axis : kAxes) {
+    const Span span = SpanOf(plan.from[Index(axis)], plan.path[Index(axis)]);
+    row.hull[Index(axis)] = {Witness::kInterval, span.low, span.high};
+  }
+  return row;
+}
+
+void Pursuit::Intend(PositionerIndex i, const IntentRow& intent) {
+  before_[i.value] = core_.unit(i).view.knowledge;
+  core_.intents[intent.serial] = intent;
+  core_.Note(intent);
+  // From here on the store must not claim the old place: the unit may be anywhere on its way.
+  core_.Know(i, intent.hull, Origin::kMove);
+}
+
+void Pursuit::TakeBackIntents() {
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    if (!before_[n]) continue;
+    const PositionerIndex i{n};
+    // Who was lost meanwhile keeps its intent: its return decides.
+    if (core_.unit(i).view.phase == kArmed || core_.unit(i).view.phase == kReady) {
+      core_.EndIntent(i, IntentEnd::kNeverBegan);
+      core_.Know(i, *before_[n], Origin::kMove);
+    }
+    before_[n].reset();
+  }
+}
+
+void Pursuit::CommitRound() {
+  for (const UnitPlan& move : plan_.moves) {
+    Intend(move.unit, IntentOf(move.unit));
+  }
+  core_.Note(NextMoveRow{core_.next_move});
+  view_.state = ConfigurationState::kMoving;
+  Record();
+  commit_batch_ = core_.batch_now();
+  SetState(State::kCommitting);
+}
+
+void Pursuit::Start() {
+  view_.started = core_.now + core_.config.start_delay;
+  last_arrival_ = view_.started;
+  start_repeats_ = 0;
+  for (const UnitPlan& move : plan_.moves) {
+    UnitRecord& unit = core_.unit(move.unit);
+    SetPart(move.unit, Part::kMoving);
+    core_.SetPhase(move.unit, kMoving);
+    before_[move.unit.value].reset();
+    // Spread over a poll period, so that a bus never hears all its units at once.
+    unit.next_poll = view_.started + core_.config.poll_period +
+                     DurationNs{core_.config.poll_period.ns * (move.unit.value % 97) / 97};
+    core_.SetDue(move.unit, unit.next_poll);
+  }
+  SetState(State::kMoving);
+  RepeatStart();
+}
+
+void Pursuit::RepeatStart() {
+  const DurationNs left = view_.started - core_.now;
+  const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
+  std::vector<std::uint8_t> told(core_.buses.size(), 0);
+  for (const UnitPlan& move : plan_.moves) {
+    const std::size_t bus = core_.unit(move.unit).bus;
+    if (told[bus]++ == 0) core_.SendNow(bus, focalfleet::Start{move_, ticks}, kBroadcastNode);
+    told[bus] = 1;
+  }
+  start_repeat_ = ++start_repeats_ > kStartRepeats
+                      ? kNever
+                      : core_.now + DurationNs{core_.config.start_delay.ns / (kStartRepeats + 2)};
+  due_ = start_repeat_;
+}
+
+std::optional<Pursuit::Course> Pursuit::CourseOf(PositionerIndex i) const {
+  if (part_[i.value] != Part::kMoving || plan_of_[i.value] == kNoPlan) return std::nullopt;
+  return Course{&plan_.moves[plan_of_[i.value]], view_.started};
+}
+
+void Pursuit::StopFollowers(PositionerIndex first, const std::string& reason) {
+  std::vector<PositionerIndex> open{first};
+  while (!open.empty()) {
+    const PositionerIndex i = open.back();
+    open.pop_back();
+    if (plan_of_[i.value] == kNoPlan) continue;
+    for (const auto& follower : plan_.moves[plan_of_[i.value]].followers) {
+      UnitRecord& unit = core_.unit(follower.unit);
+      const bool asked = unit.question && std::holds_alternative<Stop>(unit.question->message);
+      if (part_[follower.unit.value] != Part::kMoving || unit.view.phase != kMoving || asked)
+        continue;
+      StopOne(follower.unit, reason);
+      open.push_back(follower.unit);
+    }
+  }
+}
+
+// ---- homing
+
+IntentRow Pursuit::HomingIntentOf(PositionerIndex i) const {
+  const UnitView& view = core_.units[i.value].view;
+  const Unit& unit = core_.layout.unit(i);
+  IntentRow row{.configuration = view_.id,
+                .serial = view.serial,
+                .unit = unit.id,
+                .move = move_,
+                .from = {},
+                .to = {},
+                .hull = {}};
+  for (const Axis axis : kAxes) {
+    const AxisGeometry& geometry = unit.axis[Index(axis)];
+    const AxisDrive& drive = core_.drives[i.value].axis[Index(axis)];
+    const std::int32_t low = NearestVectors(geometry.min_deg, geometry, drive);
+    const std::int32_t high = NearestVectors(geometry.max_deg, geometry, drive);
+    const AxisKnowledge& known = view.knowledge[Index(axis)];
+    const bool unknown = known.witness == Witness::kUnknown;
+    const std::int32_t to = axis == Axis::kTheta ? low : high;
+    row.from[Index(axis)] = unknown ? low : known.low;
+    row.to[Index(axis)] = to;
+    row.hull[Index(axis)] = {Witness::kInterval, std::min(unknown ? low : known.low, to),
+                             std::max(unknown ? high : known.high, to)};
+  }
+  return row;
+}
+
+void Pursuit::CommitHoming() {
+  std::erase_if(homing_, [&](PositionerIndex i) {
+    if (core_.unit(i).view.phase == kReady) return false;
+    SetOutcome(i, TargetOutcome::kFailed, std::string("is ") + Name(core_.unit(i).view.phase));
+    std::erase(to_home_, i);
+    return true;
+  });
+  if (homing_.empty()) {
+    RoundOver();
+    return;
+  }
+  // A new id: the moves that made way for these units had their own.
+  move_ = core_.next_move;
+  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  for (const PositionerIndex i : homing_) {
+    Intend(i, HomingIntentOf(i));
+  }
+  core_.Note(NextMoveRow{core_.next_move});
+  view_.state = ConfigurationState::kMoving;
+  Record();
+  commit_batch_ = core_.batch_now();
+  SetState(State::kHomeCommitting);
+}
+
+void Pursuit::StartHoming() {
+  view_.started = core_.now;
+  last_arrival_ = core_.now;
+  for (const PositionerIndex i : homing_) {
+    plan_of_[i.value] = kNoPlan;
+    SetPart(i, Part::kMoving);
+    core_.SetPhase(i, kHoming);
+    before_[i.value].reset();
+    core_.unit(i).next_poll = core_.now + core_.config.poll_period;
+    core_.Ask(i, focalfleet::Home{move_});
+  }
+  SetState(State::kHoming);
+}
+
+void Pursuit::OnHomeReply(PositionerIndex i, const HomeReply& reply) {
+  if (core_.unit(i).view.phase != kHoming || reply.move != move_) return;
+  core_.SetDue(i, core_.unit(i).next_poll);
+  if (reply.answer == Answer::kOk || reply.answer == Answer::kBegunBefore) return;
+  SetOutcome(i, TargetOutcome::kFailed, std::string("refuses to home: ") + Name(reply.answer));
+  SetPart(i, Part::kNone);
+  contact_.Identify(i);
+}
+
+// ---- stopping
+
+void Pursuit::StopAll() {
+  for (std::size_t bus = 0; bus < core_.buses.size(); ++bus)
+    core_.SendNow(bus, Stop{}, kBroadcastNode);
+  if (!busy()) return;
+  stopping_ = true;
+  failure_ = "stopped by the operator";
+  start_repeat_ = kNever;
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    const PositionerIndex i{n};
+    // The broadcast may be lost to some: each unit that may move is asked to stop until it answers.
+    if (part_[n] == Part::kMoving && IsUnderWay(core_.unit(i).view.phase)) {
+      core_.Forget(i);
+      core_.Ask(i, Stop{});
+    }
+  }
+  switch (state_) {
+    case State::kGathering:
+    case State::kPlanning:
+      FinishWhenDurable(ConfigurationState::kStopped);
+      break;
+    case State::kUploading:
+    case State::kCommitting:
+      TakeBackIntents();
+      Disarm();
+      break;
+    case State::kHomeCommitting:
+      TakeBackIntents();
+      FinishWhenDurable(ConfigurationState::kStopped);
+      break;
+    case State::kIdle:
+    case State::kDisarming:
+    case State::kMoving:
+    case State::kHoming:
+    case State::kReporting:
+      break;  // Advance ends it when all have answered
+  }
+}
+
+void Pursuit::StopUnit(PositionerIndex i) {
+  SetOutcome(i, TargetOutcome::kFailed, "stopped by the operator");
+  if (busy()) Exclude(i);
+  if (!IsUnderWay(core_.unit(i).view.phase)) {
+    core_.SendNow(core_.unit(i).bus, Stop{}, core_.layout.unit(i).node);
+    return;
+  }
+  StopFollowers(i, core_.NameOf(i) + " was stopped and may stand in its way");
+  StopOne(i, "by the operator");
+}
+
+void Pursuit::StopOne(PositionerIndex i, const std::string& reason) {
+  core_.Forget(i);
+  core_.Ask(i, Stop{});
+  core_.Raise(Severity::kInfo, i, {}, core_.NameOf(i) + " is stopped: " + reason);
+}
+
+}  // namespace focalfleet
