@@ -26,7 +26,7 @@ Unit RandomUnit(Rng* rng, double x_mm) {
 Pose RandomPose(Rng* rng, const ArmGeometry& arm) {
   Pose pose{};
   for (std::size_t k = 0; k < kAxisCount; ++k) {
-    const auto width = static_cast<std::uint64_t>(arm.range().high[k] - arm.range().low[k] + 1);
+    const auto width = static_cast<std::uint64_t>(arm.range().high[k] - arm.range().low[k]) + 1;
     pose[k] = arm.range().low[k] + static_cast<std::int32_t>(rng->Below(width));
   }
   return pose;

@@ -87,7 +87,7 @@ TEST(PlanChecker, FindsContactsThatOnlySkewOrClocksMake) {
 
 TEST(PlanChecker, NamesRowsThatAreNoMotion) {
   const std::vector<CheckedUnit> units{Stretched(1, {0, 0}, 0)};
-  const auto faulty = [&](std::vector<CheckedRow> rows) {
+  const auto faulty = [&](const std::vector<CheckedRow>& rows) {
     return !CheckPlan(units, rows, {}, NoClearance()).ok();
   };
   EXPECT_FALSE(faulty({{1, 0, 0, 1, 0, 5}, {1, 0, 1, 2, 5, 9}}));

@@ -18,7 +18,6 @@ using ::focalfleet::testing::DrawStartAndTargets;
 using ::focalfleet::testing::ExpectSound;
 using ::focalfleet::testing::FleetOf;
 using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::IsUnserved;
 using ::focalfleet::testing::MoveOf;
 using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::TestSeed;
@@ -272,7 +271,7 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
       truth.targets[0].reset();
       Pose pose{};
       for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-        const auto span = static_cast<std::uint64_t>(high[axis] - low[axis] + 1);
+        const auto span = static_cast<std::uint64_t>(high[axis] - low[axis]) + 1;
         pose[axis] = low[axis] + static_cast<std::int32_t>(rng.Below(span));
       }
       truth.start[0] = Exactly(Witness::kReported, pose);
@@ -495,13 +494,16 @@ TEST(Planner, ArmsTooLongForTheirCellsNeverGiveACollidingPlan) {
   auto units = MakeHexLayout({.count = 19});
   for (Unit& unit : units) unit.axis[0].arm_mm = 11.5;
   PlanningFleet fleet = FleetOf(units);
+  std::size_t served = 0;
   for (std::uint64_t k = 0; k < 4; ++k) {
     FOCALFLEET_TRACE_SEED(Seed(k));
     DrawStartAndTargets(&fleet, Seed(k));
     const auto plan = MakePlan(fleet.request(), {});
     ASSERT_TRUE(plan) << plan.error().text;
     ExpectSound(fleet, *plan);
+    served += fleet.layout.size() - plan->unserved.size();
   }
+  EXPECT_GT(served, 0u) << "units without cells can still go by themselves";
 }
 
 TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {
