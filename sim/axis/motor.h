@@ -9,16 +9,9 @@
 // V.
 #pragma once
 
-namespace focalfleet::sim {
+#include "sim/motor/motor_parameters.h"
 
-struct MotorParameters {
-  double resistance_ohm = 14.85;
-  double flux_linkage_Wb = 0.15e-3;
-  double inertia_kg_m2 = 8.7e-11;
-  double viscous_Nms = 1e-8;
-  double load_Nm = 4.07e-6;      // mean, at the motor shaft
-  double load_variation = 0.20;  // amplitude over one output turn, as a share of the mean
-};
+namespace focalfleet::sim {
 
 class Motor {
  public:

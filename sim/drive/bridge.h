@@ -1,0 +1,41 @@
+// A two-level three-phase bridge: three legs, each with an upper and a lower switch and a diode
+// beside each. A command opens one switch at once and closes the other after the dead time. While
+// both are open the current decides: out of the leg (i > 0) it comes through the lower diode, into
+// the leg through the upper one, and where it has died out the leg floats. Whenever the leg's
+// voltage changes it does so along a ramp; while it does, the device that carries the current
+// carries the voltage, too, and heats.
+#pragma once
+
+#include <limits>
+
+namespace focalfleet::sim {
+
+/// Paper 1: STM32F302 with a MOSFET bridge of 10 ns, 10 ns and 50 ns.
+struct Bridge {
+  double v_bus_V = 1.8;
+  double rise_s = 10e-9;
+  double fall_s = 10e-9;
+  double dead_time_s = 50e-9;
+};
+
+/// One leg as it is now. Times count from the begin of the carrier period.
+struct Leg {
+  enum class Path { kUpper, kLower, kUpperDiode, kLowerDiode, kFloats };
+
+  bool commanded_high = false;
+  Path path = Path::kLower;
+  double closes_at_s = kNever;  // when the commanded switch closes after the dead time
+  double voltage_V = 0;         // against the negative rail
+  double slope_V_per_s = 0;
+  double ramp_ends_at_s = kNever;
+
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  [[nodiscard]] bool open() const {
+    return path == Path::kUpperDiode || path == Path::kLowerDiode || path == Path::kFloats;
+  }
+  /// Begins the ramp to the rail that `path` ties the leg to, if it is not there.
+  void FollowPath(const Bridge& bridge, double now_s);
+};
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,345 @@
+#include "sim/drive/drive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace focalfleet::sim {
+namespace {
+
+using Complex = std::complex<double>;
+constexpr Complex kJ{0, 1};
+constexpr double kRoot3Half = 0.86602540378443864676;
+constexpr std::array<Complex, kLegCount> kPhase = {
+    {{1, 0}, {-0.5, kRoot3Half}, {-0.5, -kRoot3Half}}};
+
+// No interval is longer: bounds the turn of the rotor and the change of its speed within one.
+constexpr double kStepMax_s = 1e-6;
+// Below it a current that died out is not looked for again.
+constexpr double kCrossingMin_s = 1e-14;
+
+double Project(Complex vector, std::size_t leg) {
+  return vector.real() * kPhase[leg].real() + vector.imag() * kPhase[leg].imag();
+}
+
+}  // namespace
+
+Complex Drive::Course::At(double t) const {
+  return c[0] + t * (c[1] + t * (c[2] + t * c[3])) + h * std::exp(-t * rate);
+}
+
+Drive::Drive(const Setting& setting) : setting_(setting), shaft_(setting.motor, setting.gearhead) {}
+
+double Drive::torque_Nm() const {
+  const Complex direction = std::polar(1.0, shaft_.angle_rad());
+  return 1.5 * setting_.motor.flux_linkage_Wb * (current_ * std::conj(direction)).imag();
+}
+
+DriveEnergy Drive::energy() const {
+  const MotorParameters& motor = setting_.motor;
+  return {.supply_J = supply_J_,
+          .copper_J = 1.5 * motor.resistance_ohm * square_A2s_,
+          .switching_J = switching_J_,
+          .load_J = shaft_.load_J(),
+          .viscous_J = shaft_.viscous_J(),
+          .stored_J = 0.75 * motor.inductance_H * std::norm(current_) + shaft_.kinetic_J()};
+}
+
+void Drive::Probe(double period_s, Sink sink) {
+  probe_period_s_ = period_s;
+  next_probe_s_ = 0;
+  sink_ = std::move(sink);
+}
+
+void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
+  if (leg->commanded_high == high) return;
+  ++edges_;
+  leg->commanded_high = high;
+  if (setting_.bridge.dead_time_s <= 0) {
+    leg->path = high ? Leg::Path::kUpper : Leg::Path::kLower;
+    leg->FollowPath(setting_.bridge, now_s);
+    return;
+  }
+  leg->closes_at_s = now_s + setting_.bridge.dead_time_s;
+  if (leg->open()) return;
+  leg->path = phase_A > 0   ? Leg::Path::kLowerDiode
+              : phase_A < 0 ? Leg::Path::kUpperDiode
+                            : Leg::Path::kFloats;
+  leg->FollowPath(setting_.bridge, now_s);
+}
+
+void Drive::CloseSwitches(double now_s) {
+  for (Leg& leg : legs_) {
+    if (leg.closes_at_s > now_s) continue;
+    leg.closes_at_s = Leg::kNever;
+    leg.path = leg.commanded_high ? Leg::Path::kUpper : Leg::Path::kLower;
+    leg.FollowPath(setting_.bridge, now_s);
+  }
+}
+
+double Drive::BackEmf(std::size_t leg) const {
+  return Project(kJ * (speed_ * setting_.motor.flux_linkage_Wb) * direction_, leg);
+}
+
+// The voltage that a leg without current takes from the others: that of the star plus its back-EMF.
+double Drive::FloatingVoltage(std::size_t leg) const {
+  double tied_V = 0;
+  double tied_emf_V = 0;
+  int tied = 0;
+  for (std::size_t other = 0; other < kLegCount; ++other) {
+    if (other == leg || legs_[other].path == Leg::Path::kFloats) continue;
+    tied_V += legs_[other].voltage_V;
+    tied_emf_V += BackEmf(other);
+    ++tied;
+  }
+  if (tied == 0) return setting_.bridge.v_bus_V / 2;
+  return (tied_V - tied_emf_V) / tied + BackEmf(leg);
+}
+
+// A leg floats only while its voltage stays between the rails; beyond, a diode takes it.
+void Drive::SettleDiodes(double now_s) {
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    Leg& leg = legs_[k];
+    if (leg.path != Leg::Path::kFloats) continue;
+    leg.voltage_V = FloatingVoltage(k);
+    if (leg.voltage_V >= 0 && leg.voltage_V <= setting_.bridge.v_bus_V) continue;
+    const bool below = leg.voltage_V < 0;
+    leg.path = below ? Leg::Path::kLowerDiode : Leg::Path::kUpperDiode;
+    leg.voltage_V = below ? 0 : setting_.bridge.v_bus_V;
+    leg.FollowPath(setting_.bridge, now_s);
+  }
+}
+
+Drive::Course Drive::CourseOf(double speed) const {
+  const MotorParameters& motor = setting_.motor;
+  const double r = motor.resistance_ohm;
+  const double l = motor.inductance_H;
+  Complex voltage;
+  Complex slope;
+  std::size_t floating = 0;
+  std::size_t last_floating = 0;
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    if (legs_[k].path == Leg::Path::kFloats) {
+      ++floating;
+      last_floating = k;
+      continue;
+    }
+    voltage += legs_[k].voltage_V * kPhase[k];
+    slope += legs_[k].slope_V_per_s * kPhase[k];
+  }
+  voltage *= 2.0 / 3;
+  slope *= 2.0 / 3;
+  Course course;
+  course.rate = r / l;
+  if (floating >= 2) {
+    course.c = {};
+    course.h = 0;
+    return course;
+  }
+  // Particular solution of the back-EMF: a phasor that turns with the rotor.
+  const Complex emf = -kJ * (speed * motor.flux_linkage_Wb) / Complex(r, speed * l) * direction_;
+  const Complex turn = kJ * speed;
+  const Complex c1 = slope / r;
+  const Complex emf1 = emf * turn;
+  const Complex emf2 = emf1 * turn * 0.5;
+  course.c = {(voltage - l * c1) / r + emf, c1 + emf1, emf2, emf2 * turn * (1.0 / 3)};
+  if (floating == 1) {
+    // Two legs in series: only the direction across the floating phase is left.
+    const Complex across = kJ * kPhase[last_floating];
+    // A floating leg's voltage lies along its own phase, so leaving it out above changes nothing.
+    for (Complex& c : course.c) c = across * (c * std::conj(across)).real();
+  }
+  course.h = current_ - course.c[0];
+  return course;
+}
+
+// When within the interval the current of a conducting diode dies out; `step_s` where it does not.
+double Drive::Crossing(const Course& course, double step_s, std::size_t* crossed) const {
+  double first = step_s;
+  *crossed = kLegCount;
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    const Leg::Path path = legs_[k].path;
+    if (path != Leg::Path::kUpperDiode && path != Leg::Path::kLowerDiode) continue;
+    const double sign = path == Leg::Path::kLowerDiode ? 1 : -1;
+    if (sign * Project(course.At(first), k) >= 0) continue;
+    double low = 0;
+    double high = first;
+    for (int i = 0; i < 60 && high - low > 1e-18; ++i) {
+      const double middle = (low + high) / 2;
+      (sign * Project(course.At(middle), k) >= 0 ? low : high) = middle;
+    }
+    first = high;
+    *crossed = k;
+  }
+  return first;
+}
+
+void Drive::Emit(const Course& course, double now_s, double step_s, double speed) {
+  while (next_probe_s_ < now_s + step_s) {
+    const double t = std::max(0.0, next_probe_s_ - now_s);
+    const Complex current = course.At(t);
+    const Complex direction = direction_ * std::polar(1.0, speed * t);
+    DriveSample sample;
+    sample.t_s = elapsed_s_ + next_probe_s_;
+    for (std::size_t k = 0; k < kLegCount; ++k) {
+      sample.current_A[k] = Project(current, k);
+      sample.voltage_V[k] = legs_[k].voltage_V + legs_[k].slope_V_per_s * t;
+    }
+    sample.torque_Nm =
+        1.5 * setting_.motor.flux_linkage_Wb * (current * std::conj(direction)).imag();
+    sample.angle_rad = shaft_.angle_rad() + speed * t;
+    sink_(sample);
+    next_probe_s_ += probe_period_s_;
+  }
+}
+
+// Integrals over the interval: |i|^2, what the supply gives, what the switches take, and the
+// torque.
+void Drive::Account(const Course& course, double now_s, double step_s, double decay) {
+  const double tau = 1 / course.rate;
+  // Integrals of t^k e^(-t/tau) and of t^k.
+  std::array<double, 4> fading;
+  fading[0] = tau * (1 - decay);
+  double power = 1;
+  for (std::size_t k = 1; k < 4; ++k) {
+    power *= step_s;
+    fading[k] = tau * (static_cast<double>(k) * fading[k - 1] - power * decay);
+  }
+  std::array<double, 7> flat;
+  power = 1;
+  for (std::size_t k = 0; k < flat.size(); ++k) {
+    power *= step_s;
+    flat[k] = power / static_cast<double>(k + 1);
+  }
+
+  double square = std::norm(course.h) * tau / 2 * (1 - decay * decay);
+  std::array<Complex, 4> moments;
+  for (std::size_t k = 0; k < 4; ++k) {
+    moments[k] = course.h * fading[k];
+    for (std::size_t a = 0; a < 4; ++a) moments[k] += course.c[a] * flat[a + k];
+    square += (std::conj(course.c[k]) * (moments[k] + course.h * fading[k])).real();
+  }
+  square_A2s_ += square;
+
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    const Leg& leg = legs_[k];
+    if (leg.path == Leg::Path::kFloats) continue;
+    const double charge = Project(moments[0], k);
+    const double out_J = leg.voltage_V * charge + leg.slope_V_per_s * Project(moments[1], k);
+    if (leg.slope_V_per_s == 0) {
+      if (leg.voltage_V > 0) supply_J_ += out_J;
+      continue;
+    }
+    // On a ramp the upper switch carries what flows out, the lower one what flows in.
+    const double given_J = charge > 0 ? setting_.bridge.v_bus_V * charge : 0;
+    supply_J_ += given_J;
+    switching_J_ += given_J - out_J;
+  }
+
+  // Torque: i seen from the rotor, whose turn is expanded as in the course.
+  const Complex turn = -kJ * speed_;
+  const Complex rotor =
+      moments[0] + turn * (moments[1] + turn * (0.5 * moments[2] + turn / 6.0 * moments[3]));
+  const double impulse_Nms =
+      1.5 * setting_.motor.flux_linkage_Wb * (rotor * std::conj(direction_)).imag();
+  shaft_.Step(impulse_Nms, step_s);
+  if (listener_) listener_({elapsed_s_ + now_s, step_s, moments, impulse_Nms});
+}
+
+void Drive::Advance(double now_s, double step_s) {
+  const double torque =
+      1.5 * setting_.motor.flux_linkage_Wb * (current_ * std::conj(direction_)).imag();
+  speed_ = shaft_.MiddleSpeed(torque, step_s);
+  const Course course = CourseOf(speed_);
+  if (sink_) Emit(course, now_s, step_s, speed_);
+  const double decay = std::exp(-step_s * course.rate);
+  const double angle_before = shaft_.angle_rad();
+  Account(course, now_s, step_s, decay);
+  current_ = course.c[0] + step_s * (course.c[1] + step_s * (course.c[2] + step_s * course.c[3])) +
+             course.h * decay;
+  const double turned = shaft_.angle_rad() - angle_before;
+  // e^(j turned) for a small turn, exact to 1e-15 of the step; made anew every carrier period.
+  const double half = turned * turned / 2;
+  direction_ *= Complex(1 - half + half * half / 6, turned * (1 - half / 3 + half * half / 30));
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    legs_[k].voltage_V += legs_[k].slope_V_per_s * step_s;
+    peak_A_ = std::max(peak_A_, std::abs(Project(current_, k)));
+  }
+}
+
+void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
+  const double period_s = modulation.carrier_s();
+  direction_ = std::polar(1.0, shaft_.angle_rad());
+
+  struct Order {
+    double at_s;
+    std::size_t leg;
+    bool high;
+  };
+  std::array<Order, 3 * kLegCount> orders;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    if (pattern[k].none()) {
+      orders[count++] = {0, k, false};
+      continue;
+    }
+    if (pattern[k].on > 0) orders[count++] = {0, k, false};
+    orders[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
+    if (pattern[k].off < modulation.counter1)
+      orders[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
+  }
+  std::sort(orders.begin(), orders.begin() + static_cast<std::ptrdiff_t>(count),
+            [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
+
+  double now_s = 0;
+  std::size_t next = 0;
+  while (true) {
+    while (next < count && orders[next].at_s <= now_s) {
+      Leg& leg = legs_[orders[next].leg];
+      Command(&leg, orders[next].high, now_s, Project(current_, orders[next].leg));
+      ++next;
+    }
+    CloseSwitches(now_s);
+    for (Leg& leg : legs_)
+      if (leg.ramp_ends_at_s <= now_s) {
+        leg.slope_V_per_s = 0;
+        leg.ramp_ends_at_s = Leg::kNever;
+        const bool upper = leg.path == Leg::Path::kUpper || leg.path == Leg::Path::kUpperDiode;
+        leg.voltage_V = upper ? setting_.bridge.v_bus_V : 0;
+      }
+    SettleDiodes(now_s);
+    if (now_s >= period_s) break;
+
+    double until_s = std::min(period_s, now_s + kStepMax_s);
+    if (next < count) until_s = std::min(until_s, orders[next].at_s);
+    bool diode = false;
+    for (const Leg& leg : legs_) {
+      until_s = std::min({until_s, leg.closes_at_s, leg.ramp_ends_at_s});
+      diode |= leg.path == Leg::Path::kUpperDiode || leg.path == Leg::Path::kLowerDiode;
+    }
+    std::size_t crossed = kLegCount;
+    if (diode) {
+      speed_ = shaft_.MiddleSpeed(
+          1.5 * setting_.motor.flux_linkage_Wb * (current_ * std::conj(direction_)).imag(),
+          until_s - now_s);
+      const double step_s = Crossing(CourseOf(speed_), until_s - now_s, &crossed);
+      until_s = now_s + std::max(step_s, kCrossingMin_s);
+    }
+    Advance(now_s, until_s - now_s);
+    now_s = until_s;
+    if (crossed < kLegCount) {
+      Leg& leg = legs_[crossed];
+      leg.path = Leg::Path::kFloats;
+      leg.FollowPath(setting_.bridge, now_s);
+      current_ -= Project(current_, crossed) * kPhase[crossed];
+    }
+  }
+  for (Leg& leg : legs_) {
+    leg.closes_at_s -= period_s;
+    leg.ramp_ends_at_s -= period_s;
+  }
+  next_probe_s_ -= period_s;
+  elapsed_s_ += period_s;
+}
+
+}  // namespace focalfleet::sim
