@@ -1,7 +1,7 @@
 // Plots as SVG for a page (page.h): no script, nothing fetched, sharp on paper, colours from the
 // page's style sheet so that they follow light and dark. The colours are Okabe and Ito's, which
-// stay apart for the colour-blind; the eighth series begins them again with dashes, and after 21
-// they repeat.
+// stay apart for the colour-blind (their blue is lighter on dark); the eighth series begins them
+// again, lines with dashes, and after 21 they repeat.
 //
 // Data are shown as they are or the plot says what it leaves out. What would mislead silently is
 // named under the plot: values <= 0 on a logarithmic axis, infinite values, reference lines outside
