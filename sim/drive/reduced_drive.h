@@ -1,0 +1,64 @@
+// The drive without its carrier: what is left of PWM when currents are averaged over a carrier
+// period and settle at once (their time constant is 2.5 us, a vector lasts 60 us and more). A
+// vector then is a mean voltage, and
+//
+//   i = (v_k - j w flux e^(j theta)) / (r + j w L),   T = 1.5 flux Im(i e^(-j theta))
+//
+// drives the same shaft as the drive at PWM level. The mean voltages v_k come from that level, with
+// the rotor blocked: so they know the mode, the rounding to counts, and what dead time takes.
+// Ripple and switching losses are taken from there too, as a resistance does not forget. Left out:
+// how back-EMF shifts the instants at which dead time changes sign, and the currents' settling.
+#pragma once
+
+#include <complex>
+#include <cstdint>
+#include <vector>
+
+#include "sim/drive/drive.h"
+
+namespace focalfleet::sim {
+
+class ReducedDrive {
+ public:
+  /// Cost: some ten carrier periods of each vector at PWM level. Keep one per modulation and copy.
+  ReducedDrive(const Drive::Setting& setting, const Modulation& modulation);
+
+  void Place(double angle_rad, double speed_rad_per_s);
+  /// Shows the vectors from `first` on, `count` of them (backwards for a negative count), each for
+  /// `repeat` carrier periods; `repeat` need not be whole.
+  void RunVectors(std::int64_t first, std::int64_t count, double repeat);
+  void RunVectors(std::int64_t first, std::int64_t count) {
+    RunVectors(first, count, modulation_.repeat);
+  }
+
+  [[nodiscard]] const Shaft& shaft() const { return shaft_; }
+  [[nodiscard]] double t_s() const { return t_s_; }
+  [[nodiscard]] double copper_J() const { return copper_J_; }
+  [[nodiscard]] double switching_J() const { return switching_J_; }
+  /// Electrical input, copper, switching and what went into the shaft. Units: J.
+  [[nodiscard]] double supply_J() const {
+    return copper_J_ + switching_J_ + shaft_.load_J() + shaft_.viscous_J() + shaft_.kinetic_J();
+  }
+  /// Torque on a blocked rotor that lags the vector by a right angle, mean over vectors. Units: Nm.
+  [[nodiscard]] double stall_Nm() const { return stall_Nm_; }
+
+ private:
+  struct Vector {
+    std::complex<double> voltage_V;
+    double ripple_A2 = 0;  // mean square of i about its mean
+    double switching_W = 0;
+  };
+  [[nodiscard]] std::complex<double> Current(const Vector& vector, double angle_rad,
+                                             double speed_rad_per_s) const;
+
+  Drive::Setting setting_;
+  Modulation modulation_;
+  Shaft shaft_;
+  std::vector<Vector> vectors_;
+  double stall_Nm_ = 0;
+  double t_s_ = 0;
+  double copper_J_ = 0;
+  double switching_J_ = 0;
+};
+
+}  // namespace focalfleet::sim

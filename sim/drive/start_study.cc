@@ -1,0 +1,224 @@
+#include "sim/drive/start_study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+
+#include "protocol/base/check.h"
+#include "sim/drive/steady.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+constexpr int kRepeatMax = 255;  // what a unit's timer table holds
+
+// Both levels behind one face.
+class Reduced {
+ public:
+  Reduced(const Drive::Setting& setting, const Modulation& modulation)
+      : drive_(setting, modulation) {}
+  void Place(double angle_rad) { drive_.Place(angle_rad, 0); }
+  void Run(std::int64_t first, const Stage& stage) {
+    drive_.RunVectors(first, stage.vectors, stage.repeat);
+  }
+  [[nodiscard]] double angle_rad() const { return drive_.shaft().angle_rad(); }
+  [[nodiscard]] double load_Nm() const { return drive_.shaft().LoadTorque(); }
+  [[nodiscard]] double copper_J() const { return drive_.copper_J(); }
+  [[nodiscard]] double t_s() const { return drive_.t_s(); }
+
+ private:
+  ReducedDrive drive_;
+};
+
+class Pwm {
+ public:
+  Pwm(const Drive::Setting& setting, const Modulation& modulation)
+      : drive_(setting), modulation_(modulation), table_(VectorTable(modulation)) {}
+  void Place(double angle_rad) { drive_.Place(angle_rad, 0); }
+  void Run(std::int64_t first, const Stage& stage) {
+    modulation_.repeat = stage.repeat;
+    RunVectors(&drive_, modulation_, table_, first, stage.vectors);
+  }
+  [[nodiscard]] double angle_rad() const { return drive_.shaft().angle_rad(); }
+  [[nodiscard]] double load_Nm() const { return drive_.shaft().LoadTorque(); }
+  [[nodiscard]] double copper_J() const { return drive_.energy().copper_J; }
+  [[nodiscard]] double t_s() const { return drive_.t_s(); }
+
+ private:
+  Drive drive_;
+  Modulation modulation_;
+  std::vector<Pattern> table_;
+};
+
+// Rests behind `field` vectors as far as friction holds it. False: the load is more than the field
+// can ever give.
+template <class Level>
+bool Rest(Level* level, const Modulation& modulation, std::int64_t field, double stall_Nm,
+          int direction) {
+  const double angle = static_cast<double>(field) * kTurn / modulation.subdivision;
+  level->Place(angle);
+  const double share = level->load_Nm() / stall_Nm;
+  if (share >= 1) return false;
+  level->Place(angle - direction * std::asin(share));
+  return true;
+}
+
+template <class Level>
+void RunProfile(Level* level, std::int64_t field, const std::vector<Stage>& profile) {
+  for (const Stage& stage : profile) {
+    // The vector shown at rest is the one before the first of the move.
+    level->Run(stage.vectors > 0 ? field + 1 : field - 1, stage);
+    field += stage.vectors;
+  }
+}
+
+template <class Level>
+MoveCount TryMovesAt(Level level, double stall_Nm, const Drive::Setting& setting,
+                     const Modulation& modulation, const StartRule& rule) {
+  const auto vectors =
+      std::llround(rule.move_deg / 360 * setting.gearhead.ratio * modulation.subdivision);
+  MoveCount count;
+  std::int64_t field = 0;
+  for (const int direction : {1, -1})
+    for (int k = 0; k < rule.moves_each_way; ++k) {
+      ++count.moves;
+      if (!Rest(&level, modulation, field, stall_Nm, direction)) continue;
+      RunProfile(&level, field, MakeProfile(direction * vectors, modulation, rule.ramp));
+      const std::int64_t end = field + direction * vectors;
+      const double off =
+          level.angle_rad() / kTurn - static_cast<double>(end) / modulation.subdivision;
+      // Turns that were lost stay lost: the next move starts where the rotor is.
+      const auto lost = std::llround(off);
+      count.succeeded += lost == 0 ? 1 : 0;
+      field = end + lost * modulation.subdivision;
+    }
+  count.copper_J = level.copper_J();
+  count.time_s = level.t_s();
+  return count;
+}
+
+template <class Level>
+bool StartsAt(Level level, double stall_Nm, const Modulation& modulation, const StartTrial& trial) {
+  if (!Rest(&level, modulation, 0, stall_Nm, 1)) return false;
+  const std::int64_t vectors = static_cast<std::int64_t>(trial.turns) * modulation.subdivision;
+  RunProfile(&level, 0, MakeProfile(vectors, modulation, trial.ramp));
+  return std::abs(level.angle_rad() - trial.turns * kTurn) < kTurn / 2;
+}
+
+Drive::Setting AtWorstLoad(Drive::Setting setting) {
+  setting.motor.load_Nm *= 1 + setting.motor.load_variation;
+  setting.motor.load_variation = 0;
+  return setting;
+}
+
+double Stall(const Drive::Setting& setting, const Modulation& modulation) {
+  return ReducedDrive(setting, modulation).stall_Nm();
+}
+
+bool StartsReal(const ReducedDrive& rested, double stall_Nm, double load_Nm,
+                const Modulation& modulation, double repeat) {
+  if (load_Nm >= stall_Nm) return false;
+  ReducedDrive drive = rested;
+  drive.Place(-std::asin(load_Nm / stall_Nm), 0);
+  const StartTrial trial;
+  drive.RunVectors(1, static_cast<std::int64_t>(trial.turns) * modulation.subdivision, repeat);
+  return std::abs(drive.shaft().angle_rad() - trial.turns * kTurn) < kTurn / 2;
+}
+
+}  // namespace
+
+std::vector<Stage> MakeProfile(std::int64_t vectors, const Modulation& modulation,
+                               const Ramp& ramp) {
+  const std::int64_t direction = vectors < 0 ? -1 : 1;
+  std::int64_t left = std::abs(vectors);
+  std::vector<Stage> up;
+  for (int s = 0; s < ramp.stages; ++s) {
+    const int repeat =
+        std::min(kRepeatMax, (modulation.repeat * (ramp.stages + 1) + s) / (s + 1));  // rounded up
+    const auto count =
+        std::max<std::int64_t>(1, std::llround(ramp.stage_s / (repeat * modulation.carrier_s())));
+    if (2 * count > left) break;
+    left -= 2 * count;
+    up.push_back({direction * count, repeat});
+  }
+  std::vector<Stage> profile = up;
+  // Full speed only after the whole ramp.
+  const bool whole = up.size() == static_cast<std::size_t>(ramp.stages);
+  if (left > 0)
+    profile.push_back(
+        {direction * left, whole || up.empty() ? modulation.repeat : up.back().repeat});
+  profile.insert(profile.end(), up.rbegin(), up.rend());
+  return profile;
+}
+
+MoveCount TryMoves(const Drive::Setting& setting, const Modulation& modulation,
+                   const StartRule& rule, DriveLevel level) {
+  FOCALFLEET_CHECK(modulation.repeat > 0);
+  const double stall_Nm = Stall(setting, modulation);
+  return level == DriveLevel::kReduced
+             ? TryMovesAt(Reduced(setting, modulation), stall_Nm, setting, modulation, rule)
+             : TryMovesAt(Pwm(setting, modulation), stall_Nm, setting, modulation, rule);
+}
+
+bool StartsAtWorstLoad(const Drive::Setting& setting, const Modulation& modulation,
+                       const StartTrial& trial, DriveLevel level) {
+  const Drive::Setting worst = AtWorstLoad(setting);
+  const double stall_Nm = Stall(worst, modulation);
+  return level == DriveLevel::kReduced
+             ? StartsAt(Reduced(worst, modulation), stall_Nm, modulation, trial)
+             : StartsAt(Pwm(worst, modulation), stall_Nm, modulation, trial);
+}
+
+std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
+                                  const StartTrial& trial, DriveLevel level, int highest) {
+  const auto starts = [&](int repeat) {
+    Modulation at = modulation;
+    at.repeat = repeat;
+    return StartsAtWorstLoad(setting, at, trial, level);
+  };
+  if (!starts(highest)) return std::nullopt;
+  int fails = 0;
+  int works = highest;
+  while (works - fails > 1) {
+    const int middle = (fails + works) / 2;
+    (starts(middle) ? works : fails) = middle;
+  }
+  return works;
+}
+
+std::optional<double> CriticalRepeatReal(const Drive::Setting& setting,
+                                         const Modulation& modulation) {
+  const Drive::Setting worst = AtWorstLoad(setting);
+  const ReducedDrive rested(worst, modulation);
+  const auto starts = [&](double repeat) {
+    return StartsReal(rested, rested.stall_Nm(), worst.motor.load_Nm, modulation, repeat);
+  };
+  double fails = 0.5;
+  double works = kRepeatMax;
+  if (!starts(works)) return std::nullopt;
+  while (works - fails > 1e-3) {
+    const double middle = std::sqrt(fails * works);
+    (starts(middle) ? works : fails) = middle;
+  }
+  return works;
+}
+
+double LoadOfCriticalRepeat(Drive::Setting setting, const Modulation& modulation, int repeat) {
+  const double variation = setting.motor.load_variation;
+  setting.motor.load_variation = 0;
+  double starts = 0;
+  double stalls = Stall(setting, modulation);
+  for (int k = 0; k < 24; ++k) {
+    const double worst = (starts + stalls) / 2;
+    setting.motor.load_Nm = worst;
+    const ReducedDrive rested(setting, modulation);
+    // Critical for `repeat` is what half a count less would not start.
+    const bool ok = StartsReal(rested, rested.stall_Nm(), worst, modulation, repeat - 0.5);
+    (ok ? starts : stalls) = worst;
+  }
+  return starts / (1 + variation);
+}
+
+}  // namespace focalfleet::sim
