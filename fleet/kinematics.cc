@@ -18,6 +18,8 @@ constexpr double kClampTryDeg = 3;
 
 std::vector<double> TurnsWithin(double angle_deg, const AxisGeometry& axis, double tolerance_deg) {
   std::vector<double> turns;
+  // Exact, and near 0 a turn more is another number, whatever the angle was.
+  angle_deg = std::remainder(angle_deg, 360);
   const double first = std::ceil((axis.min_deg - tolerance_deg - angle_deg) / 360);
   for (double k = first; angle_deg + 360 * k <= axis.max_deg + tolerance_deg; ++k)
     turns.push_back(std::clamp(angle_deg + 360 * k, axis.min_deg, axis.max_deg));

@@ -19,7 +19,6 @@ constexpr double kClearanceShare = 0.012;  // of the pitch
 constexpr std::size_t kUnitsPerBus = 100;
 constexpr double kCoordinateMaxMm = 1e5;
 constexpr double kArmMaxMm = 1e4;
-constexpr double kAngleMaxDeg = 36'000;
 constexpr double kNearestMinMm = 1e-3;
 
 std::string Text(double value) {

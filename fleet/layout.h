@@ -31,6 +31,8 @@ struct AxisGeometry {
   double max_deg = 0;
 };
 
+/// No angle of a file, range or target, is beyond: 100 turns.
+inline constexpr double kAngleMaxDeg = 36'000;
 /// No bus was given: Create finds a place.
 inline constexpr BusId kNoBus{UINT32_MAX};
 /// No node was given: Create takes the lowest that is free on the bus, in the order of the units.

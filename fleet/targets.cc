@@ -15,7 +15,7 @@ namespace {
 
 std::string Number(double value) {
   char text[40];
-  std::snprintf(text, sizeof text, "%.4f", value);
+  std::snprintf(text, sizeof text, std::abs(value) < 1e9 ? "%.4f" : "%g", value);
   return text;
 }
 
@@ -61,6 +61,13 @@ Result<std::vector<AxisAngles>> SolutionsFor(const TargetAngles& target, const U
                                              const std::string& at) {
   if (!std::isfinite(target.theta_deg) || !std::isfinite(target.phi_deg))
     return Fail(ErrorCode::kInvalid, at + ": the target's angles are not finite numbers");
+  for (const Axis axis : kAxes) {
+    const double angle_deg = axis == Axis::kTheta ? target.theta_deg : target.phi_deg;
+    if (std::abs(angle_deg) > kAngleMaxDeg)
+      return Fail(ErrorCode::kInvalid, at + ": " + Name(axis) + "_deg " + Number(angle_deg) +
+                                           " is not an angle within " +
+                                           std::to_string(static_cast<int>(kAngleMaxDeg)));
+  }
   if (target.phi_deg < unit.phi().min_deg || target.phi_deg > unit.phi().max_deg)
     return Fail(ErrorCode::kInvalid, at + ": phi_deg " + Number(target.phi_deg) +
                                          " is out of its range " + RangeText(unit.phi()));

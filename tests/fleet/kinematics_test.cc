@@ -141,6 +141,8 @@ TEST(Kinematics, TurnsStayInRange) {
   EXPECT_EQ(TurnsInRange(0, axis), (std::vector<double>{-360, 0, 360}));
   EXPECT_EQ(TurnsInRange(3600 + 50, axis), (std::vector<double>{-310, 50}));
   EXPECT_TRUE(TurnsInRange(90, {1, 0, 300, -45, 45}).empty());
+  for (const double beyond : {1e15, 1e17, -1e300, std::numeric_limits<double>::infinity()})
+    EXPECT_LE(TurnsInRange(beyond, axis).size(), 3u) << beyond;
 }
 
 }  // namespace

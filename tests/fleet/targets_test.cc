@@ -177,6 +177,11 @@ TEST(ResolveTargets, NamesFileLineUnitAndReason) {
   EXPECT_THAT(ErrorOf(fleet, {Row(1, PointFp{std::nan(""), 0}, 3)}),
               HasSubstr("night.csv:3: unit 1"));
   EXPECT_THAT(ErrorOf(fleet, {Row(1, TargetAngles{0, std::nan("")}, 3)}), HasSubstr("not finite"));
+  EXPECT_EQ(ErrorOf(fleet, {Row(1, TargetAngles{1e300, 90}, 3)}),
+            "night.csv:3: unit 1: theta_deg 1e+300 is not an angle within 36000");
+  EXPECT_THAT(ErrorOf(fleet, {Row(1, TargetAngles{0, -36'001}, 3)}),
+              HasSubstr("phi_deg -36001.0000 is not an angle within"));
+  EXPECT_EQ(ErrorOf(fleet, {Row(1, TargetAngles{-36'000, 90}, 3)}), "");
   auto units = MakeHexLayout({.count = 1});
   units[0].axis[0].min_deg = -90;
   units[0].axis[0].max_deg = 90;

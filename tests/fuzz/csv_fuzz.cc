@@ -9,6 +9,8 @@
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/files/targets_file.h"
+#include "fleet/hex_layout.h"
+#include "fleet/targets.h"
 #include "protocol/base/check.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -25,6 +27,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (const auto targets = ReadTargets(text, "fuzz.csv")) {
     const auto again = ReadTargets(WriteTargets(*targets), "again.csv");
     FOCALFLEET_CHECK(again && again->rows.size() == targets->rows.size());
+    static const auto layout = Layout::Create(MakeHexLayout({.count = 7}), {});
+    static const std::vector<UnitDrive> drives(7);
+    if (const auto poses = ResolveTargets(*targets, *layout, drives, {}); !poses) {
+      FOCALFLEET_CHECK(!poses.error().text.empty());
+    }
   }
   if (const auto layout = ReadLayout(text, "fuzz.csv", {})) {
     const auto again = ReadLayout(WriteUnits(layout->units()), "again.csv", {});
