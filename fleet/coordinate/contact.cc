@@ -168,7 +168,7 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   const auto answers = [&](Function function) { return core_.Answers(i, function, sequence); };
 
   if (const auto* done = std::get_if<Done>(&heard.message)) {
-    OnDone(i, *done, sequence != 0 && answers(Function::kDone));
+    OnDone(i, *done, sequence);
   } else if (const auto* status = std::get_if<StatusReply>(&heard.message)) {
     if (answers(Function::kStatus)) OnStatus(i, *status);
   } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
@@ -249,10 +249,14 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   }
 }
 
-void Contact::OnDone(PositionerIndex i, const Done& done, bool answer) {
+void Contact::OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence) {
   UnitRecord& record = core_.unit(i);
   UnitView& view = record.view;
   view.move = done.move;
+  const bool answer = sequence != 0 && core_.Answers(i, Function::kDone, sequence);
+  // A unit says `stopped` only to a stop.
+  if (done.outcome == Outcome::kStopped && !answer && !core_.MayAnswerOurStop(i, sequence))
+    core_.Tell(i, UnitEventKind::kForeignStop);
   if (view.phase == kMoving || view.phase == kHoming) {
     const auto intent = core_.intents.find(view.serial);
     if (intent != core_.intents.end() && intent->second.move == done.move) {
@@ -371,6 +375,10 @@ void Contact::Concluded(PositionerIndex i) {
   const Reconciled result =
       Reconcile({reading.status, reading.position, reading.subdivision}, store);
   if (result.intent_end) core_.EndIntent(i, *result.intent_end);
+  // Its `done` was lost, but it stands short of its end, and nothing but a stop leaves it there.
+  if (result.intent_end == IntentEnd::kStopped && record.runs_freely)
+    core_.Tell(i, UnitEventKind::kForeignStop);
+  record.runs_freely = false;
   if (!store.vector || store.vector->knowledge != result.knowledge)
     core_.Know(i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;

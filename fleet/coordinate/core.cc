@@ -12,6 +12,8 @@ namespace {
 // What an answer of eight bytes takes on average; the schedule only needs it to be fair.
 constexpr std::uint32_t kAnswerBits = 145;
 constexpr DurationNs kQueueFullWait = Milliseconds(20);
+// 255 is left to those who stop the units past the coordinator (daemon/cli/direct_stop.cc).
+constexpr std::uint8_t kLastSequence = 254;
 
 Function AnswerFunction(const CanFrame& question) {
   const auto function = static_cast<Function>(question.id >> 20 & 63);
@@ -82,6 +84,7 @@ void Core::SetPhase(PositionerIndex i, UnitPhase phase) {
   UnitView& view = unit(i).view;
   FOCALFLEET_CHECK(IsAllowed(view.phase, phase));
   view.phase = phase;
+  if (phase == UnitPhase::kMoving || phase == UnitPhase::kHoming) unit(i).runs_freely = true;
   Changed(i);
 }
 
@@ -109,8 +112,13 @@ std::optional<PositionerIndex> Core::NextDue() {
 
 void Core::Ask(PositionerIndex i, const HostMessage& message) {
   UnitRecord& record = unit(i);
-  record.sequence =
-      record.sequence == 255 ? std::uint8_t{1} : static_cast<std::uint8_t>(record.sequence + 1);
+  record.sequence = record.sequence == kLastSequence
+                        ? std::uint8_t{1}
+                        : static_cast<std::uint8_t>(record.sequence + 1);
+  if (std::holds_alternative<Stop>(message)) {
+    record.stop_sequence = record.sequence;
+    record.runs_freely = false;
+  }
   const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
   record.question = Question{message, AnswerFunction(frame), record.sequence, 0, kNever};
   if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
@@ -154,6 +162,18 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
   const CanFrame frame = Encode(message, {node, 0});
   out->frames.push_back({buses[bus].id, frame});
   buses[bus].schedule.Charge(now, FrameBits(frame));
+  if (!std::holds_alternative<Stop>(message)) return;
+  for (const PositionerIndex i : buses[bus].units) {
+    if (node != kBroadcastNode && node != layout.unit(i).node) continue;
+    unit(i).told_to_stop = now;
+    unit(i).runs_freely = false;
+  }
+}
+
+bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
+  const UnitRecord& record = units[i.value];
+  if (sequence != 0) return sequence == record.stop_sequence;
+  return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
 }
 
 void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,

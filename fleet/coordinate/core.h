@@ -50,6 +50,10 @@ struct UnitRecord {
   HostInstant due = kNever;  // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
+  // Stops of ours, so that one of somebody else's is told from them.
+  std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
+  HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
+  bool runs_freely = false;             // set in motion, and not stopped by us since
 };
 
 struct BusRecord {
@@ -63,10 +67,11 @@ struct BusRecord {
 };
 
 enum class UnitEventKind : std::uint8_t {
-  kReady,       // read anew, or its motion ended where it should: its knowledge is settled
-  kStopped,     // its motion ended before its end
-  kNeverBegan,  // did not start with the others
-  kLost,        // silent, restarted, foreign or faulty: not to be counted on
+  kReady,        // read anew, or its motion ended where it should: its knowledge is settled
+  kStopped,      // its motion ended before its end
+  kNeverBegan,   // did not start with the others
+  kLost,         // silent, restarted, foreign or faulty: not to be counted on
+  kForeignStop,  // it obeyed a stop that is not ours
 };
 struct UnitEvent {
   PositionerIndex unit;
@@ -99,6 +104,9 @@ class Core {
   [[nodiscard]] bool AskAgain(PositionerIndex i);
   /// Frames past the queue: stops, starts, the clock.
   void SendNow(std::size_t bus, const HostMessage& message, NodeId node);
+  /// A `done, stopped` under this sequence number, which no open question waits for, may answer a
+  /// stop of ours: a copy, or the answer to one past the queue.
+  [[nodiscard]] bool MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const;
   template <class AnyRow>
   void Note(AnyRow&& row) {
     out->rows.emplace_back(std::forward<AnyRow>(row));

@@ -281,6 +281,10 @@ void Pursuit::Advance() {
 
 void Pursuit::Take(const UnitEvent& event) {
   const PositionerIndex i = event.unit;
+  if (event.kind == UnitEventKind::kForeignStop) {
+    StoppedBySomebodyElse(i);
+    return;
+  }
   if (part_[i.value] == Part::kNone) return;
   switch (event.kind) {
     case UnitEventKind::kReady:
@@ -299,6 +303,8 @@ void Pursuit::Take(const UnitEvent& event) {
       if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];
       SetPart(i, Part::kNone);
       break;
+    case UnitEventKind::kForeignStop:
+      break;  // above
   }
 }
 

@@ -28,7 +28,7 @@ class Pursuit {
 
   Status Apply(std::uint64_t request, const ApplyCommand& command);
   Status Home(std::uint64_t request, const HomeCommand& command);
-  void StopAll();
+  void StopAll() { StopAll("stopped by the operator"); }
   /// By the operator: it takes no further part in this goal.
   void StopUnit(PositionerIndex i);
 
@@ -85,6 +85,8 @@ class Pursuit {
   void StartHoming();
   void FinishWhenDurable(ConfigurationState end);
   void Finish();
+  void StopAll(const std::string& reason);
+  void StoppedBySomebodyElse(PositionerIndex i);
   void Exclude(PositionerIndex i);
   void Strike(PositionerIndex i, const std::string& reason);
   void StopOne(PositionerIndex i, const std::string& reason);

@@ -195,12 +195,22 @@ void Pursuit::OnHomeReply(PositionerIndex i, const HomeReply& reply) {
 
 // ---- stopping
 
-void Pursuit::StopAll() {
+// Who stopped it had a reason that is not known here: nothing moves until an operator says so. A
+// stop of one bus or unit becomes one of all, because the others were to pass where it stands now.
+void Pursuit::StoppedBySomebodyElse(PositionerIndex i) {
+  if (!busy() || stopping_ || state_ == State::kReporting) return;
+  core_.Raise(Severity::kWarning, i, {},
+              core_.NameOf(i) + " was stopped on the bus by somebody else: configuration " +
+                  std::to_string(view_.id) + " ends, nothing moves until an operator applies again");
+  StopAll("stopped on the bus by somebody else");
+}
+
+void Pursuit::StopAll(const std::string& reason) {
   for (std::size_t bus = 0; bus < core_.buses.size(); ++bus)
     core_.SendNow(bus, Stop{}, kBroadcastNode);
   if (!busy()) return;
   stopping_ = true;
-  failure_ = "stopped by the operator";
+  failure_ = reason;
   start_repeat_ = kNever;
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const PositionerIndex i{n};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string>
 
+#include "protocol/wire/codec.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
@@ -305,6 +306,79 @@ TEST(Configuration, StopOfOneUnitLetsTheOthersArrive) {
   EXPECT_EQ(fleet.coordinator().unit(one).outcome, TargetOutcome::kFailed);
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge));
   ExpectOthersArrive(&fleet, 4);
+}
+
+// It has ended, everybody stands at a known place, and nobody moves before the next apply.
+void ExpectStoppedForGood(InProcessFleet* fleet, const std::string& when) {
+  ASSERT_TRUE(fleet->RunUntilIdle(Seconds(20))) << when;
+  EXPECT_EQ(fleet->coordinator().configuration().state, ConfigurationState::kStopped) << when;
+  EXPECT_EQ(fleet->CountOutcome(TargetOutcome::kPending), 0u) << when;
+  std::vector<std::uint32_t> begun;
+  for (std::uint32_t n = 0; n < fleet->layout().size(); ++n)
+    begun.push_back(fleet->world().Truth(n).moves_begun);
+  fleet->Run(Seconds(30));
+  EXPECT_TRUE(HasAlarm(*fleet, "was stopped on the bus by somebody else")) << when;
+  for (std::uint32_t n = 0; n < fleet->layout().size(); ++n) {
+    EXPECT_EQ(fleet->world().Truth(n).state, UnitState::kRest) << when << ", row " << n;
+    EXPECT_EQ(fleet->world().Truth(n).moves_begun, begun[n]) << when << ", row " << n;
+    EXPECT_TRUE(IsPlace(fleet->coordinator().unit({n}).knowledge)) << when << ", row " << n;
+  }
+  fleet->ExpectStoreTellsTheTruth(when);
+  const auto again = fleet->ApplyRandom(24);
+  ASSERT_TRUE(fleet->RunUntilIdle()) << when;
+  EXPECT_FALSE(fleet->LastReply(again)->error) << when;
+  EXPECT_EQ(fleet->CountOutcome(TargetOutcome::kArrived), 37u) << when << "\n" << Unserved(*fleet);
+}
+
+TEST(Configuration, StopOfSomebodyElseEndsItInEveryState) {
+  for (const int ms : {0, 10, 100, 200, 300, 400, 500, 600, 800, 1500, 8000}) {
+    InProcessFleet fleet(Small(24));
+    fleet.Run(Seconds(1));
+    const auto request = fleet.ApplyRandom(24);
+    fleet.Run(Milliseconds(ms));
+    fleet.StopDirectly();
+    ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
+    EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
+  }
+}
+
+TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
+  for (const auto heard : {InProcessFleet::Heard::kWaits, InProcessFleet::Heard::kLost}) {
+    for (const int ms : {10, 3000, 60'000}) {
+      InProcessFleet fleet(Small(24));
+      fleet.ApplyRandom(24);
+      RunIntoMotion(&fleet, Seconds(3));
+      fleet.Freeze(Milliseconds(100), InProcessFleet::Heard::kWaits);
+      fleet.StopDirectly();
+      fleet.Freeze(Milliseconds(ms), heard);
+      ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
+    }
+  }
+}
+
+TEST(Configuration, StopOfOneUnitBySomebodyElseStopsAll) {
+  InProcessFleet fleet(Small(25));
+  fleet.ApplyRandom(25);
+  RunIntoMotion(&fleet, Seconds(1));
+  const Unit& one = fleet.layout().unit(SomebodyMoving(&fleet));
+  fleet.world().Inject(one.bus, Encode(HostMessage(Stop{}), {one.node, 255}), fleet.now(), 1);
+  ExpectStoppedForGood(&fleet, "one");
+}
+
+TEST(Configuration, AnswersToAnOwnStopDoNotEndTheNextOne) {
+  InProcessFleet fleet(Small(24));
+  for (std::uint32_t n = 0; n < 37; ++n) {
+    fleet.world().faults(fleet.id(n))->late = Milliseconds(n * 2);
+    fleet.world().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
+  }
+  fleet.ApplyRandom(24);
+  RunIntoMotion(&fleet, Seconds(3));
+  fleet.Send({900, StopCommand{}});
+  ASSERT_TRUE(fleet.RunUntilIdle(Seconds(10)));
+  fleet.Send({901, StopCommand{}});
+  fleet.ApplyRandom(24);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
 }
 
 TEST(Configuration, ForeignHardwareIsNotMovedUntilAdopted) {

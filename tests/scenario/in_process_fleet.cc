@@ -9,6 +9,7 @@
 #include "fleet/plan/job.h"
 #include "fleet/targets.h"
 #include "protocol/base/check.h"
+#include "protocol/wire/codec.h"
 
 namespace focalfleet::testing {
 namespace {
@@ -109,7 +110,6 @@ void InProcessFleet::Restart() {
 }
 
 void InProcessFleet::StepOnce() {
-  heard_.clear();
   world_->AdvanceTo(now_, &heard_);
   std::vector<PlanDone> plans;
   while (!planning_.empty() && planning_.front().at <= now_) {
@@ -130,6 +130,7 @@ void InProcessFleet::StepOnce() {
                       .committed_through = committed_through_,
                       .store_failing = store_fails},
                      &effects_);
+  heard_.clear();
   commands_.clear();
   Perform(effects_);
 }
@@ -174,6 +175,19 @@ void InProcessFleet::Run(DurationNs duration) {
 
 bool InProcessFleet::RunUntilIdle(DurationNs limit) {
   return RunUntil([&] { return commands_.empty() && !coordinator_->busy(); }, limit);
+}
+
+void InProcessFleet::Freeze(DurationNs duration, Heard heard) {
+  now_ = now_ + duration;
+  world_->AdvanceTo(now_, &heard_);
+  if (heard == Heard::kLost) heard_.clear();
+}
+
+void InProcessFleet::StopDirectly() {
+  constexpr std::uint8_t kOtherHostsSequence = 255;
+  for (const BusId bus : layout_->buses())
+    world_->Inject(bus, Encode(HostMessage(Stop{}), {kBroadcastNode, kOtherHostsSequence}), now_,
+                   1);
 }
 
 void InProcessFleet::Send(Command command) { commands_.push_back(std::move(command)); }

@@ -52,6 +52,13 @@ class InProcessFleet {
   /// longer.
   bool RunUntilIdle(DurationNs limit = Seconds(900));
 
+  /// The coordinator stands still (kill -STOP) while the world goes on. What it would have heard
+  /// waits for it, or was more than the socket holds and is lost.
+  enum class Heard : std::uint8_t { kWaits, kLost };
+  void Freeze(DurationNs duration, Heard heard);
+  /// A stop of all that somebody else puts on every bus, as `stop --direct` does.
+  void StopDirectly();
+
   void Send(Command command);
   /// Applies a random configuration that is clear of what stands; returns its request number.
   std::uint64_t ApplyRandom(std::uint64_t seed);
