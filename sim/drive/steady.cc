@@ -106,6 +106,17 @@ std::optional<SteadyState> FindSteadyState(const Drive::Setting& setting,
   return state;
 }
 
+double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation) {
+  const Drive::Setting held = HeldAtSpeed(setting);
+  const std::vector<Pattern> table = VectorTable(modulation);
+  double best_Nm = 0;
+  // The top of a sine is flat: within 3 degrees of it lies 0.14 % of it.
+  for (int deg = 60; deg <= 102; deg += 6)
+    best_Nm = std::max(
+        best_Nm, TorqueAt(held, modulation, table, deg * std::numbers::pi / 180).torque_Nm);
+  return best_Nm;
+}
+
 Drive InSteadyRotation(const Drive::Setting& setting, const Modulation& modulation,
                        const SteadyState& state) {
   Drive drive(setting);

@@ -24,6 +24,9 @@ struct SteadyState {
 std::optional<SteadyState> FindSteadyState(const Drive::Setting& setting,
                                            const Modulation& modulation, double load_Nm);
 
+/// The highest mean torque of steady rotation over the lag; load and drag share it. Units: Nm.
+double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation);
+
 /// Mean power by cause. Units: W.
 struct DrivePower {
   double supply_W = 0;

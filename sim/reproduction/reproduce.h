@@ -1,0 +1,30 @@
+// Paper 1, claim by claim, from the drive's physics: times, waves, starts, positions. The paper's
+// parameters are stated here (its voltages, counts, repeats); its results are not: they are only
+// compared with.
+#pragma once
+
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "sim/motor/motor_parameters.h"
+#include "sim/reproduction/claim.h"
+
+namespace focalfleet::sim {
+
+struct ReproduceOptions {
+  /// Waves are those of one set; starts are tried with every set.
+  std::string_view wave_set = "9";
+  std::vector<std::string_view> start_sets = {"C", "V", "W", "9", "J2"};
+  /// Every phase resistance times this: claims that rest on it move.
+  double resistance_factor = 1;
+  /// Whole moves of the start rule at PWM level: minutes of CPU time instead of seconds.
+  bool full = false;
+  std::uint64_t seed = 1;
+};
+
+/// `progress` hears the share done, 0..1, and what comes next. Pre: the sets exist.
+using ReproduceProgress = std::function<void(double share, std::string_view next)>;
+Reproduction Reproduce(const ReproduceOptions& options, const ReproduceProgress& progress);
+
+}  // namespace focalfleet::sim
