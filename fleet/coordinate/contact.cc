@@ -284,23 +284,36 @@ void Contact::MotionEnded(PositionerIndex i, const Done& done) {
   const IntentRow intent = core_.intents.at(record.view.serial);
   const bool fault = done.outcome == Outcome::kFault;
   const bool arrived = done.position == intent.to && !fault;
+  const bool homed = done.outcome == Outcome::kHomed;
+  const bool cut_homing = record.view.phase == kHoming && !homed;
   core_.Forget(i);
   record.view.reported_state = fault ? UnitState::kFault : UnitState::kRest;
-  core_.Know(i, Exactly(Witness::kReported, done.position),
-             done.outcome == Outcome::kHomed ? Origin::kHoming : Origin::kMove);
-  core_.EndIntent(i, fault                             ? IntentEnd::kFault
-                     : done.outcome == Outcome::kHomed ? IntentEnd::kHomed
-                     : arrived                         ? IntentEnd::kArrived
-                                                       : IntentEnd::kStopped);
+  if (cut_homing) {
+    // The rotor may have met its stop and slipped while the vectors went on: they say nothing.
+    const auto& drive = core_.drives[i.value].axis;
+    core_.Know(i, InterruptedHull(intent, {drive[0].subdivision, drive[1].subdivision}),
+               Origin::kHoming);
+  } else {
+    core_.Know(i, Exactly(Witness::kReported, done.position),
+               homed ? Origin::kHoming : Origin::kMove);
+  }
+  core_.EndIntent(i, fault                    ? IntentEnd::kFault
+                     : homed                  ? IntentEnd::kHomed
+                     : arrived && !cut_homing ? IntentEnd::kArrived
+                                              : IntentEnd::kStopped);
   if (fault) {
     Lose(i, kFault, "stopped with a fault");
+    return;
+  }
+  if (cut_homing) {
+    core_.Tell(i, UnitEventKind::kStopped);
+    Identify(i);
     return;
   }
   core_.SetPhase(i, kReady);
   record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
   core_.SetDue(i, record.next_poll);
-  core_.Tell(i, arrived || done.outcome == Outcome::kHomed ? UnitEventKind::kReady
-                                                           : UnitEventKind::kStopped);
+  core_.Tell(i, arrived || homed ? UnitEventKind::kReady : UnitEventKind::kStopped);
 }
 
 void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
@@ -386,10 +399,14 @@ void Contact::Concluded(PositionerIndex i) {
     core_.Raise(
         Severity::kWarning, i, {},
         core_.NameOf(i) + ": position " + Name(result.knowledge[0].witness) + ", " + result.reason);
-  core_.SetPhase(i, reading.status.state == UnitState::kFault ? kFault : kReady);
-  core_.Tell(
-      i, reading.status.state == UnitState::kFault ? UnitEventKind::kLost : UnitEventKind::kReady,
-      reading.status.state == UnitState::kFault ? "is in fault" : "");
+  if (reading.status.state == UnitState::kFault) {
+    core_.SetPhase(i, kFault);
+    core_.Tell(i, UnitEventKind::kLost, "is in fault");
+    return;
+  }
+  core_.SetPhase(i, kReady);
+  const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
+  core_.Tell(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
 }
 
 Status Contact::Adopt(PositionerIndex i) {

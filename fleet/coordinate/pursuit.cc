@@ -289,7 +289,7 @@ void Pursuit::Take(const UnitEvent& event) {
   switch (event.kind) {
     case UnitEventKind::kReady:
     case UnitEventKind::kStopped:
-      Settled(i);
+      Settled(i, event.kind);
       break;
     case UnitEventKind::kNeverBegan:
       Strike(i, "does not begin to move");
@@ -308,11 +308,12 @@ void Pursuit::Take(const UnitEvent& event) {
   }
 }
 
-void Pursuit::Settled(PositionerIndex i) {
+void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
   if (part_[i.value] == Part::kMoving) {
     last_arrival_ = std::max(last_arrival_, core_.now);
     const UnitView& view = core_.unit(i).view;
-    const bool homed = state_ == State::kHoming && IsPlace(view.knowledge);
+    const bool homed =
+        state_ == State::kHoming && how == UnitEventKind::kReady && IsPlace(view.knowledge);
     if (homed) std::erase(to_home_, i);
     if (view.outcome == TargetOutcome::kPending && IsPlace(view.knowledge) &&
         (homed || (view.target && PlaceOf(view.knowledge) == *view.target)))

@@ -91,7 +91,7 @@ class Pursuit {
   void Strike(PositionerIndex i, const std::string& reason);
   void StopOne(PositionerIndex i, const std::string& reason);
   void Take(const UnitEvent& event);
-  void Settled(PositionerIndex i);
+  void Settled(PositionerIndex i, UnitEventKind how);
   void StopFollowers(PositionerIndex first, const std::string& reason);
   void SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string reason = {});
   void SetPart(PositionerIndex i, Part part);

@@ -201,7 +201,8 @@ void Pursuit::StoppedBySomebodyElse(PositionerIndex i) {
   if (!busy() || stopping_ || state_ == State::kReporting) return;
   core_.Raise(Severity::kWarning, i, {},
               core_.NameOf(i) + " was stopped on the bus by somebody else: configuration " +
-                  std::to_string(view_.id) + " ends, nothing moves until an operator applies again");
+                  std::to_string(view_.id) +
+                  " ends, nothing moves until an operator applies again");
   StopAll("stopped on the bus by somebody else");
 }
 

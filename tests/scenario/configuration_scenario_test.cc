@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <string>
 
 #include "protocol/wire/codec.h"
@@ -306,6 +307,71 @@ TEST(Configuration, StopOfOneUnitLetsTheOthersArrive) {
   EXPECT_EQ(fleet.coordinator().unit(one).outcome, TargetOutcome::kFailed);
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge));
   ExpectOthersArrive(&fleet, 4);
+}
+
+// One unit's homing, cut at `ms` by somebody; a place may only be claimed where it was homed.
+void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*)>& cut) {
+  const std::string when = std::to_string(ms) + " ms";
+  InProcessFleet fleet(Small(40));
+  fleet.Run(Seconds(2));
+  fleet.Send({900, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] { return fleet.world().Truth(std::size_t{4}).state == UnitState::kHoming; }, Seconds(5)));
+  fleet.Run(Milliseconds(ms));
+  cut(&fleet);
+  ASSERT_TRUE(fleet.RunUntilIdle(Seconds(20))) << when;
+  fleet.Run(Seconds(2));
+  const UnitView& view = fleet.coordinator().unit({4});
+  EXPECT_EQ(view.knowledge[0].witness, Witness::kInterval) << when;
+  EXPECT_EQ(view.knowledge[1].witness, Witness::kInterval) << when;
+  EXPECT_EQ(view.outcome, TargetOutcome::kFailed) << when;
+  EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
+  EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
+  fleet.ExpectStoreTellsTheTruth(when);
+  // It is homed again, and then it is known.
+  fleet.Send({901, EnableCommand{{{4}}}});
+  fleet.Run(Seconds(2));
+  fleet.Send({902, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntilIdle()) << when;
+  EXPECT_EQ(view.outcome, TargetOutcome::kArrived) << when << " " << view.outcome_reason;
+  EXPECT_TRUE(IsPlace(view.knowledge)) << when;
+  fleet.Run(Milliseconds(100));
+  fleet.ExpectStoreTellsTheTruth(when);
+}
+
+TEST(Configuration, CutHomingIsNotAPlace) {
+  for (const int ms : {100, 500, 1000, 5000, 20'000, 30'000, 45'000}) {
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->Send({910, StopCommand{}});
+    });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->Send({910, StopCommand{PositionerIndex{4}}});
+    });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) { fleet->StopDirectly(); });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->world().RaiseFault(fleet->id(4), FaultCode::kDriver);
+    });
+  }
+}
+
+// With the coordinator dead the unit's own mark decides what its vectors are worth.
+TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
+  for (const int ms : {100, 1000, 20'000, 45'000}) {
+    for (const bool stopped : {false, true}) {
+      const std::string when = std::to_string(ms) + (stopped ? " ms, stopped" : " ms");
+      InProcessFleet fleet(Small(40));
+      fleet.Run(Seconds(2));
+      fleet.Send({900, HomeCommand{{{4}}, true}});
+      fleet.Run(Milliseconds(ms));
+      if (stopped) fleet.StopDirectly();
+      fleet.Restart();
+      fleet.Run(Seconds(90));
+      const UnitView& view = fleet.coordinator().unit({4});
+      EXPECT_EQ(view.phase, UnitPhase::kReady) << when;
+      EXPECT_TRUE(stopped || IsPlace(view.knowledge)) << when;
+      fleet.ExpectStoreTellsTheTruth(when);
+    }
+  }
 }
 
 // It has ended, everybody stands at a known place, and nobody moves before the next apply.
