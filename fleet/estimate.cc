@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numbers>
 #include <tuple>
 #include <utility>
 
@@ -10,32 +9,6 @@
 
 namespace focalfleet {
 namespace {
-
-int EdgesPerCarrier(WaveMode mode) { return mode == WaveMode::kSevenSegment ? 6 : 4; }
-
-struct Current {
-  double d_A = 0;
-  double q_A = 0;
-};
-
-// The current that a voltage of fixed length drives while the rotor turns at `speed` against a
-// torque.
-Current SteadyCurrent(const MotorModel& motor, double voltage_V, double speed_rad_per_s,
-                      double torque_Nm) {
-  const double r = motor.phase_resistance_ohm;
-  const double x = speed_rad_per_s * motor.phase_inductance_H;
-  const double back_V = speed_rad_per_s * motor.flux_linkage_Wb;
-  const double impedance2 = r * r + x * x;
-  const double impedance = std::sqrt(impedance2);
-  // The voltage equation squared is Z^2 (Id + x E / Z^2)^2 + Z^2 (Iq + r E / Z^2)^2 = V^2: a
-  // circle.
-  const Current centre{-x * back_V / impedance2, -r * back_V / impedance2};
-  const double radius_A = voltage_V / impedance;
-  const double wanted_A = torque_Nm / (1.5 * motor.flux_linkage_Wb);
-  const double q_A = std::min(wanted_A, centre.q_A + radius_A);
-  const double off_A = q_A - centre.q_A;
-  return {centre.d_A + std::sqrt(std::max(0.0, radius_A * radius_A - off_A * off_A)), q_A};
-}
 
 struct PowerEvent {
   RailId rail;
@@ -61,32 +34,58 @@ std::vector<PowerStep> StepsOf(std::span<const PowerEvent> events) {
   return steps;
 }
 
+double EnergyOf(const std::vector<PowerStep>& steps) {
+  double energy_J = 0;
+  for (std::size_t k = 0; k + 1 < steps.size(); ++k)
+    energy_J += steps[k].power_W * (steps[k + 1].t_s - steps[k].t_s);
+  return energy_J;
+}
+
 double PeakOf(const std::vector<PowerStep>& steps) {
   double peak_W = 0;
   for (const PowerStep& step : steps) peak_W = std::max(peak_W, step.power_W);
   return peak_W;
 }
 
-}  // namespace
-
-MotorPower SteadyPower(const MotorModel& motor, const AxisDrive& drive, WaveMode mode,
-                       double v_bus_V) {
-  const double speed = 2 * std::numbers::pi / (drive.subdivision * SecondsPerVector(drive));
-  const double load_Nm = motor.load_torque_Nm + motor.viscous_Nms * speed;
-  const Current current = SteadyCurrent(motor, v_bus_V / std::numbers::sqrt3, speed, load_Nm);
-  const double square_A2 = current.d_A * current.d_A + current.q_A * current.q_A;
-  const double carrier_Hz = kTimerHz / drive.counter1;
-  MotorPower power;
-  power.winding_W = 1.5 * motor.phase_resistance_ohm * square_A2;
-  power.mechanical_W = std::max(0.0, 1.5 * motor.flux_linkage_Wb * current.q_A * speed);
-  power.switching_W = EdgesPerCarrier(mode) * 0.5 * v_bus_V * std::sqrt(square_A2) *
-                      (motor.switch_rise_s + motor.switch_fall_s) * carrier_Hz;
-  return power;
+void Widen(Banded* band, double value) {
+  band->low = std::min(band->low, value);
+  band->high = std::max(band->high, value);
 }
+
+void Scale(Banded* band, double factor) {
+  band->nominal *= factor;
+  band->low *= factor;
+  band->high *= factor;
+}
+
+PowerFigures FiguresOf(const std::vector<PowerStep>& steps) {
+  const double energy_J = EnergyOf(steps);
+  const double peak_W = PeakOf(steps);
+  return {.energy_J = {energy_J, energy_J, energy_J},
+          .mean_power_W = {},
+          .peak_power_W = {peak_W, peak_W, peak_W}};
+}
+
+void Widen(PowerFigures* figures, const std::vector<PowerStep>& corner) {
+  Widen(&figures->energy_J, EnergyOf(corner));
+  Widen(&figures->peak_power_W, PeakOf(corner));
+}
+
+void Finish(PowerFigures* figures, double makespan_s, double model_error) {
+  for (Banded* band : {&figures->energy_J, &figures->peak_power_W}) {
+    band->low *= 1 - model_error;
+    band->high *= 1 + model_error;
+  }
+  figures->mean_power_W = figures->energy_J;
+  Scale(&figures->mean_power_W, makespan_s > 0 ? 1 / makespan_s : 0);
+}
+
+}  // namespace
 
 PlanEstimate Estimate(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives,
                       const MotorModel& motor) {
   FOCALFLEET_CHECK(drives.size() == layout.size());
+  DrivePowers powers(motor);
   PlanEstimate estimate;
   std::vector<PowerEvent> events;
   for (const UnitPlan& move : plan.moves) {
@@ -95,8 +94,10 @@ PlanEstimate Estimate(const Plan& plan, const Layout& layout, std::span<const Un
     for (std::size_t k = 0; k < kAxisCount; ++k)
       for (const Segment& segment : move.path[k].segments()) {
         const SegmentTime time = TimeOf(segment, drive.axis[k]);
-        const double power_W =
-            SteadyPower(motor, AsSent(segment, drive.axis[k]), move.mode, drive.v_bus_V).total_W();
+        const MotorPower& power =
+            powers.Of({AsSent(segment, drive.axis[k]), move.mode, drive.v_bus_V});
+        const double power_W = power.total_W();
+        estimate.stalled_segments += power.stalled ? 1 : 0;
         events.push_back({rail, time.t0_s, Nanowatts(power_W)});
         events.push_back({rail, time.t1_s, -Nanowatts(power_W)});
         estimate.energy_J += power_W * (time.t1_s - time.t0_s);
@@ -116,6 +117,37 @@ PlanEstimate Estimate(const Plan& plan, const Layout& layout, std::span<const Un
   estimate.total = StepsOf(events);
   estimate.peak_power_W = PeakOf(estimate.total);
   return estimate;
+}
+
+EstimateFigures EstimateWithSpread(const Plan& plan, const Layout& layout,
+                                   std::span<const UnitDrive> drives, const MotorModel& motor,
+                                   const EstimateSpread& spread) {
+  EstimateFigures figures;
+  figures.nominal = Estimate(plan, layout, drives, motor);
+  const PlanEstimate& nominal = figures.nominal;
+  figures.stalls = figures.stalls_within_spread = nominal.stalled_segments > 0;
+  figures.total = FiguresOf(nominal.total);
+  for (const RailCurve& rail : nominal.rails) {
+    figures.rails.push_back({rail.rail, FiguresOf(rail.steps)});
+  }
+  for (const double load : {1 - spread.load, 1 + spread.load})
+    for (const double resistance : {1 - spread.resistance, 1 + spread.resistance}) {
+      MotorModel corner = motor;
+      corner.load_torque_Nm *= load;
+      corner.phase_resistance_ohm *= resistance;
+      const PlanEstimate estimate = Estimate(plan, layout, drives, corner);
+      figures.stalls_within_spread |= estimate.stalled_segments > 0;
+      Widen(&figures.total, estimate.total);
+      for (std::size_t k = 0; k < figures.rails.size(); ++k) {
+        Widen(&figures.rails[k].power, estimate.rails[k].steps);
+      }
+    }
+  const double makespan_s = nominal.makespan_s;
+  const double slack_s = makespan_s > 0 ? spread.start_skew_s + spread.clock_error * makespan_s : 0;
+  figures.makespan_s = {makespan_s, std::max(0.0, makespan_s - slack_s), makespan_s + slack_s};
+  Finish(&figures.total, makespan_s, spread.model_error);
+  for (RailFigures& rail : figures.rails) Finish(&rail.power, makespan_s, spread.model_error);
+  return figures;
 }
 
 }  // namespace focalfleet

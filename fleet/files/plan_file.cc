@@ -86,6 +86,7 @@ Status CheckJoins(const std::string& file, const std::vector<PlanRow>& rows) {
 std::vector<PlanRow> RowsOf(const Plan& plan, const Layout& layout,
                             std::span<const UnitDrive> drives, const MotorModel& motor) {
   FOCALFLEET_CHECK(drives.size() == layout.size());
+  DrivePowers powers(motor);
   std::vector<PlanRow> rows;
   for (const UnitPlan& move : plan.moves) {
     const Unit& unit = layout.unit(move.unit);
@@ -105,8 +106,7 @@ std::vector<PlanRow> RowsOf(const Plan& plan, const Layout& layout,
         at += segment.delta;
         row.to_deg = AngleDeg(at, geometry, tuned);
         row.mode = move.mode;
-        row.power_W =
-            SteadyPower(motor, AsSent(segment, tuned), move.mode, drive.v_bus_V).total_W();
+        row.power_W = powers.Of({AsSent(segment, tuned), move.mode, drive.v_bus_V}).total_W();
         rows.push_back(row);
       }
     }

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <complex>
 #include <map>
 
 #include "fleet/hex_layout.h"
@@ -30,71 +29,6 @@ TEST(DriveTime, TickTimesAreTheNearestDecimals) {
   const SegmentTime time = TimeOf({12'345, -96, 108}, {});
   EXPECT_EQ(time.t0_s, 1.2345);
   EXPECT_DOUBLE_EQ(time.t1_s, 1.2345 + 96 * 0.375e-3);
-}
-
-TEST(SteadyPower, TheTunedMotorHeatsAboutATenthOfAWatt) {
-  const MotorPower power = SteadyPower({}, {500, 108, 96}, WaveMode::kAsymmetric, 1.8);
-  EXPECT_NEAR(power.winding_W, 0.1, 0.015);  // I = 69.98 mA: 1.5 r I^2 = 0.109 W, less the back EMF
-  EXPECT_NEAR(power.mechanical_W, 5.8e-6 * 174.5, 2e-5);
-  EXPECT_LT(power.switching_W, 0.03 * power.winding_W);
-}
-
-TEST(SteadyPower, StandingMotorDrawsThePapersLimitCurrent) {
-  MotorModel motor;
-  motor.load_torque_Nm = motor.viscous_Nms = 0;
-  // So slow that it stands: V / (sqrt(3) r), 69.98 mA at 1.8 V and 349.91 mA at 9 V.
-  const AxisDrive slow{65'000, 255, 65'000};
-  for (const auto& [v_bus_V, current_A] : {std::pair{1.8, 69.98e-3}, std::pair{9.0, 349.91e-3}}) {
-    const double winding_W = SteadyPower(motor, slow, WaveMode::kAsymmetric, v_bus_V).winding_W;
-    EXPECT_NEAR(std::sqrt(winding_W / (1.5 * 14.85)), current_A, 1e-5);
-  }
-}
-
-// An independent way to the same current: a phasor, the load angle found by bisection.
-TEST(SteadyPower, AgreesWithThePhasorOfTheLoadAngle) {
-  const std::uint64_t seed = testing::TestSeed(7);
-  FOCALFLEET_TRACE_SEED(seed);
-  Rng rng(seed);
-  for (int k = 0; k < 200; ++k) {
-    MotorModel motor;
-    motor.flux_linkage_Wb = rng.Uniform(0.1e-3, 0.3e-3);
-    motor.load_torque_Nm = rng.Uniform(0, 6e-6);
-    const AxisDrive drive{500, static_cast<std::uint8_t>(40 + rng.Below(200)), 96};
-    const double v_bus_V = rng.Uniform(1.7, 3);
-    const double w = 2 * 3.14159265358979 / (96 * SecondsPerVector(drive));
-    const double torque = motor.load_torque_Nm + motor.viscous_Nms * w;
-    const std::complex<double> z(motor.phase_resistance_ohm, w * motor.phase_inductance_H);
-    const auto current = [&](double lead) {
-      // d axis real, q axis imaginary; back EMF on q; the voltage leads the d axis by `lead`.
-      const std::complex<double> v = std::polar(v_bus_V / std::sqrt(3.0), lead);
-      return (v - std::complex<double>(0, w * motor.flux_linkage_Wb)) / z;
-    };
-    double low = 0;
-    double high = 1.5;
-    for (int step = 0; step < 100; ++step) {
-      const double middle = (low + high) / 2;
-      const double pull = 1.5 * motor.flux_linkage_Wb * current(middle).imag();
-      (pull < torque ? low : high) = middle;
-    }
-    const double winding_W = 1.5 * motor.phase_resistance_ohm * std::norm(current(low));
-    const MotorPower power = SteadyPower(motor, drive, WaveMode::kAsymmetric, v_bus_V);
-    EXPECT_NEAR(power.winding_W, winding_W, 1e-9 + 1e-6 * winding_W);
-    EXPECT_NEAR(power.mechanical_W, torque * w, 1e-12);
-  }
-}
-
-TEST(SteadyPower, SevenSegmentsCostHalfAgainAsMuchSwitching) {
-  const auto switching = [](WaveMode mode) { return SteadyPower({}, {}, mode, 1.8).switching_W; };
-  EXPECT_EQ(switching(WaveMode::kAsymmetric), switching(WaveMode::kFiveSegment));
-  EXPECT_DOUBLE_EQ(switching(WaveMode::kSevenSegment), 1.5 * switching(WaveMode::kAsymmetric));
-}
-
-TEST(SteadyPower, BeyondPullOutStaysFinite) {
-  MotorModel motor;
-  motor.load_torque_Nm = 1;
-  const MotorPower power = SteadyPower(motor, {}, WaveMode::kAsymmetric, 1.8);
-  EXPECT_TRUE(std::isfinite(power.total_W()));
-  EXPECT_GT(power.winding_W, 0.05);
 }
 
 struct Case {
@@ -135,8 +69,8 @@ TEST(Estimate, CurvesAreTheSumOfTheMotorsThatRunAtEachInstant) {
   const std::uint64_t seed = testing::TestSeed(31);
   FOCALFLEET_TRACE_SEED(seed);
   const Case c = RandomCase(seed);
-  const MotorModel motor;
-  const PlanEstimate estimate = Estimate(c.plan, c.layout, c.drives, motor);
+  DrivePowers powers(MotorModel{});
+  const PlanEstimate estimate = Estimate(c.plan, c.layout, c.drives, {});
   Rng rng(seed + 1);
   for (int k = 0; k < 300; ++k) {
     const double t_s = rng.Uniform(-0.1, estimate.makespan_s + 0.1);
@@ -148,7 +82,7 @@ TEST(Estimate, CurvesAreTheSumOfTheMotorsThatRunAtEachInstant) {
           const double begin_s = s.start_ticks * 1e-4;
           const double end_s = begin_s + std::abs(s.delta) * s.repeat * 500 / 144e6;
           if (t_s < begin_s || t_s >= end_s) continue;
-          const double power_W = SteadyPower(motor, {500, s.repeat, 96}, move.mode, 1.8).total_W();
+          const double power_W = powers.Of({{500, s.repeat, 96}, move.mode, 1.8}).total_W();
           rail_W[c.layout.unit(move.unit).rail.value] += power_W;
           total_W += power_W;
         }
@@ -186,6 +120,83 @@ TEST(Estimate, APlanWithoutMovesTakesNothing) {
   EXPECT_EQ(estimate.energy_J, 0);
   EXPECT_TRUE(estimate.total.empty());
   EXPECT_TRUE(estimate.rails.empty());
+}
+
+TEST(EstimateWithSpread, HoldsTheNominalCurvesAndTheirRailsAddUp) {
+  const std::uint64_t seed = testing::TestSeed(8);
+  FOCALFLEET_TRACE_SEED(seed);
+  const Case c = RandomCase(seed);
+  const EstimateFigures figures = EstimateWithSpread(c.plan, c.layout, c.drives, {});
+  const PlanEstimate alone = Estimate(c.plan, c.layout, c.drives, {});
+  EXPECT_EQ(figures.nominal.makespan_s, alone.makespan_s);
+  EXPECT_EQ(figures.total.peak_power_W.nominal, alone.peak_power_W);
+  EXPECT_NEAR(figures.total.energy_J.nominal, alone.energy_J, 1e-6);
+  EXPECT_NEAR(figures.total.mean_power_W.nominal, alone.energy_J / alone.makespan_s, 1e-7);
+  ASSERT_EQ(figures.rails.size(), 3u);
+  double rails_J = 0;
+  for (const RailFigures& rail : figures.rails) rails_J += rail.power.energy_J.nominal;
+  EXPECT_NEAR(rails_J, alone.energy_J, 1e-6);
+  EXPECT_FALSE(figures.stalls);
+  EXPECT_FALSE(figures.stalls_within_spread);
+}
+
+TEST(EstimateWithSpread, LimitsHoldEveryMotorWithinTheSpread) {
+  const std::uint64_t seed = testing::TestSeed(9);
+  FOCALFLEET_TRACE_SEED(seed);
+  const Case c = RandomCase(seed);
+  const EstimateFigures figures =
+      EstimateWithSpread(c.plan, c.layout, c.drives, {}, {.model_error = 0});
+  const auto holds = [](const Banded& band, double value) {
+    return band.low <= value * (1 + 1e-4) && value <= band.high * (1 + 1e-4);
+  };
+  Rng rng(seed);
+  for (int k = 0; k < 5; ++k) {
+    MotorModel motor;
+    motor.load_torque_Nm *= rng.Uniform(0.8, 1.2);
+    motor.phase_resistance_ohm *= rng.Uniform(0.9, 1.1);
+    const PlanEstimate estimate = Estimate(c.plan, c.layout, c.drives, motor);
+    EXPECT_TRUE(holds(figures.total.energy_J, estimate.energy_J)) << k;
+    EXPECT_TRUE(holds(figures.total.peak_power_W, estimate.peak_power_W)) << k;
+  }
+  // The bus gives the voltage: the power goes nearly as 1 / r.
+  EXPECT_NEAR(figures.total.energy_J.low / figures.total.energy_J.nominal, 1 / 1.1, 0.02);
+  EXPECT_NEAR(figures.total.energy_J.high / figures.total.energy_J.nominal, 1 / 0.9, 0.02);
+}
+
+TEST(EstimateWithSpread, TheModelsErrorAndTheClocksWidenTheLimits) {
+  const Case c = RandomCase(5);
+  const EstimateSpread exact{
+      .load = 0, .resistance = 0, .model_error = 0.02, .start_skew_s = 0.1, .clock_error = 0.01};
+  const EstimateFigures f = EstimateWithSpread(c.plan, c.layout, c.drives, {}, exact);
+  const auto expect_band = [](const Banded& band, double slack) {
+    EXPECT_NEAR(band.low, band.nominal - slack, 1e-9);
+    EXPECT_NEAR(band.high, band.nominal + slack, 1e-9);
+  };
+  expect_band(f.total.energy_J, 0.02 * f.total.energy_J.nominal);
+  expect_band(f.total.mean_power_W, 0.02 * f.total.mean_power_W.nominal);
+  expect_band(f.rails[1].power.peak_power_W, 0.02 * f.rails[1].power.peak_power_W.nominal);
+  expect_band(f.makespan_s, 0.1 + 0.01 * f.makespan_s.nominal);
+}
+
+TEST(EstimateWithSpread, TellsWhereMotorsCannotPullTheirLoad) {
+  Case c = RandomCase(5);
+  MotorModel motor;
+  motor.load_torque_Nm = 11e-6;  // pull-out at 1.8 V is about 14 uNm
+  EstimateFigures figures = EstimateWithSpread(c.plan, c.layout, c.drives, motor);
+  EXPECT_FALSE(figures.stalls);
+  EXPECT_TRUE(figures.stalls_within_spread);
+  motor.load_torque_Nm = 20e-6;
+  figures = EstimateWithSpread(c.plan, c.layout, c.drives, motor);
+  EXPECT_TRUE(figures.stalls);
+  EXPECT_GT(figures.nominal.stalled_segments, 0u);
+}
+
+TEST(EstimateWithSpread, APlanWithoutMovesHasNoUncertainty) {
+  const auto layout = Layout::Create(MakeHexLayout({.count = 3}), {});
+  const EstimateFigures f = EstimateWithSpread({}, *layout, std::vector<UnitDrive>(3), {});
+  EXPECT_EQ(f.makespan_s.high, 0);
+  EXPECT_EQ(f.total.mean_power_W.high, 0);
+  EXPECT_TRUE(f.rails.empty());
 }
 
 }  // namespace

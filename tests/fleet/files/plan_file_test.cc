@@ -46,7 +46,7 @@ TEST(PlanFile, RowsAreExactlyTheSegmentsThatGoOnTheBus) {
   EXPECT_EQ(rows[2].axis, Axis::kPhi);
   EXPECT_EQ(rows[2].mode, WaveMode::kSevenSegment);
   EXPECT_EQ(rows[3].unit, UnitId{3});
-  EXPECT_EQ(rows[3].power_W, SteadyPower({}, {500, 37, 96}, WaveMode::kAsymmetric, 1.8).total_W());
+  EXPECT_EQ(rows[3].power_W, SteadyPower({}, {{500, 37, 96}}).total_W());
 }
 
 TEST(PlanFile, WhatIsWrittenReadsBackEqual) {
