@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "fleet/files/targets_file.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -94,15 +95,46 @@ Result<EnableCommand> EnableOf(const Json& args, const FleetView& view, bool ena
   return command;
 }
 
+/// As docs/protocol.md has them; the unit says the last word, on its own state too.
+struct ParameterRange {
+  std::int64_t low;
+  std::int64_t high;
+  std::int64_t step = 1;
+};
+ParameterRange RangeOf(Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kCounter1:
+      return {50, 20'000};
+    case Parameter::kRepeat:
+      return {1, 255};
+    case Parameter::kSubdivision:
+      return {6, 1536, 6};
+    case Parameter::kMode:
+      return {0, 2};
+    case Parameter::kHostTimeoutMs:
+      return {100, 3'600'000};
+    case Parameter::kPosition:
+    case Parameter::kMinPosition:
+    case Parameter::kMaxPosition:
+    case Parameter::kHomePosition:
+      break;
+  }
+  return {-limits::kPositionMax, limits::kPositionMax};
+}
+
 Result<WriteParameterCommand> WriteOf(const Json& args, const FleetView& view) {
   WriteParameterCommand command;
   FOCALFLEET_TRY_ASSIGN(command.unit, UnitArgument(args, *view.layout));
   FOCALFLEET_TRY_ASSIGN(command.axis, AxisArgument(args));
   FOCALFLEET_TRY_ASSIGN(command.parameter, ParameterArgument(args));
   FOCALFLEET_TRY_ASSIGN(const std::int64_t value, IntegerArgument(args, "value"));
-  if (value < std::numeric_limits<std::int32_t>::min() ||
-      value > std::numeric_limits<std::int32_t>::max())
-    return Fail(ErrorCode::kInvalid, "argument 'value' must fit 32 bits");
+  const ParameterRange range = RangeOf(command.parameter);
+  if (value < range.low || value > range.high || value % range.step != 0)
+    return Fail(ErrorCode::kInvalid,
+                std::string(Name(command.parameter)) + " must be " + std::to_string(range.low) +
+                    ".." + std::to_string(range.high) +
+                    (range.step > 1 ? " in steps of " + std::to_string(range.step) : "") +
+                    ", not " + std::to_string(value));
   command.value = static_cast<std::int32_t>(value);
   return command;
 }

@@ -66,13 +66,14 @@ class Coordinator::Impl {
   void Obey(const Command& command) {
     const Status status =
         std::visit([&](const auto& what) { return Do(command.request, what); }, command.what);
-    const bool goes_on = std::holds_alternative<ApplyCommand>(command.what) ||
-                         std::holds_alternative<HomeCommand>(command.what);
     if (!status) {
       core_.out->replies.push_back({command.request, true, status.error(), {}});
-    } else if (!goes_on) {
+    } else if (std::holds_alternative<StopCommand>(command.what)) {
       core_.out->replies.push_back({command.request, true, {}, "done"});
-    }
+    } else if (std::holds_alternative<EnableCommand>(command.what) ||
+               std::holds_alternative<AdoptCommand>(command.what)) {
+      core_.ReplyWhenDurable(command.request, "done");
+    }  // the others go on and answer when they are over
   }
 
   Status Do(std::uint64_t request, const ApplyCommand& c) { return pursuit_.Apply(request, c); }
@@ -97,9 +98,9 @@ class Coordinator::Impl {
     return {};
   }
   Status Do(std::uint64_t, const AdoptCommand& c) { return contact_.Adopt(c.unit); }
-  Status Do(std::uint64_t, const WriteParameterCommand& c) {
+  Status Do(std::uint64_t request, const WriteParameterCommand& c) {
     if (pursuit_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
-    return contact_.WriteParameter(c);
+    return contact_.WriteParameter(request, c);
   }
 
   Core core_;

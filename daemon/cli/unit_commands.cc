@@ -159,9 +159,9 @@ ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
                   {"axis", options.axis},
                   {"parameter", options.name},
                   {"value", *options.value}};
-  return Tell(context, Ask(context, {.verb = "params_set", .args = args}),
-              fmt::format("unit {}: {} {} = {}", options.unit_id, options.axis, options.name,
-                          *options.value));
+  // The unit has the last word: it may hold another value than the one asked for.
+  const auto answer = Ask(context, {.verb = "params_set", .args = args});
+  return Tell(context, answer, answer ? TextIn(*answer, "text") : "");
 }
 
 // What was stored or set, then what holds by default, narrowed to one axis and name where given.

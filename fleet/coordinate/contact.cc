@@ -1,6 +1,7 @@
 #include "fleet/coordinate/contact.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "fleet/coordinate/reconcile.h"
 #include "protocol/base/check.h"
@@ -320,26 +321,49 @@ void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
   UnitRecord& record = core_.unit(i);
   AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
   if (reply.written) {
-    if (reply.answer != Answer::kOk) {
+    if (record.view.phase != kIdentifying) OnWritten(i, reply);
+    if (reply.answer != Answer::kOk)
       core_.Raise(
           Severity::kWarning, i, {},
           core_.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
-    } else if (record.view.phase != kIdentifying) {
-      core_.Note(ParameterRow{record.view.serial, reply.axis, reply.parameter, reply.value,
-                              Origin::kOperator});
-      if (reply.parameter == Parameter::kRepeat)
-        drive.repeat = static_cast<std::uint8_t>(reply.value);
-      if (reply.parameter == Parameter::kCounter1)
-        drive.counter1 = static_cast<std::uint16_t>(reply.value);
-      if (reply.parameter == Parameter::kPosition || reply.parameter == Parameter::kSubdivision)
-        Identify(i);
-    }
     return;
   }
   if (record.view.phase != kIdentifying) return;
   ++record.reading.step;
   if (reply.parameter == Parameter::kCounter1 && reply.value != drive.counter1)
     core_.Ask(i, ParameterWrite{reply.axis, Parameter::kCounter1, drive.counter1});
+}
+
+void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
+  UnitRecord& record = core_.unit(i);
+  AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
+  const std::uint64_t request = std::exchange(record.write_request, 0);
+  const std::string what = std::string(Name(reply.axis)) + " " + Name(reply.parameter);
+  if (reply.answer != Answer::kOk) {
+    core_.out->replies.push_back(
+        {request,
+         true,
+         Error{ErrorCode::kRefused, core_.NameOf(i) + " refuses it (" + Name(reply.answer) +
+                                        "): " + what + " stays " + std::to_string(reply.value)},
+         {}});
+    return;
+  }
+  core_.Note(ParameterRow{record.view.serial, reply.axis, reply.parameter, reply.value,
+                          Origin::kOperator});
+  core_.ReplyWhenDurable(request,
+                         core_.NameOf(i) + ": " + what + " = " + std::to_string(reply.value));
+  if (reply.parameter == Parameter::kRepeat) drive.repeat = static_cast<std::uint8_t>(reply.value);
+  if (reply.parameter == Parameter::kCounter1)
+    drive.counter1 = static_cast<std::uint16_t>(reply.value);
+  if (reply.parameter == Parameter::kSubdivision) {
+    drive.subdivision = static_cast<std::uint16_t>(reply.value);
+    Identify(i);
+  }
+  if (reply.parameter == Parameter::kPosition) {
+    UnitKnowledge knowledge = record.view.knowledge;
+    knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);
+    core_.Know(i, knowledge, Origin::kOperator);
+  }
 }
 
 void Contact::Bind(PositionerIndex i) {
@@ -437,13 +461,14 @@ void Contact::Enable(const EnableCommand& command) {
   }
 }
 
-Status Contact::WriteParameter(const WriteParameterCommand& command) {
+Status Contact::WriteParameter(std::uint64_t request, const WriteParameterCommand& command) {
   const UnitPhase phase = core_.unit(command.unit).view.phase;
   if (phase != kReady || core_.unit(command.unit).question)
     return Fail(
         ErrorCode::kRefused,
         core_.NameOf(command.unit) + " takes parameters only at rest; its phase is " + Name(phase));
   core_.Ask(command.unit, ParameterWrite{command.axis, command.parameter, command.value});
+  core_.unit(command.unit).write_request = request;
   return {};
 }
 

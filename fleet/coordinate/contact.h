@@ -31,7 +31,8 @@ class Contact {
 
   Status Adopt(PositionerIndex i);
   void Enable(const EnableCommand& command);
-  Status WriteParameter(const WriteParameterCommand& command);
+  /// Answered when the unit has, with the value that holds then.
+  Status WriteParameter(std::uint64_t request, const WriteParameterCommand& command);
 
  private:
   void AskNext(PositionerIndex i);  // the next question of the identification
@@ -42,6 +43,7 @@ class Contact {
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
   void OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence);
   void OnParameter(PositionerIndex i, const ParameterReply& reply);
+  void OnWritten(PositionerIndex i, const ParameterReply& reply);
   void MotionEnded(PositionerIndex i, const Done& done);
 
   Core& core_;

@@ -112,6 +112,7 @@ std::optional<PositionerIndex> Core::NextDue() {
 
 void Core::Ask(PositionerIndex i, const HostMessage& message) {
   UnitRecord& record = unit(i);
+  DropQuestion(i);
   record.sequence = record.sequence == kLastSequence
                         ? std::uint8_t{1}
                         : static_cast<std::uint8_t>(record.sequence + 1);
@@ -144,8 +145,21 @@ bool Core::AskAgain(PositionerIndex i) {
 }
 
 void Core::Forget(PositionerIndex i) {
-  unit(i).question.reset();
+  DropQuestion(i);
   bus_of(i).schedule.Drop(layout.unit(i).node);
+}
+
+void Core::DropQuestion(PositionerIndex i) {
+  UnitRecord& record = unit(i);
+  const bool writes =
+      record.question && std::holds_alternative<ParameterWrite>(record.question->message);
+  record.question.reset();
+  if (!writes || record.write_request == 0) return;
+  out->replies.push_back({std::exchange(record.write_request, 0),
+                          true,
+                          Error{ErrorCode::kUnavailable,
+                                NameOf(i) + " did not answer: it may have taken the value or not"},
+                          {}});
 }
 
 bool Core::Answers(PositionerIndex i, Function function, std::uint8_t sequence) {
@@ -186,6 +200,30 @@ void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::opt
 
 void Core::Tell(PositionerIndex i, UnitEventKind kind, std::string reason) {
   events.push_back({i, kind, std::move(reason)});
+}
+
+void Core::ReplyWhenDurable(std::uint64_t request, std::string text) {
+  kept_replies_.push_back({batch_now(), request, std::move(text)});
+}
+
+void Core::SayWhatIsDurable() {
+  while (!kept_replies_.empty()) {
+    KeptReply& kept = kept_replies_.front();
+    if (committed_through >= kept.batch) {
+      out->replies.push_back({kept.request, true, {}, std::move(kept.text)});
+    } else if (store_failing) {
+      out->replies.push_back(
+          {kept.request,
+           true,
+           Error{ErrorCode::kUnavailable,
+                 "effective now, NOT stored: the store cannot be written; it is tried again, but "
+                 "lost if the daemon ends before that succeeds"},
+           {}});
+    } else {
+      return;
+    }
+    kept_replies_.pop_front();
+  }
 }
 
 void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin) {
@@ -234,6 +272,7 @@ void Core::CloseLoadWindow(BusRecord* bus) const {
 }
 
 void Core::EndStep() {
+  SayWhatIsDurable();
   for (BusRecord& bus : buses) {
     if (now >= bus.clock_due) {
       const auto host_us =

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <queue>
 #include <string>
@@ -46,6 +47,7 @@ struct UnitRecord {
   std::size_t bus = 0;  // index into Core::buses
   std::uint8_t sequence = 0;
   std::optional<Question> question;
+  std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter
   Reading reading;
   HostInstant due = kNever;  // when Service has something to do
   HostInstant next_poll{INT64_MIN};
@@ -114,6 +116,9 @@ class Core {
   void Raise(Severity severity, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
              std::string text);
   void Tell(PositionerIndex i, UnitEventKind kind, std::string reason = {});
+  /// Answers when this step's rows are durable; at once, with an error, where they cannot be
+  /// written.
+  void ReplyWhenDurable(std::uint64_t request, std::string text);
 
   /// Knowledge of a unit that is settled now: kept here and in the store.
   void Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin);
@@ -152,6 +157,15 @@ class Core {
   Effects* out = nullptr;
 
  private:
+  void SayWhatIsDurable();
+
+  struct KeptReply {
+    std::uint64_t batch;
+    std::uint64_t request;
+    std::string text;
+  };
+  std::deque<KeptReply> kept_replies_;
+
   struct Timer {
     HostInstant at;
     PositionerIndex unit;
@@ -159,6 +173,7 @@ class Core {
   };
 
   void CloseLoadWindow(BusRecord* bus) const;
+  void DropQuestion(PositionerIndex i);
 
   std::priority_queue<Timer, std::vector<Timer>, std::greater<>> timers_;
   std::vector<PositionerIndex> asked_;

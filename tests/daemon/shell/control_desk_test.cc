@@ -81,6 +81,22 @@ TEST(ControlDesk, NamesWhatIsWrong) {
               HasSubstr("no parameter 'colour'"));
 }
 
+TEST(ControlDesk, RefusesValuesThatNoUnitTakes) {
+  const SmallFleet fleet;
+  const auto error = [&](const char* parameter, std::int64_t value) {
+    return ErrorOf(fleet, "params_set",
+                   {{"unit_id", 1}, {"axis", "phi"}, {"parameter", parameter}, {"value", value}});
+  };
+  EXPECT_EQ(error("repeat", 0), "repeat must be 1..255, not 0");
+  EXPECT_EQ(error("repeat", 256), "repeat must be 1..255, not 256");
+  EXPECT_EQ(error("subdivision", 95), "subdivision must be 6..1536 in steps of 6, not 95");
+  EXPECT_EQ(error("mode", 9), "mode must be 0..2, not 9");
+  EXPECT_EQ(error("counter1", -5), "counter1 must be 50..20000, not -5");
+  EXPECT_EQ(error("host_timeout_ms", 99), "host_timeout_ms must be 100..3600000, not 99");
+  EXPECT_EQ(error("position", 8'388'608), "position must be -8388607..8388607, not 8388608");
+  EXPECT_EQ(error("position", 5'000'000'000), "position must be -8388607..8388607, not 5000000000");
+}
+
 TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
   const SmallFleet fleet;
   const Json state = Json::parse(StateText(fleet.View()), nullptr, false);
