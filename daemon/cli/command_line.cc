@@ -1,6 +1,13 @@
 #include "daemon/cli/command_line.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <sstream>
 
 namespace focalfleet::cli {
 namespace {
@@ -18,6 +25,59 @@ void AddGlobalOptions(CommandLine* line) {
                  fmt::format("Control socket of the daemon (default: $FOCALFLEET_SOCKET, else {})",
                              kDefaultSocket))
       ->type_name("FILE");
+}
+
+// What never asks a daemon ends with kRefused where its answer cannot be told.
+constexpr std::array<std::string_view, 8> kOffline = {"completion", "estimate", "layout",  "plan",
+                                                      "reproduce",  "simulate", "targets", "tune"};
+
+/// The deepest command of the tree that the line named.
+const CLI::App& Chosen(const CLI::App& app) {
+  const CLI::App* chosen = &app;
+  while (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
+  return *chosen;
+}
+
+std::string Complaint(const CLI::App& app, const CLI::ParseError& error) {
+  const CLI::App& chosen = Chosen(app);
+  if (chosen.get_require_subcommand_min() > 0) {
+    for (const std::string& word : app.remaining(true)) {
+      if (word.starts_with('-')) continue;
+      return fmt::format("there is no command '{}{}'",
+                         &chosen == &app ? "" : chosen.get_name() + " ", word);
+    }
+  }
+  return error.what();
+}
+
+// A file that is opened must not get the number of a standard stream that the caller closed: what
+// is said there would end in it. /dev/null the wrong way round takes and gives nothing.
+void HoldStandardStreams() {
+  for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(fd, F_GETFD) >= 0) continue;
+    [[maybe_unused]] const int held =
+        open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY);  // the lowest number is free
+  }
+}
+
+/// Whether the result file goes to stdout.
+bool OutIsStdout(const CLI::App& app) {
+  const CLI::Option* out = Chosen(app).get_option_no_throw("--out");
+  return out != nullptr && out->count() == 1 && out->results().front() == "-";
+}
+
+/// `exit`, unless the answer did not get out.
+int AfterOutput(const CommandLine& line, ExitCode exit) {
+  const bool good = exit == ExitCode::kOk || exit == ExitCode::kSomeUnserved;
+  if (OutputError() == 0 || !good) return static_cast<int>(exit);
+  Complain(fmt::format("focalfleet: {} standard output cannot be written: {}\n",
+                       Paint(line.context.colour_err, Colour::kRed, "error:"),
+                       std::strerror(OutputError())));
+  const auto commands = line.app.get_subcommands();
+  const bool offline =
+      commands.empty() ||
+      std::find(kOffline.begin(), kOffline.end(), commands.front()->get_name()) != kOffline.end();
+  return static_cast<int>(offline ? ExitCode::kRefused : ExitCode::kBroken);
 }
 
 }  // namespace
@@ -62,21 +122,33 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
 }
 
 int Main(int argc, char** argv) {
+  HoldStandardStreams();
   const std::unique_ptr<CommandLine> line = MakeCommandLine();
   try {
     line->app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     // CLI11 speaks in exceptions; help and version are exceptions, too, with exit code 0.
-    if (error.get_exit_code() == 0) return line->app.exit(error);
+    if (error.get_exit_code() == 0) {
+      std::ostringstream text;
+      line->app.exit(error, text, text);
+      PrintText(text.str());
+      return AfterOutput(*line, ExitCode::kOk);
+    }
     line->context.LookAtTerminals();
     return static_cast<int>(
         Report(line->context,
                Failure{ExitCode::kUsage,
-                       {ErrorCode::kInvalid,
-                        fmt::format("{} (`focalfleet --help` shows the usage)", error.what())}}));
+                       {ErrorCode::kInvalid, fmt::format("{} (`focalfleet --help` shows the usage)",
+                                                         Complaint(line->app, error))}}));
   }
   line->context.LookAtTerminals();
-  return static_cast<int>(line->run(line->context));
+  line->context.stdout_is_file = OutIsStdout(line->app);
+  if (line->context.stdout_is_file && line->context.json) {
+    return static_cast<int>(
+        Report(line->context, {ErrorCode::kInvalid, "--json and --out - both want standard output"},
+               ExitCode::kUsage));
+  }
+  return AfterOutput(*line, line->run(line->context));
 }
 
 }  // namespace focalfleet::cli

@@ -245,7 +245,7 @@ ExitCode RunCompletion(const Context& context, const CompletionOptions& options)
   if (context.json) {
     PrintJson({{"shell", options.shell}, {"script", script}});
   } else {
-    fmt::print("{}", script);
+    PrintText(script);
   }
   return ExitCode::kOk;
 }

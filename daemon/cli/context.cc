@@ -4,9 +4,15 @@
 #include <unistd.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
 
 namespace focalfleet::cli {
+namespace {
+
+int output_error = 0;  // as standard output itself: one a process
+
+}  // namespace
 
 std::string Context::SocketPath() const {
   if (!socket.empty()) return socket;
@@ -30,20 +36,46 @@ std::string Paint(bool colour_on, Colour colour, std::string_view text) {
   return fmt::format("\033[{}m{}\033[0m", kCodes[static_cast<std::size_t>(colour)], text);
 }
 
+void PrintText(std::string_view text) {
+  const bool written =
+      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (!written && output_error == 0) output_error = errno;
+}
+
+int OutputError() { return output_error; }
+
+// Not fmt::print, which throws where the stream takes nothing.
+void Complain(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+
 void Say(const Context& context, std::string_view line) {
   if (context.quiet || context.json) return;
-  fmt::print("{}\n", line);
+  const std::string text = fmt::format("{}\n", line);
+  if (context.stdout_is_file) {
+    Complain(text);
+  } else {
+    PrintText(text);
+  }
+}
+
+void TellPassedOver(const Context& context, const std::string& file,
+                    const std::vector<std::string>& columns) {
+  if (columns.empty() || context.quiet || context.json) return;
+  Complain(
+      fmt::format("focalfleet: {}: columns passed over: {}\n", file, fmt::join(columns, ", ")));
+}
+
+void NameUnserved(const Context& context, std::string_view lines) {
+  if (lines.empty() || !context.quiet || context.json) return;
+  Complain(fmt::format("focalfleet: not served:\n{}\n", lines));
 }
 
 void PrintJson(const Json& object) {
-  const std::string text = object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
-  std::fwrite(text.data(), 1, text.size(), stdout);
-  std::fflush(stdout);
+  PrintText(object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 ExitCode Report(const Context& context, const Failure& failure) {
-  fmt::print(stderr, "focalfleet: {} {}\n", Paint(context.colour_err, Colour::kRed, "error:"),
-             failure.error.text);
+  Complain(fmt::format("focalfleet: {} {}\n", Paint(context.colour_err, Colour::kRed, "error:"),
+                       failure.error.text));
   if (context.json) {
     PrintJson({{"error", {{"code", CodeName(failure.error.code)}, {"text", failure.error.text}}},
                {"exit", static_cast<int>(failure.exit)}});

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "daemon/cli/exit_code.h"
 #include "daemon/control/messages.h"
@@ -22,6 +23,7 @@ struct Context {
   bool colour_err = false;
   bool terminal_out = false;
   bool terminal_err = false;
+  bool stdout_is_file = false;  // --out -: what is said beside it goes to stderr
 
   [[nodiscard]] std::string SocketPath() const;
   /// Looks at the terminals and NO_COLOR.
@@ -32,8 +34,26 @@ inline constexpr const char* kDefaultSocket = "/run/focalfleet/control.sock";
 
 std::string Paint(bool colour_on, Colour colour, std::string_view text);
 
+/// Writes to stdout, at once.
+void PrintText(std::string_view text);
+/// errno of the first text that stdout did not take, else 0. Main tells it: an answer that nobody
+/// got is not done.
+int OutputError();
+
+/// Writes to stderr. Where that takes nothing, there is nobody to tell.
+void Complain(std::string_view text);
+
 /// Writes to stdout; nothing with --quiet or --json.
 void Say(const Context& context, std::string_view line);
+
+/// A misspelt column is one that nobody reads: it must not pass in silence. To stderr; nothing with
+/// --quiet or --json.
+void TellPassedOver(const Context& context, const std::string& file,
+                    const std::vector<std::string>& columns);
+
+/// With --quiet the summary does not name the units that were not served, so stderr does; with
+/// --json the object does.
+void NameUnserved(const Context& context, std::string_view lines);
 
 /// The one JSON object of a command that was called with --json. Text that is not UTF-8 is
 /// replaced.

@@ -37,7 +37,7 @@ ProgressBar::ProgressBar(const Context& context)
 ProgressBar::~ProgressBar() { End(); }
 
 void ProgressBar::End() {
-  if (drawn_) fmt::print(stderr, "\n");
+  if (drawn_) Complain("\n");
   drawn_ = false;
 }
 
@@ -46,7 +46,7 @@ void ProgressBar::Show(double fraction, const std::string& stage, const std::str
   const std::string details = fmt::format("{}  {}", stage, text);
   if (kind_ == Kind::kTerminal) {
     // One column is left free: a full line makes some terminals wrap.
-    fmt::print(stderr, "\r\033[K{}", DrawBar(fraction, details, Columns() - 1));
+    Complain("\r\033[K" + DrawBar(fraction, details, Columns() - 1));
     std::fflush(stderr);
     drawn_ = true;
     return;
@@ -55,7 +55,7 @@ void ProgressBar::Show(double fraction, const std::string& stage, const std::str
   if (stage == stage_ && tenth == tenth_) return;
   stage_ = stage;
   tenth_ = tenth;
-  fmt::print(stderr, "{:3.0f} %  {}\n", 100 * Clip(fraction), details);
+  Complain(fmt::format("{:3.0f} %  {}\n", 100 * Clip(fraction), details));
   std::fflush(stderr);
 }
 

@@ -171,7 +171,8 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
                      "--allow-unknown",
                      Count(file.unknown.size(), "unit", "units"), NameUnknown(file.unknown))});
   }
-  if (!options.out.empty()) {
+  const bool to_file = !options.out.empty() && !context.stdout_is_file;
+  if (to_file) {
     if (const auto written = WriteFileAtomically(options.out, file.csv); !written) {
       return Report(context, written.error());
     }
@@ -181,13 +182,15 @@ ExitCode RunState(const Context& context, const StateOptions& options) {
                {"out", options.out},
                {"unknown", file.unknown},
                {"rows", ListIn(*state, "rows")}});
-  } else if (options.out.empty()) {
-    fmt::print("{}", file.csv);
+  } else if (!to_file) {
+    PrintText(file.csv);
   } else {
     Say(context, fmt::format("{}: {}", options.out, Count(file.rows, "unit", "units")));
   }
   if (file.unknown.empty()) return ExitCode::kOk;
-  if (!context.json) fmt::print(stderr, "focalfleet: left out: {}\n", NameUnknown(file.unknown));
+  if (!context.json) {
+    Complain(fmt::format("focalfleet: left out: {}\n", NameUnknown(file.unknown)));
+  }
   return ExitCode::kSomeUnserved;
 }
 

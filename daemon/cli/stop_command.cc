@@ -51,7 +51,7 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
   Say(context, fmt::format("stop is on {} of {}; {} answered", sent,
                            Count(buses->size(), "bus", "buses"), Count(answered, "unit", "units")));
   if (troubles.empty()) return ExitCode::kOk;
-  fmt::print(stderr, "focalfleet: not stopped:{}\n", troubles);
+  Complain(fmt::format("focalfleet: not stopped:{}\n", troubles));
   return ExitCode::kSomeUnserved;
 }
 

@@ -2,7 +2,9 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <linux/magic.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -75,6 +77,20 @@ std::optional<std::size_t> FirstNonText(std::string_view text) {
   return std::nullopt;
 }
 
+// A pipe of the shell, <(command), has its writer and is waited for. One with a name in a folder
+// may have none for ever.
+Status ReadWithWaiting(int fd, const std::string& path) {
+  struct stat status {};
+  struct statfs system {};
+  if (fstat(fd, &status) == 0 && S_ISFIFO(status.st_mode) && fstatfs(fd, &system) == 0 &&
+      system.f_type != PIPEFS_MAGIC) {
+    return Fail(ErrorCode::kInvalid,
+                fmt::format("{}: a named pipe; give a file, or /dev/stdin", path));
+  }
+  fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+  return {};
+}
+
 Status WriteDirectly(const std::string& path, const std::string& text) {
   const Descriptor file(open(path.c_str(), O_WRONLY | O_CLOEXEC));
   if (file.get() < 0) return FailErrno(path, "cannot be written", errno);
@@ -87,8 +103,13 @@ Status WriteDirectly(const std::string& path, const std::string& text) {
 }  // namespace
 
 Result<std::string> ReadFile(const std::string& path) {
-  const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // Without waiting for a writer, who may never come. /dev/stdin is not opened anew: its file may
+  // be half read, or a socket.
+  const Descriptor file(path == "/dev/stdin"
+                            ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
+                            : open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (file.get() < 0) return FailErrno(path, "cannot be read", errno);
+  if (path != "/dev/stdin") FOCALFLEET_TRY(ReadWithWaiting(file.get(), path));
   std::string text;
   for (;;) {
     constexpr std::size_t kChunk = 1u << 20;
@@ -123,6 +144,12 @@ Result<std::string> ReadTextFile(const std::string& path) {
 }
 
 Status WriteFileAtomically(const std::string& path, const std::string& text) {
+  if (path == "-") {
+    if (const int error = WriteAll(STDOUT_FILENO, text)) {
+      return FailErrno("standard output", "cannot be written", error);
+    }
+    return {};
+  }
   struct stat status {};
   const bool exists = stat(path.c_str(), &status) == 0;
   if (exists && !S_ISREG(status.st_mode)) return WriteDirectly(path, text);

@@ -10,9 +10,9 @@ namespace focalfleet::cli {
 
 inline constexpr std::size_t kFileBytesMax = 256u << 20;
 
-/// The file's bytes.
-/// Errors: kUnavailable (missing, unreadable, a directory), kInvalid (larger than kFileBytesMax);
-/// names the file.
+/// The file's bytes; of a pipe without a name, all until its end.
+/// Errors: kUnavailable (missing, unreadable, a directory), kInvalid (larger than kFileBytesMax, a
+/// named pipe); names the file.
 Result<std::string> ReadFile(const std::string& path);
 
 /// As ReadFile, and the bytes are UTF-8 text without NUL.
@@ -20,7 +20,7 @@ Result<std::string> ReadFile(const std::string& path);
 Result<std::string> ReadTextFile(const std::string& path);
 
 /// `path` holds `text`, or what it held before. A path that is no regular file (a pipe) is written
-/// directly. Errors: kUnavailable, kFull; names the file.
+/// directly; `-` is stdout. Errors: kUnavailable, kFull; names the file.
 Status WriteFileAtomically(const std::string& path, const std::string& text);
 
 }  // namespace focalfleet::cli

@@ -247,8 +247,7 @@ void Draw(const Context& context, const Picture& picture, bool over) {
   if (picture.configuration) text += DescribeProgress(*picture.configuration);
   text += DescribeUnits(picture) + DescribeAlarms(picture, context.colour_out);
   if (over) text = "\033[H\033[2J" + text;
-  fmt::print("{}", text);
-  std::fflush(stdout);
+  PrintText(text);
 }
 
 // ---- the loop
@@ -297,6 +296,7 @@ ExitCode Loop(const Context& context, const WatchOptions& options, StatusReader*
     } else {
       Draw(context, picture, context.terminal_out);
     }
+    if (OutputError() != 0) break;
   }
   return ExitCode::kOk;
 }

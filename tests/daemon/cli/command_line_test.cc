@@ -76,7 +76,37 @@ TEST(CommandLine, EveryCommandRefusesAnUnknownOptionAsWrongUsage) {
 
 TEST(CommandLine, NoCommandAndAnUnknownCommandAreWrongUsage) {
   EXPECT_EQ(Focalfleet({}).exit, 2);
-  EXPECT_EQ(Focalfleet({"teleport"}).exit, 2);
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"teleport"}, {"--socket", "s", "teleport", "--far"}}) {
+    const auto unknown = Focalfleet(words);
+    EXPECT_EQ(unknown.exit, 2);
+    EXPECT_THAT(unknown.err, HasSubstr("there is no command 'teleport' (`focalfleet --help`"));
+  }
+  const auto below = Focalfleet({"layout", "cubic"});
+  EXPECT_EQ(below.exit, 2);
+  EXPECT_THAT(below.err, HasSubstr("there is no command 'layout cubic'"));
+}
+
+TEST(CommandLine, AnAnswerThatStdoutDoesNotTakeIsNotDone) {
+  const test::ScratchDirectory scratch;
+  const std::string units = scratch / "u.csv";
+  for (const std::string into : {">/dev/full", ">&-"}) {
+    for (const std::vector<std::string>& words :
+         {std::vector<std::string>{"--help"},
+          {"--version"},
+          {"completion", "bash"},
+          {"layout", "hex", "--count", "3", "--out", units},
+          {"layout", "hex", "--count", "3", "--out", units, "--json"}}) {
+      const auto result = test::FocalfleetInto(into, words);
+      EXPECT_EQ(result.exit, 1) << words[0] << into;
+      EXPECT_THAT(result.err, HasSubstr("standard output cannot be written")) << words[0] << into;
+    }
+    EXPECT_THAT(test::Slurp(units), ::testing::StartsWith("unit_id,")) << into;
+    EXPECT_THAT(test::Slurp(units), ::testing::Not(HasSubstr("pitch"))) << into;
+  }
+  EXPECT_EQ(test::FocalfleetInto(">/dev/full", {"status", "--socket", "/nowhere/s"}).exit, 4)
+      << "the first reason stays";
+  EXPECT_EQ(test::FocalfleetInto("2>/dev/full", {"status", "--socket", "/nowhere/s"}).exit, 4);
 }
 
 TEST(CommandLine, WrongUsageIsJsonWhereJsonWasAskedFor) {

@@ -229,6 +229,23 @@ TEST_F(DaemonCommands, StatusSurvivesAnAnswerWithoutTheExpectedMembers) {
   EXPECT_EQ(result.exit, 0) << result.err;
 }
 
+TEST_F(DaemonCommands, AnAnswerThatStdoutDoesNotTakeEndsWithFive) {
+  FakeDaemon daemon(scratch_ / "sock", {{"status", {.result = Status()}},
+                                        {"state", {.result = Json{{"rows", Json::array()}}}},
+                                        {"apply", {.result = Configuration("done", 1, 1)}}});
+  const std::string targets = scratch_.Put("t.csv", kTargets);
+  for (std::vector<std::string> words : {std::vector<std::string>{"status"},
+                                         {"status", "--json"},
+                                         {"state"},
+                                         {"state", "--json"},
+                                         {"apply", targets, "--wait", "--json"}}) {
+    words.insert(words.end(), {"--socket", daemon.path()});
+    const auto result = test::FocalfleetInto(">/dev/full", words);
+    EXPECT_EQ(result.exit, 5) << words[0] << words[1];
+    EXPECT_THAT(result.err, HasSubstr("standard output cannot be written: No space left"));
+  }
+}
+
 TEST_F(DaemonCommands, StopNamesAUnitOrNone) {
   EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 0);
   EXPECT_EQ(requests_.at(0).args, Json::object());

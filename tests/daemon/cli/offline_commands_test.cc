@@ -1,6 +1,8 @@
 // layout, targets and plan as processes: what they write, and that bad input is named and writes
 // nothing.
 #include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -245,6 +247,37 @@ TEST_F(OfflineCommands, ObstaclesStandInTheWay) {
                            {"--obstacles", obstacles, "--json"});
   EXPECT_NE(result.exit, 0) << result.out;
   EXPECT_EQ(Draw({"--seed", "3", "--obstacles", obstacles, "--out", scratch_ / "d.csv"}).exit, 0);
+}
+
+TEST_F(OfflineCommands, OutDashIsStdoutAndWhatIsSaidBesideGoesToStderr) {
+  const auto to_file = Draw({"--seed", "5", "--out", scratch_ / "t.csv"});
+  const auto to_stdout = Draw({"--seed", "5", "--out", "-"});
+  EXPECT_EQ(to_stdout.exit, 0);
+  EXPECT_EQ(to_stdout.out, Slurp(scratch_ / "t.csv"));
+  EXPECT_THAT(to_stdout.err, HasSubstr("-: targets of 37 units"));
+  plan_ = "-";
+  EXPECT_THAT(Plan(scratch_ / "t.csv").out, ::testing::StartsWith("unit_id,axis,"));
+  EXPECT_EQ(Plan(scratch_ / "t.csv", {"--json"}).exit, 2);
+  EXPECT_EQ(
+      test::FocalfleetInto(">/dev/full", {"layout", "hex", "--count", "1", "--out", "-"}).exit, 1);
+  EXPECT_NE(access("-", F_OK), 0);
+}
+
+TEST_F(OfflineCommands, ReadsPipesThatHaveAWriterAndRefusesNamedOnes) {
+  const std::string targets = scratch_.Put("t.csv", "unit_id,x_mm,y_mm\n1,1,1\n");
+  const auto shell = [&](const std::string& command) {
+    return test::RunProgram(
+        {"bash", "-c", command, FOCALFLEET_PROGRAM, units_, state_, plan_, targets});
+  };
+  const std::string plan = "\"$0\" plan --units \"$1\" --from \"$2\" --out \"$3\" --targets ";
+  EXPECT_EQ(shell("cat \"$4\" | " + plan + "/dev/stdin").exit, 0);
+  EXPECT_EQ(shell(plan + "/dev/stdin <\"$4\"").exit, 0);
+  EXPECT_EQ(shell(plan + "<(cat \"$4\")").exit, 0);
+  const std::string pipe = scratch_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  const auto named = Plan(pipe);
+  EXPECT_EQ(named.exit, 1);
+  EXPECT_THAT(named.err, HasSubstr("pipe: a named pipe; give a file, or /dev/stdin"));
 }
 
 TEST_F(OfflineCommands, AMisspeltColumnOfUnitsIsTold) {

@@ -93,6 +93,12 @@ ProgramResult Focalfleet(std::vector<std::string> arguments) {
   return RunProgram(arguments);
 }
 
+ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(),
+                   {"sh", "-c", "exec \"$0\" \"$@\" " + redirection, FOCALFLEET_PROGRAM});
+  return RunProgram(arguments);
+}
+
 ScratchDirectory::ScratchDirectory() {
   std::string name = (std::filesystem::temp_directory_path() / "focalfleet-cli-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no directory " + name);

@@ -21,6 +21,10 @@ ProgramResult RunProgram(const std::vector<std::string>& arguments,
 /// Runs the focalfleet executable of this build.
 ProgramResult Focalfleet(std::vector<std::string> arguments);
 
+/// The same, with stdout (and with more in `redirection` other streams) where a shell would put
+/// them: `>/dev/full`, `>&-`.
+ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::string> arguments);
+
 /// A directory of its own, removed with all that is in it.
 class ScratchDirectory {
  public:
