@@ -61,7 +61,9 @@ ExitCode TellSummary(const Context& context, const Json& configuration) {
     PrintJson(ApplySummary(configuration, status ? *status : Json::object()));
   }
   Say(context, DescribeConfiguration(configuration, context.colour_out));
-  return ExitCodeOf(configuration);
+  const ExitCode exit = ExitCodeOf(configuration);
+  if (exit == ExitCode::kSomeUnserved) NameUnserved(context, DescribeNotServed(configuration));
+  return exit;
 }
 
 ExitCode RunApply(const Context& context, const ApplyOptions& options) {

@@ -2,21 +2,50 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
+#include <vector>
+
 #include "daemon/cli/client.h"
 
 namespace focalfleet::cli {
 namespace {
 
-constexpr std::size_t kUnservedShown = 50;
+constexpr std::size_t kUnservedShown = 20;  // one by one; the others by reason
+constexpr std::size_t kReasonsShown = 10;
+constexpr std::size_t kUnitsOfReasonShown = 5;
 
-std::string DescribeUnserved(const Json& unit) {
-  std::string line =
-      fmt::format("  unit {}: {}", CountIn(unit, "unit_id"), TextIn(unit, "outcome"));
-  if (const std::string reason = TextIn(unit, "reason"); !reason.empty()) line += ": " + reason;
+std::string ReasonOf(const Json& unit) {
+  std::string text = TextIn(unit, "outcome");
+  if (const std::string reason = TextIn(unit, "reason"); !reason.empty()) text += ": " + reason;
   if (const std::string state = TextIn(unit, "state"); !state.empty()) {
-    line += fmt::format(" (now {})", state);
+    text += fmt::format(" (now {})", state);
   }
-  return line + "\n";
+  return text;
+}
+
+/// The units from `first` on: a line a reason, the most frequent one first.
+std::string DescribeByReason(const Json& unserved, std::size_t first) {
+  std::map<std::string, std::vector<std::uint64_t>> units_of;
+  for (std::size_t i = first; i < unserved.size(); ++i) {
+    units_of[ReasonOf(unserved[i])].push_back(CountIn(unserved[i], "unit_id"));
+  }
+  std::vector<std::pair<std::string, std::vector<std::uint64_t>>> reasons(units_of.begin(),
+                                                                          units_of.end());
+  std::stable_sort(reasons.begin(), reasons.end(),
+                   [](const auto& a, const auto& b) { return a.second.size() > b.second.size(); });
+  std::string text;
+  for (std::size_t r = 0; r < reasons.size() && r < kReasonsShown; ++r) {
+    std::vector<std::uint64_t>& ids = reasons[r].second;
+    const std::size_t count = ids.size();
+    ids.resize(std::min(count, kUnitsOfReasonShown));
+    text += fmt::format("  {} {}: {}{}: {}\n", count, count == 1 ? "more unit" : "more units",
+                        fmt::join(ids, ", "), count > ids.size() ? " ..." : "", reasons[r].first);
+  }
+  if (reasons.size() > kReasonsShown) {
+    text += fmt::format("  and {} more reasons\n", reasons.size() - kReasonsShown);
+  }
+  return text + "  --json names them all\n";
 }
 
 Colour ColourOf(ExitCode exit) {
@@ -54,15 +83,18 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
   if (const std::string error = TextIn(c, "error"); !error.empty()) {
     text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
   }
-  const Json& unserved = ListIn(c, "unserved");
-  if (unserved.empty()) return text;
-  text += "\n";
+  const std::string unserved = DescribeNotServed(c);
+  return unserved.empty() ? text : text + "\n" + unserved;
+}
+
+std::string DescribeNotServed(const Json& configuration) {
+  const Json& unserved = ListIn(configuration, "unserved");
+  if (unserved.empty()) return "";
+  std::string text;
   for (std::size_t i = 0; i < unserved.size() && i < kUnservedShown; ++i) {
-    text += DescribeUnserved(unserved[i]);
+    text += fmt::format("  unit {}: {}\n", CountIn(unserved[i], "unit_id"), ReasonOf(unserved[i]));
   }
-  if (unserved.size() > kUnservedShown) {
-    text += fmt::format("  and {} more; --json names them all\n", unserved.size() - kUnservedShown);
-  }
+  if (unserved.size() > kUnservedShown) text += DescribeByReason(unserved, kUnservedShown);
   text.pop_back();
   return text;
 }

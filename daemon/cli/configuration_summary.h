@@ -10,6 +10,9 @@ namespace focalfleet::cli {
 /// One line per fact, the units that were not served last, each with its reason.
 std::string DescribeConfiguration(const Json& configuration, bool colour_on);
 
+/// Only those units: the first 20 one by one, the others by reason. None: "".
+std::string DescribeNotServed(const Json& configuration);
+
 /// `focalfleet apply --wait --json`: the keys of docs/cli.md, always all of them. `status` fills in
 /// what a configuration does not say of itself (units of the fleet, bus load).
 Json ApplySummary(const Json& configuration, const Json& status);

@@ -130,6 +130,7 @@ ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
   const Json summary = Summary(*planned, options);
   if (context.json) PrintJson(summary);
   Say(context, Describe(summary));
+  if (!planned->plan.unserved.empty()) NameUnserved(context, Describe(summary));
   return planned->plan.unserved.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
 

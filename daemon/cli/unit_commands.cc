@@ -65,7 +65,9 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
     return ExitCode::kOk;
   }
   Say(context, DescribeConfiguration(*answer, context.colour_out));
-  return ExitCodeOf(*answer);
+  const ExitCode exit = ExitCodeOf(*answer);
+  if (exit == ExitCode::kSomeUnserved) NameUnserved(context, DescribeNotServed(*answer));
+  return exit;
 }
 
 void AddHome(CommandLine* line) {

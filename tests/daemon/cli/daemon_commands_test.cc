@@ -119,6 +119,38 @@ TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
   EXPECT_THAT(text.out, HasSubstr("unit 2: failed: no answer (now silent)"));
 }
 
+TEST_F(DaemonCommands, QuietStillNamesUnservedUnits) {
+  const auto apply = Apply({"--wait", "-q"}, {.result = Configuration("done", 1, 1)});
+  EXPECT_EQ(apply.exit, 3);
+  EXPECT_THAT(apply.out, IsEmpty());
+  EXPECT_EQ(apply.err, "focalfleet: not served:\n  unit 2: failed: no answer (now silent)\n");
+  const auto home =
+      Ask({"home", "1", "2", "--wait", "-q"}, {{"home", {.result = Configuration("done", 1, 1)}}});
+  EXPECT_EQ(home.exit, 3);
+  EXPECT_THAT(home.err, HasSubstr("unit 2: failed: no answer"));
+  const auto json = Apply({"--wait", "-q", "--json"}, {.result = Configuration("done", 1, 1)});
+  EXPECT_THAT(json.err, IsEmpty());
+  EXPECT_THAT(json.out, HasSubstr("no answer"));
+}
+
+TEST_F(DaemonCommands, ManyUnservedUnitsAreToldByReason) {
+  Json configuration = Configuration("done", 0, 0);
+  configuration["unserved"] = Json::array();
+  for (std::uint32_t id = 1; id <= 320; ++id) {
+    configuration["unserved"].push_back({{"unit_id", id},
+                                         {"outcome", "failed"},
+                                         {"reason", id == 30 ? "stalled" : "no answer"},
+                                         {"state", "silent"}});
+  }
+  const auto text = Apply({"--wait"}, {.result = configuration});
+  EXPECT_THAT(text.out, HasSubstr("  unit 20: failed: no answer (now silent)\n"
+                                  "  299 more units: 21, 22, 23, 24, 25 ...: failed: no answer "
+                                  "(now silent)\n"
+                                  "  1 more unit: 30: failed: stalled (now silent)\n"
+                                  "  --json names them all\n"));
+  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 3 + 20 + 3);
+}
+
 TEST_F(DaemonCommands, ApplyWaitEndsWithFiveWhereItWasStoppedOrFailed) {
   EXPECT_EQ(Apply({"--wait"}, {.result = Configuration("stopped", 1, 0)}).exit, 5);
   EXPECT_EQ(Apply({"--wait"}, {.result = Configuration("failed", 0, 1)}).exit, 5);

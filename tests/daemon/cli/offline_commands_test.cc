@@ -181,6 +181,10 @@ TEST_F(OfflineCommands, PlanNamesADisabledTargetAndEndsWithThree) {
   EXPECT_EQ(result.exit, 3) << result.err;
   const Json told = Json::parse(result.out, nullptr, false);
   EXPECT_EQ(told["unserved"], Json::parse(R"([{"unit_id":1,"why":"disabled","by":null}])"));
+  const auto quiet = Plan(scratch_ / "t.csv", {"-q"});
+  EXPECT_EQ(quiet.exit, 3);
+  EXPECT_THAT(quiet.out, IsEmpty());
+  EXPECT_THAT(quiet.err, HasSubstr("unit 1: disabled"));
   EXPECT_EQ(told["served"], 0);
   EXPECT_THAT(scratch_.List(), Contains("plan.csv"));
 }
