@@ -98,6 +98,17 @@ CLI::Option* OneOf(CLI::Option* option, const std::vector<std::string>& words) {
   return option;
 }
 
+CLI::Validator NumberBetween(double low, double high) {
+  return {[low, high](const std::string& text) {
+            double value = 0;
+            const bool good =
+                CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+            return good ? std::string()
+                        : fmt::format("{} is not a number of {:g} to {:g}", text, low, high);
+          },
+          ""};
+}
+
 std::unique_ptr<CommandLine> MakeCommandLine() {
   auto line = std::make_unique<CommandLine>();
   CLI::App& app = line->app;

@@ -46,6 +46,9 @@ CLI::Option* AddFile(CLI::App* command, const char* name, std::string* path, con
 /// Words of which the value must be one; completion offers them.
 CLI::Option* OneOf(CLI::Option* option, const std::vector<std::string>& words);
 
+/// A finite number of the range; CLI::Range lets a nan pass and prints 309 digits.
+CLI::Validator NumberBetween(double low, double high);
+
 void AddLayoutCommand(CommandLine* line);
 void AddTargetsCommand(CommandLine* line);
 void AddPlanCommand(CommandLine* line);

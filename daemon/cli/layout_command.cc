@@ -58,19 +58,19 @@ void AddLayoutCommand(CommandLine* line) {
   command->add_option("--count", options->hex.count, "How many units")
       ->required()
       ->check(CLI::Range(1u, limits::kUnits).description(""));
-  const auto positive = CLI::PositiveNumber.description("");
+  const CLI::Validator length = NumberBetween(0.01, 1000);
   command->add_option("--pitch-mm", options->hex.pitch_mm, "Distance of neighbours")
-      ->check(positive)
+      ->check(length)
       ->capture_default_str();
   command
       ->add_option("--arm-mm", options->hex.arm_mm,
                    "Length of each arm (default: by the pitch, 8.25 at 25.6)")
-      ->check(positive);
+      ->check(length);
   command
       ->add_option("--gear", options->gears,
                    "Motor turns per axis turn, for both axes or theta phi")
       ->expected(1, 2)
-      ->check(positive);
+      ->check(NumberBetween(0.001, 1e6));
   command->add_option("--units-per-bus", options->hex.units_per_bus, "Units on one CAN bus")
       ->check(CLI::Range(1u, limits::kNodesPerBus).description(""))
       ->capture_default_str();

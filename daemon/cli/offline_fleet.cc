@@ -17,7 +17,7 @@ void AddFleetFiles(CLI::App* command, FleetFiles* files) {
   command
       ->add_option("--clearance-mm", files->clearance_mm,
                    "Distance to keep between arms (default: 0.012 of the pitch)")
-      ->check(CLI::NonNegativeNumber.description(""));
+      ->check(NumberBetween(0, 1000));
 }
 
 Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) {

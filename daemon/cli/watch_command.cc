@@ -315,11 +315,14 @@ void AddWatchCommand(CommandLine* line) {
                                  "  focalfleet watch\n  focalfleet watch --once\n"
                                  "  focalfleet watch --json | jq -c .fleet");
   auto options = std::make_shared<WatchOptions>();
-  command->add_option("--domain", options->domain, "DDS domain")->capture_default_str();
+  command->add_option("--domain", options->domain, "DDS domain")
+      ->check(CLI::Range(0, 230).description(""))
+      ->capture_default_str();
   command->add_flag("--once", options->once, "Show the whole fleet once and end");
   command
       ->add_option("--wait", options->wait_s,
                    "Seconds to wait for a daemon, and with --once for all units")
+      ->check(NumberBetween(0, 86'400))
       ->capture_default_str();
   OnChosen(line, command, options, RunWatch);
 }

@@ -92,6 +92,31 @@ TEST_F(OfflineCommands, LayoutOutOfLimitsIsWrongUsage) {
   EXPECT_THAT(scratch_.List(), Not(Contains("x.csv")));
 }
 
+TEST_F(OfflineCommands, NumbersOutOfRangeAreRefusedInAFewWords) {
+  const std::string out = scratch_ / "x.csv";
+  const std::vector<std::string> hex = {"layout", "hex", "--count", "3", "--out", out};
+  const std::vector<std::string> draw = {"targets", "--units", units_, "--seed", "1", "--out", out};
+  const auto refuses = [](std::vector<std::string> words, const std::string& option,
+                          const std::string& value) {
+    words.insert(words.end(), {option, value});
+    const auto result = Focalfleet(words);
+    EXPECT_EQ(result.exit, 2) << option << " " << value;
+    EXPECT_THAT(result.err, HasSubstr(option + ": " + value + " is not a number of "))
+        << result.err;
+    EXPECT_LT(result.err.size(), 200u) << result.err;
+  };
+  for (const char* value : {"inf", "nan", "0", "-1", "1e9"}) {
+    refuses(hex, "--pitch-mm", value);
+    refuses(hex, "--arm-mm", value);
+    refuses(hex, "--gear", value);
+  }
+  for (const char* value : {"inf", "nan", "-1"}) {
+    refuses(draw, "--clearance-mm", value);
+    refuses({"watch", "--once"}, "--wait", value);
+  }
+  EXPECT_THAT(scratch_.List(), Not(Contains("x.csv")));
+}
+
 TEST_F(OfflineCommands, SameSeedDrawsTheSameBytesAndAnotherSeedOthers) {
   EXPECT_EQ(Draw({"--seed", "5", "--out", scratch_ / "a.csv"}).exit, 0);
   EXPECT_EQ(Draw({"--seed", "5", "--out", scratch_ / "b.csv"}).exit, 0);
