@@ -214,6 +214,24 @@ struct HistoryOptions {
   std::uint32_t limit = 20;
 };
 
+// Which list first, and its columns: who, what, when, how it went, what it took.
+struct HistoryTable {
+  const char* name;
+  std::vector<std::string> columns;
+};
+std::vector<HistoryTable> HistoryTables() {
+  return {{"configurations",
+           {"id", "state", "source", "began", "changed", "targeted", "arrived", "refused", "failed",
+            "makespan_s", "makespan_predicted_s", "energy_J", "peak_power_W"}},
+          {"alarms", {"id", "at", "severity", "bus_id", "unit_id", "text"}},
+          {"moves",
+           {"configuration", "move", "end", "began", "ended", "theta_from_vectors",
+            "theta_to_vectors", "theta_low_vectors", "theta_high_vectors", "theta_witness",
+            "phi_from_vectors", "phi_to_vectors", "phi_low_vectors", "phi_high_vectors",
+            "phi_witness", "unit_id", "serial"}},
+          {"unit", {"at", "enabled", "reason", "unit_id", "serial"}}};
+}
+
 ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
   Json args{{"limit", options.limit}};
   if (options.of_unit) args["unit_id"] = options.unit_id;
@@ -221,12 +239,12 @@ ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
   if (!history) return Report(context, history.error());
   if (context.json) PrintJson(*history);
   std::string text;
-  for (const auto& [name, rows] : history->items()) {
-    if (!rows.is_array() || rows.empty()) continue;
-    text += fmt::format(
-        "{}{}\n{}", text.empty() ? "" : "\n\n", Paint(context.colour_out, Colour::kBold, name),
-        DescribeRows(rows, {"began", "ended", "at", "id", "unit_id", "source", "state", "end",
-                            "targeted", "arrived", "refused", "failed", "configuration", "move"}));
+  for (const HistoryTable& table : HistoryTables()) {
+    const Json& rows = ListIn(*history, table.name);
+    if (rows.empty()) continue;
+    text += fmt::format("{}{}\n{}", text.empty() ? "" : "\n\n",
+                        Paint(context.colour_out, Colour::kBold, table.name),
+                        DescribeRows(rows, table.columns));
   }
   Say(context, text.empty() ? "nothing yet" : text);
   return ExitCode::kOk;

@@ -324,6 +324,20 @@ TEST_F(DaemonCommands, AdoptUnitAndHistoryAskForTheirUnit) {
   EXPECT_EQ(requests_.at(0).args, (Json{{"limit", 20}}));
 }
 
+TEST_F(DaemonCommands, HistoryTellsConfigurationsFirstEachByItsNumber) {
+  Json row = Configuration("done", 2, 0);
+  row.erase("unserved");
+  row.update({{"began", "b"}, {"changed", "c"}});
+  const Json alarm{{"id", 3},     {"at", "a"},          {"severity", "error"},
+                   {"bus_id", 1}, {"unit_id", nullptr}, {"text", "down"}};
+  const auto history = Ask(
+      {"history"}, {{"history", {.result = Json{{"alarms", {alarm}}, {"configurations", {row}}}}}});
+  EXPECT_THAT(history.out,
+              ::testing::MatchesRegex("configurations\nid +state +source +began +changed +targeted "
+                                      "+arrived +refused +failed +makespan_s .*\n7 +done +t.csv .*"
+                                      "\n\nalarms\nid +at +severity +bus_id +unit_id +text\n3 .*"));
+}
+
 TEST_F(DaemonCommands, ParamsSetTakesNegativeValuesAndWantsAllOfThem) {
   EXPECT_EQ(Ask({"params", "9", "set", "theta", "position", "-500"}, {{"params_set", {}}}).exit, 0);
   EXPECT_EQ(requests_.at(0).args,
