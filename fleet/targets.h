@@ -33,6 +33,7 @@ struct TargetRow {
 struct Targets {
   std::string source;  // file name for messages
   std::vector<TargetRow> rows;
+  std::vector<std::string> ignored_columns = {};  // not known; a misspelt one would be among them
 };
 
 /// The pose for each unit, none where no target names it. Shape: (n).

@@ -11,6 +11,7 @@
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/text_file.h"
+#include "fleet/files/targets_file.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -74,6 +75,10 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
     return Report(context, {ErrorCode::kInvalid,
                             fmt::format("{}: {} bytes; the daemon takes at most {}", options.file,
                                         text->size(), kControlLineBytesMax / 2)});
+  }
+  // What is wrong with the file the daemon tells; what it would pass over, only we can.
+  if (const auto targets = ReadTargets(*text, options.file)) {
+    TellPassedOver(context, options.file, targets->ignored_columns);
   }
   if (options.wait) InstallInterruptNote();
   ProgressBar bar(context);

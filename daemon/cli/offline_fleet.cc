@@ -29,10 +29,7 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
   }
   // A misspelt column is one that nobody reads: it must not pass in silence.
   FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(text, files.units));
-  if (!units.ignored_columns.empty() && !context.quiet && !context.json) {
-    fmt::print(stderr, "focalfleet: {}: columns passed over: {}\n", files.units,
-               fmt::join(units.ignored_columns, ", "));
-  }
+  TellPassedOver(context, files.units, units.ignored_columns);
   FOCALFLEET_TRY_ASSIGN(Layout layout, ReadLayout(text, files.units, std::move(options)));
   std::vector<UnitDrive> drives(layout.size());
   return OfflineFleet{std::move(layout), std::move(drives)};

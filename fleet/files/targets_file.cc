@@ -37,6 +37,8 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
   FOCALFLEET_TRY(RequireOneKind(table));
   Targets targets;
   targets.source = table.file();
+  targets.ignored_columns = table.Others(
+      {"unit_id", "x_mm", "y_mm", "theta_deg", "phi_deg", "priority", "target_id"});
   std::unordered_map<UnitId, int> line_of;
   for (std::size_t k = 0; k < table.size(); ++k) {
     CsvRow row(table, k);

@@ -85,6 +85,14 @@ TEST_F(DaemonCommands, ApplySendsTheFileAndItsName) {
   EXPECT_THAT(result.out, HasSubstr("configuration 7 accepted"));
 }
 
+TEST_F(DaemonCommands, ApplyTellsColumnsThatNobodyReads) {
+  const std::string file = scratch_.Put("p.csv", "unit_id,x_mm,y_mm,prioritty\n1,0.5,0.25,3\n");
+  const std::map<std::string, FakeAnswer> answers = {{"apply", {.result = Json{{"id", 7}}}}};
+  EXPECT_EQ(Ask({"apply", file}, answers).err,
+            "focalfleet: " + file + ": columns passed over: prioritty\n");
+  EXPECT_THAT(Ask({"apply", file, "-q"}, answers).err, IsEmpty());
+}
+
 TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
   const auto result = Apply({"--wait", "--json"}, {.result = Configuration("done", 2, 0)});
   EXPECT_EQ(result.exit, 0) << result.err;

@@ -45,6 +45,13 @@ TEST(TargetsFile, ReadsPlacesAnglesAndWhatIsCarriedAlong) {
   EXPECT_EQ(targets->source, "night.csv");
 }
 
+TEST(TargetsFile, KeepsTheNamesOfColumnsThatNobodyReads) {
+  const auto targets =
+      ReadTargets("unit_id,x_mm,y_mm,prioritty,target_id\n3,1.5,-2,7,NGC 224\n", "night.csv");
+  ASSERT_TRUE(targets) << targets.error().text;
+  EXPECT_EQ(targets->ignored_columns, std::vector<std::string>{"prioritty"});
+}
+
 TEST(TargetsFile, NamesFileLineAndReason) {
   EXPECT_EQ(TargetsError(""), "night.csv: empty, a header line is expected");
   EXPECT_EQ(TargetsError("unit_id,x_mm,y_mm\n"), "night.csv: a header, but no targets");
