@@ -190,13 +190,14 @@ struct ConfigurationView {
   std::uint32_t arrived = 0;
   std::uint32_t refused = 0;
   std::uint32_t failed = 0;
-  double makespan_predicted_s = 0;  // all rounds
+  double makespan_predicted_s = 0;  // all rounds that were started
   double makespan_s = 0;            // start signals to last arrival, all rounds
-  double energy_J = 0;              // predicted
-  double peak_power_W = 0;          // predicted
+  double energy_J = 0;              // predicted, of the same
+  double peak_power_W = 0;          // predicted, of the same
   std::uint64_t frames = 0;         // both directions, all buses, since it began
   HostInstant began;
-  HostInstant started;  // start signal of this round; kNever before it
+  HostInstant started;      // start signal of this round; kNever before it
+  std::string waiting_for;  // what holds it up, for people; usually empty
 };
 
 struct CoordinatorConfig {

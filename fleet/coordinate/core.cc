@@ -74,6 +74,38 @@ std::string Core::NameOf(PositionerIndex i) const {
   return "unit " + std::to_string(layout.unit(i).id.value);
 }
 
+std::string Core::TroubleOf(PositionerIndex i) const {
+  const UnitView& view = units[i.value].view;
+  const std::string id = std::to_string(layout.unit(i).id.value);
+  switch (view.phase) {
+    case UnitPhase::kFault:
+      return "is in fault" +
+             (view.fault == FaultCode::kNone ? "" : " (" + std::string(Name(view.fault)) + ")") +
+             ": `focalfleet enable " + id + "` clears it";
+    case UnitPhase::kForeign:
+      return "has another serial number than the one that belongs there: `focalfleet adopt " + id +
+             "` accepts it";
+    case UnitPhase::kSilent:
+      return "does not answer any more";
+    case UnitPhase::kAbsent:
+      return "has never answered";
+    case UnitPhase::kIdentifying:
+      return "is still being read";
+    case UnitPhase::kMoving:
+    case UnitPhase::kHoming:
+    case UnitPhase::kSettling:
+      return "still moves";
+    case UnitPhase::kStaging:
+    case UnitPhase::kConfirming:
+    case UnitPhase::kArming:
+    case UnitPhase::kArmed:
+      return "takes part in a configuration now";
+    case UnitPhase::kReady:
+      break;
+  }
+  return "is ready";
+}
+
 BusRecord* Core::FindBus(BusId id) {
   const auto it = std::lower_bound(buses.begin(), buses.end(), id,
                                    [](const BusRecord& bus, BusId want) { return bus.id < want; });

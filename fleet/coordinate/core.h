@@ -92,6 +92,9 @@ class Core {
   [[nodiscard]] BusRecord& bus_of(PositionerIndex i) { return buses[unit(i).bus]; }
   [[nodiscard]] std::string NameOf(PositionerIndex i) const;  // "unit 12"
   [[nodiscard]] BusRecord* FindBus(BusId id);
+  /// What keeps it from being moved, and what helps, to go after its name or "it":
+  /// "is in fault (driver): `focalfleet enable 9` clears it". Pre: it is not kReady.
+  [[nodiscard]] std::string TroubleOf(PositionerIndex i) const;
 
   // ---- doing
 

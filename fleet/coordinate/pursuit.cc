@@ -50,11 +50,7 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
   fixed_ = command.fixed;
   Begin(request, command.source);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
-    UnitView& view = core_.units[n].view;
-    view.target = targets_[n];
-    view.outcome = TargetOutcome::kNone;
-    view.outcome_reason.clear();
-    core_.Changed({n});
+    const UnitView& view = core_.units[n].view;
     if (!targets_[n]) continue;
     ++view_.targeted;
     SetOutcome({n}, TargetOutcome::kPending);
@@ -74,8 +70,7 @@ Status Pursuit::Home(std::uint64_t request, const HomeCommand& command) {
   if (command.units.empty()) return Fail(ErrorCode::kInvalid, "no unit to home");
   for (const PositionerIndex i : command.units)
     if (core_.unit(i).view.phase != kReady)
-      return Fail(ErrorCode::kRefused,
-                  core_.NameOf(i) + " cannot home: its phase is " + Name(core_.unit(i).view.phase));
+      return Fail(ErrorCode::kRefused, core_.NameOf(i) + " cannot home: it " + core_.TroubleOf(i));
   targets_.assign(core_.units.size(), std::nullopt);
   to_home_ = command.units;
   std::sort(to_home_.begin(), to_home_.end());
@@ -102,6 +97,13 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
            .state = ConfigurationState::kPlanning,
            .began = core_.now,
            .started = kNever};
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    UnitView& view = core_.units[n].view;
+    view.target = targets_[n];
+    view.outcome = TargetOutcome::kNone;
+    view.outcome_reason.clear();
+    core_.Changed({n});
+  }
   std::fill(excluded_.begin(), excluded_.end(), std::uint8_t{0});
   std::fill(strikes_.begin(), strikes_.end(), std::uint8_t{0});
   frames_before_ = FramesOf(core_);
@@ -152,7 +154,8 @@ void Pursuit::BeginRound() {
     std::optional<Pose> target;
     if (view.outcome == TargetOutcome::kPending && to_home_.empty()) {
       if (!usable) {
-        SetOutcome({n}, TargetOutcome::kFailed, std::string("is ") + Name(view.phase));
+        SetOutcome({n}, TargetOutcome::kFailed,
+                   view.phase == kReady ? "fell out before" : "it " + core_.TroubleOf({n}));
       } else if (!IsPlace(view.knowledge)) {
         SetOutcome({n}, TargetOutcome::kRefused,
                    std::string("its position is ") + Name(view.knowledge[0].witness) +
@@ -208,10 +211,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
       SetOutcome(unserved.unit, TargetOutcome::kRefused,
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
-  const PlanEstimate estimate = Estimate(plan_, core_.layout, core_.drives, MotorModel{});
-  view_.makespan_predicted_s += estimate.makespan_s;
-  view_.energy_J += estimate.energy_J;
-  view_.peak_power_W = std::max(view_.peak_power_W, estimate.peak_power_W);
+  Predict(plan_);
   move_ = core_.next_move;
   core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
   if (plan_.moves.empty()) {
@@ -229,6 +229,18 @@ void Pursuit::TakePlan(const PlanDone& done) {
     waiting_[core_.unit(i).bus].push_back(i);
   }
   PumpUploads();
+}
+
+void Pursuit::Predict(const Plan& plan) {
+  const PlanEstimate estimate = Estimate(plan, core_.layout, core_.drives, MotorModel{});
+  prediction_ = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};
+}
+
+void Pursuit::CountPrediction() {
+  view_.makespan_predicted_s += prediction_.makespan_s;
+  view_.energy_J += prediction_.energy_J;
+  view_.peak_power_W = std::max(view_.peak_power_W, prediction_.peak_power_W);
+  prediction_ = {};
 }
 
 // ---- going on
@@ -277,6 +289,14 @@ void Pursuit::Advance() {
     case State::kPlanning:
       break;
   }
+  SayWhatIsWaitedFor();
+}
+
+void Pursuit::SayWhatIsWaitedFor() {
+  const bool needs_the_store = state_ == State::kCommitting || state_ == State::kHomeCommitting ||
+                               (state_ == State::kReporting && !arrivals_.empty());
+  view_.waiting_for =
+      needs_the_store && core_.store_failing ? "the store, which cannot be written" : "";
 }
 
 void Pursuit::Take(const UnitEvent& event) {
@@ -296,7 +316,9 @@ void Pursuit::Take(const UnitEvent& event) {
       StopFollowers(i, core_.NameOf(i) + " stands in its way");
       break;  // settled when it has been read again
     case UnitEventKind::kLost:
-      SetOutcome(i, TargetOutcome::kFailed, event.reason);
+      SetOutcome(
+          i, TargetOutcome::kFailed,
+          core_.unit(i).view.phase == kFault ? "it " + core_.TroubleOf(i) : "it " + event.reason);
       Exclude(i);
       if (part_[i.value] == Part::kMoving)
         StopFollowers(i, core_.NameOf(i) + " may stand in its way");
@@ -318,7 +340,9 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
     if (view.outcome == TargetOutcome::kPending && IsPlace(view.knowledge) &&
         (homed || (view.target && PlaceOf(view.knowledge) == *view.target)))
       arrivals_.push_back({core_.batch_now(), i});
-    if (!homed && view.target && PlaceOf(view.knowledge) != *view.target && !stopping_)
+    // Not the target: whoever only makes way has none, and others may come to theirs by stages.
+    const std::size_t plan = plan_of_[i.value];
+    if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
       StopFollowers(i, core_.NameOf(i) + " did not get out of its way");
   }
   if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];

@@ -99,9 +99,13 @@ class Pursuit {
   void JudgeTargets();
   void ReportArrivals();
   void Record();
+  void Predict(const Plan& plan);
+  void CountPrediction();
+  void SayWhatIsWaitedFor();
   [[nodiscard]] StagedMove StagedMoveOf(PositionerIndex i) const;
   [[nodiscard]] IntentRow IntentOf(PositionerIndex i) const;
   [[nodiscard]] IntentRow HomingIntentOf(PositionerIndex i) const;
+  [[nodiscard]] Plan HomingMotion() const;
 
   static constexpr std::size_t kNoPlan = SIZE_MAX;
 
@@ -133,6 +137,13 @@ class Pursuit {
   std::vector<std::deque<PositionerIndex>> waiting_;  // by bus: to be uploaded
   std::vector<std::uint32_t> uploading_;              // by bus
   std::vector<PositionerIndex> homing_;
+  // What this round's motion is predicted to take and draw; added to the view when it starts.
+  struct Prediction {
+    double makespan_s = 0;
+    double energy_J = 0;
+    double peak_power_W = 0;
+  };
+  Prediction prediction_;
   std::uint64_t commit_batch_ = 0;
   HostInstant last_arrival_;
   HostInstant start_repeat_ = kNever;

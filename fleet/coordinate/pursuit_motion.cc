@@ -1,8 +1,10 @@
 // Pursuit, from the intent to rest: start, homing, and every kind of stop.
 
 #include <algorithm>
+#include <utility>
 
 #include "fleet/coordinate/pursuit.h"
+#include "fleet/estimate.h"
 
 namespace focalfleet {
 namespace {
@@ -57,13 +59,14 @@ void Pursuit::CommitRound() {
     Intend(move.unit, IntentOf(move.unit));
   }
   core_.Note(NextMoveRow{core_.next_move});
-  view_.state = ConfigurationState::kMoving;
-  Record();
   commit_batch_ = core_.batch_now();
   SetState(State::kCommitting);
 }
 
 void Pursuit::Start() {
+  view_.state = ConfigurationState::kMoving;
+  CountPrediction();
+  Record();
   view_.started = core_.now + core_.config.start_delay;
   last_arrival_ = view_.started;
   start_repeats_ = 0;
@@ -146,10 +149,37 @@ IntentRow Pursuit::HomingIntentOf(PositionerIndex i) const {
   return row;
 }
 
+// As docs/protocol.md has it: phi, then theta, each over its range and some turns more, from
+// wherever it stands. To a tenth: how much more is the firmware's own affair.
+Plan Pursuit::HomingMotion() const {
+  constexpr double kOverRange = 1.05;
+  constexpr int kTurnsMore = 2;
+  Plan plan;
+  for (const PositionerIndex i : homing_) {
+    const UnitDrive& drive = core_.drives[i.value];
+    UnitPlan motion{
+        .unit = i, .from = {}, .to = {}, .mode = drive.mode, .path = {}, .followers = {}};
+    std::uint32_t start_ticks = 0;
+    for (const Axis axis : {Axis::kPhi, Axis::kTheta}) {
+      const AxisGeometry& geometry = core_.layout.unit(i).axis[Index(axis)];
+      const AxisDrive& tuned = drive.axis[Index(axis)];
+      const auto way = static_cast<std::int32_t>(
+          NearestVectors(geometry.max_deg - geometry.min_deg, geometry, tuned) * kOverRange +
+          kTurnsMore * tuned.subdivision);
+      const Segment segment{start_ticks, way, tuned.repeat};
+      motion.path[Index(axis)].Append(segment);
+      start_ticks = static_cast<std::uint32_t>(TimeOf(segment, tuned).t1_s * 1e9 /
+                                               static_cast<double>(kTick.ns));
+    }
+    plan.moves.push_back(std::move(motion));
+  }
+  return plan;
+}
+
 void Pursuit::CommitHoming() {
   std::erase_if(homing_, [&](PositionerIndex i) {
     if (core_.unit(i).view.phase == kReady) return false;
-    SetOutcome(i, TargetOutcome::kFailed, std::string("is ") + Name(core_.unit(i).view.phase));
+    SetOutcome(i, TargetOutcome::kFailed, "it " + core_.TroubleOf(i));
     std::erase(to_home_, i);
     return true;
   });
@@ -164,13 +194,15 @@ void Pursuit::CommitHoming() {
     Intend(i, HomingIntentOf(i));
   }
   core_.Note(NextMoveRow{core_.next_move});
-  view_.state = ConfigurationState::kMoving;
-  Record();
+  Predict(HomingMotion());
   commit_batch_ = core_.batch_now();
   SetState(State::kHomeCommitting);
 }
 
 void Pursuit::StartHoming() {
+  view_.state = ConfigurationState::kMoving;
+  CountPrediction();
+  Record();
   view_.started = core_.now;
   last_arrival_ = core_.now;
   for (const PositionerIndex i : homing_) {

@@ -109,8 +109,11 @@ TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
   fleet.Run(Seconds(30));
   for (std::size_t n = 0; n < fleet.layout().size(); ++n)
     EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u);
+  EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kUploading);
+  EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "the store, which cannot be written");
   fleet.store_fails = false;
   ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "");
   EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
   fleet.store_fails = true;
   const auto refused = fleet.ApplyRandom(8);
@@ -155,6 +158,65 @@ TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
   EXPECT_EQ(fleet.coordinator().unit({0}).phase, UnitPhase::kAbsent);
   // Nobody knows where it stands, so its six neighbours keep out of its whole reach.
   EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
+}
+
+TEST(Configuration, PredictsOnlyWhatIsStarted) {
+  InProcessFleet fleet(Small(14));
+  fleet.world().faults(fleet.id(7))->wrong_digest = true;  // costs a plan before any start
+  fleet.ApplyRandom(14);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  const ConfigurationView& view = fleet.coordinator().configuration();
+  ASSERT_GE(view.round, 2u);
+  EXPECT_NEAR(view.makespan_predicted_s, view.makespan_s, 0.1 * view.makespan_s);
+  EXPECT_GT(view.energy_J, 0);
+}
+
+TEST(Configuration, HomingIsPredicted) {
+  InProcessFleet fleet(Small(44));
+  fleet.Run(Seconds(5));
+  fleet.Send({900, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  const ConfigurationView& view = fleet.coordinator().configuration();
+  EXPECT_EQ(view.arrived, 1u);
+  EXPECT_GT(view.makespan_s, 10);
+  EXPECT_NEAR(view.makespan_predicted_s, view.makespan_s, 0.1 * view.makespan_s);
+  EXPECT_GT(view.energy_J, 0);
+  EXPECT_GT(view.peak_power_W, 0);
+}
+
+TEST(Configuration, HomingTellsNothingOfTheOneBefore) {
+  InProcessFleet fleet(Small(45));
+  fleet.world().faults(fleet.id(7))->wrong_digest = true;
+  fleet.ApplyRandom(45);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ASSERT_EQ(fleet.coordinator().unit({7}).outcome, TargetOutcome::kFailed);
+  fleet.Send({900, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  for (std::uint32_t n = 0; n < 37; ++n) {
+    const UnitView& view = fleet.coordinator().unit({n});
+    EXPECT_EQ(view.outcome, n == 4 ? TargetOutcome::kArrived : TargetOutcome::kNone) << n;
+    EXPECT_EQ(view.outcome_reason, "") << n;
+    EXPECT_FALSE(view.target) << n;
+  }
+}
+
+TEST(Configuration, TellsTheWayOutOfAFault) {
+  InProcessFleet fleet(Small(46));
+  fleet.Run(Seconds(5));
+  fleet.world().RaiseFault(fleet.id(8), FaultCode::kDriver);
+  fleet.Run(Seconds(30));
+  fleet.Send({900, HomeCommand{{{8}}}});
+  fleet.Run(Seconds(1));
+  ASSERT_TRUE(fleet.LastReply(900) && fleet.LastReply(900)->error);
+  EXPECT_EQ(fleet.LastReply(900)->error->text,
+            "unit 9 cannot home: it is in fault (driver): `focalfleet enable 9` clears it");
+  fleet.ApplyRandom(46);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.coordinator().unit({8}).outcome_reason,
+            "it is in fault (driver): `focalfleet enable 9` clears it");
+  fleet.Send({901, EnableCommand{{{8}}}});
+  fleet.Run(Seconds(5));
+  EXPECT_EQ(fleet.coordinator().unit({8}).phase, UnitPhase::kReady);
 }
 
 TEST(Configuration, LateAndDoubledAnswersAreNoTrouble) {
