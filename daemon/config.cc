@@ -194,11 +194,11 @@ class Reader {
   /// What only the keys together tell; stands at the line of `section.key`, or of the section where
   /// it has none.
   void Require(bool condition, const char* section, const char* key, const std::string& text) {
-    if (condition) return;
-    const auto at = root_.at_path(std::string(section) + "." + key);
-    if (at.node() != nullptr) return Wrong(*at.node(), text);
-    if (const toml::node* table = root_.get(section)) return Wrong(*table, text);
-    WrongLine({}, text);
+    if (!condition) problems_.emplace(LineOf(section, key), text);
+  }
+  /// file:line of a key, for what only shows when it is used; as Require where it is not there.
+  [[nodiscard]] std::string At(const char* section, const char* key) const {
+    return file_ + ":" + std::to_string(LineOf(section, key));
   }
 
   [[nodiscard]] Status Verdict() const {
@@ -215,9 +215,18 @@ class Reader {
     known_.insert(Full(key));
     return section_ == nullptr ? nullptr : section_->get(key);
   }
+  static toml::source_index LineOf(const toml::source_region& source) {
+    return std::max(source.begin.line, toml::source_index{1});
+  }
+  [[nodiscard]] toml::source_index LineOf(const char* section, const char* key) const {
+    const auto at = root_.at_path(std::string(section) + "." + key);
+    if (at.node() != nullptr) return LineOf(at.node()->source());
+    const toml::node* table = root_.get(section);
+    return table != nullptr ? LineOf(table->source()) : 1;
+  }
   void Wrong(const toml::node& node, const std::string& text) { WrongLine(node.source(), text); }
   void WrongLine(const toml::source_region& source, const std::string& text) {
-    problems_.emplace(std::max(source.begin.line, toml::source_index{1}), text);
+    problems_.emplace(LineOf(source), text);
   }
   void WrongType(const toml::node& node, const char* key, const char* expected) {
     Wrong(node, Full(key) + " must be " + expected);
@@ -309,6 +318,8 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
+  config.bus.interfaces_at = reader.At("bus", "interfaces");
+  config.log.file_at = reader.At("log", "file");
   return config;
 }
 

@@ -37,13 +37,15 @@ struct DaemonConfig {
   } dds;
   struct Log {
     std::string level = "info";
-    std::string file;  // empty: standard error
+    std::string file;     // empty: standard error
+    std::string file_at;  // file:line, for messages
   } log;
   struct Bus {
     PortKind port = PortKind::kUnix;
     std::uint32_t bit_rate_bps = 1'000'000;
     std::string unix_directory;           // where bus<ID>.sock are
     std::vector<std::string> interfaces;  // by ascending bus id
+    std::string interfaces_at;            // file:line, for messages
   } bus;
   struct Clock {
     double speed = 1;  // host time runs so many times faster than real time; simulated fleets only

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "daemon/ports/simulated_port.h"
-#include "daemon/ports/socketcan_port.h"
 #include "daemon/ports/unix_port.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
@@ -46,16 +45,25 @@ Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const H
 }
 
 Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
-                            const HostClock& clock) {
+                            const HostClock& clock, const InterfaceOpener& open) {
   FOCALFLEET_TRY(CheckInterfaces(config, layout));
   Ports ports;
+  bool any = false;
   for (std::size_t b = 0; b < config.bus.interfaces.size(); ++b) {
-    FOCALFLEET_TRY_ASSIGN(auto port,
-                          SocketCanPort::Create({.bus = layout.buses()[b],
-                                                 .interface = config.bus.interfaces[b],
-                                                 .retry_period = clock.Real(kRetryPeriod)}));
-    ports.push_back(std::move(port));
+    auto port = SocketCanPort::Create({.bus = layout.buses()[b],
+                                       .interface = config.bus.interfaces[b],
+                                       .retry_period = clock.Real(kRetryPeriod),
+                                       .open = open});
+    if (!port) return Fail(port.error().code, config.bus.interfaces_at + ": " + port.error().text);
+    any |= (*port)->found();
+    ports.push_back(std::move(*port));
   }
+  // One that is missing is an adapter that died; all of them, a driver that is not loaded or a file
+  // of another machine.
+  if (!any && !ports.empty())
+    return Fail(ErrorCode::kUnavailable,
+                config.bus.interfaces_at +
+                    ": none of bus.interfaces is there: " + ports.front()->trouble());
   return ports;
 }
 
@@ -90,18 +98,20 @@ Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {
   if (config.bus.port != PortKind::kSocketCan) return {};
   const std::size_t interfaces = config.bus.interfaces.size();
   if (interfaces != layout.buses().size())
-    return Fail(ErrorCode::kInvalid, "bus.interfaces names " + std::to_string(interfaces) +
-                                         " interfaces, but " + config.fleet.units + " has " +
+    return Fail(ErrorCode::kInvalid, config.bus.interfaces_at + ": bus.interfaces names " +
+                                         std::to_string(interfaces) + " interfaces, but " +
+                                         config.fleet.units + " has " +
                                          std::to_string(layout.buses().size()) + " buses");
   return {};
 }
 
-Result<Ports> OpenPorts(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {
+Result<Ports> OpenPorts(const DaemonConfig& config, const Layout& layout, const HostClock& clock,
+                        const InterfaceOpener& open) {
   switch (config.bus.port) {
     case PortKind::kUnix:
       return OpenUnix(config, layout, clock);
     case PortKind::kSocketCan:
-      return OpenSocketCan(config, layout, clock);
+      return OpenSocketCan(config, layout, clock, open);
     case PortKind::kSimulated:
       return OpenSimulated(config, layout, clock);
   }

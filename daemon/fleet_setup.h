@@ -7,6 +7,7 @@
 #include "daemon/clock.h"
 #include "daemon/config.h"
 #include "daemon/ports/pollable_port.h"
+#include "daemon/ports/socketcan_port.h"
 #include "fleet/layout.h"
 #include "protocol/base/result.h"
 
@@ -18,10 +19,11 @@ Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet);
 /// What configuration and layout must agree on. Errors: kInvalid: not one interface a bus.
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout);
 
-/// In the order of layout.buses(). Errors: kInvalid: not one interface a bus; kUnavailable names
-/// the interface.
-Result<std::vector<std::unique_ptr<PollablePort>>> OpenPorts(const DaemonConfig& config,
-                                                             const Layout& layout,
-                                                             const HostClock& clock);
+/// In the order of layout.buses(). A bus that is not there is down, and takes only its units with
+/// it; it is looked for again.
+/// Errors: kInvalid: not one interface a bus; kUnavailable: none of the interfaces is there.
+Result<std::vector<std::unique_ptr<PollablePort>>> OpenPorts(
+    const DaemonConfig& config, const Layout& layout, const HostClock& clock,
+    const InterfaceOpener& open = OpenInterface);
 
 }  // namespace focalfleet

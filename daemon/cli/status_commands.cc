@@ -28,10 +28,12 @@ std::string Counted(const Json& counts) {
 
 std::string DescribeBus(const Json& bus, bool colour_on) {
   const std::string link = TextIn(bus, "link");
+  const std::string trouble = TextIn(bus, "trouble");
   return fmt::format(
-      "  bus {}: {}, load {:.0f} % (highest {:.0f} %), {} sent, {} received, {} malformed, {} "
+      "  bus {}: {}{}, load {:.0f} % (highest {:.0f} %), {} sent, {} received, {} malformed, {} "
       "retries\n",
       CountIn(bus, "bus_id"), Paint(colour_on, link == "up" ? Colour::kGreen : Colour::kRed, link),
+      trouble.empty() ? "" : fmt::format(" ({}: {})", TextIn(bus, "port"), trouble),
       100 * NumberIn(bus, "load"), 100 * NumberIn(bus, "load_max"), CountIn(bus, "frames_sent"),
       CountIn(bus, "frames_received"), CountIn(bus, "malformed"), CountIn(bus, "retries"));
 }

@@ -56,7 +56,8 @@ Result<InterfaceState> Look(int fd, const std::string& name) {
   return state;
 }
 
-/// A bound socket, or -1 where the interface is there but down.
+}  // namespace
+
 Result<int> OpenInterface(const std::string& name) {
   const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd < 0)
@@ -83,8 +84,6 @@ Result<int> OpenInterface(const std::string& name) {
   return fd;
 }
 
-}  // namespace
-
 std::optional<LinkState> LinkStateOf(const can_frame& error) {
   if ((error.can_id & CAN_ERR_BUSOFF) != 0) return LinkState::kOff;
   if ((error.can_id & CAN_ERR_RESTARTED) != 0) return LinkState::kUp;
@@ -101,21 +100,24 @@ std::optional<LinkState> LinkStateOf(const can_frame& error) {
 Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
   FOCALFLEET_TRY_ASSIGN(WatchedSocket socket, WatchedSocket::Create());
   std::unique_ptr<SocketCanPort> port(new SocketCanPort(std::move(options), std::move(socket)));
-  FOCALFLEET_TRY(port->Open());
+  const auto opened = port->Open();
+  if (!opened && opened.error().code == ErrorCode::kInvalid)
+    return tl::unexpected<Error>(opened.error());
   return port;
 }
 
 Status SocketCanPort::Open() {
-  FOCALFLEET_TRY_ASSIGN(const int fd, OpenInterface(options_.interface));
-  if (fd < 0) {
-    trouble_ = "the interface is down";
-    return {};
+  const auto fd = options_.open(options_.interface);
+  found_ = fd.has_value();
+  if (!fd || *fd < 0) {
+    trouble_ = fd ? "the interface is down" : fd.error().text;
+    return fd ? Status() : tl::unexpected<Error>(fd.error());
   }
-  socket_.Open(fd);
+  socket_.Open(*fd);
   state_ = LinkState::kUp;
   wake_at_ = kNever;
   trouble_.clear();
-  ++counters_.reconnects;
+  counters_.reconnects += std::exchange(was_up_, true) ? 1u : 0u;
   return {};
 }
 
@@ -140,7 +142,7 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   if (!socket_.open()) {
     if (now < wake_at_) return;
-    if (const auto opened = Open(); !opened) trouble_ = opened.error().text;
+    static_cast<void>(Open());  // what failed is the trouble
     if (!socket_.open()) {
       wake_at_ = now + options_.retry_period;
       return;

@@ -32,7 +32,7 @@ void UnixPort::Connect() {
   socket_.Open(fd);
   wake_at_ = kNever;
   trouble_.clear();
-  ++counters_.reconnects;
+  counters_.reconnects += std::exchange(was_up_, true) ? 1u : 0u;
 }
 
 void UnixPort::Lose(const std::string& why) {

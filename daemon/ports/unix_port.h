@@ -42,6 +42,7 @@ class UnixPort : public PollablePort {
   Options options_;
   WatchedSocket socket_;
   HostInstant wake_at_{0};  // while the link is down: when to try again
+  bool was_up_ = false;     // ever
   PortCounters counters_;
   std::string trouble_;
 };

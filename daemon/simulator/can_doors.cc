@@ -32,7 +32,9 @@ Result<std::unique_ptr<CanDoors>> CanDoors::Create(const Options& options) {
     FOCALFLEET_TRY_ASSIGN(auto port, SocketCanPort::Create(port_options));
     if (port->state() == LinkState::kDown)
       return Fail(ErrorCode::kUnavailable,
-                  "CAN interface '" + options.interfaces[i] + "': " + port->trouble());
+                  port->found()
+                      ? "CAN interface '" + options.interfaces[i] + "': " + port->trouble()
+                      : port->trouble());
     epoll_event event{};
     event.events = EPOLLIN;
     event.data.u64 = i;

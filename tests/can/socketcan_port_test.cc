@@ -161,11 +161,18 @@ TEST(SocketCanPort, ADownInterfaceIsALinkStateAndComesBack) {
   EXPECT_EQ(port->Send({&frame, 1}), 1u);
 }
 
-TEST(SocketCanPort, AMissingInterfaceIsNamed) {
+TEST(SocketCanPort, AMissingInterfaceIsDownAndNamed) {
   const auto port = SocketCanPort::Create({.bus = {0}, .interface = "vcan77"});
+  ASSERT_TRUE(port) << port.error().text;
+  EXPECT_EQ((*port)->state(), LinkState::kDown);
+  EXPECT_FALSE((*port)->found());
+  EXPECT_NE((*port)->trouble().find("no CAN interface 'vcan77'"), std::string::npos);
+}
+
+TEST(SocketCanPort, ANameThatNoInterfaceCanHaveIsRefused) {
+  const auto port = SocketCanPort::Create({.bus = {0}, .interface = "vcan-of-a-long-name"});
   ASSERT_FALSE(port);
-  EXPECT_EQ(port.error().code, ErrorCode::kUnavailable);
-  EXPECT_NE(port.error().text.find("vcan77"), std::string::npos);
+  EXPECT_EQ(port.error().code, ErrorCode::kInvalid);
 }
 
 }  // namespace

@@ -51,7 +51,12 @@ Json Status() {
           {"configuration", Configuration("done", 2, 0)},
           {"buses",
            {{{"bus_id", 0}, {"link", "up"}, {"load", 0.1}, {"load_max", 0.2}},
-            {{"bus_id", 1}, {"link", "off"}, {"load", 0.0}, {"load_max", 0.375}}}},
+            {{"bus_id", 1},
+             {"link", "off"},
+             {"port", "can1"},
+             {"trouble", "the controller is bus-off"},
+             {"load", 0.0},
+             {"load_max", 0.375}}}},
           {"bus_load_max", 0.375}};
 }
 
@@ -250,7 +255,7 @@ TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
   EXPECT_EQ(text.exit, 0) << text.err;
   EXPECT_THAT(text.out, HasSubstr("2, 2 enabled: 2 ready"));
   EXPECT_THAT(text.out, HasSubstr("1 of 2 up, highest load 38 %"));
-  EXPECT_THAT(text.out, HasSubstr("bus 1: off"));
+  EXPECT_THAT(text.out, HasSubstr("bus 1: off (can1: the controller is bus-off), load"));
   EXPECT_THAT(text.out, Not(HasSubstr("bus 0: up")));
   EXPECT_THAT(Ask({"status", "--buses"}, {{"status", {.result = Status()}}}).out,
               HasSubstr("bus 0: up"));

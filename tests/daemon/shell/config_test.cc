@@ -93,6 +93,8 @@ spread = "real"
   EXPECT_EQ(config->drive.axis[0].counter1, 400);
   EXPECT_EQ(config->timing.silence_limit, Milliseconds(7));
   EXPECT_EQ(config->simulated.seed, 8u);
+  EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:22");
 }
 
 TEST(Config, AbsolutePathsStay) {
