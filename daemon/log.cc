@@ -4,18 +4,26 @@
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
 namespace focalfleet {
 
 Status OpenLog(const DaemonConfig::Log& log) {
+  // spdlog would make the folders; of a misspelt path, too.
+  const std::filesystem::path folder = std::filesystem::path(log.file).parent_path();
+  std::error_code failed;
+  if (!folder.empty() && !std::filesystem::is_directory(folder, failed))
+    return Fail(ErrorCode::kUnavailable,
+                log.file_at + ": log.file: there is no folder " + folder.string());
   std::shared_ptr<spdlog::logger> logger;
   try {  // spdlog's own way of saying that a file cannot be opened
     spdlog::sink_ptr sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
     if (!log.file.empty()) sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(log.file);
     logger = std::make_shared<spdlog::logger>("focalfleetd", std::move(sink));
   } catch (const spdlog::spdlog_ex& error) {
-    return Fail(ErrorCode::kUnavailable, error.what());
+    return Fail(ErrorCode::kUnavailable, log.file_at + ": log.file: " + error.what());
   }
   logger->set_level(spdlog::level::from_str(log.level));
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");

@@ -147,10 +147,21 @@ TEST_F(FocalfleetdTest, StartsAgainAfterItWasKilled) {
 TEST_F(FocalfleetdTest, NamesAMissingInterface) {
   Configure("[bus]\nport = \"socketcan\"\ninterfaces = [\"nocan0\", \"nocan1\"]\n");
   EXPECT_EQ(Start().Wait(), 1);
+  EXPECT_THAT(Log(), HasSubstr("f.toml:5: none of bus.interfaces is there"));
   EXPECT_THAT(Log(), HasSubstr("nocan0"));
   Configure("[bus]\nport = \"socketcan\"\ninterfaces = [\"nocan0\"]\n");
   EXPECT_EQ(Start("count").Wait(), 1);
-  EXPECT_THAT(Log("count"), HasSubstr("1 interfaces"));
+  EXPECT_THAT(Log("count"), HasSubstr("f.toml:5: bus.interfaces names 1 interfaces"));
+}
+
+TEST_F(FocalfleetdTest, MakesNoFolderForItsLog) {
+  Configure("[bus]\nport = \"simulated\"\n[log]\nfile = \"no/such/log\"\n");
+  EXPECT_EQ(Start().Wait(), 1);
+  EXPECT_THAT(Log(), HasSubstr("f.toml:6: log.file: there is no folder "));
+  EXPECT_NE(::access((scratch_ / "no").c_str(), F_OK), 0);
+  Configure("[bus]\nport = \"simulated\"\n[log]\nfile = \".\"\n");
+  EXPECT_EQ(Start("folder").Wait(), 1);
+  EXPECT_THAT(Log("folder"), HasSubstr("f.toml:6: log.file: "));
 }
 
 TEST_F(FocalfleetdTest, WaitsForBusesThatAreNotThereYet) {
