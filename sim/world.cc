@@ -114,7 +114,11 @@ class World::Impl {
  public:
   explicit Impl(WorldConfig config)
       : config_(std::move(config)),
-        motor_(MotorParameters{}, config_.drive.v_bus_V),
+        motor_({.bridge = {.v_bus_V = config_.drive.v_bus_V}},
+               {.counter1 = config_.drive.counter1,
+                .repeat = config_.drive.repeat,
+                .subdivision = config_.drive.subdivision,
+                .mode = config_.drive.mode}),
         now_(config_.start) {
     MakeBuses();
     events_.emplace(segments_.size() + config_.units.size());

@@ -1,23 +1,23 @@
-// One 4 mm brushless motor with its gearhead's load, driven open loop: the field is put somewhere,
-// the rotor follows behind it by a load angle. Two pole (one electrical turn is one motor turn).
+// One motor as the fleet sees it: where its rotor is behind its field, and whether it comes along.
+// Three numbers stand for the drive; all come from the drive's physics (sim/drive), so they know
+// the bus voltage, the modulation and what dead time takes: the mean length V of the voltage
+// vectors, the highest speed that a load starts with, and the time in which lag settles.
 //
-//   J w' = 1.5 psi (V sin(lag) - psi w) / r - b w - T_load       V = V_bus / sqrt(3)
+//   at rest      sin(lag) = T_load r / (1.5 flux V)
+//   running      sin(lag) = (flux w + r (b w + T_load) / (1.5 flux)) / V
 //
-// At rest the rotor stops where friction holds it: sin(lag) = T_load r / (1.5 psi V), 15.0 degrees
-// electrical at 1.8 V. Running at the electrical speed w: sin(lag) = (psi w + r (b w + T_load) /
-// (1.5 psi)) / V, 23 degrees at n = 108. Values: flux and load fitted to the critical n = 37 at 1.8
-// V.
+// With 1.8 V that is 15 degrees electrical at rest, 24 at n = 108. Against the PWM level the
+// running lag is within a degree (tests/sim/axis_test.cc).
 #pragma once
 
-#include "sim/motor/motor_parameters.h"
+#include "sim/drive/drive.h"
 
 namespace focalfleet::sim {
 
 class Motor {
  public:
-  /// Pre: v_bus_V > 0. Cost: some tens of thousands of integration steps; make one per kind of
-  /// motor.
-  Motor(const MotorParameters& parameters, double v_bus_V);
+  /// Pre: the bus voltage is above 0. Cost: 50 ms of CPU time; make one per kind of motor.
+  Motor(const Drive::Setting& setting, const Modulation& modulation);
 
   /// Load angle at rest in electrical turns, 0..0.25, for `share` of the mean load.
   [[nodiscard]] double StaticLagTurns(double share) const;
@@ -38,12 +38,10 @@ class Motor {
   [[nodiscard]] const MotorParameters& parameters() const { return parameters_; }
 
  private:
-  [[nodiscard]] bool ComesUp(double turns_per_s) const;
-
   MotorParameters parameters_;
-  double amplitude_V_;
   double stall_Nm_;
-  double settling_s_;
+  double amplitude_V_ = 0;
+  double settling_s_ = 0;
   double pull_in_turns_per_s_ = 0;
 };
 

@@ -97,6 +97,11 @@ class Recorder {
     for (const Stage& stage : stages_)
       for (std::int64_t k = 0; k < stage.vectors; ++k) ShowVector(shown++, stage.repeat);
     Judge(shown);
+    if (!recording_.in_step) {
+      // Over a mean that is anything, zero too, ripple says nothing.
+      recording_.figures.torque_ripple_rms = std::nan("");
+      recording_.figures.torque_ripple_peak_to_peak = std::nan("");
+    }
     return std::move(recording_);
   }
 

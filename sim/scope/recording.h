@@ -48,6 +48,7 @@ struct Recording {
   double sample_s = 0;
   std::vector<VectorRecord> vectors;  // of the whole run
   /// Over all turns that were sampled; what is periodic (harmonics, ripple) in the last of them.
+  /// The ripple of a stall is not a number.
   WaveFigures figures;
   std::vector<double> harmonics_A;     // of that turn: amplitudes, from 0 (the mean)
   std::vector<double> carrier_peak_A;  // of that turn: highest current of a phase, per carrier

@@ -6,7 +6,7 @@
 namespace focalfleet::sim::testing {
 
 inline const Motor& BenchMotor() {
-  static const Motor motor(MotorParameters{}, 1.8);
+  static const Motor motor({}, {});
   return motor;
 }
 
