@@ -17,6 +17,9 @@ Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 
 Json UnservedJson(const FleetView& view) {
   Json unserved = Json::array();
+  // A homing leaves the outcomes of the configuration before it.
+  const ConfigurationView& c = view.coordinator->configuration();
+  if (c.refused == 0 && c.failed == 0) return unserved;
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
     const UnitView& unit = view.coordinator->unit({n});
     if (unit.outcome != TargetOutcome::kRefused && unit.outcome != TargetOutcome::kFailed) continue;
@@ -73,13 +76,20 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"subdivision", drive.subdivision}};
 }
 
+/// The rounds that ended, and so much of the one under way.
+double MakespanSoFar(const FleetView& view) {
+  const ConfigurationView& c = view.coordinator->configuration();
+  if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
+  return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
+}
+
 /// How far along, 0..1: by time while it moves, by arrivals in the end.
-double FractionOf(const ConfigurationView& view, HostInstant now) {
+double FractionOf(const FleetView& fleet) {
+  const ConfigurationView& view = fleet.coordinator->configuration();
   if (view.state == ConfigurationState::kDone) return 1;
   const double arrived = view.targeted > 0 ? double(view.arrived) / view.targeted : 0;
   if (view.started == kNever || view.makespan_predicted_s <= 0) return arrived;
-  const double elapsed_s = view.makespan_s + std::max(0.0, (now - view.started).seconds());
-  return std::clamp(elapsed_s / view.makespan_predicted_s, arrived, 1.0);
+  return std::clamp(MakespanSoFar(fleet) / view.makespan_predicted_s, arrived, 1.0);
 }
 
 }  // namespace
@@ -95,7 +105,7 @@ Json ConfigurationJson(const FleetView& view) {
           {"refused", c.refused},
           {"failed", c.failed},
           {"makespan_predicted_s", Number(c.makespan_predicted_s)},
-          {"makespan_s", Number(c.makespan_s)},
+          {"makespan_s", Number(MakespanSoFar(view))},
           {"energy_J", Number(c.energy_J)},
           {"peak_power_W", Number(c.peak_power_W)},
           {"frames", c.frames},
@@ -114,7 +124,7 @@ Json ProgressJson(const FleetView& view) {
           {"failed", c.failed},
           {"frames", c.frames},
           {"makespan_predicted_s", Number(c.makespan_predicted_s)},
-          {"fraction", FractionOf(c, view.now)}};
+          {"fraction", FractionOf(view)}};
 }
 
 Json StatusJson(const FleetView& view, const ShellFacts& facts) {

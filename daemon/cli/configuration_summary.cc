@@ -76,10 +76,14 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
                   Paint(colour_on, colour, state), CountIn(c, "round"));
   text += fmt::format("  {} of {} units arrived, {} refused, {} failed\n", CountIn(c, "arrived"),
                       CountIn(c, "targeted"), CountIn(c, "refused"), CountIn(c, "failed"));
-  text += fmt::format("  makespan {} (predicted {}), energy {}, peak power {}, {} frames",
-                      Shown(c, "makespan_s", "s", 1), Shown(c, "makespan_predicted_s", "s", 1),
-                      Shown(c, "energy_J", "J", 1), Shown(c, "peak_power_W", "W", 1),
-                      CountIn(c, "frames"));
+  // Nothing has begun where it is 0, and nothing was predicted.
+  const auto span = [&](const char* key) {
+    return NumberIn(c, key) > 0 || over ? Shown(c, key, "s", 1) : "-";
+  };
+  text += fmt::format("  makespan {}{} (predicted {}), energy {}, peak power {}, {} frames",
+                      span("makespan_s"), over || NumberIn(c, "makespan_s") <= 0 ? "" : " so far",
+                      span("makespan_predicted_s"), Shown(c, "energy_J", "J", 1),
+                      Shown(c, "peak_power_W", "W", 1), CountIn(c, "frames"));
   if (const std::string error = TextIn(c, "error"); !error.empty()) {
     text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
   }

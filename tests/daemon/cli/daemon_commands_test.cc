@@ -263,6 +263,18 @@ TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
   EXPECT_EQ(Json::parse(json.out, nullptr, false), Status());
 }
 
+TEST_F(DaemonCommands, StatusTellsTheTimeSoFarOfAConfigurationUnderWay) {
+  const auto told = [&](const std::string& state, double makespan_s) {
+    Json status = Status();
+    status["configuration"] = Configuration(state, 0, 0);
+    status["configuration"]["makespan_s"] = makespan_s;
+    return Ask({"status"}, {{"status", {.result = status}}}).out;
+  };
+  EXPECT_THAT(told("uploading", 0), HasSubstr("makespan - (predicted 12.5 s)"));
+  EXPECT_THAT(told("moving", 3.25), HasSubstr("makespan 3.2 s so far (predicted 12.5 s)"));
+  EXPECT_THAT(told("done", 13), HasSubstr("makespan 13.0 s (predicted 12.5 s)"));
+}
+
 TEST_F(DaemonCommands, AQuestionThatIsNotAnsweredMeansThatNoDaemonIsThere) {
   const auto result = Ask({"status", "--json"}, {{"status", {.hang_up = true}}});
   EXPECT_EQ(result.exit, 4);

@@ -114,6 +114,19 @@ TEST_F(FocalfleetdTest, MovesAUnitAndSaysSo) {
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalid);
 }
 
+TEST_F(FocalfleetdTest, TellsTheTimeSoFarWhileAConfigurationMoves) {
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  ASSERT_TRUE(Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,180,90\n"}}));
+  EXPECT_TRUE(WaitUntil(
+      [&] {
+        const auto status = Ask("status");
+        return status && (*status)["configuration"]["state"] == "moving" &&
+               (*status)["configuration"]["makespan_s"] > 0;
+      },
+      kPatienceMs));
+}
+
 TEST_F(FocalfleetdTest, ASecondOneOnTheSameStoreIsRefused) {
   const auto first = Start();
   ASSERT_TRUE(Answers()) << Log();
