@@ -1,10 +1,16 @@
 #include "daemon/simulator/command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
 #include <functional>
+#include <optional>
 
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
 #include "daemon/cli/text_file.h"
 #include "daemon/control/line_client.h"
@@ -59,6 +65,12 @@ struct Given {
   std::string axis = "theta";
   double seconds = -1;
   double after_s = -1;
+  std::optional<double> late_s;
+  std::optional<std::uint32_t> copies;
+  std::optional<std::uint32_t> foreign_serial;
+  bool deaf = false;
+  bool wrong_digest = false;
+  bool mute_done = false;
   bool off = false;
   bool json = false;
 };
@@ -76,7 +88,7 @@ int Ask(const Given& given, const ControlRequest& request,
 
 int AskSimply(const Given& given, const ControlRequest& request) {
   return Ask(given, request, [&](const Json& result) {
-    if (given.json) std::printf("%s\n", result.dump().c_str());
+    if (given.json) cli::PrintJson(result);
     return static_cast<int>(ExitCode::kOk);
   });
 }
@@ -86,6 +98,21 @@ int AskAboutUnits(const Given& given, const char* verb, Json args) {
   if (!units) return Complain(units.error(), ExitCode::kUsage);
   args["units"] = *units;
   return AskSimply(given, {0, verb, std::move(args)});
+}
+
+int Misbehave(const Given& given) {
+  Json args = Json::object();
+  if (given.off) args["off"] = true;
+  if (given.late_s) args["late_s"] = *given.late_s;
+  if (given.copies) args["copies"] = *given.copies;
+  if (given.deaf) args["deaf"] = true;
+  if (given.wrong_digest) args["wrong_digest"] = true;
+  if (given.mute_done) args["mute_done"] = true;
+  if (given.foreign_serial) args["foreign_serial"] = *given.foreign_serial;
+  if (args.empty())
+    return Complain({ErrorCode::kInvalid, "misbehave: say how (--help lists the ways)"},
+                    ExitCode::kUsage);
+  return AskAboutUnits(given, "misbehave", std::move(args));
 }
 
 int SetBuses(const Given& given, const char* verb) {
@@ -109,15 +136,15 @@ int TellTruth(const Given& given) {
     if (given.json) {
       Json summary = result;
       summary.erase("csv");
-      std::printf("%s\n", summary.dump().c_str());
+      cli::PrintJson(summary);
     } else if (result.contains("targets")) {
       const Json& errors = result["targets"];
-      std::printf("%llu units compared, worst is unit %u with %.1f um\n",
-                  errors.value("units", 0ull), errors.value("worst_unit_id", 0u),
-                  errors.value("max_um", 0.0));
-      std::printf("true position %.1f um rms\n", errors.value("rms_um", 0.0));
+      cli::PrintText(fmt::format(
+          "{} units compared, worst is unit {} with {:.1f} um\ntrue position {:.1f} um rms\n",
+          errors.value("units", 0ull), errors.value("worst_unit_id", 0u),
+          errors.value("max_um", 0.0), errors.value("rms_um", 0.0)));
     } else if (given.out.empty()) {
-      std::fputs(result.value("csv", "").c_str(), stdout);
+      cli::PrintText(result.value("csv", ""));
     }
     return static_cast<int>(ExitCode::kOk);
   });
@@ -157,7 +184,7 @@ void AddRunOptions(CLI::App* app, Given* given) {
   app->add_option("--flash", run.flash_path,
                   "what survives power-off: read at the start where it is, written at the end");
   app->add_option("--speed", run.speed, "times faster than life")
-      ->check(CLI::Range(0.01, 1000.0))
+      ->check(cli::NumberBetween(0.01, 1000))
       ->capture_default_str();
   app->add_option("--seed", run.seed, "of all chance")->capture_default_str();
   app->add_option("--spread", given->spread,
@@ -188,13 +215,32 @@ CLI::App* AddUnitsSubcommand(CLI::App* app, Given* given, const char* name, cons
   return sub;
 }
 
+CLI::App* AddMisbehave(CLI::App* app, Given* given) {
+  CLI::App* sub = AddUnitsSubcommand(app, given, "misbehave",
+                                     "units answer wrongly; their motors obey as ever. Ways add up "
+                                     "until --off");
+  sub->add_option("--late", given->late_s, "every answer comes so many seconds later")
+      ->check(cli::NumberBetween(0, 86'400));
+  sub->add_option("--copies", given->copies, "every answer is sent so many times")
+      ->check(CLI::Range(1, 100));
+  sub->add_flag("--deaf", given->deaf, "they hear nothing");
+  sub->add_flag("--wrong-digest", given->wrong_digest,
+                "what they say they hold is not what was staged");
+  sub->add_flag("--mute-done", given->mute_done, "they never report the end of a motion unasked");
+  sub->add_option("--foreign", given->foreign_serial,
+                  "other hardware, with this serial number, sits at the place of the one unit")
+      ->check(CLI::Range(1u, UINT32_MAX));
+  sub->add_flag("--off", given->off, "first: they behave again");
+  return sub;
+}
+
 std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
   CLI::App* truth = AddSubcommand(app, given, "truth", "where all axes and fibres truly are");
   truth->add_option("--out", given->out, "truth.csv; without it and --targets: to stdout");
   truth->add_option("--targets", given->targets, "targets.csv: compare the named units with it");
   CLI::App* cut = AddUnitsSubcommand(app, given, "power-cut", "cut the power of units, now");
   cut->add_option("--seconds", given->seconds, "power comes back after so much of the fleet's time")
-      ->check(CLI::Range(0.0, 86'400.0));
+      ->check(cli::NumberBetween(0, 86'400));
   CLI::App* on = AddUnitsSubcommand(app, given, "power-on", "give units their power back");
   CLI::App* fault = AddUnitsSubcommand(app, given, "fault", "let units fail");
   fault
@@ -203,10 +249,11 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
       ->required();
   fault->add_option("--axis", given->axis, "theta or phi")->capture_default_str();
   fault->add_option("--after", given->after_s, "not now: so many seconds into the next motion")
-      ->check(CLI::Range(0.0, 86'400.0));
+      ->check(cli::NumberBetween(0, 86'400));
   CLI::App* silence =
       AddUnitsSubcommand(app, given, "silence", "units act as told and say nothing");
   silence->add_flag("--off", given->off, "they speak again");
+  CLI::App* misbehave = AddMisbehave(app, given);
   CLI::App* kill = AddSubcommand(app, given, "kill-bus", "nothing passes on these buses any more");
   kill->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
   CLI::App* revive = AddSubcommand(app, given, "revive-bus", "these buses work again");
@@ -233,6 +280,7 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
            [given] {
              return AskAboutUnits(*given, "silence", {{"off", given->off}});
            }},
+          {misbehave, [given] { return Misbehave(*given); }},
           {kill, [given] { return SetBuses(*given, "kill_bus"); }},
           {revive, [given] { return SetBuses(*given, "revive_bus"); }},
           {status,
@@ -308,8 +356,14 @@ int Main(int argc, char** argv) {
     return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
                                 : static_cast<int>(ExitCode::kUsage);
   }
-  for (const Subcommand& subcommand : subcommands)
-    if (subcommand.app->parsed()) return subcommand.run();
+  for (const Subcommand& subcommand : subcommands) {
+    if (!subcommand.app->parsed()) continue;
+    const int exit = subcommand.run();
+    if (exit != 0 || cli::OutputError() == 0) return exit;
+    return Complain({ErrorCode::kUnavailable, std::string("standard output cannot be written: ") +
+                                                  std::strerror(cli::OutputError())},
+                    ExitCode::kRefused);
+  }
   return Run(&given, app);
 }
 

@@ -12,6 +12,7 @@ namespace focalfleet::simulator {
 namespace {
 
 constexpr double kSecondsMax = 86'400;
+constexpr std::uint64_t kCopiesMax = 100;
 
 Result<double> SecondsOr(const Json& args, const char* name, double otherwise) {
   const auto found = args.find(name);
@@ -35,6 +36,7 @@ Result<Json> Verbs::Do(const ControlRequest& request) {
   if (request.verb == "power_on") return PowerOn(request.args);
   if (request.verb == "fault") return RaiseFault(request.args);
   if (request.verb == "silence") return Silence(request.args);
+  if (request.verb == "misbehave") return Misbehave(request.args);
   if (request.verb == "kill_bus") return SetBuses(request.args, false);
   if (request.verb == "revive_bus") return SetBuses(request.args, true);
   if (request.verb == "status") return StatusOfAll();
@@ -126,6 +128,39 @@ Result<Json> Verbs::Silence(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
   FOCALFLEET_TRY_ASSIGN(const bool off, FlagArgumentOr(args, "off", false));
   for (const UnitId unit : units) world_->faults(unit)->silent = !off;
+  return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::Misbehave(const Json& args) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
+  FOCALFLEET_TRY_ASSIGN(const bool off, FlagArgumentOr(args, "off", false));
+  FOCALFLEET_TRY_ASSIGN(const double late_s, SecondsOr(args, "late_s", 0));
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t copies, UnsignedArgumentOr(args, "copies", 1));
+  FOCALFLEET_TRY_ASSIGN(const bool deaf, FlagArgumentOr(args, "deaf", false));
+  FOCALFLEET_TRY_ASSIGN(const bool wrong_digest, FlagArgumentOr(args, "wrong_digest", false));
+  FOCALFLEET_TRY_ASSIGN(const bool mute_done, FlagArgumentOr(args, "mute_done", false));
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t serial, UnsignedArgumentOr(args, "foreign_serial", 0));
+  if (copies < 1 || copies > kCopiesMax)
+    return Fail(ErrorCode::kInvalid, "copies is not within 1.." + std::to_string(kCopiesMax));
+  if (serial > UINT32_MAX) return Fail(ErrorCode::kInvalid, "a serial number has 32 bits");
+  if (serial != 0 && units.size() != 1)
+    return Fail(ErrorCode::kInvalid,
+                "one serial number is one unit's; " + std::to_string(units.size()) + " are named");
+  for (const UnitId unit : units) {
+    sim::UnitFaults& faults = *world_->faults(unit);
+    if (off) {
+      const sim::UnitFaults before = faults;
+      faults = {};
+      faults.silent = before.silent;  // other verbs' doing
+      faults.in_motion = before.in_motion;
+    }
+    if (args.contains("late_s")) faults.late = Seconds(late_s);
+    if (args.contains("copies")) faults.copies = static_cast<std::uint8_t>(copies);
+    faults.deaf |= deaf;
+    faults.wrong_digest |= wrong_digest;
+    faults.mute_done |= mute_done;
+    if (serial != 0) faults.foreign_serial = SerialNumber{static_cast<std::uint32_t>(serial)};
+  }
   return Json{{"units", units.size()}};
 }
 

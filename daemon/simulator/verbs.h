@@ -1,8 +1,10 @@
 // What a running simulation does when asked on its control socket: tells the truth, and plants
 // misfortune.
-//   truth {targets_csv?, targets_name?}   power_cut {units, seconds?}   power_on {units}   status
-//   {}   quit {} fault {units, code, axis?, after_s?}  silence {units, off?}         kill_bus
-//   {buses}   revive_bus {buses}
+//   truth {targets_csv?, targets_name?}   status {}   quit {}
+//   power_cut {units, seconds?}   power_on {units}   fault {units, code, axis?, after_s?}
+//   silence {units, off?}   kill_bus {buses}   revive_bus {buses}
+//   misbehave {units, off?, late_s?, copies?, deaf?, wrong_digest?, mute_done?, foreign_serial?}:
+//     adds to how the units already misbehave; `off` ends all that this verb began before
 #pragma once
 
 #include <vector>
@@ -30,6 +32,7 @@ class Verbs {
   Result<Json> PowerOn(const Json& args);
   Result<Json> RaiseFault(const Json& args);
   Result<Json> Silence(const Json& args);
+  Result<Json> Misbehave(const Json& args);
   Result<Json> SetBuses(const Json& args, bool alive);
   [[nodiscard]] Json StatusOfAll() const;
   /// All of them exist, or none is touched.

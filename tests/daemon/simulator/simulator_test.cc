@@ -261,6 +261,46 @@ TEST_F(Simulation, TellsTheTruthAndPlantsMisfortune) {
   EXPECT_EQ(ask({"quit"}).exit, 4);
 }
 
+TEST_F(Simulation, UnitsMisbehaveAsAskedUntilTheyBehaveAgain) {
+  RunningSimulation simulation(Arguments());
+  ASSERT_TRUE(simulation.ready());
+  const auto misbehave = [&](const std::string& units, std::vector<std::string> how) {
+    std::vector<std::string> all = {"misbehave", "--units", units, "--control", control()};
+    all.insert(all.end(), how.begin(), how.end());
+    return RunToEnd(std::move(all));
+  };
+  BusClient eight(scratch_ / "bus8.sock");
+  BusClient three(scratch_ / "bus3.sock");
+  EXPECT_EQ(misbehave("13", {"--copies", "3", "--foreign", "77"}).exit, 0);
+  eight.Send(1, IdentifyRequest{});
+  for (int copy = 0; copy < 3; ++copy)
+    EXPECT_EQ(eight.ReceiveFromUnit<IdentifyReply>()->serial, SerialNumber{77});
+
+  EXPECT_EQ(misbehave("13", {"--off", "--late", "2"}).exit, 0);
+  eight.Send(1, StatusRequest{}, 1);
+  // Unit 13 is late by two seconds of the fleet's time, in which unit 11 answers.
+  eight.Send(1, ProgressRequest{}, 2);
+  three.Send(1, StatusRequest{}, 3);
+  EXPECT_TRUE(three.ReceiveFromUnit<StatusReply>());
+  EXPECT_TRUE(eight.ReceiveFromUnit<StatusReply>());
+  EXPECT_TRUE(eight.ReceiveFromUnit<ProgressReply>()) << "one copy again";
+
+  EXPECT_EQ(misbehave("11-12", {"--deaf"}).exit, 0);
+  three.Send(255, IdentifyRequest{});
+  EXPECT_EQ(misbehave("12", {"--off"}).exit, 0);
+  three.Send(255, IdentifyRequest{});
+  EXPECT_EQ(three.ReceiveFromUnit<IdentifyReply>()->serial, SerialNumber{1'000'012});
+
+  EXPECT_EQ(misbehave("13", {"--wrong-digest", "--mute-done"}).exit, 0);
+  EXPECT_EQ(misbehave("13", {}).exit, 2);
+  EXPECT_EQ(misbehave("13", {"--late", "nan"}).exit, 2);
+  EXPECT_EQ(misbehave("13", {"--copies", "0"}).exit, 2);
+  EXPECT_EQ(misbehave("13", {"--foreign", "0"}).exit, 2);
+  const auto two = misbehave("11-12", {"--foreign", "5"});
+  EXPECT_EQ(two.exit, 1);
+  EXPECT_EQ(two.err, "focalfleet-sim: one serial number is one unit's; 2 are named\n");
+}
+
 TEST_F(Simulation, PowerComesBackAfterItsTime) {
   RunningSimulation simulation(Arguments());
   ASSERT_TRUE(simulation.ready());
