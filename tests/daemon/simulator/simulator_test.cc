@@ -279,10 +279,10 @@ TEST_F(Simulation, UnitsMisbehaveAsAskedUntilTheyBehaveAgain) {
   EXPECT_EQ(misbehave("13", {"--off", "--late", "2"}).exit, 0);
   eight.Send(1, StatusRequest{}, 1);
   // Unit 13 is late by two seconds of the fleet's time, in which unit 11 answers.
-  eight.Send(1, ProgressRequest{}, 2);
   three.Send(1, StatusRequest{}, 3);
   EXPECT_TRUE(three.ReceiveFromUnit<StatusReply>());
   EXPECT_TRUE(eight.ReceiveFromUnit<StatusReply>());
+  eight.Send(1, ProgressRequest{}, 2);
   EXPECT_TRUE(eight.ReceiveFromUnit<ProgressReply>()) << "one copy again";
 
   EXPECT_EQ(misbehave("11-12", {"--deaf"}).exit, 0);
