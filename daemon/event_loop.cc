@@ -124,6 +124,10 @@ void EventLoop::Run() {
     parts_.lines->Flush(parts_.clock);
     Tell();
   }
+  effects_.Clear();
+  parts_.coordinator->End(now_, &effects_);
+  LogChanges();
+  if (!effects_.rows.empty()) parts_.store->Commit(effects_.batch, std::move(effects_.rows));
 }
 
 void EventLoop::Wait() {

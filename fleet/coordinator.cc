@@ -20,6 +20,7 @@ class Coordinator::Impl {
 
   void Step(const Inputs& inputs, Effects* effects) {
     core_.BeginStep(inputs, effects);
+    pursuit_.EndThoseOfAnEarlierRun();
     for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
     for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
@@ -28,6 +29,19 @@ class Coordinator::Impl {
     pursuit_.Advance();
     effects->wake_at = std::min(effects->wake_at, pursuit_.due());
     core_.EndStep();
+  }
+
+  void End(HostInstant now, Effects* effects) {
+    core_.BeginStep({.now = now,
+                     .frames = {},
+                     .links = {},
+                     .commands = {},
+                     .plans = {},
+                     .committed_through = core_.committed_through,
+                     .store_failing = core_.store_failing},
+                    effects);
+    pursuit_.GiveUp();
+    if (!effects->rows.empty()) effects->batch = core_.next_batch++;
   }
 
   Core& core() { return core_; }
@@ -124,6 +138,8 @@ Coordinator::Coordinator(const Layout* layout, std::vector<UnitDrive> drives,
 Coordinator::~Coordinator() = default;
 
 void Coordinator::Step(const Inputs& inputs, Effects* effects) { impl_->Step(inputs, effects); }
+
+void Coordinator::End(HostInstant now, Effects* effects) { impl_->End(now, effects); }
 
 const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->core().unit(i).view; }
 

@@ -223,6 +223,8 @@ class Coordinator {
   ~Coordinator();
 
   void Step(const Inputs& inputs, Effects* effects);
+  /// The shell ends: what must still be written. Units that move finish by themselves.
+  void End(HostInstant now, Effects* effects);
 
   [[nodiscard]] const UnitView& unit(PositionerIndex i) const;
   /// Knowledge for showing: as `unit(i).knowledge`, but a moving unit's is predicted at `now`.

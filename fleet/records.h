@@ -94,6 +94,8 @@ constexpr const char* Name(ConfigurationState state) {
   return kNames[static_cast<std::size_t>(state)];
 }
 
+constexpr bool IsOver(ConfigurationState state) { return state >= ConfigurationState::kDone; }
+
 struct ConfigurationRow {
   std::uint64_t id = 0;
   std::string source;
@@ -137,6 +139,8 @@ struct StoredFleet {
   std::vector<VectorRow> vectors;  // by serial
   std::vector<IntentRow> open_intents;
   std::vector<ParameterRow> parameters;
+  /// By id: those that never ended, and the newest.
+  std::vector<ConfigurationRow> configurations;
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;

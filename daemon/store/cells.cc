@@ -55,6 +55,20 @@ AxisKnowledge Cells::Knowledge(int column) {
   return knowledge;
 }
 
+ConfigurationRow ReadConfiguration(Cells& cells) {
+  return {.id = cells.Whole<std::uint64_t>(0),
+          .source = cells.Text(1),
+          .state = cells.Code(2, kLastConfigurationState),
+          .targeted = cells.Whole<std::uint32_t>(3),
+          .arrived = cells.Whole<std::uint32_t>(4),
+          .refused = cells.Whole<std::uint32_t>(5),
+          .failed = cells.Whole<std::uint32_t>(6),
+          .makespan_predicted_s = cells.Real(7),
+          .makespan_s = cells.Real(8),
+          .energy_J = cells.Real(9),
+          .peak_power_W = cells.Real(10)};
+}
+
 void Cells::Require(bool condition, const char* what) {
   if (!condition) Fault(what);
 }

@@ -83,6 +83,10 @@ inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState
 inline constexpr Severity kLastSeverity = Severity::kError;
 inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
 
+/// The columns id, source, state, targeted, arrived, refused, failed, makespan_predicted_s,
+/// makespan_s, energy_J, peak_power_W, in this order from the first on.
+ConfigurationRow ReadConfiguration(Cells& cells);
+
 /// The tables as the coordinator wants them, in one read transaction.
 Result<StoredFleet> LoadFleet(Connection& connection);
 

@@ -121,6 +121,16 @@ Status LoadParameters(Connection& connection, StoredFleet* fleet) {
       });
 }
 
+Status LoadConfigurations(Connection& connection, StoredFleet* fleet) {
+  return ForEach(
+      connection, "configuration", 1,
+      "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
+      "makespan_s, energy_J, peak_power_W FROM configuration "
+      "WHERE state < 3 OR id = (SELECT max(id) FROM configuration) ORDER BY id",
+      [fleet](Cells& cells) { fleet->configurations.push_back(ReadConfiguration(cells)); });
+}
+static_assert(ConfigurationState::kDone == ConfigurationState{3});
+
 Status LoadNextIds(Connection& connection, StoredFleet* fleet) {
   FOCALFLEET_TRY(
       ForEach(connection, "meta", 1, "SELECT key, value FROM meta", [fleet](Cells& cells) {
@@ -143,6 +153,7 @@ Status LoadAll(Connection& connection, StoredFleet* fleet) {
   FOCALFLEET_TRY(LoadVectors(connection, fleet));
   FOCALFLEET_TRY(LoadOpenIntents(connection, fleet));
   FOCALFLEET_TRY(LoadParameters(connection, fleet));
+  FOCALFLEET_TRY(LoadConfigurations(connection, fleet));
   return LoadNextIds(connection, fleet);
 }
 

@@ -116,17 +116,7 @@ Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(std::uint3
       "peak_power_W, began_ns, changed_ns FROM configuration ORDER BY id DESC LIMIT ?1",
       limit, std::nullopt, [](Cells& cells) {
         ConfigurationHistory entry;
-        entry.row.id = cells.Whole<std::uint64_t>(0);
-        entry.row.source = cells.Text(1);
-        entry.row.state = cells.Code(2, kLastConfigurationState);
-        entry.row.targeted = cells.Whole<std::uint32_t>(3);
-        entry.row.arrived = cells.Whole<std::uint32_t>(4);
-        entry.row.refused = cells.Whole<std::uint32_t>(5);
-        entry.row.failed = cells.Whole<std::uint32_t>(6);
-        entry.row.makespan_predicted_s = cells.Real(7);
-        entry.row.makespan_s = cells.Real(8);
-        entry.row.energy_J = cells.Real(9);
-        entry.row.peak_power_W = cells.Real(10);
+        entry.row = ReadConfiguration(cells);
         entry.began = cells.Time(11);
         entry.changed = cells.Time(12);
         return entry;

@@ -149,6 +149,7 @@ class Core {
   std::unordered_map<SerialNumber, VectorRow> stored_vectors;
   std::unordered_map<SerialNumber, IntentRow> intents;  // open ones
   std::unordered_map<SerialNumber, PositionerIndex> place_of;
+  std::vector<ConfigurationRow> earlier_configurations;  // as stored
   std::vector<UnitEvent> events;
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;

@@ -21,6 +21,11 @@ std::uint64_t FramesOf(const Core& core) {
   return frames;
 }
 
+std::string DaemonEnded(std::uint64_t configuration) {
+  return "configuration " + std::to_string(configuration) +
+         " has failed: the daemon ended; what moves finishes by itself";
+}
+
 }  // namespace
 
 Pursuit::Pursuit(Core* core, Contact* contact)
@@ -33,9 +38,42 @@ Pursuit::Pursuit(Core* core, Contact* contact)
       part_(core->units.size(), Part::kNone),
       stage_tries_(core->units.size(), 0),
       waiting_(core->buses.size()),
-      uploading_(core->buses.size(), 0) {}
+      uploading_(core->buses.size(), 0) {
+  if (core_.earlier_configurations.empty()) return;
+  const ConfigurationRow& last = core_.earlier_configurations.back();
+  view_ = {.id = last.id,
+           .source = last.source,
+           .state = IsOver(last.state) ? last.state : ConfigurationState::kFailed,
+           .targeted = last.targeted,
+           .arrived = last.arrived,
+           .refused = last.refused,
+           .failed = last.failed,
+           .makespan_predicted_s = last.makespan_predicted_s,
+           .makespan_s = last.makespan_s,
+           .energy_J = last.energy_J,
+           .peak_power_W = last.peak_power_W,
+           .began = {},
+           .started = kNever};
+}
 
 // ---- the goal
+
+void Pursuit::GiveUp() {
+  if (!busy()) return;
+  view_.state = ConfigurationState::kFailed;
+  core_.Raise(Severity::kWarning, {}, {}, DaemonEnded(view_.id));
+  Record();
+}
+
+void Pursuit::EndThoseOfAnEarlierRun() {
+  for (ConfigurationRow& row : core_.earlier_configurations) {
+    if (IsOver(row.state)) continue;
+    row.state = ConfigurationState::kFailed;
+    core_.Raise(Severity::kWarning, {}, {}, DaemonEnded(row.id));
+    core_.Note(row);
+  }
+  core_.earlier_configurations.clear();
+}
 
 Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
   if (busy())

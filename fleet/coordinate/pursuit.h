@@ -32,6 +32,11 @@ class Pursuit {
   /// By the operator: it takes no further part in this goal.
   void StopUnit(PositionerIndex i);
 
+  /// The daemon ends: the configuration that is under way ends with the counts that it has.
+  void GiveUp();
+  /// Configurations that an earlier run could not end: nobody pursues them any more.
+  void EndThoseOfAnEarlierRun();
+
   void OnPlan(const PlanDone& done);
   void OnConfirm(PositionerIndex i, const ConfirmReply& reply);
   void OnArm(PositionerIndex i, const ArmReply& reply);

@@ -676,6 +676,35 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
   EXPECT_LE(unproven, 10);
 }
 
+TEST(Configuration, TheOneThatTheDaemonDidNotEndHasFailed) {
+  for (const bool asked : {false, true}) {  // kill -9, SIGTERM
+    InProcessFleet fleet(Small(47));
+    fleet.ApplyRandom(47);
+    RunIntoMotion(&fleet, Seconds(2));
+    fleet.Run(Milliseconds(50));
+    ASSERT_EQ(fleet.store().configurations.back().state, ConfigurationState::kMoving);
+    if (asked) {
+      fleet.End();
+      EXPECT_EQ(fleet.store().configurations.back().state, ConfigurationState::kFailed);
+    }
+    fleet.Restart();
+    fleet.Run(Milliseconds(100));
+    const ConfigurationRow& row = fleet.store().configurations.back();
+    EXPECT_EQ(row.state, ConfigurationState::kFailed);
+    EXPECT_EQ(row.targeted, 37u);
+    EXPECT_TRUE(HasAlarm(fleet, "configuration 1 has failed: the daemon ended"));
+    EXPECT_EQ(fleet.store().alarms.size(), 1u) << "said once";
+    EXPECT_EQ(fleet.coordinator().configuration().id, 1u);
+    EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kFailed);
+    EXPECT_EQ(fleet.coordinator().configuration().source, "test");
+    fleet.Run(Seconds(90));
+    fleet.ApplyRandom(47);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_EQ(fleet.coordinator().configuration().id, 2u);
+    ExpectOthersArrive(&fleet, 0);
+  }
+}
+
 TEST(Configuration, SameSeedSameFrames) {
   std::uint64_t digests[2];
   for (auto& digest : digests) {

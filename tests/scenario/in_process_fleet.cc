@@ -67,6 +67,7 @@ void MemoryStore::Commit(const std::vector<Row>& rows) {
     } else if (const auto* configuration = std::get_if<ConfigurationRow>(&any)) {
       configurations.push_back(*configuration);
       fleet.next_configuration = configuration->id + 1;
+      fleet.configurations = {*configuration};  // one at a time is under way
     } else if (const auto* enable = std::get_if<EnableRow>(&any)) {
       for (auto& row : fleet.units)
         if (row.unit == enable->unit) row.enabled = enable->enabled, row.reason = enable->reason;
@@ -107,6 +108,13 @@ void InProcessFleet::Restart() {
   coordinator_ =
       std::make_unique<Coordinator>(layout_.get(), drives_, options_.config, store_.fleet);
   wake_at_ = now_;
+}
+
+void InProcessFleet::End() {
+  Effects last;
+  coordinator_->End(now_, &last);
+  for (const Commit& commit : commits_) store_.Commit(commit.rows);
+  store_.Commit(last.rows);
 }
 
 void InProcessFleet::StepOnce() {

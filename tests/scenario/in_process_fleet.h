@@ -67,6 +67,9 @@ class InProcessFleet {
   /// kill -9 and a new start: nothing of the coordinator survives but the store; the world goes on.
   void Restart();
 
+  /// SIGTERM: the coordinator's last rows are written.
+  void End();
+
   [[nodiscard]] std::optional<ReplyEffect> LastReply(std::uint64_t request) const;
   /// Fails the running test where a unit's true angle is not where the store says it is.
   void ExpectStoreTellsTheTruth(const std::string& when) const;
