@@ -120,6 +120,7 @@ StoreThread::Sinks Daemon::StoreSinks() {
     if (outlet_ != nullptr) outlet_->Publish(alarm);
   };
   sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
+  sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
   return sinks;
 }
 

@@ -124,6 +124,7 @@ Json ProgressJson(const FleetView& view) {
           {"failed", c.failed},
           {"frames", c.frames},
           {"makespan_predicted_s", Number(c.makespan_predicted_s)},
+          {"waiting_for", c.waiting_for},
           {"fraction", FractionOf(view)}};
 }
 

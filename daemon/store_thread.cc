@@ -123,7 +123,8 @@ bool StoreThread::TryCommit() {
   open_.rows.clear();
   attempted_ = false;
   committed_through_ = open_.number;
-  failing_ = false;
+  if (failing_.exchange(false) && sinks_.log_info)
+    sinks_.log_info("the store can be written again");
   progressed_->Raise();
   return true;
 }

@@ -44,6 +44,7 @@ class StoreThread {
     std::function<bool(const StatusBatch&)> publish;
     std::function<void(const AlarmValue&)> alarm;
     std::function<void(const std::string&)> log_error;
+    std::function<void(const std::string&)> log_info;
     std::chrono::milliseconds retry_period{1000};
   };
 

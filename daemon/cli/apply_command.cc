@@ -37,7 +37,7 @@ void InstallInterruptNote() {
 
 void ShowProgress(ProgressBar* bar, const Json& progress) {
   const std::string stage =
-      fmt::format("round {}: {}", CountIn(progress, "round"), TextIn(progress, "state"));
+      fmt::format("round {}: {}", CountIn(progress, "round"), DescribeStage(progress));
   bar->Show(
       NumberIn(progress, "fraction"), stage,
       fmt::format("{} of {} arrived", CountIn(progress, "arrived"), CountIn(progress, "targeted")));

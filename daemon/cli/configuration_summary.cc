@@ -91,6 +91,11 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
   return unserved.empty() ? text : text + "\n" + unserved;
 }
 
+std::string DescribeStage(const Json& progress) {
+  const std::string waiting_for = TextIn(progress, "waiting_for");
+  return TextIn(progress, "state") + (waiting_for.empty() ? "" : ", waiting for " + waiting_for);
+}
+
 std::string DescribeNotServed(const Json& configuration) {
   const Json& unserved = ListIn(configuration, "unserved");
   if (unserved.empty()) return "";

@@ -10,6 +10,9 @@ namespace focalfleet::cli {
 /// One line per fact, the units that were not served last, each with its reason.
 std::string DescribeConfiguration(const Json& configuration, bool colour_on);
 
+/// Of a progress line: its state, and what it waits for.
+std::string DescribeStage(const Json& progress);
+
 /// Only those units: the first 20 one by one, the others by reason. None: "".
 std::string DescribeNotServed(const Json& configuration);
 

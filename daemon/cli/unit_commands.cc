@@ -53,7 +53,7 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
                                     .args = args,
                                     .long_lasting = options.wait,
                                     .on_progress = [&bar](const Json& p) {
-                                      bar.Show(NumberIn(p, "fraction"), TextIn(p, "state"),
+                                      bar.Show(NumberIn(p, "fraction"), DescribeStage(p),
                                                fmt::format("{} of {} homed", CountIn(p, "arrived"),
                                                            CountIn(p, "targeted")));
                                     }});
@@ -113,7 +113,8 @@ void AddEnable(CommandLine* line) {
   OnChosen(line, disable, taken_out, RunDisable);
 
   CLI::App* enable =
-      AddCommand(&line->app, "enable", "Take units in again", "  focalfleet enable 4711");
+      AddCommand(&line->app, "enable", "Take units in again; of a unit in fault, clear the fault",
+                 "  focalfleet enable 4711");
   auto taken_in = std::make_shared<EnableOptions>();
   AddUnits(enable, &taken_in->units)->required();
   OnChosen(line, enable, taken_in, RunEnable);
