@@ -34,8 +34,9 @@ constexpr int kSpeed = 30;
 // A configuration of this fleet takes 60 to 120 s of its time.
 constexpr double kSpanRealMs = 90'000.0 / kSpeed;
 constexpr int kPatienceMs = 60'000;
-// The rotor rests up to a quarter of an electrical turn behind the field.
-constexpr double kLagVectorsMax = 24;
+// The rotor rests behind the field by the angle whose sine is load over stall torque: 15 degrees of
+// 360, 4 of 96 vectors. The rest is for rounding; what a cut motion adds is in the interval.
+constexpr double kLagVectorsMax = 6;
 
 struct Truth {
   std::array<double, kAxisCount> vectors{};

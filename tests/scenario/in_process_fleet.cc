@@ -18,9 +18,9 @@ namespace {
 constexpr DurationNs kTurn = Microseconds(200);
 
 // At rest the rotor lags the field by the angle whose sine is load over stall torque, 15 degrees of
-// 360 at 1.8 V; a motion that was cut anywhere may leave it up to a quarter of an electrical turn
-// behind.
-constexpr double kLagVectorsMax = 24;
+// 360 at 1.8 V: 4 of 96 vectors; the rest is for rounding and for the motor's own spread. What a
+// cut motion adds is in the interval, not in here. No run of these scenarios exceeds 5.
+constexpr double kLagVectorsMax = 6;
 
 sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDrive& drive) {
   sim::UnitDescription described{.id = unit.id,
