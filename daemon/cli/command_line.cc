@@ -128,6 +128,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddWatchCommand(line.get());
   AddStopCommand(line.get());
   AddUnitCommands(line.get());
+  AddSimulateCommand(line.get());
   AddCompletionCommand(line.get());
   return line;
 }

@@ -57,6 +57,7 @@ void AddStatusCommands(CommandLine* line);  // status, unit, state, history
 void AddWatchCommand(CommandLine* line);
 void AddStopCommand(CommandLine* line);
 void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, params
+void AddSimulateCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

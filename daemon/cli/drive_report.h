@@ -1,0 +1,27 @@
+// A recorded drive as pictures, those of paper 1's Figs. 12, 13, 15 and 17 and two that its bench
+// had no probe for: torque and lag.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/cli/drive_options.h"
+#include "sim/scope/recording.h"
+
+namespace focalfleet::cli {
+
+/// Limits that paper 1 and the circuit set to a phase current. Units: A.
+struct CurrentLimits {
+  double linear_A = 0;     // V / (sqrt3 r): the largest linear fundamental, paper 1's limit
+  double reachable_A = 0;  // 2 V / (3 r): one leg against two, for ever
+};
+CurrentLimits LimitsOf(const sim::Drive::Setting& setting);
+
+using TextRows = std::vector<std::vector<std::string>>;
+
+/// The page; `rows` (name, value) stand on top, `settings` at the end.
+std::string DriveReport(const DriveChoice& choice, const sim::Recording& recording,
+                        const TextRows& rows, const TextRows& settings);
+
+}  // namespace focalfleet::cli
