@@ -3,7 +3,8 @@
 // both are open the current decides: out of the leg (i > 0) it comes through the lower diode, into
 // the leg through the upper one, and where it has died out the leg floats. Whenever the leg's
 // voltage changes it does so along a ramp; while it does, the device that carries the current
-// carries the voltage, too, and heats.
+// carries the voltage, too, and heats. A switch acts in the middle of its gate's ramp: a leg's own
+// ramp lies around that instant, and a switch whose diode conducts already takes over then.
 #pragma once
 
 #include <limits>
@@ -25,6 +26,7 @@ struct Leg {
   bool commanded_high = false;
   Path path = Path::kLower;
   double closes_at_s = kNever;  // when the commanded switch closes after the dead time
+  bool gate_rises = false;      // the dead time is over, the switch's diode conducts
   double voltage_V = 0;         // against the negative rail
   double slope_V_per_s = 0;
   double ramp_ends_at_s = kNever;

@@ -61,6 +61,7 @@ void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
     return;
   }
   leg->closes_at_s = now_s + setting_.bridge.dead_time_s;
+  leg->gate_rises = false;
   if (leg->open()) return;
   leg->path = phase_A > 0   ? Leg::Path::kLowerDiode
               : phase_A < 0 ? Leg::Path::kUpperDiode
@@ -71,8 +72,18 @@ void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
 void Drive::CloseSwitches(double now_s) {
   for (Leg& leg : legs_) {
     if (leg.closes_at_s > now_s) continue;
+    const bool high = leg.commanded_high;
+    if (!leg.gate_rises && leg.path == (high ? Leg::Path::kUpperDiode : Leg::Path::kLowerDiode)) {
+      // Nothing to move: the diode holds the leg at this rail until the switch conducts.
+      leg.gate_rises = true;
+      leg.closes_at_s = now_s + (high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
+      if (leg.closes_at_s > now_s) continue;
+    }
+    const bool died_out = leg.gate_rises && leg.path == Leg::Path::kFloats;
+    leg.gate_rises = false;
     leg.closes_at_s = Leg::kNever;
-    leg.path = leg.commanded_high ? Leg::Path::kUpper : Leg::Path::kLower;
+    leg.path = high ? Leg::Path::kUpper : Leg::Path::kLower;
+    if (died_out) leg.voltage_V = high ? setting_.bridge.v_bus_V : 0;
     leg.FollowPath(setting_.bridge, now_s);
   }
 }

@@ -112,8 +112,8 @@ double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation
   double best_Nm = 0;
   // The top of a sine is flat: within 3 degrees of it lies 0.14 % of it.
   for (int deg = 60; deg <= 102; deg += 6)
-    best_Nm = std::max(
-        best_Nm, TorqueAt(held, modulation, table, deg * std::numbers::pi / 180).torque_Nm);
+    best_Nm = std::max(best_Nm,
+                       TorqueAt(held, modulation, table, deg * std::numbers::pi / 180).torque_Nm);
   return best_Nm;
 }
 

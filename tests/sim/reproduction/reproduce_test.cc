@@ -98,6 +98,15 @@ TEST(Reproduce, WhatDoesNotHoldIsShownWithBothNumbersAndAReason) {
   EXPECT_NEAR(Find(AsPrinted(), "torque_equation").simulated[0], 2, 1e-6);
 }
 
+TEST(Reproduce, AtEqualFieldMoreEdgesCostMore) {
+  for (const char* id : {"saving_equal_field_9V", "saving_equal_field_1V8"}) {
+    const Claim& claim = Find(AsPrinted(), id);
+    ASSERT_EQ(claim.simulated.size(), 2u);
+    EXPECT_GT(claim.simulated[1], 0) << "three legs against two";
+    EXPECT_LT(claim.simulated[1], 12.33);
+  }
+}
+
 TEST(Reproduce, IdsAreUniqueAndEveryFitNamesItsParameter) {
   std::vector<std::string> ids;
   for (const Claim& claim : AsPrinted().claims) {
