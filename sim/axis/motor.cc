@@ -14,14 +14,16 @@ constexpr double kTurn = 2 * std::numbers::pi;
 }
 
 Motor::Motor(const Drive::Setting& setting, const Modulation& modulation)
-    : parameters_(setting.motor), stall_Nm_(ReducedDrive(setting, modulation).stall_Nm()) {
+    : parameters_(setting.motor) {
   FOCALFLEET_CHECK(setting.bridge.v_bus_V > 0);
+  const ReducedDrive drive(setting, modulation);
+  stall_Nm_ = drive.stall_Nm();
   const MotorParameters& p = parameters_;
   amplitude_V_ = stall_Nm_ * p.resistance_ohm / (1.5 * p.flux_linkage_Wb);
   const double damping =
       p.viscous_Nms + 1.5 * p.flux_linkage_Wb * p.flux_linkage_Wb / p.resistance_ohm;
   settling_s_ = p.inertia_kg_m2 / damping;
-  if (const auto repeat = CriticalRepeatReal(setting, modulation))
+  if (const auto repeat = CriticalRepeatReal(drive, setting, modulation))
     pull_in_turns_per_s_ = 1 / (modulation.subdivision * *repeat * modulation.carrier_s());
 }
 

@@ -16,7 +16,7 @@ namespace focalfleet::sim {
 
 class Motor {
  public:
-  /// Pre: the bus voltage is above 0. Cost: 50 ms of CPU time; make one per kind of motor.
+  /// Pre: the bus voltage is above 0. Cost: 30 ms of CPU time; make one per kind of motor.
   Motor(const Drive::Setting& setting, const Modulation& modulation);
 
   /// Load angle at rest in electrical turns, 0..0.25, for `share` of the mean load.
@@ -39,7 +39,7 @@ class Motor {
 
  private:
   MotorParameters parameters_;
-  double stall_Nm_;
+  double stall_Nm_ = 0;
   double amplitude_V_ = 0;
   double settling_s_ = 0;
   double pull_in_turns_per_s_ = 0;

@@ -9,8 +9,8 @@ using Complex = std::complex<double>;
 constexpr Complex kJ{0, 1};
 // A hundredth of the fastest swing of the rotor about its field (0.5 ms at 9 V and 0.3 mWb).
 constexpr double kStepMax_s = 20e-6;
-// Carrier periods until the currents of a blocked rotor repeat: e^-20 at 250 counts.
-constexpr int kSettlingCarriers = 30;
+// Time constants until the currents of a blocked rotor repeat: e^-20.
+constexpr double kSettling = 20;
 
 }  // namespace
 
@@ -20,12 +20,14 @@ ReducedDrive::ReducedDrive(const Drive::Setting& setting, const Modulation& modu
   blocked.motor.load_Nm = 1;
   blocked.motor.load_variation = 0;
   const double resistance = setting.motor.resistance_ohm;
+  const int settling_carriers = static_cast<int>(
+      std::ceil(kSettling * setting.motor.inductance_H / resistance / modulation.carrier_s()));
   vectors_.reserve(static_cast<std::size_t>(modulation.subdivision));
   for (int k = 0; k < modulation.subdivision; ++k) {
     const Pattern pattern = PatternOf(modulation, k);
     Drive drive(blocked);
     drive.Place(0, 0);
-    for (int n = 0; n < kSettlingCarriers; ++n) drive.RunCarrier(pattern, modulation);
+    for (int n = 0; n < settling_carriers; ++n) drive.RunCarrier(pattern, modulation);
     Complex charge;
     drive.Listen([&](const DriveInterval& interval) { charge += interval.moments[0]; });
     const double square_before = drive.square_A2s();
@@ -43,6 +45,12 @@ ReducedDrive::ReducedDrive(const Drive::Setting& setting, const Modulation& modu
 
 void ReducedDrive::Place(double angle_rad, double speed_rad_per_s) {
   shaft_.Place(angle_rad, speed_rad_per_s);
+}
+
+void ReducedDrive::SetLoad(double load_Nm) {
+  setting_.motor.load_Nm = load_Nm;
+  setting_.motor.load_variation = 0;
+  shaft_ = Shaft(setting_.motor, setting_.gearhead);
 }
 
 Complex ReducedDrive::Current(const Vector& vector, double angle_rad,

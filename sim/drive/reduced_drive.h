@@ -24,6 +24,8 @@ class ReducedDrive {
   ReducedDrive(const Drive::Setting& setting, const Modulation& modulation);
 
   void Place(double angle_rad, double speed_rad_per_s);
+  /// From now on every place has this load.
+  void SetLoad(double load_Nm);
   /// Shows the vectors from `first` on, `count` of them (backwards for a negative count), each for
   /// `repeat` carrier periods; `repeat` need not be whole.
   void RunVectors(std::int64_t first, std::int64_t count, double repeat);

@@ -117,14 +117,20 @@ double Stall(const Drive::Setting& setting, const Modulation& modulation) {
   return ReducedDrive(setting, modulation).stall_Nm();
 }
 
-bool StartsReal(const ReducedDrive& rested, double stall_Nm, double load_Nm,
-                const Modulation& modulation, double repeat) {
+bool StartsReal(const ReducedDrive& rested, double load_Nm, const Modulation& modulation,
+                double repeat) {
+  const double stall_Nm = rested.stall_Nm();
   if (load_Nm >= stall_Nm) return false;
   ReducedDrive drive = rested;
+  drive.SetLoad(load_Nm);
   drive.Place(-std::asin(load_Nm / stall_Nm), 0);
-  const StartTrial trial;
-  drive.RunVectors(1, static_cast<std::int64_t>(trial.turns) * modulation.subdivision, repeat);
-  return std::abs(drive.shaft().angle_rad() - trial.turns * kTurn) < kTurn / 2;
+  constexpr int kTurns = 30;
+  for (int turn = 0; turn < kTurns; ++turn) {
+    drive.RunVectors(1, modulation.subdivision, repeat);
+    // A turn that is lost is not won back.
+    if (drive.shaft().angle_rad() < (turn + 0.5) * kTurn) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -190,35 +196,40 @@ std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulatio
 
 std::optional<double> CriticalRepeatReal(const Drive::Setting& setting,
                                          const Modulation& modulation) {
-  const Drive::Setting worst = AtWorstLoad(setting);
-  const ReducedDrive rested(worst, modulation);
+  return CriticalRepeatReal(ReducedDrive(setting, modulation), setting, modulation);
+}
+
+std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive::Setting& setting,
+                                         const Modulation& modulation) {
+  const double worst_Nm = AtWorstLoad(setting).motor.load_Nm;
   const auto starts = [&](double repeat) {
-    return StartsReal(rested, rested.stall_Nm(), worst.motor.load_Nm, modulation, repeat);
+    return StartsReal(drive, worst_Nm, modulation, repeat);
   };
+  // Upwards, for what fails does so within a turn or two.
   double fails = 0.5;
-  double works = kRepeatMax;
-  if (!starts(works)) return std::nullopt;
+  double works = 2;
+  while (!starts(works)) {
+    if (works >= kRepeatMax) return std::nullopt;
+    fails = works;
+    works = std::min(1.4 * works, static_cast<double>(kRepeatMax));
+  }
   while (works - fails > 1e-3) {
-    const double middle = std::sqrt(fails * works);
+    const double middle = (fails + works) / 2;
     (starts(middle) ? works : fails) = middle;
   }
   return works;
 }
 
 double LoadOfCriticalRepeat(Drive::Setting setting, const Modulation& modulation, int repeat) {
-  const double variation = setting.motor.load_variation;
-  setting.motor.load_variation = 0;
+  const ReducedDrive rested(setting, modulation);
   double starts = 0;
-  double stalls = Stall(setting, modulation);
+  double stalls = rested.stall_Nm();
   for (int k = 0; k < 24; ++k) {
     const double worst = (starts + stalls) / 2;
-    setting.motor.load_Nm = worst;
-    const ReducedDrive rested(setting, modulation);
     // Critical for `repeat` is what half a count less would not start.
-    const bool ok = StartsReal(rested, rested.stall_Nm(), worst, modulation, repeat - 0.5);
-    (ok ? starts : stalls) = worst;
+    (StartsReal(rested, worst, modulation, repeat - 0.5) ? starts : stalls) = worst;
   }
-  return starts / (1 + variation);
+  return starts / (1 + setting.motor.load_variation);
 }
 
 }  // namespace focalfleet::sim

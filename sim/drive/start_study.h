@@ -70,6 +70,9 @@ std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulatio
 /// The same between whole numbers, at the reduced level: what V_bus * n is when n is not rounded.
 std::optional<double> CriticalRepeatReal(const Drive::Setting& setting,
                                          const Modulation& modulation);
+/// Pre: `drive` was made of the same setting and modulation; it is copied.
+std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive::Setting& setting,
+                                         const Modulation& modulation);
 
 /// The mean load with which `repeat` is critical: the one number about the load that a critical n
 /// tells. Units: Nm at the motor shaft.
