@@ -123,6 +123,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddLayoutCommand(line.get());
   AddTargetsCommand(line.get());
   AddPlanCommand(line.get());
+  AddEstimateCommand(line.get());
   AddApplyCommand(line.get());
   AddStatusCommands(line.get());
   AddWatchCommand(line.get());

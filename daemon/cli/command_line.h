@@ -52,6 +52,7 @@ CLI::Validator NumberBetween(double low, double high);
 void AddLayoutCommand(CommandLine* line);
 void AddTargetsCommand(CommandLine* line);
 void AddPlanCommand(CommandLine* line);
+void AddEstimateCommand(CommandLine* line);
 void AddApplyCommand(CommandLine* line);
 void AddStatusCommands(CommandLine* line);  // status, unit, state, history
 void AddWatchCommand(CommandLine* line);

@@ -7,8 +7,22 @@
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/state_file.h"
+#include "fleet/files/targets_file.h"
+#include "fleet/plan/planner.h"
+#include "fleet/targets.h"
 
 namespace focalfleet::cli {
+namespace {
+
+std::vector<UnitKnowledge> KnowledgeOf(const StatePoses& state) {
+  std::vector<UnitKnowledge> knowledge(state.size());
+  for (std::size_t i = 0; i < state.size(); ++i) {
+    if (state[i]) knowledge[i] = Exactly(Witness::kReported, *state[i]);
+  }
+  return knowledge;
+}
+
+}  // namespace
 
 void AddFleetFiles(CLI::App* command, FleetFiles* files) {
   AddFile(command, "--units", &files->units, "units.csv: the focal plane")->required();
@@ -39,6 +53,52 @@ Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
                                                    const OfflineFleet& fleet) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
   return ReadState(text, path, fleet.layout, fleet.drives);
+}
+
+Result<OfflinePlan> PlanOffline(const OfflineFleet& fleet, const StatePoses& state,
+                                const PlanFiles& files) {
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.targets));
+  FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
+  const std::vector<UnitKnowledge> start = KnowledgeOf(state);
+  FOCALFLEET_TRY_ASSIGN(const auto poses,
+                        ResolveTargets(targets, fleet.layout, fleet.drives, start));
+  std::vector<std::uint8_t> frozen(fleet.layout.size());
+  for (std::uint32_t i = 0; i < frozen.size(); ++i) {
+    frozen[i] = fleet.layout.unit({i}).enabled ? 0 : 1;
+  }
+  auto plan = MakePlan({.layout = &fleet.layout,
+                        .drives = fleet.drives,
+                        .start = start,
+                        .targets = poses,
+                        .frozen = frozen},
+                       {.fixed = files.fixed});
+  if (!plan) {
+    return Fail(plan.error().code,
+                fmt::format("{} from {}: {}", files.targets, files.from, plan.error().text));
+  }
+  return OfflinePlan{std::move(*plan), targets.rows.size()};
+}
+
+Json UnservedJson(const Plan& plan, const Layout& layout) {
+  Json rows = Json::array();
+  for (const Unserved& unserved : plan.unserved) {
+    Json by = nullptr;
+    if (unserved.by) by = layout.unit(*unserved.by).id.value;
+    rows.push_back({{"unit_id", layout.unit(unserved.unit).id.value},
+                    {"why", Name(unserved.why)},
+                    {"by", by}});
+  }
+  return rows;
+}
+
+std::string DescribeUnserved(const Json& unserved) {
+  std::string text;
+  for (const Json& row : unserved) {
+    text += fmt::format("\n  unit {}: {}", row["unit_id"].get<std::uint32_t>(),
+                        row["why"].get<std::string>());
+    if (!row["by"].is_null()) text += fmt::format(" (unit {})", row["by"].get<std::uint32_t>());
+  }
+  return text;
 }
 
 }  // namespace focalfleet::cli

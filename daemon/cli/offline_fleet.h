@@ -9,6 +9,7 @@
 #include "daemon/cli/context.h"
 #include "fleet/drive.h"
 #include "fleet/layout.h"
+#include "fleet/plan/plan.h"
 #include "protocol/base/result.h"
 
 namespace CLI {
@@ -38,5 +39,25 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files);
 /// Shape: (n); none: the file does not name the unit. Errors: as LoadFleet.
 Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
                                                    const OfflineFleet& fleet);
+
+using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
+
+struct PlanFiles {
+  std::string targets;
+  std::string from;    // for messages: what `state` was read from
+  bool fixed = false;  // units without a target may not step aside
+};
+struct OfflinePlan {
+  Plan plan;
+  std::size_t targeted = 0;
+};
+/// The plan from `state` to the targets; disabled units stand. Errors: as LoadFleet, and those of
+/// ResolveTargets and MakePlan.
+Result<OfflinePlan> PlanOffline(const OfflineFleet& fleet, const StatePoses& state,
+                                const PlanFiles& files);
+
+/// `unserved` of the JSON summaries, and the lines for people, each after a line break.
+Json UnservedJson(const Plan& plan, const Layout& layout);
+std::string DescribeUnserved(const Json& unserved);
 
 }  // namespace focalfleet::cli

@@ -1,0 +1,225 @@
+// estimate as a process: its figures are those of the plan, its curves add up, and bad input is
+// named and writes nothing.
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "daemon/control/messages.h"
+#include "fleet/files/csv.h"
+#include "fleet/files/layout_file.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using test::Focalfleet;
+using test::ProgramResult;
+using test::ScratchDirectory;
+using test::Slurp;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+class EstimateCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(
+        Focalfleet({"layout", "hex", "--count", "37", "--units-per-rail", "20", "--out", units_})
+            .exit,
+        0);
+    ASSERT_EQ(Draw({"--seed", "1", "--as", "state", "--out", state_}).exit, 0);
+    ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets_}).exit, 0);
+  }
+
+  ProgramResult Draw(std::vector<std::string> more) {
+    std::vector<std::string> words = {"targets", "--units", units_};
+    words.insert(words.end(), more.begin(), more.end());
+    return Focalfleet(words);
+  }
+  ProgramResult Estimate(std::vector<std::string> more = {}) {
+    std::vector<std::string> words = {"estimate", "--units", units_, "--targets", targets_};
+    words.insert(words.end(), more.begin(), more.end());
+    return Focalfleet(words);
+  }
+  Json EstimateJson(std::vector<std::string> more = {}) {
+    more.emplace_back("--json");
+    const ProgramResult result = Estimate(more);
+    EXPECT_EQ(result.exit, 0) << result.err;
+    EXPECT_THAT(result.err, IsEmpty());
+    return Json::parse(result.out, nullptr, false);
+  }
+  void ExpectRefused(std::vector<std::string> more, int exit, const std::string& complaint) {
+    more.insert(more.end(), {"--out", scratch_ / "curve.csv"});
+    const ProgramResult result = Estimate(more);
+    EXPECT_EQ(result.exit, exit) << result.err;
+    EXPECT_THAT(result.out, IsEmpty());
+    EXPECT_THAT(result.err, HasSubstr(complaint));
+    EXPECT_THAT(scratch_.List(), Not(Contains("curve.csv")));
+  }
+
+  ScratchDirectory scratch_;
+  std::string units_ = scratch_ / "units.csv";
+  std::string state_ = scratch_ / "state.csv";
+  std::string targets_ = scratch_ / "targets.csv";
+};
+
+double Of(const Json& band, const char* key = "value") { return band[key].get<double>(); }
+
+void ExpectBand(const Json& band) {
+  EXPECT_GT(Of(band, "low"), 0) << band;
+  EXPECT_LT(Of(band, "low"), Of(band)) << band;
+  EXPECT_LT(Of(band), Of(band, "high")) << band;
+}
+
+TEST_F(EstimateCommand, AllModesStandSideBySideWithLimits) {
+  const Json told = EstimateJson({"--from", state_});
+  EXPECT_EQ(told["units"], 37);
+  EXPECT_EQ(told["served"], 37);
+  ExpectBand(told["makespan_s"]);
+  ASSERT_EQ(told["modes"].size(), 3u);
+  EXPECT_EQ(told["modes"][0]["mode"], "asymmetric");
+  EXPECT_EQ(told["modes"][1]["mode"], "five_segment");
+  EXPECT_EQ(told["modes"][2]["mode"], "seven_segment");
+  for (const Json& mode : told["modes"]) {
+    EXPECT_EQ(mode["stalls"], false);
+    ASSERT_EQ(mode["rails"].size(), 2u);
+    double rails_J = 0;
+    for (const Json& rail : mode["rails"]) {
+      for (const char* key : {"energy_J", "mean_power_W", "peak_power_W"}) ExpectBand(rail[key]);
+      rails_J += Of(rail["energy_J"]);
+    }
+    for (const char* key : {"energy_J", "mean_power_W", "peak_power_W"}) ExpectBand(mode[key]);
+    EXPECT_NEAR(rails_J / Of(mode["energy_J"]), 1, 1e-6);
+    EXPECT_NEAR(Of(mode["mean_power_W"]) * Of(told["makespan_s"]) / Of(mode["energy_J"]), 1, 1e-9);
+  }
+}
+
+TEST_F(EstimateCommand, AgreesWithThePlanThatWouldBeSent) {
+  const Json estimate = EstimateJson({"--from", state_, "--mode", "asymmetric"});
+  ASSERT_EQ(estimate["modes"].size(), 1u);
+  const auto plan = Focalfleet({"plan", "--units", units_, "--targets", targets_, "--from", state_,
+                                "--out", scratch_ / "plan.csv", "--json"});
+  ASSERT_EQ(plan.exit, 0) << plan.err;
+  const Json planned = Json::parse(plan.out, nullptr, false);
+  EXPECT_EQ(Of(estimate["makespan_s"]), planned["makespan_s"].get<double>());
+  const Json& mode = estimate["modes"][0];
+  EXPECT_NEAR(Of(mode["energy_J"]), planned["energy_J"].get<double>(), 1e-5);
+  EXPECT_EQ(Of(mode["peak_power_W"]), planned["peak_power_W"].get<double>());
+}
+
+TEST_F(EstimateCommand, TheCurveHoldsTheEnergyOfEachRailAndMode) {
+  const std::string out = scratch_ / "curve.csv";
+  const Json told = EstimateJson({"--from", state_, "--out", out});
+  EXPECT_EQ(told["out"], out);
+  const auto table = CsvTable::Parse(Slurp(out), out);
+  ASSERT_TRUE(table) << table.error().text;
+  ASSERT_TRUE(table->Require({"t_s", "rail", "power_W", "mode"}));
+  std::map<std::pair<std::string, std::string>, double> energy_J;
+  std::map<std::pair<std::string, std::string>, std::pair<double, double>> last;
+  for (std::size_t k = 0; k < table->size(); ++k) {
+    CsvRow row(*table, k);
+    const std::pair key{row.Text("mode"), row.Text("rail")};
+    const double t_s = row.Number("t_s");
+    auto& [before_s, power_W] = last[key];
+    energy_J[key] += power_W * (t_s - before_s);
+    EXPECT_GE(t_s, before_s);
+    before_s = t_s;
+    power_W = row.Number("power_W");
+    ASSERT_FALSE(row.error());
+  }
+  EXPECT_EQ(energy_J.size(), 9u);
+  for (const auto& [key, at] : last) EXPECT_EQ(at.second, 0) << key.first << " " << key.second;
+  for (const Json& mode : told["modes"]) {
+    const auto name = mode["mode"].get<std::string>();
+    EXPECT_NEAR((energy_J[{name, "total"}]), Of(mode["energy_J"]), 1e-6);
+    for (const Json& rail : mode["rails"]) {
+      const std::string id = std::to_string(rail["rail_id"].get<int>());
+      EXPECT_NEAR((energy_J[{name, id}]), Of(rail["energy_J"]), 1e-6);
+    }
+  }
+}
+
+TEST_F(EstimateCommand, StartsWithAllArmsFoldedWhereNoStateIsGiven) {
+  const Json told = EstimateJson();
+  EXPECT_EQ(told["served"], 37);
+  EXPECT_NE(Of(told["makespan_s"]), Of(EstimateJson({"--from", state_})["makespan_s"]));
+}
+
+TEST_F(EstimateCommand, TakesVoltageAndTimerCounts) {
+  const Json slow = EstimateJson();
+  const Json fast = EstimateJson({"--v-bus", "9", "--repeat", "54"});
+  EXPECT_NEAR(Of(fast["makespan_s"]) / Of(slow["makespan_s"]), 0.5, 0.05);
+  EXPECT_GT(Of(fast["modes"][0]["peak_power_W"]), 10 * Of(slow["modes"][0]["peak_power_W"]));
+  const Json same_speed = EstimateJson({"--counter1", "1000", "--repeat", "54"});
+  EXPECT_NEAR(Of(same_speed["makespan_s"]), Of(slow["makespan_s"]), 1e-3);
+  const Json coarse = EstimateJson({"--subdivision", "48", "--repeat", "216"});
+  EXPECT_NEAR(Of(coarse["makespan_s"]) / Of(slow["makespan_s"]), 1, 0.05);
+  EXPECT_EQ(coarse["subdivision"], 48);
+}
+
+TEST_F(EstimateCommand, TellsPeopleATableForEachMode) {
+  const auto result = Estimate({"--from", state_});
+  EXPECT_EQ(result.exit, 0);
+  for (const char* text : {"37 of 37 targets served", "makespan ", "asymmetric", "five-segment",
+                           "seven-segment", "rail 1", "peak power, W", "load +-20 %"}) {
+    EXPECT_THAT(result.out, HasSubstr(text));
+  }
+  EXPECT_THAT(Estimate({"--quiet"}).out, IsEmpty());
+}
+
+TEST_F(EstimateCommand, SaysWhereThereIsNoMargin) {
+  const auto result = Estimate({"--repeat", "23"});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("no margin"));
+}
+
+TEST_F(EstimateCommand, RefusesWhatTheMotorCannotPull) {
+  ExpectRefused({"--repeat", "10"}, 1,
+                "1.8 V, 500 counts x 10, 96 vectors a turn: the motor "
+                "cannot pull its load");
+  ExpectRefused({"--v-bus", "0.2", "--mode", "asymmetric"}, 1, "cannot pull its load");
+}
+
+TEST_F(EstimateCommand, ImpossibleSettingsAreWrongUsage) {
+  for (const char* v : {"0", "-1.8", "12.5", "nan", "inf", "lots"}) {
+    ExpectRefused({"--v-bus", v}, 2, "--v-bus");
+  }
+  for (const char* n : {"0", "-1", "256", "1.5", "nan"})
+    ExpectRefused({"--repeat", n}, 2, "--repeat");
+  for (const char* c : {"0", "-500", "65536", "x"})
+    ExpectRefused({"--counter1", c}, 2, "--counter1");
+  for (const char* n : {"0", "1", "-6", "97", "100000", "nan"}) {
+    ExpectRefused({"--subdivision", n}, 2, "--subdivision");
+  }
+  ExpectRefused({"--mode", "six-segment"}, 2, "--mode");
+  EXPECT_EQ(Focalfleet({"estimate", "--units", units_}).exit, 2);
+}
+
+TEST_F(EstimateCommand, RefusesBadFilesWithFileRowAndReason) {
+  targets_ = scratch_.Put("bad.csv", "unit_id,x_mm,y_mm\n1,1,1\n4711,1,1\n");
+  ExpectRefused({}, 1, "bad.csv:3: unit 4711: unknown unit");
+  targets_ = scratch_ / "none.csv";
+  ExpectRefused({}, 1, "none.csv: cannot be read");
+  targets_ = scratch_.Put("good.csv", "unit_id,theta_deg,phi_deg\n1,0,150\n");
+  ExpectRefused({"--from", scratch_.Put("s.csv", "unit_id,theta_deg\n1,0\n")}, 1, "s.csv");
+  const auto full = Estimate({"--out", "/dev/full"});
+  EXPECT_EQ(full.exit, 1);
+  EXPECT_THAT(full.err, HasSubstr("No space left"));
+}
+
+TEST_F(EstimateCommand, NamesUnitsThatAreNotServedAndEndsWithThree) {
+  auto file = ReadUnits(Slurp(units_), units_);
+  ASSERT_TRUE(file);
+  file->units[0].enabled = false;
+  units_ = scratch_.Put("units.csv", WriteUnits(file->units));
+  targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,0,180\n2,0,150\n");
+  EXPECT_THAT(Estimate().out, HasSubstr("unit 1: disabled"));
+  const auto result = Estimate({"--json"});
+  EXPECT_EQ(result.exit, 3) << result.err << result.out;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["unserved"][0]["unit_id"], 1);
+}
+
+}  // namespace
+}  // namespace focalfleet
