@@ -1,0 +1,79 @@
+// Which n a motor needs, always from rest: steady rotation tells nothing about a start. The
+// critical n starts the worst place of the load; the tuned n would start (1 + margin) times that
+// load. Both are searched with the reduced drive and then tried at PWM level. A tuning whose
+// currents come near what the bridge can force through a phase is refused: there the winding is a
+// resistance across the bus (paper 1's saturation), turning or blocked, cold or warm.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "sim/drive/drive.h"
+#include "sim/drive/start_study.h"
+
+namespace focalfleet::sim {
+
+struct TuningRule {
+  double margin = 0.5;       // of load torque
+  double peak_share = 0.95;  // highest current over 2 V / (3 r)
+  double move_deg = 300;     // of the output: what time and energy are told for
+  Ramp ramp;
+  /// Winding above ambient, K for a watt of copper losses. None: it stays at 20 degrees Celsius.
+  std::optional<double> winding_K_per_W;
+  double ambient_C = 20;
+  bool cross_check = true;  // at PWM level: some seconds
+};
+
+enum class TuningOutcome : std::uint8_t {
+  kTuned,
+  kStalls,    // no n starts the load
+  kNoMargin,  // some n starts it, none with the margin
+  kPeak       // the current is too high
+};
+const char* Name(TuningOutcome outcome);
+
+struct Tuning {
+  TuningOutcome outcome = TuningOutcome::kTuned;
+  int critical = 0;
+  int critical_reduced = 0;  // what the reduced drive alone says
+  int repeat = 0;
+  double margin = 0;  // what `repeat` has, half a count on the safe side
+  double peak_A = 0;  // in steady rotation with the mean load
+  double blocked_peak_A = 0;
+  double limit_A = 0;      // V / (sqrt3 r): paper 1's
+  double reachable_A = 0;  // 2 V / (3 r)
+  double peak_share = 0;   // the higher of both peaks over reachable, cold or warm
+  double copper_W = 0;     // in steady rotation
+  double winding_C = 20;
+  double resistance_ohm = 0;  // at that temperature
+  double move_s = 0;  // time of the move and what the supply gives for it, by the reduced drive
+  double move_J = 0;
+};
+
+/// `modulation.repeat` is not looked at. Deterministic.
+Tuning Tune(const Drive::Setting& setting, const Modulation& modulation, const TuningRule& rule);
+
+/// A tuning of one load, as far as it differs between the loads of a fleet.
+struct LoadTuning {
+  double load_Nm = 0;
+  TuningOutcome outcome = TuningOutcome::kTuned;
+  int critical = 0;
+  int repeat = 0;
+  double margin = 0;
+  double peak_share = 0;
+};
+/// As Tune for each of `loads_Nm`, in that order. Loads are rounded up to 0.1 %; where two loads
+/// need the same n, those between need it, too. Cost: some tenths of a second for each n that
+/// occurs, ten times that with the cross-check. `progress` hears the share that is done.
+std::vector<LoadTuning> TuneLoads(const Drive::Setting& setting, const Modulation& modulation,
+                                  const TuningRule& rule, std::span<const double> loads_Nm,
+                                  const std::function<void(double)>& progress);
+
+/// The torque margin that n = `modulation.repeat` has: by how much the load may grow until it is
+/// critical. Pre: the load is not 0.
+double MarginOf(const Drive::Setting& setting, const Modulation& modulation);
+
+}  // namespace focalfleet::sim
