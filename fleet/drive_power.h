@@ -2,7 +2,7 @@
 // carrier period (1.7 to 14 us) is as long as the winding's time constant L/r (2.5 us), so the
 // current rises and falls within every carrier: its ripple heats the winding, and where it passes
 // through zero decides what the dead time does to the voltage. A sinusoid of the mean voltage knows
-// neither; it is up to a fifth too low.
+// neither: at 1.8 V it is 7 % low with 2000 counts and 11 % high with 250 and seven segments.
 //
 // Equations. Phase quantities as one complex number (amplitude invariant), flux psi at the angle
 // theta = w t - lag, w = 2 pi / (subdivision * time of a vector), constant:
