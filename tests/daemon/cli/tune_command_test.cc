@@ -1,0 +1,173 @@
+// tune as a process: one motor, a fleet into a table and into the store, and bad input.
+#include <gmock/gmock.h>
+
+#include "daemon/control/messages.h"
+#include "daemon/store/store.h"
+#include "fleet/files/csv.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using test::Focalfleet;
+using test::ProgramResult;
+using test::ScratchDirectory;
+using test::Slurp;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// As the sets were fitted.
+const std::vector<std::string> kIdeal = {"--dead-time-ns", "0", "--rise-ns", "0", "--fall-ns", "0"};
+
+class TuneCommand : public ::testing::Test {
+ protected:
+  static ProgramResult Tune(std::vector<std::string> more) {
+    std::vector<std::string> words = {"tune"};
+    words.insert(words.end(), kIdeal.begin(), kIdeal.end());
+    words.insert(words.end(), more.begin(), more.end());
+    return Focalfleet(words);
+  }
+  void MakeUnits() {
+    ASSERT_EQ(Focalfleet({"layout", "hex", "--count", "3", "--out", units_}).exit, 0);
+  }
+
+  ScratchDirectory scratch_;
+  std::string units_ = scratch_ / "units.csv";
+  std::string tuned_ = scratch_ / "tuned.csv";
+};
+
+TEST_F(TuneCommand, FindsThePapersCriticalRepeat) {
+  const ProgramResult result = Tune({"--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["critical"], 37);
+  EXPECT_EQ(told["critical_reduced"], 37);
+  EXPECT_GT(told["repeat"].get<int>(), 50);
+  EXPECT_NEAR(told["margin"].get<double>(), 0.5, 0.02);
+  EXPECT_NEAR(told["margin_at_108"].get<double>(), 0.88, 0.03);
+}
+
+TEST_F(TuneCommand, RefusesWhatThePeakCheckForbids) {
+  const ProgramResult result = Tune({"--v-bus", "9", "--counter1", "2000"});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.err, HasSubstr("of 2V/(3r), more than 95.0 %"));
+  EXPECT_EQ(Tune({"--v-bus", "9", "--counter1", "2000", "--peak-share", "1"}).exit, 0);
+}
+
+TEST_F(TuneCommand, ChoosesTheBestOfTheRails) {
+  const ProgramResult result = Tune({"--minimise", "time", "--rails", "1.8,3", "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["candidates"].size(), 6u);
+  EXPECT_EQ(told["v_bus_V"], 3);
+  for (const Json& candidate : told["candidates"])
+    EXPECT_GE(candidate["move_s"].get<double>(), told["move_s"].get<double>());
+}
+
+TEST_F(TuneCommand, AFleetIsTunedByItsLoadsAndTheRefusedAreNamed) {
+  MakeUnits();
+  const std::string loads =
+      scratch_.Put("loads.csv", "unit_id,axis,load_uNm\n1,theta,6\n2,phi,40\n");
+  const ProgramResult result = Tune({"--units", units_, "--loads", loads, "--out", tuned_});
+  EXPECT_EQ(result.exit, 3) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("5 of 6 axes tuned"));
+  EXPECT_THAT(result.out, HasSubstr("unit 2 phi: the load stalls"));
+  const auto table = CsvTable::Parse(Slurp(tuned_), tuned_);
+  ASSERT_TRUE(table) << table.error().text;
+  ASSERT_EQ(table->size(), 6u);
+  EXPECT_EQ(table->cell(0, *table->Find("load_uNm")), "6");
+  EXPECT_EQ(table->cell(1, *table->Find("critical")), "37");
+  EXPECT_EQ(table->cell(1, *table->Find("origin")), "tuning");
+  EXPECT_EQ(table->cell(3, *table->Find("outcome")), "stalls");
+  EXPECT_EQ(table->cell(3, *table->Find("repeat")), "");
+}
+
+TEST_F(TuneCommand, TheSameSeedDrawsTheSameLoads) {
+  MakeUnits();
+  const auto text = [&](const char* seed) {
+    EXPECT_EQ(
+        Tune({"--units", units_, "--load-spread", "0.05", "--seed", seed, "--out", tuned_}).exit,
+        0);
+    return Slurp(tuned_);
+  };
+  const std::string first = text("1");
+  EXPECT_EQ(text("1"), first);
+  EXPECT_NE(text("2"), first);
+}
+
+TEST_F(TuneCommand, TheStoreTakesWhatWasTunedWithItsOrigin) {
+  MakeUnits();
+  const std::string path = scratch_ / "fleet.db";
+  {
+    auto store = Store::Open(path);
+    ASSERT_TRUE(store) << store.error().text;
+    const std::vector<Row> rows = {BindingRow{UnitId{1}, {7001}}, BindingRow{UnitId{2}, {7002}}};
+    ASSERT_TRUE((*store)->Commit(rows, WallTime{1}));
+    // As while a daemon has it.
+    const ProgramResult held = Tune({"--units", units_, "--store", path});
+    EXPECT_EQ(held.exit, 1);
+    EXPECT_THAT(held.err, HasSubstr(path));
+  }
+  const ProgramResult result = Tune({"--units", units_, "--store", path});
+  EXPECT_EQ(result.exit, 3) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("unit 3 theta: no serial number"));
+  auto reader = StoreReader::Open(path);
+  ASSERT_TRUE(reader) << reader.error().text;
+  const auto history = (*reader)->Parameters({7001}, 100);
+  ASSERT_TRUE(history);
+  EXPECT_EQ(history->size(), 8u);
+  int repeats = 0;
+  for (const ParameterHistory& entry : *history) {
+    EXPECT_EQ(entry.row.origin, Origin::kTuning);
+    if (entry.row.parameter != Parameter::kRepeat) continue;
+    ++repeats;
+    EXPECT_GT(entry.row.value, 50);
+  }
+  EXPECT_EQ(repeats, 2);
+}
+
+TEST_F(TuneCommand, BadInputIsRefusedWithTheReason) {
+  MakeUnits();
+  struct Bad {
+    std::vector<std::string> words;
+    int exit;
+    const char* complaint;
+  };
+  const auto loads = [&](const std::string& rows) {
+    static int count = 0;
+    return scratch_.Put("l" + std::to_string(++count) + ".csv", "unit_id,axis,load_uNm\n" + rows);
+  };
+  for (const Bad& bad : {
+           Bad{{"--load", "40"}, 1, "the load stalls from rest"},
+           Bad{{"--load", "22"}, 1, "with the margin"},
+           Bad{{"--margin", "-1"}, 2, "--margin"},
+           Bad{{"--peak-share", "0"}, 2, "--peak-share"},
+           Bad{{"--rails", "1.8,24", "--minimise", "energy"}, 2, "which the bridge bears"},
+           Bad{{"--minimise", "beauty"}, 2, "--minimise"},
+           Bad{{"--out", tuned_}, 1, "need --units"},
+           Bad{{"--units", units_}, 1, "--store or --out"},
+           Bad{{"--units", scratch_ / "none.csv", "--out", tuned_}, 1, "none.csv"},
+           Bad{{"--units", units_, "--store", scratch_ / "none.db"}, 1, "no such store"},
+           Bad{{"--units", units_, "--out", tuned_, "--minimise", "time"}, 1, "one motor"},
+           Bad{{"--units", units_, "--out", tuned_, "--loads", loads("9,theta,5\n")},
+               1,
+               ":2: column unit_id"},
+           Bad{{"--units", units_, "--out", tuned_, "--loads", loads("1,psi,5\n")},
+               1,
+               "neither theta"},
+           Bad{{"--units", units_, "--out", tuned_, "--loads", loads("1,phi,0\n")}, 1, "load_uNm"},
+           Bad{{"--units", units_, "--out", tuned_, "--loads", loads("1,phi,5\n1,phi,5\n")},
+               1,
+               "twice"},
+       }) {
+    const ProgramResult result = Tune(bad.words);
+    EXPECT_EQ(result.exit, bad.exit) << bad.words[0] << " " << result.err;
+    EXPECT_THAT(result.err, HasSubstr(bad.complaint));
+  }
+  EXPECT_THAT(scratch_.List(), Not(Contains("tuned.csv")));
+  EXPECT_THAT(scratch_.List(), Not(Contains("none.db")));
+}
+
+}  // namespace
+}  // namespace focalfleet
