@@ -130,6 +130,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddStopCommand(line.get());
   AddUnitCommands(line.get());
   AddSimulateCommand(line.get());
+  AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
   AddCompletionCommand(line.get());
   return line;

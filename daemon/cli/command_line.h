@@ -59,6 +59,7 @@ void AddWatchCommand(CommandLine* line);
 void AddStopCommand(CommandLine* line);
 void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, params
 void AddSimulateCommand(CommandLine* line);
+void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
