@@ -4,7 +4,8 @@
 // the leg through the upper one, and where it has died out the leg floats. Whenever the leg's
 // voltage changes it does so along a ramp; while it does, the device that carries the current
 // carries the voltage, too, and heats. A switch acts in the middle of its gate's ramp: a leg's own
-// ramp lies around that instant, and a switch whose diode conducts already takes over then.
+// ramp lies around that instant, and a leg that floats or stands at the right rail already is taken
+// over then.
 #pragma once
 
 #include <limits>
@@ -26,7 +27,7 @@ struct Leg {
   bool commanded_high = false;
   Path path = Path::kLower;
   double closes_at_s = kNever;  // when the commanded switch closes after the dead time
-  bool gate_rises = false;      // the dead time is over, the switch's diode conducts
+  bool gate_rises = false;      // the dead time is over, the switch is about to conduct
   double voltage_V = 0;         // against the negative rail
   double slope_V_per_s = 0;
   double ramp_ends_at_s = kNever;

@@ -69,15 +69,24 @@ void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
   leg->FollowPath(setting_.bridge, now_s);
 }
 
+// At the end of a dead time the gate begins to rise. A leg that the other diode still holds begins
+// its ramp, which lies around the middle of the gate's. Any other waits until there: its own diode
+// holds it at the rail already, or its current has died out (or is about to) and it floats.
 void Drive::CloseSwitches(double now_s) {
-  for (Leg& leg : legs_) {
+  for (std::size_t k = 0; k < kLegCount; ++k) {
+    Leg& leg = legs_[k];
     if (leg.closes_at_s > now_s) continue;
     const bool high = leg.commanded_high;
-    if (!leg.gate_rises && leg.path == (high ? Leg::Path::kUpperDiode : Leg::Path::kLowerDiode)) {
-      // Nothing to move: the diode holds the leg at this rail until the switch conducts.
-      leg.gate_rises = true;
-      leg.closes_at_s = now_s + (high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
-      if (leg.closes_at_s > now_s) continue;
+    const double half_s = (high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
+    if (!leg.gate_rises && half_s > 0) {
+      const auto other = high ? Leg::Path::kLowerDiode : Leg::Path::kUpperDiode;
+      const double sign = high ? 1 : -1;
+      const bool held = leg.path == other && sign * Project(CourseOf(speed_).At(half_s), k) > 0;
+      if (!held) {
+        leg.gate_rises = true;
+        leg.closes_at_s = now_s + half_s;
+        continue;
+      }
     }
     const bool died_out = leg.gate_rises && leg.path == Leg::Path::kFloats;
     leg.gate_rises = false;
@@ -306,8 +315,11 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
   std::size_t next = 0;
   while (true) {
     while (next < count && orders[next].at_s <= now_s) {
-      Leg& leg = legs_[orders[next].leg];
-      Command(&leg, orders[next].high, now_s, Project(current_, orders[next].leg));
+      // The switch opens in the middle of its gate's ramp: that current finds the diode.
+      const Order& order = orders[next];
+      const double half_s = (order.high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
+      Command(&legs_[order.leg], order.high, now_s,
+              Project(CourseOf(speed_).At(half_s), order.leg));
       ++next;
     }
     CloseSwitches(now_s);

@@ -12,7 +12,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
-constexpr int kRepeatMax = 255;  // what a unit's timer table holds
+constexpr double kRealResolution = 1e-3;  // of a critical n that is not whole
+constexpr int kRepeatMax = 255;           // what a unit's timer table holds
 
 // Both levels behind one face.
 class Reduced {
@@ -179,14 +180,24 @@ bool StartsAtWorstLoad(const Drive::Setting& setting, const Modulation& modulati
 
 std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
                                   const StartTrial& trial, DriveLevel level, int highest) {
+  if (level == DriveLevel::kReduced && trial.ramp.stages == 0) {
+    const auto real = CriticalRepeatReal(setting, modulation);
+    if (!real || *real > highest) return std::nullopt;
+    return static_cast<int>(std::ceil(*real - kRealResolution));
+  }
   const auto starts = [&](int repeat) {
     Modulation at = modulation;
     at.repeat = repeat;
     return StartsAtWorstLoad(setting, at, trial, level);
   };
-  if (!starts(highest)) return std::nullopt;
+  // Upwards: a slow field is dear to simulate, and mostly not needed.
   int fails = 0;
-  int works = highest;
+  int works = std::min(4, highest);
+  while (!starts(works)) {
+    if (works == highest) return std::nullopt;
+    fails = works;
+    works = std::min(works + works / 2, highest);
+  }
   while (works - fails > 1) {
     const int middle = (fails + works) / 2;
     (starts(middle) ? works : fails) = middle;
@@ -213,7 +224,7 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
     fails = works;
     works = std::min(1.4 * works, static_cast<double>(kRepeatMax));
   }
-  while (works - fails > 1e-3) {
+  while (works - fails > kRealResolution) {
     const double middle = (fails + works) / 2;
     (starts(middle) ? works : fails) = middle;
   }

@@ -27,8 +27,9 @@ struct ParameterSet {
   MotorParameters motor;
 };
 
-/// C: constant torque, no viscous drag. V: V_bus * n falls nowhere. W: between. 9: turns bare at
-/// 9 V, n = 8. J2: as 9 with twice the inertia.
+/// C: constant torque, no viscous drag. V: V_bus * n falls nowhere. W: between. 9: the
+/// strongest magnet; without drag it starts bare at 9 V with n = 8. J2: as 9 with twice the
+/// inertia.
 inline constexpr std::array<ParameterSet, 5> kParameterSets = {{
     {"C", {.flux_linkage_Wb = 0.15e-3, .viscous_Nms = 0, .load_Nm = 5.93e-6}},
     {"V", {.flux_linkage_Wb = 0.15e-3, .viscous_Nms = 1e-8, .load_Nm = 4.07e-6}},
