@@ -72,12 +72,20 @@ struct Command {
       what;
 };
 
+/// What carrying out a plan will take and draw.
+struct PlanPrediction {
+  double makespan_s = 0;
+  double energy_J = 0;
+  double peak_power_W = 0;
+};
+
 /// A planner's answer (fleet/plan/job.h).
 struct PlanDone {
   std::uint64_t job = 0;
   Result<Plan> plan;
   std::vector<PositionerIndex>
       homing;  // units that may home at once when `plan` has been carried out
+  PlanPrediction predicted;
 };
 
 struct Inputs {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "fleet/estimate.h"
 #include "protocol/base/check.h"
 #include "protocol/base/limits.h"
 
@@ -249,7 +248,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
       SetOutcome(unserved.unit, TargetOutcome::kRefused,
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
-  Predict(plan_);
+  prediction_ = done.predicted;
   move_ = core_.next_move;
   core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
   if (plan_.moves.empty()) {
@@ -267,11 +266,6 @@ void Pursuit::TakePlan(const PlanDone& done) {
     waiting_[core_.unit(i).bus].push_back(i);
   }
   PumpUploads();
-}
-
-void Pursuit::Predict(const Plan& plan) {
-  const PlanEstimate estimate = Estimate(plan, core_.layout, core_.drives, MotorModel{});
-  prediction_ = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};
 }
 
 void Pursuit::CountPrediction() {

@@ -104,7 +104,6 @@ class Pursuit {
   void JudgeTargets();
   void ReportArrivals();
   void Record();
-  void Predict(const Plan& plan);
   void CountPrediction();
   void SayWhatIsWaitedFor();
   [[nodiscard]] StagedMove StagedMoveOf(PositionerIndex i) const;
@@ -143,12 +142,7 @@ class Pursuit {
   std::vector<std::uint32_t> uploading_;              // by bus
   std::vector<PositionerIndex> homing_;
   // What this round's motion is predicted to take and draw; added to the view when it starts.
-  struct Prediction {
-    double makespan_s = 0;
-    double energy_J = 0;
-    double peak_power_W = 0;
-  };
-  Prediction prediction_;
+  PlanPrediction prediction_;
   std::uint64_t commit_batch_ = 0;
   HostInstant last_arrival_;
   HostInstant start_repeat_ = kNever;

@@ -194,7 +194,9 @@ void Pursuit::CommitHoming() {
     Intend(i, HomingIntentOf(i));
   }
   core_.Note(NextMoveRow{core_.next_move});
-  Predict(HomingMotion());
+  // A few feeds: no work for the planner's thread.
+  const PlanEstimate estimate = Estimate(HomingMotion(), core_.layout, core_.drives, MotorModel{});
+  prediction_ = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};
   commit_batch_ = core_.batch_now();
   SetState(State::kHomeCommitting);
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "fleet/estimate.h"
+
 namespace focalfleet {
 namespace {
 
@@ -29,7 +31,7 @@ Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Po
 }
 
 PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
-  PlanDone done{job.job, Plan{}, {}};
+  PlanDone done{job.job, Plan{}, {}, {}};
   Error refusal;
   std::vector<std::pair<PositionerIndex, std::vector<std::optional<Pose>>>> crowded;
   for (const PositionerIndex unit : job.to_home) {
@@ -61,6 +63,11 @@ PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
   return done;
 }
 
+PlanDone PlanOf(const PlanJob& job, const PlanRequest& request) {
+  if (!job.to_home.empty()) return PlanHomingWave(job, request);
+  return {job.job, MakePlan(request, job.options), {}, {}};
+}
+
 }  // namespace
 
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives) {
@@ -69,8 +76,12 @@ PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const Un
                             .start = job.start,
                             .targets = job.targets,
                             .frozen = job.frozen};
-  if (!job.to_home.empty()) return PlanHomingWave(job, request);
-  return {job.job, MakePlan(request, job.options), {}};
+  PlanDone done = PlanOf(job, request);
+  if (done.plan) {
+    const PlanEstimate estimate = Estimate(*done.plan, layout, drives, MotorModel{});
+    done.predicted = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};
+  }
+  return done;
 }
 
 }  // namespace focalfleet

@@ -12,7 +12,7 @@ TEST(PlannerThread, AnswersEachJobInOrder) {
   const auto done = EventSignal::Create().value();
   const auto thread = PlannerThread::Create(
                           [](const PlannerWork& work) {
-                            return PlanDone{.job = work.job.job, .plan = Plan{}, .homing = {}};
+                            return PlanDone{.job = work.job.job, .plan = Plan{}};
                           },
                           &done)
                           .value();
@@ -37,7 +37,7 @@ TEST(PlannerThread, RefusesMoreThanItHasRoomFor) {
   const auto thread = PlannerThread::Create(
                           [&](const PlannerWork& work) {
                             go.wait();
-                            return PlanDone{.job = work.job.job, .plan = Plan{}, .homing = {}};
+                            return PlanDone{.job = work.job.job, .plan = Plan{}};
                           },
                           &done)
                           .value();
