@@ -15,6 +15,8 @@ struct ModeWord {
   WaveMode mode;
   const char* word;
 };
+constexpr double kTimeConstantMax_s = 1e-3;
+constexpr double kInertiaMin_kg_m2 = 1e-12;
 constexpr std::array<ModeWord, 3> kModeWords = {{{WaveMode::kAsymmetric, "asymmetric"},
                                                  {WaveMode::kFiveSegment, "five-segment"},
                                                  {WaveMode::kSevenSegment, "seven-segment"}}};
@@ -166,6 +168,17 @@ Result<DriveChoice> ChoiceOf(const DriveOptions& options) {
                            .rise_s = options.rise_ns * 1e-9,
                            .fall_s = options.fall_ns * 1e-9,
                            .dead_time_s = options.dead_time_ns * 1e-9};
+  // Beyond these the drive's model does not hold: currents that settle slower than vectors change,
+  // a rotor that turns about between two switching edges.
+  const sim::MotorParameters& motor = choice.setting.motor;
+  if (const double tau_s = motor.inductance_H / motor.resistance_ohm; tau_s > kTimeConstantMax_s)
+    return Fail(ErrorCode::kInvalid,
+                fmt::format("L/r of a phase is {:g} ms; the drive is simulated up to {:g} ms",
+                            tau_s * 1e3, kTimeConstantMax_s * 1e3));
+  if (motor.inertia_kg_m2 < kInertiaMin_kg_m2)
+    return Fail(ErrorCode::kInvalid,
+                fmt::format("an inertia of {:g} gcm2; the drive is simulated from {:g} gcm2",
+                            motor.inertia_kg_m2 * 1e7, kInertiaMin_kg_m2 * 1e7));
   const double carrier_ns = choice.modulation.carrier_s() * 1e9;
   struct Time {
     const char* name;

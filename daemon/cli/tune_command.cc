@@ -369,6 +369,10 @@ ExitCode RunTune(const Context& context, const TuneOptions& given) {
     return Report(context, {ErrorCode::kInvalid,
                             "--minimise chooses for one motor; a fleet has the rails it has"});
   }
+  if (fleet && options.rule.ramp.stages > 0) {
+    return Report(context, {ErrorCode::kInvalid,
+                            "--ramp-stages is for one motor; units start their moves without"});
+  }
   if (fleet && choice->setting.motor.load_Nm <= 0) {
     return Report(context, {ErrorCode::kInvalid, "--load 0: nothing is to be tuned"});
   }

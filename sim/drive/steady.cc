@@ -26,19 +26,38 @@ double AngleAtBegin(const Modulation& modulation, double lag_rad) {
   return -lag_rad - std::numbers::pi / modulation.subdivision;
 }
 
+// The lag at which a sinusoid of the field's speed pulls most.
+double LagOfPullOut(const Drive::Setting& setting, double speed_rad_per_s) {
+  return std::numbers::pi / 2 +
+         std::atan2(speed_rad_per_s * setting.motor.inductance_H, setting.motor.resistance_ohm);
+}
+
 struct Trial {
   double torque_Nm = 0;
   std::complex<double> current_A;
 };
 
-// Mean torque at a lag, over a third of a turn: sectors repeat in pairs. One vector before it lets
-// the currents settle.
+// Vectors until currents have settled to e^-20.
+std::int64_t SettlingVectors(const Drive::Setting& setting, const Modulation& modulation) {
+  const double tau_s = setting.motor.inductance_H / setting.motor.resistance_ohm;
+  return static_cast<std::int64_t>(std::ceil(20 * tau_s / modulation.vector_s()));
+}
+
+// Starts a rotor held at speed so long before vector 0 that the currents have settled by then.
+void RunIn(Drive* held, const Modulation& modulation, const std::vector<Pattern>& table,
+           double lag_rad, std::int64_t vectors) {
+  held->Place(AngleAtBegin(modulation, lag_rad) -
+                  kTurn * static_cast<double>(vectors) / modulation.subdivision,
+              FieldSpeed(modulation));
+  RunVectors(held, modulation, table, -vectors, vectors);
+}
+
+// Mean torque at a lag, over a third of a turn: sectors repeat in pairs.
 Trial TorqueAt(const Drive::Setting& held, const Modulation& modulation,
                const std::vector<Pattern>& table, double lag_rad) {
   const double speed = FieldSpeed(modulation);
   Drive drive(held);
-  drive.Place(AngleAtBegin(modulation, lag_rad) - kTurn / modulation.subdivision, speed);
-  RunVectors(&drive, modulation, table, -1, 1);
+  RunIn(&drive, modulation, table, lag_rad, SettlingVectors(held, modulation));
   const Trial settled{0, drive.current_A()};
   const DriveEnergy before = drive.energy();
   const double begin_s = drive.t_s();
@@ -74,9 +93,9 @@ std::optional<SteadyState> FindSteadyState(const Drive::Setting& setting,
   const std::vector<Pattern> table = VectorTable(modulation);
   const double speed = FieldSpeed(modulation);
   const double wanted_Nm = load_Nm + setting.motor.viscous_Nms * speed;
-  // Torque over lag is a sine, shifted and lowered by the back-EMF: its top is near 90 degrees.
+  // Torque over lag is a sine, lowered by the back-EMF and shifted by the winding's phase.
   double low = 0;
-  double high = std::numbers::pi / 2;
+  double high = LagOfPullOut(held, speed);
   double at_low = TorqueAt(held, modulation, table, low).torque_Nm - wanted_Nm;
   double at_high = TorqueAt(held, modulation, table, high).torque_Nm - wanted_Nm;
   if (at_high < 0) return std::nullopt;
@@ -110,10 +129,11 @@ double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation
   const Drive::Setting held = HeldAtSpeed(setting);
   const std::vector<Pattern> table = VectorTable(modulation);
   double best_Nm = 0;
+  const double top_rad = LagOfPullOut(held, FieldSpeed(modulation));
   // The top of a sine is flat: within 3 degrees of it lies 0.14 % of it.
-  for (int deg = 60; deg <= 102; deg += 6)
-    best_Nm = std::max(best_Nm,
-                       TorqueAt(held, modulation, table, deg * std::numbers::pi / 180).torque_Nm);
+  for (int deg = -30; deg <= 12; deg += 6)
+    best_Nm =
+        std::max(best_Nm, TorqueAt(held, modulation, table, top_rad + deg * kTurn / 360).torque_Nm);
   return best_Nm;
 }
 
@@ -129,9 +149,7 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
                               const SteadyState& state) {
   const std::vector<Pattern> table = VectorTable(modulation);
   Drive drive(HeldAtSpeed(setting));
-  drive.Place(AngleAtBegin(modulation, state.lag_rad) - kTurn / modulation.subdivision,
-              state.speed_rad_per_s);
-  RunVectors(&drive, modulation, table, -1, 1);
+  RunIn(&drive, modulation, table, state.lag_rad, SettlingVectors(setting, modulation));
   drive.ResetPeak();
 
   const DriveEnergy before = drive.energy();

@@ -245,7 +245,12 @@ Tuning Tune(const Drive::Setting& setting, const Modulation& modulation, const T
   if (tuning.repeat == 0) return tuning;
   Modulation at = modulation;
   at.repeat = tuning.repeat;
-  if (setting.motor.load_Nm > 0) tuning.margin = MarginOf(tried.setting, at);
+  // With a ramp the margin is known only as what was asked for and is there at least.
+  if (rule.ramp.stages > 0) {
+    tuning.margin = rule.margin;
+  } else if (setting.motor.load_Nm > 0) {
+    tuning.margin = MarginOf(tried.setting, at);
+  }
   MeasureMove(tried.setting, at, rule, &tuning);
   return tuning;
 }
