@@ -127,6 +127,18 @@ TEST_F(TuneCommand, TheStoreTakesWhatWasTunedWithItsOrigin) {
   EXPECT_EQ(repeats, 2);
 }
 
+TEST_F(TuneCommand, ARampLowersNAndKeepsTheMarginThatWasAskedFor) {
+  const ProgramResult with =
+      Tune({"--set", "C", "--ramp-stages", "8", "--ramp-stage-ms", "20", "--json"});
+  const ProgramResult without = Tune({"--set", "C", "--json"});
+  ASSERT_EQ(with.exit, 0) << with.err;
+  ASSERT_EQ(without.exit, 0) << without.err;
+  const Json ramped = Json::parse(with.out);
+  const Json plain = Json::parse(without.out);
+  EXPECT_LT(ramped["repeat"].get<int>(), plain["repeat"].get<int>());
+  EXPECT_EQ(ramped["margin"].get<double>(), 0.5);
+}
+
 TEST_F(TuneCommand, BadInputIsRefusedWithTheReason) {
   MakeUnits();
   struct Bad {
@@ -150,6 +162,9 @@ TEST_F(TuneCommand, BadInputIsRefusedWithTheReason) {
            Bad{{"--units", scratch_ / "none.csv", "--out", tuned_}, 1, "none.csv"},
            Bad{{"--units", units_, "--store", scratch_ / "none.db"}, 1, "no such store"},
            Bad{{"--units", units_, "--out", tuned_, "--minimise", "time"}, 1, "one motor"},
+           Bad{{"--units", units_, "--out", tuned_, "--ramp-stages", "4"}, 1, "start their moves"},
+           Bad{{"--resistance-ohm", "0.001"}, 1, "L/r of a phase"},
+           Bad{{"--inertia-gcm2", "1e-9"}, 1, "an inertia of"},
            Bad{{"--units", units_, "--out", tuned_, "--loads", loads("9,theta,5\n")},
                1,
                ":2: column unit_id"},
