@@ -79,7 +79,7 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
   const std::string from = options.from.empty() ? "all arms folded" : options.from;
   FOCALFLEET_TRY_ASSIGN(
       OfflinePlan planned,
-      PlanOffline(fleet, start,
+      PlanOffline(context, fleet, start,
                   {.targets = options.targets, .from = from, .fixed = options.fixed}));
   Estimated estimated{std::move(fleet), std::move(planned), {}, {}};
   bool any_turns = false;

@@ -55,10 +55,11 @@ Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
   return ReadState(text, path, fleet.layout, fleet.drives);
 }
 
-Result<OfflinePlan> PlanOffline(const OfflineFleet& fleet, const StatePoses& state,
-                                const PlanFiles& files) {
+Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
+                                const StatePoses& state, const PlanFiles& files) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.targets));
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
+  TellPassedOver(context, files.targets, targets.ignored_columns);
   const std::vector<UnitKnowledge> start = KnowledgeOf(state);
   FOCALFLEET_TRY_ASSIGN(const auto poses,
                         ResolveTargets(targets, fleet.layout, fleet.drives, start));

@@ -53,8 +53,8 @@ struct OfflinePlan {
 };
 /// The plan from `state` to the targets; disabled units stand. Errors: as LoadFleet, and those of
 /// ResolveTargets and MakePlan.
-Result<OfflinePlan> PlanOffline(const OfflineFleet& fleet, const StatePoses& state,
-                                const PlanFiles& files);
+Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
+                                const StatePoses& state, const PlanFiles& files);
 
 /// `unserved` of the JSON summaries, and the lines for people, each after a line break.
 Json UnservedJson(const Plan& plan, const Layout& layout);

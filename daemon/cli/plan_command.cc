@@ -34,7 +34,7 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
   FOCALFLEET_TRY_ASSIGN(
       OfflinePlan planned,
-      PlanOffline(fleet, state,
+      PlanOffline(context, fleet, state,
                   {.targets = options.targets, .from = options.from, .fixed = options.fixed}));
   const MotorModel motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);

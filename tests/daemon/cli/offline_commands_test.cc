@@ -317,5 +317,11 @@ TEST_F(OfflineCommands, AMisspeltColumnOfUnitsIsTold) {
   EXPECT_THAT(result.err, HasSubstr("enabld"));
 }
 
+TEST_F(OfflineCommands, PlanTellsColumnsOfTargetsThatNobodyReads) {
+  const std::string file =
+      scratch_.Put("p.csv", "unit_id,theta_deg,phi_deg,prioritty\n1,10,150,3\n");
+  EXPECT_THAT(Plan(file).err, HasSubstr("p.csv: columns passed over: prioritty"));
+}
+
 }  // namespace
 }  // namespace focalfleet
