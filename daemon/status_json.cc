@@ -17,9 +17,6 @@ Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nul
 
 Json UnservedJson(const FleetView& view) {
   Json unserved = Json::array();
-  // A homing leaves the outcomes of the configuration before it.
-  const ConfigurationView& c = view.coordinator->configuration();
-  if (c.refused == 0 && c.failed == 0) return unserved;
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
     const UnitView& unit = view.coordinator->unit({n});
     if (unit.outcome != TargetOutcome::kRefused && unit.outcome != TargetOutcome::kFailed) continue;

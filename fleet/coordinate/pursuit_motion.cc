@@ -87,11 +87,12 @@ void Pursuit::Start() {
 void Pursuit::RepeatStart() {
   const DurationNs left = view_.started - core_.now;
   const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
-  std::vector<std::uint8_t> told(core_.buses.size(), 0);
+  std::vector<bool> told(core_.buses.size());
   for (const UnitPlan& move : plan_.moves) {
     const std::size_t bus = core_.unit(move.unit).bus;
-    if (told[bus]++ == 0) core_.SendNow(bus, focalfleet::Start{move_, ticks}, kBroadcastNode);
-    told[bus] = 1;
+    if (told[bus]) continue;
+    told[bus] = true;
+    core_.SendNow(bus, focalfleet::Start{move_, ticks}, kBroadcastNode);
   }
   start_repeat_ = ++start_repeats_ > kStartRepeats
                       ? kNever

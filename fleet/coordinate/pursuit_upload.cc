@@ -39,24 +39,18 @@ void Pursuit::Upload(PositionerIndex i) {
     ++uploading_[core_.unit(i).bus];
     SetPart(i, Part::kUploading);
   }
-  const Address to{core_.layout.unit(i).node, 0};
-  bool room = bus.schedule.Enqueue(
-      {Encode(HostMessage{StageBegin{
-                  move.move, {move.path[0].size(), move.path[1].size()}, move.mode}},
-              to),
-       0,
-       {}});
+  // Where the queue has no room the read-back shows it, and the move is sent again.
+  const auto send = [&, to = Address{core_.layout.unit(i).node, 0}](const HostMessage& message) {
+    static_cast<void>(bus.schedule.Enqueue({Encode(message, to), 0, {}}));
+  };
+  send(StageBegin{move.move, {move.path[0].size(), move.path[1].size()}, move.mode});
   for (const Axis axis : kAxes) {
     std::uint8_t index = 0;
     for (const Segment& segment : move.path[Index(axis)].segments())
-      room = bus.schedule.Enqueue(
-                 {Encode(HostMessage{StageSegment{axis, index++, segment}}, to), 0, {}}) &&
-             room;
+      send(StageSegment{axis, index++, segment});
   }
-  // Where the queue had no room the read-back shows it, and the move is sent again.
   core_.SetPhase(i, kConfirming);
   core_.Ask(i, Confirm{move_});
-  static_cast<void>(room);
 }
 
 void Pursuit::OnConfirm(PositionerIndex i, const ConfirmReply& reply) {
