@@ -1,11 +1,11 @@
 // A two-level three-phase bridge: three legs, each with an upper and a lower switch and a diode
-// beside each. A command opens one switch at once and closes the other after the dead time. While
-// both are open the current decides: out of the leg (i > 0) it comes through the lower diode, into
-// the leg through the upper one, and where it has died out the leg floats. Whenever the leg's
-// voltage changes it does so along a ramp; while it does, the device that carries the current
-// carries the voltage, too, and heats. A switch acts in the middle of its gate's ramp: a leg's own
-// ramp lies around that instant, and a leg that floats or stands at the right rail already is taken
-// over then.
+// beside each. A command opens one switch and, after the dead time, closes the other. While both
+// are open the current decides: out of the leg (i > 0) it comes through the lower diode, into the
+// leg through the upper one, and where it has died out the leg floats. Whenever the leg's voltage
+// changes it does so along a ramp; while it does, the device that carries the current carries the
+// voltage, too, and heats. A switch acts in the middle of its gate's ramp: a leg's own ramp lies
+// around that instant, and a leg that floats or stands at the right rail already is taken over
+// then.
 #pragma once
 
 #include <limits>

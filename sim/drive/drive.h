@@ -61,7 +61,7 @@ class Drive {
   };
   explicit Drive(const Setting& setting);
 
-  /// Begins anew: currents 0, all legs low.
+  /// Rotor only: currents and legs stay as they are (at first 0 and low).
   void Place(double angle_rad, double speed_rad_per_s) { shaft_.Place(angle_rad, speed_rad_per_s); }
   void SetCurrent(std::complex<double> current_A) { current_ = current_A; }
 

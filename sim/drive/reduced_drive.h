@@ -20,11 +20,11 @@ namespace focalfleet::sim {
 
 class ReducedDrive {
  public:
-  /// Cost: some ten carrier periods of each vector at PWM level. Keep one per modulation and copy.
+  /// Cost: 20 time constants of each vector at PWM level. Keep one per modulation and copy it.
   ReducedDrive(const Drive::Setting& setting, const Modulation& modulation);
 
   void Place(double angle_rad, double speed_rad_per_s);
-  /// From now on every place has this load.
+  /// From now on every place has this load. The rotor stands at 0; place it.
   void SetLoad(double load_Nm);
   /// Shows the vectors from `first` on, `count` of them (backwards for a negative count), each for
   /// `repeat` carrier periods; `repeat` need not be whole.

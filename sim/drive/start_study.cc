@@ -231,7 +231,8 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
   return works;
 }
 
-double LoadOfCriticalRepeat(Drive::Setting setting, const Modulation& modulation, int repeat) {
+double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
+                            int repeat) {
   const ReducedDrive rested(setting, modulation);
   double starts = 0;
   double stalls = rested.stall_Nm();

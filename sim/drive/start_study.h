@@ -76,6 +76,7 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
 
 /// The mean load with which `repeat` is critical: the one number about the load that a critical n
 /// tells. Units: Nm at the motor shaft.
-double LoadOfCriticalRepeat(Drive::Setting setting, const Modulation& modulation, int repeat);
+double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
+                            int repeat);
 
 }  // namespace focalfleet::sim

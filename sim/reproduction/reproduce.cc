@@ -65,6 +65,9 @@ Reproduction Reproduce(const ReproduceOptions& options, const ReproduceProgress&
   reproduction::AddStarts(options, progress, &out);
   progress(0.95, "positions");
   reproduction::AddPositions(options, &out);
+  for (Claim& claim : out.claims)
+    if (claim.status == ClaimStatus::kReproduced || claim.status == ClaimStatus::kOrdering)
+      claim.reason.clear();
   progress(1, "done");
   return out;
 }
