@@ -13,8 +13,10 @@
 #include "fleet/drive_power.h"
 #include "fleet/estimate.h"
 #include "protocol/base/rng.h"
+#include "sim/axis/field_path.h"
 #include "sim/drive/start_study.h"
 #include "sim/drive/steady.h"
+#include "tests/fleet/plan/planning.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
@@ -133,6 +135,39 @@ TEST(EstimateAgainstPwm, TimeOfAMoveIsExactToACarrierPeriod) {
         TimeOf({.start_ticks = 0, .delta = signed_vectors, .repeat = point.feed.drive.repeat},
                point.feed.drive);
     EXPECT_LT(std::abs(time.t1_s - time.t0_s - drive.t_s()), 0.5 * point.modulation.carrier_s());
+  }
+}
+
+// Plans have segments that wait, that follow one another and that are slower than tuned; the unit's
+// side of the time is the simulation's field path.
+TEST(EstimateAgainstPwm, MakespanOfAPlanIsThatOfTheUnitsFields) {
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    const std::uint64_t seed = testing::TestSeed(4200 + k);
+    FOCALFLEET_TRACE_SEED(seed);
+    testing::PlanningFleet fleet = testing::HexFleet(127);
+    testing::DrawStartAndTargets(&fleet, seed);
+    const auto plan = MakePlan(fleet.request(), {});
+    ASSERT_TRUE(plan) << plan.error().text;
+    double makespan_s = 0;
+    std::size_t segments = 0;
+    for (const UnitPlan& move : plan->moves)
+      for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+        const AxisDrive& drive = fleet.drives[move.unit.value].axis[axis];
+        const double carrier_s = drive.counter1 / kTimerHz;
+        const auto path = move.path[axis].segments();
+        const sim::FieldPath field(
+            {.from = move.from[axis], .begin = {0}, .clock = {1.0}, .counter1 = drive.counter1},
+            path);
+        for (std::size_t n = 0; n < path.size(); ++n, ++segments) {
+          const SegmentTime time = TimeOf(path[n], drive);
+          EXPECT_NEAR(time.t0_s, field.pieces()[n].begin_ns * 1e-9, carrier_s);
+          EXPECT_NEAR(time.t1_s, field.pieces()[n].end_ns() * 1e-9, carrier_s);
+        }
+        makespan_s = std::max(makespan_s, static_cast<double>(field.end().ns) * 1e-9);
+      }
+    EXPECT_GT(segments, 2 * plan->moves.size()) << "no segment follows another";
+    const PlanEstimate estimate = Estimate(*plan, fleet.layout, fleet.drives, MotorModel{});
+    EXPECT_NEAR(estimate.makespan_s, makespan_s, 500 / kTimerHz);
   }
 }
 
