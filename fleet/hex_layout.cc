@@ -75,15 +75,17 @@ std::size_t PartsOf(std::size_t size, std::uint32_t per_part) {
 
 std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options) {
   const std::vector<PointFp> points = LatticeNearestFirst(options.count, options.pitch_mm);
-  const double arm_mm = options.arm_mm > 0 ? options.arm_mm : kArmPerPitch * options.pitch_mm;
+  const double theta_arm_mm =
+      options.theta_arm_mm > 0 ? options.theta_arm_mm : kArmPerPitch * options.pitch_mm;
+  const double phi_arm_mm = options.phi_arm_mm > 0 ? options.phi_arm_mm : theta_arm_mm;
   std::vector<Unit> units(points.size());
   std::vector<std::uint32_t> order(points.size());
   for (std::uint32_t i = 0; i < units.size(); ++i) {
     order[i] = i;
     units[i].id = UnitId{i + 1};
     units[i].base_fp = points[i];
-    units[i].axis[Index(Axis::kTheta)] = {arm_mm, 0, kGear, -kThetaEndDeg, kThetaEndDeg};
-    units[i].axis[Index(Axis::kPhi)] = {arm_mm, 0, kGear, 0, kPhiMaxDeg};
+    units[i].axis[Index(Axis::kTheta)] = {theta_arm_mm, 0, kGear, -kThetaEndDeg, kThetaEndDeg};
+    units[i].axis[Index(Axis::kPhi)] = {phi_arm_mm, 0, kGear, 0, kPhiMaxDeg};
   }
   std::uint32_t rail = 0;
   std::uint32_t bus = 0;

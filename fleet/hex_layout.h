@@ -14,10 +14,17 @@ namespace focalfleet {
 struct HexLayoutOptions {
   std::uint32_t count = 0;
   double pitch_mm = 25.6;
-  double arm_mm = 0;  // both arms; 0: as LAMOST's, 8.25 at 25.6 mm pitch
+  double theta_arm_mm = 0;  // 0: as LAMOST's, 8.25 at 25.6 mm pitch
+  double phi_arm_mm = 0;    // 0: as long as the theta arm
   std::uint32_t units_per_bus = 100;
   std::uint32_t units_per_rail = 500;
 };
+
+/// SDSS-V's proportions: arms of 7.4 and 14.3 mm at 22.4 mm pitch, so that a fibre reaches its
+/// neighbour's base.
+inline HexLayoutOptions SdssLike(std::uint32_t count) {
+  return {.count = count, .pitch_mm = 22.4, .theta_arm_mm = 7.4, .phi_arm_mm = 14.3};
+}
 
 /// Exactly `count` units, ids from 1, nearest the centre first; nodes are given on each bus in that
 /// order. Frame: focal plane, the centre unit at 0, 0. Cost: O(n log n).

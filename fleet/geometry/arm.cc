@@ -55,19 +55,10 @@ ArmGeometry::ArmGeometry(const Unit& unit, const UnitDrive& drive)
 }
 
 SegmentFp ArmGeometry::At(const Pose& pose) const {
-  const double theta = theta_zero_rad_ + pose[0] * theta_step_rad_;
-  const double beyond = theta + Fold(pose[1]);
-  SegmentFp line;
-  line.a.x_mm = base_.x_mm + theta_arm_mm_ * std::cos(theta);
-  line.a.y_mm = base_.y_mm + theta_arm_mm_ * std::sin(theta);
-  line.b.x_mm = line.a.x_mm + phi_arm_mm_ * std::cos(beyond);
-  line.b.y_mm = line.a.y_mm + phi_arm_mm_ * std::sin(beyond);
-  return line;
+  return AtAngles(Theta(pose[0]), Fold(pose[1]));
 }
 
-double ArmGeometry::FibreRadiusMax(std::int32_t phi_low, std::int32_t phi_high) const {
-  const double low = Fold(phi_low);
-  const double high = Fold(phi_high);
+double ArmGeometry::FibreRadiusMaxFold(double low, double high) const {
   const double turn = 2 * std::numbers::pi;
   double cosine = std::max(std::cos(low), std::cos(high));
   if (std::ceil(low / turn) * turn <= high) cosine = 1;

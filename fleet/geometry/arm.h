@@ -14,6 +14,7 @@
 
 #include "fleet/drive.h"
 #include "fleet/geometry/segment.h"
+#include "fleet/geometry/turn.h"
 #include "fleet/layout.h"
 
 namespace focalfleet {
@@ -45,9 +46,23 @@ class ArmGeometry {
 
   /// The phi arm, `a` the elbow and `b` the fibre.
   [[nodiscard]] SegmentFp At(const Pose& pose) const;
-  /// Largest and smallest distance of the fibre from the base over a range of phi. Units: vectors,
-  /// mm.
-  [[nodiscard]] double FibreRadiusMax(std::int32_t phi_low, std::int32_t phi_high) const;
+  /// The same for angles that need not be whole vectors; as Theta and Fold give them. Units: rad.
+  [[nodiscard]] SegmentFp AtAngles(double theta_rad, double fold_rad) const {
+    const Direction inner = DirectionOf(theta_rad);
+    const Direction outer = DirectionOf(theta_rad + fold_rad);
+    const PointFp elbow{base_.x_mm + theta_arm_mm_ * inner.cos,
+                        base_.y_mm + theta_arm_mm_ * inner.sin};
+    return {elbow, {elbow.x_mm + phi_arm_mm_ * outer.cos, elbow.y_mm + phi_arm_mm_ * outer.sin}};
+  }
+  /// Largest distance of the fibre from the base over a range of phi. Units: vectors, mm.
+  [[nodiscard]] double FibreRadiusMax(std::int32_t phi_low, std::int32_t phi_high) const {
+    return FibreRadiusMaxFold(Fold(phi_low), Fold(phi_high));
+  }
+  [[nodiscard]] double FibreRadiusMaxFold(double low_rad, double high_rad) const;
+  /// Direction of the theta arm in the focal plane. Units: rad.
+  [[nodiscard]] double Theta(std::int32_t theta) const {
+    return theta_zero_rad_ + theta * theta_step_rad_;
+  }
   /// Angle between theta arm and phi arm: 0 stretched out, pi folded back. Units: rad.
   [[nodiscard]] double Fold(std::int32_t phi) const { return phi_zero_rad_ + phi * phi_step_rad_; }
 

@@ -55,6 +55,11 @@ constexpr double SquaredDistance(const SegmentFp& s, const SegmentFp& t) {
   return std::min({SquaredDistance(s.a, t), SquaredDistance(s.b, t), SquaredDistance(t.a, s),
                    SquaredDistance(t.b, s)});
 }
+constexpr double SquaredDistanceOfMiddles(const SegmentFp& s, const SegmentFp& t) {
+  const double dx = (s.a.x_mm + s.b.x_mm) - (t.a.x_mm + t.b.x_mm);
+  const double dy = (s.a.y_mm + s.b.y_mm) - (t.a.y_mm + t.b.y_mm);
+  return (dx * dx + dy * dy) / 4;
+}
 inline double DistanceMm(const SegmentFp& s, const SegmentFp& t) {
   return std::sqrt(SquaredDistance(s, t));
 }

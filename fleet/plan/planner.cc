@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numbers>
 
+#include "fleet/plan/choreography.h"
 #include "fleet/plan/midway.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
@@ -328,6 +329,21 @@ void Planner::GiveWay() {
 Result<Plan> Planner::Run() {
   Classify();
   FOCALFLEET_TRY(Check());
+  if (getenv("CHOREO")) {
+    DropCollidingTargets();
+    scene_.AllowFor(start_);
+    scene_.AllowFor(goal_);
+    double bound=0;
+    for (std::uint32_t i=0;i<scene_.size();++i) bound=std::max(bound, Straight(request_.drives[i], start_[i], goal_[i]).end_s);
+    ChoreographyRequest q{.scene=&scene_, .drives=request_.drives, .from=start_, .to=goal_, .movable=movable_, .tolerance={.notice_s=atof(getenv("CHOREO"))}, .within_s=bound*1.0};
+    auto c = Choreograph(q);
+    Plan plan;
+    for (std::uint32_t i=0;i<scene_.size();++i) { if (c.paths[i][0].size()+c.paths[i][1].size()==0) continue;
+      UnitPlan u; u.unit={i}; u.from=start_[i]; u.to=goal_[i]; u.path=c.paths[i]; plan.makespan_s=std::max(plan.makespan_s, EndOf(u, request_.drives[i])); plan.moves.push_back(u);}
+    std::printf("conflicts %zu\n", c.in_conflict.size());
+    plan.unserved = std::move(unserved_);
+    return plan;
+  }
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {

@@ -228,7 +228,7 @@ TEST(DrawConfiguration, CoversThePatrolAreaEvenly) {
   // Units too far apart to touch: within each ring of equal area falls the same share of fibres.
   constexpr int kUnits = 3000;
   constexpr int kRings = 10;
-  auto units = MakeHexLayout({.count = kUnits, .pitch_mm = 100, .arm_mm = 8.25});
+  auto units = MakeHexLayout({.count = kUnits, .pitch_mm = 100, .theta_arm_mm = 8.25});
   for (Unit& unit : units) unit.axis[1].min_deg = -40;  // two elbow sides for the outer part
   const Fleet fleet = FleetOf(units);
   const auto poses = DrawConfiguration(fleet.layout, fleet.drives, {}, Rng(20));

@@ -1,0 +1,314 @@
+#include "fleet/plan/choreography.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+
+#include "fleet/plan/time_search.h"
+#include "protocol/base/rng.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr int kLooksPerUnit = 10;
+constexpr int kLooksAlone = 3;
+constexpr int kLooksWithNotice = 3;
+
+class Repair {
+ public:
+  explicit Repair(const ChoreographyRequest& request)
+      : q_(request), scene_(*request.scene), rng_(Rng::Stream(request.seed, "choreography")) {}
+
+  Choreography Run();
+
+ private:
+  void Begin();
+  bool Improve(std::uint32_t unit);
+  double Cost(std::uint32_t unit, const Track& track, double limit);
+  [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot);
+  [[nodiscard]] bool InConflict(std::uint32_t unit);
+  void Push(std::uint32_t unit);
+  [[nodiscard]] const Tolerance& ToleranceOf(std::uint32_t unit, std::uint32_t slot) const {
+    return unnoticed_[unit][slot] != 0 ? without_notice_ : q_.tolerance;
+  }
+  [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
+  void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
+  bool SearchWay(std::uint32_t unit, double end_s, int looks);
+  bool GoAround(std::uint32_t unit, std::uint32_t other);
+  double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
+  void Take(std::uint32_t unit, const Candidate& candidate);
+
+  const ChoreographyRequest& q_;
+  const Scene& scene_;
+  Rng rng_;
+  Tolerance without_notice_;
+  Choreography out_;
+  std::vector<std::vector<std::uint8_t>> unnoticed_;  // by unit and slot: the pair has no notice
+  std::vector<std::vector<float>> weight_;            // by unit and neighbour's slot
+  std::vector<std::vector<std::uint32_t>> order_;     // slots, those that mattered last first
+  std::vector<std::uint8_t> queued_;
+  std::vector<std::uint8_t> looks_;
+  std::deque<std::uint32_t> queue_;
+  std::vector<Candidate> candidates_;
+  Track track_;
+  TimeSearch search_;
+  std::vector<Passer> passers_;
+  std::vector<Blocker> blockers_;
+};
+
+bool Repair::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) {
+  const NeighbourNeed& near = scene_.neighbours(unit)[slot];
+  if (!scene_.is_place(near.unit) || out_.tracks[near.unit].legs().empty()) return false;
+  return !PassesClear(scene_.arm(unit), track, scene_.arm(near.unit), out_.tracks[near.unit],
+                      near.need_mm, ToleranceOf(unit, slot));
+}
+
+/// Sum of the weights of the neighbours that it would meet; at least `limit` once that is reached.
+double Repair::Cost(std::uint32_t unit, const Track& track, double limit) {
+  for (const StandingThing& thing : scene_.standing(unit))
+    if (!PassesClearOf(scene_.arm(unit), track, thing.capsule, thing.need_mm)) return kNever;
+  double cost = 0;
+  std::vector<std::uint32_t>& order = order_[unit];
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::uint32_t slot = order[k];
+    if (!Meets(unit, track, slot)) continue;
+    if (q_.movable[scene_.neighbours(unit)[slot].unit] == 0) return kNever;
+    cost += static_cast<double>(weight_[unit][slot]);
+    if (k > 0) std::swap(order[k], order[k - 1]);
+    if (cost >= limit) return cost;
+  }
+  return cost;
+}
+
+bool Repair::InConflict(std::uint32_t unit) {
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot)
+    if (Meets(unit, out_.tracks[unit], slot)) return true;
+  return false;
+}
+
+void Repair::Push(std::uint32_t unit) {
+  if (queued_[unit] != 0 || q_.movable[unit] == 0) return;
+  queued_[unit] = 1;
+  queue_.push_back(unit);
+}
+
+std::uint32_t Repair::BackSlot(std::uint32_t unit, std::uint32_t slot) const {
+  const auto back = scene_.neighbours(scene_.neighbours(unit)[slot].unit);
+  const auto it = std::find_if(back.begin(), back.end(),
+                               [&](const NeighbourNeed& near) { return near.unit == unit; });
+  return static_cast<std::uint32_t>(it - back.begin());
+}
+
+void Repair::GiveUpNotice(std::uint32_t unit, std::uint32_t slot) {
+  unnoticed_[unit][slot] = 1;
+  unnoticed_[scene_.neighbours(unit)[slot].unit][BackSlot(unit, slot)] = 1;
+}
+
+void Repair::Begin() {
+  const std::size_t n = scene_.size();
+  out_.paths.resize(n);
+  out_.tracks.resize(n);
+  weight_.resize(n);
+  unnoticed_.resize(n);
+  without_notice_ = q_.tolerance;
+  without_notice_.notice_s = 0;
+  order_.resize(n);
+  queued_.assign(n, 0);
+  looks_.assign(n, 0);
+  std::vector<std::pair<double, std::uint32_t>> spare;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::size_t near = scene_.neighbours(i).size();
+    weight_[i].assign(near, 1);
+    unnoticed_[i].assign(near, 0);
+    order_[i].resize(near);
+    for (std::uint32_t k = 0; k < near; ++k) order_[i][k] = k;
+    if (!scene_.is_place(i)) continue;
+    if (q_.movable[i] == 0 || q_.from[i] == q_.to[i]) {
+      out_.tracks[i] = Track(scene_.arm(i), q_.from[i]);
+      if (q_.movable[i] != 0) spare.emplace_back(-q_.within_s, i);
+      continue;
+    }
+    Candidate straight = Straight(q_.drives[i], q_.from[i], q_.to[i]);
+    out_.paths[i] = straight.path;
+    out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], straight.path);
+    spare.emplace_back(straight.end_s - q_.within_s, i);
+  }
+  // Who has the most time to spare gives way first.
+  std::sort(spare.begin(), spare.end());
+  for (const auto& [time, i] : spare) Push(i);
+}
+
+void Repair::Take(std::uint32_t unit, const Candidate& candidate) {
+  out_.paths[unit] = candidate.path;
+  out_.tracks[unit] = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
+}
+
+/// The least cost of the candidates from `first` on, and which.
+double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::size_t* chosen) {
+  double best = kNever;
+  int ties = 0;
+  for (std::size_t c = first; c < candidates_.size() && best > 0; ++c) {
+    const Candidate& candidate = candidates_[c];
+    const double late = std::max(0.0, candidate.end_s / (q_.within_s * extend) - 1);
+    if (late >= best) continue;
+    track_ = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
+    const double cost = late + Cost(unit, track_, best == kNever ? best : best - late + 1e-9);
+    if (cost > best || cost == kNever) continue;
+    ties = cost < best ? 1 : ties + 1;
+    if (cost == best && rng_.Below(static_cast<std::uint64_t>(ties)) != 0) continue;
+    best = cost;
+    *chosen = c;
+  }
+  return best;
+}
+
+/// A way for `unit` among all others as they go.
+bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
+  passers_.clear();
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
+    const NeighbourNeed& near = scene_.neighbours(unit)[slot];
+    if (scene_.is_place(near.unit))
+      passers_.push_back(
+          {&scene_.arm(near.unit), &out_.tracks[near.unit], near.need_mm, ToleranceOf(unit, slot)});
+  }
+  blockers_.clear();
+  for (const StandingThing& thing : scene_.standing(unit))
+    blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
+  const ArmGeometry& arm = scene_.arm(unit);
+  TimeSearch::Question question{.arm = &arm,
+                                .drive = &q_.drives[unit],
+                                .passers = passers_,
+                                .standing = blockers_,
+                                .from = q_.from[unit],
+                                .to = q_.to[unit],
+                                .within = RangeAround(arm, q_.from[unit]),
+                                .end_s = end_s};
+  for (const double grid_deg : {6.0, 3.0}) {
+    if (grid_deg < 6 && looks < kLooksAlone) break;
+    question.grid_deg = grid_deg;
+    question.expansions_max = looks < kLooksAlone ? 1500 : 20'000;
+    const std::optional<AxisPaths> paths = search_.Find(question);
+    if (!paths) continue;
+    track_ = Track(arm, q_.drives[unit], q_.from[unit], *paths);
+    if (Cost(unit, track_, 1) >= 1) continue;
+    out_.paths[unit] = *paths;
+    out_.tracks[unit] = track_;
+    return true;
+  }
+  return false;
+}
+
+/// `other` goes in one of its own ways that meet nobody else, and `unit` finds one around it. True:
+/// neither meets anybody then.
+bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
+  const Choreography::Motion before{out_.paths[unit], out_.tracks[unit]};
+  const Choreography::Motion other_before{out_.paths[other], out_.tracks[other]};
+  const double extend = 1 + 0.02 * std::max(0, looks_[unit] - kLooksAlone);
+  out_.tracks[unit] = Track();
+  candidates_.clear();
+  CandidateQuestion question{.scene = &scene_,
+                             .drive = &q_.drives[other],
+                             .unit = other,
+                             .from = q_.from[other],
+                             .to = q_.to[other],
+                             .within_s = q_.within_s * extend};
+  for (const CandidateRound& round : kCandidateRounds) {
+    question.round = round;
+    AppendCandidates(question, &candidates_);
+  }
+  const std::vector<Candidate> ways = std::move(candidates_);
+  candidates_ = {};
+  constexpr int kTries = 6;
+  std::vector<std::size_t> good;
+  for (std::size_t w = 0; w < ways.size(); ++w) {
+    track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], ways[w].path);
+    if (Cost(other, track_, 1) < 1) good.push_back(w);
+  }
+  for (int k = 0; k < kTries && !good.empty(); ++k) {
+    // The soonest, the latest, and some between.
+    const std::size_t pick = k == 0 ? 0 : k == 1 ? good.size() - 1 : rng_.Below(good.size());
+    Take(other, ways[good[pick]]);
+    if (SearchWay(unit, q_.within_s * extend, looks_[unit])) return true;
+  }
+  out_.paths[unit] = before.path;
+  out_.tracks[unit] = before.track;
+  out_.paths[other] = other_before.path;
+  out_.tracks[other] = other_before.track;
+  return false;
+}
+
+/// The best candidate of the unit as the others go now. True: it meets nobody.
+bool Repair::Improve(std::uint32_t unit) {
+  if (Cost(unit, out_.tracks[unit], kNever) == 0) return true;
+  const int looks = looks_[unit]++;
+  const double extend = 1 + 0.02 * std::max(0, looks - kLooksAlone);
+  double best = kNever;
+  std::size_t chosen = 0;
+  candidates_.clear();
+  CandidateQuestion question{.scene = &scene_,
+                             .drive = &q_.drives[unit],
+                             .unit = unit,
+                             .from = q_.from[unit],
+                             .to = q_.to[unit],
+                             .within_s = q_.within_s * extend};
+  for (const CandidateRound& round : kCandidateRounds) {
+    question.round = round;
+    const std::size_t first = candidates_.size();
+    AppendCandidates(question, &candidates_);
+    std::size_t here = 0;
+    const double cost = Best(unit, extend, first, &here);
+    if (cost < best) {
+      best = cost;
+      chosen = here;
+    }
+    if (best < 1) break;
+  }
+  if (best < 1) {
+    Take(unit, candidates_[chosen]);
+    return true;
+  }
+  if (looks >= 1 || best == kNever) {
+    if (SearchWay(unit, q_.within_s * extend, looks)) return true;
+    if (best == kNever) {
+      Push(unit);
+      return false;
+    }
+  }
+  Take(unit, candidates_[chosen]);
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
+    if (!Meets(unit, out_.tracks[unit], slot)) continue;
+    const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
+    if (looks >= 1 && q_.movable[other] != 0 && (GoAround(unit, other) || GoAround(other, unit))) {
+      Push(unit);
+      Push(other);
+      return true;
+    }
+    if (looks >= kLooksWithNotice) GiveUpNotice(unit, slot);
+    weight_[unit][slot] += 1;
+    weight_[other][BackSlot(unit, slot)] += 1;
+    Push(other);
+    Push(unit);
+  }
+  return false;
+}
+
+Choreography Repair::Run() {
+  Begin();
+  while (!queue_.empty()) {
+    const std::uint32_t unit = queue_.front();
+    queue_.pop_front();
+    queued_[unit] = 0;
+    if (looks_[unit] < kLooksPerUnit) Improve(unit);
+  }
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    if (scene_.is_place(i) && InConflict(i)) out_.in_conflict.push_back(i);
+  return std::move(out_);
+}
+
+}  // namespace
+
+Choreography Choreograph(const ChoreographyRequest& request) { return Repair(request).Run(); }
+
+}  // namespace focalfleet

@@ -1,0 +1,93 @@
+// Where a unit's arm is over its own time: legs, linear in both angles, with a stand before the
+// first and after the last. Times are seconds after the start signal by the unit's own clock, made
+// from the very segments that go on the bus.
+//
+// Two clocks never agree: a unit starts up to `start_skew_s` early or late and its clock runs up to
+// `clock_error` fast or slow. So of two units own times a and b can belong to one true instant
+// exactly if |a - b| <= Slip(max(a, b)), and a test of all such (a, b) holds for every skew and
+// clock. Asking for `notice_s` more keeps each clear of where the other was that long before: a
+// unit that halts by itself can then be waited for by stopping the other that much later.
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <vector>
+
+#include "fleet/drive.h"
+#include "fleet/geometry/arm.h"
+#include "protocol/wire/staged_move.h"
+
+namespace focalfleet {
+
+struct Tolerance {
+  double start_skew_s = 0.020;
+  double clock_error = 0.005;
+  double notice_s = 0;
+
+  /// How far apart the own times of two units may be at one instant, by `t_s`. Units: s.
+  [[nodiscard]] double Slip(double t_s) const {
+    // (1 + e) / (1 - e) - 1 is below 2 e / (1 - e).
+    return ((2 * start_skew_s + notice_s) * (1 + clock_error) + kVectorS) +
+           2 * clock_error / (1 - clock_error) * std::max(t_s, 0.0);
+  }
+  static constexpr double kVectorS = 1e-3;  // within a vector nobody says where the rotor is
+};
+
+/// One leg: angles at `begin_s` and their rates.
+struct Leg {
+  double begin_s = 0;
+  double end_s = 0;
+  double theta_rad = 0;
+  double fold_rad = 0;
+  double theta_rad_per_s = 0;
+  double fold_rad_per_s = 0;
+  double speed_mm_per_s = 0;  // no point of the arm is faster
+  [[nodiscard]] bool stands() const { return speed_mm_per_s == 0; }
+};
+
+using AxisPaths = std::array<AxisPath, kAxisCount>;
+
+class Track {
+ public:
+  Track() = default;
+  /// A unit that stands where it is.
+  Track(const ArmGeometry& arm, const Pose& stands);
+  Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from, const AxisPaths& path);
+
+  /// Shape: at least one; the first begins at -kForever, the last ends at kForever.
+  [[nodiscard]] std::span<const Leg> legs() const { return legs_; }
+  [[nodiscard]] double end_s() const { return legs_.back().begin_s; }
+  /// Farthest that any point of the arm's core gets from the base. Units: mm.
+  [[nodiscard]] double reach_mm() const { return reach_mm_; }
+
+  static constexpr double kForever = 1e9;
+
+ private:
+  std::vector<Leg> legs_;
+  double reach_mm_ = 0;
+};
+
+/// A leg of one arm, where it is at a time.
+inline SegmentFp ArmAt(const ArmGeometry& arm, const Leg& leg, double own_s) {
+  const double dt_s = leg.stands() ? 0 : own_s - leg.begin_s;
+  return arm.AtAngles(leg.theta_rad + leg.theta_rad_per_s * dt_s,
+                      leg.fold_rad + leg.fold_rad_per_s * dt_s);
+}
+
+/// True: the two are farther apart than `need_mm` at all own times that the tolerance lets meet.
+/// Nothing is sampled. Cost: at most `budget` distances; more would be needed only where they
+/// nearly touch: false.
+bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
+                 double need_mm, const Tolerance& tolerance, int budget = 2000);
+
+/// The same for one leg of `a`; before and after it nothing is asked.
+bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
+                    const Track& b, double need_mm, const Tolerance& tolerance, int budget = 500);
+
+/// The same against something that never moves.
+bool LegPassesClearOf(const ArmGeometry& arm, const Leg& leg, const Capsule& standing,
+                      double need_mm, int budget = 500);
+bool PassesClearOf(const ArmGeometry& arm, const Track& track, const Capsule& standing,
+                   double need_mm, int budget = 2000);
+
+}  // namespace focalfleet

@@ -1,0 +1,127 @@
+// Random configuration to random configuration, one line a configuration: makespan over the lower
+// bound, CPU seconds, who was not served; the independent checker on request. A summary at the end.
+//   plan_bench --layout 0 --units 5000 --configurations 100 --seed 1 --check 1
+// --layout 0 hexagonal, 1 the plate of the file FOCALFLEET_DESI_UNITS names, 2 SDSS-like.
+#include <sys/resource.h>
+
+#include <cstdlib>
+#include <ctime>
+#include <fstream>
+#include <sstream>
+
+#include "fleet/estimate.h"
+#include "fleet/files/layout_file.h"
+#include "fleet/hex_layout.h"
+#include "fleet/plan/planner.h"
+#include "fleet/targets.h"
+#include "tests/bench/options.h"
+#include "tests/fleet/plan/plan_rows.h"
+
+namespace focalfleet::bench {
+namespace {
+
+std::vector<Unit> UnitsOf(int layout, std::uint32_t count) {
+  if (layout == 0) return MakeHexLayout({.count = count});
+  if (layout == 2) return MakeHexLayout(SdssLike(count));
+  const char* path = std::getenv("FOCALFLEET_DESI_UNITS");
+  if (path == nullptr) return {};
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  auto read = ReadUnits(text.str(), path);
+  return read ? std::move(read->units) : std::vector<Unit>{};
+}
+
+double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// The slowest unit's shortest move alone. Units: s.
+double BoundOf(const PlanRequest& request) {
+  double bound_s = 0;
+  for (std::uint32_t i = 0; i < request.layout->size(); ++i) {
+    if (!request.targets[i] || request.frozen[i] != 0) continue;
+    const Pose from = PlaceOf(request.start[i]);
+    for (std::size_t k = 0; k < kAxisCount; ++k)
+      bound_s = std::max(bound_s, std::abs((*request.targets[i])[k] - from[k]) *
+                                      SecondsPerVector(request.drives[i].axis[k]));
+  }
+  return bound_s;
+}
+
+struct Row {
+  double ratio = 0;
+  double cpu_s = 0;
+};
+
+int Run(int argc, char** argv) {
+  const int kind = Option(argc, argv, "--layout", 0);
+  const auto count = static_cast<std::uint32_t>(Option(argc, argv, "--units", 5000));
+  const int configurations = Option(argc, argv, "--configurations", 10);
+  const auto seed = static_cast<std::uint64_t>(Option(argc, argv, "--seed", 1));
+  const bool check = Option(argc, argv, "--check", 0) != 0;
+  auto layout = Layout::Create(UnitsOf(kind, count), {});
+  if (!layout || layout->size() == 0) return std::fprintf(stderr, "no such layout\n"), 2;
+  const std::size_t n = layout->size();
+  const std::vector<UnitDrive> drives(n);
+  std::vector<std::uint8_t> frozen(n, 0);
+  std::vector<Row> rows;
+  int faults = 0;
+  for (int c = 0; c < configurations; ++c) {
+    std::vector<std::optional<Pose>> standing(n);
+    const auto draw = [&](const char* what) {
+      return DrawConfiguration(*layout, drives, standing,
+                               Rng::Stream(seed + static_cast<std::uint64_t>(c), what));
+    };
+    const auto from = draw("start");
+    if (!from) return std::fprintf(stderr, "%s\n", from.error().text.c_str()), 1;
+    std::vector<UnitKnowledge> start;
+    for (const Pose& pose : *from) start.push_back(Exactly(Witness::kReported, pose));
+    for (std::uint32_t i = 0; i < n; ++i)
+      if (!layout->unit({i}).enabled) standing[i] = (*from)[i];
+    const auto to = draw("target");
+    if (!to) return std::fprintf(stderr, "%s\n", to.error().text.c_str()), 1;
+    std::vector<std::optional<Pose>> targets(to->begin(), to->end());
+    for (std::uint32_t i = 0; i < n; ++i)
+      if (!layout->unit({i}).enabled) targets[i].reset();
+    const PlanRequest request{
+        .layout = &*layout, .drives = drives, .start = start, .targets = targets, .frozen = frozen};
+    const double begin_s = CpuSeconds();
+    const auto plan = MakePlan(request, {});
+    const double cpu_s = CpuSeconds() - begin_s;
+    if (!plan) return std::fprintf(stderr, "%s\n", plan.error().text.c_str()), 1;
+    const double bound_s = BoundOf(request);
+    rows.push_back({plan->makespan_s / bound_s, cpu_s});
+    std::string verdict = "-";
+    if (check) {
+      testing::CheckOptions options;
+      options.clearance_mm = layout->clearance_mm();
+      const auto report = testing::CheckPlan(testing::CheckedUnits(*layout, drives, start, frozen),
+                                             testing::CheckedRows(*plan, *layout, drives),
+                                             testing::CheckedObstacles(*layout), options);
+      verdict = report.ok() ? "clear" : report.Text();
+    }
+    if (!plan->unserved.empty() || (check && verdict != "clear")) ++faults;
+    std::printf("seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu %s\n",
+                static_cast<unsigned long long>(seed + static_cast<std::uint64_t>(c)), bound_s,
+                plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), verdict.c_str());
+    std::fflush(stdout);
+  }
+  std::vector<double> ratios;
+  std::vector<double> cpu;
+  for (const Row& row : rows) {
+    ratios.push_back(row.ratio);
+    cpu.push_back(row.cpu_s);
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  std::printf(
+      "%zu units, %d configurations: ratio median %.4f worst %.4f, cpu median %.3f s worst %.3f s, "
+      "memory %ld MiB, %d with faults\n",
+      n, configurations, Median(ratios), *std::max_element(ratios.begin(), ratios.end()),
+      Median(cpu), *std::max_element(cpu.begin(), cpu.end()), usage.ru_maxrss / 1024, faults);
+  return faults == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace focalfleet::bench
+
+int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
