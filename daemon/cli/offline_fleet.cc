@@ -61,7 +61,7 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
   TellPassedOver(context, files.targets, targets.ignored_columns);
   const std::vector<UnitKnowledge> start = KnowledgeOf(state);
-  FOCALFLEET_TRY_ASSIGN(const auto poses,
+  FOCALFLEET_TRY_ASSIGN(StatePoses poses,
                         ResolveTargets(targets, fleet.layout, fleet.drives, start));
   std::vector<std::uint8_t> frozen(fleet.layout.size());
   for (std::uint32_t i = 0; i < frozen.size(); ++i) {
@@ -77,7 +77,7 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
     return Fail(plan.error().code,
                 fmt::format("{} from {}: {}", files.targets, files.from, plan.error().text));
   }
-  return OfflinePlan{std::move(*plan), targets.rows.size()};
+  return OfflinePlan{std::move(*plan), std::move(poses), targets.rows.size()};
 }
 
 Json UnservedJson(const Plan& plan, const Layout& layout) {

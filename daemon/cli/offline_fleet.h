@@ -49,6 +49,7 @@ struct PlanFiles {
 };
 struct OfflinePlan {
   Plan plan;
+  StatePoses targets;
   std::size_t targeted = 0;
 };
 /// The plan from `state` to the targets; disabled units stand. Errors: as LoadFleet, and those of

@@ -1,4 +1,5 @@
-// plan: from a state to targets, on paper. Nothing moves; anyone can check the file that it writes.
+// plan: from a state to targets, on paper. Nothing moves; anyone can check the file that it writes,
+// or look at it.
 
 #include <fmt/format.h>
 
@@ -7,6 +8,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/offline_fleet.h"
 #include "daemon/cli/text_file.h"
+#include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
 
@@ -19,6 +21,7 @@ struct PlanCommandOptions {
   std::string from;
   bool fixed = false;
   std::string out;
+  std::string plot;  // empty: none
 };
 
 struct Planned {
@@ -29,6 +32,16 @@ struct Planned {
   std::size_t rows = 0;
 };
 
+std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
+                   const StatePoses& state, const OfflinePlan& planned) {
+  return report::PlanPage({.title = fmt::format("Plan: {} from {}", options.targets, options.from),
+                           .layout = &fleet.layout,
+                           .drives = fleet.drives,
+                           .start = state,
+                           .targets = planned.targets,
+                           .plan = &planned.plan});
+}
+
 Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& options) {
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
   FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
@@ -38,6 +51,10 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
                   {.targets = options.targets, .from = options.from, .fixed = options.fixed}));
   const MotorModel motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);
+  if (!options.plot.empty()) {
+    FOCALFLEET_TRY(WriteFileAtomically(options.plot, PageOf(options, fleet, state, planned)));
+  }
+  // Last: where it is, all is.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
   return Planned{std::move(fleet), planned.targeted, std::move(planned.plan), std::move(estimate),
@@ -65,7 +82,8 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"rails", rails},
           {"rows", planned.rows},
           {"cpu_s", static_cast<double>(std::clock()) / CLOCKS_PER_SEC},
-          {"out", options.out}};
+          {"out", options.out},
+          {"plot", options.plot.empty() ? Json(nullptr) : Json(options.plot)}};
 }
 
 std::string Describe(const Json& summary) {
@@ -76,7 +94,11 @@ std::string Describe(const Json& summary) {
       summary["out"].get<std::string>(), summary["served"].get<std::uint64_t>(),
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
       number("makespan_s"), number("energy_J"), number("peak_power_W"));
-  return text + DescribeUnserved(summary["unserved"]);
+  const std::string plot =
+      summary["plot"].is_null()
+          ? ""
+          : fmt::format("\n  {}: to look at, in a browser", summary["plot"].get<std::string>());
+  return text + plot + DescribeUnserved(summary["unserved"]);
 }
 
 ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
@@ -89,13 +111,21 @@ ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
   return planned->plan.unserved.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
 
+// stdout has the plan or its summary.
+CLI::Validator NoStdout() {
+  return {[](const std::string& path) {
+            return path == "-" ? std::string("a page goes into a file") : std::string();
+          },
+          ""};
+}
+
 }  // namespace
 
 void AddPlanCommand(CommandLine* line) {
   CLI::App* command =
       AddCommand(&line->app, "plan", "Plan a configuration on paper: what will move when",
                  "  focalfleet plan --units units.csv --targets targets.csv --from state.csv "
-                 "--out plan.csv --json");
+                 "--out plan.csv --plot plan.html");
   auto options = std::make_shared<PlanCommandOptions>();
   AddFleetFiles(command, &options->files);
   AddFile(command, "--targets", &options->targets, "targets.csv: where the fibres shall be")
@@ -103,6 +133,9 @@ void AddPlanCommand(CommandLine* line) {
   AddFile(command, "--from", &options->from, "state.csv: where every axis stands")->required();
   command->add_flag("--fixed", options->fixed, "Units that no target names may not step aside");
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
+  AddFile(command, "--plot", &options->plot,
+          "plan.html to write: the plan to look at, in a browser")
+      ->check(NoStdout());
   OnChosen(line, command, options, RunPlan);
 }
 

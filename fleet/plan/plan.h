@@ -45,11 +45,20 @@ struct Unserved {
   std::optional<PositionerIndex> by;
 };
 
+/// Two units where they come nearest to each other.
+struct TightPair {
+  PositionerIndex a, b;
+  double clearance_mm = 0;  // distance of the arms' surfaces minus the configured clearance: 0 is
+                            // just clear
+  double t_s = 0;           // after the start signal
+};
+
 struct Plan {
   std::vector<UnitPlan> moves;     // ascending by unit; only units that move
   std::vector<Unserved> unserved;  // ascending by unit
   std::string too_near;   // with PlanOptions::lead_apart: the pairs that are led apart, for people
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
+  std::vector<TightPair> tightest;  // those with the least clearance; empty: nobody looked
 };
 
 /// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so

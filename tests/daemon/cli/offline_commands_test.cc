@@ -198,6 +198,29 @@ TEST_F(OfflineCommands, PlanServesADrawnConfigurationAndTellsTheSummary) {
   EXPECT_GT(told["rails"][0]["peak_power_W"].get<double>(), 0);
 }
 
+TEST_F(OfflineCommands, PlanWritesAPageToLookAt) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const std::string page = scratch_ / "plan.html";
+  const auto result = Plan(targets, {"--plot", page, "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err << result.out;
+  EXPECT_EQ(Json::parse(result.out, nullptr, false)["plot"], page);
+  EXPECT_THAT(Slurp(page), HasSubstr("\"units_count\":37"));
+  EXPECT_THAT(Slurp(page), HasSubstr("<title>Plan: " + targets));
+  EXPECT_THAT(Plan(targets, {"--plot", page}).out, HasSubstr(page + ": to look at"));
+  EXPECT_EQ(Json::parse(Plan(targets, {"--json"}).out, nullptr, false)["plot"], nullptr);
+}
+
+TEST_F(OfflineCommands, PlanWritesNothingWhereItsPageCannotBe) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto result = Plan(targets, {"--plot", scratch_ / "none/plan.html"});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.err, HasSubstr("none/plan.html: cannot be written"));
+  EXPECT_EQ(Plan(targets, {"--plot", "-"}).exit, 2) << "stdout has the plan or its summary";
+  EXPECT_THAT(scratch_.List(), ElementsAre("state.csv", "t.csv", "units.csv"));
+}
+
 TEST_F(OfflineCommands, PlanNamesADisabledTargetAndEndsWithThree) {
   units_ = scratch_.Put("units.csv", WithUnitOneDisabled(Slurp(units_)));
   ASSERT_EQ(Draw({"--seed", "1", "--as", "state", "--out", state_}).exit, 0);

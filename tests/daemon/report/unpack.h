@@ -1,0 +1,19 @@
+// The other side of pack.h, for tests: written from what its header says, with its own base64.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace focalfleet::report {
+
+/// Empty where the text is no base64 of whole groups.
+std::vector<std::uint8_t> FromBase64(const std::string& text);
+
+/// The bits of each number.
+std::vector<std::uint64_t> UnpackBits(const nlohmann::json& packed, std::size_t count);
+std::vector<double> Unpack(const nlohmann::json& packed, std::size_t count);
+
+}  // namespace focalfleet::report
