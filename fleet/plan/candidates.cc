@@ -24,12 +24,17 @@ class Builder {
   explicit Builder(const CandidateQuestion& question) : q_(question) {
     for (std::size_t k = 0; k < kAxisCount; ++k)
       lasts_s_[k] = Seconds(k, std::abs(q_.to[k] - q_.from[k]));
+    FindFolds();
   }
 
   void AppendStraight(std::vector<Candidate>* out) const;
   void AppendFolding(std::vector<Candidate>* out) const;
+  void AppendSliding(std::vector<Candidate>* out) const;
 
  private:
+  /// Values of phi to fold back to, beyond those of start and target; at most three.
+  [[nodiscard]] std::span<const std::int32_t> Folds() const { return {folds_.data(), fold_count_}; }
+  void FindFolds();
   [[nodiscard]] double Seconds(std::size_t axis, std::int32_t vectors) const {
     return vectors * SecondsPerVector(q_.drive->axis[axis]);
   }
@@ -64,6 +69,8 @@ class Builder {
 
   const CandidateQuestion& q_;
   std::array<double, kAxisCount> lasts_s_{};
+  std::array<std::int32_t, 3> folds_{};
+  std::size_t fold_count_ = 0;
 };
 
 void Builder::AppendStraight(std::vector<Candidate>* out) const {
@@ -94,15 +101,13 @@ void Builder::AppendStraight(std::vector<Candidate>* out) const {
   }
 }
 
-void Builder::AppendFolding(std::vector<Candidate>* out) const {
+void Builder::FindFolds() {
   const PhiSpan& cell = q_.scene->cell(q_.unit);
   const std::int32_t least = std::max(q_.from[1], q_.to[1]);
   const std::int32_t most = q_.scene->arm(q_.unit).range().high[1];
-  std::array<std::int32_t, 3> folds{};
-  std::size_t count = 0;
   const auto add = [&](std::int32_t fold) {
-    if (fold > least && fold <= most && (count == 0 || folds[count - 1] != fold))
-      folds[count++] = fold;
+    if (fold > least && fold <= most && (fold_count_ == 0 || folds_[fold_count_ - 1] != fold))
+      folds_[fold_count_++] = fold;
   };
   if (cell.low <= cell.high) {
     add(cell.low);
@@ -112,11 +117,14 @@ void Builder::AppendFolding(std::vector<Candidate>* out) const {
     add((least + most) / 2);
     add(most);
   }
+}
+
+void Builder::AppendFolding(std::vector<Candidate>* out) const {
   const double theta = lasts_s_[0];
   for (const double delay : Delays()) {
-    for (std::size_t f = 0; f < count; ++f) {
-      const double in = Seconds(1, folds[f] - q_.from[1]);
-      const double open = Seconds(1, folds[f] - q_.to[1]);
+    for (const std::int32_t fold : Folds()) {
+      const double in = Seconds(1, fold - q_.from[1]);
+      const double open = Seconds(1, fold - q_.to[1]);
       // Theta begins with the folding, in its middle or after it; the arm opens as late as theta
       // ends, or after it.
       for (const double lead : {0.0, in / 2, in}) {
@@ -125,7 +133,7 @@ void Builder::AppendFolding(std::vector<Candidate>* out) const {
           const double spare = q_.within_s - lasts;
           if (spare <= 0 && delay > 0) continue;
           const double begin = std::max(spare, 0.0) * delay;
-          out->push_back(FoldingAt(folds[f], begin, begin + lead, begin + lasts));
+          out->push_back(FoldingAt(fold, begin, begin + lead, begin + lasts));
           if (theta == 0) break;
         }
         if (theta == 0) break;
@@ -134,14 +142,67 @@ void Builder::AppendFolding(std::vector<Candidate>* out) const {
   }
 }
 
+/// Out of the start, over to the target and in, where out and in may slide.
+void Builder::AppendSliding(std::vector<Candidate>* out) const {
+  const ArmGeometry& arm = q_.scene->arm(q_.unit);
+  const double per_phi = arm.step_rad(Axis::kPhi) / arm.step_rad(Axis::kTheta);
+  const auto slid = [&](std::int32_t by_phi, int way) {
+    return static_cast<std::int32_t>(std::lround(by_phi * per_phi)) * way;
+  };
+  for (const double delay : Delays()) {
+    for (const std::int32_t fold : Folds()) {
+      for (const int way_out : {-1, 0, 1}) {
+        for (const int way_in : {-1, 0, 1}) {
+          if (way_out == 0 && way_in == 0) continue;
+          const std::int32_t out_theta = q_.from[0] + slid(fold - q_.from[1], way_out);
+          const std::int32_t in_theta = q_.to[0] + slid(fold - q_.to[1], way_in);
+          const auto in_range = [&](std::int32_t theta) {
+            return arm.range().low[0] <= theta && theta <= arm.range().high[0];
+          };
+          if (!in_range(out_theta) || !in_range(in_theta)) continue;
+          const double out_s =
+              std::max(Seconds(1, fold - q_.from[1]), Seconds(0, std::abs(out_theta - q_.from[0])));
+          const double over_s = Seconds(0, std::abs(in_theta - out_theta));
+          const double in_s =
+              std::max(Seconds(1, fold - q_.to[1]), Seconds(0, std::abs(in_theta - q_.to[0])));
+          const double lasts = out_s + over_s + in_s + 3 * kTickS;
+          const double spare = std::max(0.0, q_.within_s - lasts);
+          // The time to spare is spent before, folded before or after going over, or at the end.
+          constexpr std::array<std::array<double, 3>, 4> kWaits{
+              {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}, {0, 0.5, 0.5}}};
+          for (const auto& waits : kWaits) {
+            const double wait = spare * (1 - delay);
+            Candidate made;
+            double at = wait * waits[0];
+            Add(1, at, fold - q_.from[1], &made);
+            Add(0, at, out_theta - q_.from[0], &made);
+            at += out_s + kTickS + wait * waits[1];
+            Add(0, at, in_theta - out_theta, &made);
+            at += over_s + kTickS + wait * waits[2];
+            Add(1, at, q_.to[1] - fold, &made);
+            Add(0, at, q_.to[0] - in_theta, &made);
+            out->push_back(made);
+            if (spare == 0) break;
+          }
+        }
+      }
+    }
+    if (q_.within_s <= 0) return;
+  }
+}
+
 }  // namespace
 
 void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>* candidates) {
   const Builder builder(question);
-  if (question.round.folding)
-    builder.AppendFolding(candidates);
-  else
-    builder.AppendStraight(candidates);
+  switch (question.round.shape) {
+    case Shape::kStraight:
+      return builder.AppendStraight(candidates);
+    case Shape::kFolding:
+      return builder.AppendFolding(candidates);
+    case Shape::kSliding:
+      return builder.AppendSliding(candidates);
+  }
 }
 
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "fleet/plan/scene.h"
@@ -15,16 +16,23 @@ struct Candidate {
   double end_s = 0;
 };
 
-/// Which delays, as positions in the order in which they are tried.
+/// Shape and which delays, as positions in the order in which they are tried.
+enum class Shape : std::uint8_t {
+  kStraight,
+  kFolding,  // with the arm folded back on the way
+  kSliding,  // folded back along itself: theta turns with phi so that the arm keeps its direction,
+             // which gets it out of (or into) a place where it is hooked with another
+};
 struct CandidateRound {
-  bool folding = false;  // with the arm folded back on the way
+  Shape shape = Shape::kStraight;
   std::size_t first = 0;
   std::size_t last = 0;
 };
 /// Going straight comes first, folding back helps most often, waiting sometimes.
 inline constexpr std::array kCandidateRounds{
-    CandidateRound{false, 0, 2}, CandidateRound{true, 0, 2}, CandidateRound{false, 2, 13},
-    CandidateRound{true, 2, 7}};
+    CandidateRound{Shape::kStraight, 0, 2}, CandidateRound{Shape::kFolding, 0, 2},
+    CandidateRound{Shape::kSliding, 0, 1},  CandidateRound{Shape::kStraight, 2, 13},
+    CandidateRound{Shape::kFolding, 2, 7},  CandidateRound{Shape::kSliding, 2, 3}};
 
 struct CandidateQuestion {
   const Scene* scene = nullptr;

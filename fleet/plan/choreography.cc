@@ -35,6 +35,7 @@ class Repair {
   }
   [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
   void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
+  [[nodiscard]] bool Reaches(std::uint32_t unit, const AxisPaths& paths) const;
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
@@ -61,8 +62,13 @@ class Repair {
 bool Repair::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) {
   const NeighbourNeed& near = scene_.neighbours(unit)[slot];
   if (!scene_.is_place(near.unit) || out_.tracks[near.unit].legs().empty()) return false;
-  return !PassesClear(scene_.arm(unit), track, scene_.arm(near.unit), out_.tracks[near.unit],
-                      near.need_mm, ToleranceOf(unit, slot));
+  const Tolerance& tolerance = ToleranceOf(unit, slot);
+  const Track& other = out_.tracks[near.unit];
+  // Near touching the order of the two may matter: it is always the same.
+  return unit < near.unit ? !PassesClear(scene_.arm(unit), track, scene_.arm(near.unit), other,
+                                         near.need_mm, tolerance)
+                          : !PassesClear(scene_.arm(near.unit), other, scene_.arm(unit), track,
+                                         near.need_mm, tolerance);
 }
 
 /// Sum of the weights of the neighbours that it would meet; at least `limit` once that is reached.
@@ -92,6 +98,15 @@ void Repair::Push(std::uint32_t unit) {
   if (queued_[unit] != 0 || q_.movable[unit] == 0) return;
   queued_[unit] = 1;
   queue_.push_back(unit);
+}
+
+bool Repair::Reaches(std::uint32_t unit, const AxisPaths& paths) const {
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    std::int32_t at = q_.from[unit][k];
+    for (const Segment& segment : paths[k].segments()) at += segment.delta;
+    if (at != q_.to[unit][k]) return false;
+  }
+  return true;
 }
 
 std::uint32_t Repair::BackSlot(std::uint32_t unit, std::uint32_t slot) const {
@@ -125,14 +140,17 @@ void Repair::Begin() {
     order_[i].resize(near);
     for (std::uint32_t k = 0; k < near; ++k) order_[i][k] = k;
     if (!scene_.is_place(i)) continue;
-    if (q_.movable[i] == 0 || q_.from[i] == q_.to[i]) {
+    const bool steps_aside =
+        !q_.begin_with.empty() && q_.begin_with[i][0].size() + q_.begin_with[i][1].size() > 0;
+    if (q_.movable[i] == 0 || (q_.from[i] == q_.to[i] && !steps_aside)) {
       out_.tracks[i] = Track(scene_.arm(i), q_.from[i]);
       if (q_.movable[i] != 0) spare.emplace_back(-q_.within_s, i);
       continue;
     }
-    Candidate straight = Straight(q_.drives[i], q_.from[i], q_.to[i]);
-    out_.paths[i] = straight.path;
-    out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], straight.path);
+    const Candidate straight = Straight(q_.drives[i], q_.from[i], q_.to[i]);
+    const bool begun = !q_.begin_with.empty() && Reaches(i, q_.begin_with[i]);
+    out_.paths[i] = begun ? q_.begin_with[i] : straight.path;
+    out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], out_.paths[i]);
     spare.emplace_back(straight.end_s - q_.within_s, i);
   }
   // Who has the most time to spare gives way first.
@@ -188,7 +206,7 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
   for (const double grid_deg : {6.0, 3.0}) {
     if (grid_deg < 6 && looks < kLooksAlone) break;
     question.grid_deg = grid_deg;
-    question.expansions_max = looks < kLooksAlone ? 1500 : 20'000;
+    question.expansions_max = looks < kLooksAlone ? 300 : looks < 2 * kLooksAlone ? 2000 : 20'000;
     const std::optional<AxisPaths> paths = search_.Find(question);
     if (!paths) continue;
     track_ = Track(arm, q_.drives[unit], q_.from[unit], *paths);
@@ -220,13 +238,13 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   }
   const std::vector<Candidate> ways = std::move(candidates_);
   candidates_ = {};
-  constexpr int kTries = 6;
+  const int tries = looks_[unit] < kLooksAlone ? 2 : 6;
   std::vector<std::size_t> good;
   for (std::size_t w = 0; w < ways.size(); ++w) {
     track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], ways[w].path);
     if (Cost(other, track_, 1) < 1) good.push_back(w);
   }
-  for (int k = 0; k < kTries && !good.empty(); ++k) {
+  for (int k = 0; k < tries && !good.empty(); ++k) {
     // The soonest, the latest, and some between.
     const std::size_t pick = k == 0 ? 0 : k == 1 ? good.size() - 1 : rng_.Below(good.size());
     Take(other, ways[good[pick]]);
@@ -304,6 +322,11 @@ Choreography Repair::Run() {
   }
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     if (scene_.is_place(i) && InConflict(i)) out_.in_conflict.push_back(i);
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    for (std::uint32_t slot = 0; slot < unnoticed_[i].size(); ++slot)
+      if (const std::uint32_t j = scene_.neighbours(i)[slot].unit;
+          unnoticed_[i][slot] != 0 && i < j)
+        out_.without_notice.emplace_back(i, j);
   return std::move(out_);
 }
 

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "fleet/plan/candidates.h"
@@ -28,6 +29,8 @@ struct Choreography {
   std::vector<AxisPaths> paths;
   std::vector<Track> tracks;
   std::vector<std::uint32_t> in_conflict;  // ascending; empty: clear of each other at all times
+  /// Pairs that are clear, but not with notice. Lower index first, sorted.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> without_notice;
 };
 
 struct ChoreographyRequest {
@@ -36,6 +39,7 @@ struct ChoreographyRequest {
   std::span<const Pose> from;             // Shape: (n)
   std::span<const Pose> to;               // Shape: (n)
   std::span<const std::uint8_t> movable;  // Shape: (n); others stand
+  std::span<const AxisPaths> begin_with;  // Shape: (n), or empty: straight ways
   Tolerance tolerance;
   double within_s = 0;  // the time that may be used without being noticed
   std::uint64_t seed = 1;

@@ -25,8 +25,10 @@ struct UnitPlan {
   struct Follower {
     PositionerIndex unit;
     double begins_s = 0;  // seconds after the start signal
-    double left_s =
-        0;  // this one has left all of it by then: if it ends later, the other may go on
+    /// This one has left all of it by then: if it ends later, the other may go on. Nor does it
+    /// concern the other if it ends before `since_s`.
+    double left_s = 0;
+    double since_s = 0;
   };
   std::vector<Follower> followers;
 };
@@ -53,12 +55,23 @@ struct TightPair {
   double t_s = 0;           // after the start signal
 };
 
+/// A pair for which a stop of the one may be noticed too late to stop the other.
+struct Unnoticed {
+  PositionerIndex ends;
+  PositionerIndex follower;
+  double at_s = 0;      // it may be too late from here on, seconds after the start signal
+  double leaves_s = 0;  // time that is left between the end of the one and the stop of the other
+};
+
 struct Plan {
   std::vector<UnitPlan> moves;     // ascending by unit; only units that move
   std::vector<Unserved> unserved;  // ascending by unit
   std::string too_near;   // with PlanOptions::lead_apart: the pairs that are led apart, for people
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
-  std::vector<TightPair> tightest;  // those with the least clearance; empty: nobody looked
+  double bound_s = 0;     // no plan can be shorter: the slowest unit's shortest move alone
+  std::uint32_t crossings = 0;       // pairs of which one comes where the other was before
+  std::vector<Unnoticed> unnoticed;  // those among them that the notice does not cover
+  std::vector<TightPair> tightest;   // those with the least clearance; empty: nobody looked
 };
 
 /// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so

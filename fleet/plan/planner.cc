@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "fleet/plan/choreography.h"
+#include "fleet/plan/guarantee.h"
 #include "fleet/plan/midway.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
@@ -20,6 +21,10 @@ namespace {
 /// fleet in which more goes wrong than this is planned with what can be served without any stepping
 /// aside.
 constexpr int kAttemptsMax = 60;
+constexpr std::size_t kTightest = 20;
+/// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
+/// is found sooner.
+constexpr double kDenseNeighbours = 10;
 
 std::vector<Pose> StartsOf(const PlanRequest& request) {
   std::vector<Pose> starts;
@@ -55,6 +60,13 @@ class Planner {
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
+  [[nodiscard]] double MeanNeighbours() const;
+  [[nodiscard]] double BoundS() const;
+  bool AllAtOnce(std::span<const AxisPaths> begin_with);
+  void PlanOfChoreography();
+  void TracksOfPlan();
+  void ServeTheRest();
+  Plan Finish();
 
   const PlanRequest& request_;
   const PlanOptions& options_;
@@ -71,6 +83,9 @@ class Planner {
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
   std::vector<Unserved> unserved_;
+  std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
+  Choreography choreography_;                   // tracks of plan_
+  Plan plan_;
   std::string too_near_;  // pairs that start nearer than allowed, by name
 };
 
@@ -259,9 +274,10 @@ bool Planner::LetStepAside(std::uint32_t stuck) {
 }
 
 void Planner::Abandon(std::uint32_t unit) {
-  if (served_[unit] != 0 && goal_[unit] != start_[unit])
+  if (served_[unit] != 0 && goal_[unit] != start_[unit]) {
+    if (hopeful_[unit] != 0) stuck_for_order_.push_back(unit);
     Unserve(unit, UnservedWhy::kBlocked, Blames(unit));
-  else
+  } else
     movable_[unit] = 0;
   aside_[unit] = 0;
   by_itself_[unit] = 0;
@@ -326,24 +342,124 @@ void Planner::GiveWay() {
   }
 }
 
-Result<Plan> Planner::Run() {
-  Classify();
-  FOCALFLEET_TRY(Check());
-  if (getenv("CHOREO")) {
+double Planner::MeanNeighbours() const {
+  std::size_t sum = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) sum += scene_.neighbours(i).size();
+  return scene_.size() == 0 ? 0 : static_cast<double>(sum) / static_cast<double>(scene_.size());
+}
+
+double Planner::BoundS() const {
+  double bound_s = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    if (served_[i] != 0)
+      bound_s = std::max(bound_s, Straight(request_.drives[i], start_[i], goal_[i]).end_s);
+  return bound_s;
+}
+
+/// Everybody at once. False: somebody is left who meets others; nothing is planned then.
+bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
+  std::vector<std::uint8_t> may_move = movable_;
+  if (options_.fixed)
+    for (std::uint32_t i = 0; i < scene_.size(); ++i)
+      if (!request_.targets[i]) may_move[i] = 0;
+  std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
+  for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
     DropCollidingTargets();
     scene_.AllowFor(start_);
     scene_.AllowFor(goal_);
-    double bound=0;
-    for (std::uint32_t i=0;i<scene_.size();++i) bound=std::max(bound, Straight(request_.drives[i], start_[i], goal_[i]).end_s);
-    ChoreographyRequest q{.scene=&scene_, .drives=request_.drives, .from=start_, .to=goal_, .movable=movable_, .tolerance={.notice_s=atof(getenv("CHOREO"))}, .within_s=bound*1.0};
-    auto c = Choreograph(q);
-    Plan plan;
-    for (std::uint32_t i=0;i<scene_.size();++i) { if (c.paths[i][0].size()+c.paths[i][1].size()==0) continue;
-      UnitPlan u; u.unit={i}; u.from=start_[i]; u.to=goal_[i]; u.path=c.paths[i]; plan.makespan_s=std::max(plan.makespan_s, EndOf(u, request_.drives[i])); plan.moves.push_back(u);}
-    std::printf("conflicts %zu\n", c.in_conflict.size());
-    plan.unserved = std::move(unserved_);
-    return plan;
+    const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
+    choreography_ = Choreograph({.scene = &scene_,
+                                 .drives = request_.drives,
+                                 .from = start_,
+                                 .to = goal_,
+                                 .movable = may_move,
+                                 .begin_with = paths,
+                                 .tolerance = tolerance,
+                                 .within_s = std::max(BoundS(), plan_.makespan_s),
+                                 .seed = options_.seed});
+    if (choreography_.in_conflict.empty()) {
+      PlanOfChoreography();
+      return true;
+    }
+    // Some may have no way at all: they stay, and the others are asked again.
+    stuck_ = choreography_.in_conflict;
+    std::erase_if(stuck_, [&](std::uint32_t i) { return movable_[i] == 0; });
+    if (!AbandonHopeless()) break;
+    paths = choreography_.paths;
   }
+  choreography_ = {};
+  return false;
+}
+
+void Planner::PlanOfChoreography() {
+  plan_ = {};
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    const AxisPaths& paths = choreography_.paths[i];
+    if (paths[0].size() + paths[1].size() == 0) continue;
+    UnitPlan unit{.unit = {i},
+                  .from = start_[i],
+                  .to = goal_[i],
+                  .mode = request_.drives[i].mode,
+                  .path = paths,
+                  .followers = {}};
+    plan_.makespan_s = std::max(plan_.makespan_s, EndOf(unit, request_.drives[i]));
+    plan_.moves.push_back(std::move(unit));
+  }
+}
+
+void Planner::TracksOfPlan() {
+  choreography_.tracks.clear();
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    choreography_.tracks.push_back(scene_.is_place(i) ? Track(scene_.arm(i), start_[i]) : Track());
+  for (const UnitPlan& move : plan_.moves) {
+    const std::uint32_t i = move.unit.value;
+    choreography_.tracks[i] = Track(scene_.arm(i), request_.drives[i], move.from, move.path);
+  }
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    for (const NeighbourNeed& near : scene_.neighbours(i))
+      if (i < near.unit) choreography_.without_notice.emplace_back(i, near.unit);
+}
+
+/// Those that found no turn in the order go among the others as these are planned.
+void Planner::ServeTheRest() {
+  const std::vector<Unserved> unserved = unserved_;
+  const Plan ordered = plan_;
+  std::vector<AxisPaths> paths(scene_.size());
+  for (const UnitPlan& move : plan_.moves) paths[move.unit.value] = move.path;
+  for (const std::uint32_t i : stuck_for_order_) {
+    movable_[i] = served_[i] = 1;
+    goal_[i] = *request_.targets[i];
+    std::erase_if(unserved_, [i](const Unserved& u) { return u.unit.value == i; });
+  }
+  if (AllAtOnce(paths)) return;
+  unserved_ = unserved;
+  plan_ = ordered;
+}
+
+Plan Planner::Finish() {
+  const Tolerance proven{options_.start_skew_s, options_.clock_error, options_.notice_s};
+  Tolerance plain = proven;
+  plain.notice_s = 0;
+  FindFollowers({.scene = &scene_,
+                 .tracks = choreography_.tracks,
+                 .tolerance = proven,
+                 .without_notice = choreography_.without_notice,
+                 .notice_s = options_.notice_s},
+                &plan_);
+  plan_.tightest = FindTightest(scene_, choreography_.tracks, plain, kTightest);
+  plan_.too_near = too_near_;
+  plan_.bound_s = BoundS();
+  std::sort(unserved_.begin(), unserved_.end(),
+            [](const Unserved& a, const Unserved& b) { return a.unit < b.unit; });
+  plan_.unserved = std::move(unserved_);
+  return std::move(plan_);
+}
+
+Result<Plan> Planner::Run() {
+  Classify();
+  FOCALFLEET_TRY(Check());
+  const bool dense = MeanNeighbours() > kDenseNeighbours;
+  if (!options_.lead_apart && !dense && AllAtOnce({})) return Finish();
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
@@ -360,12 +476,10 @@ Result<Plan> Planner::Run() {
       if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, kNobody);
   }
   const std::vector<Piece> pieces = CutPieces(order, scene_);
-  FOCALFLEET_TRY_ASSIGN(Plan plan, Schedule(pieces, scene_, request_.drives, options_));
-  plan.too_near = too_near_;
-  std::sort(unserved_.begin(), unserved_.end(),
-            [](const Unserved& a, const Unserved& b) { return a.unit < b.unit; });
-  plan.unserved = std::move(unserved_);
-  return plan;
+  FOCALFLEET_TRY_ASSIGN(plan_, Schedule(pieces, scene_, request_.drives, options_));
+  if (!options_.lead_apart && !stuck_for_order_.empty()) ServeTheRest();
+  if (choreography_.tracks.empty()) TracksOfPlan();
+  return Finish();
 }
 
 }  // namespace

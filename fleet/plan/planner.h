@@ -39,6 +39,10 @@ struct PlanOptions {
   bool lead_apart = false;
   double start_skew_s = 0.020;  // any unit may start this early or late
   double clock_error = 0.005;   // and its clock may run this fast or slow
+  /// How long it may take until a unit that has ended early is noticed and those that would run
+  /// into it are stopped. Pairs for which the plan cannot promise that are in Plan::unnoticed.
+  double notice_s = 1;
+  std::uint64_t seed = 1;
 };
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the

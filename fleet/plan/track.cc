@@ -106,6 +106,56 @@ Track::Track(const ArmGeometry& arm, const Pose& stands) {
   leg.fold_rad = arm.Fold(stands[1]);
   legs_.push_back(leg);
   reach_mm_ = std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(stands[1], stands[1]));
+  Cut(arm);
+}
+
+/// Slices and their bounds.
+void Track::Cut(const ArmGeometry& arm) {
+  const int count = std::max(0, static_cast<int>(std::ceil(end_s() / kSliceS)));
+  slices_.clear();
+  slices_.reserve(static_cast<std::size_t>(count) + 2);
+  slices_.push_back({ArmAt(arm, legs_.front(), 0), 0});
+  std::size_t at = 0;
+  for (int n = 0; n < count; ++n) {
+    const double begin_s = n * kSliceS;
+    const double middle_s = begin_s + kSliceS / 2;
+    const double end_s = begin_s + kSliceS;
+    while (legs_[at].end_s <= begin_s) ++at;
+    double before_mm = 0;
+    double after_mm = 0;
+    std::size_t middle = at;
+    for (std::size_t k = at; k < legs_.size() && legs_[k].begin_s < end_s; ++k) {
+      const Leg& leg = legs_[k];
+      if (leg.begin_s <= middle_s) middle = k;
+      if (leg.stands()) continue;
+      const double from_s = std::max(leg.begin_s, begin_s);
+      const double to_s = std::min(leg.end_s, end_s);
+      before_mm += std::max(0.0, std::min(to_s, middle_s) - from_s) * leg.speed_mm_per_s;
+      after_mm += std::max(0.0, to_s - std::max(from_s, middle_s)) * leg.speed_mm_per_s;
+    }
+    const double travel_mm = std::max(before_mm, after_mm);
+    if (travel_mm == 0 && slices_.back().travel_mm == 0)
+      slices_.push_back(slices_.back());
+    else
+      slices_.push_back({ArmAt(arm, legs_[middle], middle_s), travel_mm});
+  }
+  slices_.push_back({ArmAt(arm, legs_.back(), end_s()), 0});
+  const auto cover = [&](int first, int last) {
+    Bounds box{1e18, -1e18, 1e18, -1e18};
+    for (int n = first; n <= last; ++n) {
+      const Slice& s = slice(n);
+      box.x_low = std::min(box.x_low, std::min(s.line.a.x_mm, s.line.b.x_mm) - s.travel_mm);
+      box.x_high = std::max(box.x_high, std::max(s.line.a.x_mm, s.line.b.x_mm) + s.travel_mm);
+      box.y_low = std::min(box.y_low, std::min(s.line.a.y_mm, s.line.b.y_mm) - s.travel_mm);
+      box.y_high = std::max(box.y_high, std::max(s.line.a.y_mm, s.line.b.y_mm) + s.travel_mm);
+    }
+    return box;
+  };
+  bounds_.clear();
+  bounds_.push_back(cover(-1, -1));
+  for (int n = 0; n < count; n += kSlicesPerBounds)
+    bounds_.push_back(cover(n, n + kSlicesPerBounds - 1));
+  bounds_.push_back(cover(count, count));
 }
 
 Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
@@ -162,35 +212,75 @@ Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
     leg.speed_mm_per_s = radius * std::abs(rate[0]) + arm.phi_arm_mm() * std::abs(rate[1]);
     legs_.push_back(leg);
   }
+  Cut(arm);
 }
 
-bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
-                 double need_mm, const Tolerance& tolerance, int budget) {
-  const double reach = need_mm + a.reach_mm() + b.reach_mm();
-  if (SquaredDistance(arm_a.base_fp(), arm_b.base_fp()) > reach * reach) return true;
-  const double slip_last_s = tolerance.Slip(std::max(a.end_s(), b.end_s()));
-  // Beyond these nothing new can be met.
-  const double first_s = -slip_last_s;
-  const double last_s = std::max({a.end_s(), b.end_s(), 0.0}) + slip_last_s;
-  std::size_t from_b = 0;
+namespace {
+
+/// The legs of both within these own times.
+bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
+                const ArmGeometry& arm_b, const Track& b, const Span1& time_b, double slip_s,
+                double need_mm, int* budget) {
   for (const Leg& leg_a : a.legs()) {
-    const Span1 span_a{std::max(leg_a.begin_s, first_s), std::min(leg_a.end_s, last_s)};
-    for (std::size_t n = from_b; n < b.legs().size(); ++n) {
-      const Leg& leg_b = b.legs()[n];
-      const Span1 span_b{std::max(leg_b.begin_s, first_s), std::min(leg_b.end_s, last_s)};
-      if (span_b.high < span_a.low - slip_last_s) {
-        from_b = n + 1;
-        continue;
-      }
-      if (span_b.low > span_a.high + slip_last_s) break;
-      const double slip_s = tolerance.Slip(std::min(span_a.high, span_b.high) + slip_last_s);
+    const Span1 span_a{std::max(leg_a.begin_s, time_a.low), std::min(leg_a.end_s, time_a.high)};
+    if (span_a.low > span_a.high) continue;
+    for (const Leg& leg_b : b.legs()) {
+      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
+      if (span_b.low > span_b.high) continue;
       const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
                          std::min(span_a.high, span_b.high + slip_s)};
       const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
                          std::min(span_b.high, span_a.high + slip_s)};
       if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-      if (!LegsClear({&arm_a, &leg_a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, &budget))
+      if (!LegsClear({&arm_a, &leg_a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, budget))
         return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
+                 double need_mm, const Tolerance& tolerance, int budget) {
+  const double reach = need_mm + a.reach_mm() + b.reach_mm();
+  if (SquaredDistance(arm_a.base_fp(), arm_b.base_fp()) > reach * reach) return true;
+  constexpr double h = Track::kSliceS;
+  constexpr int kGroup = Track::kSlicesPerBounds;
+  const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
+  const int last = std::max(a.slice_count(), b.slice_count());
+  for (int group = -1; group * kGroup <= last; ++group) {
+    const int first_n = std::max(group * kGroup, -1);
+    const int last_n = std::min(group * kGroup + kGroup - 1, last);
+    if (first_n > last_n) continue;
+    const double slip_s = tolerance.Slip((last_n + 1) * h + tolerance.Slip((last_n + 1) * h));
+    const int reach_n = static_cast<int>(slip_s / h) + 1;
+    bool apart = true;
+    const int group_low = (first_n - reach_n + kGroup) / kGroup - 1;
+    const int group_high = (last_n + reach_n) / kGroup;
+    for (int g = group_low; g <= group_high && apart; ++g)
+      apart = Apart(a.bounds(group), b.bounds(g), need_mm);
+    if (apart) continue;
+    for (int n = first_n; n <= last_n; ++n) {
+      const Slice& slice_a = a.slice(n);
+      for (int m = n - reach_n; m <= n + reach_n; ++m) {
+        const Slice& slice_b = b.slice(m);
+        const double enough = need_mm + slice_a.travel_mm + slice_b.travel_mm;
+        if (SquaredDistanceOfMiddles(slice_a.line, slice_b.line) >
+            (enough + halves) * (enough + halves))
+          continue;
+        const double distance2 = SquaredDistance(slice_a.line, slice_b.line);
+        if (distance2 > enough * enough) continue;
+        const bool meet = std::abs(n - m) * h <= slip_s;
+        if (distance2 <= need_mm * need_mm && meet) return false;
+        const auto time_of = [&](int k, const Track& track) {
+          // The stands, as far as the other may meet them.
+          return Span1{k < 0 ? -Track::kForever : k * h,
+                       k >= track.slice_count() ? Track::kForever : (k + 1) * h};
+        };
+        if (!PartsClear(arm_a, a, time_of(n, a), arm_b, b, time_of(m, b), slip_s, need_mm, &budget))
+          return false;
+      }
     }
   }
   return true;
@@ -198,22 +288,48 @@ bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& ar
 
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget) {
-  const double most_slip_s =
-      tolerance.Slip(std::max(std::min(a.end_s, b.end_s()), a.begin_s)) * 1.1;
-  const double last_s = std::max({a.begin_s, b.end_s(), 0.0}) + 2 * most_slip_s;
+  constexpr double h = Track::kSliceS;
+  const double last_s = std::max(a.begin_s, b.end_s()) + h;
   const Span1 span_a{a.begin_s, std::min(a.end_s, last_s)};
-  for (const Leg& leg_b : b.legs()) {
-    const Span1 span_b{std::max(leg_b.begin_s, -most_slip_s), std::min(leg_b.end_s, last_s)};
-    if (span_b.high < span_a.low - most_slip_s) continue;
-    if (span_b.low > span_a.high + most_slip_s) break;
-    const double slip_s = tolerance.Slip(std::min(span_a.high, span_b.high) + most_slip_s);
-    const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
-                       std::min(span_a.high, span_b.high + slip_s)};
-    const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
-                       std::min(span_b.high, span_a.high + slip_s)};
-    if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-    if (!LegsClear({&arm_a, &a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, &budget))
+  const double slip_s = tolerance.Slip(span_a.high + tolerance.Slip(span_a.high));
+  const double middle_s = span_a.middle();
+  const SegmentFp line = ArmAt(arm_a, a, middle_s);
+  const double travel_a = a.speed_mm_per_s * span_a.half();
+  const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
+  const int first = static_cast<int>(std::floor((span_a.low - slip_s) / h));
+  const int last =
+      std::min(static_cast<int>(std::floor((span_a.high + slip_s) / h)), b.slice_count());
+  // What meets for certain is found at once; only then is it worth to look closely at the rest.
+  constexpr std::size_t kNearMax = 64;
+  std::array<int, kNearMax> near;
+  std::size_t near_count = 0;
+  for (int m = std::max(first, -1); m <= last; ++m) {
+    const Slice& slice = b.slice(m);
+    const double enough = need_mm + travel_a + slice.travel_mm;
+    if (SquaredDistanceOfMiddles(line, slice.line) > (enough + halves) * (enough + halves))
+      continue;
+    const double distance2 = SquaredDistance(line, slice.line);
+    if (distance2 > enough * enough) continue;
+    if (distance2 <= need_mm * need_mm && std::abs((m + 0.5) * h - middle_s) <= slip_s)
       return false;
+    if (near_count == kNearMax) return false;
+    near[near_count++] = m;
+  }
+  for (std::size_t n = 0; n < near_count; ++n) {
+    const int m = near[n];
+    const Span1 time_b{m < 0 ? -Track::kForever : m * h,
+                       m >= b.slice_count() ? Track::kForever : (m + 1) * h};
+    for (const Leg& leg_b : b.legs()) {
+      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
+      if (span_b.low > span_b.high) continue;
+      const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
+                         std::min(span_a.high, span_b.high + slip_s)};
+      const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
+                         std::min(span_b.high, span_a.high + slip_s)};
+      if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
+      if (!LegsClear({&arm_a, &a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, &budget))
+        return false;
+    }
   }
   return true;
 }

@@ -45,6 +45,24 @@ struct Leg {
   [[nodiscard]] bool stands() const { return speed_mm_per_s == 0; }
 };
 
+/// Where an arm is during one slice of its own time: nowhere farther than `travel_mm` from `line`.
+struct Slice {
+  SegmentFp line;
+  double travel_mm = 0;
+};
+/// All that the arm covers during some slices, without its half-width.
+struct Bounds {
+  double x_low = 0;
+  double x_high = 0;
+  double y_low = 0;
+  double y_high = 0;
+};
+
+inline bool Apart(const Bounds& a, const Bounds& b, double need_mm) {
+  return a.x_low > b.x_high + need_mm || b.x_low > a.x_high + need_mm ||
+         a.y_low > b.y_high + need_mm || b.y_low > a.y_high + need_mm;
+}
+
 using AxisPaths = std::array<AxisPath, kAxisCount>;
 
 class Track {
@@ -61,9 +79,26 @@ class Track {
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
 
   static constexpr double kForever = 1e9;
+  static constexpr double kSliceS = 0.5;
+  static constexpr int kSlicesPerBounds = 8;
+
+  /// The slice from n * kSliceS on; below 0 and beyond the end: where it stands then.
+  [[nodiscard]] const Slice& slice(int n) const {
+    return slices_[static_cast<std::size_t>(std::clamp(n + 1, 0, slice_count() + 1))];
+  }
+  [[nodiscard]] int slice_count() const { return static_cast<int>(slices_.size()) - 2; }
+  /// Of slices n * kSlicesPerBounds and those that follow; of the stands beyond either end.
+  [[nodiscard]] const Bounds& bounds(int n) const {
+    return bounds_[static_cast<std::size_t>(
+        std::clamp(n + 1, 0, static_cast<int>(bounds_.size()) - 1))];
+  }
 
  private:
+  void Cut(const ArmGeometry& arm);
+
   std::vector<Leg> legs_;
+  std::vector<Slice> slices_;
+  std::vector<Bounds> bounds_;
   double reach_mm_ = 0;
 };
 

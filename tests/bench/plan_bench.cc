@@ -100,9 +100,11 @@ int Run(int argc, char** argv) {
       verdict = report.ok() ? "clear" : report.Text();
     }
     if (!plan->unserved.empty() || (check && verdict != "clear")) ++faults;
-    std::printf("seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu %s\n",
+    std::printf("seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu crossing %u unnoticed %zu clearance %.1f um at %.2f s %s\n",
                 static_cast<unsigned long long>(seed + static_cast<std::uint64_t>(c)), bound_s,
-                plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), verdict.c_str());
+                plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), plan->crossings, plan->unnoticed.size(),
+                plan->tightest.empty() ? 0 : 1e3 * plan->tightest.front().clearance_mm,
+                plan->tightest.empty() ? 0 : plan->tightest.front().t_s, verdict.c_str());
     std::fflush(stdout);
   }
   std::vector<double> ratios;

@@ -1,0 +1,203 @@
+#include "fleet/plan/guarantee.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace focalfleet {
+namespace {
+
+constexpr double kTightToMm = 1e-3;
+
+struct Nearest {
+  double distance_mm = 0;
+  double t_s = 0;
+};
+
+/// The least distance of two motions, where it is below `below_mm`; else something above.
+class Search {
+ public:
+  Search(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
+         const Tolerance& tolerance)
+      : arm_a_(arm_a), arm_b_(arm_b), a_(a), b_(b), tolerance_(tolerance) {}
+
+  Nearest Run(double below_mm) {
+    best_ = {below_mm, 0};
+    const int last = std::max(a_.slice_count(), b_.slice_count());
+    for (int n = -1; n <= last; ++n) {
+      const double slip_s = tolerance_.Slip((n + 2) * Track::kSliceS + 2);
+      const int reach = static_cast<int>(slip_s / Track::kSliceS) + 1;
+      for (int m = std::max(n - reach, -1); m <= std::min(n + reach, last); ++m) {
+        const Slice& in_a = a_.slice(n);
+        const Slice& in_b = b_.slice(m);
+        const double enough = best_.distance_mm - kTightToMm + in_a.travel_mm + in_b.travel_mm;
+        if (enough <= 0 || SquaredDistance(in_a.line, in_b.line) > enough * enough) continue;
+        Look(TimeOf(n, a_), TimeOf(m, b_), slip_s);
+      }
+    }
+    return best_;
+  }
+
+ private:
+  struct Times {
+    double low = 0;
+    double high = 0;
+    [[nodiscard]] double middle() const { return (low + high) / 2; }
+  };
+  static Times TimeOf(int n, const Track& track) {
+    const double end = track.slice_count() * Track::kSliceS;
+    // A stand is the same at all times: its own edge, where the other may be, stands for it.
+    if (n < 0) return {-Track::kSliceS, 0};
+    if (n >= track.slice_count())
+      return {std::max(end, n * Track::kSliceS), (n + 1) * Track::kSliceS};
+    return {n * Track::kSliceS, (n + 1) * Track::kSliceS};
+  }
+  static const Leg& LegAt(const Track& track, double t_s) {
+    const auto legs = track.legs();
+    const auto it =
+        std::find_if(legs.begin(), legs.end(), [t_s](const Leg& leg) { return t_s < leg.end_s; });
+    return it == legs.end() ? legs.back() : *it;
+  }
+  static double Travel(const Track& track, const Times& times) {
+    double travel = 0;
+    for (const Leg& leg : track.legs()) {
+      if (leg.stands() || leg.end_s <= times.low) continue;
+      if (leg.begin_s >= times.high) break;
+      travel +=
+          (std::min(leg.end_s, times.high) - std::max(leg.begin_s, times.low)) * leg.speed_mm_per_s;
+    }
+    return travel;
+  }
+  void Look(const Times& in_a, const Times& in_b, double slip_s) {
+    if (in_a.low > in_b.high + slip_s || in_b.low > in_a.high + slip_s) return;
+    const double travel_a = Travel(a_, in_a);
+    const double travel_b = Travel(b_, in_b);
+    const double t_a = in_a.middle();
+    const double t_b = in_b.middle();
+    const double distance =
+        DistanceMm(ArmAt(arm_a_, LegAt(a_, t_a), t_a), ArmAt(arm_b_, LegAt(b_, t_b), t_b));
+    if (distance - travel_a - travel_b >= best_.distance_mm - kTightToMm) return;
+    if (distance < best_.distance_mm && std::abs(t_a - t_b) <= slip_s)
+      best_ = {distance, std::max(0.0, (t_a + t_b) / 2)};
+    if (travel_a + travel_b < kTightToMm) {
+      best_.distance_mm = std::min(best_.distance_mm, distance);
+      return;
+    }
+    if (travel_a >= travel_b) {
+      Look({in_a.low, t_a}, in_b, slip_s);
+      Look({t_a, in_a.high}, in_b, slip_s);
+    } else {
+      Look(in_a, {in_b.low, t_b}, slip_s);
+      Look(in_a, {t_b, in_b.high}, slip_s);
+    }
+  }
+
+  const ArmGeometry& arm_a_;
+  const ArmGeometry& arm_b_;
+  const Track& a_;
+  const Track& b_;
+  Tolerance tolerance_;
+  Nearest best_;
+};
+
+}  // namespace
+
+std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
+                                    const Tolerance& tolerance, std::size_t count) {
+  std::vector<TightPair> tightest;
+  const auto nearer = [](const TightPair& x, const TightPair& y) {
+    return x.clearance_mm != y.clearance_mm ? x.clearance_mm < y.clearance_mm
+                                            : x.a.value < y.a.value;
+  };
+  double limit_mm = 1e9;
+  for (std::uint32_t i = 0; i < scene.size() && count > 0; ++i) {
+    for (const NeighbourNeed& near : scene.neighbours(i)) {
+      const std::uint32_t j = near.unit;
+      if (j < i || tracks[i].legs().empty() || tracks[j].legs().empty()) continue;
+      if (tracks[i].legs().size() == 1 && tracks[j].legs().size() == 1) continue;
+      const double need_mm = scene.FullNeed(i, j);
+      const double apart = DistanceMm(scene.arm(i).base_fp(), scene.arm(j).base_fp());
+      if (apart - tracks[i].reach_mm() - tracks[j].reach_mm() - need_mm >= limit_mm) continue;
+      const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
+                                  .Run(std::min(limit_mm, apart) + need_mm);
+      const double clearance_mm = nearest.distance_mm - need_mm;
+      if (clearance_mm >= limit_mm) continue;
+      tightest.push_back({{i}, {j}, clearance_mm, nearest.t_s});
+      if (tightest.size() < 2 * count) continue;
+      std::sort(tightest.begin(), tightest.end(), nearer);
+      tightest.resize(count);
+      limit_mm = tightest.back().clearance_mm;
+    }
+  }
+  std::sort(tightest.begin(), tightest.end(), nearer);
+  if (tightest.size() > count) tightest.resize(count);
+  return tightest;
+}
+
+void FindFollowers(const FollowersQuestion& question, Plan* plan) {
+  constexpr double h = Track::kSliceS;
+  constexpr int kGroup = Track::kSlicesPerBounds;
+  const Scene& scene = *question.scene;
+  Tolerance plain = question.tolerance;
+  plain.notice_s = 0;
+  const double error = plain.clock_error;
+  const double skew_s = plain.start_skew_s;
+  plan->unnoticed.clear();
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> crossing;
+  for (UnitPlan& move : plan->moves) {
+    move.followers.clear();
+    const std::uint32_t i = move.unit.value;
+    const Track& mine = question.tracks[i];
+    for (const NeighbourNeed& near : scene.neighbours(i)) {
+      const Track& other = question.tracks[near.unit];
+      if (other.legs().size() < 2) continue;
+      const std::pair pair = std::minmax(i, near.unit);
+      const bool excepted =
+          std::binary_search(question.without_notice.begin(), question.without_notice.end(),
+                             std::pair<std::uint32_t, std::uint32_t>(pair));
+      const Tolerance& proven = excepted ? plain : question.tolerance;
+      UnitPlan::Follower follower{{near.unit}, 0, 0, 0};
+      Unnoticed late{{i}, {near.unit}, 0, question.notice_s};
+      bool any = false;
+      for (int n = 0; n < mine.slice_count(); ++n) {
+        if (n % kGroup == 0) {
+          // Nothing in this group of slices is met later: on to the next.
+          bool apart = true;
+          for (int g = n / kGroup; g * kGroup <= other.slice_count() && apart; ++g)
+            apart = Apart(mine.bounds(n / kGroup), other.bounds(g), near.need_mm);
+          if (apart) {
+            n += kGroup - 1;
+            continue;
+          }
+        }
+        const Slice& stands = mine.slice(n);
+        // Times within the slip are proven clear already.
+        const double after_s = n * h + proven.Slip(n * h);
+        for (int m = static_cast<int>(after_s / h); m <= other.slice_count(); ++m) {
+          const Slice& comes = other.slice(m);
+          const double enough = near.need_mm + stands.travel_mm + comes.travel_mm;
+          if (SquaredDistance(stands.line, comes.line) > enough * enough) continue;
+          const double meets_s = std::max(m * h, after_s);
+          const double begins_s = meets_s * (1 - error) - skew_s;
+          if (!any) follower.since_s = n * h * (1 - error) - skew_s;
+          follower.begins_s = any ? std::min(follower.begins_s, begins_s) : begins_s;
+          follower.left_s = (n + 1) * h / (1 - error) + skew_s;
+          any = true;
+          // What is proven holds for each instant of the slice, what is seen only for all of it.
+          const double leaves_s =
+              m * h > after_s ? std::max(m * h - (n + 1) * h, proven.notice_s) : proven.notice_s;
+          if (leaves_s < late.leaves_s) late = {{i}, {near.unit}, follower.since_s, leaves_s};
+          break;
+        }
+      }
+      if (!any) continue;
+      crossing.push_back(pair);
+      move.followers.push_back(follower);
+      if (late.leaves_s < question.notice_s) plan->unnoticed.push_back(late);
+    }
+  }
+  std::sort(crossing.begin(), crossing.end());
+  plan->crossings =
+      static_cast<std::uint32_t>(std::unique(crossing.begin(), crossing.end()) - crossing.begin());
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,34 @@
+// What a plan promises beyond "clear": how near the nearest pairs come and when, and whom to stop
+// where a unit ends early.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "fleet/plan/plan.h"
+#include "fleet/plan/scene.h"
+#include "fleet/plan/track.h"
+
+namespace focalfleet {
+
+/// The `count` pairs that come nearest for any start skew and clock within the tolerance, nearest
+/// first; to a micrometre. Shape: `tracks` (n). Cost: O(n), most pairs are dismissed by their
+/// bounds.
+std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
+                                    const Tolerance& tolerance, std::size_t count);
+
+/// Fills the followers of every move (who must be stopped before when, should that unit end early),
+/// counts the pairs that follow each other, and names those for which less than `notice_s` is left
+/// between the end and the last moment to stop the follower. Shape: `tracks` (n). Cost: O(n).
+struct FollowersQuestion {
+  const Scene* scene = nullptr;
+  std::span<const Track> tracks;
+  Tolerance tolerance;  // its notice: proven for all pairs but those in `without_notice`
+  std::span<const std::pair<std::uint32_t, std::uint32_t>> without_notice;  // sorted, lower first
+  double notice_s = 0;
+};
+void FindFollowers(const FollowersQuestion& question, Plan* plan);
+
+}  // namespace focalfleet
