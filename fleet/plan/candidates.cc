@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <span>
 
 namespace focalfleet {
@@ -30,6 +31,7 @@ class Builder {
   void AppendStraight(std::vector<Candidate>* out) const;
   void AppendFolding(std::vector<Candidate>* out) const;
   void AppendSliding(std::vector<Candidate>* out) const;
+  void AppendAlong(const Way& way, std::vector<Candidate>* out) const;
 
  private:
   /// Values of phi to fold back to, beyond those of start and target; at most three.
@@ -191,6 +193,37 @@ void Builder::AppendSliding(std::vector<Candidate>* out) const {
   }
 }
 
+void Builder::AppendAlong(const Way& way, std::vector<Candidate>* out) const {
+  const auto along = [&](double begin_s) {
+    Candidate made;
+    double at = begin_s;
+    for (std::size_t n = 1; n < way.size(); ++n) {
+      const Pose& from = way[n - 1].pose;
+      const Pose& to = way[n].pose;
+      std::optional<InStep> in_step;
+      if (way[n].out_of_step < 1) in_step = KeepInStep(from, to, *q_.drive);
+      const std::uint32_t ticks = TicksOf(at);
+      double end_s = ticks * kTickS;
+      for (std::size_t k = 0; k < kAxisCount; ++k) {
+        if (to[k] == from[k]) continue;
+        if (made.path[k].full()) return Candidate{{}, std::numeric_limits<double>::infinity()};
+        AxisDrive drive = q_.drive->axis[k];
+        if (in_step) drive.repeat = in_step->repeat[k];
+        made.path[k].Append({ticks, to[k] - from[k], drive.repeat});
+        end_s = std::max(end_s, ticks * kTickS + std::abs(to[k] - from[k]) * SecondsPerVector(drive));
+      }
+      at = end_s + kTickS;
+    }
+    made.end_s = at;
+    return made;
+  };
+  const double spare = std::max(0.0, q_.within_s - along(0).end_s);
+  for (const double delay : kDelays) {
+    out->push_back(along(spare * delay));
+    if (spare == 0) break;
+  }
+}
+
 }  // namespace
 
 void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>* candidates) {
@@ -203,6 +236,11 @@ void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>*
     case Shape::kSliding:
       return builder.AppendSliding(candidates);
   }
+}
+
+void AppendAlong(const CandidateQuestion& question, const Way& way,
+                 std::vector<Candidate>* candidates) {
+  Builder(question).AppendAlong(way, candidates);
 }
 
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "fleet/plan/path_search.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/track.h"
 
@@ -46,6 +47,10 @@ struct CandidateQuestion {
 
 /// Straight ones first, sooner before later.
 void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>* candidates);
+
+/// Leg after leg along a way that was found elsewhere, sooner or later.
+void AppendAlong(const CandidateQuestion& question, const Way& way,
+                 std::vector<Candidate>* candidates);
 
 /// Both axes at once, without delay.
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to);

@@ -12,9 +12,16 @@ namespace focalfleet {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
-constexpr int kLooksPerUnit = 10;
+constexpr int kLooksPerUnit = 16;
+/// The time that a unit may take grows once it has looked this often, by so much each time.
+constexpr int kLooksInTime = 5;
+constexpr double kExtension = 0.03;
 constexpr int kLooksAlone = 3;
 constexpr int kLooksWithNotice = 3;
+
+double ExtensionAt(int looks) {
+  return 1.005 + kExtension * std::max(0, looks - kLooksInTime);
+}
 
 class Repair {
  public:
@@ -36,6 +43,7 @@ class Repair {
   [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
   void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
   [[nodiscard]] bool Reaches(std::uint32_t unit, const AxisPaths& paths) const;
+  Way WayAmongStanding(std::uint32_t unit);
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
@@ -55,6 +63,7 @@ class Repair {
   std::vector<Candidate> candidates_;
   Track track_;
   TimeSearch search_;
+  PathSearch path_search_;
   std::vector<Passer> passers_;
   std::vector<Blocker> blockers_;
 };
@@ -169,10 +178,9 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
   int ties = 0;
   for (std::size_t c = first; c < candidates_.size() && best > 0; ++c) {
     const Candidate& candidate = candidates_[c];
-    const double late = std::max(0.0, candidate.end_s / (q_.within_s * extend) - 1);
-    if (late >= best) continue;
+    if (candidate.end_s > q_.within_s * extend) continue;
     track_ = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
-    const double cost = late + Cost(unit, track_, best == kNever ? best : best - late + 1e-9);
+    const double cost = Cost(unit, track_, best == kNever ? best : best + 1e-9);
     if (cost > best || cost == kNever) continue;
     ties = cost < best ? 1 : ties + 1;
     if (cost == best && rng_.Below(static_cast<std::uint64_t>(ties)) != 0) continue;
@@ -180,6 +188,31 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
     *chosen = c;
   }
   return best;
+}
+
+/// A way for `unit` among what never moves; empty where there is none.
+Way Repair::WayAmongStanding(std::uint32_t unit) {
+  blockers_.clear();
+  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+    if (!scene_.is_place(near.unit) || q_.movable[near.unit] != 0) continue;
+    const SegmentFp line = scene_.arm(near.unit).At(q_.from[near.unit]);
+    blockers_.push_back({{line, 0}, near.need_mm, near.unit});
+  }
+  for (const StandingThing& thing : scene_.standing(unit))
+    blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
+  PathSearch::Question question;
+  question.arm = &scene_.arm(unit);
+  question.drive = &q_.drives[unit];
+  question.blockers = blockers_;
+  question.from = q_.from[unit];
+  question.within = RangeAround(*question.arm, question.from);
+  question.goal = PoseBox::Of(q_.to[unit]);
+  for (const double grid_deg : kSearchGridsDeg) {
+    question.grid_deg = grid_deg;
+    Way way = path_search_.Find(question);
+    if (!way.empty()) return way;
+  }
+  return {};
 }
 
 /// A way for `unit` among all others as they go.
@@ -223,7 +256,7 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
 bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   const Choreography::Motion before{out_.paths[unit], out_.tracks[unit]};
   const Choreography::Motion other_before{out_.paths[other], out_.tracks[other]};
-  const double extend = 1 + 0.02 * std::max(0, looks_[unit] - kLooksAlone);
+  const double extend = ExtensionAt(looks_[unit]);
   out_.tracks[unit] = Track();
   candidates_.clear();
   CandidateQuestion question{.scene = &scene_,
@@ -241,6 +274,7 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   const int tries = looks_[unit] < kLooksAlone ? 2 : 6;
   std::vector<std::size_t> good;
   for (std::size_t w = 0; w < ways.size(); ++w) {
+    if (ways[w].end_s > q_.within_s * extend) continue;
     track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], ways[w].path);
     if (Cost(other, track_, 1) < 1) good.push_back(w);
   }
@@ -261,7 +295,7 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
 bool Repair::Improve(std::uint32_t unit) {
   if (Cost(unit, out_.tracks[unit], kNever) == 0) return true;
   const int looks = looks_[unit]++;
-  const double extend = 1 + 0.02 * std::max(0, looks - kLooksAlone);
+  const double extend = ExtensionAt(looks);
   double best = kNever;
   std::size_t chosen = 0;
   candidates_.clear();
@@ -283,18 +317,21 @@ bool Repair::Improve(std::uint32_t unit) {
     }
     if (best < 1) break;
   }
+  if (best == kNever && looks >= 1) {
+    // What stands is in every way: one around it.
+    candidates_.clear();
+    AppendAlong(question, WayAmongStanding(unit), &candidates_);
+    best = Best(unit, extend, 0, &chosen);
+  }
   if (best < 1) {
     Take(unit, candidates_[chosen]);
     return true;
   }
   if (looks >= 1 || best == kNever) {
     if (SearchWay(unit, q_.within_s * extend, looks)) return true;
-    if (best == kNever) {
-      Push(unit);
-      return false;
-    }
+    Push(unit);
   }
-  Take(unit, candidates_[chosen]);
+  if (best != kNever) Take(unit, candidates_[chosen]);
   for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot) {
     if (!Meets(unit, out_.tracks[unit], slot)) continue;
     const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
@@ -327,6 +364,10 @@ Choreography Repair::Run() {
       if (const std::uint32_t j = scene_.neighbours(i)[slot].unit;
           unnoticed_[i][slot] != 0 && i < j)
         out_.without_notice.emplace_back(i, j);
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) if (getenv("LATE") && !out_.tracks[i].legs().empty() && out_.tracks[i].end_s() > q_.within_s*1.01) {
+    std::printf("late %u ends %.2f of %.2f alone %.2f looks %d legs %zu:", i, out_.tracks[i].end_s(), q_.within_s, Straight(q_.drives[i], q_.from[i], q_.to[i]).end_s, looks_[i], out_.tracks[i].legs().size());
+    for (std::size_t k=0;k<2;++k) { for (auto& g: out_.paths[i][k].segments()) std::printf(" %.1f:%+.0f", g.start_ticks*1e-4, g.delta*scene_.arm(i).step_rad(kAxes[k])*57.3); std::printf(" |"); }
+    std::printf("\n"); }
   return std::move(out_);
 }
 
