@@ -210,7 +210,8 @@ void Builder::AppendAlong(const Way& way, std::vector<Candidate>* out) const {
         AxisDrive drive = q_.drive->axis[k];
         if (in_step) drive.repeat = in_step->repeat[k];
         made.path[k].Append({ticks, to[k] - from[k], drive.repeat});
-        end_s = std::max(end_s, ticks * kTickS + std::abs(to[k] - from[k]) * SecondsPerVector(drive));
+        end_s =
+            std::max(end_s, ticks * kTickS + std::abs(to[k] - from[k]) * SecondsPerVector(drive));
       }
       at = end_s + kTickS;
     }

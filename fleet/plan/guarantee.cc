@@ -76,12 +76,9 @@ class Search {
     const double distance =
         DistanceMm(ArmAt(arm_a_, LegAt(a_, t_a), t_a), ArmAt(arm_b_, LegAt(b_, t_b), t_b));
     if (distance - travel_a - travel_b >= best_.distance_mm - kTightToMm) return;
-    if (distance < best_.distance_mm && std::abs(t_a - t_b) <= slip_s)
+    if (distance < best_.distance_mm && std::abs(t_a - t_b) <= tolerance_.Slip(std::max(t_a, t_b)))
       best_ = {distance, std::max(0.0, (t_a + t_b) / 2)};
-    if (travel_a + travel_b < kTightToMm) {
-      best_.distance_mm = std::min(best_.distance_mm, distance);
-      return;
-    }
+    if (travel_a + travel_b < kTightToMm) return;
     if (travel_a >= travel_b) {
       Look({in_a.low, t_a}, in_b, slip_s);
       Look({t_a, in_a.high}, in_b, slip_s);
@@ -103,33 +100,49 @@ class Search {
 
 std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
                                     const Tolerance& tolerance, std::size_t count) {
-  std::vector<TightPair> tightest;
-  const auto nearer = [](const TightPair& x, const TightPair& y) {
-    return x.clearance_mm != y.clearance_mm ? x.clearance_mm < y.clearance_mm
-                                            : x.a.value < y.a.value;
+  struct Pair {
+    std::uint32_t i;
+    std::uint32_t j;
+    double seen_mm;  // clearance at some instant
   };
-  double limit_mm = 1e9;
-  for (std::uint32_t i = 0; i < scene.size() && count > 0; ++i) {
+  std::vector<Pair> pairs;
+  for (std::uint32_t i = 0; i < scene.size(); ++i) {
     for (const NeighbourNeed& near : scene.neighbours(i)) {
       const std::uint32_t j = near.unit;
       if (j < i || tracks[i].legs().empty() || tracks[j].legs().empty()) continue;
       if (tracks[i].legs().size() == 1 && tracks[j].legs().size() == 1) continue;
-      const double need_mm = scene.FullNeed(i, j);
-      const double apart = DistanceMm(scene.arm(i).base_fp(), scene.arm(j).base_fp());
-      if (apart - tracks[i].reach_mm() - tracks[j].reach_mm() - need_mm >= limit_mm) continue;
-      const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
-                                  .Run(std::min(limit_mm, apart) + need_mm);
-      const double clearance_mm = nearest.distance_mm - need_mm;
-      if (clearance_mm >= limit_mm) continue;
-      tightest.push_back({{i}, {j}, clearance_mm, nearest.t_s});
-      if (tightest.size() < 2 * count) continue;
-      std::sort(tightest.begin(), tightest.end(), nearer);
-      tightest.resize(count);
-      limit_mm = tightest.back().clearance_mm;
+      double nearest2 = 1e18;
+      for (int n = -1; n <= std::max(tracks[i].slice_count(), tracks[j].slice_count()); ++n)
+        nearest2 =
+            std::min(nearest2, SquaredDistance(tracks[i].slice(n).line, tracks[j].slice(n).line));
+      pairs.push_back({i, j, std::sqrt(nearest2) - scene.FullNeed(i, j)});
     }
   }
-  std::sort(tightest.begin(), tightest.end(), nearer);
-  if (tightest.size() > count) tightest.resize(count);
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& x, const Pair& y) {
+    return x.seen_mm != y.seen_mm ? x.seen_mm < y.seen_mm
+                                  : std::pair(x.i, x.j) < std::pair(y.i, y.j);
+  });
+  // Those that were seen near come first, so that most of the others need no more than one test.
+  std::vector<TightPair> tightest;
+  const auto nearer = [](const TightPair& x, const TightPair& y) {
+    if (x.clearance_mm != y.clearance_mm) return x.clearance_mm < y.clearance_mm;
+    return std::pair(x.a.value, x.b.value) < std::pair(y.a.value, y.b.value);
+  };
+  double limit_mm = count < pairs.size() ? pairs[count].seen_mm : 1e9;
+  for (const Pair& pair : pairs) {
+    const auto& [i, j, seen_mm] = pair;
+    const double need_mm = scene.FullNeed(i, j);
+    if (limit_mm < 1e8 && PassesClear(scene.arm(i), tracks[i], scene.arm(j), tracks[j],
+                                      need_mm + limit_mm, tolerance))
+      continue;
+    const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
+                                .Run(seen_mm + need_mm + kTightToMm);
+    tightest.push_back({{i}, {j}, nearest.distance_mm - need_mm, nearest.t_s});
+    std::sort(tightest.begin(), tightest.end(), nearer);
+    if (tightest.size() < count) continue;
+    tightest.resize(count);
+    limit_mm = std::min(limit_mm, tightest.back().clearance_mm);
+  }
   return tightest;
 }
 
