@@ -218,6 +218,7 @@ void Builder::AppendAlong(const Way& way, std::vector<Candidate>* out) const {
     made.end_s = at;
     return made;
   };
+  if (way.size() < 2) return;
   const double spare = std::max(0.0, q_.within_s - along(0).end_s);
   for (const double delay : kDelays) {
     out->push_back(along(spare * delay));

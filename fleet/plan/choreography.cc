@@ -362,21 +362,6 @@ Choreography Repair::Run() {
       if (const std::uint32_t j = scene_.neighbours(i)[slot].unit;
           unnoticed_[i][slot] != 0 && i < j)
         out_.without_notice.emplace_back(i, j);
-  for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    if (getenv("LATE") && !out_.tracks[i].legs().empty() &&
-        out_.tracks[i].end_s() > q_.within_s * 1.01) {
-      std::printf("late %u ends %.2f of %.2f alone %.2f looks %d legs %zu:", i,
-                  out_.tracks[i].end_s(), q_.within_s,
-                  Straight(q_.drives[i], q_.from[i], q_.to[i]).end_s, looks_[i],
-                  out_.tracks[i].legs().size());
-      for (std::size_t k = 0; k < 2; ++k) {
-        for (auto& g : out_.paths[i][k].segments())
-          std::printf(" %.1f:%+.0f", g.start_ticks * 1e-4,
-                      g.delta * scene_.arm(i).step_rad(kAxes[k]) * 57.3);
-        std::printf(" |");
-      }
-      std::printf("\n");
-    }
   return std::move(out_);
 }
 

@@ -6,7 +6,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kTightToMm = 1e-3;
+constexpr double kTightToMm = 1e-2;
 
 struct Nearest {
   double distance_mm = 0;
@@ -96,6 +96,13 @@ class Search {
   Nearest best_;
 };
 
+double NeedOf(const Scene& scene, std::uint32_t i, std::uint32_t j) {
+  const auto near = scene.neighbours(i);
+  const auto it = std::find_if(near.begin(), near.end(),
+                               [j](const NeighbourNeed& n) { return n.unit == j; });
+  return it->need_mm;
+}
+
 }  // namespace
 
 std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
@@ -137,7 +144,10 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
       continue;
     const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
                                 .Run(seen_mm + need_mm + kTightToMm);
-    tightest.push_back({{i}, {j}, nearest.distance_mm - need_mm, nearest.t_s});
+    // Clear by the planned need it is proven to be; the search stops short of the very least.
+    const double proven_mm = NeedOf(scene, i, j) - need_mm;
+    const double clearance_mm = std::max(proven_mm, nearest.distance_mm - kTightToMm - need_mm);
+    tightest.push_back({{i}, {j}, clearance_mm, nearest.t_s});
     std::sort(tightest.begin(), tightest.end(), nearer);
     if (tightest.size() < count) continue;
     tightest.resize(count);
