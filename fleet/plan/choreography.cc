@@ -21,6 +21,13 @@ constexpr int kLooksWithNotice = 3;
 
 double ExtensionAt(int looks) { return 1.005 + kExtension * std::max(0, looks - kLooksInTime); }
 
+std::uint32_t BeginOf(const AxisPaths& path) {
+  std::uint32_t begin = std::numeric_limits<std::uint32_t>::max();
+  for (const AxisPath& axis : path)
+    if (axis.size() > 0) begin = std::min(begin, axis.segments().front().start_ticks);
+  return begin;
+}
+
 class Repair {
  public:
   explicit Repair(const ChoreographyRequest& request)
@@ -41,7 +48,8 @@ class Repair {
   [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
   void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
   [[nodiscard]] bool Reaches(std::uint32_t unit, const AxisPaths& paths) const;
-  Way WayAmongStanding(std::uint32_t unit);
+  Way WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses);
+  void PushMet(std::uint32_t unit);
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
@@ -93,6 +101,12 @@ double Repair::Cost(std::uint32_t unit, const Track& track, double limit) {
     if (cost >= limit) return cost;
   }
   return cost;
+}
+
+/// Whoever the unit meets looks again.
+void Repair::PushMet(std::uint32_t unit) {
+  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot)
+    if (Meets(unit, out_.tracks[unit], slot)) Push(scene_.neighbours(unit)[slot].unit);
 }
 
 bool Repair::InConflict(std::uint32_t unit) {
@@ -188,12 +202,14 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
   return best;
 }
 
-/// A way for `unit` among what never moves; empty where there is none.
-Way Repair::WayAmongStanding(std::uint32_t unit) {
+/// A way for `unit` among what never moves, and `other` where `poses` has it; empty where there is
+/// none.
+Way Repair::WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses) {
   blockers_.clear();
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
-    if (!scene_.is_place(near.unit) || q_.movable[near.unit] != 0) continue;
-    const SegmentFp line = scene_.arm(near.unit).At(q_.from[near.unit]);
+    if (!scene_.is_place(near.unit)) continue;
+    if (q_.movable[near.unit] != 0 && near.unit != other) continue;
+    const SegmentFp line = scene_.arm(near.unit).At(poses[near.unit]);
     blockers_.push_back({{line, 0}, near.need_mm, near.unit});
   }
   for (const StandingThing& thing : scene_.standing(unit))
@@ -269,18 +285,45 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   }
   const std::vector<Candidate> ways = std::move(candidates_);
   candidates_ = {};
-  const int tries = looks_[unit] < kLooksAlone ? 2 : 6;
+  int tries = looks_[unit] < kLooksAlone ? 2 : 6;
   std::vector<std::size_t> good;
   for (std::size_t w = 0; w < ways.size(); ++w) {
     if (ways[w].end_s > q_.within_s * extend) continue;
     track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], ways[w].path);
     if (Cost(other, track_, 1) < 1) good.push_back(w);
   }
-  for (int k = 0; k < tries && !good.empty(); ++k) {
-    // The soonest, the latest, and some between.
-    const std::size_t pick = k == 0 ? 0 : k == 1 ? good.size() - 1 : rng_.Below(good.size());
+  if (good.empty()) tries = 0;
+  // Gone as soon, or still there as long as can be: that leaves the most room at the one end or the
+  // other.
+  const auto soonest =
+      std::min_element(good.begin(), good.end(),
+                       [&](std::size_t x, std::size_t y) { return ways[x].end_s < ways[y].end_s; });
+  const auto latest = std::max_element(good.begin(), good.end(), [&](std::size_t x, std::size_t y) {
+    return BeginOf(ways[x].path) < BeginOf(ways[y].path);
+  });
+  for (int k = 0; k < tries; ++k) {
+    const std::size_t pick = k == 0   ? static_cast<std::size_t>(latest - good.begin())
+                             : k == 1 ? static_cast<std::size_t>(soonest - good.begin())
+                                      : rng_.Below(good.size());
     Take(other, ways[good[pick]]);
     if (SearchWay(unit, q_.within_s * extend, looks_[unit])) return true;
+    if (k > 1 || looks_[unit] < kLooksAlone) continue;
+    // The search in time has a coarse grid; among things that stand there is a finer one.
+    question = {.scene = &scene_,
+                .drive = &q_.drives[unit],
+                .unit = unit,
+                .from = q_.from[unit],
+                .to = q_.to[unit],
+                .within_s = q_.within_s * extend};
+    candidates_.clear();
+    AppendAlong(question, WayAmongStanding(unit, other, k == 0 ? q_.from : q_.to), &candidates_);
+    std::size_t chosen = 0;
+    const double best = Best(unit, extend, 0, &chosen);
+    if (best == kNever || (best >= 1 && looks_[unit] < kLooksInTime)) continue;
+    // Where nothing else helps, third ones have to find another way.
+    Take(unit, candidates_[chosen]);
+    PushMet(unit);
+    return true;
   }
   out_.paths[unit] = before.path;
   out_.tracks[unit] = before.track;
@@ -318,7 +361,7 @@ bool Repair::Improve(std::uint32_t unit) {
   if (best == kNever && looks >= 1) {
     // What stands is in every way: one around it.
     candidates_.clear();
-    AppendAlong(question, WayAmongStanding(unit), &candidates_);
+    AppendAlong(question, WayAmongStanding(unit, kNobody, q_.from), &candidates_);
     best = Best(unit, extend, 0, &chosen);
   }
   if (best < 1) {

@@ -98,8 +98,8 @@ class Search {
 
 double NeedOf(const Scene& scene, std::uint32_t i, std::uint32_t j) {
   const auto near = scene.neighbours(i);
-  const auto it = std::find_if(near.begin(), near.end(),
-                               [j](const NeighbourNeed& n) { return n.unit == j; });
+  const auto it =
+      std::find_if(near.begin(), near.end(), [j](const NeighbourNeed& n) { return n.unit == j; });
   return it->need_mm;
 }
 

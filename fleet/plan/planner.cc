@@ -384,7 +384,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     // Some may have no way at all: they stay, and the others are asked again.
     stuck_ = choreography_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return movable_[i] == 0; });
-      if (!AbandonHopeless()) break;
+    if (!AbandonHopeless()) break;
     paths = choreography_.paths;
   }
   choreography_ = {};
