@@ -253,7 +253,7 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
   for (const double grid_deg : {6.0, 3.0}) {
     if (grid_deg < 6 && looks < kLooksAlone) break;
     question.grid_deg = grid_deg;
-    question.expansions_max = looks < kLooksAlone ? 300 : looks < 2 * kLooksAlone ? 2000 : 20'000;
+    question.expansions_max = looks < kLooksAlone ? 500 : 4000;
     const std::optional<AxisPaths> paths = search_.Find(question);
     if (!paths) continue;
     track_ = Track(arm, q_.drives[unit], q_.from[unit], *paths);

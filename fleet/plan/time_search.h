@@ -1,5 +1,7 @@
-// A way for one unit among others that move: A* over its own square of angles and time. Every step
-// takes the same time; in it each axis turns one way, the other way, or waits. A step is tested
+// A way for one unit among others that move: A* over its own square of angles and the times at
+// which each pose is safe (safe interval path planning, Phillips and Likhachev 2011): waiting in a
+// safe pose costs no search, so a pose is looked at once for each of its safe intervals. Every step
+// takes the same time; in it each axis turns one way, the other way, or not. A step is tested
 // against the motions of the others as they are (track.h), so what is found holds in time; it is
 // laid out as segments and may be tested whole once more.
 #pragma once
@@ -42,12 +44,19 @@ class TimeSearch {
   std::optional<AxisPaths> Find(const Question& question);
 
  private:
+  /// Steps from `first` to `last` in which a pose may be held.
+  struct Interval {
+    std::int32_t first = 0;
+    std::int32_t last = 0;
+    std::int32_t node = -1;  // that reached it first; the earliest is the best
+  };
   struct Node {
     std::int32_t came_from = -1;
-    std::int32_t theta = 0;  // in steps from the start
-    std::int32_t phi = 0;
-    std::int32_t step = 0;
+    std::int32_t pose = 0;  // index into the grid
+    std::int32_t interval = 0;
+    std::int32_t step = 0;  // arrives
     std::int8_t turned[2] = {0, 0};
+    bool done = false;
   };
   struct Open {
     std::int32_t total;  // steps, at least, until the target is reached for good
@@ -59,20 +68,31 @@ class TimeSearch {
     }
   };
 
-  void SetUp();
-  [[nodiscard]] Pose PoseOf(const Node& node) const;
-  [[nodiscard]] Leg LegOf(const Pose& from, const Pose& to, double begin_s, double end_s) const;
+  bool SetUp();
+  [[nodiscard]] Pose PoseOf(std::int32_t pose) const;
+  [[nodiscard]] Leg LegOf(const Pose& from, const Pose& to, std::int32_t step) const;
   [[nodiscard]] bool StepClear(const Leg& leg) const;
   [[nodiscard]] std::int32_t StepsLeft(const Pose& pose) const;
-  std::optional<AxisPaths> LayOut(std::int32_t node) const;
-  [[nodiscard]] bool EndsAt(const Node& node) const;
+  std::vector<Interval>& SafeAt(std::int32_t pose);
+  void Expand(std::int32_t node);
+  void Reach(const Node& node);
+  [[nodiscard]] std::optional<AxisPaths> LayOut(std::int32_t node, std::int32_t leaves) const;
+  [[nodiscard]] std::optional<AxisPaths> EndFrom(std::int32_t node) const;
+  [[nodiscard]] bool EndsClear(const Pose& pose, std::int32_t step) const;
 
   Question q_;
   std::int64_t step_ticks_ = 0;
+  double step_s_ = 0;
+  std::int32_t steps_max_ = 0;
+  std::int32_t target_safe_ = 0;  // from this step on
   std::array<std::int32_t, kAxisCount> step_{};
+  std::array<std::int32_t, kAxisCount> low_{};
+  std::array<std::int32_t, kAxisCount> count_{};
   std::vector<Node> nodes_;
   std::vector<Open> open_;
-  std::vector<std::uint8_t> seen_;
+  std::vector<std::vector<Interval>> safe_;
+  std::vector<std::uint8_t> known_;
+  std::vector<std::uint8_t> blocked_;  // scratch: by step
 };
 
 }  // namespace focalfleet
