@@ -255,4 +255,21 @@ Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to) {
   return made;
 }
 
+Candidate Delayed(const UnitDrive& drive, const Candidate& straight, double begin_s,
+                  bool one_by_one) {
+  Candidate later;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    for (Segment segment : straight.path[k].segments()) {
+      segment.start_ticks +=
+          TicksOf(one_by_one && k > 0 ? std::max(begin_s, later.end_s) : begin_s);
+      const AxisDrive as_sent{drive.axis[k].counter1, segment.repeat, drive.axis[k].subdivision};
+      later.path[k].Append(segment);
+      later.end_s =
+          std::max(later.end_s, segment.start_ticks * kTickS +
+                                    std::abs(segment.delta) * SecondsPerVector(as_sent) + kTickS);
+    }
+  }
+  return later;
+}
+
 }  // namespace focalfleet

@@ -54,5 +54,8 @@ void AppendAlong(const CandidateQuestion& question, const Way& way,
 
 /// Both axes at once, without delay.
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to);
+/// A straight one that begins later; with `one_by_one` phi waits for theta.
+Candidate Delayed(const UnitDrive& drive, const Candidate& straight, double begin_s,
+                  bool one_by_one);
 
 }  // namespace focalfleet

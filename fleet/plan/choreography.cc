@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "fleet/plan/time_search.h"
+#include "protocol/base/check.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
@@ -54,6 +55,9 @@ class Repair {
   bool GoAround(std::uint32_t unit, std::uint32_t other);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
   void Take(std::uint32_t unit, const Candidate& candidate);
+  void Go(std::uint32_t unit, const AxisPaths& paths, Track track);
+  [[nodiscard]] bool KeepsLimits(std::uint32_t unit, const AxisPaths& paths) const;
+  void BeginWithinLimits(std::uint32_t unit);
 
   const ChoreographyRequest& q_;
   const Scene& scene_;
@@ -170,18 +174,54 @@ void Repair::Begin() {
     }
     const Candidate straight = Straight(q_.drives[i], q_.from[i], q_.to[i]);
     const bool begun = !q_.begin_with.empty() && Reaches(i, q_.begin_with[i]);
-    out_.paths[i] = begun ? q_.begin_with[i] : straight.path;
-    out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], out_.paths[i]);
+    if (q_.ledger == nullptr) {
+      out_.paths[i] = begun ? q_.begin_with[i] : straight.path;
+      out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], out_.paths[i]);
+    }
     spare.emplace_back(straight.end_s - q_.within_s, i);
   }
   // Who has the most time to spare gives way first.
   std::sort(spare.begin(), spare.end());
   for (const auto& [time, i] : spare) Push(i);
+  if (q_.ledger == nullptr) return;
+  // The longest first, each as soon as its rail can feed it.
+  for (auto it = spare.rbegin(); it != spare.rend(); ++it)
+    if (q_.from[it->second] != q_.to[it->second]) BeginWithinLimits(it->second);
+}
+
+/// Straight, as soon as the limits of power let it.
+void Repair::BeginWithinLimits(std::uint32_t unit) {
+  constexpr double kStepS = 0.5;
+  const Candidate straight = Straight(q_.drives[unit], q_.from[unit], q_.to[unit]);
+  const double last_s = 1000 + 100 * q_.within_s;
+  for (double begin_s = 0; begin_s < last_s; begin_s += kStepS) {
+    for (const bool one_by_one : {false, true}) {
+      const Candidate later = Delayed(q_.drives[unit], straight, begin_s, one_by_one);
+      if (!q_.ledger->Enter(unit, later.path)) continue;
+      out_.paths[unit] = later.path;
+      out_.tracks[unit] = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], later.path);
+      return;
+    }
+  }
+  out_.tracks[unit] = Track(scene_.arm(unit), q_.from[unit]);
+}
+
+/// The unit goes so from now on. Pre: that keeps the limits of power.
+void Repair::Go(std::uint32_t unit, const AxisPaths& paths, Track track) {
+  if (q_.ledger != nullptr) {
+    q_.ledger->Remove(unit, out_.paths[unit]);
+    FOCALFLEET_CHECK(q_.ledger->Enter(unit, paths));
+  }
+  out_.paths[unit] = paths;
+  out_.tracks[unit] = std::move(track);
 }
 
 void Repair::Take(std::uint32_t unit, const Candidate& candidate) {
-  out_.paths[unit] = candidate.path;
-  out_.tracks[unit] = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
+  Go(unit, candidate.path, Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path));
+}
+
+bool Repair::KeepsLimits(std::uint32_t unit, const AxisPaths& paths) const {
+  return q_.ledger == nullptr || q_.ledger->Fits(unit, paths, out_.paths[unit]);
 }
 
 /// The least cost of the candidates from `first` on, and which.
@@ -194,6 +234,7 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
     track_ = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
     const double cost = Cost(unit, track_, best == kNever ? best : best + 1e-9);
     if (cost > best || cost == kNever) continue;
+    if (!KeepsLimits(unit, candidate.path)) continue;
     ties = cost < best ? 1 : ties + 1;
     if (cost == best && rng_.Below(static_cast<std::uint64_t>(ties)) != 0) continue;
     best = cost;
@@ -258,8 +299,8 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
     if (!paths) continue;
     track_ = Track(arm, q_.drives[unit], q_.from[unit], *paths);
     if (Cost(unit, track_, 1) >= 1) continue;
-    out_.paths[unit] = *paths;
-    out_.tracks[unit] = track_;
+    if (!KeepsLimits(unit, *paths)) continue;
+    Go(unit, *paths, track_);
     return true;
   }
   return false;
@@ -271,7 +312,7 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   const Choreography::Motion before{out_.paths[unit], out_.tracks[unit]};
   const Choreography::Motion other_before{out_.paths[other], out_.tracks[other]};
   const double extend = ExtensionAt(looks_[unit]);
-  out_.tracks[unit] = Track();
+  Go(unit, {}, Track());
   candidates_.clear();
   CandidateQuestion question{.scene = &scene_,
                              .drive = &q_.drives[other],
@@ -305,6 +346,7 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
     const std::size_t pick = k == 0   ? static_cast<std::size_t>(latest - good.begin())
                              : k == 1 ? static_cast<std::size_t>(soonest - good.begin())
                                       : rng_.Below(good.size());
+    if (!KeepsLimits(other, ways[good[pick]].path)) continue;
     Take(other, ways[good[pick]]);
     if (SearchWay(unit, q_.within_s * extend, looks_[unit])) return true;
     if (k > 1 || looks_[unit] < kLooksAlone) continue;
@@ -325,10 +367,9 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
     PushMet(unit);
     return true;
   }
-  out_.paths[unit] = before.path;
-  out_.tracks[unit] = before.track;
-  out_.paths[other] = other_before.path;
-  out_.tracks[other] = other_before.track;
+  Go(unit, {}, Track());
+  Go(other, other_before.path, other_before.track);
+  Go(unit, before.path, before.track);
   return false;
 }
 

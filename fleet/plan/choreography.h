@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "fleet/plan/candidates.h"
+#include "fleet/plan/power_ledger.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/track.h"
 
@@ -40,6 +41,7 @@ struct ChoreographyRequest {
   std::span<const Pose> to;               // Shape: (n)
   std::span<const std::uint8_t> movable;  // Shape: (n); others stand
   std::span<const AxisPaths> begin_with;  // Shape: (n), or empty: straight ways
+  PowerLedger* ledger = nullptr;          // empty at first; null: power has no limit
   Tolerance tolerance;
   double within_s = 0;  // the time that may be used without being noticed
   std::uint64_t seed = 1;

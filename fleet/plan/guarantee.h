@@ -14,8 +14,8 @@
 namespace focalfleet {
 
 /// The `count` pairs that come nearest for any start skew and clock within the tolerance, nearest
-/// first; what is told is never more than the truth, and at most 10 um less. Shape: `tracks` (n). Cost: O(n), most pairs are dismissed by their
-/// bounds.
+/// first; what is told is never more than the truth, and at most 10 um less. Shape: `tracks` (n).
+/// Cost: O(n), most pairs are dismissed by their bounds.
 std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
                                     const Tolerance& tolerance, std::size_t count);
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <map>
 #include <numbers>
 
 #include "fleet/plan/choreography.h"
@@ -22,6 +23,7 @@ namespace {
 /// aside.
 constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
+constexpr double kSlackMost = 4;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
 /// is found sooner.
 constexpr double kDenseNeighbours = 10;
@@ -60,8 +62,10 @@ class Planner {
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
+  [[nodiscard]] Status CheckPower() const;
   [[nodiscard]] double MeanNeighbours() const;
   [[nodiscard]] double BoundS() const;
+  double PowerBoundS(PowerLedger* ledger) const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   void PlanOfChoreography();
   void TracksOfPlan();
@@ -342,6 +346,24 @@ void Planner::GiveWay() {
   }
 }
 
+/// A limit below what one motor draws lets nobody move.
+Status Planner::CheckPower() const {
+  const PowerLedger ledger(layout_, request_.drives, options_.motor, options_.power, {});
+  const double least_W = ledger.LargestMotor_W();
+  std::array<char, 160> text{};
+  for (const auto& [limit_W, name] :
+       {std::pair{options_.power.rail_W, "rail"}, std::pair{options_.power.total_W, "total"}}) {
+    if (limit_W <= 0 || limit_W >= least_W) continue;
+    std::snprintf(
+        text.data(), text.size(),
+        "the %s limit of %.4f W is below what one motor draws; the least that is feasible "
+        "is %.4f W",
+        name, limit_W, least_W);
+    return Fail(ErrorCode::kRefused, text.data());
+  }
+  return {};
+}
+
 double Planner::MeanNeighbours() const {
   std::size_t sum = 0;
   for (std::uint32_t i = 0; i < scene_.size(); ++i) sum += scene_.neighbours(i).size();
@@ -356,6 +378,24 @@ double Planner::BoundS() const {
   return bound_s;
 }
 
+/// With limits of power no plan is shorter than the energy of straight moves over the limit.
+double Planner::PowerBoundS(PowerLedger* ledger) const {
+  std::map<std::uint32_t, double> rails;
+  double total_J = 0;
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (served_[i] == 0) continue;
+    const double energy_J =
+        ledger->Energy(i, Straight(request_.drives[i], start_[i], goal_[i]).path);
+    rails[layout_.unit({i}).rail.value] += energy_J;
+    total_J += energy_J;
+  }
+  double bound_s = options_.power.total_W > 0 ? total_J / options_.power.total_W : 0;
+  if (options_.power.rail_W > 0)
+    for (const auto& [rail, energy_J] : rails)
+      bound_s = std::max(bound_s, energy_J / options_.power.rail_W);
+  return bound_s;
+}
+
 /// Everybody at once. False: somebody is left who meets others; nothing is planned then.
 bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<std::uint8_t> may_move = movable_;
@@ -363,23 +403,35 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
       if (!request_.targets[i]) may_move[i] = 0;
   std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
+  double slack = 1.02;
   for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
     DropCollidingTargets();
     scene_.AllowFor(start_);
     scene_.AllowFor(goal_);
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
+    std::optional<PowerLedger> ledger;
+    double within_s = std::max(BoundS(), plan_.makespan_s);
+    if (options_.power.any()) {
+      ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
+      within_s = std::max(within_s, PowerBoundS(&*ledger)) * slack;
+    }
     choreography_ = Choreograph({.scene = &scene_,
                                  .drives = request_.drives,
                                  .from = start_,
                                  .to = goal_,
                                  .movable = may_move,
                                  .begin_with = paths,
+                                 .ledger = ledger ? &*ledger : nullptr,
                                  .tolerance = tolerance,
-                                 .within_s = std::max(BoundS(), plan_.makespan_s),
+                                 .within_s = within_s,
                                  .seed = options_.seed});
     if (choreography_.in_conflict.empty()) {
       PlanOfChoreography();
       return true;
+    }
+    if (ledger) {
+      slack *= 1.1;
+      if (slack < kSlackMost) continue;
     }
     // Some may have no way at all: they stay, and the others are asked again.
     stuck_ = choreography_.in_conflict;
@@ -458,6 +510,11 @@ Plan Planner::Finish() {
 Result<Plan> Planner::Run() {
   Classify();
   FOCALFLEET_TRY(Check());
+  if (options_.power.any()) {
+    FOCALFLEET_TRY(CheckPower());
+    if (AllAtOnce({})) return Finish();
+    return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
+  }
   const bool dense = MeanNeighbours() > kDenseNeighbours;
   if (!options_.lead_apart && !dense && AllAtOnce({})) return Finish();
   std::vector<Piece> order;

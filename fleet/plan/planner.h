@@ -18,6 +18,7 @@
 #include "fleet/knowledge.h"
 #include "fleet/layout.h"
 #include "fleet/plan/plan.h"
+#include "fleet/plan/power_ledger.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
@@ -43,6 +44,8 @@ struct PlanOptions {
   /// into it are stopped. Pairs for which the plan cannot promise that are in Plan::unnoticed.
   double notice_s = 1;
   std::uint64_t seed = 1;
+  PowerLimits power = {};  // hard at every instant, for every skew and clock
+  MotorModel motor = {};   // what the motors draw
 };
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the

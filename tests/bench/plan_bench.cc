@@ -57,6 +57,7 @@ int Run(int argc, char** argv) {
   const auto count = static_cast<std::uint32_t>(Option(argc, argv, "--units", 5000));
   const int configurations = Option(argc, argv, "--configurations", 10);
   const auto seed = static_cast<std::uint64_t>(Option(argc, argv, "--seed", 1));
+  const double rail_limit_W = Option(argc, argv, "--rail-limit-mw", 0) * 1e-3;
   const bool check = Option(argc, argv, "--check", 0) != 0;
   auto layout = Layout::Create(UnitsOf(kind, count), {});
   if (!layout || layout->size() == 0) return std::fprintf(stderr, "no such layout\n"), 2;
@@ -85,26 +86,37 @@ int Run(int argc, char** argv) {
     const PlanRequest request{
         .layout = &*layout, .drives = drives, .start = start, .targets = targets, .frozen = frozen};
     const double begin_s = CpuSeconds();
-    const auto plan = MakePlan(request, {});
+    PlanOptions options;
+    options.power.rail_W = rail_limit_W;
+    const auto plan = MakePlan(request, options);
     const double cpu_s = CpuSeconds() - begin_s;
     if (!plan) return std::fprintf(stderr, "%s\n", plan.error().text.c_str()), 1;
     const double bound_s = BoundOf(request);
     rows.push_back({plan->makespan_s / bound_s, cpu_s});
+    const PlanEstimate estimate = Estimate(*plan, *layout, drives, {});
+    double rail_peak_W = 0;
+    for (const RailCurve& rail : estimate.rails)
+      for (const PowerStep& step : rail.steps) rail_peak_W = std::max(rail_peak_W, step.power_W);
+    std::printf("energy %.1f J, largest rail's peak %.2f W, total peak %.2f W; ", estimate.energy_J,
+                rail_peak_W, estimate.peak_power_W);
     std::string verdict = "-";
     if (check) {
-      testing::CheckOptions options;
-      options.clearance_mm = layout->clearance_mm();
+      testing::CheckOptions check_options;
+      check_options.clearance_mm = layout->clearance_mm();
       const auto report = testing::CheckPlan(testing::CheckedUnits(*layout, drives, start, frozen),
                                              testing::CheckedRows(*plan, *layout, drives),
-                                             testing::CheckedObstacles(*layout), options);
+                                             testing::CheckedObstacles(*layout), check_options);
       verdict = report.ok() ? "clear" : report.Text();
     }
     if (!plan->unserved.empty() || (check && verdict != "clear")) ++faults;
-    std::printf("seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu crossing %u unnoticed %zu clearance %.1f um at %.2f s %s\n",
-                static_cast<unsigned long long>(seed + static_cast<std::uint64_t>(c)), bound_s,
-                plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), plan->crossings, plan->unnoticed.size(),
-                plan->tightest.empty() ? 0 : 1e3 * plan->tightest.front().clearance_mm,
-                plan->tightest.empty() ? 0 : plan->tightest.front().t_s, verdict.c_str());
+    std::printf(
+        "seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu crossing %u "
+        "unnoticed %zu clearance %.1f um at %.2f s %s\n",
+        static_cast<unsigned long long>(seed + static_cast<std::uint64_t>(c)), bound_s,
+        plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), plan->crossings,
+        plan->unnoticed.size(),
+        plan->tightest.empty() ? 0 : 1e3 * plan->tightest.front().clearance_mm,
+        plan->tightest.empty() ? 0 : plan->tightest.front().t_s, verdict.c_str());
     std::fflush(stdout);
   }
   std::vector<double> ratios;

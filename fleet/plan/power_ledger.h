@@ -1,0 +1,65 @@
+// What each supply rail gives at every moment of a plan in the making, against what it may give.
+// Time is cut into slots, and a motor that may run at any moment of a slot, for any start skew and
+// clock, is counted for all of it: what fits here holds at every instant of the nominal rows and of
+// all rows that the tolerance allows.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "fleet/drive_power.h"
+#include "fleet/layout.h"
+#include "fleet/plan/track.h"
+
+namespace focalfleet {
+
+struct PowerLimits {
+  double rail_W = 0;   // of each rail; 0: none
+  double total_W = 0;  // of all rails together; 0: none
+  [[nodiscard]] bool any() const { return rail_W > 0 || total_W > 0; }
+};
+
+class PowerLedger {
+ public:
+  PowerLedger(const Layout& layout, std::span<const UnitDrive> drives, const MotorModel& motor,
+              const PowerLimits& limits, const Tolerance& tolerance);
+
+  /// Enters the motion of a unit where it keeps the limits. False: it does not, nothing changes.
+  bool Enter(std::uint32_t unit, const AxisPaths& path);
+  void Remove(std::uint32_t unit, const AxisPaths& path);
+  /// Whether `path` would keep the limits if the unit left `instead_of`, which is entered.
+  bool Fits(std::uint32_t unit, const AxisPaths& path, const AxisPaths& instead_of);
+
+  /// Energy that the motion takes by nominal clocks. Units: J.
+  double Energy(std::uint32_t unit, const AxisPaths& path);
+  /// The most that one motor of the fleet draws: no limit below it can be kept. Units: W.
+  [[nodiscard]] double LargestMotor_W() const { return largest_W_; }
+
+ private:
+  static constexpr double kSlotS = 0.05;
+  void Add(std::uint32_t unit, const AxisPaths& path, double sign);
+  [[nodiscard]] bool Kept(std::uint32_t unit, const AxisPaths& path) const;
+  struct Slots {
+    std::size_t first = 0;
+    std::size_t last = 0;  // included
+  };
+  [[nodiscard]] Slots SlotsOf(const Segment& segment, const AxisDrive& drive) const;
+  double Power(std::uint32_t unit, std::size_t axis, const Segment& segment);
+  static std::int64_t Nanowatts(double power_W) {
+    return static_cast<std::int64_t>(std::llround(power_W * 1e9));
+  }
+
+  const Layout& layout_;
+  std::span<const UnitDrive> drives_;
+  DrivePowers powers_;
+  PowerLimits limits_;
+  Tolerance tolerance_;
+  double largest_W_ = 0;
+  std::vector<std::uint32_t> rail_;               // by unit: index into rails_
+  std::vector<std::vector<std::int64_t>> rails_;  // nanowatts by slot, so that sums are exact
+  std::vector<std::int64_t> total_;
+};
+
+}  // namespace focalfleet
