@@ -23,6 +23,7 @@ namespace {
 /// aside.
 constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
+constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 4;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
 /// is found sooner.
@@ -403,7 +404,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
       if (!request_.targets[i]) may_move[i] = 0;
   std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
-  double slack = 1.02;
+  double slack = 0;  // of the time with limits of power; 0: not known yet
   for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
     DropCollidingTargets();
     scene_.AllowFor(start_);
@@ -413,7 +414,10 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     double within_s = std::max(BoundS(), plan_.makespan_s);
     if (options_.power.any()) {
       ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
-      within_s = std::max(within_s, PowerBoundS(&*ledger)) * slack;
+      // Where power is what takes the time, rails that are full leave no room to give way.
+      const double power_s = PowerBoundS(&*ledger);
+      if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
+      within_s = std::max(within_s, power_s) * slack;
     }
     choreography_ = Choreograph({.scene = &scene_,
                                  .drives = request_.drives,
