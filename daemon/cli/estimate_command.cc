@@ -80,7 +80,7 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
   FOCALFLEET_TRY_ASSIGN(
       OfflinePlan planned,
       PlanOffline(context, fleet, start,
-                  {.targets = options.targets, .from = from, .fixed = options.fixed}));
+                  {.targets = options.targets, .from = from, .plan = {.fixed = options.fixed}}));
   Estimated estimated{std::move(fleet), std::move(planned), {}, {}};
   bool any_turns = false;
   for (const std::string& word : ModeWords()) {

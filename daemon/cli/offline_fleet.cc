@@ -72,7 +72,7 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
                         .start = start,
                         .targets = poses,
                         .frozen = frozen},
-                       {.fixed = files.fixed});
+                       files.plan);
   if (!plan) {
     return Fail(plan.error().code,
                 fmt::format("{} from {}: {}", files.targets, files.from, plan.error().text));

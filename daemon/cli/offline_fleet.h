@@ -45,7 +45,7 @@ using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
 struct PlanFiles {
   std::string targets;
   std::string from;    // for messages: what `state` was read from
-  bool fixed = false;  // units without a target may not step aside
+  PlanOptions plan = {};
 };
 struct OfflinePlan {
   Plan plan;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <ctime>
+#include <set>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/offline_fleet.h"
@@ -19,7 +20,7 @@ struct PlanCommandOptions {
   FleetFiles files;
   std::string targets;
   std::string from;
-  bool fixed = false;
+  PlanOptions plan;
   std::string out;
   std::string plot;  // empty: none
 };
@@ -32,6 +33,17 @@ struct Planned {
   std::size_t rows = 0;
 };
 
+std::vector<report::RailLimit> LimitsOf(const PlanCommandOptions& options,
+                                        const OfflineFleet& fleet) {
+  std::set<std::uint32_t> rails;
+  if (options.plan.power.rail_W > 0)
+    for (const Unit& unit : fleet.layout.units()) rails.insert(unit.rail.value);
+  std::vector<report::RailLimit> limits;
+  for (const std::uint32_t rail : rails)
+    limits.push_back({RailId{rail}, options.plan.power.rail_W});
+  return limits;
+}
+
 std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
                    const StatePoses& state, const OfflinePlan& planned) {
   return report::PlanPage({.title = fmt::format("Plan: {} from {}", options.targets, options.from),
@@ -39,7 +51,8 @@ std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
                            .drives = fleet.drives,
                            .start = state,
                            .targets = planned.targets,
-                           .plan = &planned.plan});
+                           .plan = &planned.plan,
+                           .rail_limits = LimitsOf(options, fleet)});
 }
 
 Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& options) {
@@ -48,8 +61,8 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   FOCALFLEET_TRY_ASSIGN(
       OfflinePlan planned,
       PlanOffline(context, fleet, state,
-                  {.targets = options.targets, .from = options.from, .fixed = options.fixed}));
-  const MotorModel motor;
+                  {.targets = options.targets, .from = options.from, .plan = options.plan}));
+  const MotorModel& motor = options.plan.motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);
   if (!options.plot.empty()) {
     FOCALFLEET_TRY(WriteFileAtomically(options.plot, PageOf(options, fleet, state, planned)));
@@ -67,6 +80,31 @@ double Peak(const RailCurve& curve) {
   return peak;
 }
 
+Json PairJson(const Layout& layout, PositionerIndex a, PositionerIndex b) {
+  return Json::array({layout.unit(a).id.value, layout.unit(b).id.value});
+}
+
+/// What the plan promises besides arriving.
+Json GuaranteeJson(const Planned& planned, const PlanOptions& options) {
+  const Layout& layout = planned.fleet.layout;
+  Json tightest = Json::array();
+  for (const TightPair& pair : planned.plan.tightest)
+    tightest.push_back({{"unit_ids", PairJson(layout, pair.a, pair.b)},
+                        {"clearance_um", 1e3 * pair.clearance_mm},
+                        {"t_s", pair.t_s}});
+  Json late = Json::array();
+  for (const Unnoticed& pair : planned.plan.unnoticed)
+    late.push_back({{"unit_ids", PairJson(layout, pair.ends, pair.follower)},
+                    {"from_s", pair.at_s},
+                    {"leaves_s", pair.leaves_s}});
+  return {{"start_skew_s", options.start_skew_s},
+          {"clock_error", options.clock_error},
+          {"notice_s", options.notice_s},
+          {"crossing_pairs", planned.plan.crossings},
+          {"without_notice", late},
+          {"tightest", tightest}};
+}
+
 Json Summary(const Planned& planned, const PlanCommandOptions& options) {
   Json rails = Json::array();
   for (const RailCurve& curve : planned.estimate.rails) {
@@ -77,6 +115,8 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"served", planned.targeted - planned.plan.unserved.size()},
           {"unserved", UnservedJson(planned.plan, planned.fleet.layout)},
           {"makespan_s", planned.estimate.makespan_s},
+          {"bound_s", planned.plan.bound_s},
+          {"guarantee", GuaranteeJson(planned, options.plan)},
           {"energy_J", planned.estimate.energy_J},
           {"peak_power_W", planned.estimate.peak_power_W},
           {"rails", rails},
@@ -86,19 +126,35 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"plot", options.plot.empty() ? Json(nullptr) : Json(options.plot)}};
 }
 
+std::string DescribeGuarantee(const Json& guarantee) {
+  std::string text;
+  if (!guarantee["tightest"].empty()) {
+    const Json& nearest = guarantee["tightest"].front();
+    text += fmt::format(
+        "\n  nearest: units {} and {} at {:.2f} s, {:.1f} um beyond the clearance or more",
+        nearest["unit_ids"][0].get<std::uint32_t>(), nearest["unit_ids"][1].get<std::uint32_t>(),
+        nearest["t_s"].get<double>(), nearest["clearance_um"].get<double>());
+  }
+  if (!guarantee["without_notice"].empty())
+    text += fmt::format(
+        "\n  a unit that ends early may be noticed too late in {} of {} crossing pairs",
+        guarantee["without_notice"].size(), guarantee["crossing_pairs"].get<std::uint32_t>());
+  return text;
+}
+
 std::string Describe(const Json& summary) {
   const auto number = [&](const char* key) { return summary[key].get<double>(); };
   const std::string text = fmt::format(
-      "{}: {} of {} targets served, {} rows\n  makespan {:.1f} s, energy {:.1f} J, peak power "
-      "{:.1f} W",
+      "{}: {} of {} targets served, {} rows\n  makespan {:.2f} s (the slowest unit alone: {:.2f} s), "
+      "energy {:.1f} J, peak power {:.1f} W",
       summary["out"].get<std::string>(), summary["served"].get<std::uint64_t>(),
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
-      number("makespan_s"), number("energy_J"), number("peak_power_W"));
+      number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"));
   const std::string plot =
       summary["plot"].is_null()
           ? ""
           : fmt::format("\n  {}: to look at, in a browser", summary["plot"].get<std::string>());
-  return text + plot + DescribeUnserved(summary["unserved"]);
+  return text + DescribeGuarantee(summary["guarantee"]) + plot + DescribeUnserved(summary["unserved"]);
 }
 
 ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
@@ -131,7 +187,21 @@ void AddPlanCommand(CommandLine* line) {
   AddFile(command, "--targets", &options->targets, "targets.csv: where the fibres shall be")
       ->required();
   AddFile(command, "--from", &options->from, "state.csv: where every axis stands")->required();
-  command->add_flag("--fixed", options->fixed, "Units that no target names may not step aside");
+  command->add_flag("--fixed", options->plan.fixed,
+                    "Units that no target names may not step aside");
+  command
+      ->add_option("--rail-limit-w", options->plan.power.rail_W,
+                   "No supply rail gives more at any instant, W")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--total-limit-w", options->plan.power.total_W,
+                   "Nor do all rails together, W")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--notice-s", options->plan.notice_s,
+                   "Time to notice that a unit has stopped by itself, and to stop those that "
+                   "follow it, s [1]")
+      ->check(CLI::Range(0.0, 60.0));
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
   AddFile(command, "--plot", &options->plot,
           "plan.html to write: the plan to look at, in a browser")
