@@ -44,12 +44,13 @@ struct DriveSample {
 };
 
 /// What happened between two events, as integrals from `t_s` over `step_s`: of t^k i (t from the
-/// interval's begin), k = 0..3, and of the torque.
+/// interval's begin), k = 0..3, and of the torque and of t times it.
 struct DriveInterval {
   double t_s = 0;
   double step_s = 0;
   std::array<std::complex<double>, 4> moments;
   double impulse_Nms = 0;
+  double moment_Nms2 = 0;
 };
 
 class Drive {
