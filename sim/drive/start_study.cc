@@ -94,6 +94,7 @@ MoveCount TryMovesAt(Level level, double stall_Nm, const Drive::Setting& setting
       const auto lost = std::llround(off);
       count.succeeded += lost == 0 ? 1 : 0;
       field = end + lost * modulation.subdivision;
+      if (rule.on_move) rule.on_move();
     }
   count.copper_J = level.copper_J();
   count.time_s = level.t_s();

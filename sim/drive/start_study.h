@@ -38,6 +38,7 @@ struct StartRule {
   double move_deg = 300;  // of the output
   int moves_each_way = 6;
   Ramp ramp;
+  std::function<void()> on_move = {};  // hears each move's end; may be empty
 };
 
 /// What came of the moves of a rule.
