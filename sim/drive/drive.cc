@@ -245,6 +245,7 @@ void Drive::Account(const Course& course, double now_s, double step_s, double de
     const Leg& leg = legs_[k];
     if (leg.path == Leg::Path::kFloats) continue;
     const double charge = Project(moments[0], k);
+    if (leg.open()) diode_C_ += std::abs(charge);
     const double out_J = leg.voltage_V * charge + leg.slope_V_per_s * Project(moments[1], k);
     if (leg.slope_V_per_s == 0) {
       if (leg.voltage_V > 0) supply_J_ += out_J;

@@ -157,6 +157,7 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   const double square_before = drive.square_A2s();
   const double begin_s = drive.t_s();
   const std::uint64_t edges_before = drive.edges();
+  const double diode_before_C = drive.diode_C();
   const double turn_s = 1 / modulation.field_Hz();
 
   // Components e^(j m w t) of the current in the plane, m = -6..6; a phase sees m and -m as one.
@@ -207,6 +208,7 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   figures.power.switching_W = (after.switching_J - before.switching_J) / time_s;
   figures.power.mechanical_W = state.torque_Nm * state.speed_rad_per_s;
   figures.supply_A = figures.power.supply_W / setting.bridge.v_bus_V;
+  figures.diode_A = (drive.diode_C() - diode_before_C) / time_s;
   figures.edges_per_carrier =
       static_cast<double>(drive.edges() - edges_before) / (time_s / modulation.carrier_s());
   return figures;

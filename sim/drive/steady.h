@@ -50,6 +50,7 @@ struct WaveFigures {
   double torque_ripple_rms = 0;
   double supply_A = 0;
   double edges_per_carrier = 0;
+  double diode_A = 0;  // mean through all diodes
   DrivePower power;
 };
 

@@ -165,6 +165,18 @@ TEST(Reproduce, AtEqualFieldMoreEdgesCostMore) {
   }
 }
 
+TEST(Reproduce, WithDiodesTheSavingIsTheIndependentOne) {
+  // The independent one: -1.6 and 8.2 mW at 9 V; 0.01 and 1.2 to 1.3 mW at 1.8 V.
+  const std::vector<double>& high = Find(AsPrinted(), "saving_with_diodes_9V").simulated;
+  const std::vector<double>& low = Find(AsPrinted(), "saving_with_diodes_1V8").simulated;
+  ASSERT_EQ(high.size(), 2u);
+  ASSERT_EQ(low.size(), 2u);
+  EXPECT_NEAR(high[0], -1.6, 0.1);
+  EXPECT_NEAR(high[1], 8.2, 0.2);
+  EXPECT_NEAR(low[0], 0.01, 0.02);
+  EXPECT_NEAR(low[1], 1.2, 0.1);
+}
+
 TEST(Reproduce, IdsAreUniqueAndEveryFitNamesItsParameter) {
   std::vector<std::string> ids;
   for (const Claim& claim : AsPrinted().claims) {
