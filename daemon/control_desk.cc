@@ -159,6 +159,16 @@ Json NewestOf(const std::vector<ParameterHistory>& history) {
   return HistoryJson(newest);
 }
 
+/// The newest of each axis; `history` is newest first.
+Json NewestOf(const std::vector<TuningHistory>& history) {
+  std::vector<TuningHistory> newest;
+  for (const TuningHistory& entry : history)
+    if (std::ranges::none_of(
+            newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
+      newest.push_back(entry);
+  return HistoryJson(newest);
+}
+
 bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
@@ -249,6 +259,7 @@ Result<Json> ControlDesk::AskParameters(const FleetView& view, const ControlRequ
   const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
   FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kHistoryRowsMax));
+  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kHistoryRowsMax));
   const Json known = UnitJson(view, i);
   Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
   for (const char* axis : {"theta", "phi"})
@@ -258,6 +269,8 @@ Result<Json> ControlDesk::AskParameters(const FleetView& view, const ControlRequ
               {"serial", serial.value},
               {"drive", std::move(drive)},  // what holds now, whether stored or by default
               {"parameters", NewestOf(history)},
+              {"tuning", NewestOf(tunings)},
+              {"tuning_history", HistoryJson(tunings)},
               {"history", HistoryJson(history)}};
 }
 

@@ -279,6 +279,24 @@ Json HistoryJson(const std::vector<ParameterHistory>& parameters) {
   return rows;
 }
 
+Json HistoryJson(const std::vector<TuningHistory>& tunings) {
+  Json rows = Json::array();
+  for (const auto& [row, at] : tunings)
+    rows.push_back({{"axis", Name(row.axis)},
+                    {"critical", row.critical},
+                    {"repeat", row.repeat},
+                    {"margin", row.margin},
+                    {"load_uNm", row.load_uNm},
+                    {"v_bus_V", row.v_bus_V},
+                    {"counter1", row.counter1},
+                    {"subdivision", row.subdivision},
+                    {"mode", Name(row.mode)},
+                    {"origin", Name(row.origin)},
+                    {"serial", row.serial.value},
+                    {"at", ToIso8601(at)}});
+  return rows;
+}
+
 Json HistoryJson(const std::vector<AlarmHistory>& alarms) {
   Json rows = Json::array();
   for (const auto& [row, at] : alarms)

@@ -47,6 +47,7 @@ std::string StateText(const FleetView& view);
 Json HistoryJson(const std::vector<ConfigurationHistory>& configurations);
 Json HistoryJson(const std::vector<MoveHistory>& moves);
 Json HistoryJson(const std::vector<ParameterHistory>& parameters);
+Json HistoryJson(const std::vector<TuningHistory>& tunings);
 Json HistoryJson(const std::vector<AlarmHistory>& alarms);
 Json HistoryJson(const std::vector<UnitHistory>& units);
 

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "fleet/drive.h"
 #include "fleet/knowledge.h"
 #include "protocol/base/ids.h"
 #include "protocol/wire/messages.h"
@@ -81,6 +82,26 @@ struct ParameterRow {
   Origin origin = Origin::kOperator;
 };
 
+/// What the row says of its unit's drive, if anything. A unit has one mode; a tuning writes it for
+/// both axes.
+void TakeParameter(const ParameterRow& row, UnitDrive* drive);
+
+/// What a tuning found for an axis: why its parameters are what they are. The parameters themselves
+/// are rows of their own, which others may change later.
+struct TuningRow {
+  SerialNumber serial;
+  Axis axis = Axis::kTheta;
+  std::uint16_t critical = 0;  // least n that starts the load from rest
+  std::uint16_t repeat = 0;    // the n that was chosen
+  double margin = 0;           // by which the load may grow until that n is critical, as a share
+  double load_uNm = 0;         // mean, at the motor shaft
+  double v_bus_V = 0;
+  std::uint16_t counter1 = 0;
+  std::uint16_t subdivision = 0;
+  WaveMode mode = WaveMode::kAsymmetric;
+  Origin origin = Origin::kTuning;
+};
+
 enum class ConfigurationState : std::uint8_t {
   kPlanning,
   kUploading,
@@ -125,7 +146,7 @@ struct NextMoveRow {
 };
 
 using Row = std::variant<VectorRow, IntentRow, IntentEndRow, BindingRow, EnableRow, ParameterRow,
-                         ConfigurationRow, AlarmRow, NextMoveRow>;
+                         TuningRow, ConfigurationRow, AlarmRow, NextMoveRow>;
 
 /// All that the coordinator needs to go on after a restart.
 struct StoredFleet {
@@ -139,6 +160,7 @@ struct StoredFleet {
   std::vector<VectorRow> vectors;  // by serial
   std::vector<IntentRow> open_intents;
   std::vector<ParameterRow> parameters;
+  std::vector<TuningRow> tunings;
   /// By id: those that never ended, and the newest.
   std::vector<ConfigurationRow> configurations;
   MoveId next_move{1};

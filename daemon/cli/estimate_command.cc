@@ -8,6 +8,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/drive_options.h"
 #include "daemon/cli/offline_fleet.h"
+#include "daemon/cli/start_check.h"
 #include "daemon/cli/table.h"
 #include "daemon/cli/text_file.h"
 #include "fleet/estimate.h"
@@ -24,14 +25,16 @@ struct EstimateOptions {
   std::string targets;
   std::string from;  // empty: all arms folded
   bool fixed = false;
-  std::string mode;  // empty: all
-  UnitDrive drive;   // of every unit; both axes as the first
-  std::string out;   // empty: none
+  std::string mode;   // empty: all
+  UnitDrive drive;    // both axes as the first; of every unit that was not tuned in `store`
+  std::string store;  // empty: none
+  std::string out;    // empty: none
 };
 
 struct ModeEstimate {
   WaveMode mode;
   EstimateFigures figures;
+  StartVerdict starts;
 };
 
 struct Estimated {
@@ -75,6 +78,8 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
   UnitDrive drive = options.drive;
   drive.axis[1] = drive.axis[0];
   fleet.drives.assign(fleet.layout.size(), drive);
+  FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
+  for (UnitDrive& tuned : fleet.drives) tuned.v_bus_V = drive.v_bus_V;
   FOCALFLEET_TRY_ASSIGN(const StatePoses start, StartOf(options, fleet));
   const std::string from = options.from.empty() ? "all arms folded" : options.from;
   FOCALFLEET_TRY_ASSIGN(
@@ -83,20 +88,36 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
                   {.targets = options.targets, .from = from, .plan = {.fixed = options.fixed}}));
   Estimated estimated{std::move(fleet), std::move(planned), {}, {}};
   bool any_turns = false;
+  bool any_starts = false;
+  StartCheck check{MotorModel{}};
   for (const std::string& word : ModeWords()) {
     if (!options.mode.empty() && options.mode != word) continue;
     const WaveMode mode = ModeOf(word);
     for (UnitPlan& move : estimated.planned.plan.moves) move.mode = mode;
     estimated.modes.push_back(
-        {mode, EstimateWithSpread(estimated.planned.plan, estimated.fleet.layout,
-                                  estimated.fleet.drives, MotorModel{}, estimated.spread)});
+        {mode,
+         EstimateWithSpread(estimated.planned.plan, estimated.fleet.layout, estimated.fleet.drives,
+                            MotorModel{}, estimated.spread),
+         check.Of(estimated.planned.plan, estimated.fleet)});
     any_turns |= !estimated.modes.back().figures.stalls;
+    any_starts |= !estimated.modes.back().starts.none_starts();
   }
   if (!any_turns) {
     return Fail(ErrorCode::kInvalid,
                 fmt::format("{}: the motor cannot pull its load ({:.2f} uNm) at this speed and "
                             "voltage; a higher --v-bus or --repeat is needed",
                             DescribeDrive(drive), MotorModel{}.load_torque_Nm * 1e6));
+  }
+  if (!any_starts) {
+    // They would turn if somebody brought them up to speed; nobody does.
+    const BelowCritical& first = estimated.modes.front().starts.below.front();
+    return Fail(
+        ErrorCode::kInvalid,
+        fmt::format(
+            "{}: no axis would start from rest: n {} is below the critical n{} of the load; "
+            "a higher --v-bus or --repeat is needed",
+            DescribeDrive(drive), first.repeat,
+            first.critical > 0 ? fmt::format(" {}", first.critical) : ""));
   }
   if (!options.out.empty()) {
     FOCALFLEET_TRY(WriteFileAtomically(options.out, CurveText(estimated.modes)));
@@ -117,7 +138,9 @@ Json PowerJson(const PowerFigures& power) {
 Json ModeJson(const ModeEstimate& of) {
   Json mode{{"mode", Name(of.mode)},
             {"stalls", of.figures.stalls},
-            {"stalls_within_spread", of.figures.stalls_within_spread}};
+            {"stalls_within_spread", of.figures.stalls_within_spread},
+            {"axes", of.starts.axes},
+            {"below_critical", BelowCriticalJson(of.starts)}};
   if (of.figures.stalls) return mode;
   mode.update(PowerJson(of.figures.total));
   mode["rails"] = Json::array();
@@ -177,7 +200,7 @@ std::string DescribeMode(const ModeEstimate& of) {
   if (of.figures.stalls_within_spread) {
     text += "\n  no margin: motors at the end of the spread cannot pull their load";
   }
-  return text;
+  return text + DescribeBelowCritical(of.starts);
 }
 
 std::string Describe(const Estimated& estimated, const EstimateOptions& options) {
@@ -237,6 +260,7 @@ void AddEstimateCommand(CommandLine* line) {
   command->add_flag("--fixed", options->fixed, "Units that no target names may not step aside");
   OneOf(command->add_option("--mode", options->mode, "One wave mode (default: all, side by side)"),
         ModeWords());
+  AddTunedStore(command, &options->store);
   AxisDrive& axis = options->drive.axis[0];
   command->add_option("--v-bus", options->drive.v_bus_V, "Bus voltage, V")
       ->check(NumberBetween(0.1, kBridgeMax_V))

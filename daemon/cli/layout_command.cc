@@ -13,12 +13,18 @@ namespace {
 
 struct LayoutOptions {
   HexLayoutOptions hex;
+  std::vector<double> arms_mm;  // none, one for both arms, or theta and phi
   std::vector<double> gears;  // none, one for both axes, or theta and phi
   std::string out;
 };
 
 ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
-  std::vector<Unit> units = MakeHexLayout(options.hex);
+  HexLayoutOptions hex = options.hex;
+  if (!options.arms_mm.empty()) {
+    hex.theta_arm_mm = options.arms_mm.front();
+    hex.phi_arm_mm = options.arms_mm.back();
+  }
+  std::vector<Unit> units = MakeHexLayout(hex);
   if (!options.gears.empty()) {
     for (Unit& unit : units) {
       unit.axis[0].gear = options.gears.front();
@@ -63,8 +69,9 @@ void AddLayoutCommand(CommandLine* line) {
       ->check(length)
       ->capture_default_str();
   command
-      ->add_option("--arm-mm", options->hex.arm_mm,
-                   "Length of each arm (default: by the pitch, 8.25 at 25.6)")
+      ->add_option("--arm-mm", options->arms_mm,
+                   "Length of both arms, or of theta phi (default: by the pitch, 8.25 at 25.6)")
+      ->expected(1, 2)
       ->check(length);
   command
       ->add_option("--gear", options->gears,

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <map>
+
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/text_file.h"
+#include "daemon/store/store.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/state_file.h"
@@ -32,6 +35,34 @@ void AddFleetFiles(CLI::App* command, FleetFiles* files) {
       ->add_option("--clearance-mm", files->clearance_mm,
                    "Distance to keep between arms (default: 0.012 of the pitch)")
       ->check(NumberBetween(0, 1000));
+}
+
+void AddTunedStore(CLI::App* command, std::string* store) {
+  AddFile(command, "--store", store,
+          "The daemon's store: units have the parameters and loads that were tuned");
+}
+
+Status TakeTuned(const std::string& store, OfflineFleet* fleet) {
+  if (store.empty()) return {};
+  FOCALFLEET_TRY_ASSIGN(const auto reader, StoreReader::Open(store));
+  FOCALFLEET_TRY_ASSIGN(const StoredFleet stored, reader->Load());
+  std::map<SerialNumber, PositionerIndex> place_of;
+  for (const StoredFleet::StoredUnit& unit : stored.units)
+    if (const auto i = fleet->layout.Find(unit.unit); i && unit.serial.value != 0)
+      place_of[unit.serial] = *i;
+  for (const ParameterRow& row : stored.parameters) {
+    const auto place = place_of.find(row.serial);
+    if (place == place_of.end()) continue;
+    TakeParameter(row, &fleet->drives[place->second.value]);
+  }
+  fleet->tunings.resize(fleet->layout.size());
+  for (const TuningRow& row : stored.tunings) {
+    const auto place = place_of.find(row.serial);
+    if (place == place_of.end()) continue;
+    fleet->tunings[place->second.value][Index(row.axis)] = row;
+    fleet->drives[place->second.value].v_bus_V = row.v_bus_V;
+  }
+  return {};
 }
 
 Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) {

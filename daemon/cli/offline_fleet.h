@@ -1,7 +1,8 @@
 // What the commands that work on files share: the focal plane as units.csv and obstacles.csv give
-// it, with the nominal drive, because no store says what was tuned.
+// it, with the nominal drive, or with what the daemon's store says that was tuned.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "fleet/drive.h"
 #include "fleet/layout.h"
 #include "fleet/plan/plan.h"
+#include "fleet/records.h"
 #include "protocol/base/result.h"
 
 namespace CLI {
@@ -27,10 +29,23 @@ struct FleetFiles {
 /// --units, --obstacles, --clearance-mm.
 void AddFleetFiles(CLI::App* command, FleetFiles* files);
 
+/// --store.
+void AddTunedStore(CLI::App* command, std::string* store);
+
 struct OfflineFleet {
   Layout layout;
   std::vector<UnitDrive> drives;  // Shape: (n)
+  /// What tunings found, by unit and axis. Shape: (n), or empty where no store was read.
+  std::vector<std::array<std::optional<TuningRow>, kAxisCount>> tunings = {};
+
+  [[nodiscard]] std::optional<TuningRow> TuningOf(PositionerIndex i, Axis axis) const {
+    return tunings.empty() ? std::nullopt : tunings[i.value][Index(axis)];
+  }
 };
+
+/// The drives and tunings of units that are bound in the store are those that it has; an empty path
+/// changes nothing. The store is only read: a daemon may have it open. Errors: as StoreReader's.
+Status TakeTuned(const std::string& store, OfflineFleet* fleet);
 
 /// Tells on stderr which columns of units.csv were passed over.
 /// Errors: kUnavailable, kInvalid with file:line.

@@ -8,6 +8,7 @@
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/offline_fleet.h"
+#include "daemon/cli/start_check.h"
 #include "daemon/cli/text_file.h"
 #include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
@@ -20,6 +21,7 @@ struct PlanCommandOptions {
   FleetFiles files;
   std::string targets;
   std::string from;
+  std::string store;  // empty: none
   PlanOptions plan;
   std::string out;
   std::string plot;  // empty: none
@@ -30,6 +32,7 @@ struct Planned {
   std::size_t targeted = 0;
   Plan plan;
   PlanEstimate estimate;
+  StartVerdict starts;
   std::size_t rows = 0;
 };
 
@@ -57,6 +60,7 @@ std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
 
 Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& options) {
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
+  FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
   FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
   FOCALFLEET_TRY_ASSIGN(
       OfflinePlan planned,
@@ -70,8 +74,9 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   // Last: where it is, all is.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
-  return Planned{std::move(fleet), planned.targeted, std::move(planned.plan), std::move(estimate),
-                 rows.size()};
+  StartVerdict starts = StartCheck(motor).Of(planned.plan, fleet);
+  return Planned{std::move(fleet),    planned.targeted,  std::move(planned.plan),
+                 std::move(estimate), std::move(starts), rows.size()};
 }
 
 double Peak(const RailCurve& curve) {
@@ -120,6 +125,7 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"energy_J", planned.estimate.energy_J},
           {"peak_power_W", planned.estimate.peak_power_W},
           {"rails", rails},
+          {"below_critical", BelowCriticalJson(planned.starts)},
           {"rows", planned.rows},
           {"cpu_s", static_cast<double>(std::clock()) / CLOCKS_PER_SEC},
           {"out", options.out},
@@ -162,7 +168,7 @@ ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
   if (!planned) return Report(context, planned.error());
   const Json summary = Summary(*planned, options);
   if (context.json) PrintJson(summary);
-  Say(context, Describe(summary));
+  Say(context, Describe(summary) + DescribeBelowCritical(planned->starts));
   if (!planned->plan.unserved.empty()) NameUnserved(context, Describe(summary));
   return planned->plan.unserved.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
@@ -187,6 +193,7 @@ void AddPlanCommand(CommandLine* line) {
   AddFile(command, "--targets", &options->targets, "targets.csv: where the fibres shall be")
       ->required();
   AddFile(command, "--from", &options->from, "state.csv: where every axis stands")->required();
+  AddTunedStore(command, &options->store);
   command->add_flag("--fixed", options->plan.fixed,
                     "Units that no target names may not step aside");
   command

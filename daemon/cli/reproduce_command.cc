@@ -199,7 +199,8 @@ void AddReproduceCommand(CommandLine* line) {
       ->check(NumberBetween(0.1, 10))
       ->capture_default_str();
   command->add_flag("--full", options->full,
-                    "Whole moves of the start rule at PWM level: minutes, not seconds");
+                    "Search every critical n and make the 12 moves (with it, and one less) at PWM "
+                    "level: some 20 minutes of CPU time, not seconds");
   command->add_option("--seed", options->seed, "Of what is drawn in the positioning claims")
       ->capture_default_str();
   OnChosen(line, command, options, RunReproduce);

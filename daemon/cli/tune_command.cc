@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
+#include <set>
+#include <tuple>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/drive_options.h"
@@ -203,6 +206,7 @@ ExitCode TuneOne(const Context& context, const TuneOptions& options, const Drive
 
 struct AxisLoad {
   UnitId unit;
+  RailId rail;
   Axis axis = Axis::kTheta;
   double load_Nm = 0;
 };
@@ -216,8 +220,8 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
       Rng rng = Rng::Stream(options.seed, axis == Axis::kTheta ? "load theta" : "load phi",
                             unit.id.value);
       const double off = std::clamp(rng.Normal(), -kSigmasMax, kSigmasMax) * options.load_spread;
-      loads.push_back(
-          {unit.id, axis, choice.setting.motor.load_Nm * std::max(kLoadShareMin, 1 + off)});
+      loads.push_back({unit.id, unit.rail, axis,
+                       choice.setting.motor.load_Nm * std::max(kLoadShareMin, 1 + off)});
     }
   if (options.loads.empty()) return loads;
   FOCALFLEET_TRY_ASSIGN(const std::string loads_text, ReadTextFile(options.loads));
@@ -244,12 +248,86 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
   return loads;
 }
 
-std::string TunedText(const std::vector<AxisLoad>& loads,
-                      const std::vector<sim::LoadTuning>& tunings, const DriveChoice& choice) {
+// What all loads need with one voltage and mode.
+struct FleetChoice {
+  DriveChoice choice;
+  std::vector<sim::LoadTuning> tunings;  // Shape: as the loads
+};
+
+// Which of the choices an axis gets, and what it needs there.
+struct AxisTuning {
+  const DriveChoice* choice;
+  sim::LoadTuning tuning;
+};
+
+// Of one unit with one choice: its axes have one mode, and a rail has one voltage.
+struct UnitCost {
+  int refused = 0;  // axes
+  double cost = 0;  // J, or s until both axes are there
+  bool operator<(const UnitCost& other) const {
+    return std::tie(refused, cost) < std::tie(other.refused, other.cost);
+  }
+};
+UnitCost CostOf(const FleetChoice& of, std::size_t first, const std::string& minimise) {
+  UnitCost unit;
+  for (std::size_t k = first; k < first + kAxisCount; ++k) {
+    const sim::LoadTuning& tuning = of.tunings[k];
+    if (tuning.outcome != sim::TuningOutcome::kTuned) {
+      ++unit.refused;
+      continue;
+    }
+    unit.cost =
+        minimise == "energy" ? unit.cost + tuning.move_J : std::max(unit.cost, tuning.move_s);
+  }
+  return unit;
+}
+
+// The voltage of each rail that costs its units least in sum, and of each unit the mode that costs
+// it least there. Fewer axes that are refused come first. Pre: loads go unit by unit, axis by axis.
+std::vector<AxisTuning> ChooseFor(const std::vector<AxisLoad>& loads,
+                                  const std::vector<FleetChoice>& all,
+                                  const std::string& minimise) {
+  std::map<std::pair<RailId, double>, UnitCost> rails;
+  const auto best_at = [&](std::size_t first, double v_bus_V) {
+    const FleetChoice* best = nullptr;
+    for (const FleetChoice& of : all) {
+      if (of.choice.setting.bridge.v_bus_V != v_bus_V) continue;
+      if (best == nullptr || CostOf(of, first, minimise) < CostOf(*best, first, minimise))
+        best = &of;
+    }
+    return best;
+  };
+  std::set<double> voltages;
+  for (const FleetChoice& of : all) voltages.insert(of.choice.setting.bridge.v_bus_V);
+  for (std::size_t first = 0; first < loads.size(); first += kAxisCount)
+    for (const double v_bus_V : voltages) {
+      const UnitCost unit = CostOf(*best_at(first, v_bus_V), first, minimise);
+      UnitCost& rail = rails[{loads[first].rail, v_bus_V}];
+      rail.refused += unit.refused;
+      rail.cost += unit.cost;
+    }
+  std::map<RailId, double> chosen_V;
+  for (const auto& [key, cost] : rails) {
+    const auto& [rail, v_bus_V] = key;
+    const auto known = chosen_V.find(rail);
+    if (known == chosen_V.end() || cost < rails[{rail, known->second}]) chosen_V[rail] = v_bus_V;
+  }
+  std::vector<AxisTuning> chosen;
+  chosen.reserve(loads.size());
+  for (std::size_t first = 0; first < loads.size(); first += kAxisCount) {
+    const FleetChoice* const best = best_at(first, chosen_V[loads[first].rail]);
+    for (std::size_t k = first; k < first + kAxisCount; ++k)
+      chosen.push_back({&best->choice, best->tunings[k]});
+  }
+  return chosen;
+}
+
+std::string TunedText(const std::vector<AxisLoad>& loads, const std::vector<AxisTuning>& chosen) {
   CsvWriter csv({"unit_id", "axis", "load_uNm", "outcome", "critical", "repeat", "margin",
-                 "peak_share", "counter1", "subdivision", "mode", "origin"});
+                 "peak_share", "counter1", "subdivision", "mode", "v_bus_V", "move_s", "move_J",
+                 "origin"});
   for (std::size_t k = 0; k < loads.size(); ++k) {
-    const sim::LoadTuning& tuning = tunings[k];
+    const auto& [choice, tuning] = chosen[k];
     const bool tuned = tuning.outcome == sim::TuningOutcome::kTuned;
     csv.Integer(loads[k].unit.value).Text(Name(loads[k].axis)).Number(loads[k].load_Nm * 1e6);
     csv.Text(Name(tuning.outcome));
@@ -257,9 +335,13 @@ std::string TunedText(const std::vector<AxisLoad>& loads,
     if (tuning.critical == 0) csv.Missing();
     if (tuned) csv.Integer(tuning.repeat).Number(tuning.margin);
     if (!tuned) csv.Missing().Missing();
-    csv.Number(tuning.peak_share).Integer(choice.modulation.counter1);
-    csv.Integer(choice.modulation.subdivision).Text(Name(choice.modulation.mode)).Text("tuning");
-    csv.EndRow();
+    csv.Number(tuning.peak_share).Integer(choice->modulation.counter1);
+    csv.Integer(choice->modulation.subdivision).Text(Name(choice->modulation.mode));
+    csv.Number(choice->setting.bridge.v_bus_V);
+    const bool measured = tuned && tuning.move_s > 0;
+    if (measured) csv.Number(tuning.move_s).Number(tuning.move_J);
+    if (!measured) csv.Missing().Missing();
+    csv.Text("tuning").EndRow();
   }
   return csv.Take();
 }
@@ -270,34 +352,83 @@ struct Refused {
 };
 
 // What the store takes, as rows of one transaction; who is not bound there has no parameters.
-Status WriteStore(const TuneOptions& options, const DriveChoice& choice,
-                  const std::vector<AxisLoad>& loads, const std::vector<sim::LoadTuning>& tunings,
-                  std::vector<Refused>* refused) {
+Status WriteStore(const TuneOptions& options, const std::vector<AxisLoad>& loads,
+                  const std::vector<AxisTuning>& chosen, std::vector<Refused>* refused) {
   if (!std::filesystem::exists(options.store)) {
     return Fail(ErrorCode::kUnavailable, options.store + ": no such store");
   }
   FOCALFLEET_TRY_ASSIGN(const auto store, Store::Open(options.store));
   FOCALFLEET_TRY_ASSIGN(const StoredFleet stored, store->Load());
+  std::map<UnitId, SerialNumber> serial_of;
+  for (const StoredFleet::StoredUnit& unit : stored.units) serial_of[unit.unit] = unit.serial;
   std::vector<Row> rows;
   for (std::size_t k = 0; k < loads.size(); ++k) {
-    if (tunings[k].outcome != sim::TuningOutcome::kTuned) continue;
-    const auto bound = std::find_if(
-        stored.units.begin(), stored.units.end(),
-        [&](const StoredFleet::StoredUnit& unit) { return unit.unit == loads[k].unit; });
-    if (bound == stored.units.end() || bound->serial.value == 0) {
+    const auto& [choice, tuning] = chosen[k];
+    if (tuning.outcome != sim::TuningOutcome::kTuned) continue;
+    const SerialNumber serial = serial_of[loads[k].unit];
+    if (serial.value == 0) {
       refused->push_back({loads[k], "no serial number is bound to it in the store"});
       continue;
     }
     const auto add = [&](Parameter parameter, int value) {
-      rows.emplace_back(
-          ParameterRow{bound->serial, loads[k].axis, parameter, value, Origin::kTuning});
+      rows.emplace_back(ParameterRow{serial, loads[k].axis, parameter, value, Origin::kTuning});
     };
-    add(Parameter::kCounter1, choice.modulation.counter1);
-    add(Parameter::kRepeat, tunings[k].repeat);
-    add(Parameter::kSubdivision, choice.modulation.subdivision);
-    add(Parameter::kMode, static_cast<int>(choice.modulation.mode));
+    const sim::Modulation& modulation = choice->modulation;
+    add(Parameter::kCounter1, modulation.counter1);
+    add(Parameter::kRepeat, tuning.repeat);
+    add(Parameter::kSubdivision, modulation.subdivision);
+    add(Parameter::kMode, static_cast<int>(modulation.mode));
+    rows.emplace_back(TuningRow{.serial = serial,
+                                .axis = loads[k].axis,
+                                .critical = static_cast<std::uint16_t>(tuning.critical),
+                                .repeat = static_cast<std::uint16_t>(tuning.repeat),
+                                .margin = tuning.margin,
+                                .load_uNm = loads[k].load_Nm * 1e6,
+                                .v_bus_V = choice->setting.bridge.v_bus_V,
+                                .counter1 = static_cast<std::uint16_t>(modulation.counter1),
+                                .subdivision = static_cast<std::uint16_t>(modulation.subdivision),
+                                .mode = modulation.mode});
   }
   return store->Commit(rows, WallTime::Now());
+}
+
+// How many axes of a rail got which voltage and mode, and what their moves take.
+Json ChoicesJson(const std::vector<AxisLoad>& loads, const std::vector<AxisTuning>& chosen) {
+  struct Group {
+    int axes = 0;
+    double move_s_max = 0;
+    double move_J = 0;
+  };
+  std::map<std::tuple<RailId, double, WaveMode>, Group> groups;
+  for (std::size_t k = 0; k < loads.size(); ++k) {
+    const auto& [choice, tuning] = chosen[k];
+    if (tuning.outcome != sim::TuningOutcome::kTuned) continue;
+    Group& group = groups[{loads[k].rail, choice->setting.bridge.v_bus_V, choice->modulation.mode}];
+    ++group.axes;
+    group.move_s_max = std::max(group.move_s_max, tuning.move_s);
+    group.move_J += tuning.move_J;
+  }
+  Json rows = Json::array();
+  for (const auto& [key, group] : groups)
+    rows.push_back({{"rail_id", std::get<0>(key).value},
+                    {"v_bus_V", std::get<1>(key)},
+                    {"mode", Name(std::get<2>(key))},
+                    {"axes", group.axes},
+                    {"move_s_max", group.move_s_max},
+                    {"move_J", group.move_J}});
+  return rows;
+}
+
+std::string DescribeChoices(const Json& choices) {
+  std::vector<std::vector<std::string>> rows = {
+      {"  rail", "V_bus, V", "mode", "axes", "longest move, s", "all moves, J"}};
+  for (const Json& row : choices)
+    rows.push_back({fmt::format("  {}", row["rail_id"].get<std::uint32_t>()),
+                    fmt::format("{:g}", row["v_bus_V"].get<double>()),
+                    row["mode"].get<std::string>(), std::to_string(row["axes"].get<int>()),
+                    fmt::format("{:.2f}", row["move_s_max"].get<double>()),
+                    fmt::format("{:.1f}", row["move_J"].get<double>())});
+  return AlignColumns(rows);
 }
 
 ExitCode TuneFleet(const Context& context, const TuneOptions& options, const DriveChoice& choice) {
@@ -307,25 +438,36 @@ ExitCode TuneFleet(const Context& context, const TuneOptions& options, const Dri
   for (const AxisLoad& load : *loads) loads_Nm.push_back(load.load_Nm);
   sim::TuningRule rule = options.rule;
   rule.cross_check = options.full;
-  std::vector<sim::LoadTuning> tunings;
+  rule.measure_move = !options.minimise.empty();
+  std::vector<FleetChoice> all;
   {
     ProgressBar bar(context);
-    tunings = TuneLoads(choice.setting, choice.modulation, rule, loads_Nm, [&](double share) {
-      bar.Show(share, "tuning", Count(loads->size(), "axis", "axes"));
-    });
+    const std::vector<DriveChoice> choices = ChoicesOf(options, choice);
+    for (const DriveChoice& one : choices) {
+      const std::string what =
+          choices.size() == 1
+              ? Count(loads->size(), "axis", "axes")
+              : fmt::format("{:g} V, {}", one.setting.bridge.v_bus_V, WordOf(one.modulation.mode));
+      all.push_back({one, TuneLoads(one.setting, one.modulation, rule, loads_Nm, [&](double share) {
+                       bar.Show((static_cast<double>(all.size()) + share) /
+                                    static_cast<double>(choices.size()),
+                                "tuning", what);
+                     })});
+    }
   }
+  const std::vector<AxisTuning> chosen = ChooseFor(*loads, all, options.minimise);
   std::vector<Refused> refused;
-  for (std::size_t k = 0; k < tunings.size(); ++k) {
-    if (tunings[k].outcome == sim::TuningOutcome::kTuned) continue;
-    refused.push_back(
-        {(*loads)[k], Because(tunings[k].outcome, tunings[k].peak_share, rule.peak_share)});
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const sim::LoadTuning& tuning = chosen[k].tuning;
+    if (tuning.outcome == sim::TuningOutcome::kTuned) continue;
+    refused.push_back({(*loads)[k], Because(tuning.outcome, tuning.peak_share, rule.peak_share)});
   }
   if (!options.store.empty()) {
-    const auto written = WriteStore(options, choice, *loads, tunings, &refused);
+    const auto written = WriteStore(options, *loads, chosen, &refused);
     if (!written) return Report(context, written.error());
   }
   if (!options.out.empty()) {
-    const auto written = WriteFileAtomically(options.out, TunedText(*loads, tunings, choice));
+    const auto written = WriteFileAtomically(options.out, TunedText(*loads, chosen));
     if (!written) return Report(context, written.error());
   }
   Json named = Json::array();
@@ -338,16 +480,20 @@ ExitCode TuneFleet(const Context& context, const TuneOptions& options, const Dri
     lines += fmt::format("{}  unit {} {}: {}", lines.empty() ? "" : "\n", one.of.unit.value,
                          Name(one.of.axis), one.why);
   }
+  const Json chosen_rows = ChoicesJson(*loads, chosen);
   if (context.json) {
     PrintJson({{"axes", loads->size()},
                {"tuned", loads->size() - refused.size()},
                {"refused", named},
+               {"choices", chosen_rows},
                {"settings", SettingsJson(options.drive, choice)},
                {"store", options.store.empty() ? Json(nullptr) : Json(options.store)},
                {"out", options.out.empty() ? Json(nullptr) : Json(options.out)}});
   }
-  Say(context, fmt::format("{} of {} tuned{}{}", loads->size() - refused.size(),
-                           Count(loads->size(), "axis", "axes"), lines.empty() ? "" : "\n", lines));
+  std::string text = fmt::format("{} of {} tuned", loads->size() - refused.size(),
+                                 Count(loads->size(), "axis", "axes"));
+  if (!options.minimise.empty()) text += "\n" + DescribeChoices(chosen_rows);
+  Say(context, text + (lines.empty() ? "" : "\n") + lines);
   NameUnserved(context, lines);
   return refused.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
@@ -365,13 +511,12 @@ ExitCode RunTune(const Context& context, const TuneOptions& given) {
   if (fleet && options.store.empty() && options.out.empty()) {
     return Report(context, {ErrorCode::kInvalid, "a fleet's tuning goes to --store or --out"});
   }
-  if (fleet && !options.minimise.empty()) {
-    return Report(context, {ErrorCode::kInvalid,
-                            "--minimise chooses for one motor; a fleet has the rails it has"});
-  }
   if (fleet && options.rule.ramp.stages > 0) {
     return Report(context, {ErrorCode::kInvalid,
                             "--ramp-stages is for one motor; units start their moves without"});
+  }
+  if (!options.rails_V.empty() && options.minimise.empty()) {
+    return Report(context, {ErrorCode::kInvalid, "--rails are what --minimise chooses from"});
   }
   if (fleet && choice->setting.motor.load_Nm <= 0) {
     return Report(context, {ErrorCode::kInvalid, "--load 0: nothing is to be tuned"});
@@ -407,7 +552,8 @@ void AddRuleOptions(CLI::App* command, TuneOptions* options) {
       ->check(NumberBetween(-50, 100))
       ->capture_default_str();
   OneOf(command->add_option("--minimise", options->minimise,
-                            "Choose bus voltage, mode and ramp for this"),
+                            "Choose bus voltage, mode and ramp for this; of a fleet the voltage of "
+                            "each rail and the mode of each unit"),
         {"energy", "time"});
   command->add_option("--rails", options->rails_V, "Bus voltages to choose from (default: --v-bus)")
       ->delimiter(',')

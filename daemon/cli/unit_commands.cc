@@ -194,6 +194,22 @@ Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   return rows;
 }
 
+// What the last tuning found, for people; empty where the unit was never tuned.
+std::string DescribeTuning(const Json& answer, const ParamsOptions& options) {
+  Json rows = Json::array();
+  for (Json row : ListIn(answer, "tuning")) {
+    if (!options.axis.empty() && options.axis != TextIn(row, "axis")) continue;
+    row["margin"] = fmt::format("{:.2f}", NumberIn(row, "margin"));
+    row["load_uNm"] = fmt::format("{:.2f}", NumberIn(row, "load_uNm"));
+    row["v_bus_V"] = fmt::format("{:g}", NumberIn(row, "v_bus_V"));
+    rows.push_back(std::move(row));
+  }
+  if (rows.empty()) return "";
+  return "\ntuned from rest:\n" +
+         DescribeRows(rows, {"axis", "critical", "repeat", "margin", "load_uNm", "v_bus_V", "mode",
+                             "origin", "at"});
+}
+
 ExitCode RunParams(const Context& context, const ParamsOptions& options) {
   const bool set = options.action == "set";
   const bool complete = !options.axis.empty() && !options.name.empty() && options.value.has_value();
@@ -213,8 +229,10 @@ ExitCode RunParams(const Context& context, const ParamsOptions& options) {
     shown["parameters"] = rows;
     PrintJson(shown);
   }
-  Say(context, rows.empty() ? "nothing is known of it: neither set nor read from the unit"
-                            : DescribeRows(rows, {"axis", "parameter", "value", "origin"}));
+  const std::string tuning = options.name.empty() ? DescribeTuning(*answer, options) : "";
+  Say(context, (rows.empty() ? "nothing is known of it: neither set nor read from the unit"
+                             : DescribeRows(rows, {"axis", "parameter", "value", "origin"})) +
+                   tuning);
   return ExitCode::kOk;
 }
 

@@ -1,5 +1,7 @@
 #include "daemon/store/cells.h"
 
+#include <cmath>
+
 namespace focalfleet::store_internal {
 
 void Cells::Fault(const std::string& what) {
@@ -71,6 +73,42 @@ ConfigurationRow ReadConfiguration(Cells& cells) {
 
 void Cells::Require(bool condition, const char* what) {
   if (!condition) Fault(what);
+}
+
+TuningRow ReadTuning(Cells& cells, int first) {
+  TuningRow row;
+  row.serial = cells.Serial(first);
+  row.axis = cells.AxisAt(first + 1);
+  row.critical = cells.Whole<std::uint16_t>(first + 2);
+  row.repeat = cells.Whole<std::uint16_t>(first + 3);
+  row.margin = cells.Real(first + 4);
+  row.load_uNm = cells.Real(first + 5);
+  row.v_bus_V = cells.Real(first + 6);
+  row.counter1 = cells.Whole<std::uint16_t>(first + 7);
+  row.subdivision = cells.Whole<std::uint16_t>(first + 8);
+  row.mode = cells.Code(first + 9, kLastMode);
+  row.origin = cells.Code(first + 10, kLastOrigin);
+  if (!cells.error()) {
+    const char* const flaw = Flaw(row);
+    cells.Require(flaw == nullptr, flaw);
+  }
+  return row;
+}
+
+const char* Flaw(const TuningRow& row) {
+  if (row.serial.value == 0) return "it has no serial number";
+  if (row.axis > Axis::kPhi || row.mode > kLastMode || row.origin > kLastOrigin) {
+    return "its axis, mode or origin does not exist";
+  }
+  if (row.critical < 1 || row.repeat < row.critical || row.repeat > 255) {
+    return "its n are not 1 <= critical <= repeat <= 255";
+  }
+  if (row.counter1 == 0 || row.subdivision == 0) return "V_counter1 or subdivision is 0";
+  if (!std::isfinite(row.margin) || !(row.load_uNm > 0) || !std::isfinite(row.load_uNm) ||
+      !(row.v_bus_V > 0) || !std::isfinite(row.v_bus_V)) {
+    return "margin, load or V_bus is no possible number";
+  }
+  return nullptr;
 }
 
 }  // namespace focalfleet::store_internal

@@ -78,6 +78,7 @@ constexpr const char* Flaw(const AxisKnowledge& knowledge) {
 }
 
 inline constexpr Origin kLastOrigin = Origin::kHoming;
+inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
 inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
 inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
 inline constexpr Severity kLastSeverity = Severity::kError;
@@ -86,6 +87,12 @@ inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCou
 /// The columns id, source, state, targeted, arrived, refused, failed, makespan_predicted_s,
 /// makespan_s, energy_J, peak_power_W, in this order from the first on.
 ConfigurationRow ReadConfiguration(Cells& cells);
+
+/// serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, mode, origin,
+/// in this order from column `first` on.
+TuningRow ReadTuning(Cells& cells, int first);
+/// What such a row must satisfy, when written and when read: nullptr, or what is wrong.
+const char* Flaw(const TuningRow& row);
 
 /// The tables as the coordinator wants them, in one read transaction.
 Result<StoredFleet> LoadFleet(Connection& connection);

@@ -121,6 +121,14 @@ Status LoadParameters(Connection& connection, StoredFleet* fleet) {
       });
 }
 
+Status LoadTunings(Connection& connection, StoredFleet* fleet) {
+  return ForEach(
+      connection, "tuning", 2,
+      "SELECT serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, "
+      "mode, origin FROM tuning ORDER BY serial, axis",
+      [fleet](Cells& cells) { fleet->tunings.push_back(ReadTuning(cells, 0)); });
+}
+
 Status LoadConfigurations(Connection& connection, StoredFleet* fleet) {
   return ForEach(
       connection, "configuration", 1,
@@ -153,6 +161,7 @@ Status LoadAll(Connection& connection, StoredFleet* fleet) {
   FOCALFLEET_TRY(LoadVectors(connection, fleet));
   FOCALFLEET_TRY(LoadOpenIntents(connection, fleet));
   FOCALFLEET_TRY(LoadParameters(connection, fleet));
+  FOCALFLEET_TRY(LoadTunings(connection, fleet));
   FOCALFLEET_TRY(LoadConfigurations(connection, fleet));
   return LoadNextIds(connection, fleet);
 }

@@ -160,7 +160,54 @@ PRAGMA application_id = 1179012180;
 )sql";
 static_assert(kApplicationId == 1179012180);
 
-constexpr const char* kMigrations[] = {kVersion1};
+// What tunings found; before, only the parameters that they set were kept.
+constexpr const char* kVersion2 = R"sql(
+CREATE TABLE tuning(
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  critical INTEGER NOT NULL,    -- least n that starts the load from rest
+  repeat INTEGER NOT NULL,      -- n that was chosen
+  margin REAL NOT NULL,         -- share by which the load may grow until that n is critical
+  load_uNm REAL NOT NULL,
+  v_bus_V REAL NOT NULL,
+  counter1 INTEGER NOT NULL,
+  subdivision INTEGER NOT NULL,
+  mode INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(serial, axis)
+) STRICT, WITHOUT ROWID;
+
+-- Every tuning, the present one too.
+CREATE TABLE tuning_history(
+  entry INTEGER PRIMARY KEY,
+  serial INTEGER NOT NULL,
+  axis INTEGER NOT NULL,
+  critical INTEGER NOT NULL,
+  repeat INTEGER NOT NULL,
+  margin REAL NOT NULL,
+  load_uNm REAL NOT NULL,
+  v_bus_V REAL NOT NULL,
+  counter1 INTEGER NOT NULL,
+  subdivision INTEGER NOT NULL,
+  mode INTEGER NOT NULL,
+  origin INTEGER NOT NULL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+CREATE INDEX tuning_history_by_serial ON tuning_history(serial);
+
+CREATE VIEW tuned AS SELECT
+  unit.unit_id, tuning.serial,
+  CASE axis WHEN 0 THEN 'theta' ELSE 'phi' END AS axis,
+  critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision,
+  CASE mode WHEN 0 THEN 'asymmetric' WHEN 1 THEN 'five_segment' ELSE 'seven_segment' END AS mode,
+  CASE origin WHEN 0 THEN 'factory' WHEN 1 THEN 'tuning' WHEN 2 THEN 'campaign'
+    WHEN 3 THEN 'operator' WHEN 4 THEN 'move' ELSE 'homing' END AS origin,
+  datetime(tuning.at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM tuning LEFT JOIN unit ON unit.serial = tuning.serial;
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -17,6 +17,7 @@ struct Statements {
   Statement intent, intent_end;
   Statement unbound_elsewhere, unbind_elsewhere, bind, enable, unit_changed;
   Statement parameter_changed, parameter;
+  Statement tuning_kept, tuning;
   Statement configuration, alarm;
   Statement raise_meta, set_meta;
 };
@@ -75,6 +76,14 @@ constexpr const char* kParameter =
     "?5, ?6) "
     "ON CONFLICT(serial, axis, parameter) DO UPDATE SET value = ?4, origin = ?5, at_ns = ?6 "
     "WHERE value <> ?4 OR origin <> ?5";
+constexpr const char* kTuningKept =
+    "INSERT INTO tuning_history(serial, axis, critical, repeat, margin, load_uNm, v_bus_V, "
+    "counter1, subdivision, mode, origin, at_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
+constexpr const char* kTuning =
+    "INSERT OR REPLACE INTO tuning(serial, axis, critical, repeat, margin, load_uNm, v_bus_V, "
+    "counter1, subdivision, mode, origin, at_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
@@ -112,6 +121,8 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {&Statements::unit_changed, kUnitChanged},
       {&Statements::parameter_changed, kParameterChanged},
       {&Statements::parameter, kParameter},
+      {&Statements::tuning_kept, kTuningKept},
+      {&Statements::tuning, kTuning},
       {&Statements::configuration, kConfiguration},
       {&Statements::alarm, kAlarm},
       {&Statements::raise_meta, kRaiseMeta},
@@ -220,6 +231,26 @@ class RowWriter {
       s->Bind(4, row.value);
       s->Bind(5, Code(row.origin));
       s->Bind(6, now_.ns);
+      FOCALFLEET_TRY(s->Run());
+    }
+    return {};
+  }
+
+  Status operator()(const TuningRow& row) {
+    if (const char* const flaw = Flaw(row)) return Wrong("tuning", row.serial, flaw);
+    for (Statement* s : {&statements_.tuning_kept, &statements_.tuning}) {
+      s->Bind(1, row.serial.value);
+      s->Bind(2, Code(row.axis));
+      s->Bind(3, row.critical);
+      s->Bind(4, row.repeat);
+      s->BindReal(5, row.margin);
+      s->BindReal(6, row.load_uNm);
+      s->BindReal(7, row.v_bus_V);
+      s->Bind(8, row.counter1);
+      s->Bind(9, row.subdivision);
+      s->Bind(10, Code(row.mode));
+      s->Bind(11, Code(row.origin));
+      s->Bind(12, now_.ns);
       FOCALFLEET_TRY(s->Run());
     }
     return {};

@@ -112,6 +112,11 @@ struct ParameterHistory {
   WallTime at;
 };
 
+struct TuningHistory {
+  TuningRow row;
+  WallTime at;
+};
+
 struct AlarmHistory {
   AlarmRow row;
   WallTime at;
@@ -142,6 +147,7 @@ class StoreReader {
   Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit);
   Result<std::vector<ConfigurationHistory>> Configurations(std::uint32_t limit);
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
+  Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
 

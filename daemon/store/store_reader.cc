@@ -141,6 +141,20 @@ Result<std::vector<ParameterHistory>> StoreReader::Parameters(SerialNumber seria
                                  });
 }
 
+Result<std::vector<TuningHistory>> StoreReader::Tunings(SerialNumber serial, std::uint32_t limit) {
+  return Query<TuningHistory>(
+      *connection_, "tuning_history",
+      "SELECT entry, serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, "
+      "subdivision, mode, origin, at_ns FROM tuning_history WHERE serial = ?2 "
+      "ORDER BY entry DESC LIMIT ?1",
+      limit, serial.value, [](Cells& cells) {
+        TuningHistory entry;
+        entry.row = ReadTuning(cells, 1);
+        entry.at = cells.Time(12);
+        return entry;
+      });
+}
+
 Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
   return Query<AlarmHistory>(
       *connection_, "alarm",

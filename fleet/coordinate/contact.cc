@@ -336,7 +336,6 @@ void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
 
 void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
   UnitRecord& record = core_.unit(i);
-  AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
   const std::uint64_t request = std::exchange(record.write_request, 0);
   const std::string what = std::string(Name(reply.axis)) + " " + Name(reply.parameter);
   if (reply.answer != Answer::kOk) {
@@ -348,17 +347,13 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
          {}});
     return;
   }
-  core_.Note(ParameterRow{record.view.serial, reply.axis, reply.parameter, reply.value,
-                          Origin::kOperator});
+  const ParameterRow row{record.view.serial, reply.axis, reply.parameter, reply.value,
+                         Origin::kOperator};
+  core_.Note(row);
   core_.ReplyWhenDurable(request,
                          core_.NameOf(i) + ": " + what + " = " + std::to_string(reply.value));
-  if (reply.parameter == Parameter::kRepeat) drive.repeat = static_cast<std::uint8_t>(reply.value);
-  if (reply.parameter == Parameter::kCounter1)
-    drive.counter1 = static_cast<std::uint16_t>(reply.value);
-  if (reply.parameter == Parameter::kSubdivision) {
-    drive.subdivision = static_cast<std::uint16_t>(reply.value);
-    Identify(i);
-  }
+  TakeParameter(row, &core_.drives[i.value]);
+  if (reply.parameter == Parameter::kSubdivision) Identify(i);
   if (reply.parameter == Parameter::kPosition) {
     UnitKnowledge knowledge = record.view.knowledge;
     knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);

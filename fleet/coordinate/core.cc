@@ -62,12 +62,7 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
   for (const auto& row : stored.parameters) {
     const auto place = place_of.find(row.serial);
     if (place == place_of.end()) continue;
-    AxisDrive& drive = drives[place->second.value].axis[Index(row.axis)];
-    if (row.parameter == Parameter::kRepeat) drive.repeat = static_cast<std::uint8_t>(row.value);
-    if (row.parameter == Parameter::kCounter1)
-      drive.counter1 = static_cast<std::uint16_t>(row.value);
-    if (row.parameter == Parameter::kSubdivision)
-      drive.subdivision = static_cast<std::uint16_t>(row.value);
+    TakeParameter(row, &drives[place->second.value]);
   }
 }
 

@@ -245,6 +245,7 @@ void Drive::Account(const Course& course, double now_s, double step_s, double de
     const Leg& leg = legs_[k];
     if (leg.path == Leg::Path::kFloats) continue;
     const double charge = Project(moments[0], k);
+    if (leg.open()) diode_C_ += std::abs(charge);
     const double out_J = leg.voltage_V * charge + leg.slope_V_per_s * Project(moments[1], k);
     if (leg.slope_V_per_s == 0) {
       if (leg.voltage_V > 0) supply_J_ += out_J;
@@ -260,10 +261,14 @@ void Drive::Account(const Course& course, double now_s, double step_s, double de
   const Complex turn = -kJ * speed_;
   const Complex rotor =
       moments[0] + turn * (moments[1] + turn * (0.5 * moments[2] + turn / 6.0 * moments[3]));
-  const double impulse_Nms =
-      1.5 * setting_.motor.flux_linkage_Wb * (rotor * std::conj(direction_)).imag();
+  const auto torque_of = [&](Complex current) {
+    return 1.5 * setting_.motor.flux_linkage_Wb * (current * std::conj(direction_)).imag();
+  };
+  const double impulse_Nms = torque_of(rotor);
   shaft_.Step(impulse_Nms, step_s);
-  if (listener_) listener_({elapsed_s_ + now_s, step_s, moments, impulse_Nms});
+  if (!listener_) return;
+  const double moment_Nms2 = torque_of(moments[1] + turn * (moments[2] + 0.5 * turn * moments[3]));
+  listener_({elapsed_s_ + now_s, step_s, moments, impulse_Nms, moment_Nms2});
 }
 
 void Drive::Advance(double now_s, double step_s) {

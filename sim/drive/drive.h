@@ -44,12 +44,13 @@ struct DriveSample {
 };
 
 /// What happened between two events, as integrals from `t_s` over `step_s`: of t^k i (t from the
-/// interval's begin), k = 0..3, and of the torque.
+/// interval's begin), k = 0..3, and of the torque and of t times it.
 struct DriveInterval {
   double t_s = 0;
   double step_s = 0;
   std::array<std::complex<double>, 4> moments;
   double impulse_Nms = 0;
+  double moment_Nms2 = 0;
 };
 
 class Drive {
@@ -86,6 +87,9 @@ class Drive {
   [[nodiscard]] double peak_A() const { return peak_A_; }
   void ResetPeak() { peak_A_ = 0; }
   [[nodiscard]] std::uint64_t edges() const { return edges_; }  // of commands, all legs
+  /// What went through diodes since the start, either way. They have no forward voltage here; times
+  /// one, this is what it would take, to first order.
+  [[nodiscard]] double diode_C() const { return diode_C_; }
 
  private:
   // i(t) = c0 + c1 t + c2 t^2 + c3 t^3 + h e^(-t / tau) over one interval; the back-EMF's turn, at
@@ -120,6 +124,7 @@ class Drive {
   double square_A2s_ = 0;
   double peak_A_ = 0;
   std::uint64_t edges_ = 0;
+  double diode_C_ = 0;
   double probe_period_s_ = 0;
   double next_probe_s_ = 0;  // since the begin of the carrier period
   Sink sink_;

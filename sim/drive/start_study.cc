@@ -94,6 +94,7 @@ MoveCount TryMovesAt(Level level, double stall_Nm, const Drive::Setting& setting
       const auto lost = std::llround(off);
       count.succeeded += lost == 0 ? 1 : 0;
       field = end + lost * modulation.subdivision;
+      if (rule.on_move) rule.on_move();
     }
   count.copper_J = level.copper_J();
   count.time_s = level.t_s();
@@ -242,6 +243,54 @@ double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& mod
     (StartsReal(rested, worst, modulation, repeat - 0.5) ? starts : stalls) = worst;
   }
   return starts / (1 + setting.motor.load_variation);
+}
+
+CriticalLoads::CriticalLoads(const Drive::Setting& setting, const Modulation& modulation)
+    : modulation_(modulation),
+      variation_(setting.motor.load_variation),
+      rested_(setting, modulation) {}
+
+double CriticalLoads::Of(int repeat) {
+  const auto above = known_.lower_bound(repeat);
+  if (above != known_.end() && above->first == repeat) return above->second;
+  // More time a vector never hurts: neighbours bound it.
+  double starts = above == known_.begin() ? 0 : std::prev(above)->second * (1 + variation_);
+  double stalls = above == known_.end() ? rested_.stall_Nm() : above->second * (1 + variation_);
+  const double fine_Nm = 1e-4 * rested_.stall_Nm();
+  while (stalls - starts > fine_Nm) {
+    const double middle = (starts + stalls) / 2;
+    (StartsReal(rested_, middle, modulation_, repeat) ? starts : stalls) = middle;
+  }
+  return known_[repeat] = starts / (1 + variation_);
+}
+
+std::optional<int> CriticalLoads::RepeatFor(double load_Nm) {
+  // Upwards: a slow field is dear to simulate, and mostly not needed.
+  int fails = 0;
+  int works = 4;
+  while (Of(works) < load_Nm) {
+    if (works == kRepeatMax) return std::nullopt;
+    fails = works;
+    works = std::min(works + works / 2, kRepeatMax);
+  }
+  while (works - fails > 1) {
+    const int middle = (fails + works) / 2;
+    (Of(middle) >= load_Nm ? works : fails) = middle;
+  }
+  return works;
+}
+
+double CriticalLoads::Supply_W(int repeat, double load_Nm) const {
+  constexpr int kSettlingTurns = 20;
+  constexpr int kTurns = 5;
+  ReducedDrive drive = rested_;
+  drive.SetLoad(load_Nm);
+  drive.Place(-std::asin(std::min(1.0, load_Nm / rested_.stall_Nm())), 0);
+  drive.RunVectors(1, std::int64_t{kSettlingTurns} * modulation_.subdivision, repeat);
+  const double before_J = drive.supply_J();
+  const double before_s = drive.t_s();
+  drive.RunVectors(1, std::int64_t{kTurns} * modulation_.subdivision, repeat);
+  return (drive.supply_J() - before_J) / (drive.t_s() - before_s);
 }
 
 }  // namespace focalfleet::sim

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct StartRule {
   double move_deg = 300;  // of the output
   int moves_each_way = 6;
   Ramp ramp;
+  std::function<void()> on_move = {};  // hears each move's end; may be empty
 };
 
 /// What came of the moves of a rule.
@@ -78,5 +80,25 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
 /// tells. Units: Nm at the motor shaft.
 double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
                             int repeat);
+
+/// The same the other way round, for many loads: what each n starts at most. By the reduced drive,
+/// without a ramp, to 1e-4 of the stall torque; each n is tried once.
+class CriticalLoads {
+ public:
+  CriticalLoads(const Drive::Setting& setting, const Modulation& modulation);
+
+  /// Mean load at the motor shaft that n = `repeat` starts at its worst place, at most. Units: Nm.
+  double Of(int repeat);
+  /// Least n that starts it; none: no n does.
+  std::optional<int> RepeatFor(double load_Nm);
+  /// Mean power from the supply in steady rotation with this load. Pre: `repeat` starts it.
+  [[nodiscard]] double Supply_W(int repeat, double load_Nm) const;
+
+ private:
+  Modulation modulation_;
+  double variation_;
+  ReducedDrive rested_;
+  std::map<int, double> known_;  // ascending in both
+};
 
 }  // namespace focalfleet::sim

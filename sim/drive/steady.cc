@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "protocol/base/check.h"
+#include "sim/drive/torque_ripple.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -156,13 +157,13 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   const double square_before = drive.square_A2s();
   const double begin_s = drive.t_s();
   const std::uint64_t edges_before = drive.edges();
+  const double diode_before_C = drive.diode_C();
   const double turn_s = 1 / modulation.field_Hz();
 
   // Components e^(j m w t) of the current in the plane, m = -6..6; a phase sees m and -m as one.
   constexpr int kHarmonics = 6;
   std::array<std::complex<double>, 2 * kHarmonics + 1> components{};
-  std::vector<double> impulses(static_cast<std::size_t>(modulation.subdivision) *
-                               static_cast<std::size_t>(modulation.repeat));
+  TorqueRipple ripple(modulation.carrier_s());
   drive.Listen([&](const DriveInterval& interval) {
     for (int m = -kHarmonics; m <= kHarmonics; ++m) {
       // e^(-j m w t) about the interval's begin, to third order.
@@ -174,9 +175,7 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
       components[static_cast<std::size_t>(kHarmonics + m)] +=
           around * std::polar(1.0, -kTurn * m * (interval.t_s - begin_s) / turn_s);
     }
-    const double middle_s = interval.t_s + interval.step_s / 2 - begin_s;
-    const auto carrier = static_cast<std::size_t>(middle_s / modulation.carrier_s());
-    impulses[std::min(carrier, impulses.size() - 1)] += interval.impulse_Nms;
+    ripple.Hear(interval);
   });
   RunVectors(&drive, modulation, table, 0, modulation.subdivision);
 
@@ -200,23 +199,16 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   figures.fundamental_A = std::sqrt(2 * fundamental_A2);
   figures.snr_dB = 10 * std::log10(fundamental_A2 / (square_A2 - first_six_A2));
   figures.thd = std::sqrt(std::max(0.0, alternating_A2 - fundamental_A2) / fundamental_A2);
-  const auto [lowest, highest] = std::minmax_element(impulses.begin(), impulses.end());
-  double sum = 0;
-  double squares = 0;
-  for (const double impulse : impulses) {
-    sum += impulse;
-    squares += impulse * impulse;
-  }
-  const double mean = sum / static_cast<double>(impulses.size());
-  figures.torque_mean_Nm = mean / modulation.carrier_s();
-  figures.torque_ripple_peak_to_peak = (*highest - *lowest) / mean;
-  figures.torque_ripple_rms =
-      std::sqrt(std::max(0.0, squares / static_cast<double>(impulses.size()) - mean * mean)) / mean;
+  const TorqueRipple::Figures torque = ripple.Judge();
+  figures.torque_mean_Nm = torque.mean_Nm;
+  figures.torque_ripple_peak_to_peak = torque.peak_to_peak;
+  figures.torque_ripple_rms = torque.rms;
   figures.power.supply_W = (after.supply_J - before.supply_J) / time_s;
   figures.power.copper_W = (after.copper_J - before.copper_J) / time_s;
   figures.power.switching_W = (after.switching_J - before.switching_J) / time_s;
   figures.power.mechanical_W = state.torque_Nm * state.speed_rad_per_s;
   figures.supply_A = figures.power.supply_W / setting.bridge.v_bus_V;
+  figures.diode_A = (drive.diode_C() - diode_before_C) / time_s;
   figures.edges_per_carrier =
       static_cast<double>(drive.edges() - edges_before) / (time_s / modulation.carrier_s());
   return figures;

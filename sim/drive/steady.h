@@ -44,12 +44,13 @@ struct WaveFigures {
   /// noise).
   double snr_dB = 0;
   double thd = 0;  // all but fundamental and DC, over the fundamental
-  /// Of the torque's mean over a carrier period, over its mean.
+  /// Of the torque's running mean over a carrier period, over its mean.
   double torque_mean_Nm = 0;
   double torque_ripple_peak_to_peak = 0;
   double torque_ripple_rms = 0;
   double supply_A = 0;
   double edges_per_carrier = 0;
+  double diode_A = 0;  // mean through all diodes
   DrivePower power;
 };
 

@@ -18,7 +18,9 @@ struct ReproduceOptions {
   std::vector<std::string_view> start_sets = {"C", "V", "W", "9", "J2"};
   /// Every phase resistance times this: claims that rest on it move.
   double resistance_factor = 1;
-  /// Whole moves of the start rule at PWM level: minutes of CPU time instead of seconds.
+  /// Every critical n is searched at PWM level (the first 60 turns at the worst load), and the
+  /// twelve moves of the start rule are made there with the n found and with one less: some twenty
+  /// minutes of CPU time instead of seconds. Heat over ramps and the bare motor stay reduced.
   bool full = false;
   std::uint64_t seed = 1;
 };

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <vector>
 
 #include "sim/drive/steady.h"
 #include "sim/reproduction/parts.h"
@@ -43,6 +44,36 @@ double TimeConstant_s(const Drive::Setting& setting) {
   const double step_s = 2e-6;
   const double ratio = StepResponse_A(setting, 2 * step_s) / StepResponse_A(setting, step_s) - 1;
   return -step_s / std::log(ratio);
+}
+
+// Highest current of a blocked motor under vector 100 for a share of every carrier period, over
+// what it reaches when the vector stays: once everything repeats.
+double PulseTrainPeak(const Drive::Setting& setting, int on_counts) {
+  const Modulation modulation{};
+  const double period = modulation.counter1;
+  const Pattern pulses{{{period - on_counts, period}, {period, period}, {period, period}}};
+  Drive drive(Blocked(Ideal(setting)));
+  drive.Place(0, 0);
+  for (int k = 0; k < 40; ++k) drive.RunCarrier(pulses, modulation);
+  drive.ResetPeak();
+  drive.RunCarrier(pulses, modulation);
+  return drive.peak_A() / (2 * setting.bridge.v_bus_V / (3 * setting.motor.resistance_ohm));
+}
+
+// What the rotor does in steady rotation. Four turns let die out that it swings within a vector.
+double RotorSpeed_rpm(Drive::Setting setting, const Modulation& modulation, double load_Nm) {
+  setting.motor.load_Nm = load_Nm;
+  setting.motor.load_variation = 0;
+  const auto state = FindSteadyState(setting, modulation, load_Nm);
+  if (!state) return std::nan("");
+  Drive drive = InSteadyRotation(setting, modulation, *state);
+  const std::vector<Pattern> table = VectorTable(modulation);
+  const std::int64_t vectors = std::int64_t{4} * modulation.subdivision;
+  RunVectors(&drive, modulation, table, 0, vectors);
+  const double begin_rad = drive.shaft().angle_rad();
+  const double begin_s = drive.t_s();
+  RunVectors(&drive, modulation, table, 0, vectors);
+  return (drive.shaft().angle_rad() - begin_rad) / kTurn / (drive.t_s() - begin_s) * 60;
 }
 
 double BlockedFundamental_A(const Drive::Setting& setting) {
@@ -130,8 +161,39 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
   equal.paper.assign(4, 22'500);  // follows from V_counter2 = 4000
   within(std::move(equal), 1e-9);
 
+  // Table 2 is known only by its rule, "same speed": V_counter2 = n V_counter1 doubles as vectors
+  // halve.
+  Claim vectors{.id = "speed_equal_subdivision",
+                .text = "speed is equal in all tests of the subdivision",
+                .unit = "rpm",
+                .conditions = "96, 48, 24, 12, 6 vectors with V_counter2 4000 to 64000"};
+  for (const int subdivision : {96, 48, 24, 12, 6})
+    vectors.simulated.push_back(
+        60 * Modulation{.repeat = 8 * 96 / subdivision, .subdivision = subdivision}.field_Hz());
+  vectors.paper.assign(5, 22'500);
+  within(std::move(vectors), 1e-9);
+
   const auto nine_V = PaperSetting(options, options.wave_set, 9);
   const auto low_V = PaperSetting(options, options.wave_set, 1.8);
+  const double motor_turns = low_V.gearhead.ratio;
+  within({.id = "motor_speed",
+          .text = "the motor turns as the times of 360 degrees and V_counter2 4000 say",
+          .paper = {60 * motor_turns / 11, 60 * motor_turns / 32.1, 22'500},
+          .simulated = {RotorSpeed_rpm(low_V, {.repeat = 37}, low_V.motor.load_Nm),
+                        RotorSpeed_rpm(low_V, {.repeat = 108}, low_V.motor.load_Nm),
+                        RotorSpeed_rpm(nine_V, {.repeat = 8}, kBareLoad_Nm)},
+          .unit = "rpm",
+          .conditions = "the rotor in steady rotation: 1.8 V, n 37 and n 108, mean load; 9 V, n 8, "
+                        "bare motor"},
+         0.005);
+  add({.id = "pole_pairs",
+       .text = "96 vectors are a turn of the motor",
+       .paper = {1},
+       .simulated = {11 / OutputTurn_s(options, 37)},
+       .unit = "electrical turns a motor turn",
+       .conditions = "from the time of 360 degrees with n 37",
+       .status = ClaimStatus::kFitted,
+       .reason = "parameter: pole pairs, which the paper does not print; its times leave one"});
   const double tau_s = TimeConstant_s(nine_V);
   within({.id = "time_constant",
           .text = "electrical time constant of a phase",
@@ -147,6 +209,24 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
           .unit = "counts",
           .conditions = "one pulse from zero, 144 MHz"},
          0.005);
+  {
+    constexpr int kOn = 359;
+    const double period_s = Modulation{}.carrier_s();
+    const double on_s = kOn / Modulation{}.clock_Hz;
+    Claim claim{.id = "pulse_train",
+                .text = "a pulse of 359 counts reaches 0.632 of the steady current",
+                .paper = {0.632},
+                .simulated = {PulseTrainPeak(nine_V, kOn),
+                              (1 - std::exp(-on_s / tau_s)) / (1 - std::exp(-period_s / tau_s))},
+                .unit = "of 2 V_bus / (3 r): in a train of pulses, by its formula",
+                .conditions = "blocked motor, V_counter1 500, high for 359 counts of each period"};
+    const bool holds = std::abs(claim.simulated[0] - 0.632) < 0.005 * 0.632;
+    claim.status = holds ? ClaimStatus::kReproduced : ClaimStatus::kDisagrees;
+    claim.reason =
+        "0.632 holds for one pulse from zero; in a train each begins at what the last one left: "
+        "i_pk = i_inf (1 - exp(-t_on / tau)) / (1 - exp(-T / tau))";
+    add(std::move(claim));
+  }
   within({.id = "timer_base",
           .text = "base cycle of the timer",
           .paper = {6.94},
@@ -186,6 +266,15 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
   };
   steady("steady_current_9V", 349.91, nine_V, reached_9V);
   steady("steady_current_1V8", 69.98, low_V, reached_1V8);
+  within(
+      {.id = "steady_current_1V8_as_printed",
+       .text = "1.8 V sqrt3 / 14.85 ohm is 69.98 mA",
+       .paper = {69.98},
+       .simulated = {1e3 * low_V.bridge.v_bus_V * std::numbers::sqrt3 / low_V.motor.resistance_ohm},
+       .unit = "mA",
+       .conditions = "the formula as printed",
+       .reason = "a misprint: 69.98 is 1.8 V / (sqrt3 r), a third of it"},
+      0.005);
   within({.id = "torque_equation",
           .text = "eq. 12 and 13: torque is 3 P / L |flux_s| flux_f sin(delta)",
           .paper = {1},
@@ -194,6 +283,12 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
           .conditions = "1.8 V, n 37, in steady rotation; eq. 9 makes it so for any current",
           .reason = "eqs. 9 to 11 give 3 p / (2 L): as printed the torque is twice too big"},
          0.005);
+  add({.id = "torque_equation_second_term",
+       .text = "eq. 12, second term: its factor has no number of pole pairs",
+       .unit = "",
+       .conditions = "eqs. 9 to 11 give 3 p (Ld - Lq) / (4 Ld Lq)",
+       .status = ClaimStatus::kNotTestable,
+       .reason = "p is missing; here p = 1, and the term is 0 as Ld = Lq. Eq. 13 inherits it"});
   {
     // Eq. 4 in all sectors: volt-seconds of every vector against its angle.
     double worst = 0;
@@ -226,6 +321,63 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
                         "t_base is the timer's count; the carrier that the paper means "
                         "elsewhere is 1 / (V_counter1 t_base)"};
   within(std::move(fundamental), 0.005);
+  {
+    // Basic vectors are where a table of six stands.
+    const auto angle_deg = [](int k) {
+      const Pattern pattern = PatternOf({.counter1 = 6000, .subdivision = 6}, k);
+      std::complex<double> sum;
+      for (std::size_t leg = 0; leg < kLegCount; ++leg)
+        sum += (pattern[leg].none() ? 0.0 : pattern[leg].off - pattern[leg].on) *
+               std::polar(1.0, kTurn / 3 * static_cast<double>(leg));
+      return std::arg(sum) * 360 / kTurn;
+    };
+    add({.id = "sector_width",
+         .text = "the basic vectors have a 60r distribution",
+         .paper = {60},
+         .simulated = {angle_deg(1) - angle_deg(0), angle_deg(2) - angle_deg(1)},
+         .unit = "deg",
+         .conditions = "angles between vectors 100, 110 and 010",
+         .status = ClaimStatus::kNotTestable,
+         .reason = "a misprint: 60 degrees"});
+  }
+  add({.id = "counter2",
+       .text = "V_counter1 500 and V_counter1 4000",
+       .paper = {4000},
+       .simulated = {Modulation{.repeat = 8}.vector_s() * Modulation{}.clock_Hz,
+                     60 * Modulation{.repeat = 8}.field_Hz(),
+                     60 * Modulation{.counter1 = 4000, .repeat = 8}.field_Hz()},
+       .unit = "counts of a vector; rpm with V_counter2 4000, with V_counter1 4000",
+       .conditions = "n 8, 96 vectors",
+       .status = ClaimStatus::kNotTestable,
+       .reason = "a misprint: the second is V_counter2; as V_counter1 the motor would turn at an "
+                 "eighth of the speed"});
+  // What the paper leaves open, from another motor: J 2 r / (3 flux^2) is its mechanical time
+  // constant, 9.31 and 11.07 ms in the data sheets of two motors of 10 mm.
+  const MotorParameters& motor = low_V.motor;
+  const auto flux_mWb = [&](double constant_s) {
+    return 1e3 * std::sqrt(2 * 8.7e-11 * motor.resistance_ohm / (3 * constant_s));
+  };
+  add({.id = "flux_by_scaling",
+       .text = "flux linkage is not printed",
+       .simulated = {flux_mWb(9.31e-3), flux_mWb(11.07e-3)},
+       .unit = "mWb",
+       .conditions = "inertia and resistance as printed",
+       .status = ClaimStatus::kFitted,
+       .reason = "parameter: mechanical time constant, taken from Orbray's BMS10-1003 and "
+                 "BMS10-1008"});
+  {
+    // Four equal stages of 46 and 14 teeth: a gearhead for 4 mm motors that is sold as 337:1.
+    const double ratio = std::pow(46.0 / 14 + 1, 4);
+    const double off = ratio / 337 - 1;
+    add({.id = "gear_ratio",
+         .text = "the gearhead's ratio is 337",
+         .paper = {337},
+         .simulated = {ratio, 360 * off, kTurn * off * 8250},
+         .unit = "ratio; degrees and um at the arm that a turn is off if so",
+         .conditions = "a gearhead (46/14 + 1)^4; arm of 8.25 mm (assumed)",
+         .status = ClaimStatus::kNotTestable,
+         .reason = "the paper does not say which gearhead it has"});
+  }
   add({.id = "permeability",
        .text = "the magnet's permeability equals 0, the same as air",
        .unit = "",

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "protocol/base/check.h"
 #include "sim/drive/reduced_drive.h"
+#include "sim/drive/torque_ripple.h"
 #include "sim/scope/spectrum.h"
 
 namespace focalfleet::sim {
@@ -83,7 +83,8 @@ class Recorder {
         begun_(std::move(begun)),
         stages_(StagesOf(modulation, plan)),
         table_(VectorTable(modulation)),
-        sampled_(static_cast<std::int64_t>(plan.turns) * modulation.subdivision) {
+        sampled_(static_cast<std::int64_t>(plan.turns) * modulation.subdivision),
+        ripple_(modulation.carrier_s()) {
     recording_.sample_s = plan.sample_s > 0 ? plan.sample_s : SampleTime(modulation, plan.turns);
   }
 
@@ -91,7 +92,10 @@ class Recorder {
     Drive& drive = begun_.drive;
     drive.Probe(recording_.sample_s,
                 [this](const DriveSample& sample) { recording_.samples.push_back(sample); });
-    drive.Listen([this](const DriveInterval& interval) { impulse_ += interval.impulse_Nms; });
+    drive.Listen([this](const DriveInterval& interval) {
+      vector_impulse_ += interval.impulse_Nms;
+      if (in_last_turn_) ripple_.Hear(interval);
+    });
     begin_ = Read(drive);
     std::int64_t shown = 0;
     for (const Stage& stage : stages_)
@@ -110,23 +114,19 @@ class Recorder {
     Drive& drive = begun_.drive;
     const std::int64_t turn_begins = sampled_ - modulation_.subdivision;
     if (shown == turn_begins) last_turn_ = Read(drive);
-    const bool in_last_turn = shown >= turn_begins && shown < sampled_;
+    in_last_turn_ = shown >= turn_begins && shown < sampled_;
     const std::int64_t field = begun_.first + shown;
     const auto index = static_cast<std::size_t>(field % modulation_.subdivision);
-    double vector_impulse = 0;
+    vector_impulse_ = 0;
     for (int n = 0; n < repeat; ++n) {
-      impulse_ = 0;
       drive.ResetPeak();
       drive.RunCarrier(table_[index], modulation_);
-      vector_impulse += impulse_;
       if (shown < sampled_) peak_A_ = std::max(peak_A_, drive.peak_A());
-      if (!in_last_turn) continue;
-      recording_.carrier_peak_A.push_back(drive.peak_A());
-      impulses_.push_back(impulse_);
+      if (in_last_turn_) recording_.carrier_peak_A.push_back(drive.peak_A());
     }
     const double middle = (static_cast<double>(field) + 0.5) * kTurn / modulation_.subdivision;
     recording_.vectors.push_back({drive.t_s(), middle - drive.shaft().angle_rad(),
-                                  vector_impulse / (repeat * modulation_.carrier_s())});
+                                  vector_impulse_ / (repeat * modulation_.carrier_s())});
     if (shown + 1 == sampled_) EndSampling();
   }
 
@@ -140,7 +140,7 @@ class Recorder {
       recording_.samples.pop_back();
     recording_.spent = Difference(end.energy, begin_.energy);
     MeasurePower(end);
-    MeasureTorque(end);
+    MeasureTorque();
     MeasureHarmonics(end);
   }
 
@@ -158,16 +158,11 @@ class Recorder {
         static_cast<double>(end.edges - begin_.edges) / (time_s / modulation_.carrier_s());
   }
 
-  void MeasureTorque(const Meter& end) {
-    WaveFigures& figures = recording_.figures;
-    const auto [lowest, highest] = std::minmax_element(impulses_.begin(), impulses_.end());
-    const auto count = static_cast<double>(impulses_.size());
-    const double mean = std::accumulate(impulses_.begin(), impulses_.end(), 0.0) / count;
-    double squares = 0;
-    for (const double impulse : impulses_) squares += (impulse - mean) * (impulse - mean);
-    figures.torque_mean_Nm = mean * count / (end.t_s - last_turn_.t_s);
-    figures.torque_ripple_peak_to_peak = (*highest - *lowest) / std::abs(mean);
-    figures.torque_ripple_rms = std::sqrt(squares / count) / std::abs(mean);
+  void MeasureTorque() {
+    const TorqueRipple::Figures torque = ripple_.Judge();
+    recording_.figures.torque_mean_Nm = torque.mean_Nm;
+    recording_.figures.torque_ripple_peak_to_peak = torque.peak_to_peak;
+    recording_.figures.torque_ripple_rms = torque.rms;
   }
 
   // The last turn's samples at a power of two of instants: where they are not so already, a line
@@ -232,8 +227,9 @@ class Recorder {
   Recording recording_;
   Meter begin_;
   Meter last_turn_;  // as the last turn that is sampled begins
-  double impulse_ = 0;
-  std::vector<double> impulses_;  // of the carrier periods of that turn
+  bool in_last_turn_ = false;
+  TorqueRipple ripple_;  // of that turn
+  double vector_impulse_ = 0;
   double peak_A_ = 0;
 };
 

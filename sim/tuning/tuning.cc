@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -123,6 +124,11 @@ void MeasureMove(const Drive::Setting& setting, const Modulation& modulation,
   tuning->move_J = drive.supply_J();
 }
 
+// The search has shown that n starts the load with the rule's margin, whatever half a count says.
+double MarginAtLeast(const TuningRule& rule, double margin) {
+  return std::max(rule.margin, margin);
+}
+
 // All but margin and move, which need no trial of their own in a fleet.
 struct Tried {
   Tuning tuning;
@@ -187,7 +193,13 @@ class LoadTable {
     if (known.repeat > 0) {
       Modulation shown = modulation_;
       shown.repeat = known.repeat;
-      known.margin = MarginOf(tried.setting, shown);
+      known.margin = MarginAtLeast(rule_, MarginOf(tried.setting, shown));
+      if (rule_.measure_move) {
+        Tuning moved;
+        MeasureMove(tried.setting, shown, rule_, &moved);
+        known.move_s = moved.move_s;
+        known.move_J = moved.move_J;
+      }
     }
     Done(1);
   }
@@ -201,8 +213,10 @@ class LoadTable {
         known_[k] = a;
         known_[k].load_Nm = loads_Nm_[k];
         // The load that n just starts is the same for all of them.
-        known_[k].margin = (1 + a.margin) * a.load_Nm / loads_Nm_[k] - 1;
+        known_[k].margin = MarginAtLeast(rule_, (1 + a.margin) * a.load_Nm / loads_Nm_[k] - 1);
         known_[k].peak_share = std::max(a.peak_share, b.peak_share);
+        const double share = (loads_Nm_[k] - a.load_Nm) / (b.load_Nm - a.load_Nm);
+        known_[k].move_J = a.move_J + share * (b.move_J - a.move_J);
       }
       Done(high - low - 1);
       return;
@@ -227,6 +241,71 @@ class LoadTable {
   std::size_t done_ = 0;
 };
 
+// Where neither ramp nor temperature nor the PWM level is asked for, an n and what it starts are
+// all that there is to know: no trial for each load. Peaks: a motor that pulls its load draws less
+// than a blocked one, for the back-EMF is never beyond what the lag gives (V sin(lag) >= flux w).
+std::vector<LoadTuning> TuneByCriticalLoads(const Drive::Setting& setting,
+                                            const Modulation& modulation, const TuningRule& rule,
+                                            const std::vector<double>& loads_Nm,
+                                            const std::function<void(double)>& progress) {
+  CriticalLoads critical_loads(setting, modulation);
+  std::map<int, double> blocked_share;
+  const auto at = [&](int repeat) {
+    Modulation shown = modulation;
+    shown.repeat = repeat;
+    return shown;
+  };
+  const auto vectors =
+      std::llround(rule.move_deg / 360 * setting.gearhead.ratio * modulation.subdivision);
+  std::vector<LoadTuning> tunings;
+  tunings.reserve(loads_Nm.size());
+  for (const double load_Nm : loads_Nm) {
+    LoadTuning tuning{.load_Nm = load_Nm};
+    const auto critical = critical_loads.RepeatFor(load_Nm);
+    const auto repeat = critical_loads.RepeatFor(load_Nm * (1 + rule.margin));
+    tuning.outcome = !critical ? TuningOutcome::kStalls
+                     : !repeat ? TuningOutcome::kNoMargin
+                               : TuningOutcome::kTuned;
+    if (critical) tuning.critical = *critical;
+    if (critical && repeat) {
+      tuning.repeat = *repeat;
+      // Half a count on the safe side.
+      const double holds_Nm =
+          *repeat > 1 ? (critical_loads.Of(*repeat) + critical_loads.Of(*repeat - 1)) / 2
+                      : critical_loads.Of(*repeat);
+      tuning.margin = MarginAtLeast(rule, holds_Nm / load_Nm - 1);
+      const int settled = std::min(*repeat, kSettlingCarriers);
+      if (!blocked_share.contains(settled))
+        blocked_share[settled] = BlockedPeak(setting, at(settled)) / Reachable(setting);
+      tuning.peak_share = blocked_share[settled];
+      if (tuning.peak_share > rule.peak_share) tuning.outcome = TuningOutcome::kPeak;
+    }
+    tunings.push_back(tuning);
+    if (progress)
+      progress(static_cast<double>(tunings.size()) / static_cast<double>(loads_Nm.size()));
+  }
+  if (!rule.measure_move) return tunings;
+  // Loads ascend, so those of one n are neighbours; between the ends power is a line.
+  for (std::size_t first = 0, last = 0; first < tunings.size(); first = last + 1) {
+    const int repeat = tunings[first].repeat;
+    last = first;
+    while (last + 1 < tunings.size() && tunings[last + 1].repeat == repeat) ++last;
+    if (repeat == 0) continue;
+    const double move_s = static_cast<double>(vectors) * at(repeat).vector_s();
+    const double low_W = critical_loads.Supply_W(repeat, tunings[first].load_Nm);
+    const double high_W =
+        last == first ? low_W : critical_loads.Supply_W(repeat, tunings[last].load_Nm);
+    for (std::size_t k = first; k <= last; ++k) {
+      const double share = last == first ? 0
+                                         : (tunings[k].load_Nm - tunings[first].load_Nm) /
+                                               (tunings[last].load_Nm - tunings[first].load_Nm);
+      tunings[k].move_s = move_s;
+      tunings[k].move_J = move_s * (low_W + share * (high_W - low_W));
+    }
+  }
+  return tunings;
+}
+
 double RoundedUp(double load_Nm) {
   const double step = std::pow(10, std::floor(std::log10(load_Nm)) - 3);
   return std::ceil(load_Nm / step * (1 - 1e-12)) * step;
@@ -249,7 +328,7 @@ Tuning Tune(const Drive::Setting& setting, const Modulation& modulation, const T
   if (rule.ramp.stages > 0) {
     tuning.margin = rule.margin;
   } else if (setting.motor.load_Nm > 0) {
-    tuning.margin = MarginOf(tried.setting, at);
+    tuning.margin = MarginAtLeast(rule, MarginOf(tried.setting, at));
   }
   MeasureMove(tried.setting, at, rule, &tuning);
   return tuning;
@@ -263,8 +342,10 @@ std::vector<LoadTuning> TuneLoads(const Drive::Setting& setting, const Modulatio
   for (const double load : loads_Nm) sorted.push_back(RoundedUp(load));
   std::sort(sorted.begin(), sorted.end());
   sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
+  const bool each_alone = rule.cross_check || rule.ramp.stages > 0 || rule.winding_K_per_W;
   const std::vector<LoadTuning> table =
-      LoadTable(setting, modulation, rule, sorted, progress).Fill();
+      each_alone ? LoadTable(setting, modulation, rule, sorted, progress).Fill()
+                 : TuneByCriticalLoads(setting, modulation, rule, sorted, progress);
   std::vector<LoadTuning> tunings;
   tunings.reserve(loads_Nm.size());
   for (const double load : loads_Nm) {

@@ -24,7 +24,8 @@ struct TuningRule {
   /// Winding above ambient, K for a watt of copper losses. None: it stays at 20 degrees Celsius.
   std::optional<double> winding_K_per_W;
   double ambient_C = 20;
-  bool cross_check = true;  // at PWM level: some seconds
+  bool cross_check = true;    // at PWM level: some seconds
+  bool measure_move = false;  // of a fleet's loads, too: a tenth of a second for each n that occurs
 };
 
 enum class TuningOutcome : std::uint8_t {
@@ -40,7 +41,7 @@ struct Tuning {
   int critical = 0;
   int critical_reduced = 0;  // what the reduced drive alone says
   int repeat = 0;
-  double margin = 0;  // what `repeat` has, half a count on the safe side
+  double margin = 0;  // what `repeat` has, half a count on the safe side; never below the rule's
   double peak_A = 0;  // in steady rotation with the mean load
   double blocked_peak_A = 0;
   double limit_A = 0;      // V / (sqrt3 r): paper 1's
@@ -64,10 +65,13 @@ struct LoadTuning {
   int repeat = 0;
   double margin = 0;
   double peak_share = 0;
+  double move_s = 0;  // where the rule measures it; its energy between two loads is a line
+  double move_J = 0;
 };
-/// As Tune for each of `loads_Nm`, in that order. Loads are rounded up to 0.1 %; where two loads
-/// need the same n, those between need it, too. Cost: some tenths of a second for each n that
-/// occurs, ten times that with the cross-check. `progress` hears the share that is done.
+/// As Tune for each of `loads_Nm`, in that order. Loads are rounded up to 0.1 %. Cost: hundredths
+/// of a second for each n that occurs; with the cross-check or a winding that warms, where two
+/// loads need the same n, those between need it, too, and each trial takes half a second and more.
+/// `progress` hears the share that is done.
 std::vector<LoadTuning> TuneLoads(const Drive::Setting& setting, const Modulation& modulation,
                                   const TuningRule& rule, std::span<const double> loads_Nm,
                                   const std::function<void(double)>& progress);

@@ -73,6 +73,8 @@ void MemoryStore::Commit(const std::vector<Row>& rows) {
         if (row.unit == enable->unit) row.enabled = enable->enabled, row.reason = enable->reason;
     } else if (const auto* parameter = std::get_if<ParameterRow>(&any)) {
       fleet.parameters.push_back(*parameter);
+    } else if (const auto* tuning = std::get_if<TuningRow>(&any)) {
+      fleet.tunings.push_back(*tuning);
     }
   }
 }

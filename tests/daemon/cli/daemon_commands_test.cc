@@ -239,6 +239,28 @@ TEST_F(DaemonCommands, ParamsShowWhatWasSetAndWhatHoldsByDefault) {
             Json::parse(R"([{"axis":"phi","parameter":"repeat","value":108,"origin":"default"}])"));
 }
 
+TEST_F(DaemonCommands, ParamsShowWhatTheLastTuningFound) {
+  const Json answer{{"drive", {{"theta_repeat", 54}}},
+                    {"parameters", Json::array()},
+                    {"tuning",
+                     {{{"axis", "theta"},
+                       {"critical", 37},
+                       {"repeat", 54},
+                       {"margin", 0.512345},
+                       {"load_uNm", 4.07},
+                       {"v_bus_V", 1.8},
+                       {"mode", "asymmetric"},
+                       {"origin", "tuning"},
+                       {"at", "2024-05-01T20:00:00Z"}}}}};
+  const auto text = Ask({"params", "9"}, {{"params", {.result = answer}}});
+  EXPECT_THAT(text.out, HasSubstr("tuned from rest:"));
+  EXPECT_THAT(text.out, HasSubstr("theta  37        54      0.51"));
+  EXPECT_THAT(Ask({"params", "9", "get", "phi"}, {{"params", {.result = answer}}}).out,
+              Not(HasSubstr("tuned from rest")));
+  const auto json = Ask({"params", "9", "--json"}, {{"params", {.result = answer}}});
+  EXPECT_EQ(Json::parse(json.out, nullptr, false)["tuning"][0]["margin"], 0.512345);
+}
+
 TEST_F(DaemonCommands, ApplyDoesNotAskTheDaemonAboutAFileThatIsNoText) {
   const std::string binary = scratch_.Put("b.csv", std::string("unit_id,x_mm\n1,\0", 16) + "\xff");
   const auto result = Ask({"apply", binary}, {});

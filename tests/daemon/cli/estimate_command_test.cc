@@ -5,6 +5,7 @@
 #include <map>
 
 #include "daemon/control/messages.h"
+#include "daemon/store/store.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 #include "tests/daemon/cli/program.h"
@@ -168,10 +169,61 @@ TEST_F(EstimateCommand, TellsPeopleATableForEachMode) {
   EXPECT_THAT(Estimate({"--quiet"}).out, IsEmpty());
 }
 
-TEST_F(EstimateCommand, SaysWhereThereIsNoMargin) {
-  const auto result = Estimate({"--repeat", "23"});
-  EXPECT_EQ(result.exit, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("no margin"));
+TEST_F(EstimateCommand, RefusesANBelowTheCriticalOne) {
+  ExpectRefused({"--repeat", "23"}, 1,
+                "no axis would start from rest: n 23 is below the critical n 38");
+  ExpectRefused({"--repeat", "37"}, 1, "critical n 38");
+  EXPECT_EQ(Estimate({"--repeat", "38"}).exit, 0);
+  // With the stronger field less time is enough.
+  EXPECT_EQ(Estimate({"--repeat", "23", "--v-bus", "3.5"}).exit, 0);
+}
+
+TEST_F(EstimateCommand, NamesTheAxesThatWouldNotStartByWhatTheStoreKnows) {
+  const std::string path = scratch_ / "fleet.db";
+  {
+    auto store = Store::Open(path);
+    ASSERT_TRUE(store) << store.error().text;
+    TuningRow heavy{.serial = {7001},
+                    .axis = Axis::kTheta,
+                    .critical = 120,
+                    .repeat = 150,
+                    .margin = 0.1,
+                    .load_uNm = 5.6,
+                    .v_bus_V = 1.8,
+                    .counter1 = 500,
+                    .subdivision = 96};
+    TuningRow light = heavy;
+    light.axis = Axis::kPhi;
+    light.critical = 20;
+    light.load_uNm = 2;
+    const std::vector<Row> rows = {
+        BindingRow{UnitId{1}, {7001}}, heavy, light,
+        ParameterRow{{7001}, Axis::kTheta, Parameter::kRepeat, 54, Origin::kOperator},
+        ParameterRow{{7001}, Axis::kPhi, Parameter::kRepeat, 30, Origin::kTuning}};
+    ASSERT_TRUE((*store)->Commit(rows, WallTime{1}));
+  }
+  const Json told = EstimateJson({"--store", path, "--mode", "asymmetric"});
+  const Json& below = told["modes"][0]["below_critical"];
+  ASSERT_EQ(below.size(), 1u) << below.dump();
+  EXPECT_EQ(below[0]["unit_id"], 1);
+  EXPECT_EQ(below[0]["axis"], "theta");
+  EXPECT_EQ(below[0]["repeat"], 54);
+  EXPECT_EQ(below[0]["critical"], 120);
+  const auto text = Estimate({"--store", path, "--mode", "asymmetric"});
+  EXPECT_EQ(text.exit, 0);
+  EXPECT_THAT(text.out, HasSubstr("axes that move would stall"));
+  EXPECT_THAT(text.out, HasSubstr("unit 1 theta: n 54, critical 120"));
+  // At another voltage the load decides, not the n that was found at 1.8 V.
+  EXPECT_TRUE(EstimateJson({"--store", path, "--mode", "asymmetric", "--v-bus",
+                            "4"})["modes"][0]["below_critical"]
+                  .empty());
+  EXPECT_TRUE(EstimateJson({"--mode", "asymmetric"})["modes"][0]["below_critical"].empty());
+  // One axis is light enough to start, so the figures are told, with who stalls and how near the
+  // others are to losing step.
+  const auto fast = Estimate({"--store", path, "--mode", "asymmetric", "--repeat", "23"});
+  EXPECT_EQ(fast.exit, 0) << fast.err;
+  EXPECT_THAT(fast.out, HasSubstr("no margin"));
+  EXPECT_THAT(fast.out, HasSubstr("more"));
 }
 
 TEST_F(EstimateCommand, RefusesWhatTheMotorCannotPull) {

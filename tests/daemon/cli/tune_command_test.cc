@@ -125,6 +125,69 @@ TEST_F(TuneCommand, TheStoreTakesWhatWasTunedWithItsOrigin) {
     EXPECT_GT(entry.row.value, 50);
   }
   EXPECT_EQ(repeats, 2);
+  const auto tunings = (*reader)->Tunings({7001}, 100);
+  ASSERT_TRUE(tunings) << tunings.error().text;
+  ASSERT_EQ(tunings->size(), 2u);
+  for (const TuningHistory& entry : *tunings) {
+    EXPECT_EQ(entry.row.critical, 37);
+    EXPECT_GT(entry.row.repeat, 50);
+    EXPECT_GE(entry.row.margin, 0.5);
+    EXPECT_EQ(entry.row.v_bus_V, 1.8);
+    EXPECT_EQ(entry.row.origin, Origin::kTuning);
+  }
+}
+
+TEST_F(TuneCommand, WithoutAMarginThereIsNoneAndNotLessThanNone) {
+  const ProgramResult result = Tune({"--margin", "0", "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["repeat"], told["critical"]);
+  EXPECT_EQ(told["margin"].get<double>(), 0);
+  MakeUnits();
+  ASSERT_EQ(
+      Tune({"--margin", "0", "--units", units_, "--load-spread", "0.02", "--out", tuned_}).exit, 0);
+  const auto table = CsvTable::Parse(Slurp(tuned_), tuned_);
+  ASSERT_TRUE(table) << table.error().text;
+  for (std::size_t k = 0; k < table->size(); ++k)
+    EXPECT_GE(std::stod(std::string(table->cell(k, *table->Find("margin")))), 0);
+}
+
+TEST_F(TuneCommand, AFleetGetsTheVoltageOfEachRailAndTheModeOfEachUnit) {
+  const std::string units = scratch_ / "rails.csv";
+  ASSERT_EQ(Focalfleet({"layout", "hex", "--count", "4", "--out", units}).exit, 0);
+  const std::string loads =
+      scratch_.Put("loads.csv", "unit_id,axis,load_uNm\n1,theta,3\n2,phi,6\n");
+  const auto best = [&](const char* what) {
+    const ProgramResult result = Tune({"--units", units, "--loads", loads, "--minimise", what,
+                                       "--rails", "1.8,3", "--out", tuned_, "--json"});
+    EXPECT_EQ(result.exit, 0) << result.err;
+    return Json::parse(result.out, nullptr, false);
+  };
+  for (const char* what : {"time", "energy"}) {
+    const Json told = best(what);
+    const auto table = CsvTable::Parse(Slurp(tuned_), tuned_);
+    ASSERT_TRUE(table) << table.error().text;
+    const auto cell = [&](std::size_t row, const char* column) {
+      return std::string(table->cell(row, *table->Find(column)));
+    };
+    // One rail: one voltage. A unit: one mode. Time wants the high voltage.
+    for (std::size_t k = 0; k < table->size(); ++k) {
+      EXPECT_EQ(cell(k, "v_bus_V"), cell(0, "v_bus_V"));
+      EXPECT_EQ(cell(k, "mode"), cell(k - k % 2, "mode"));
+    }
+    if (what == std::string("time")) {
+      EXPECT_EQ(cell(0, "v_bus_V"), "3");
+    }
+    // Of unit 2 both axes have the mode that costs least in sum, so each costs no less than alone.
+    const ProgramResult one =
+        Tune({"--load", "6", "--minimise", what, "--rails", cell(0, "v_bus_V"), "--json"});
+    ASSERT_EQ(one.exit, 0) << one.err;
+    const Json alone = Json::parse(one.out, nullptr, false);
+    const char* const figure = what == std::string("time") ? "move_s" : "move_J";
+    EXPECT_GE(std::stod(cell(3, figure)), 0.995 * alone[figure].get<double>());
+    EXPECT_LE(std::stod(cell(3, figure)), 1.1 * alone[figure].get<double>());
+    EXPECT_GE(told["choices"].size(), 1u);
+  }
 }
 
 TEST_F(TuneCommand, ARampLowersNAndKeepsTheMarginThatWasAskedFor) {
@@ -161,7 +224,7 @@ TEST_F(TuneCommand, BadInputIsRefusedWithTheReason) {
            Bad{{"--units", units_}, 1, "--store or --out"},
            Bad{{"--units", scratch_ / "none.csv", "--out", tuned_}, 1, "none.csv"},
            Bad{{"--units", units_, "--store", scratch_ / "none.db"}, 1, "no such store"},
-           Bad{{"--units", units_, "--out", tuned_, "--minimise", "time"}, 1, "one motor"},
+           Bad{{"--rails", "1.8,3"}, 1, "--minimise chooses from"},
            Bad{{"--units", units_, "--out", tuned_, "--ramp-stages", "4"}, 1, "start their moves"},
            Bad{{"--resistance-ohm", "0.001"}, 1, "L/r of a phase"},
            Bad{{"--inertia-gcm2", "1e-9"}, 1, "an inertia of"},

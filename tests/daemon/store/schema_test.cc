@@ -44,6 +44,46 @@ TEST_F(StoreTest, AFailedStepLeavesTheVersionBeforeIt) {
   EXPECT_EQ(connection->Integer("SELECT count(*) FROM sqlite_schema"), 1);
 }
 
+TEST_F(StoreTest, AStoreOfVersionOneKeepsWhatItHasAndTakesTunings) {
+  {
+    auto connection = Open(Path());
+    ASSERT_TRUE(Migrate(*connection, 0, Migrations().first(1)));
+    ASSERT_TRUE(
+        connection->Execute("INSERT INTO unit VALUES(12, 7001, 1, '', 5); "
+                            "INSERT INTO parameter VALUES(7001, 1, 1, 37, 1, 5); "
+                            "INSERT INTO parameter_history VALUES(1, 7001, 1, 1, 37, 1, 5)"));
+    EXPECT_EQ(connection->Integer("PRAGMA user_version"), 1);
+  }
+  const TuningRow row{.serial = {7001},
+                      .axis = Axis::kPhi,
+                      .critical = 37,
+                      .repeat = 54,
+                      .margin = 0.5,
+                      .load_uNm = 4.07,
+                      .v_bus_V = 1.8,
+                      .counter1 = 500,
+                      .subdivision = 96};
+  {
+    auto store = OpenStore();
+    const auto fleet = store->Load();
+    ASSERT_TRUE(fleet) << fleet.error().text;
+    ASSERT_EQ(fleet->units.size(), 1u);
+    EXPECT_EQ(fleet->units[0].serial.value, 7001u);
+    ASSERT_EQ(fleet->parameters.size(), 1u);
+    EXPECT_EQ(fleet->parameters[0].value, 37);
+    EXPECT_TRUE(fleet->tunings.empty());
+    testing::ExpectDone(store->Commit(std::vector<Row>{row}, {6}));
+    EXPECT_EQ(store->Load()->tunings.size(), 1u);
+  }
+  EXPECT_EQ(OpenReader()->Parameters({7001}, 9)->size(), 1u);
+  auto connection = Open(Path());
+  EXPECT_EQ(connection->Integer("PRAGMA user_version"),
+            static_cast<std::int64_t>(Migrations().size()));
+  EXPECT_EQ(connection->Integer("SELECT critical FROM tuned WHERE unit_id = 12 AND axis = 'phi' "
+                                "AND origin = 'tuning' AND mode = 'asymmetric'"),
+            37);
+}
+
 TEST_F(StoreTest, OpeningANewStoreSurvivesEveryFailingWrite) {
   focalfleet::testing::FaultyDisk disk;
   std::uint64_t n = 1;

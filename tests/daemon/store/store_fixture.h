@@ -96,6 +96,14 @@ inline std::vector<Row> Batch(std::uint32_t k, std::uint32_t serials) {
   }
   rows.emplace_back(ParameterRow{
       {1}, Axis::kPhi, Parameter::kRepeat, static_cast<std::int32_t>(k), Origin::kTuning});
+  rows.emplace_back(TuningRow{.serial = {1},
+                              .critical = 1,
+                              .repeat = 1,
+                              .margin = static_cast<double>(k),
+                              .load_uNm = 1,
+                              .v_bus_V = 1,
+                              .counter1 = 1,
+                              .subdivision = 6});
   rows.emplace_back(NextMoveRow{{static_cast<std::uint16_t>(k)}});
   rows.emplace_back(AlarmRow{k, Severity::kInfo, {}, {}, "batch " + std::to_string(k)});
   return rows;
@@ -106,6 +114,7 @@ inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   if (fleet.vectors.empty()) {
     EXPECT_EQ(fleet.next_alarm, 1u);
     EXPECT_TRUE(fleet.parameters.empty());
+    EXPECT_TRUE(fleet.tunings.empty());
     return 0;
   }
   const auto k = static_cast<std::uint32_t>(fleet.next_alarm - 1);
@@ -117,6 +126,8 @@ inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   }
   EXPECT_EQ(fleet.parameters.size(), 1u);
   EXPECT_EQ(fleet.parameters.at(0).value, static_cast<std::int32_t>(k));
+  EXPECT_EQ(fleet.tunings.size(), 1u);
+  EXPECT_EQ(fleet.tunings.at(0).margin, k);
   EXPECT_EQ(fleet.next_move.value, static_cast<std::uint16_t>(k));
   return k;
 }

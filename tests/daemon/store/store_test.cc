@@ -95,6 +95,47 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
   EXPECT_EQ(fleet->next_alarm, 10u);
 }
 
+TuningRow Tuned(std::uint16_t critical, double margin) {
+  return {.serial = {7},
+          .axis = Axis::kPhi,
+          .critical = critical,
+          .repeat = 54,
+          .margin = margin,
+          .load_uNm = 4.07,
+          .v_bus_V = 1.8,
+          .counter1 = 500,
+          .subdivision = 96,
+          .mode = WaveMode::kSevenSegment};
+}
+
+TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
+  auto store = OpenStore();
+  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(37, 0.5)}, kEight));
+  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(38, 0.25)}, kNine));
+  const auto fleet = store->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  ASSERT_EQ(fleet->tunings.size(), 1u);
+  const TuningRow& now = fleet->tunings[0];
+  EXPECT_EQ(now.serial.value, 7u);
+  EXPECT_EQ(now.axis, Axis::kPhi);
+  EXPECT_EQ(now.critical, 38);
+  EXPECT_EQ(now.repeat, 54);
+  EXPECT_EQ(now.margin, 0.25);
+  EXPECT_EQ(now.load_uNm, 4.07);
+  EXPECT_EQ(now.v_bus_V, 1.8);
+  EXPECT_EQ(now.counter1, 500);
+  EXPECT_EQ(now.subdivision, 96);
+  EXPECT_EQ(now.mode, WaveMode::kSevenSegment);
+  EXPECT_EQ(now.origin, Origin::kTuning);
+  const auto history = OpenReader()->Tunings({7}, 10);
+  ASSERT_TRUE(history) << history.error().text;
+  ASSERT_EQ(history->size(), 2u);
+  EXPECT_EQ((*history)[0].row.margin, 0.25);
+  EXPECT_EQ((*history)[1].row.margin, 0.5);
+  EXPECT_EQ((*history)[1].at, kEight);
+  EXPECT_TRUE(OpenReader()->Tunings({8}, 10)->empty());
+}
+
 TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
   auto store = OpenStore();
   testing::ExpectDone(
@@ -242,6 +283,9 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
       Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(6)),
       IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
       ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
+      Tuned(0, 0.5),   // no n at all
+      Tuned(55, 0.5),  // chosen below what starts the load
+      Tuned(37, std::nan("")),
       ConfigurationRow{.id = 1, .source = "", .state = static_cast<ConfigurationState>(6)},
       AlarmRow{1, static_cast<Severity>(3), {}, {}, ""},
       AlarmRow{UINT64_MAX, Severity::kInfo, {}, {}, ""}};
@@ -270,7 +314,7 @@ TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
       std::vector<Row>{BindingRow{{12}, {7}}, Vector(7, Witness::kReported, 10, 20),
                        Intent(12, 7, 3, {0, 0}, {1, 1}),
                        ParameterRow{{7}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
-                       NextMoveRow{{4}}},
+                       Tuned(37, 0.5), NextMoveRow{{4}}},
       kEight));
   Sql(GetParam().sql);
   auto store = OpenStore();
@@ -309,6 +353,10 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE intent SET configuration = -3", "configuration is -3"},
         Garbage{"UPDATE parameter SET parameter = 9", "parameter is 9"},
         Garbage{"UPDATE parameter SET value = 2147483648", "value is 2147483648"},
+        Garbage{"UPDATE tuning SET critical = 55", "tuning, row serial 7, axis 1: its n are not"},
+        Garbage{"UPDATE tuning SET load_uNm = 0", "load"},
+        Garbage{"UPDATE tuning SET mode = 3", "mode is 3"},
+        Garbage{"UPDATE tuning SET origin = 6", "origin is 6"},
         Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
         Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 

@@ -150,5 +150,49 @@ TEST(ReducedDrive, FollowsTheDriveAtPwmLevel) {
   RecordProperty("largest_power_error", std::to_string(power));
 }
 
+TEST(ReducedDrive, FollowsTheDriveUpAndDownARamp) {
+  double angle_deg = 0;
+  double power = 0;
+  for (std::uint64_t k = 0; k < 10; ++k) {
+    const std::uint64_t seed = TestSeed(330 + k);
+    FOCALFLEET_TRACE_SEED(seed);
+    Rng rng(seed);
+    const Drive::Setting setting{
+        kParameterSets[rng.Below(5)].motor, {}, {.v_bus_V = rng.Uniform(1.7, 9.2)}};
+    Modulation modulation{.mode = static_cast<WaveMode>(rng.Below(3))};
+    const Ramp ramp{.stages = static_cast<int>(2 + rng.Below(7)),
+                    .stage_s = rng.Uniform(5e-3, 20e-3)};
+    // Comfortably above what the ramp starts, and for most below what starts without it.
+    const int critical =
+        CriticalRepeat(setting, modulation, {.ramp = ramp}, DriveLevel::kReduced).value_or(100);
+    modulation.repeat = critical * 5 / 4 + 1;
+    Drive pwm(setting);
+    ReducedDrive reduced(setting, modulation);
+    pwm.Place(-0.5, 0);
+    reduced.Place(-0.5, 0);
+    const std::vector<Pattern> table = VectorTable(modulation);
+    std::int64_t field = 0;
+    double worst_deg = 0;
+    for (const Stage& stage : MakeProfile(96 * 60, modulation, ramp)) {
+      Modulation at = modulation;
+      at.repeat = stage.repeat;
+      for (std::int64_t v = 0; v < stage.vectors; ++v, ++field) {
+        RunVectors(&pwm, at, table, field, 1);
+        reduced.RunVectors(field, 1, stage.repeat);
+        worst_deg =
+            std::max(worst_deg, std::abs(pwm.shaft().angle_rad() - reduced.shaft().angle_rad()) *
+                                    180 / std::numbers::pi);
+      }
+    }
+    const double energy = reduced.supply_J() / pwm.energy().supply_J - 1;
+    EXPECT_LT(worst_deg, 6) << "n " << modulation.repeat << ", " << ramp.stages << " stages";
+    EXPECT_LT(std::abs(energy), 0.02);
+    angle_deg = std::max(angle_deg, worst_deg);
+    power = std::max(power, std::abs(energy));
+  }
+  RecordProperty("largest_angle_deg", std::to_string(angle_deg));
+  RecordProperty("largest_energy_error", std::to_string(power));
+}
+
 }  // namespace
 }  // namespace focalfleet::sim
