@@ -10,7 +10,7 @@
 #include "daemon/cli/context.h"
 #include "fleet/drive.h"
 #include "fleet/layout.h"
-#include "fleet/plan/plan.h"
+#include "fleet/plan/planner.h"
 #include "fleet/records.h"
 #include "protocol/base/result.h"
 

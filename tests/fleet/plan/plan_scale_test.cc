@@ -15,7 +15,7 @@
 namespace focalfleet::testing {
 namespace {
 
-void ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
+void ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed, double ratio_most) {
   FOCALFLEET_TRACE_SEED(seed);
   ASSERT_NO_FATAL_FAILURE(DrawStartAndTargets(fleet, seed));
   const std::clock_t begin = std::clock();
@@ -23,10 +23,13 @@ void ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
   const double cpu_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   ASSERT_TRUE(plan) << plan.error().text;
   EXPECT_TRUE(plan->unserved.empty()) << plan->unserved.size() << " units";
+  EXPECT_LE(plan->makespan_s, ratio_most * plan->bound_s);
+  // Of the pairs that cross hardly any may be noticed too late.
+  EXPECT_LE(static_cast<double>(plan->unnoticed.size()), 0.02 * plan->crossings);
   ExpectSound(*fleet, *plan);
-  std::printf("FOCALFLEET_SEED=%llu moves %zu unserved %zu makespan %.2f s cpu %.2f s\n",
+  std::printf("FOCALFLEET_SEED=%llu moves %zu unserved %zu makespan %.2f of %.2f s cpu %.2f s\n",
               static_cast<unsigned long long>(seed), plan->moves.size(), plan->unserved.size(),
-              plan->makespan_s, cpu_s);
+              plan->makespan_s, plan->bound_s, cpu_s);
 }
 
 constexpr std::uint64_t kSeedsPerTest = 5;
@@ -37,7 +40,7 @@ TEST_P(HexScale, Serves5000UnitsFromRandomToRandom) {
   PlanningFleet fleet = HexFleet(5000);
   const std::uint64_t first = static_cast<std::uint64_t>(GetParam()) * kSeedsPerTest;
   for (std::uint64_t k = 0; k < kSeedsPerTest; ++k)
-    ExpectAllServed(&fleet, TestSeed(1 + first + k));
+    ExpectAllServed(&fleet, TestSeed(1 + first + k), 1.25);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, HexScale, ::testing::Range(0, 4));
 
@@ -54,7 +57,7 @@ TEST_P(DesiScale, ServesAllEnabledUnitsOfTheRealPlate) {
   ASSERT_EQ(fleet.layout.size(), 5020u);
   const std::uint64_t first = static_cast<std::uint64_t>(GetParam()) * kSeedsPerTest;
   for (std::uint64_t k = 0; k < kSeedsPerTest; ++k)
-    ExpectAllServed(&fleet, TestSeed(1 + first + k));
+    ExpectAllServed(&fleet, TestSeed(1 + first + k), 1.4);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, DesiScale, ::testing::Range(0, 2));
 #endif
