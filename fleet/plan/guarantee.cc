@@ -205,9 +205,11 @@ void FindFollowers(const FollowersQuestion& question, Plan* plan) {
           follower.begins_s = any ? std::min(follower.begins_s, begins_s) : begins_s;
           follower.left_s = (n + 1) * h / (1 - error) + skew_s;
           any = true;
-          // What is proven holds for each instant of the slice, what is seen only for all of it.
-          const double leaves_s =
-              m * h > after_s ? std::max(m * h - (n + 1) * h, proven.notice_s) : proven.notice_s;
+          // What is proven holds for each instant of the slice, what is seen only for all of it;
+          // and the other may be ahead by its clock when this one ends.
+          const double ends_s = (n + 1) * h;
+          const double seen_s = (m * h - ends_s - plain.Slip(ends_s)) / (1 + error);
+          const double leaves_s = std::max(seen_s, proven.notice_s);
           if (leaves_s < late.leaves_s) late = {{i}, {near.unit}, follower.since_s, leaves_s};
           break;
         }
