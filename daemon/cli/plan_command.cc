@@ -151,7 +151,8 @@ std::string DescribeGuarantee(const Json& guarantee) {
 std::string Describe(const Json& summary) {
   const auto number = [&](const char* key) { return summary[key].get<double>(); };
   const std::string text = fmt::format(
-      "{}: {} of {} targets served, {} rows\n  makespan {:.2f} s (the slowest unit alone: {:.2f} s), "
+      "{}: {} of {} targets served, {} rows\n  makespan {:.2f} s (the slowest unit alone: {:.2f} "
+      "s), "
       "energy {:.1f} J, peak power {:.1f} W",
       summary["out"].get<std::string>(), summary["served"].get<std::uint64_t>(),
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
@@ -160,7 +161,8 @@ std::string Describe(const Json& summary) {
       summary["plot"].is_null()
           ? ""
           : fmt::format("\n  {}: to look at, in a browser", summary["plot"].get<std::string>());
-  return text + DescribeGuarantee(summary["guarantee"]) + plot + DescribeUnserved(summary["unserved"]);
+  return text + DescribeGuarantee(summary["guarantee"]) + plot +
+         DescribeUnserved(summary["unserved"]);
 }
 
 ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
@@ -201,8 +203,7 @@ void AddPlanCommand(CommandLine* line) {
                    "No supply rail gives more at any instant, W")
       ->check(CLI::PositiveNumber);
   command
-      ->add_option("--total-limit-w", options->plan.power.total_W,
-                   "Nor do all rails together, W")
+      ->add_option("--total-limit-w", options->plan.power.total_W, "Nor do all rails together, W")
       ->check(CLI::PositiveNumber);
   command
       ->add_option("--notice-s", options->plan.notice_s,

@@ -520,7 +520,7 @@ Result<Plan> Planner::Run() {
     return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
   }
   const bool dense = MeanNeighbours() > kDenseNeighbours;
-  if (!options_.lead_apart && !dense && AllAtOnce({})) return Finish();
+  if (too_near_.empty() && !dense && AllAtOnce({})) return Finish();
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
@@ -538,7 +538,7 @@ Result<Plan> Planner::Run() {
   }
   const std::vector<Piece> pieces = CutPieces(order, scene_);
   FOCALFLEET_TRY_ASSIGN(plan_, Schedule(pieces, scene_, request_.drives, options_));
-  if (!options_.lead_apart && !stuck_for_order_.empty()) ServeTheRest();
+  if (too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
   if (choreography_.tracks.empty()) TracksOfPlan();
   return Finish();
 }

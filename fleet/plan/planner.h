@@ -1,14 +1,11 @@
 // From any collision-free start to any collision-free target, provably clear, without sampling in
 // time.
 //
-// The idea: first find an order in which the units could go one at a time, each along a path whose
-// swept region is clear of everything that stands still meanwhile. That order is then run in
-// parallel under one rule: of two moves whose swept regions overlap, the later in the order begins
-// after the earlier has ended (with a margin for start skew and clock error). docs/adr/ has the
-// proof that this is enough, whatever the speeds. Each unit makes up to three moves: retract into
-// its own cell, turn inside it, extend; cells are discs that no other unit's cell touches, so
-// turning is free. Where a straight retraction is blocked, a path is searched in the unit's own
-// (theta, phi) square with the others standing.
+// The idea: all go at once, straight, and who would meet somebody goes later or another way, within
+// the time that the slowest unit needs anyhow (choreography.h, docs/adr/0007). Where units stand so
+// close that this finds no end, an order is found in which they could go one at a time, and is run
+// in parallel under one rule (retreat.h, midway.h, schedule.h, docs/adr/0003). Either way every
+// pair is proven clear as the segments are sent, for every start skew and clock.
 #pragma once
 
 #include <optional>

@@ -109,7 +109,7 @@ TEST(PassesClear, HoldsForAllTimesThatCanMeetAndNotForMuchMore) {
   int clear = 0;
   int touching = 0;
   int reserved = 0;
-  for (int k = 0; k < 200; ++k) {
+  for (int k = 0; k < 400; ++k) {
     FOCALFLEET_TRACE_SEED(TestSeed(13));
     const std::array<Motion, 2> motions{DrawMotion(arms[0], &rng), DrawMotion(arms[1], &rng)};
     const Track a(arms[0], fleet.drives[0], motions[0].from, motions[0].paths);
