@@ -23,6 +23,7 @@ namespace {
 /// aside.
 constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
+constexpr std::uint64_t kFreshStarts = 3;
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 4;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
@@ -404,6 +405,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
       if (!request_.targets[i]) may_move[i] = 0;
   std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
+  std::uint64_t fresh_starts = 0;
   double slack = 0;  // of the time with limits of power; 0: not known yet
   for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
     DropCollidingTargets();
@@ -428,7 +430,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
                                  .ledger = ledger ? &*ledger : nullptr,
                                  .tolerance = tolerance,
                                  .within_s = within_s,
-                                 .seed = options_.seed});
+                                 .seed = options_.seed + fresh_starts});
     if (choreography_.in_conflict.empty()) {
       PlanOfChoreography();
       return true;
@@ -440,8 +442,9 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     // Some may have no way at all: they stay, and the others are asked again.
     stuck_ = choreography_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return movable_[i] == 0; });
-    if (!AbandonHopeless()) break;
-    paths = choreography_.paths;
+    // The others may need other luck.
+    if (!AbandonHopeless() && ++fresh_starts > kFreshStarts) break;
+    if (!options_.power.any()) paths = choreography_.paths;
   }
   choreography_ = {};
   return false;
