@@ -189,7 +189,6 @@ void Builder::AppendSliding(std::vector<Candidate>* out) const {
         }
       }
     }
-    if (q_.within_s <= 0) return;
   }
 }
 
@@ -255,13 +254,12 @@ Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to) {
   return made;
 }
 
-Candidate Delayed(const UnitDrive& drive, const Candidate& straight, double begin_s,
-                  bool one_by_one) {
+Candidate Delayed(const UnitDrive& drive, const Candidate& straight,
+                  const std::array<double, kAxisCount>& begin_s) {
   Candidate later;
   for (std::size_t k = 0; k < kAxisCount; ++k) {
     for (Segment segment : straight.path[k].segments()) {
-      segment.start_ticks +=
-          TicksOf(one_by_one && k > 0 ? std::max(begin_s, later.end_s) : begin_s);
+      segment.start_ticks += TicksOf(begin_s[k]);
       const AxisDrive as_sent{drive.axis[k].counter1, segment.repeat, drive.axis[k].subdivision};
       later.path[k].Append(segment);
       later.end_s =

@@ -9,8 +9,12 @@
 #include "fleet/plan/path_search.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/track.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
+
+/// A segment cannot begin later: its offset has 24 bits of 100 us.
+inline constexpr double kOffsetMaxS = limits::kOffsetTicksMax * 1e-4;
 
 struct Candidate {
   AxisPaths path;
@@ -54,8 +58,8 @@ void AppendAlong(const CandidateQuestion& question, const Way& way,
 
 /// Both axes at once, without delay.
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to);
-/// A straight one that begins later; with `one_by_one` phi waits for theta.
-Candidate Delayed(const UnitDrive& drive, const Candidate& straight, double begin_s,
-                  bool one_by_one);
+/// A straight one whose axes begin later. Units: s. Shape: (axes).
+Candidate Delayed(const UnitDrive& drive, const Candidate& straight,
+                  const std::array<double, kAxisCount>& begin_s);
 
 }  // namespace focalfleet

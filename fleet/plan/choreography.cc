@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <deque>
 #include <limits>
 
@@ -37,8 +38,12 @@ class Repair {
   Choreography Run();
 
  private:
+  struct Motion {
+    AxisPaths path;
+    Track track;
+  };
   void Begin();
-  bool Improve(std::uint32_t unit);
+  void Improve(std::uint32_t unit);
   double Cost(std::uint32_t unit, const Track& track, double limit);
   [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot);
   [[nodiscard]] bool InConflict(std::uint32_t unit);
@@ -83,6 +88,7 @@ bool Repair::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) {
   if (!scene_.is_place(near.unit) || out_.tracks[near.unit].legs().empty()) return false;
   const Tolerance& tolerance = ToleranceOf(unit, slot);
   const Track& other = out_.tracks[near.unit];
+  if (!track.moves() && !other.moves()) return false;
   // Near touching the order of the two may matter: it is always the same.
   return unit < near.unit ? !PassesClear(scene_.arm(unit), track, scene_.arm(near.unit), other,
                                          near.need_mm, tolerance)
@@ -92,8 +98,10 @@ bool Repair::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) {
 
 /// Sum of the weights of the neighbours that it would meet; at least `limit` once that is reached.
 double Repair::Cost(std::uint32_t unit, const Track& track, double limit) {
+  // Where it merely stands no plan has brought it.
   for (const StandingThing& thing : scene_.standing(unit))
-    if (!PassesClearOf(scene_.arm(unit), track, thing.capsule, thing.need_mm)) return kNever;
+    if (track.moves() && !PassesClearOf(scene_.arm(unit), track, thing.capsule, thing.need_mm))
+      return kNever;
   double cost = 0;
   std::vector<std::uint32_t>& order = order_[unit];
   for (std::size_t k = 0; k < order.size(); ++k) {
@@ -113,11 +121,8 @@ void Repair::PushMet(std::uint32_t unit) {
     if (Meets(unit, out_.tracks[unit], slot)) Push(scene_.neighbours(unit)[slot].unit);
 }
 
-bool Repair::InConflict(std::uint32_t unit) {
-  for (std::uint32_t slot = 0; slot < scene_.neighbours(unit).size(); ++slot)
-    if (Meets(unit, out_.tracks[unit], slot)) return true;
-  return false;
-}
+/// Meets somebody, or something that never moves.
+bool Repair::InConflict(std::uint32_t unit) { return Cost(unit, out_.tracks[unit], kNever) > 0; }
 
 void Repair::Push(std::uint32_t unit) {
   if (queued_[unit] != 0 || q_.movable[unit] == 0) return;
@@ -185,25 +190,27 @@ void Repair::Begin() {
   for (const auto& [time, i] : spare) Push(i);
   if (q_.ledger == nullptr) return;
   // The longest first, each as soon as its rail can feed it.
-  for (auto it = spare.rbegin(); it != spare.rend(); ++it)
+  for (auto it = spare.rbegin(); it != spare.rend() && !out_.starved; ++it)
     if (q_.from[it->second] != q_.to[it->second]) BeginWithinLimits(it->second);
 }
 
-/// Straight, as soon as the limits of power let it.
+/// Straight, as soon as the limits of power let it: both axes at once, or phi after theta.
 void Repair::BeginWithinLimits(std::uint32_t unit) {
   constexpr double kStepS = 0.5;
   const Candidate straight = Straight(q_.drives[unit], q_.from[unit], q_.to[unit]);
-  const double last_s = 1000 + 100 * q_.within_s;
-  for (double begin_s = 0; begin_s < last_s; begin_s += kStepS) {
-    for (const bool one_by_one : {false, true}) {
-      const Candidate later = Delayed(q_.drives[unit], straight, begin_s, one_by_one);
+  const double theta_s =
+      std::abs(q_.to[unit][0] - q_.from[unit][0]) * SecondsPerVector(q_.drives[unit].axis[0]);
+  for (double begin_s = 0; begin_s < kOffsetMaxS; begin_s += kStepS) {
+    for (const double phi_s : {begin_s, q_.ledger->BeginAfter(begin_s + theta_s)}) {
+      const Candidate later = Delayed(q_.drives[unit], straight, {begin_s, phi_s});
+      if (later.end_s > kOffsetMaxS) continue;
       if (!q_.ledger->Enter(unit, later.path)) continue;
       out_.paths[unit] = later.path;
       out_.tracks[unit] = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], later.path);
       return;
     }
   }
-  out_.tracks[unit] = Track(scene_.arm(unit), q_.from[unit]);
+  out_.starved = true;
 }
 
 /// The unit goes so from now on. Pre: that keeps the limits of power.
@@ -230,7 +237,7 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
   int ties = 0;
   for (std::size_t c = first; c < candidates_.size() && best > 0; ++c) {
     const Candidate& candidate = candidates_[c];
-    if (candidate.end_s > q_.within_s * extend) continue;
+    if (candidate.end_s > std::min(q_.within_s * extend, kOffsetMaxS)) continue;
     track_ = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], candidate.path);
     const double cost = Cost(unit, track_, best == kNever ? best : best + 1e-9);
     if (cost > best || cost == kNever) continue;
@@ -309,8 +316,8 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
 /// `other` goes in one of its own ways that meet nobody else, and `unit` finds one around it. True:
 /// neither meets anybody then.
 bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
-  const Choreography::Motion before{out_.paths[unit], out_.tracks[unit]};
-  const Choreography::Motion other_before{out_.paths[other], out_.tracks[other]};
+  const Motion before{out_.paths[unit], out_.tracks[unit]};
+  const Motion other_before{out_.paths[other], out_.tracks[other]};
   const double extend = ExtensionAt(looks_[unit]);
   Go(unit, {}, Track());
   candidates_.clear();
@@ -373,9 +380,9 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   return false;
 }
 
-/// The best candidate of the unit as the others go now. True: it meets nobody.
-bool Repair::Improve(std::uint32_t unit) {
-  if (Cost(unit, out_.tracks[unit], kNever) == 0) return true;
+/// The best candidate of the unit as the others go now.
+void Repair::Improve(std::uint32_t unit) {
+  if (!InConflict(unit)) return;
   const int looks = looks_[unit]++;
   const double extend = ExtensionAt(looks);
   double best = kNever;
@@ -407,10 +414,10 @@ bool Repair::Improve(std::uint32_t unit) {
   }
   if (best < 1) {
     Take(unit, candidates_[chosen]);
-    return true;
+    return;
   }
   if (looks >= 1 || best == kNever) {
-    if (SearchWay(unit, q_.within_s * extend, looks)) return true;
+    if (SearchWay(unit, q_.within_s * extend, looks)) return;
     Push(unit);
   }
   if (best != kNever) Take(unit, candidates_[chosen]);
@@ -420,7 +427,7 @@ bool Repair::Improve(std::uint32_t unit) {
     if (looks >= 1 && q_.movable[other] != 0 && (GoAround(unit, other) || GoAround(other, unit))) {
       Push(unit);
       Push(other);
-      return true;
+      return;
     }
     if (looks >= kLooksWithNotice) GiveUpNotice(unit, slot);
     weight_[unit][slot] += 1;
@@ -428,11 +435,11 @@ bool Repair::Improve(std::uint32_t unit) {
     Push(other);
     Push(unit);
   }
-  return false;
 }
 
 Choreography Repair::Run() {
   Begin();
+  if (out_.starved) return std::move(out_);
   while (!queue_.empty()) {
     const std::uint32_t unit = queue_.front();
     queue_.pop_front();

@@ -22,14 +22,11 @@
 namespace focalfleet {
 
 struct Choreography {
-  struct Motion {
-    AxisPaths path;
-    Track track;
-  };
   /// Shape: (n). Empty paths: the unit stands.
   std::vector<AxisPaths> paths;
   std::vector<Track> tracks;
   std::vector<std::uint32_t> in_conflict;  // ascending; empty: clear of each other at all times
+  bool starved = false;  // the limits of power leave somebody no time at all: nothing was tried
   /// Pairs that are clear, but not with notice. Lower index first, sorted.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> without_notice;
 };

@@ -25,7 +25,7 @@ constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
 constexpr std::uint64_t kFreshStarts = 3;
 constexpr double kFullShare = 0.75;
-constexpr double kSlackMost = 4;  // times the bound that limits of power may take
+constexpr double kSlackMost = 2;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
 /// is found sooner.
 constexpr double kDenseNeighbours = 10;
@@ -348,10 +348,11 @@ void Planner::GiveWay() {
   }
 }
 
-/// A limit below what one motor draws lets nobody move.
+/// A limit below what one motor draws lets nobody move; one that takes longer than offsets can say
+/// leaves some no time.
 Status Planner::CheckPower() const {
-  const PowerLedger ledger(layout_, request_.drives, options_.motor, options_.power, {});
-  const double least_W = ledger.LargestMotor_W();
+  PowerLedger ledger(layout_, request_.drives, options_.motor, options_.power, {});
+  const double least_W = ledger.largest_motor_W();
   std::array<char, 160> text{};
   for (const auto& [limit_W, name] :
        {std::pair{options_.power.rail_W, "rail"}, std::pair{options_.power.total_W, "total"}}) {
@@ -363,7 +364,13 @@ Status Planner::CheckPower() const {
         name, limit_W, least_W);
     return Fail(ErrorCode::kRefused, text.data());
   }
-  return {};
+  const double least_s = PowerBoundS(&ledger);
+  if (least_s <= kOffsetMaxS) return {};
+  std::snprintf(text.data(), text.size(),
+                "the limits of power need %.0f s at least, a start can be put off for %.0f s; "
+                "limits must be at least %.3f times as high",
+                least_s, kOffsetMaxS, least_s / kOffsetMaxS);
+  return Fail(ErrorCode::kRefused, text.data());
 }
 
 double Planner::MeanNeighbours() const {
@@ -431,19 +438,18 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
                                  .tolerance = tolerance,
                                  .within_s = within_s,
                                  .seed = options_.seed + fresh_starts});
+    if (choreography_.starved) break;
     if (choreography_.in_conflict.empty()) {
       PlanOfChoreography();
       return true;
     }
-    if (ledger) {
-      slack *= 1.1;
-      if (slack < kSlackMost) continue;
-    }
     // Some may have no way at all: they stay, and the others are asked again.
     stuck_ = choreography_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return movable_[i] == 0; });
-    // The others may need other luck.
-    if (!AbandonHopeless() && ++fresh_starts > kFreshStarts) break;
+    if (AbandonHopeless()) continue;
+    // The others may need more time within limits of power, or other luck.
+    if (ledger) slack *= 1.1;
+    if (ledger ? slack > kSlackMost : ++fresh_starts > kFreshStarts) break;
     if (!options_.power.any()) paths = choreography_.paths;
   }
   choreography_ = {};
@@ -491,6 +497,10 @@ void Planner::ServeTheRest() {
     std::erase_if(unserved_, [i](const Unserved& u) { return u.unit.value == i; });
   }
   if (AllAtOnce(paths)) return;
+  for (const std::uint32_t i : stuck_for_order_) {
+    served_[i] = 0;
+    goal_[i] = start_[i];
+  }
   unserved_ = unserved;
   plan_ = ordered;
 }
@@ -517,11 +527,7 @@ Plan Planner::Finish() {
 Result<Plan> Planner::Run() {
   Classify();
   FOCALFLEET_TRY(Check());
-  if (options_.power.any()) {
-    FOCALFLEET_TRY(CheckPower());
-    if (AllAtOnce({})) return Finish();
-    return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
-  }
+  if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
   const bool dense = MeanNeighbours() > kDenseNeighbours;
   if (too_near_.empty() && !dense && AllAtOnce({})) return Finish();
   std::vector<Piece> order;
@@ -540,7 +546,12 @@ Result<Plan> Planner::Run() {
       if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, kNobody);
   }
   const std::vector<Piece> pieces = CutPieces(order, scene_);
-  FOCALFLEET_TRY_ASSIGN(plan_, Schedule(pieces, scene_, request_.drives, options_));
+  std::optional<PowerLedger> ledger;
+  if (options_.power.any())
+    ledger.emplace(layout_, request_.drives, options_.motor, options_.power,
+                   Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
+  FOCALFLEET_TRY_ASSIGN(
+      plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
   if (too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
   if (choreography_.tracks.empty()) TracksOfPlan();
   return Finish();

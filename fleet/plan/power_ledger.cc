@@ -88,6 +88,11 @@ bool PowerLedger::Fits(std::uint32_t unit, const AxisPaths& path, const AxisPath
   return fits;
 }
 
+double PowerLedger::BeginAfter(double end_s) const {
+  const double last_s = end_s / (1 - tolerance_.clock_error) + tolerance_.start_skew_s;
+  return (last_s + kSlotS + tolerance_.start_skew_s) * (1 + tolerance_.clock_error);
+}
+
 double PowerLedger::Energy(std::uint32_t unit, const AxisPaths& path) {
   double energy_J = 0;
   for (std::size_t k = 0; k < kAxisCount; ++k) {

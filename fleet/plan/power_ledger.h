@@ -32,10 +32,13 @@ class PowerLedger {
   /// Whether `path` would keep the limits if the unit left `instead_of`, which is entered.
   bool Fits(std::uint32_t unit, const AxisPaths& path, const AxisPaths& instead_of);
 
+  /// The soonest begin of a segment that is in no slot with one that ends at `end_s`. Units: s.
+  [[nodiscard]] double BeginAfter(double end_s) const;
+
   /// Energy that the motion takes by nominal clocks. Units: J.
   double Energy(std::uint32_t unit, const AxisPaths& path);
   /// The most that one motor of the fleet draws: no limit below it can be kept. Units: W.
-  [[nodiscard]] double LargestMotor_W() const { return largest_W_; }
+  [[nodiscard]] double largest_motor_W() const { return largest_W_; }
 
  private:
   static constexpr double kSlotS = 0.05;

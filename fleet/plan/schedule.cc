@@ -39,8 +39,8 @@ AxisPath Lengthened(const AxisPath& path, std::int32_t by) {
 class Scheduler {
  public:
   Scheduler(std::span<const Piece> order, const Scene& scene, std::span<const UnitDrive> drives,
-            const PlanOptions& options)
-      : order_(order), scene_(scene), drives_(drives), options_(options) {}
+            const PlanOptions& options, PowerLedger* ledger)
+      : order_(order), scene_(scene), drives_(drives), options_(options), ledger_(ledger) {}
 
   Result<Plan> Run();
 
@@ -68,46 +68,84 @@ class Scheduler {
     if (scene_.InCell(a.unit, a.sweep.box()) && scene_.InCell(b.unit, b.sweep.box())) return false;
     return !SweepsClear(scene_.arm(a.unit), a.sweep, scene_.arm(b.unit), b.sweep, need_mm, 2000);
   }
-  Timed Lay(std::uint32_t index, std::int64_t earliest);
+  [[nodiscard]] AxisPaths SegmentsOf(const Piece& piece, std::int64_t earliest,
+                                     std::int64_t phi) const;
+  std::optional<AxisPaths> FindPower(const Piece& piece, std::int64_t earliest);
+  Timed Lay(std::uint32_t index, std::int64_t earliest, const AxisPaths& paths);
   void Collect(Plan* plan);
 
   std::span<const Piece> order_;
   const Scene& scene_;
   std::span<const UnitDrive> drives_;
   const PlanOptions& options_;
+  PowerLedger* ledger_;
   std::vector<std::vector<Timed>> laid_;  // per unit
   std::vector<UnitPlan> plans_;           // per unit
   std::vector<std::array<std::int64_t, kAxisCount>> axis_end_;
   std::vector<Wait> waits_;
 };
 
-/// Gives a piece its segments; a leg that goes on without pause lengthens the segment before it.
-Scheduler::Timed Scheduler::Lay(std::uint32_t index, std::int64_t earliest) {
-  const Piece& piece = order_[index];
+/// What a piece sends where it begins at `earliest`; `phi` as well, or later if it need not keep in
+/// step with theta.
+AxisPaths Scheduler::SegmentsOf(const Piece& piece, std::int64_t earliest, std::int64_t phi) const {
   const Sweep& sweep = piece.sweep;
   const UnitDrive& drive = drives_[piece.unit];
-  UnitPlan& plan = plans_[piece.unit];
-  if (laid_[piece.unit].empty()) plan.from = sweep.from;
-  plan.to = sweep.to;
   std::optional<InStep> in_step;
   if (sweep.out_of_step < 1) in_step = KeepInStep(sweep.from, sweep.to, drive);
+  AxisPaths paths;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    if (sweep.to[k] == sweep.from[k]) continue;
+    const std::int64_t tick = ((k == 0 ? earliest : phi) + kCountsPerTick - 1) / kCountsPerTick;
+    paths[k].Append({static_cast<std::uint32_t>(tick), sweep.to[k] - sweep.from[k],
+                     in_step ? in_step->repeat[k] : drive.axis[k].repeat});
+  }
+  return paths;
+}
+
+/// Enters the piece where its rail can feed it, as soon as that is. Empty: never.
+std::optional<AxisPaths> Scheduler::FindPower(const Piece& piece, std::int64_t earliest) {
+  constexpr std::int64_t kStepCounts = 500 * kCountsPerTick;
+  constexpr std::int64_t kLast = std::int64_t{limits::kOffsetTicksMax} * kCountsPerTick;
+  const Sweep& sweep = piece.sweep;
+  const double theta_s =
+      std::abs(sweep.to[0] - sweep.from[0]) * SecondsPerVector(drives_[piece.unit].axis[0]);
+  for (; earliest < kLast; earliest += kStepCounts) {
+    AxisPaths paths = SegmentsOf(piece, earliest, earliest);
+    if (ledger_->Enter(piece.unit, paths)) return paths;
+    if (sweep.out_of_step < 1 || paths[0].size() == 0 || paths[1].size() == 0) continue;
+    const double theta_ends_s = static_cast<double>(earliest) / kTimerHz + theta_s;
+    paths = SegmentsOf(piece, earliest,
+                       static_cast<std::int64_t>(ledger_->BeginAfter(theta_ends_s) * kTimerHz));
+    if (ledger_->Enter(piece.unit, paths)) return paths;
+  }
+  return std::nullopt;
+}
+
+/// Gives a piece its segments; a leg that goes on without pause lengthens the segment before it.
+Scheduler::Timed Scheduler::Lay(std::uint32_t index, std::int64_t earliest,
+                                const AxisPaths& paths) {
+  const Piece& piece = order_[index];
+  UnitPlan& plan = plans_[piece.unit];
+  if (laid_[piece.unit].empty()) plan.from = piece.sweep.from;
+  plan.to = piece.sweep.to;
   Timed timed{index, earliest, earliest};
   for (std::size_t k = 0; k < kAxisCount; ++k) {
-    const std::int32_t delta = sweep.to[k] - sweep.from[k];
-    if (delta == 0) continue;
-    const std::uint8_t repeat = in_step ? in_step->repeat[k] : drive.axis[k].repeat;
-    const std::int64_t lasts =
-        static_cast<std::int64_t>(std::abs(delta)) * repeat * drive.axis[k].counter1;
+    if (paths[k].size() == 0) continue;
+    const Segment segment = paths[k].segments().front();
+    const std::int64_t lasts = static_cast<std::int64_t>(std::abs(segment.delta)) * segment.repeat *
+                               drives_[piece.unit].axis[k].counter1;
     std::int64_t& end = axis_end_[piece.unit][k];
     const std::span<const Segment> before = plan.path[k].segments();
-    if (!in_step && end == earliest && !before.empty() && before.back().repeat == repeat &&
-        (before.back().delta > 0) == (delta > 0)) {
-      plan.path[k] = Lengthened(plan.path[k], delta);
+    // What is entered in the ledger stays as it was entered.
+    const bool goes_on = ledger_ == nullptr && piece.sweep.out_of_step >= 1 && end == earliest &&
+                         !before.empty() && before.back().repeat == segment.repeat &&
+                         (before.back().delta > 0) == (segment.delta > 0);
+    if (goes_on) {
+      plan.path[k] = Lengthened(plan.path[k], segment.delta);
       end += lasts;
     } else {
-      const std::int64_t tick = (earliest + kCountsPerTick - 1) / kCountsPerTick;
-      plan.path[k].Append({static_cast<std::uint32_t>(tick), delta, repeat});
-      end = tick * kCountsPerTick + lasts;
+      plan.path[k].Append(segment);
+      end = segment.start_ticks * kCountsPerTick + lasts;
     }
     timed.end = std::max(timed.end, end);
   }
@@ -129,9 +167,17 @@ Result<Plan> Scheduler::Run() {
         waits_.push_back({near.unit, piece.unit, other.end, 0});
       }
     }
-    if (earliest / kCountsPerTick + 1 > static_cast<std::int64_t>(limits::kOffsetTicksMax))
-      return Fail(ErrorCode::kRefused, "the motion would take longer than a start offset can say");
-    const Timed timed = Lay(index, earliest);
+    AxisPaths paths = SegmentsOf(piece, earliest, earliest);
+    if (ledger_ != nullptr) {
+      const std::optional<AxisPaths> fed = FindPower(piece, earliest);
+      if (!fed) return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
+      paths = *fed;
+    }
+    for (const AxisPath& path : paths)
+      if (path.size() > 0 && path.segments().front().start_ticks > limits::kOffsetTicksMax)
+        return Fail(ErrorCode::kRefused,
+                    "the motion would take longer than a start offset can say");
+    const Timed timed = Lay(index, earliest, paths);
     for (std::size_t k = first_wait; k < waits_.size(); ++k) waits_[k].begins = timed.begin;
     laid_[piece.unit].push_back(timed);
   }
@@ -217,8 +263,9 @@ std::vector<std::uint32_t> UnitsWithTooManyPieces(std::span<const Piece> order, 
 }
 
 Result<Plan> Schedule(std::span<const Piece> order, const Scene& scene,
-                      std::span<const UnitDrive> drives, const PlanOptions& options) {
-  return Scheduler(order, scene, drives, options).Run();
+                      std::span<const UnitDrive> drives, const PlanOptions& options,
+                      PowerLedger* ledger) {
+  return Scheduler(order, scene, drives, options, ledger).Run();
 }
 
 }  // namespace focalfleet

@@ -11,6 +11,7 @@
 
 #include "fleet/plan/plan.h"
 #include "fleet/plan/planner.h"
+#include "fleet/plan/power_ledger.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 
@@ -23,9 +24,11 @@ std::vector<Piece> CutPieces(std::span<const Piece> order, const Scene& scene);
 /// Units whose pieces need more segments than one staged move holds; ascending.
 std::vector<std::uint32_t> UnitsWithTooManyPieces(std::span<const Piece> order, std::size_t units);
 
-/// Pre: no unit has too many pieces.
+/// Pre: no unit has too many pieces. `ledger`: every piece waits until it fits in; null: power has
+/// no limit.
 /// Errors: kRefused where the motion would not end within the offsets that the wire can carry.
 Result<Plan> Schedule(std::span<const Piece> order, const Scene& scene,
-                      std::span<const UnitDrive> drives, const PlanOptions& options);
+                      std::span<const UnitDrive> drives, const PlanOptions& options,
+                      PowerLedger* ledger = nullptr);
 
 }  // namespace focalfleet

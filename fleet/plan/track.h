@@ -74,6 +74,7 @@ class Track {
 
   /// Shape: at least one; the first begins at -kForever, the last ends at kForever.
   [[nodiscard]] std::span<const Leg> legs() const { return legs_; }
+  [[nodiscard]] bool moves() const { return legs_.size() > 1; }
   [[nodiscard]] double end_s() const { return legs_.back().begin_s; }
   /// Farthest that any point of the arm's core gets from the base. Units: mm.
   [[nodiscard]] double reach_mm() const { return reach_mm_; }

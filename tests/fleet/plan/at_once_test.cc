@@ -110,7 +110,11 @@ TEST(PlanAtOnce, NamesTheLeastLimitThatIsFeasible) {
   std::snprintf(expected, sizeof expected, "the least that is feasible is %.4f W", least_W);
   EXPECT_NE(plan.error().text.find(expected), std::string::npos) << plan.error().text;
   options.power.total_W = 1.01 * least_W;
-  EXPECT_TRUE(MakePlan(fleet.request(), options));
+  const auto just = MakePlan(fleet.request(), options);
+  ASSERT_TRUE(just) << just.error().text;
+  EXPECT_TRUE(just->unserved.empty());
+  ExpectSound(fleet, *just);
+  EXPECT_LE(Estimate(*just, fleet.layout, fleet.drives, {}).peak_power_W, options.power.total_W);
 }
 
 TEST(PlanAtOnce, TightestPairsAreAsNearAsTheCheckerSeesThem) {
@@ -125,6 +129,35 @@ TEST(PlanAtOnce, TightestPairsAreAsNearAsTheCheckerSeesThem) {
   const CheckReport report = Witnessed(fleet, *plan);
   // The checker looks at the corners of skew and clocks only, the promise holds for all of them.
   EXPECT_GE(report.worst_margin_mm, plan->tightest.front().clearance_mm - 1e-4);
+}
+
+TEST(PlanAtOnce, NobodyGoesThroughWhatLeavesNoWay) {
+  // The elbow itself cannot pass these two, on either side of the unit.
+  std::vector<Unit> units = MakeHexLayout({.count = 1});
+  PlanningFleet fleet =
+      FleetOf(std::move(units),
+              {.clearance_mm = 0.3, .obstacles = {{1, {0, 8.25}, 1}, {2, {0, -8.25}, 1}}});
+  const auto vectors = [&](double degrees) {
+    return NearestVectors(degrees, fleet.layout.unit({0}).theta(), fleet.drives[0].axis[0]);
+  };
+  fleet.StandAt({{0, vectors(90)}});
+  fleet.targets[0] = Pose{vectors(180), vectors(90)};
+  const auto plan = MakePlan(fleet.request(), {});
+  ASSERT_TRUE(plan) << plan.error().text;
+  ExpectSound(fleet, *plan);
+  ASSERT_EQ(plan->unserved.size(), 1u);
+  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kBlocked);
+}
+
+TEST(PlanAtOnce, RefusesALimitThatWouldTakeLongerThanAnOffsetCanSay) {
+  // One motor at a time: 200 units take some 3000 s.
+  const PlanningFleet fleet = Drawn(200, TestSeed(331));
+  PlanOptions options;
+  options.power.rail_W = 1.01 * SteadyPower({}, {}).total_W();
+  const auto plan = MakePlan(fleet.request(), options);
+  ASSERT_FALSE(plan) << plan->moves.size() << " moves";
+  EXPECT_EQ(plan.error().code, ErrorCode::kRefused);
+  EXPECT_NE(plan.error().text.find("times as high"), std::string::npos) << plan.error().text;
 }
 
 TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
