@@ -35,25 +35,34 @@ constexpr double SquaredDistance(PointFp p, const SegmentFp& s) {
 }
 inline double DistanceMm(PointFp p, const SegmentFp& s) { return std::sqrt(SquaredDistance(p, s)); }
 
-/// Twice the signed area of the triangle: positive where a, b, c turn counter-clockwise.
-constexpr double DoubleArea(PointFp a, PointFp b, PointFp c) {
-  return (b.x_mm - a.x_mm) * (c.y_mm - a.y_mm) - (b.y_mm - a.y_mm) * (c.x_mm - a.x_mm);
-}
-
-/// Strictly crossing; segments that only touch have distance 0 by their end points anyway.
-constexpr bool Crosses(const SegmentFp& s, const SegmentFp& t) {
-  const double s1 = DoubleArea(t.a, t.b, s.a);
-  const double s2 = DoubleArea(t.a, t.b, s.b);
-  const double t1 = DoubleArea(s.a, s.b, t.a);
-  const double t2 = DoubleArea(s.a, s.b, t.b);
-  return ((s1 > 0 && s2 < 0) || (s1 < 0 && s2 > 0)) && ((t1 > 0 && t2 < 0) || (t1 < 0 && t2 > 0));
-}
-
-/// Squared distance of two segments, 0 where they cross. Units: mm^2.
+/// Squared distance of two segments, 0 within rounding where they cross: the nearest points of the
+/// two lines, moved to the ends where they lie beyond (Ericson, Real-Time Collision Detection,
+/// 5.1.9). Where the two are almost parallel the nearest points are ill-conditioned, their distance
+/// is not: it stays within 1e-7 mm. Units: mm^2.
 constexpr double SquaredDistance(const SegmentFp& s, const SegmentFp& t) {
-  if (Crosses(s, t)) return 0;
-  return std::min({SquaredDistance(s.a, t), SquaredDistance(s.b, t), SquaredDistance(t.a, s),
-                   SquaredDistance(t.b, s)});
+  const double ux = s.b.x_mm - s.a.x_mm;
+  const double uy = s.b.y_mm - s.a.y_mm;
+  const double vx = t.b.x_mm - t.a.x_mm;
+  const double vy = t.b.y_mm - t.a.y_mm;
+  const double wx = s.a.x_mm - t.a.x_mm;
+  const double wy = s.a.y_mm - t.a.y_mm;
+  const double uu = ux * ux + uy * uy;
+  const double vv = vx * vx + vy * vy;
+  if (uu <= 0) return SquaredDistance(s.a, t);
+  if (vv <= 0) return SquaredDistance(t.a, s);
+  const double uv = ux * vx + uy * vy;
+  const double uw = ux * wx + uy * wy;
+  const double vw = vx * wx + vy * wy;
+  const double area2 = uu * vv - uv * uv;
+  double p = area2 > 0 ? std::clamp((uv * vw - uw * vv) / area2, 0.0, 1.0) : 0;
+  double q = (uv * p + vw) / vv;
+  if (q < 0 || q > 1) {
+    q = q < 0 ? 0 : 1;
+    p = std::clamp((uv * q - uw) / uu, 0.0, 1.0);
+  }
+  const double dx = wx + p * ux - q * vx;
+  const double dy = wy + p * uy - q * vy;
+  return dx * dx + dy * dy;
 }
 constexpr double SquaredDistanceOfMiddles(const SegmentFp& s, const SegmentFp& t) {
   const double dx = (s.a.x_mm + s.b.x_mm) - (t.a.x_mm + t.b.x_mm);

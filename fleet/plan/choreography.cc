@@ -18,6 +18,8 @@ constexpr int kLooksPerUnit = 16;
 /// The time that a unit may take grows once it has looked this often, by so much each time.
 constexpr int kLooksInTime = 5;
 constexpr double kExtension = 0.03;
+/// Ways with long waits hardly ever help where the search in time finds none: not before this look.
+constexpr int kLooksWithoutWaits = 2;
 constexpr int kLooksAlone = 3;
 constexpr int kLooksWithNotice = 3;
 
@@ -57,7 +59,10 @@ class Repair {
   Way WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses);
   void PushMet(std::uint32_t unit);
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
+  [[nodiscard]] std::vector<Candidate> AllWays(std::uint32_t unit, double within_s) const;
+  bool TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
+  bool GoAlong(std::uint32_t unit, const Way& way);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
   void Take(std::uint32_t unit, const Candidate& candidate);
   void Go(std::uint32_t unit, const AxisPaths& paths, Track track);
@@ -313,71 +318,90 @@ bool Repair::SearchWay(std::uint32_t unit, double end_s, int looks) {
   return false;
 }
 
+/// All candidates of the unit, in every round.
+std::vector<Candidate> Repair::AllWays(std::uint32_t unit, double within_s) const {
+  std::vector<Candidate> ways;
+  CandidateQuestion question{.scene = &scene_,
+                             .drive = &q_.drives[unit],
+                             .unit = unit,
+                             .from = q_.from[unit],
+                             .to = q_.to[unit],
+                             .within_s = within_s};
+  for (const CandidateRound& round : kCandidateRounds) {
+    question.round = round;
+    AppendCandidates(question, &ways);
+  }
+  std::erase_if(ways, [&](const Candidate& way) { return way.end_s > within_s; });
+  return ways;
+}
+
+/// The first of the ways, in this order, that meets nobody; `ways` loses those that were looked at.
+bool Repair::TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways) {
+  for (std::size_t k = 0; k < ways->size(); ++k) {
+    const Candidate& way = (*ways)[k];
+    track_ = Track(scene_.arm(unit), q_.drives[unit], q_.from[unit], way.path);
+    if (Cost(unit, track_, 1) >= 1 || !KeepsLimits(unit, way.path)) continue;
+    Go(unit, way.path, track_);
+    ways->erase(ways->begin(), ways->begin() + static_cast<std::ptrdiff_t>(k) + 1);
+    return true;
+  }
+  ways->clear();
+  return false;
+}
+
 /// `other` goes in one of its own ways that meet nobody else, and `unit` finds one around it. True:
 /// neither meets anybody then.
 bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
   const Motion before{out_.paths[unit], out_.tracks[unit]};
   const Motion other_before{out_.paths[other], out_.tracks[other]};
-  const double extend = ExtensionAt(looks_[unit]);
+  const double within_s = q_.within_s * ExtensionAt(looks_[unit]);
+  const int looks = looks_[unit];
   Go(unit, {}, Track());
-  candidates_.clear();
-  CandidateQuestion question{.scene = &scene_,
-                             .drive = &q_.drives[other],
-                             .unit = other,
-                             .from = q_.from[other],
-                             .to = q_.to[other],
-                             .within_s = q_.within_s * extend};
-  for (const CandidateRound& round : kCandidateRounds) {
-    question.round = round;
-    AppendCandidates(question, &candidates_);
-  }
-  const std::vector<Candidate> ways = std::move(candidates_);
-  candidates_ = {};
-  int tries = looks_[unit] < kLooksAlone ? 2 : 6;
-  std::vector<std::size_t> good;
-  for (std::size_t w = 0; w < ways.size(); ++w) {
-    if (ways[w].end_s > q_.within_s * extend) continue;
-    track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], ways[w].path);
-    if (Cost(other, track_, 1) < 1) good.push_back(w);
-  }
-  if (good.empty()) tries = 0;
-  // Gone as soon, or still there as long as can be: that leaves the most room at the one end or the
-  // other.
-  const auto soonest =
-      std::min_element(good.begin(), good.end(),
-                       [&](std::size_t x, std::size_t y) { return ways[x].end_s < ways[y].end_s; });
-  const auto latest = std::max_element(good.begin(), good.end(), [&](std::size_t x, std::size_t y) {
-    return BeginOf(ways[x].path) < BeginOf(ways[y].path);
-  });
-  for (int k = 0; k < tries; ++k) {
-    const std::size_t pick = k == 0   ? static_cast<std::size_t>(latest - good.begin())
-                             : k == 1 ? static_cast<std::size_t>(soonest - good.begin())
-                                      : rng_.Below(good.size());
-    if (!KeepsLimits(other, ways[good[pick]].path)) continue;
-    Take(other, ways[good[pick]]);
-    if (SearchWay(unit, q_.within_s * extend, looks_[unit])) return true;
-    if (k > 1 || looks_[unit] < kLooksAlone) continue;
-    // The search in time has a coarse grid; among things that stand there is a finer one.
-    question = {.scene = &scene_,
-                .drive = &q_.drives[unit],
-                .unit = unit,
-                .from = q_.from[unit],
-                .to = q_.to[unit],
-                .within_s = q_.within_s * extend};
-    candidates_.clear();
-    AppendAlong(question, WayAmongStanding(unit, other, k == 0 ? q_.from : q_.to), &candidates_);
-    std::size_t chosen = 0;
-    const double best = Best(unit, extend, 0, &chosen);
-    if (best == kNever || (best >= 1 && looks_[unit] < kLooksInTime)) continue;
-    // Where nothing else helps, third ones have to find another way.
-    Take(unit, candidates_[chosen]);
-    PushMet(unit);
-    return true;
+  std::vector<Candidate> ways = AllWays(other, within_s);
+  const int tries = looks < kLooksAlone ? 2 : 6;
+  for (int k = 0; k < tries && !ways.empty(); ++k) {
+    // Still there as long as can be, or gone as soon: that leaves the most room at the one end or
+    // the other.
+    if (k == 0)
+      std::stable_sort(ways.begin(), ways.end(), [](const Candidate& x, const Candidate& y) {
+        return BeginOf(x.path) > BeginOf(y.path);
+      });
+    else if (k == 1)
+      std::stable_sort(ways.begin(), ways.end(),
+                       [](const Candidate& x, const Candidate& y) { return x.end_s < y.end_s; });
+    else
+      for (std::size_t n = ways.size(); n > 1; --n) std::swap(ways[n - 1], ways[rng_.Below(n)]);
+    if (!TakeFirst(other, &ways)) break;
+    if (SearchWay(unit, within_s, looks)) return true;
+    if (k <= 1 && looks >= kLooksAlone &&
+        GoAlong(unit, WayAmongStanding(unit, other, k == 0 ? q_.from : q_.to)))
+      return true;
   }
   Go(unit, {}, Track());
   Go(other, other_before.path, other_before.track);
   Go(unit, before.path, before.track);
   return false;
+}
+
+/// The search in time has a coarse grid; among things that stand there is a finer one. True: the
+/// unit goes along that way, and whom it meets looks again.
+bool Repair::GoAlong(std::uint32_t unit, const Way& way) {
+  const double extend = ExtensionAt(looks_[unit]);
+  candidates_.clear();
+  AppendAlong({.scene = &scene_,
+               .drive = &q_.drives[unit],
+               .unit = unit,
+               .from = q_.from[unit],
+               .to = q_.to[unit],
+               .within_s = q_.within_s * extend},
+              way, &candidates_);
+  std::size_t chosen = 0;
+  const double best = Best(unit, extend, 0, &chosen);
+  // Only where nothing else helps third ones have to find another way.
+  if (best == kNever || (best >= 1 && looks_[unit] < kLooksInTime)) return false;
+  Take(unit, candidates_[chosen]);
+  PushMet(unit);
+  return true;
 }
 
 /// The best candidate of the unit as the others go now.
@@ -395,6 +419,7 @@ void Repair::Improve(std::uint32_t unit) {
                              .to = q_.to[unit],
                              .within_s = q_.within_s * extend};
   for (const CandidateRound& round : kCandidateRounds) {
+    if (round.first > 0 && looks < kLooksWithoutWaits) break;
     question.round = round;
     const std::size_t first = candidates_.size();
     AppendCandidates(question, &candidates_);

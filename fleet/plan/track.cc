@@ -99,14 +99,19 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
 }  // namespace
 
 Track::Track(const ArmGeometry& arm, const Pose& stands) {
+  Stand(arm, stands);
+  Cut(arm);
+}
+
+/// One leg that never ends.
+void Track::Stand(const ArmGeometry& arm, const Pose& pose) {
   Leg leg;
   leg.begin_s = -kForever;
   leg.end_s = kForever;
-  leg.theta_rad = arm.Theta(stands[0]);
-  leg.fold_rad = arm.Fold(stands[1]);
+  leg.theta_rad = arm.Theta(pose[0]);
+  leg.fold_rad = arm.Fold(pose[1]);
   legs_.push_back(leg);
-  reach_mm_ = std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(stands[1], stands[1]));
-  Cut(arm);
+  reach_mm_ = std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(pose[1], pose[1]));
 }
 
 /// Slices and their bounds.
@@ -159,8 +164,8 @@ void Track::Cut(const ArmGeometry& arm) {
 }
 
 Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
-             const AxisPaths& path)
-    : Track(arm, from) {
+             const AxisPaths& path) {
+  Stand(arm, from);
   struct Run {  // of one axis, in order
     double begin_s;
     double end_s;
@@ -182,7 +187,11 @@ Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
       knots[knot_count++] = begin_s + lasts_s;
     }
   }
-  if (knot_count == 0) return;
+  if (knot_count == 0) {
+    Cut(arm);
+    return;
+  }
+  legs_.reserve(knot_count + 1);
   std::sort(knots.begin(), knots.begin() + knot_count);
   legs_.front().end_s = knots[0];
   std::array<std::size_t, kAxisCount> next{};

@@ -95,6 +95,7 @@ class Track {
   }
 
  private:
+  void Stand(const ArmGeometry& arm, const Pose& pose);
   void Cut(const ArmGeometry& arm);
 
   std::vector<Leg> legs_;
