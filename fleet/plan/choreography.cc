@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <deque>
 #include <limits>
+#include <utility>
 
 #include "fleet/plan/time_search.h"
 #include "protocol/base/check.h"
@@ -22,6 +23,7 @@ constexpr double kExtension = 0.03;
 constexpr int kLooksWithoutWaits = 2;
 constexpr int kLooksAlone = 3;
 constexpr int kLooksWithNotice = 3;
+constexpr float kApart = 1e6F;  // weight of a neighbour that must not be met
 
 double ExtensionAt(int looks) { return 1.005 + kExtension * std::max(0, looks - kLooksInTime); }
 
@@ -53,15 +55,19 @@ class Repair {
   [[nodiscard]] const Tolerance& ToleranceOf(std::uint32_t unit, std::uint32_t slot) const {
     return unnoticed_[unit][slot] != 0 ? without_notice_ : q_.tolerance;
   }
-  [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
+  [[nodiscard]] std::uint32_t SlotOf(std::uint32_t unit, std::uint32_t other) const;
   void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
   [[nodiscard]] bool Reaches(std::uint32_t unit, const AxisPaths& paths) const;
-  Way WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses);
+  Way WayAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                       std::uint32_t other, std::span<const Pose> poses);
+  [[nodiscard]] std::vector<Candidate> WaysViaCell(std::uint32_t unit, std::uint32_t other,
+                                                   double within_s);
   void PushMet(std::uint32_t unit);
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
   [[nodiscard]] std::vector<Candidate> AllWays(std::uint32_t unit, double within_s) const;
   bool TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
+  bool GoViaCell(std::uint32_t unit, std::uint32_t other);
   bool GoAlong(std::uint32_t unit, const Way& way);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
   void Take(std::uint32_t unit, const Candidate& candidate);
@@ -144,16 +150,18 @@ bool Repair::Reaches(std::uint32_t unit, const AxisPaths& paths) const {
   return true;
 }
 
-std::uint32_t Repair::BackSlot(std::uint32_t unit, std::uint32_t slot) const {
-  const auto back = scene_.neighbours(scene_.neighbours(unit)[slot].unit);
-  const auto it = std::find_if(back.begin(), back.end(),
-                               [&](const NeighbourNeed& near) { return near.unit == unit; });
-  return static_cast<std::uint32_t>(it - back.begin());
+/// Which neighbour of `unit` the other is.
+std::uint32_t Repair::SlotOf(std::uint32_t unit, std::uint32_t other) const {
+  const auto near = scene_.neighbours(unit);
+  const auto it = std::find_if(near.begin(), near.end(),
+                               [&](const NeighbourNeed& n) { return n.unit == other; });
+  return static_cast<std::uint32_t>(it - near.begin());
 }
 
 void Repair::GiveUpNotice(std::uint32_t unit, std::uint32_t slot) {
   unnoticed_[unit][slot] = 1;
-  unnoticed_[scene_.neighbours(unit)[slot].unit][BackSlot(unit, slot)] = 1;
+  const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
+  unnoticed_[other][SlotOf(other, unit)] = 1;
 }
 
 void Repair::Begin() {
@@ -257,7 +265,8 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
 
 /// A way for `unit` among what never moves, and `other` where `poses` has it; empty where there is
 /// none.
-Way Repair::WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses) {
+Way Repair::WayAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                             std::uint32_t other, std::span<const Pose> poses) {
   blockers_.clear();
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
     if (!scene_.is_place(near.unit)) continue;
@@ -271,9 +280,9 @@ Way Repair::WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<
   question.arm = &scene_.arm(unit);
   question.drive = &q_.drives[unit];
   question.blockers = blockers_;
-  question.from = q_.from[unit];
-  question.within = RangeAround(*question.arm, question.from);
-  question.goal = PoseBox::Of(q_.to[unit]);
+  question.from = from;
+  question.within = RangeAround(*question.arm, from);
+  question.goal = goal;
   for (const double grid_deg : kSearchGridsDeg) {
     question.grid_deg = grid_deg;
     Way way = path_search_.Find(question);
@@ -335,6 +344,29 @@ std::vector<Candidate> Repair::AllWays(std::uint32_t unit, double within_s) cons
   return ways;
 }
 
+/// Ways of the unit through its cell that leave `other` alone, first where that starts, at last
+/// where that ends.
+std::vector<Candidate> Repair::WaysViaCell(std::uint32_t unit, std::uint32_t other,
+                                           double within_s) {
+  std::vector<Candidate> ways;
+  if (!scene_.HasCell(unit)) return ways;
+  PoseBox cell = scene_.arm(unit).range();
+  cell.low[1] = std::max(cell.low[1], scene_.cell(unit).low);
+  cell.high[1] = std::min(cell.high[1], scene_.cell(unit).high);
+  if (cell.low[1] > cell.high[1]) return ways;
+  const Way in = WayAmongStanding(unit, q_.from[unit], cell, other, q_.from);
+  const Way out = WayAmongStanding(unit, q_.to[unit], cell, other, q_.to);
+  AppendVia({.scene = &scene_,
+             .drive = &q_.drives[unit],
+             .unit = unit,
+             .from = q_.from[unit],
+             .to = q_.to[unit],
+             .within_s = within_s},
+            in, out, &ways);
+  std::erase_if(ways, [&](const Candidate& way) { return way.end_s > within_s; });
+  return ways;
+}
+
 /// The first of the ways, in this order, that meets nobody; `ways` loses those that were looked at.
 bool Repair::TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways) {
   for (std::size_t k = 0; k < ways->size(); ++k) {
@@ -373,13 +405,50 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
       for (std::size_t n = ways.size(); n > 1; --n) std::swap(ways[n - 1], ways[rng_.Below(n)]);
     if (!TakeFirst(other, &ways)) break;
     if (SearchWay(unit, within_s, looks)) return true;
-    if (k <= 1 && looks >= kLooksAlone &&
-        GoAlong(unit, WayAmongStanding(unit, other, k == 0 ? q_.from : q_.to)))
+    if (k <= 1 && looks >= kLooksAlone && looks % 2 == 1 &&
+        GoAlong(unit, WayAmongStanding(unit, q_.from[unit], PoseBox::Of(q_.to[unit]), other,
+                                       k == 0 ? q_.from : q_.to)))
       return true;
   }
+  if (looks >= kLooksAlone && GoViaCell(unit, other)) return true;
   Go(unit, {}, Track());
   Go(other, other_before.path, other_before.track);
   Go(unit, before.path, before.track);
+  return false;
+}
+
+/// `other` goes through its own cell, and `unit` around it. True: neither meets the other then, and
+/// whom else they meet looks again.
+bool Repair::GoViaCell(std::uint32_t unit, std::uint32_t other) {
+  const int looks = looks_[unit];
+  const double within_s = q_.within_s * ExtensionAt(looks);
+  const std::vector<Candidate> ways = WaysViaCell(other, unit, within_s);
+  std::vector<Candidate> clear = ways;
+  while (!clear.empty() && TakeFirst(other, &clear))
+    if (SearchWay(unit, within_s, looks)) return true;
+  if (looks < kLooksInTime) return false;
+  // Where nothing else helps, third ones have to find another way.
+  for (const Candidate& way : ways) {
+    track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], way.path);
+    if (Cost(other, track_, kNever) == kNever || !KeepsLimits(other, way.path)) continue;
+    Go(other, way.path, track_);
+    if (SearchWay(unit, within_s, looks)) {
+      PushMet(other);
+      return true;
+    }
+    candidates_ = WaysViaCell(unit, kNobody, within_s);
+    for (const Candidate& own : AllWays(unit, within_s)) candidates_.push_back(own);
+    const std::size_t slot = SlotOf(unit, other);
+    const float weight = std::exchange(weight_[unit][slot], kApart);
+    std::size_t chosen = 0;
+    const double best = Best(unit, ExtensionAt(looks), 0, &chosen);
+    weight_[unit][slot] = weight;
+    if (best >= static_cast<double>(kApart)) continue;
+    Take(unit, candidates_[chosen]);
+    PushMet(unit);
+    PushMet(other);
+    return true;
+  }
   return false;
 }
 
@@ -434,7 +503,9 @@ void Repair::Improve(std::uint32_t unit) {
   if (best == kNever && looks >= 1) {
     // What stands is in every way: one around it.
     candidates_.clear();
-    AppendAlong(question, WayAmongStanding(unit, kNobody, q_.from), &candidates_);
+    AppendAlong(question,
+                WayAmongStanding(unit, q_.from[unit], PoseBox::Of(q_.to[unit]), kNobody, q_.from),
+                &candidates_);
     best = Best(unit, extend, 0, &chosen);
   }
   if (best < 1) {
@@ -456,7 +527,7 @@ void Repair::Improve(std::uint32_t unit) {
     }
     if (looks >= kLooksWithNotice) GiveUpNotice(unit, slot);
     weight_[unit][slot] += 1;
-    weight_[other][BackSlot(unit, slot)] += 1;
+    weight_[other][SlotOf(other, unit)] += 1;
     Push(other);
     Push(unit);
   }
