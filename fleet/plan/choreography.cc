@@ -1,6 +1,7 @@
 #include "fleet/plan/choreography.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <deque>
@@ -19,13 +20,17 @@ constexpr int kLooksPerUnit = 16;
 /// The time that a unit may take grows once it has looked this often, by so much each time.
 constexpr int kLooksInTime = 5;
 constexpr double kExtension = 0.03;
+constexpr double kWithin = 1.005;  // times the time that may be used without being noticed
+/// Whoever ends later than this in the end tries again, with less and less success to hope for.
+constexpr double kWorthTightening = 1.1;
+constexpr std::array kTightenTo{1.005, 1.03, 1.1};
+constexpr int kLooksToTighten = 8;
+constexpr int kTurnsToTighten = 12;  // of all units together
 /// Ways with long waits hardly ever help where the search in time finds none: not before this look.
 constexpr int kLooksWithoutWaits = 2;
 constexpr int kLooksAlone = 3;
 constexpr int kLooksWithNotice = 3;
 constexpr float kApart = 1e6F;  // weight of a neighbour that must not be met
-
-double ExtensionAt(int looks) { return 1.005 + kExtension * std::max(0, looks - kLooksInTime); }
 
 std::uint32_t BeginOf(const AxisPaths& path) {
   std::uint32_t begin = std::numeric_limits<std::uint32_t>::max();
@@ -47,6 +52,12 @@ class Repair {
     Track track;
   };
   void Begin();
+  void Drain(int turns_most);
+  void Tighten();
+  bool Tighten(std::uint32_t unit, double extend);
+  [[nodiscard]] double ExtensionAt(int looks) const {
+    return std::min(extend_most_, kWithin + kExtension * std::max(0, looks - kLooksInTime));
+  }
   void Improve(std::uint32_t unit);
   double Cost(std::uint32_t unit, const Track& track, double limit);
   [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot);
@@ -86,6 +97,10 @@ class Repair {
   std::vector<std::uint8_t> queued_;
   std::vector<std::uint8_t> looks_;
   std::deque<std::uint32_t> queue_;
+  int looks_most_ = kLooksPerUnit;
+  double extend_most_ = kNever;
+  bool tightens_ = false;
+  std::vector<std::pair<std::uint32_t, Motion>> before_;  // of who went otherwise since
   std::vector<Candidate> candidates_;
   Track track_;
   TimeSearch search_;
@@ -232,6 +247,8 @@ void Repair::Go(std::uint32_t unit, const AxisPaths& paths, Track track) {
     q_.ledger->Remove(unit, out_.paths[unit]);
     FOCALFLEET_CHECK(q_.ledger->Enter(unit, paths));
   }
+  if (tightens_)
+    before_.push_back({unit, {std::move(out_.paths[unit]), std::move(out_.tracks[unit])}});
   out_.paths[unit] = paths;
   out_.tracks[unit] = std::move(track);
 }
@@ -533,15 +550,56 @@ void Repair::Improve(std::uint32_t unit) {
   }
 }
 
-Choreography Repair::Run() {
-  Begin();
-  if (out_.starved) return std::move(out_);
-  while (!queue_.empty()) {
+/// Whoever waits to look does, one after the other; at most so many, then nobody waits any more.
+void Repair::Drain(int turns_most) {
+  for (int turn = 0; !queue_.empty(); ++turn) {
     const std::uint32_t unit = queue_.front();
     queue_.pop_front();
     queued_[unit] = 0;
-    if (looks_[unit] < kLooksPerUnit) Improve(unit);
+    if (turn < turns_most && looks_[unit] < looks_most_) Improve(unit);
   }
+}
+
+/// Straight again and repaired again, in less time. False: that found no end, and all go as before.
+bool Repair::Tighten(std::uint32_t unit, double extend) {
+  before_.clear();
+  tightens_ = true;
+  looks_most_ = kLooksToTighten;
+  extend_most_ = extend;
+  std::fill(looks_.begin(), looks_.end(), std::uint8_t{1});
+  Take(unit, Straight(q_.drives[unit], q_.from[unit], q_.to[unit]));
+  Push(unit);
+  PushMet(unit);
+  Drain(kTurnsToTighten);
+  tightens_ = false;
+  const bool clear = std::none_of(before_.begin(), before_.end(),
+                                  [&](const auto& made) { return InConflict(made.first); });
+  if (clear) return true;
+  for (auto it = before_.rbegin(); it != before_.rend(); ++it) {
+    out_.paths[it->first] = std::move(it->second.path);
+    out_.tracks[it->first] = std::move(it->second.track);
+  }
+  return false;
+}
+
+/// The last ones may have been late for want of luck.
+void Repair::Tighten() {
+  if (q_.ledger != nullptr) return;  // power is what takes the time
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    for (const double extend : kTightenTo) {
+      const double end_s =
+          out_.paths[i][0].size() + out_.paths[i][1].size() == 0 ? 0 : out_.tracks[i].end_s();
+      if (end_s <= q_.within_s * std::max(kWorthTightening, extend)) break;
+      if (Tighten(i, extend)) break;
+    }
+  }
+}
+
+Choreography Repair::Run() {
+  Begin();
+  if (out_.starved) return std::move(out_);
+  Drain(std::numeric_limits<int>::max());
+  Tighten();
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     if (scene_.is_place(i) && InConflict(i)) out_.in_conflict.push_back(i);
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
