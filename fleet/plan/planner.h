@@ -28,6 +28,12 @@ struct PlanRequest {
   /// Units that must not move whatever the targets say: disabled, silent, faulty. Non-zero is
   /// frozen. Shape: (n).
   std::span<const std::uint8_t> frozen;
+  /// Motions that are known beforehand: what a unit may begin with, if it leads to its target.
+  /// Shape: (n), or empty.
+  std::span<const AxisPaths> motions = {};
+  /// Non-zero: somebody else plans this unit, and its motion stands as it is. All others go around
+  /// it at once, never in an order. Shape: (n), or empty: nobody. Pre: it starts at a place.
+  std::span<const std::uint8_t> given = {};
 };
 
 struct PlanOptions {
@@ -40,6 +46,8 @@ struct PlanOptions {
   /// How long it may take until a unit that has ended early is noticed and those that would run
   /// into it are stopped. Pairs for which the plan cannot promise that are in Plan::unnoticed.
   double notice_s = 1;
+  /// Time that may be used without being noticed, where the bound is shorter.
+  double within_s = 0;
   std::uint64_t seed = 1;
   PowerLimits power = {};  // hard at every instant, for every skew and clock
   MotorModel motor = {};   // what the motors draw
@@ -47,9 +55,13 @@ struct PlanOptions {
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the
 /// reason. Errors: kInvalid where the start or the targets collide (all pairs named), or an array
-/// has the wrong size. Cost: O(n) for bounded neighbourhoods, a fraction of a second for 5000
-/// units; path searches come on top.
+/// has the wrong size; kRefused where limits of power or given motions leave no way. Cost: O(n) for
+/// bounded neighbourhoods, a fraction of a second for 5000 units; path searches come on top.
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options);
+
+/// What MakePlan asks of its input, all collisions of starts and of targets named. Errors:
+/// kInvalid.
+Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options);
 
 /// Targets that send the neighbours of `homing` out of every place that its arm may pass on its way
 /// home: phi to its upper stop first, from anywhere that its knowledge allows, then theta to its
