@@ -23,6 +23,7 @@ struct PlanCommandOptions {
   std::string from;
   std::string store;  // empty: none
   PlanOptions plan;
+  std::uint32_t sectors = 1;
   std::string out;
   std::string plot;  // empty: none
 };
@@ -31,6 +32,7 @@ struct Planned {
   OfflineFleet fleet;
   std::size_t targeted = 0;
   Plan plan;
+  std::uint32_t sectors = 1;
   PlanEstimate estimate;
   StartVerdict starts;
   std::size_t rows = 0;
@@ -62,10 +64,11 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
   FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
   FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
-  FOCALFLEET_TRY_ASSIGN(
-      OfflinePlan planned,
-      PlanOffline(context, fleet, state,
-                  {.targets = options.targets, .from = options.from, .plan = options.plan}));
+  FOCALFLEET_TRY_ASSIGN(OfflinePlan planned, PlanOffline(context, fleet, state,
+                                                         {.targets = options.targets,
+                                                          .from = options.from,
+                                                          .plan = options.plan,
+                                                          .sectors = options.sectors}));
   const MotorModel& motor = options.plan.motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);
   if (!options.plot.empty()) {
@@ -75,8 +78,9 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
   StartVerdict starts = StartCheck(motor).Of(planned.plan, fleet);
-  return Planned{std::move(fleet),    planned.targeted,  std::move(planned.plan),
-                 std::move(estimate), std::move(starts), rows.size()};
+  return Planned{std::move(fleet), planned.targeted,    std::move(planned.plan),
+                 planned.sectors,  std::move(estimate), std::move(starts),
+                 rows.size()};
 }
 
 double Peak(const RailCurve& curve) {
@@ -121,6 +125,7 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"unserved", UnservedJson(planned.plan, planned.fleet.layout)},
           {"makespan_s", planned.estimate.makespan_s},
           {"bound_s", planned.plan.bound_s},
+          {"sectors", planned.sectors},
           {"guarantee", GuaranteeJson(planned, options.plan)},
           {"energy_J", planned.estimate.energy_J},
           {"peak_power_W", planned.estimate.peak_power_W},
@@ -161,7 +166,10 @@ std::string Describe(const Json& summary) {
       summary["plot"].is_null()
           ? ""
           : fmt::format("\n  {}: to look at, in a browser", summary["plot"].get<std::string>());
-  return text + DescribeGuarantee(summary["guarantee"]) + plot +
+  const auto sectors = summary["sectors"].get<std::uint32_t>();
+  const std::string parts =
+      sectors > 1 ? fmt::format("\n  planned by {} sectors", sectors) : std::string();
+  return text + parts + DescribeGuarantee(summary["guarantee"]) + plot +
          DescribeUnserved(summary["unserved"]);
 }
 
@@ -210,6 +218,10 @@ void AddPlanCommand(CommandLine* line) {
                    "Time to notice that a unit has stopped by itself, and to stop those that "
                    "follow it, s [1]")
       ->check(CLI::Range(0.0, 60.0));
+  command
+      ->add_option("--sectors", options->sectors,
+                   "Plan by this many strips of the plate, each with those around it [1]")
+      ->check(CLI::Range(1, 512));
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
   AddFile(command, "--plot", &options->plot,
           "plan.html to write: the plan to look at, in a browser")

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
+#include <numbers>
 
 #include "tests/fleet/plan/planning.h"
 
@@ -147,6 +149,109 @@ TEST(Sectors, AreTheSameWhoeverComputesWhen) {
   }
 }
 
+/// All motions begin this much later.
+void Delay(Plan* plan, std::uint32_t ticks) {
+  for (UnitPlan& move : plan->moves)
+    for (AxisPath& path : move.path) {
+      AxisPath late;
+      for (Segment segment : path.segments()) {
+        segment.start_ticks += ticks;
+        late.Append(segment);
+      }
+      path = late;
+    }
+}
+
+TEST(Sectors, GoAroundWhatIsGivenWhateverThatIs) {
+  for (std::uint64_t k = 0; k < 3; ++k) {
+    const std::uint64_t seed = TestSeed(725 + k);
+    FOCALFLEET_TRACE_SEED(seed);
+    const PlanningFleet fleet = Drawn(217, seed);
+    const PlanRequest request = fleet.request();
+    const auto sectors = SplitIntoSectors(fleet.layout, {.count = 2});
+    ASSERT_TRUE(sectors);
+    std::vector<std::optional<SectorPlan>> plans(2);
+    for (std::uint32_t s = 0; s < 2; ++s) {
+      auto plan = PlanSector(request, {}, *sectors, plans, s);
+      ASSERT_TRUE(plan) << plan.error().text;
+      plans[s] = std::move(*plan);
+      // The first goes as a whole later than it proposed.
+      plans[s]->proposals.clear();
+      if (s == 0) Delay(&plans[s]->plan, 70'000);
+    }
+    const auto joined = JoinSectors(request, {}, *sectors, plans);
+    ASSERT_TRUE(joined) << joined.error().text;
+    ExpectSound(fleet, *joined);
+  }
+}
+
+TEST(Planner, LeavesGivenMotionsAsTheyAre) {
+  for (std::uint64_t k = 0; k < 4; ++k) {
+    const std::uint64_t seed = TestSeed(760 + k);
+    FOCALFLEET_TRACE_SEED(seed);
+    const PlanningFleet fleet = Drawn(127, seed);
+    const auto before = MakePlan(fleet.request(), {});
+    ASSERT_TRUE(before);
+    std::vector<AxisPaths> motions(127);
+    std::vector<std::uint8_t> given(127, 0);
+    for (const UnitPlan& move : before->moves) {
+      if (move.unit.value % 3 != 0) continue;
+      motions[move.unit.value] = move.path;
+      given[move.unit.value] = 1;
+    }
+    PlanRequest request = fleet.request();
+    request.motions = motions;
+    request.given = given;
+    PlanOptions options;
+    options.seed = 77;
+    const auto after = MakePlan(request, options);
+    ASSERT_TRUE(after) << after.error().text;
+    ExpectSound(fleet, *after);
+    Plan kept = *before;
+    Plan found = *after;
+    const auto others = [](const UnitPlan& move) { return move.unit.value % 3 != 0; };
+    std::erase_if(kept.moves, others);
+    std::erase_if(found.moves, others);
+    ExpectSame(kept, found);
+  }
+}
+
+TEST(Planner, RefusesGivenMotionsThatEndOnSomebody) {
+  PlanningFleet fleet = HexFleet(7);
+  const Unit& middle = fleet.layout.unit({0});
+  const Unit& other = fleet.layout.unit({1});
+  const auto pose = [](const Unit& unit, double theta_deg, double phi_deg) {
+    return Pose{NearestVectors(theta_deg, unit.axis[0], {}),
+                NearestVectors(phi_deg, unit.axis[1], {})};
+  };
+  const double to_other_deg =
+      std::atan2(other.base_fp.y_mm, other.base_fp.x_mm) * 180 / std::numbers::pi;
+  const double to_middle_deg = to_other_deg > 0 ? to_other_deg - 180 : to_other_deg + 180;
+  std::vector<Pose> start;
+  for (std::uint32_t i = 0; i < 7; ++i) start.push_back(pose(fleet.layout.unit({i}), 0, 175));
+  // One stands with its arm towards the other, which shall unfold over it.
+  start[0] = pose(middle, to_other_deg, 0);
+  start[1] = pose(other, to_middle_deg, 175);
+  fleet.StandAt(start);
+  std::vector<AxisPaths> motions(7);
+  motions[1][1].Append({0, -start[1][1], 108});
+  std::vector<std::uint8_t> given(7, 0);
+  given[1] = 1;
+  PlanRequest request = fleet.request();
+  request.motions = motions;
+  request.given = given;
+  const auto none = MakePlan(request, {});
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kRefused);
+  EXPECT_NE(none.error().text.find("motions that are given, unit 1"), std::string::npos)
+      << none.error().text;
+  // With its arm folded there is room.
+  fleet.targets[0] = pose(middle, to_other_deg, 175);
+  const auto plan = MakePlan(request, {});
+  ASSERT_TRUE(plan) << plan.error().text;
+  EXPECT_TRUE(plan->unserved.empty());
+}
+
 TEST(Sectors, ThatDoNotFitAreRefusedByName) {
   const std::uint64_t seed = TestSeed(730);
   FOCALFLEET_TRACE_SEED(seed);
@@ -165,15 +270,7 @@ TEST(Sectors, ThatDoNotFitAreRefusedByName) {
     plans[s] = std::move(*plan);
   }
   // One of them late as a whole: what crosses the border no longer fits.
-  for (UnitPlan& move : plans[1]->plan.moves)
-    for (AxisPath& path : move.path) {
-      AxisPath late;
-      for (Segment segment : path.segments()) {
-        segment.start_ticks += 150'000;
-        late.Append(segment);
-      }
-      path = late;
-    }
+  Delay(&plans[1]->plan, 150'000);
   const auto joined = JoinSectors(request, {}, *sectors, plans);
   ASSERT_FALSE(joined);
   EXPECT_EQ(joined.error().code, ErrorCode::kRefused);
