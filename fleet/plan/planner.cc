@@ -25,6 +25,7 @@ namespace {
 constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
 constexpr std::uint64_t kFreshStarts = 3;
+constexpr double kLongGiven = 1.02;
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
@@ -448,7 +449,9 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     scene_.AllowFor(goal_);
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
     std::optional<PowerLedger> ledger;
-    double within_s = std::max({BoundS(), plan_.makespan_s, options_.within_s, given_end_s_});
+    double within_s = std::max({BoundS(), plan_.makespan_s, options_.within_s});
+    // Each turn of sectors may take a little longer than its bound: that must not add up.
+    if (given_end_s_ > kLongGiven * within_s) within_s = given_end_s_;
     if (options_.power.any()) {
       ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
       // Where power is what takes the time, rails that are full leave no room to give way.

@@ -245,8 +245,8 @@ TEST(Planner, RefusesGivenMotionsThatEndOnSomebody) {
   EXPECT_EQ(none.error().code, ErrorCode::kRefused);
   EXPECT_NE(none.error().text.find("motions that are given, unit 1"), std::string::npos)
       << none.error().text;
-  // With its arm folded there is room.
-  fleet.targets[0] = pose(middle, to_other_deg, 175);
+  // With its arm folded and turned away there is room.
+  fleet.targets[0] = pose(middle, to_other_deg > 0 ? to_other_deg - 90 : to_other_deg + 90, 175);
   const auto plan = MakePlan(request, {});
   ASSERT_TRUE(plan) << plan.error().text;
   EXPECT_TRUE(plan->unserved.empty());
