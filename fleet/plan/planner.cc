@@ -12,6 +12,7 @@
 #include "fleet/plan/choreography.h"
 #include "fleet/plan/guarantee.h"
 #include "fleet/plan/midway.h"
+#include "fleet/plan/objective.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
@@ -608,7 +609,12 @@ Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) 
 
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
-  return Planner(request, options).Run();
+  if (options.objective == Objective::kSoonest) return Planner(request, options).Run();
+  PlanOptions soonest = options;
+  soonest.objective = Objective::kSoonest;
+  soonest.within_s = 0;
+  FOCALFLEET_TRY_ASSIGN(Plan plan, Planner(request, soonest).Run());
+  return ImprovePlan(request, options, std::move(plan));
 }
 
 }  // namespace focalfleet

@@ -36,6 +36,9 @@ struct PlanRequest {
   std::span<const std::uint8_t> given = {};
 };
 
+/// What the time that is there is used for, objective.h.
+enum class Objective : std::uint8_t { kSoonest, kLeastEnergy, kLeastPeak, kEvenPower };
+
 struct PlanOptions {
   bool fixed = false;  // units without a target may not even step aside
   /// Pairs that start nearer than allowed (a unit was cut short while its neighbour went on) are no
@@ -46,7 +49,9 @@ struct PlanOptions {
   /// How long it may take until a unit that has ended early is noticed and those that would run
   /// into it are stopped. Pairs for which the plan cannot promise that are in Plan::unnoticed.
   double notice_s = 1;
-  /// Time that may be used without being noticed, where the bound is shorter.
+  Objective objective = Objective::kSoonest;
+  /// With another objective than kSoonest the plan ends by then (0: when the soonest one does).
+  /// With kSoonest, time that may be used without being noticed, where the bound is shorter.
   double within_s = 0;
   std::uint64_t seed = 1;
   PowerLimits power = {};  // hard at every instant, for every skew and clock

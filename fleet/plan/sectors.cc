@@ -7,6 +7,7 @@
 #include <string>
 
 #include "fleet/plan/candidates.h"
+#include "fleet/plan/objective.h"
 #include "fleet/plan/proof.h"
 #include "protocol/base/check.h"
 
@@ -251,6 +252,7 @@ Result<SectorPlan> PlanSector(const PlanRequest& request, const PlanOptions& opt
   FOCALFLEET_TRY_ASSIGN(LocalRequest local, LocalOf(request, sector));
   TakeEarlier(request, sectors, plans, which, &local);
   PlanOptions own_options = options;
+  own_options.objective = Objective::kSoonest;  // another one is for the whole
   own_options.within_s = std::max(options.within_s, BoundOf(request));
   if (options.power.total_W > 0)
     own_options.power.total_W *= EnergyShare(request, options, sector.own);
@@ -306,7 +308,7 @@ Result<Plan> JoinSectors(const PlanRequest& request, const PlanOptions& options,
   if (!text.empty())
     return Fail(ErrorCode::kRefused, "not clear of each other across a border: " + text);
   FillPromises(request, options, scene, tracks, proof, &whole);
-  return whole;
+  return ImprovePlan(request, options, std::move(whole));
 }
 
 Result<SectoredPlan> PlanBySectors(const PlanRequest& request, const PlanOptions& options,

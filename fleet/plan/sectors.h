@@ -64,7 +64,7 @@ Result<SectorPlan> PlanSector(const PlanRequest& request, const PlanOptions& opt
                               std::uint32_t which);
 
 /// One plan of all sectors' plans, with every pair proven again and what follows from the whole:
-/// followers, tightest pairs, makespan.
+/// followers, tightest pairs, makespan; changed for `options.objective`.
 /// Errors: kRefused where a pair across a border is not clear: names all.
 Result<Plan> JoinSectors(const PlanRequest& request, const PlanOptions& options,
                          std::span<const Sector> sectors,

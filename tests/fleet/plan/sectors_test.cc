@@ -229,12 +229,13 @@ TEST(Planner, RefusesGivenMotionsThatEndOnSomebody) {
   const double to_middle_deg = to_other_deg > 0 ? to_other_deg - 180 : to_other_deg + 180;
   std::vector<Pose> start;
   for (std::uint32_t i = 0; i < 7; ++i) start.push_back(pose(fleet.layout.unit({i}), 0, 175));
-  // One stands with its arm towards the other, which shall unfold over it.
+  // One stands with its arm towards the other, which shall turn around and unfold over it.
   start[0] = pose(middle, to_other_deg, 0);
-  start[1] = pose(other, to_middle_deg, 175);
+  start[1] = pose(other, to_other_deg, 175);
   fleet.StandAt(start);
   std::vector<AxisPaths> motions(7);
-  motions[1][1].Append({0, -start[1][1], 108});
+  motions[1][0].Append({0, pose(other, to_middle_deg, 0)[0] - start[1][0], 108});
+  motions[1][1].Append({200'000, -start[1][1], 108});
   std::vector<std::uint8_t> given(7, 0);
   given[1] = 1;
   PlanRequest request = fleet.request();
