@@ -13,6 +13,7 @@
 #include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
+#include "fleet/plan/objective.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -34,6 +35,7 @@ struct Planned {
   Plan plan;
   std::uint32_t sectors = 1;
   PlanEstimate estimate;
+  PowerStatement power;
   StartVerdict starts;
   std::size_t rows = 0;
 };
@@ -77,16 +79,10 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   // Last: where it is, all is.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
+  PowerStatement power = StatePower(planned.plan, fleet.layout, fleet.drives, options.plan);
   StartVerdict starts = StartCheck(motor).Of(planned.plan, fleet);
-  return Planned{std::move(fleet), planned.targeted,    std::move(planned.plan),
-                 planned.sectors,  std::move(estimate), std::move(starts),
-                 rows.size()};
-}
-
-double Peak(const RailCurve& curve) {
-  double peak = 0;
-  for (const PowerStep& step : curve.steps) peak = std::max(peak, step.power_W);
-  return peak;
+  return Planned{std::move(fleet),    planned.targeted, std::move(planned.plan), planned.sectors,
+                 std::move(estimate), std::move(power), std::move(starts),       rows.size()};
 }
 
 Json PairJson(const Layout& layout, PositionerIndex a, PositionerIndex b) {
@@ -114,11 +110,19 @@ Json GuaranteeJson(const Planned& planned, const PlanOptions& options) {
           {"tightest", tightest}};
 }
 
+const char* WordOf(Objective objective) {
+  constexpr const char* kWords[] = {"soonest", "least_energy", "least_peak", "even_power"};
+  return kWords[static_cast<std::size_t>(objective)];
+}
+
 Json Summary(const Planned& planned, const PlanCommandOptions& options) {
   Json rails = Json::array();
-  for (const RailCurve& curve : planned.estimate.rails) {
-    rails.push_back({{"rail_id", curve.rail.value}, {"peak_power_W", Peak(curve)}});
-  }
+  for (const RailStatement& rail : planned.power.rails)
+    rails.push_back({{"rail_id", rail.rail.value},
+                     {"energy_J", rail.energy_J},
+                     {"peak_power_W", rail.peak_W},
+                     {"peak_power_most_W", rail.peak_most_W},
+                     {"flatness", rail.flatness}});
   return {{"units", planned.fleet.layout.size()},
           {"targeted", planned.targeted},
           {"served", planned.targeted - planned.plan.unserved.size()},
@@ -129,6 +133,9 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
           {"guarantee", GuaranteeJson(planned, options.plan)},
           {"energy_J", planned.estimate.energy_J},
           {"peak_power_W", planned.estimate.peak_power_W},
+          {"peak_power_most_W", planned.power.peak_most_W},
+          {"flatness", planned.power.flatness},
+          {"objective", WordOf(options.plan.objective)},
           {"rails", rails},
           {"below_critical", BelowCriticalJson(planned.starts)},
           {"rows", planned.rows},
@@ -158,10 +165,12 @@ std::string Describe(const Json& summary) {
   const std::string text = fmt::format(
       "{}: {} of {} targets served, {} rows\n  makespan {:.2f} s (the slowest unit alone: {:.2f} "
       "s), "
-      "energy {:.1f} J, peak power {:.1f} W",
+      "energy {:.1f} J, peak power {:.1f} W (with skew and clocks {:.1f} W at most), flatness "
+      "{:.2f}",
       summary["out"].get<std::string>(), summary["served"].get<std::uint64_t>(),
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
-      number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"));
+      number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"),
+      number("peak_power_most_W"), number("flatness"));
   const std::string plot =
       summary["plot"].is_null()
           ? ""
@@ -191,6 +200,36 @@ CLI::Validator NoStdout() {
           ""};
 }
 
+void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
+  struct Flag {
+    const char* name;
+    Objective objective;
+    const char* what;
+  };
+  constexpr Flag kFlags[] = {
+      {"--least-energy", Objective::kLeastEnergy, "Without detours, as far as the time allows"},
+      {"--least-peak", Objective::kLeastPeak, "The largest peak of a supply rail as low as can be"},
+      {"--even-power", Objective::kEvenPower, "Power of each rail as even as can be"}};
+  auto* within = command
+                     ->add_option("--within-s", options->plan.within_s,
+                                  "All have arrived by then, s; with one of the three above "
+                                  "[the end of the soonest plan]")
+                     ->check(CLI::PositiveNumber);
+  std::vector<CLI::Option*> flags;
+  for (const Flag& flag : kFlags) {
+    const Objective objective = flag.objective;
+    flags.push_back(command->add_flag_callback(
+        flag.name, [options, objective] { options->plan.objective = objective; }, flag.what));
+    for (CLI::Option* other : flags)
+      if (other != flags.back()) flags.back()->excludes(other);
+  }
+  command->final_callback([within, options] {
+    if (within->count() > 0 && options->plan.objective == Objective::kSoonest)
+      throw CLI::ValidationError("--within-s",
+                                 "goes with --least-energy, --least-peak or --even-power");
+  });
+}
+
 }  // namespace
 
 void AddPlanCommand(CommandLine* line) {
@@ -218,6 +257,7 @@ void AddPlanCommand(CommandLine* line) {
                    "Time to notice that a unit has stopped by itself, and to stop those that "
                    "follow it, s [1]")
       ->check(CLI::Range(0.0, 60.0));
+  AddObjectives(command, options.get());
   command
       ->add_option("--sectors", options->sectors,
                    "Plan by this many strips of the plate, each with those around it [1]")

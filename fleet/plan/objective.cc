@@ -31,6 +31,7 @@ struct Draw {
   std::size_t first = 0;
   std::size_t last = 0;  // included
   double power_W = 0;
+  double lasts_s = 0;  // by nominal clocks
 };
 using Draws = std::vector<Draw>;
 
@@ -66,7 +67,7 @@ class Improver {
   double EndOfPaths(std::uint32_t unit, const AxisPaths& path) const;
   Draws DrawsOf(std::uint32_t unit, const AxisPaths& path);
   void Add(std::uint32_t unit, const Draws& draws, double sign);
-  [[nodiscard]] double Energy(const Draws& draws) const;
+  [[nodiscard]] static double Energy(const Draws& draws);
   [[nodiscard]] double Cost(std::uint32_t unit, const Draws& draws);
   [[nodiscard]] bool KeepsLimits(std::uint32_t unit, const Draws& draws);
   [[nodiscard]] bool IsClear(std::uint32_t unit, const Track& track) const;
@@ -74,14 +75,16 @@ class Improver {
   void FindCandidates(std::uint32_t unit);
   bool Improve(std::uint32_t unit);
   void Passes();
-  [[nodiscard]] double Figure() const;
+  [[nodiscard]] double Figure();
   [[nodiscard]] double RailPeak() const;
   void LowerThePeak();
+  void SaveEnergy();
   void SetPaths(const std::vector<AxisPaths>& paths);
 
   const PlanRequest& request_;
   const PlanOptions& options_;
   const Layout& layout_;
+  Objective objective_;  // of the passes now
   double within_s_;
   Plan plan_;
   Scene scene_;
@@ -108,6 +111,7 @@ Improver::Improver(const PlanRequest& request, const PlanOptions& options, Plan 
     : request_(request),
       options_(options),
       layout_(*request.layout),
+      objective_(options.objective),
       within_s_(within_s),
       plan_(std::move(plan)),
       scene_(SceneOf(request, plan_.moves)),
@@ -164,7 +168,7 @@ Draws Improver::DrawsOf(std::uint32_t unit, const AxisPaths& path) {
       const double power_W =
           powers_.Of({AsSent(segment, drive.axis[k]), drive.mode, drive.v_bus_V}).total_W();
       draws.push_back({static_cast<std::size_t>(std::max(0.0, first_s / kSlotS)),
-                       static_cast<std::size_t>(last_s / kSlotS), power_W});
+                       static_cast<std::size_t>(last_s / kSlotS), power_W, time.t1_s - time.t0_s});
     }
   return draws;
 }
@@ -178,16 +182,15 @@ void Improver::Add(std::uint32_t unit, const Draws& draws, double sign) {
     }
 }
 
-double Improver::Energy(const Draws& draws) const {
+double Improver::Energy(const Draws& draws) {
   double energy_J = 0;
-  for (const Draw& draw : draws)
-    energy_J += draw.power_W * static_cast<double>(draw.last + 1 - draw.first) * kSlotS;
+  for (const Draw& draw : draws) energy_J += draw.power_W * draw.lasts_s;
   return energy_J;
 }
 
 /// What the unit adds to the figure if it draws so. Pre: its own draws are not in the sums.
 double Improver::Cost(std::uint32_t unit, const Draws& draws) {
-  if (options_.objective == Objective::kLeastEnergy) return Energy(draws);
+  if (objective_ == Objective::kLeastEnergy) return Energy(draws);
   const std::vector<double>& rail = rails_[rail_[unit]];
   scratch_.assign(rail.size(), 0);
   std::size_t first = rail.size();
@@ -198,7 +201,7 @@ double Improver::Cost(std::uint32_t unit, const Draws& draws) {
     for (std::size_t n = draw.first; n <= draw.last && n < rail.size(); ++n)
       scratch_[n] += draw.power_W;
   }
-  const double free_W = options_.objective == Objective::kLeastPeak ? limit_W_ : 0;
+  const double free_W = objective_ == Objective::kLeastPeak ? limit_W_ : 0;
   double cost = 0;
   for (std::size_t n = first; n < last; ++n) {
     const double with = std::max(rail[n] + scratch_[n] - free_W, 0.0);
@@ -244,7 +247,7 @@ bool Improver::IsClear(std::uint32_t unit, const Track& track) const {
 
 /// With a limit only who runs while it is exceeded can help.
 bool Improver::NeedsChange(std::uint32_t unit, const Draws& draws) const {
-  if (options_.objective != Objective::kLeastPeak) return true;
+  if (objective_ != Objective::kLeastPeak) return true;
   const std::vector<double>& rail = rails_[rail_[unit]];
   return std::any_of(draws.begin(), draws.end(), [&](const Draw& draw) {
     for (std::size_t n = draw.first; n <= draw.last && n < rail.size(); ++n)
@@ -307,15 +310,15 @@ bool Improver::Improve(std::uint32_t unit) {
 }
 
 /// Of all units together: what Cost is a unit's part of.
-double Improver::Figure() const {
+double Improver::Figure() {
   double figure = 0;
-  const double free_W = options_.objective == Objective::kLeastPeak ? limit_W_ : 0;
+  if (objective_ == Objective::kLeastEnergy) {
+    for (const std::uint32_t i : order_) figure += Energy(DrawsOf(i, paths_[i]));
+    return figure;
+  }
+  const double free_W = objective_ == Objective::kLeastPeak ? limit_W_ : 0;
   for (const std::vector<double>& rail : rails_)
     for (const double power_W : rail) {
-      if (options_.objective == Objective::kLeastEnergy) {
-        figure += power_W;
-        continue;
-      }
       const double over = std::max(power_W - free_W, 0.0);
       figure += over * over;
     }
@@ -373,9 +376,31 @@ void Improver::LowerThePeak() {
   SetPaths(best);
 }
 
+/// Who stands in the way of a shorter way loses nothing by another time, but gains nothing either:
+/// spreading all over the time moves them.
+void Improver::SaveEnergy() {
+  constexpr int kRoundsMax = 4;
+  Passes();
+  double least_J = Figure();
+  std::vector<AxisPaths> best = paths_;
+  for (int round = 0; round < kRoundsMax; ++round) {
+    objective_ = Objective::kEvenPower;
+    Passes();
+    objective_ = Objective::kLeastEnergy;
+    Passes();
+    const double now_J = Figure();
+    if (now_J >= least_J) break;
+    least_J = now_J;
+    best = paths_;
+  }
+  SetPaths(best);
+}
+
 Plan Improver::Run() {
   if (options_.objective == Objective::kLeastPeak)
     LowerThePeak();
+  else if (options_.objective == Objective::kLeastEnergy)
+    SaveEnergy();
   else
     Passes();
   for (UnitPlan& move : plan_.moves) move.path = paths_[move.unit.value];

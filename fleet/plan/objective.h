@@ -5,18 +5,18 @@
 // within the limits of power and the time. So every plan on the way is proven, none is worse than
 // the one before, and there are no deadlocks: whoever finds nothing better stays as it is.
 //
-// Energy. A motor in step draws nearly the same whatever its speed (1.8 V, n 108: 103 mW, n 37:
-// less, of which more is mechanical), so slower is dearer and n is never raised; below the tuned n
-// there is no margin. What is left to save is turning: detours that folding made.
+// Energy. A motor that turns in step draws power all the time, so a move costs the more the slower
+// it is: n is never raised, and below the tuned n there is no margin. The wave mode is tuning's to
+// choose. What is left to save is turning: the detours that folding made.
 //
 // Power is counted as in power_ledger.h: for all slots in which a motor may run for any skew and
 // clock. Even power is the least sum of squares over rails and slots; the least peak is found by
 // bisection: what exceeds a limit, squared, goes to zero or the limit is too low.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "fleet/plan/plan.h"
