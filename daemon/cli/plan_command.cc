@@ -183,6 +183,9 @@ std::string Describe(const Json& summary) {
 }
 
 ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
+  if (options.plan.within_s > 0 && options.plan.objective == Objective::kSoonest)
+    return Report(context, {ErrorCode::kInvalid,
+                            "--within-s goes with --least-energy, --least-peak or --even-power"});
   const auto planned = MakeAndWrite(context, options);
   if (!planned) return Report(context, planned.error());
   const Json summary = Summary(*planned, options);
@@ -210,11 +213,6 @@ void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
       {"--least-energy", Objective::kLeastEnergy, "Without detours, as far as the time allows"},
       {"--least-peak", Objective::kLeastPeak, "The largest peak of a supply rail as low as can be"},
       {"--even-power", Objective::kEvenPower, "Power of each rail as even as can be"}};
-  auto* within = command
-                     ->add_option("--within-s", options->plan.within_s,
-                                  "All have arrived by then, s; with one of the three above "
-                                  "[the end of the soonest plan]")
-                     ->check(CLI::PositiveNumber);
   std::vector<CLI::Option*> flags;
   for (const Flag& flag : kFlags) {
     const Objective objective = flag.objective;
@@ -223,11 +221,11 @@ void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
     for (CLI::Option* other : flags)
       if (other != flags.back()) flags.back()->excludes(other);
   }
-  command->final_callback([within, options] {
-    if (within->count() > 0 && options->plan.objective == Objective::kSoonest)
-      throw CLI::ValidationError("--within-s",
-                                 "goes with --least-energy, --least-peak or --even-power");
-  });
+  command
+      ->add_option("--within-s", options->plan.within_s,
+                   "All have arrived by then, s; with one of the three above "
+                   "[the end of the soonest plan]")
+      ->check(CLI::PositiveNumber);
 }
 
 }  // namespace
