@@ -123,6 +123,17 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
   return made;
 }
 
+namespace {
+
+Json ProofJson(const std::optional<NoWay>& proof, const Layout& layout) {
+  if (!proof) return nullptr;
+  Json walls = Json::array();
+  for (const PositionerIndex unit : proof->walls) walls.push_back(layout.unit(unit).id.value);
+  return {{"grid_deg", proof->grid_deg}, {"walls", walls}, {"obstacle", proof->obstacle}};
+}
+
+}  // namespace
+
 Json UnservedJson(const Plan& plan, const Layout& layout) {
   Json rows = Json::array();
   for (const Unserved& unserved : plan.unserved) {
@@ -130,7 +141,8 @@ Json UnservedJson(const Plan& plan, const Layout& layout) {
     if (unserved.by) by = layout.unit(*unserved.by).id.value;
     rows.push_back({{"unit_id", layout.unit(unserved.unit).id.value},
                     {"why", Name(unserved.why)},
-                    {"by", by}});
+                    {"by", by},
+                    {"proof", ProofJson(unserved.proof, layout)}});
   }
   return rows;
 }
@@ -141,6 +153,12 @@ std::string DescribeUnserved(const Json& unserved) {
     text += fmt::format("\n  unit {}: {}", row["unit_id"].get<std::uint32_t>(),
                         row["why"].get<std::string>());
     if (!row["by"].is_null()) text += fmt::format(" (unit {})", row["by"].get<std::uint32_t>());
+    if (row["proof"].is_null()) continue;
+    std::string walls = row["proof"]["obstacle"].get<bool>() ? ", what stands" : "";
+    for (const Json& unit : row["proof"]["walls"])
+      walls += fmt::format(", unit {}", unit.get<std::uint32_t>());
+    text += fmt::format("; proven: no way leads past {}",
+                        walls.empty() ? "its range" : walls.substr(2));
   }
   return text;
 }

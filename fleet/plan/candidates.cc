@@ -32,6 +32,7 @@ class Builder {
   void AppendFolding(std::vector<Candidate>* out) const;
   void AppendSliding(std::vector<Candidate>* out) const;
   void AppendAlong(const Way& way, std::vector<Candidate>* out) const;
+  void AppendVia(const Way& in, const Way& out, std::vector<Candidate>* made) const;
 
  private:
   /// Values of phi to fold back to, beyond those of start and target; at most three.
@@ -68,6 +69,10 @@ class Builder {
     Add(1, std::max(folded_s + kTickS, opens_s), q_.to[1] - fold, &made);
     return made;
   }
+
+  /// Leg after leg; before the leg to way[n] it waits for waits_s[n] (absent: not at all). Ends
+  /// never where that takes more segments than a move holds. Pre: at least two corners.
+  [[nodiscard]] Candidate Along(const Way& way, std::span<const double> waits_s) const;
 
   const CandidateQuestion& q_;
   std::array<double, kAxisCount> lasts_s_{};
@@ -192,35 +197,58 @@ void Builder::AppendSliding(std::vector<Candidate>* out) const {
   }
 }
 
-void Builder::AppendAlong(const Way& way, std::vector<Candidate>* out) const {
-  const auto along = [&](double begin_s) {
-    Candidate made;
-    double at = begin_s;
-    for (std::size_t n = 1; n < way.size(); ++n) {
-      const Pose& from = way[n - 1].pose;
-      const Pose& to = way[n].pose;
-      std::optional<InStep> in_step;
-      if (way[n].out_of_step < 1) in_step = KeepInStep(from, to, *q_.drive);
-      const std::uint32_t ticks = TicksOf(at);
-      double end_s = ticks * kTickS;
-      for (std::size_t k = 0; k < kAxisCount; ++k) {
-        if (to[k] == from[k]) continue;
-        if (made.path[k].full()) return Candidate{{}, std::numeric_limits<double>::infinity()};
-        AxisDrive drive = q_.drive->axis[k];
-        if (in_step) drive.repeat = in_step->repeat[k];
-        made.path[k].Append({ticks, to[k] - from[k], drive.repeat});
-        end_s =
-            std::max(end_s, ticks * kTickS + std::abs(to[k] - from[k]) * SecondsPerVector(drive));
-      }
-      at = end_s + kTickS;
+Candidate Builder::Along(const Way& way, std::span<const double> waits_s) const {
+  Candidate made;
+  double at = 0;
+  for (std::size_t n = 1; n < way.size(); ++n) {
+    const Pose& from = way[n - 1].pose;
+    const Pose& to = way[n].pose;
+    std::optional<InStep> in_step;
+    if (way[n].out_of_step < 1) in_step = KeepInStep(from, to, *q_.drive);
+    if (n < waits_s.size()) at += waits_s[n];
+    const std::uint32_t ticks = TicksOf(at);
+    double end_s = ticks * kTickS;
+    for (std::size_t k = 0; k < kAxisCount; ++k) {
+      if (to[k] == from[k]) continue;
+      if (made.path[k].full()) return {{}, std::numeric_limits<double>::infinity()};
+      AxisDrive drive = q_.drive->axis[k];
+      if (in_step) drive.repeat = in_step->repeat[k];
+      made.path[k].Append({ticks, to[k] - from[k], drive.repeat});
+      end_s = std::max(end_s, ticks * kTickS + std::abs(to[k] - from[k]) * SecondsPerVector(drive));
     }
-    made.end_s = at;
-    return made;
-  };
+    at = end_s + kTickS;
+  }
+  made.end_s = at;
+  return made;
+}
+
+void Builder::AppendAlong(const Way& way, std::vector<Candidate>* out) const {
   if (way.size() < 2) return;
-  const double spare = std::max(0.0, q_.within_s - along(0).end_s);
+  const double spare = std::max(0.0, q_.within_s - Along(way, {}).end_s);
   for (const double delay : kDelays) {
-    out->push_back(along(spare * delay));
+    out->push_back(Along(way, std::array{0.0, spare * delay}));
+    if (spare == 0) break;
+  }
+}
+
+void Builder::AppendVia(const Way& in, const Way& out, std::vector<Candidate>* made) const {
+  if (in.empty() || out.empty()) return;
+  Way way = in;
+  const std::size_t turn = way.size();
+  // Within the cell the axes need not keep in step.
+  if (out.back().pose != in.back().pose) way.push_back({out.back().pose});
+  const std::size_t opens = way.size();
+  for (std::size_t n = out.size(); n-- > 1;) way.push_back({out[n - 1].pose, out[n].out_of_step});
+  if (way.size() < 2) return;
+  const double spare = std::max(0.0, q_.within_s - Along(way, {}).end_s);
+  std::vector<double> waits_s;
+  for (const auto& [before_turn, before_open] :
+       {std::pair{0.0, 1.0}, std::pair{1.0, 0.0}, std::pair{0.0, 0.0}, std::pair{0.5, 0.5},
+        std::pair{0.0, 0.5}, std::pair{0.5, 0.0}}) {
+    waits_s.assign(way.size() + 1, 0);
+    waits_s[turn] += spare * before_turn;
+    waits_s[opens] += spare * before_open;
+    made->push_back(Along(way, waits_s));
     if (spare == 0) break;
   }
 }
@@ -242,6 +270,11 @@ void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>*
 void AppendAlong(const CandidateQuestion& question, const Way& way,
                  std::vector<Candidate>* candidates) {
   Builder(question).AppendAlong(way, candidates);
+}
+
+void AppendVia(const CandidateQuestion& question, const Way& in, const Way& out,
+               std::vector<Candidate>* candidates) {
+  Builder(question).AppendVia(in, out, candidates);
 }
 
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to) {

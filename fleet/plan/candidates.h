@@ -56,6 +56,11 @@ void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>*
 void AppendAlong(const CandidateQuestion& question, const Way& way,
                  std::vector<Candidate>* candidates);
 
+/// Along `in` into the own cell, there over to the end of `out`, and along that backwards to the
+/// target; folded before or after going over for as long as there is time to spare.
+void AppendVia(const CandidateQuestion& question, const Way& in, const Way& out,
+               std::vector<Candidate>* candidates);
+
 /// Both axes at once, without delay.
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to);
 /// A straight one whose axes begin later. Units: s. Shape: (axes).

@@ -1,10 +1,12 @@
 #include "fleet/plan/choreography.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <deque>
 #include <limits>
+#include <utility>
 
 #include "fleet/plan/time_search.h"
 #include "protocol/base/check.h"
@@ -18,12 +20,17 @@ constexpr int kLooksPerUnit = 16;
 /// The time that a unit may take grows once it has looked this often, by so much each time.
 constexpr int kLooksInTime = 5;
 constexpr double kExtension = 0.03;
+constexpr double kWithin = 1.005;  // times the time that may be used without being noticed
+/// Whoever ends later than this in the end tries again, with less and less success to hope for.
+constexpr double kWorthTightening = 1.1;
+constexpr std::array kTightenTo{1.005, 1.03, 1.1};
+constexpr int kLooksToTighten = 8;
+constexpr int kTurnsToTighten = 12;  // of all units together
 /// Ways with long waits hardly ever help where the search in time finds none: not before this look.
 constexpr int kLooksWithoutWaits = 2;
 constexpr int kLooksAlone = 3;
 constexpr int kLooksWithNotice = 3;
-
-double ExtensionAt(int looks) { return 1.005 + kExtension * std::max(0, looks - kLooksInTime); }
+constexpr float kApart = 1e6F;  // weight of a neighbour that must not be met
 
 std::uint32_t BeginOf(const AxisPaths& path) {
   std::uint32_t begin = std::numeric_limits<std::uint32_t>::max();
@@ -45,6 +52,12 @@ class Repair {
     Track track;
   };
   void Begin();
+  void Drain(int turns_most);
+  void Tighten();
+  bool Tighten(std::uint32_t unit, double extend);
+  [[nodiscard]] double ExtensionAt(int looks) const {
+    return std::min(extend_most_, kWithin + kExtension * std::max(0, looks - kLooksInTime));
+  }
   void Improve(std::uint32_t unit);
   double Cost(std::uint32_t unit, const Track& track, double limit);
   [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot);
@@ -56,15 +69,19 @@ class Repair {
   [[nodiscard]] const Tolerance& ToleranceOf(std::uint32_t unit, std::uint32_t slot) const {
     return unnoticed_[unit][slot] != 0 ? without_notice_ : q_.tolerance;
   }
-  [[nodiscard]] std::uint32_t BackSlot(std::uint32_t unit, std::uint32_t slot) const;
+  [[nodiscard]] std::uint32_t SlotOf(std::uint32_t unit, std::uint32_t other) const;
   void GiveUpNotice(std::uint32_t unit, std::uint32_t slot);
   [[nodiscard]] bool Reaches(std::uint32_t unit, const AxisPaths& paths) const;
-  Way WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses);
+  Way WayAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                       std::uint32_t other, std::span<const Pose> poses);
+  [[nodiscard]] std::vector<Candidate> WaysViaCell(std::uint32_t unit, std::uint32_t other,
+                                                   double within_s);
   void PushMet(std::uint32_t unit);
   bool SearchWay(std::uint32_t unit, double end_s, int looks);
   [[nodiscard]] std::vector<Candidate> AllWays(std::uint32_t unit, double within_s) const;
   bool TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways);
   bool GoAround(std::uint32_t unit, std::uint32_t other);
+  bool GoViaCell(std::uint32_t unit, std::uint32_t other);
   bool GoAlong(std::uint32_t unit, const Way& way);
   double Best(std::uint32_t unit, double extend, std::size_t from, std::size_t* chosen);
   void Take(std::uint32_t unit, const Candidate& candidate);
@@ -83,6 +100,10 @@ class Repair {
   std::vector<std::uint8_t> queued_;
   std::vector<std::uint8_t> looks_;
   std::deque<std::uint32_t> queue_;
+  int looks_most_ = kLooksPerUnit;
+  double extend_most_ = kNever;
+  bool tightens_ = false;
+  std::vector<std::pair<std::uint32_t, Motion>> before_;  // of who went otherwise since
   std::vector<Candidate> candidates_;
   Track track_;
   TimeSearch search_;
@@ -148,16 +169,18 @@ bool Repair::Reaches(std::uint32_t unit, const AxisPaths& paths) const {
   return true;
 }
 
-std::uint32_t Repair::BackSlot(std::uint32_t unit, std::uint32_t slot) const {
-  const auto back = scene_.neighbours(scene_.neighbours(unit)[slot].unit);
-  const auto it = std::find_if(back.begin(), back.end(),
-                               [&](const NeighbourNeed& near) { return near.unit == unit; });
-  return static_cast<std::uint32_t>(it - back.begin());
+/// Which neighbour of `unit` the other is.
+std::uint32_t Repair::SlotOf(std::uint32_t unit, std::uint32_t other) const {
+  const auto near = scene_.neighbours(unit);
+  const auto it = std::find_if(near.begin(), near.end(),
+                               [&](const NeighbourNeed& n) { return n.unit == other; });
+  return static_cast<std::uint32_t>(it - near.begin());
 }
 
 void Repair::GiveUpNotice(std::uint32_t unit, std::uint32_t slot) {
   unnoticed_[unit][slot] = 1;
-  unnoticed_[scene_.neighbours(unit)[slot].unit][BackSlot(unit, slot)] = 1;
+  const std::uint32_t other = scene_.neighbours(unit)[slot].unit;
+  unnoticed_[other][SlotOf(other, unit)] = 1;
 }
 
 void Repair::Begin() {
@@ -233,6 +256,8 @@ void Repair::Go(std::uint32_t unit, const AxisPaths& paths, Track track) {
     q_.ledger->Remove(unit, out_.paths[unit]);
     FOCALFLEET_CHECK(q_.ledger->Enter(unit, paths));
   }
+  if (tightens_)
+    before_.push_back({unit, {std::move(out_.paths[unit]), std::move(out_.tracks[unit])}});
   out_.paths[unit] = paths;
   out_.tracks[unit] = std::move(track);
 }
@@ -266,7 +291,8 @@ double Repair::Best(std::uint32_t unit, double extend, std::size_t first, std::s
 
 /// A way for `unit` among what never moves, and `other` where `poses` has it; empty where there is
 /// none.
-Way Repair::WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<const Pose> poses) {
+Way Repair::WayAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
+                             std::uint32_t other, std::span<const Pose> poses) {
   blockers_.clear();
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
     if (!scene_.is_place(near.unit)) continue;
@@ -280,9 +306,9 @@ Way Repair::WayAmongStanding(std::uint32_t unit, std::uint32_t other, std::span<
   question.arm = &scene_.arm(unit);
   question.drive = &q_.drives[unit];
   question.blockers = blockers_;
-  question.from = q_.from[unit];
-  question.within = RangeAround(*question.arm, question.from);
-  question.goal = PoseBox::Of(q_.to[unit]);
+  question.from = from;
+  question.within = RangeAround(*question.arm, from);
+  question.goal = goal;
   for (const double grid_deg : kSearchGridsDeg) {
     question.grid_deg = grid_deg;
     Way way = path_search_.Find(question);
@@ -344,6 +370,29 @@ std::vector<Candidate> Repair::AllWays(std::uint32_t unit, double within_s) cons
   return ways;
 }
 
+/// Ways of the unit through its cell that leave `other` alone, first where that starts, at last
+/// where that ends.
+std::vector<Candidate> Repair::WaysViaCell(std::uint32_t unit, std::uint32_t other,
+                                           double within_s) {
+  std::vector<Candidate> ways;
+  if (!scene_.HasCell(unit)) return ways;
+  PoseBox cell = scene_.arm(unit).range();
+  cell.low[1] = std::max(cell.low[1], scene_.cell(unit).low);
+  cell.high[1] = std::min(cell.high[1], scene_.cell(unit).high);
+  if (cell.low[1] > cell.high[1]) return ways;
+  const Way in = WayAmongStanding(unit, q_.from[unit], cell, other, q_.from);
+  const Way out = WayAmongStanding(unit, q_.to[unit], cell, other, q_.to);
+  AppendVia({.scene = &scene_,
+             .drive = &q_.drives[unit],
+             .unit = unit,
+             .from = q_.from[unit],
+             .to = q_.to[unit],
+             .within_s = within_s},
+            in, out, &ways);
+  std::erase_if(ways, [&](const Candidate& way) { return way.end_s > within_s; });
+  return ways;
+}
+
 /// The first of the ways, in this order, that meets nobody; `ways` loses those that were looked at.
 bool Repair::TakeFirst(std::uint32_t unit, std::vector<Candidate>* ways) {
   for (std::size_t k = 0; k < ways->size(); ++k) {
@@ -382,13 +431,50 @@ bool Repair::GoAround(std::uint32_t unit, std::uint32_t other) {
       for (std::size_t n = ways.size(); n > 1; --n) std::swap(ways[n - 1], ways[rng_.Below(n)]);
     if (!TakeFirst(other, &ways)) break;
     if (SearchWay(unit, within_s, looks)) return true;
-    if (k <= 1 && looks >= kLooksAlone &&
-        GoAlong(unit, WayAmongStanding(unit, other, k == 0 ? q_.from : q_.to)))
+    if (k <= 1 && looks >= kLooksAlone && looks % 2 == 1 &&
+        GoAlong(unit, WayAmongStanding(unit, q_.from[unit], PoseBox::Of(q_.to[unit]), other,
+                                       k == 0 ? q_.from : q_.to)))
       return true;
   }
+  if (looks >= kLooksAlone && GoViaCell(unit, other)) return true;
   Go(unit, {}, Track());
   Go(other, other_before.path, other_before.track);
   Go(unit, before.path, before.track);
+  return false;
+}
+
+/// `other` goes through its own cell, and `unit` around it. True: neither meets the other then, and
+/// whom else they meet looks again.
+bool Repair::GoViaCell(std::uint32_t unit, std::uint32_t other) {
+  const int looks = looks_[unit];
+  const double within_s = q_.within_s * ExtensionAt(looks);
+  const std::vector<Candidate> ways = WaysViaCell(other, unit, within_s);
+  std::vector<Candidate> clear = ways;
+  while (!clear.empty() && TakeFirst(other, &clear))
+    if (SearchWay(unit, within_s, looks)) return true;
+  if (looks < kLooksInTime) return false;
+  // Where nothing else helps, third ones have to find another way.
+  for (const Candidate& way : ways) {
+    track_ = Track(scene_.arm(other), q_.drives[other], q_.from[other], way.path);
+    if (Cost(other, track_, kNever) == kNever || !KeepsLimits(other, way.path)) continue;
+    Go(other, way.path, track_);
+    if (SearchWay(unit, within_s, looks)) {
+      PushMet(other);
+      return true;
+    }
+    candidates_ = WaysViaCell(unit, kNobody, within_s);
+    for (const Candidate& own : AllWays(unit, within_s)) candidates_.push_back(own);
+    const std::size_t slot = SlotOf(unit, other);
+    const float weight = std::exchange(weight_[unit][slot], kApart);
+    std::size_t chosen = 0;
+    const double best = Best(unit, ExtensionAt(looks), 0, &chosen);
+    weight_[unit][slot] = weight;
+    if (best >= static_cast<double>(kApart)) continue;
+    Take(unit, candidates_[chosen]);
+    PushMet(unit);
+    PushMet(other);
+    return true;
+  }
   return false;
 }
 
@@ -443,7 +529,9 @@ void Repair::Improve(std::uint32_t unit) {
   if (best == kNever && looks >= 1) {
     // What stands is in every way: one around it.
     candidates_.clear();
-    AppendAlong(question, WayAmongStanding(unit, kNobody, q_.from), &candidates_);
+    AppendAlong(question,
+                WayAmongStanding(unit, q_.from[unit], PoseBox::Of(q_.to[unit]), kNobody, q_.from),
+                &candidates_);
     best = Best(unit, extend, 0, &chosen);
   }
   if (best < 1) {
@@ -465,21 +553,62 @@ void Repair::Improve(std::uint32_t unit) {
     }
     if (looks >= kLooksWithNotice) GiveUpNotice(unit, slot);
     weight_[unit][slot] += 1;
-    weight_[other][BackSlot(unit, slot)] += 1;
+    weight_[other][SlotOf(other, unit)] += 1;
     Push(other);
     Push(unit);
+  }
+}
+
+/// Whoever waits to look does, one after the other; at most so many, then nobody waits any more.
+void Repair::Drain(int turns_most) {
+  for (int turn = 0; !queue_.empty(); ++turn) {
+    const std::uint32_t unit = queue_.front();
+    queue_.pop_front();
+    queued_[unit] = 0;
+    if (turn < turns_most && looks_[unit] < looks_most_) Improve(unit);
+  }
+}
+
+/// Straight again and repaired again, in less time. False: that found no end, and all go as before.
+bool Repair::Tighten(std::uint32_t unit, double extend) {
+  before_.clear();
+  tightens_ = true;
+  looks_most_ = kLooksToTighten;
+  extend_most_ = extend;
+  std::fill(looks_.begin(), looks_.end(), std::uint8_t{1});
+  Take(unit, Straight(q_.drives[unit], q_.from[unit], q_.to[unit]));
+  Push(unit);
+  PushMet(unit);
+  Drain(kTurnsToTighten);
+  tightens_ = false;
+  const bool clear = std::none_of(before_.begin(), before_.end(),
+                                  [&](const auto& made) { return InConflict(made.first); });
+  if (clear) return true;
+  for (auto it = before_.rbegin(); it != before_.rend(); ++it) {
+    out_.paths[it->first] = std::move(it->second.path);
+    out_.tracks[it->first] = std::move(it->second.track);
+  }
+  return false;
+}
+
+/// The last ones may have been late for want of luck.
+void Repair::Tighten() {
+  if (q_.ledger != nullptr) return;  // power is what takes the time
+  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    for (const double extend : kTightenTo) {
+      const double end_s =
+          out_.paths[i][0].size() + out_.paths[i][1].size() == 0 ? 0 : out_.tracks[i].end_s();
+      if (end_s <= q_.within_s * std::max(kWorthTightening, extend)) break;
+      if (Tighten(i, extend)) break;
+    }
   }
 }
 
 Choreography Repair::Run() {
   Begin();
   if (out_.starved) return std::move(out_);
-  while (!queue_.empty()) {
-    const std::uint32_t unit = queue_.front();
-    queue_.pop_front();
-    queued_[unit] = 0;
-    if (looks_[unit] < kLooksPerUnit) Improve(unit);
-  }
+  Drain(std::numeric_limits<int>::max());
+  Tighten();
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     if (scene_.is_place(i) && InConflict(i)) out_.in_conflict.push_back(i);
   for (std::uint32_t i = 0; i < scene_.size(); ++i)

@@ -41,10 +41,19 @@ enum class UnservedWhy : std::uint8_t {
 };
 const char* Name(UnservedWhy why);
 
+/// A proof that no way leads to a target, however all that can move gets out of the way
+/// (no_way.h).
+struct NoWay {
+  double grid_deg = 0;                 // of the boxes that were enough for it
+  std::vector<PositionerIndex> walls;  // units that never move and close the way; ascending
+  bool obstacle = false;               // fixed obstacles, or covers of uncertain units, do, too
+};
+
 struct Unserved {
   PositionerIndex unit;
   UnservedWhy why = UnservedWhy::kBlocked;
   std::optional<PositionerIndex> by;
+  std::optional<NoWay> proof;  // of kBlocked; none: a way may exist and was not found
 };
 
 /// Two units where they come nearest to each other.

@@ -12,6 +12,7 @@
 #include "fleet/plan/choreography.h"
 #include "fleet/plan/guarantee.h"
 #include "fleet/plan/midway.h"
+#include "fleet/plan/no_way.h"
 #include "fleet/plan/objective.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
@@ -72,7 +73,7 @@ class Planner {
   bool Attempt(std::vector<Piece>* order);
   void GiveWay();
   void Abandon(std::uint32_t unit);
-  bool CanEver(std::uint32_t unit);
+  bool CanEver(std::uint32_t unit, std::optional<NoWay>* proof);
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
@@ -170,7 +171,7 @@ void Planner::TakeGiven(std::uint32_t unit) {
 void Planner::Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by) {
   served_[unit] = 0;
   goal_[unit] = start_[unit];
-  Unserved unserved{{unit}, why, std::nullopt};
+  Unserved unserved{{unit}, why, std::nullopt, std::nullopt};
   if (by != kNobody) unserved.by = PositionerIndex{by};
   unserved_.push_back(unserved);
 }
@@ -319,8 +320,10 @@ void Planner::Abandon(std::uint32_t unit) {
   by_itself_[unit] = 0;
 }
 
-/// False: even if all that can move were away, no way leads from the start to the target.
-bool Planner::CanEver(std::uint32_t unit) {
+/// Whether a way may lead from the start to the target if all that can move were away. False: there
+/// is none that a search finds; `proof` (where that is possible): there is none at all.
+bool Planner::CanEver(std::uint32_t unit, std::optional<NoWay>* proof) {
+  proof->reset();
   if (goal_[unit] == start_[unit]) return true;
   std::vector<std::uint8_t> immovable(scene_.size());
   for (const NeighbourNeed& near : scene_.neighbours(unit))
@@ -332,10 +335,15 @@ bool Planner::CanEver(std::uint32_t unit) {
   question.from = start_[unit];
   question.within = RangeAround(*question.arm, question.from);
   question.goal = PoseBox::Of(goal_[unit]);
-  return std::any_of(kSearchGridsDeg.begin(), kSearchGridsDeg.end(), [&](double grid_deg) {
+  for (const double grid_deg : kSearchGridsDeg) {
     question.grid_deg = grid_deg;
-    return !surroundings_.search().Find(question).empty();
-  });
+    if (!surroundings_.search().Find(question).empty()) return true;
+  }
+  *proof = ProveNoWay({.arm = question.arm,
+                       .never_move = question.blockers,
+                       .from = start_[unit],
+                       .to = goal_[unit]});
+  return false;
 }
 
 /// Gives up on stuck units that no order of moves can help. True: there was one.
@@ -343,11 +351,13 @@ bool Planner::AbandonHopeless() {
   bool any = false;
   for (const std::uint32_t i : stuck_) {
     if (hopeful_[i] != 0) continue;
-    if (CanEver(i)) {
+    std::optional<NoWay> proof;
+    if (CanEver(i, &proof)) {
       hopeful_[i] = 1;
       continue;
     }
     Abandon(i);
+    if (proof) unserved_.back().proof = std::move(proof);
     any = true;
   }
   return any;
@@ -595,7 +605,7 @@ Result<Plan> Planner::Run() {
                    Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
-  if (too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
+  if (too_near_.empty() && !dense && !stuck_for_order_.empty()) ServeTheRest();
   if (choreography_.tracks.empty()) TracksOfPlan();
   return Finish();
 }

@@ -7,6 +7,9 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint8_t kFavoursMax = 3;
+constexpr std::uint8_t kShakesMax = 2;  // for one unit
+constexpr int kShakeTries = 600;
+constexpr int kShakeSteps = 7;
 
 }  // namespace
 
@@ -52,7 +55,9 @@ Retreat::Retreat(const Scene* scene, std::span<const UnitDrive> drives, Surround
       waits_(poses.size(), 0),
       straight_(poses.size(), Known::kNo),
       searched_deg_(poses.size(), 0),
-      favours_(poses.size(), 0) {
+      favours_(poses.size(), 0),
+      shakes_(poses.size(), 0),
+      rng_(Rng::Stream(1, "retreat")) {
   for (std::uint32_t i = 0; i < poses_.size(); ++i) {
     lines_[i] = scene_->arm(i).At(poses_[i]);
     if (movers_[i] == 0 || scene_->InCell(i, poses_[i])) continue;
@@ -67,7 +72,7 @@ void Retreat::Run() {
     if (waiting_.empty()) return;
     bool moved = false;
     for (const double grid_deg : kSearchGridsDeg) moved = moved || GoAround(grid_deg);
-    moved = moved || MakeRoom();
+    moved = moved || MakeRoom() || Shake();
     DropArrived();
     if (!moved) return;
   }
@@ -140,18 +145,23 @@ bool Retreat::GoAround(double grid_deg) {
   for (const std::uint32_t i : waiting_) {
     if (!Waits(i) || !scene_->HasCell(i)) continue;
     if (searched_deg_[i] > 0 && searched_deg_[i] <= grid_deg) continue;
-    PathSearch::Question question = QuestionFor(i, grid_deg);
-    PoseBox goal = question.within;
-    goal.low[1] = scene_->cell(i).low;
-    goal.high[1] = scene_->cell(i).high;
-    question.goal = goal;
-    const Way way = surroundings_->search().Find(question);
+    const Way way = WayIntoCell(i, grid_deg);
     searched_deg_[i] = grid_deg;
     if (way.empty()) continue;
     Go(i, way);
     moved = true;
   }
   return moved;
+}
+
+/// Among all others as they stand. Empty: none on this grid.
+Way Retreat::WayIntoCell(std::uint32_t unit, double grid_deg) {
+  PathSearch::Question question = QuestionFor(unit, grid_deg);
+  PoseBox goal = question.within;
+  goal.low[1] = scene_->cell(unit).low;
+  goal.high[1] = scene_->cell(unit).high;
+  question.goal = goal;
+  return surroundings_->search().Find(question);
 }
 
 /// Some neighbour of a waiting unit goes where it no longer blocks the straight way. Those that are
@@ -199,6 +209,59 @@ bool Retreat::GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double g
     return true;
   }
   return false;
+}
+
+bool Retreat::Shake() {
+  for (const std::uint32_t i : waiting_)
+    if (scene_->HasCell(i) && ShakeFree(i)) return true;
+  return false;
+}
+
+/// Some of the unit and its neighbours go anywhere, one after the other, and then it into its cell
+/// if there is a way.
+bool Retreat::ShakeFree(std::uint32_t unit) {
+  std::vector<std::uint32_t> near;
+  for (const NeighbourNeed& n : scene_->neighbours(unit))
+    if (movers_[n.unit] != 0) near.push_back(n.unit);
+  if (near.empty() || shakes_[unit] >= kShakesMax) return false;
+  ++shakes_[unit];
+  std::vector<std::pair<std::uint32_t, Way>> made;
+  for (int attempt = 0; attempt < kShakeTries; ++attempt) {
+    made.clear();
+    const int steps = 1 + attempt * kShakeSteps / kShakeTries;
+    for (int step = 0; step < steps; ++step) {
+      const std::uint64_t pick = rng_.Below(near.size() + (steps > 1 ? 1 : 0));
+      const std::uint32_t who = pick < near.size() ? near[pick] : unit;
+      Way way;
+      if (!Wander(who, &way)) continue;
+      StandAt(who, way.back().pose);
+      made.emplace_back(who, std::move(way));
+    }
+    Way in;
+    for (const double grid_deg : kSearchGridsDeg)
+      if (in.empty()) in = WayIntoCell(unit, grid_deg);
+    for (auto it = made.rbegin(); it != made.rend(); ++it)
+      StandAt(it->first, it->second.front().pose);
+    if (in.empty()) continue;
+    for (const auto& [who, way] : made) Go(who, way);
+    Go(unit, in);
+    return true;
+  }
+  return false;
+}
+
+/// A way to any place that the unit can reach among all others as they stand.
+bool Retreat::Wander(std::uint32_t unit, Way* way) {
+  surroundings_->search().Find(QuestionFor(unit, kSearchGridsDeg.front()));
+  const std::vector<Pose>& reached = surroundings_->search().reached();
+  if (reached.empty()) return false;
+  *way = surroundings_->search().WayTo(rng_.Below(reached.size()));
+  return !way->empty();
+}
+
+void Retreat::StandAt(std::uint32_t unit, const Pose& pose) {
+  poses_[unit] = pose;
+  lines_[unit] = scene_->arm(unit).At(pose);
 }
 
 /// All around the unit as it is now; where to is for the caller to say.

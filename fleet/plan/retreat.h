@@ -6,7 +6,8 @@
 // take all units that are free now, so that chains of waiting stay short. A unit whose end would
 // shut in a neighbour that is free waits for it. Where a round finds nobody free it tries a way
 // around (path search); where there is none, a neighbour goes where it no longer blocks a straight
-// way, inside its cell if it is there already and finds room, otherwise anywhere. How often one
+// way, inside its cell if it is there already and finds room, otherwise anywhere. At last it and
+// its neighbours go anywhere at all, a few steps, until that happens to let it in. How often one
 // does that for others is bounded.
 #pragma once
 
@@ -16,6 +17,7 @@
 
 #include "fleet/plan/path_search.h"
 #include "fleet/plan/scene.h"
+#include "protocol/base/rng.h"
 
 namespace focalfleet {
 
@@ -76,6 +78,11 @@ class Retreat {
   bool MakeRoomFor(std::uint32_t unit, bool stay_in_cell);
   bool GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
                bool stay_in_cell);
+  bool Shake();
+  bool ShakeFree(std::uint32_t unit);
+  bool Wander(std::uint32_t unit, Way* way);
+  Way WayIntoCell(std::uint32_t unit, double grid_deg);
+  void StandAt(std::uint32_t unit, const Pose& pose);
   PathSearch::Question QuestionFor(std::uint32_t unit, double grid_deg);
   void Go(std::uint32_t unit, std::span<const Waypoint> way);
   void GoStraight(std::uint32_t unit);
@@ -96,6 +103,8 @@ class Retreat {
   std::vector<Known> straight_;        // as far as nothing near has moved since
   std::vector<double> searched_deg_;   // finest grid on which a search failed since then; 0: none
   std::vector<std::uint8_t> favours_;  // turns and yields made for others
+  std::vector<std::uint8_t> shakes_;   // made for this unit
+  Rng rng_;
 };
 
 }  // namespace focalfleet

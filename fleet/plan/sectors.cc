@@ -274,6 +274,8 @@ Result<SectorPlan> PlanSector(const PlanRequest& request, const PlanOptions& opt
   for (Unserved unserved : made.unserved) {
     unserved.unit = local.units[unserved.unit.value];
     if (unserved.by) unserved.by = local.units[unserved.by->value];
+    if (unserved.proof)
+      for (PositionerIndex& wall : unserved.proof->walls) wall = local.units[wall.value];
     if (is_own(unserved.unit)) mine.plan.unserved.push_back(unserved);
   }
   return mine;

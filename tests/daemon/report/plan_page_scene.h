@@ -62,7 +62,7 @@ inline SceneData MakeSceneData() {
   for (const UnitKnowledge& known : data.fleet.start) data.start.emplace_back(PlaceOf(known));
   TakeOut(SceneData::kUnserved, &data.plan);
   data.plan.unserved = {
-      {SceneData::kUnserved, UnservedWhy::kBlocked, std::optional(SceneData::kInTheWay)}};
+      {SceneData::kUnserved, UnservedWhy::kBlocked, std::optional(SceneData::kInTheWay), {}}};
   TakeOut(SceneData::kUnknown, &data.plan);
   data.start[SceneData::kUnknown.value].reset();
   // Not ordered; the page orders them.

@@ -147,6 +147,9 @@ TEST(PlanAtOnce, NobodyGoesThroughWhatLeavesNoWay) {
   ExpectSound(fleet, *plan);
   ASSERT_EQ(plan->unserved.size(), 1u);
   EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kBlocked);
+  ASSERT_TRUE(plan->unserved[0].proof);
+  EXPECT_TRUE(plan->unserved[0].proof->obstacle);
+  EXPECT_TRUE(plan->unserved[0].proof->walls.empty());
 }
 
 TEST(PlanAtOnce, RefusesALimitThatWouldTakeLongerThanAnOffsetCanSay) {
