@@ -595,6 +595,7 @@ bool Repair::Tighten(std::uint32_t unit, double extend) {
 void Repair::Tighten() {
   if (q_.ledger != nullptr) return;  // power is what takes the time
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (IsGiven(i)) continue;
     for (const double extend : kTightenTo) {
       const double end_s =
           out_.paths[i][0].size() + out_.paths[i][1].size() == 0 ? 0 : out_.tracks[i].end_s();

@@ -276,7 +276,8 @@ TEST_F(OfflineCommands, PlanNamesADisabledTargetAndEndsWithThree) {
       Plan(scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,0,180\n"), {"--json"});
   EXPECT_EQ(result.exit, 3) << result.err;
   const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["unserved"], Json::parse(R"([{"unit_id":1,"why":"disabled","by":null}])"));
+  EXPECT_EQ(told["unserved"],
+            Json::parse(R"([{"unit_id":1,"why":"disabled","by":null,"proof":null}])"));
   const auto quiet = Plan(scratch_ / "t.csv", {"-q"});
   EXPECT_EQ(quiet.exit, 3);
   EXPECT_THAT(quiet.out, IsEmpty());

@@ -95,10 +95,10 @@ TEST(Sectors, RefuseMoreThanThereCanBe) {
 }
 
 TEST(Sectors, TogetherServeAndClearAllAsOnePlanDoes) {
-  for (std::uint64_t k = 0; k < 3; ++k) {
+  for (std::uint64_t k = 0; k < 2; ++k) {
     const std::uint64_t seed = TestSeed(700 + k);
     FOCALFLEET_TRACE_SEED(seed);
-    const PlanningFleet fleet = Drawn(k % 2 == 0 ? 217 : 397, seed);
+    const PlanningFleet fleet = Drawn(k == 0 ? 271 : 217, seed);
     for (const std::uint32_t count : kCounts) {
       SCOPED_TRACE(count);
       const auto made = PlanBySectors(fleet.request(), {}, {.count = count});
@@ -194,7 +194,9 @@ TEST(Planner, LeavesGivenMotionsAsTheyAre) {
     ASSERT_TRUE(before);
     std::vector<AxisPaths> motions(127);
     std::vector<std::uint8_t> given(127, 0);
-    for (const UnitPlan& move : before->moves) {
+    Plan late = *before;
+    if (k % 2 == 1) Delay(&late, 100'000);  // and end when nobody else needs to move
+    for (const UnitPlan& move : late.moves) {
       if (move.unit.value % 3 != 0) continue;
       motions[move.unit.value] = move.path;
       given[move.unit.value] = 1;
@@ -207,7 +209,7 @@ TEST(Planner, LeavesGivenMotionsAsTheyAre) {
     const auto after = MakePlan(request, options);
     ASSERT_TRUE(after) << after.error().text;
     ExpectSound(fleet, *after);
-    Plan kept = *before;
+    Plan kept = late;
     Plan found = *after;
     const auto others = [](const UnitPlan& move) { return move.unit.value % 3 != 0; };
     std::erase_if(kept.moves, others);
