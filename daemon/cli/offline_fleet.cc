@@ -12,6 +12,7 @@
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/plan/planner.h"
+#include "fleet/plan/sectors.h"
 #include "fleet/targets.h"
 
 namespace focalfleet::cli {
@@ -23,6 +24,14 @@ std::vector<UnitKnowledge> KnowledgeOf(const StatePoses& state) {
     if (state[i]) knowledge[i] = Exactly(Witness::kReported, *state[i]);
   }
   return knowledge;
+}
+
+Result<Plan> PlanOf(const PlanRequest& request, const PlanFiles& files, std::uint32_t* sectors) {
+  if (files.sectors <= 1) return MakePlan(request, files.plan);
+  FOCALFLEET_TRY_ASSIGN(SectoredPlan made,
+                        PlanBySectors(request, files.plan, {.count = files.sectors}));
+  *sectors = static_cast<std::uint32_t>(made.sectors.size());
+  return std::move(made.plan);
 }
 
 }  // namespace
@@ -98,17 +107,20 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
   for (std::uint32_t i = 0; i < frozen.size(); ++i) {
     frozen[i] = fleet.layout.unit({i}).enabled ? 0 : 1;
   }
-  auto plan = MakePlan({.layout = &fleet.layout,
-                        .drives = fleet.drives,
-                        .start = start,
-                        .targets = poses,
-                        .frozen = frozen},
-                       files.plan);
+  OfflinePlan made{{}, {}, targets.rows.size()};
+  auto plan = PlanOf({.layout = &fleet.layout,
+                      .drives = fleet.drives,
+                      .start = start,
+                      .targets = poses,
+                      .frozen = frozen},
+                     files, &made.sectors);
   if (!plan) {
     return Fail(plan.error().code,
                 fmt::format("{} from {}: {}", files.targets, files.from, plan.error().text));
   }
-  return OfflinePlan{std::move(*plan), std::move(poses), targets.rows.size()};
+  made.plan = std::move(*plan);
+  made.targets = std::move(poses);
+  return made;
 }
 
 namespace {

@@ -61,11 +61,13 @@ struct PlanFiles {
   std::string targets;
   std::string from;    // for messages: what `state` was read from
   PlanOptions plan = {};
+  std::uint32_t sectors = 1;
 };
 struct OfflinePlan {
   Plan plan;
   StatePoses targets;
   std::size_t targeted = 0;
+  std::uint32_t sectors = 1;  // fewer than asked for where some had to become one
 };
 /// The plan from `state` to the targets; disabled units stand. Errors: as LoadFleet, and those of
 /// ResolveTargets and MakePlan.

@@ -13,6 +13,7 @@
 #include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
+#include "fleet/plan/objective.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -23,6 +24,7 @@ struct PlanCommandOptions {
   std::string from;
   std::string store;  // empty: none
   PlanOptions plan;
+  std::uint32_t sectors = 1;
   std::string out;
   std::string plot;  // empty: none
 };
@@ -31,7 +33,9 @@ struct Planned {
   OfflineFleet fleet;
   std::size_t targeted = 0;
   Plan plan;
+  std::uint32_t sectors = 1;
   PlanEstimate estimate;
+  PowerStatement power;
   StartVerdict starts;
   std::size_t rows = 0;
 };
@@ -62,10 +66,11 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
   FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
   FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
-  FOCALFLEET_TRY_ASSIGN(
-      OfflinePlan planned,
-      PlanOffline(context, fleet, state,
-                  {.targets = options.targets, .from = options.from, .plan = options.plan}));
+  FOCALFLEET_TRY_ASSIGN(OfflinePlan planned, PlanOffline(context, fleet, state,
+                                                         {.targets = options.targets,
+                                                          .from = options.from,
+                                                          .plan = options.plan,
+                                                          .sectors = options.sectors}));
   const MotorModel& motor = options.plan.motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);
   if (!options.plot.empty()) {
@@ -74,15 +79,10 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   // Last: where it is, all is.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
+  PowerStatement power = StatePower(planned.plan, fleet.layout, fleet.drives, options.plan);
   StartVerdict starts = StartCheck(motor).Of(planned.plan, fleet);
-  return Planned{std::move(fleet),    planned.targeted,  std::move(planned.plan),
-                 std::move(estimate), std::move(starts), rows.size()};
-}
-
-double Peak(const RailCurve& curve) {
-  double peak = 0;
-  for (const PowerStep& step : curve.steps) peak = std::max(peak, step.power_W);
-  return peak;
+  return Planned{std::move(fleet),    planned.targeted, std::move(planned.plan), planned.sectors,
+                 std::move(estimate), std::move(power), std::move(starts),       rows.size()};
 }
 
 Json PairJson(const Layout& layout, PositionerIndex a, PositionerIndex b) {
@@ -110,20 +110,32 @@ Json GuaranteeJson(const Planned& planned, const PlanOptions& options) {
           {"tightest", tightest}};
 }
 
+const char* WordOf(Objective objective) {
+  constexpr const char* kWords[] = {"soonest", "least_energy", "least_peak", "even_power"};
+  return kWords[static_cast<std::size_t>(objective)];
+}
+
 Json Summary(const Planned& planned, const PlanCommandOptions& options) {
   Json rails = Json::array();
-  for (const RailCurve& curve : planned.estimate.rails) {
-    rails.push_back({{"rail_id", curve.rail.value}, {"peak_power_W", Peak(curve)}});
-  }
+  for (const RailStatement& rail : planned.power.rails)
+    rails.push_back({{"rail_id", rail.rail.value},
+                     {"energy_J", rail.energy_J},
+                     {"peak_power_W", rail.peak_W},
+                     {"peak_power_most_W", rail.peak_most_W},
+                     {"flatness", rail.flatness}});
   return {{"units", planned.fleet.layout.size()},
           {"targeted", planned.targeted},
           {"served", planned.targeted - planned.plan.unserved.size()},
           {"unserved", UnservedJson(planned.plan, planned.fleet.layout)},
           {"makespan_s", planned.estimate.makespan_s},
           {"bound_s", planned.plan.bound_s},
+          {"sectors", planned.sectors},
           {"guarantee", GuaranteeJson(planned, options.plan)},
           {"energy_J", planned.estimate.energy_J},
           {"peak_power_W", planned.estimate.peak_power_W},
+          {"peak_power_most_W", planned.power.peak_most_W},
+          {"flatness", planned.power.flatness},
+          {"objective", WordOf(options.plan.objective)},
           {"rails", rails},
           {"below_critical", BelowCriticalJson(planned.starts)},
           {"rows", planned.rows},
@@ -153,19 +165,27 @@ std::string Describe(const Json& summary) {
   const std::string text = fmt::format(
       "{}: {} of {} targets served, {} rows\n  makespan {:.2f} s (the slowest unit alone: {:.2f} "
       "s), "
-      "energy {:.1f} J, peak power {:.1f} W",
+      "energy {:.1f} J, peak power {:.1f} W (with skew and clocks {:.1f} W at most), flatness "
+      "{:.2f}",
       summary["out"].get<std::string>(), summary["served"].get<std::uint64_t>(),
       summary["targeted"].get<std::uint64_t>(), summary["rows"].get<std::uint64_t>(),
-      number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"));
+      number("makespan_s"), number("bound_s"), number("energy_J"), number("peak_power_W"),
+      number("peak_power_most_W"), number("flatness"));
   const std::string plot =
       summary["plot"].is_null()
           ? ""
           : fmt::format("\n  {}: to look at, in a browser", summary["plot"].get<std::string>());
-  return text + DescribeGuarantee(summary["guarantee"]) + plot +
+  const auto sectors = summary["sectors"].get<std::uint32_t>();
+  const std::string parts =
+      sectors > 1 ? fmt::format("\n  planned by {} sectors", sectors) : std::string();
+  return text + parts + DescribeGuarantee(summary["guarantee"]) + plot +
          DescribeUnserved(summary["unserved"]);
 }
 
 ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
+  if (options.plan.within_s > 0 && options.plan.objective == Objective::kSoonest)
+    return Report(context, {ErrorCode::kInvalid,
+                            "--within-s goes with --least-energy, --least-peak or --even-power"});
   const auto planned = MakeAndWrite(context, options);
   if (!planned) return Report(context, planned.error());
   const Json summary = Summary(*planned, options);
@@ -181,6 +201,31 @@ CLI::Validator NoStdout() {
             return path == "-" ? std::string("a page goes into a file") : std::string();
           },
           ""};
+}
+
+void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
+  struct Flag {
+    const char* name;
+    Objective objective;
+    const char* what;
+  };
+  constexpr Flag kFlags[] = {
+      {"--least-energy", Objective::kLeastEnergy, "Without detours, as far as the time allows"},
+      {"--least-peak", Objective::kLeastPeak, "The largest peak of a supply rail as low as can be"},
+      {"--even-power", Objective::kEvenPower, "Power of each rail as even as can be"}};
+  std::vector<CLI::Option*> flags;
+  for (const Flag& flag : kFlags) {
+    const Objective objective = flag.objective;
+    flags.push_back(command->add_flag_callback(
+        flag.name, [options, objective] { options->plan.objective = objective; }, flag.what));
+    for (CLI::Option* other : flags)
+      if (other != flags.back()) flags.back()->excludes(other);
+  }
+  command
+      ->add_option("--within-s", options->plan.within_s,
+                   "All have arrived by then, s; with one of the three above "
+                   "[the end of the soonest plan]")
+      ->check(CLI::PositiveNumber);
 }
 
 }  // namespace
@@ -210,6 +255,11 @@ void AddPlanCommand(CommandLine* line) {
                    "Time to notice that a unit has stopped by itself, and to stop those that "
                    "follow it, s [1]")
       ->check(CLI::Range(0.0, 60.0));
+  AddObjectives(command, options.get());
+  command
+      ->add_option("--sectors", options->sectors,
+                   "Plan by this many strips of the plate, each with those around it [1]")
+      ->check(CLI::Range(1, 512));
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
   AddFile(command, "--plot", &options->plot,
           "plan.html to write: the plan to look at, in a browser")

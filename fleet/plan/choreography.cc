@@ -62,6 +62,9 @@ class Repair {
   double Cost(std::uint32_t unit, const Track& track, double limit);
   [[nodiscard]] bool Meets(std::uint32_t unit, const Track& track, std::uint32_t slot);
   [[nodiscard]] bool InConflict(std::uint32_t unit);
+  [[nodiscard]] bool IsGiven(std::uint32_t unit) const {
+    return !q_.given.empty() && q_.given[unit] != 0;
+  }
   void Push(std::uint32_t unit);
   [[nodiscard]] const Tolerance& ToleranceOf(std::uint32_t unit, std::uint32_t slot) const {
     return unnoticed_[unit][slot] != 0 ? without_notice_ : q_.tolerance;
@@ -112,6 +115,7 @@ class Repair {
 bool Repair::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) {
   const NeighbourNeed& near = scene_.neighbours(unit)[slot];
   if (!scene_.is_place(near.unit) || out_.tracks[near.unit].legs().empty()) return false;
+  if (IsGiven(unit) && IsGiven(near.unit)) return false;
   const Tolerance& tolerance = ToleranceOf(unit, slot);
   const Track& other = out_.tracks[near.unit];
   if (!track.moves() && !other.moves()) return false;
@@ -198,6 +202,11 @@ void Repair::Begin() {
     order_[i].resize(near);
     for (std::uint32_t k = 0; k < near; ++k) order_[i][k] = k;
     if (!scene_.is_place(i)) continue;
+    if (IsGiven(i)) {
+      out_.paths[i] = q_.begin_with[i];
+      out_.tracks[i] = Track(scene_.arm(i), q_.drives[i], q_.from[i], out_.paths[i]);
+      continue;
+    }
     const bool steps_aside =
         !q_.begin_with.empty() && q_.begin_with[i][0].size() + q_.begin_with[i][1].size() > 0;
     if (q_.movable[i] == 0 || (q_.from[i] == q_.to[i] && !steps_aside)) {
@@ -287,7 +296,7 @@ Way Repair::WayAmongStanding(std::uint32_t unit, const Pose& from, const PoseBox
   blockers_.clear();
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
     if (!scene_.is_place(near.unit)) continue;
-    if (q_.movable[near.unit] != 0 && near.unit != other) continue;
+    if ((q_.movable[near.unit] != 0 && near.unit != other) || IsGiven(near.unit)) continue;
     const SegmentFp line = scene_.arm(near.unit).At(poses[near.unit]);
     blockers_.push_back({{line, 0}, near.need_mm, near.unit});
   }
@@ -586,6 +595,7 @@ bool Repair::Tighten(std::uint32_t unit, double extend) {
 void Repair::Tighten() {
   if (q_.ledger != nullptr) return;  // power is what takes the time
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+    if (IsGiven(i)) continue;
     for (const double extend : kTightenTo) {
       const double end_s =
           out_.paths[i][0].size() + out_.paths[i][1].size() == 0 ? 0 : out_.tracks[i].end_s();

@@ -38,7 +38,10 @@ struct ChoreographyRequest {
   std::span<const Pose> to;               // Shape: (n)
   std::span<const std::uint8_t> movable;  // Shape: (n); others stand
   std::span<const AxisPaths> begin_with;  // Shape: (n), or empty: straight ways
-  PowerLedger* ledger = nullptr;          // empty at first; null: power has no limit
+  /// Shape: (n), or empty: nobody. Non-zero: goes as `begin_with` says, whatever the others do; its
+  /// power is somebody else's to count. Two such units are not tested against each other.
+  std::span<const std::uint8_t> given = {};
+  PowerLedger* ledger = nullptr;  // empty at first; null: power has no limit
   Tolerance tolerance;
   double within_s = 0;  // the time that may be used without being noticed
   std::uint64_t seed = 1;

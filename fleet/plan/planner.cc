@@ -8,10 +8,12 @@
 #include <map>
 #include <numbers>
 
+#include "fleet/estimate.h"
 #include "fleet/plan/choreography.h"
 #include "fleet/plan/guarantee.h"
 #include "fleet/plan/midway.h"
 #include "fleet/plan/no_way.h"
+#include "fleet/plan/objective.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
@@ -25,6 +27,7 @@ namespace {
 constexpr int kAttemptsMax = 60;
 constexpr std::size_t kTightest = 20;
 constexpr std::uint64_t kFreshStarts = 3;
+constexpr double kLongGiven = 1.02;
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
 /// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
@@ -49,9 +52,18 @@ class Planner {
         surroundings_(&scene_, start_) {}
 
   Result<Plan> Run();
+  Status CheckOnly() {
+    Classify();
+    return Check();
+  }
 
  private:
   Status Check();
+  [[nodiscard]] bool IsGiven(std::uint32_t unit) const {
+    return !request_.given.empty() && request_.given[unit] != 0;
+  }
+  void TakeGiven(std::uint32_t unit);
+  Result<Plan> AmongGiven();
   void NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
                       const char* what, std::string* text) const;
   void Classify();
@@ -93,12 +105,17 @@ class Planner {
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
   Choreography choreography_;                   // tracks of plan_
   Plan plan_;
-  std::string too_near_;  // pairs that start nearer than allowed, by name
+  double given_end_s_ = 0;  // of the last motion that is given
+  std::string too_near_;    // pairs that start nearer than allowed, by name
 };
 
 Status CheckShapes(const PlanRequest& request) {
   if (request.layout == nullptr) return Fail(ErrorCode::kInvalid, "a plan needs a layout");
   const std::size_t n = request.layout->size();
+  const auto fits = [n](std::size_t size) { return size == 0 || size == n; };
+  if (!fits(request.motions.size()) || !fits(request.given.size()) ||
+      request.given.size() > request.motions.size())
+    return Fail(ErrorCode::kInvalid, "motions and given must be empty or have one row a unit");
   if (request.drives.size() == n && request.start.size() == n && request.targets.size() == n &&
       request.frozen.size() == n)
     return {};
@@ -123,6 +140,10 @@ void Planner::Classify() {
     const bool enabled = layout_.unit({i}).enabled;
     const bool frozen = request_.frozen[i] != 0;
     const bool place = scene_.is_place(i);
+    if (IsGiven(i) && place) {
+      TakeGiven(i);
+      continue;
+    }
     movable_[i] = enabled && !frozen && place ? 1 : 0;
     if (!request_.targets[i]) continue;
     if (movable_[i] != 0) {
@@ -136,6 +157,15 @@ void Planner::Classify() {
       Unserve(i, UnservedWhy::kBlocked, i);
     }
   }
+}
+
+void Planner::TakeGiven(std::uint32_t unit) {
+  const AxisPaths& motion = request_.motions[unit];
+  for (std::size_t k = 0; k < kAxisCount; ++k)
+    for (const Segment& segment : motion[k].segments()) {
+      goal_[unit][k] += segment.delta;
+      given_end_s_ = std::max(given_end_s_, TimeOf(segment, request_.drives[unit].axis[k]).t1_s);
+    }
 }
 
 void Planner::Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by) {
@@ -297,7 +327,7 @@ bool Planner::CanEver(std::uint32_t unit, std::optional<NoWay>* proof) {
   if (goal_[unit] == start_[unit]) return true;
   std::vector<std::uint8_t> immovable(scene_.size());
   for (const NeighbourNeed& near : scene_.neighbours(unit))
-    immovable[near.unit] = movable_[near.unit] == 0 ? 1 : 0;
+    immovable[near.unit] = movable_[near.unit] == 0 && !IsGiven(near.unit) ? 1 : 0;
   PathSearch::Question question;
   question.arm = &scene_.arm(unit);
   question.drive = &request_.drives[unit];
@@ -430,7 +460,9 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     scene_.AllowFor(goal_);
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
     std::optional<PowerLedger> ledger;
-    double within_s = std::max(BoundS(), plan_.makespan_s);
+    double within_s = std::max({BoundS(), plan_.makespan_s, options_.within_s});
+    // Each turn of sectors may take a little longer than its bound: that must not add up.
+    if (given_end_s_ > kLongGiven * within_s) within_s = given_end_s_;
     if (options_.power.any()) {
       ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
       // Where power is what takes the time, rails that are full leave no room to give way.
@@ -444,6 +476,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
                                  .to = goal_,
                                  .movable = may_move,
                                  .begin_with = paths,
+                                 .given = request_.given,
                                  .ledger = ledger ? &*ledger : nullptr,
                                  .tolerance = tolerance,
                                  .within_s = within_s,
@@ -534,13 +567,23 @@ Plan Planner::Finish() {
   return std::move(plan_);
 }
 
+/// An order would not know what is given.
+Result<Plan> Planner::AmongGiven() {
+  if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
+  if (too_near_.empty() && AllAtOnce(request_.motions)) return Finish();
+  std::string text = "no way was found among the motions that are given";
+  for (const std::uint32_t i : stuck_) text += ", unit " + UnitName(layout_, i);
+  return Fail(ErrorCode::kRefused, text);
+}
+
 Result<Plan> Planner::Run() {
   Classify();
   FOCALFLEET_TRY(Check());
+  if (!request_.given.empty()) return AmongGiven();
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
   const bool dense = MeanNeighbours() > kDenseNeighbours;
   const bool at_once = too_near_.empty() && !dense && !options_.stall_tolerant;
-  if (at_once && AllAtOnce({})) return Finish();
+  if (at_once && AllAtOnce(request_.motions)) return Finish();
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
@@ -571,9 +614,19 @@ Result<Plan> Planner::Run() {
 
 }  // namespace
 
+Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) {
+  FOCALFLEET_TRY(CheckShapes(request));
+  return Planner(request, options).CheckOnly();
+}
+
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
-  return Planner(request, options).Run();
+  if (options.objective == Objective::kSoonest) return Planner(request, options).Run();
+  PlanOptions soonest = options;
+  soonest.objective = Objective::kSoonest;
+  soonest.within_s = 0;
+  FOCALFLEET_TRY_ASSIGN(Plan plan, Planner(request, soonest).Run());
+  return ImprovePlan(request, options, std::move(plan));
 }
 
 }  // namespace focalfleet

@@ -28,7 +28,16 @@ struct PlanRequest {
   /// Units that must not move whatever the targets say: disabled, silent, faulty. Non-zero is
   /// frozen. Shape: (n).
   std::span<const std::uint8_t> frozen;
+  /// Motions that are known beforehand: what a unit may begin with, if it leads to its target.
+  /// Shape: (n), or empty.
+  std::span<const AxisPaths> motions = {};
+  /// Non-zero: somebody else plans this unit, and its motion stands as it is. All others go around
+  /// it at once, never in an order. Shape: (n), or empty: nobody. Pre: it starts at a place.
+  std::span<const std::uint8_t> given = {};
 };
+
+/// What the time that is there is used for, objective.h.
+enum class Objective : std::uint8_t { kSoonest, kLeastEnergy, kLeastPeak, kEvenPower };
 
 struct PlanOptions {
   bool fixed = false;  // units without a target may not even step aside
@@ -43,6 +52,10 @@ struct PlanOptions {
   /// In stages: a unit that halts unseen anywhere in one touches nobody as long as the next does
   /// not begin. Takes several times as long; Plan::stages_s says where to look at all units again.
   bool stall_tolerant = false;
+  Objective objective = Objective::kSoonest;
+  /// With another objective than kSoonest the plan ends by then (0: when the soonest one does).
+  /// With kSoonest, time that may be used without being noticed, where the bound is shorter.
+  double within_s = 0;
   std::uint64_t seed = 1;
   PowerLimits power = {};  // hard at every instant, for every skew and clock
   MotorModel motor = {};   // what the motors draw
@@ -50,9 +63,13 @@ struct PlanOptions {
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the
 /// reason. Errors: kInvalid where the start or the targets collide (all pairs named), or an array
-/// has the wrong size. Cost: O(n) for bounded neighbourhoods, a fraction of a second for 5000
-/// units; path searches come on top.
+/// has the wrong size; kRefused where limits of power or given motions leave no way. Cost: O(n) for
+/// bounded neighbourhoods, a fraction of a second for 5000 units; path searches come on top.
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options);
+
+/// What MakePlan asks of its input, all collisions of starts and of targets named. Errors:
+/// kInvalid.
+Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options);
 
 /// Targets that send the neighbours of `homing` out of every place that its arm may pass on its way
 /// home: phi to its upper stop first, from anywhere that its knowledge allows, then theta to its

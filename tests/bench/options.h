@@ -1,4 +1,4 @@
-// The few options of a bench: --name VALUE, all integers.
+// The few options of a bench: --name VALUE, integers but for names of files.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +14,14 @@ inline int Option(int argc, char** argv, const char* name, int otherwise) {
     if (std::strcmp(argv[i], name) == 0) return std::atoi(argv[i + 1]);
   }
   return otherwise;
+}
+
+/// Empty: not given.
+inline const char* TextOption(int argc, char** argv, const char* name) {
+  for (int i = 1; i + 1 < argc; i += 2) {
+    if (std::strcmp(argv[i], name) == 0) return argv[i + 1];
+  }
+  return "";
 }
 
 inline double Median(std::vector<double> values) {

@@ -1,20 +1,27 @@
 // Random configuration to random configuration, one line a configuration: makespan over the lower
 // bound, CPU seconds, who was not served; the independent checker on request. A summary at the end.
 //   plan_bench --layout 0 --units 5000 --configurations 100 --seed 1 --check 1
+// --beside retract: what the way of others would take at least: all fold into their cells, all
+// rotate, all extend, each when the last one has ended, if nobody ever met anybody.
+// --plot FILE: the distribution of both, SVG. --objective 1, 2, 3: least energy, least peak, even
+// power.
 // --layout 0 hexagonal, 1 the plate of the file FOCALFLEET_DESI_UNITS names, 2 SDSS-like.
 #include <sys/resource.h>
 
+#include <array>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
 #include <sstream>
 
-#include "fleet/estimate.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/hex_layout.h"
+#include "fleet/plan/objective.h"
 #include "fleet/plan/planner.h"
+#include "fleet/plan/scene.h"
 #include "fleet/targets.h"
 #include "tests/bench/options.h"
+#include "tests/bench/ratio_plot.h"
 #include "tests/fleet/plan/plan_rows.h"
 
 namespace focalfleet::bench {
@@ -47,8 +54,29 @@ double BoundOf(const PlanRequest& request) {
   return bound_s;
 }
 
+/// Fold, rotate, extend with a barrier after each. Units: s.
+double RetractOf(const PlanRequest& request) {
+  const Scene scene(*request.layout, request.drives, request.start);
+  std::array<double, 3> stage_s{};
+  for (std::uint32_t i = 0; i < scene.size(); ++i) {
+    if (!request.targets[i] || request.frozen[i] != 0) continue;
+    const Pose from = PlaceOf(request.start[i]);
+    const Pose to = *request.targets[i];
+    const std::int32_t low = scene.HasCell(i) ? scene.cell(i).low : scene.arm(i).range().high[1];
+    const auto& axis = request.drives[i].axis;
+    const auto take = [&](std::size_t stage, std::size_t k, std::int32_t vectors) {
+      stage_s[stage] = std::max(stage_s[stage], std::abs(vectors) * SecondsPerVector(axis[k]));
+    };
+    take(0, 1, std::max(low - from[1], 0));
+    take(1, 0, to[0] - from[0]);
+    take(2, 1, std::max(low - to[1], 0));
+  }
+  return stage_s[0] + stage_s[1] + stage_s[2];
+}
+
 struct Row {
   double ratio = 0;
+  double retract_ratio = 0;
   double cpu_s = 0;
 };
 
@@ -59,6 +87,8 @@ int Run(int argc, char** argv) {
   const auto seed = static_cast<std::uint64_t>(Option(argc, argv, "--seed", 1));
   const double rail_limit_W = Option(argc, argv, "--rail-limit-mw", 0) * 1e-3;
   const bool check = Option(argc, argv, "--check", 0) != 0;
+  const bool beside = std::string(TextOption(argc, argv, "--beside")) == "retract";
+  const std::string plot = TextOption(argc, argv, "--plot");
   auto layout = Layout::Create(UnitsOf(kind, count), {});
   if (!layout || layout->size() == 0) return std::fprintf(stderr, "no such layout\n"), 2;
   const std::size_t n = layout->size();
@@ -88,17 +118,21 @@ int Run(int argc, char** argv) {
     const double begin_s = CpuSeconds();
     PlanOptions options;
     options.power.rail_W = rail_limit_W;
+    options.objective = static_cast<Objective>(Option(argc, argv, "--objective", 0) % 4);
     const auto plan = MakePlan(request, options);
     const double cpu_s = CpuSeconds() - begin_s;
     if (!plan) return std::fprintf(stderr, "%s\n", plan.error().text.c_str()), 1;
     const double bound_s = BoundOf(request);
-    rows.push_back({plan->makespan_s / bound_s, cpu_s});
-    const PlanEstimate estimate = Estimate(*plan, *layout, drives, {});
+    rows.push_back({plan->makespan_s / bound_s, RetractOf(request) / bound_s, cpu_s});
+    if (beside) std::printf("retract-rotate-extend %.4f; ", rows.back().retract_ratio);
+    const PowerStatement power = StatePower(*plan, *layout, drives, options);
     double rail_peak_W = 0;
-    for (const RailCurve& rail : estimate.rails)
-      for (const PowerStep& step : rail.steps) rail_peak_W = std::max(rail_peak_W, step.power_W);
-    std::printf("energy %.1f J, largest rail's peak %.2f W, total peak %.2f W; ", estimate.energy_J,
-                rail_peak_W, estimate.peak_power_W);
+    for (const RailStatement& rail : power.rails) rail_peak_W = std::max(rail_peak_W, rail.peak_W);
+    std::printf(
+        "energy %.1f J, largest rail's peak %.2f W (at most %.2f W), total peak %.2f W (at most "
+        "%.2f W), flatness %.3f; ",
+        power.energy_J, rail_peak_W, power.LargestRail_W(), power.peak_W, power.peak_most_W,
+        power.flatness);
     std::string verdict = "-";
     if (check) {
       testing::CheckOptions check_options;
@@ -120,9 +154,11 @@ int Run(int argc, char** argv) {
     std::fflush(stdout);
   }
   std::vector<double> ratios;
+  std::vector<double> retract;
   std::vector<double> cpu;
   for (const Row& row : rows) {
     ratios.push_back(row.ratio);
+    retract.push_back(row.retract_ratio);
     cpu.push_back(row.cpu_s);
   }
   rusage usage{};
@@ -132,6 +168,16 @@ int Run(int argc, char** argv) {
       "memory %ld MiB, %d with faults\n",
       n, configurations, Median(ratios), *std::max_element(ratios.begin(), ratios.end()),
       Median(cpu), *std::max_element(cpu.begin(), cpu.end()), usage.ru_maxrss / 1024, faults);
+  if (beside)
+    std::printf("retract-rotate-extend: ratio median %.4f worst %.4f at least\n", Median(retract),
+                *std::max_element(retract.begin(), retract.end()));
+  if (!plot.empty()) {
+    const char* kinds[] = {"hexagonal", "DESI's plate", "SDSS-like"};
+    std::ofstream(plot) << PlotRatios(
+        std::string(kinds[kind % 3]) + ", " + std::to_string(n) + " units, " +
+            std::to_string(configurations) + " random configurations",
+        {{"focalfleet", "#06c", ratios}, {"retract, rotate, extend, at least", "#c40", retract}});
+  }
   return faults == 0 ? 0 : 1;
 }
 

@@ -198,6 +198,54 @@ TEST_F(OfflineCommands, PlanServesADrawnConfigurationAndTellsTheSummary) {
   EXPECT_GT(told["rails"][0]["peak_power_W"].get<double>(), 0);
 }
 
+TEST_F(OfflineCommands, PlanSavesEnergyLowersThePeakOrEvensPowerOut) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto planned = [&](const std::vector<std::string>& options) {
+    const auto result = Plan(targets, options);
+    EXPECT_EQ(result.exit, 0) << result.err;
+    return Json::parse(result.out, nullptr, false);
+  };
+  const auto number = [](const Json& told, const char* key) { return told[key].get<double>(); };
+  const Json soonest = planned({"--json"});
+  EXPECT_EQ(soonest["objective"], "soonest");
+  EXPECT_GE(number(soonest, "peak_power_most_W"), number(soonest, "peak_power_W"));
+  const Json energy = planned({"--json", "--least-energy"});
+  EXPECT_EQ(energy["objective"], "least_energy");
+  EXPECT_LE(number(energy, "energy_J"), number(soonest, "energy_J") * (1 + 1e-9));
+  const Json peak = planned({"--json", "--least-peak"});
+  EXPECT_LT(number(peak, "peak_power_most_W"), number(soonest, "peak_power_most_W"));
+  const Json even = planned({"--json", "--even-power", "--within-s", "60"});
+  EXPECT_GT(number(even, "flatness"), number(soonest, "flatness"));
+  EXPECT_LE(number(even, "makespan_s"), 60);
+  EXPECT_EQ(Plan(targets, {"--even-power", "--least-peak"}).exit, 2);
+}
+
+TEST_F(OfflineCommands, PlanSaysWhichTimeIsFeasible) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto soon = Plan(targets, {"--even-power", "--within-s", "0.5"});
+  EXPECT_EQ(soon.exit, 1);
+  EXPECT_THAT(soon.err, HasSubstr("no plan within 0.50 s was found: the soonest one takes "));
+  const auto alone = Plan(targets, {"--within-s", "60"});
+  EXPECT_EQ(alone.exit, 1);
+  EXPECT_THAT(alone.err, HasSubstr("--within-s goes with --least-energy"));
+  EXPECT_THAT(scratch_.List(), Not(Contains("plan.csv")));
+}
+
+TEST_F(OfflineCommands, PlanBySectorsServesAll) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto result = Plan(targets, {"--sectors", "3", "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["served"], 37);
+  EXPECT_EQ(told["sectors"], 3);
+  const auto refused = Plan(targets, {"--sectors", "38"});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.err, HasSubstr("38 sectors: between 1 and 37 are possible"));
+}
+
 TEST_F(OfflineCommands, PlanWritesAPageToLookAt) {
   const std::string targets = scratch_ / "t.csv";
   ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
@@ -228,7 +276,8 @@ TEST_F(OfflineCommands, PlanNamesADisabledTargetAndEndsWithThree) {
       Plan(scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,0,180\n"), {"--json"});
   EXPECT_EQ(result.exit, 3) << result.err;
   const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["unserved"], Json::parse(R"([{"unit_id":1,"why":"disabled","by":null}])"));
+  EXPECT_EQ(told["unserved"],
+            Json::parse(R"([{"unit_id":1,"why":"disabled","by":null,"proof":null}])"));
   const auto quiet = Plan(scratch_ / "t.csv", {"-q"});
   EXPECT_EQ(quiet.exit, 3);
   EXPECT_THAT(quiet.out, IsEmpty());
