@@ -19,11 +19,13 @@ constexpr double kTickS = 1e-4;
 constexpr double kLastS = limits::kOffsetTicksMax * kTickS;  // that a segment can begin
 constexpr double kGuardMm = 1.5e-4;  // of a pair that may be as near as the rule allows
 constexpr double kCoverSlackMm = 0.05;
-/// Grids of the search among the others as they go, and how far it may look: what it costs.
+/// Grids of the searches among the others as they go, and as they stand in the end: as fine as an
+/// answer within some milliseconds allows.
 struct Effort {
   double grid_deg;
   std::uint32_t expansions_max;
 };
+constexpr std::array kGridsAtRestDeg{3.0, 1.5};
 constexpr std::array kEfforts{Effort{6, 300}, Effort{3, 600}};
 
 AxisPaths Later(const AxisPaths& paths, std::uint32_t by_ticks) {
@@ -42,6 +44,15 @@ AxisPaths Sooner(const AxisPaths& paths, std::uint32_t by_ticks) {
 }
 
 std::uint32_t TicksOf(double t_s) { return static_cast<std::uint32_t>(std::llround(t_s / kTickS)); }
+
+Way Reversed(const Way& way) {
+  Way reversed(way.size());
+  for (std::size_t k = 0; k < way.size(); ++k) {
+    reversed[k] = way[way.size() - 1 - k];
+    reversed[k].out_of_step = k == 0 ? 1 : way[way.size() - k].out_of_step;
+  }
+  return reversed;
+}
 
 bool IsEmpty(const AxisPaths& paths) { return paths[0].size() + paths[1].size() == 0; }
 
@@ -84,8 +95,10 @@ class Replanner {
   bool TakeOneOf(bool with_notice);
   void Candidates(double within_s);
   bool Search(double end_s, bool with_notice);
-  bool GoWhenAllStand(bool with_notice);
-  bool FindWay(bool with_notice);
+  [[nodiscard]] Way WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached) const;
+  bool TakeAlong(const Way& way);
+  bool GoWhenAllStand();
+  bool FindWay();
   [[nodiscard]] double OthersEnd() const;
   void EnterPower();
   LateMove Finish();
@@ -331,47 +344,63 @@ double Replanner::OthersEnd() const {
   return end_s;
 }
 
-/// Waits until the others have ended, and goes along a way among them as they stand then.
-bool Replanner::GoWhenAllStand(bool with_notice) {
+/// A way among the others as they stand in the end; empty: none on this grid. `reached`: how many
+/// poses were, where there is none.
+Way Replanner::WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached) const {
   std::vector<Blocker> blockers = standing_;
   for (const Other& other : others_)
     blockers.push_back({{scene_.arm(other.unit).At(other.ends), 0}, other.need_mm, other.unit});
-  PathSearch search;
   PathSearch::Question question;
   question.arm = &arm();
   question.drive = &drive();
   question.blockers = blockers;
-  question.from = q_.from;
+  question.from = backwards ? q_.to : q_.from;
   question.within = RangeAround(arm(), q_.from);
-  question.goal = PoseBox::Of(q_.to);
-  for (const double grid_deg : kSearchGridsDeg) {
-    question.grid_deg = grid_deg;
-    const Way way = search.Find(question);
-    if (way.empty()) continue;
-    CandidateQuestion along{
-        .scene = &scene_, .drive = &drive(), .unit = q_.unit.value, .from = q_.from, .to = q_.to};
-    candidates_.clear();
-    AppendAlong(along, way, &candidates_);
-    if (candidates_.empty()) continue;
-    along.within_s = std::max(0.0, OthersEnd() - start_s_) + candidates_.front().end_s;
-    AppendAlong(along, way, &candidates_);
-    if (TakeOneOf(with_notice)) return true;
-  }
-  return false;
+  question.goal = PoseBox::Of(backwards ? q_.from : q_.to);
+  question.grid_deg = grid_deg;
+  PathSearch search;
+  Way way = search.Find(question);
+  *reached = search.reached().size();
+  return backwards ? Reversed(way) : way;
 }
 
-/// Within the time that the others take anyhow, then after them.
-bool Replanner::FindWay(bool with_notice) {
+/// Waits until the others have ended, and goes along a way among them as they stand then.
+bool Replanner::GoWhenAllStand() {
+  // Where there is no way the start or the target is shut in: the fine search begins at that end,
+  // where it soon knows.
+  std::size_t from_start = 0;
+  std::size_t from_end = 0;
+  if (TakeAlong(WayInTheEnd(kGridsAtRestDeg[0], false, &from_start))) return true;
+  if (TakeAlong(WayInTheEnd(kGridsAtRestDeg[0], true, &from_end))) return true;
+  return TakeAlong(WayInTheEnd(kGridsAtRestDeg[1], from_end < from_start, &from_start));
+}
+
+bool Replanner::TakeAlong(const Way& way) {
+  if (way.empty()) return false;
+  CandidateQuestion along{
+      .scene = &scene_, .drive = &drive(), .unit = q_.unit.value, .from = q_.from, .to = q_.to};
+  candidates_.clear();
+  AppendAlong(along, way, &candidates_);
+  if (candidates_.empty()) return false;
+  along.within_s = std::max(0.0, OthersEnd() - start_s_) + candidates_.front().end_s;
+  AppendAlong(along, way, &candidates_);
+  return TakeOneOf(true);
+}
+
+/// Within the time that the others take anyhow, then after them, at last without notice.
+bool Replanner::FindWay() {
   const double straight_s = Straight(drive(), q_.from, q_.to).end_s;
   const double within_s = std::max(straight_s, running_.end_s_ - start_s_);
   Candidates(within_s);
-  if (TakeOneOf(with_notice)) return true;
-  if (Search(start_s_ + within_s, with_notice)) return true;
+  if (TakeOneOf(true) || Search(start_s_ + within_s, true)) return true;
   // Folded all the way in and out again, once the others stand.
   const PoseBox& range = arm().range();
   const double fold_s = (range.high[1] - range.low[1]) * SecondsPerVector(drive().axis[1]);
   Candidates(std::max(0.0, OthersEnd() - start_s_) + straight_s + 2 * fold_s);
-  return TakeOneOf(with_notice) || GoWhenAllStand(with_notice);
+  if (TakeOneOf(true) || GoWhenAllStand()) return true;
+  if (running_.options_.notice_s <= 0) return false;
+  Candidates(within_s);
+  return TakeOneOf(false) || Search(start_s_ + within_s, false);
 }
 
 /// What the others draw; who stands for certain draws nothing.
@@ -459,7 +488,7 @@ Result<LateMove> Replanner::Run() {
   LookAround();
   FOCALFLEET_TRY(CheckTarget());
   EnterPower();
-  if (FindWay(true) || (running_.options_.notice_s > 0 && FindWay(false))) return Finish();
+  if (FindWay()) return Finish();
   return tl::unexpected(NoWay());
 }
 
