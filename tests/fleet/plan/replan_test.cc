@@ -60,17 +60,19 @@ class UnderWay {
     extra_.clear();
   }
   /// All within the tolerance, half of them at its corners; or all at one corner.
+  void SetClocks(int corner) {
+    clocks_.assign(size(),
+                   {(corner & 1) != 0 ? options_.start_skew_s : -options_.start_skew_s,
+                    1 + ((corner & 2) != 0 ? options_.clock_error : -options_.clock_error)});
+  }
   void DrawClocks(Rng* rng, int corner) {
+    if (corner > 0) return SetClocks(corner);
     const auto draw = [&](double most) {
       const double u = rng->Uniform(-1, 1);
       return rng->Uniform() < 0.5 ? std::copysign(most, u) : most * u;
     };
-    for (Clock& clock : clocks_) {
+    for (Clock& clock : clocks_)
       clock = {draw(options_.start_skew_s), 1 + draw(options_.clock_error)};
-      if (corner > 0)
-        clock = {(corner & 1) != 0 ? options_.start_skew_s : -options_.start_skew_s,
-                 1 + ((corner & 2) != 0 ? options_.clock_error : -options_.clock_error)};
-    }
   }
   [[nodiscard]] bool Moves(std::uint32_t i, double true_s) const {
     return move_of_[i] != nullptr && true_s < EndOf(i) && true_s < stops_[i];
@@ -212,6 +214,28 @@ class UnderWay {
       *text += fault + "\n";
     }
     return unclear;
+  }
+  /// At all corners of the late unit's own clock.
+  void ExpectClear(const LateMove& late, double since_s) {
+    for (const double skew : {-late.start_skew_s, late.start_skew_s}) {
+      for (const double rate : {0.995, 1.005}) {
+        Go(late, {skew, rate});
+        std::string text;
+        EXPECT_TRUE(Unclear({late.move.unit.value}, since_s, &text).empty())
+            << "unit index " << late.move.unit.value << " starts at " << late.start_s << " s:\n"
+            << text;
+      }
+    }
+  }
+  /// Were its start this much beyond its skew.
+  bool WouldMeet(const LateMove& late, double since_s, double beyond_s) {
+    bool meets = false;
+    for (const double skew : {-late.start_skew_s - beyond_s, late.start_skew_s + beyond_s}) {
+      Go(late, {skew, 1});
+      std::string text;
+      meets = meets || !Unclear({late.move.unit.value}, since_s, &text).empty();
+    }
+    return meets;
   }
   [[nodiscard]] bool IsUnnoticed(const Pair& pair) const {
     const auto is = [&](const Unnoticed& u) {
@@ -393,15 +417,7 @@ TEST(Replan, IsClearOfAllOthersForEverySkewAndClock) {
       ++served;
       failed += draw->failed ? 1 : 0;
       ExpectEndsAt(*late, draw->question);
-      for (const double skew : {-kLateSkewS, kLateSkewS}) {
-        for (const double rate : {0.995, 1.005}) {
-          fleet->Go(*late, {skew, rate});
-          std::string text;
-          EXPECT_TRUE(fleet->Unclear({draw->unit}, draw->question.now_s, &text).empty())
-              << "unit index " << draw->unit << " starts at " << late->start_s << " s:\n"
-              << text;
-        }
-      }
+      fleet->ExpectClear(*late, draw->question.now_s);
     }
   }
   std::printf(
@@ -409,6 +425,64 @@ TEST(Replan, IsClearOfAllOthersForEverySkewAndClock) {
       asked, served, failed, collides);
   EXPECT_GE(served, asked * 9 / 10);
   EXPECT_GT(failed, 10);
+}
+
+bool GoesStraightAtOnce(const LateMove& late) {
+  return std::all_of(late.move.path.begin(), late.move.path.end(), [](const AxisPath& path) {
+    return path.size() == 0 || (path.size() == 1 && path.segments()[0].start_ticks == 0);
+  });
+}
+
+/// Its neighbours go from one random configuration to another; it stands.
+std::optional<UnderWay> BegunAround(std::uint32_t unit, std::uint64_t seed) {
+  PlanningFleet fleet = HexFleet(7);
+  DrawStartAndTargets(&fleet, seed);
+  std::vector<std::optional<Pose>> standing(fleet.layout.size());
+  standing[unit] = PlaceOf(fleet.start[unit]);
+  const auto to =
+      DrawConfiguration(fleet.layout, fleet.drives, standing, Rng::Stream(seed, "targets"));
+  if (!to) return std::nullopt;
+  fleet.targets.assign(to->begin(), to->end());
+  fleet.targets[unit].reset();
+  const PlanOptions options{.fixed = true, .notice_s = 0};
+  auto plan = MakePlan(fleet.request(), options);
+  if (!plan || !plan->unserved.empty()) return std::nullopt;
+  return std::optional<UnderWay>(std::in_place, std::move(fleet), options, std::move(*plan));
+}
+
+// The straight way opens or closes while somebody passes: at that moment the tolerance of clocks
+// and skews is all that keeps the two apart.
+TEST(Replan, HoldsWhereTheStraightWayJustOpensOrCloses) {
+  constexpr double kStepS = 0.02;
+  int turns = 0;
+  int tight = 0;
+  for (std::uint64_t k = 0; k < 60; ++k) {
+    const std::uint64_t seed = TestSeed(1000 + k);
+    FOCALFLEET_TRACE_SEED(seed);
+    const std::uint32_t unit = 3;  // has all others around it
+    auto fleet = BegunAround(unit, seed);
+    if (!fleet) continue;
+    const auto target = fleet->DrawTarget(unit, Rng::Stream(seed, "target"));
+    ASSERT_TRUE(target);
+    ReplanQuestion question{.unit = {unit}, .from = fleet->EndPose(unit), .to = *target};
+    std::optional<LateMove> before;
+    for (; question.start_s < fleet->plan().makespan_s; question.start_s += kStepS) {
+      const auto late = fleet->running().Replan(question, {});
+      if (!late) break;
+      if (before && GoesStraightAtOnce(*late) != GoesStraightAtOnce(*before)) {
+        ++turns;
+        const LateMove& clear = GoesStraightAtOnce(*late) ? *late : *before;
+        tight += fleet->WouldMeet(clear, 0, 0.5) ? 1 : 0;
+        for (int corner = 0; corner < 4; ++corner) {
+          fleet->SetClocks(corner);
+          fleet->ExpectClear(clear, 0);
+        }
+      }
+      before = *late;
+    }
+  }
+  std::printf("%d times the straight way opens or closes; %d of them are tight\n", turns, tight);
+  EXPECT_GT(tight, 5);
 }
 
 // Whoever ends early from then on, the late unit or one of its neighbours: with their followers
