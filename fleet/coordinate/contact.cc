@@ -93,7 +93,8 @@ bool Contact::Service(PositionerIndex i) {
 /// Others pass where it may stand: it is asked more often, and missed sooner.
 void Contact::Watch(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
-  if (core_.now >= record.watch_until) return;
+  // As long as it may have ended while that mattered.
+  if (record.seen_moving >= record.watch_until) return;
   const Noticing noticing = NoticingOf(core_.config);
   record.next_poll =
       std::min(record.next_poll, std::max(core_.now + noticing.poll, record.watch_from));
