@@ -38,7 +38,7 @@ inline double DistanceMm(PointFp p, const SegmentFp& s) { return std::sqrt(Squar
 /// Squared distance of two segments, 0 within rounding where they cross: the nearest points of the
 /// two lines, moved to the ends where they lie beyond (Ericson, Real-Time Collision Detection,
 /// 5.1.9). Where the two are almost parallel the nearest points are ill-conditioned, their distance
-/// is not: it stays within 1e-7 mm. Units: mm^2.
+/// is not: it stays within 1e-6 mm. Units: mm^2.
 constexpr double SquaredDistance(const SegmentFp& s, const SegmentFp& t) {
   const double ux = s.b.x_mm - s.a.x_mm;
   const double uy = s.b.y_mm - s.a.y_mm;

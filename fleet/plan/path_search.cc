@@ -209,8 +209,10 @@ std::optional<Waypoint> PathSearch::Leg(const Pose& from, const Pose& to) const 
   return Waypoint{to, step->out_of_step};
 }
 
-/// Each leg as far along the way as it can go.
+/// Each leg as far along the way as it can go; where that leaves many corners, the fewest that
+/// there can be with corners on the way.
 Way PathSearch::Shorten(const std::vector<Pose>& way) const {
+  constexpr std::size_t kManyCorners = 6;
   Way corners{{way.front()}};
   std::size_t at = 0;
   while (at + 1 < way.size()) {
@@ -221,7 +223,39 @@ Way PathSearch::Shorten(const std::vector<Pose>& way) const {
     corners.push_back(leg ? *leg : Waypoint{way[next]});
     at = next;
   }
-  return corners;
+  return corners.size() > kManyCorners ? WithFewestCorners(way) : corners;
+}
+
+Way PathSearch::WithFewestCorners(const std::vector<Pose>& way) const {
+  struct Corner {
+    std::size_t came_from = 0;
+    Waypoint at;
+    bool seen = false;
+  };
+  std::vector<Corner> corners(way.size());
+  corners[0] = {0, {way.front()}, true};
+  std::vector<std::size_t> layer{0};
+  while (!corners.back().seen) {
+    std::vector<std::size_t> next_layer;
+    for (const std::size_t from : layer) {
+      for (std::size_t to = way.size() - 1; to > from && !corners.back().seen; --to) {
+        if (corners[to].seen) continue;
+        std::optional<Waypoint> leg = Leg(way[from], way[to]);
+        if (!leg && to == from + 1) leg = Waypoint{way[to]};
+        if (!leg) continue;
+        corners[to] = {from, *leg, true};
+        next_layer.push_back(to);
+      }
+    }
+    layer = std::move(next_layer);
+  }
+  Way found;
+  for (std::size_t at = way.size() - 1;; at = corners[at].came_from) {
+    found.push_back(corners[at].at);
+    if (at == 0) break;
+  }
+  std::reverse(found.begin(), found.end());
+  return found;
 }
 
 }  // namespace focalfleet

@@ -89,6 +89,7 @@ class PathSearch {
   [[nodiscard]] std::int64_t Estimate(const Pose& pose) const;
   [[nodiscard]] std::vector<Pose> Trace(std::int32_t node) const;
   [[nodiscard]] Way Shorten(const std::vector<Pose>& way) const;
+  [[nodiscard]] Way WithFewestCorners(const std::vector<Pose>& way) const;
   [[nodiscard]] std::optional<Waypoint> Leg(const Pose& from, const Pose& to) const;
 
   Question q_;

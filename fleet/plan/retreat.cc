@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint8_t kFavoursMax = 3;
 constexpr std::uint8_t kShakesMax = 2;  // for one unit
-constexpr int kShakeTries = 600;
+constexpr int kShakeTries = 300;
 constexpr int kShakeSteps = 7;
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <map>
 #include <numbers>
+#include <thread>
 
 #include "tests/fleet/plan/planning.h"
 
@@ -147,6 +148,41 @@ TEST(Sectors, AreTheSameWhoeverComputesWhen) {
     ASSERT_TRUE(joined) << joined.error().text;
     ExpectSame(*joined, made->plan);
   }
+}
+
+TEST(Sectors, TwoThreadsMakeTheSamePlanAsOne) {
+  const std::uint64_t seed = TestSeed(725);
+  FOCALFLEET_TRACE_SEED(seed);
+  const PlanningFleet fleet = Drawn(500, seed);
+  const PlanRequest request = fleet.request();
+  const auto made = PlanBySectors(request, {}, {.count = 6});
+  const auto whole = MakePlan(request, {});
+  ASSERT_TRUE(made && whole);
+  const std::vector<Sector>& sectors = made->sectors;
+  std::vector<std::optional<SectorPlan>> plans(sectors.size());
+  for (std::uint32_t turn = 0; turn < 2; ++turn) {
+    // What a turn writes is looked at in the next one only.
+    const std::vector<std::optional<SectorPlan>> before = plans;
+    const auto every_other = [&](std::uint32_t first) {
+      for (std::uint32_t s = 0, n = 0; s < sectors.size(); ++s) {
+        if (sectors[s].turn != turn || n++ % 2 != first) continue;
+        auto plan = PlanSector(request, {}, sectors, before, s);
+        if (plan) plans[s] = std::move(*plan);
+      }
+    };
+    std::thread other(every_other, 1);
+    every_other(0);
+    other.join();
+  }
+  const auto joined = JoinSectors(request, {}, sectors, plans);
+  ASSERT_TRUE(joined) << joined.error().text;
+  ExpectSame(*joined, made->plan);
+  std::optional<Plan> again;
+  std::thread other([&] { again = *MakePlan(request, {}); });
+  const auto beside = MakePlan(request, {});
+  other.join();
+  ExpectSame(*again, *whole);
+  ExpectSame(*beside, *whole);
 }
 
 /// All motions begin this much later.
