@@ -78,6 +78,9 @@ struct Plan {
   std::string too_near;   // with PlanOptions::lead_apart: the pairs that are led apart, for people
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
   double bound_s = 0;     // no plan can be shorter: the slowest unit's shortest move alone
+  /// With PlanOptions::stall_tolerant: when each stage begins; where everybody is must be measured
+  /// before. Seconds after the start signal.
+  std::vector<double> stages_s;
   std::uint32_t crossings = 0;       // pairs of which one comes where the other was before
   std::vector<Unnoticed> unnoticed;  // those among them that the notice does not cover
   std::vector<TightPair> tightest;   // those with the least clearance; empty: nobody looked

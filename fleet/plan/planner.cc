@@ -582,7 +582,8 @@ Result<Plan> Planner::Run() {
   if (!request_.given.empty()) return AmongGiven();
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
   const bool dense = MeanNeighbours() > kDenseNeighbours;
-  if (too_near_.empty() && !dense && AllAtOnce(request_.motions)) return Finish();
+  const bool at_once = too_near_.empty() && !dense && !options_.stall_tolerant;
+  if (at_once && AllAtOnce(request_.motions)) return Finish();
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
@@ -598,14 +599,15 @@ Result<Plan> Planner::Run() {
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
       if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, kNobody);
   }
-  const std::vector<Piece> pieces = CutPieces(order, scene_);
+  // Stages gain nothing from short legs.
+  const std::vector<Piece> pieces = options_.stall_tolerant ? order : CutPieces(order, scene_);
   std::optional<PowerLedger> ledger;
   if (options_.power.any())
     ledger.emplace(layout_, request_.drives, options_.motor, options_.power,
                    Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
-  if (too_near_.empty() && !dense && !stuck_for_order_.empty()) ServeTheRest();
+  if (at_once && !stuck_for_order_.empty()) ServeTheRest();
   if (choreography_.tracks.empty()) TracksOfPlan();
   return Finish();
 }
@@ -619,6 +621,12 @@ Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) 
 
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
+  // Stages are an order in time: whoever goes at another time would leave them.
+  if (options.stall_tolerant &&
+      (options.objective != Objective::kSoonest || !request.given.empty()))
+    return Fail(ErrorCode::kInvalid,
+                "a plan in stages that unseen halts leave clear can neither have another objective "
+                "nor go around given motions");
   if (options.objective == Objective::kSoonest) return Planner(request, options).Run();
   PlanOptions soonest = options;
   soonest.objective = Objective::kSoonest;

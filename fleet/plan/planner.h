@@ -49,6 +49,9 @@ struct PlanOptions {
   /// How long it may take until a unit that has ended early is noticed and those that would run
   /// into it are stopped. Pairs for which the plan cannot promise that are in Plan::unnoticed.
   double notice_s = 1;
+  /// In stages: a unit that halts unseen anywhere in one touches nobody as long as the next does
+  /// not begin. Takes several times as long; Plan::stages_s says where to look at all units again.
+  bool stall_tolerant = false;
   Objective objective = Objective::kSoonest;
   /// With another objective than kSoonest the plan ends by then (0: when the soonest one does).
   /// With kSoonest, time that may be used without being noticed, where the bound is shorter.

@@ -72,6 +72,9 @@ class Scheduler {
                                      std::int64_t phi) const;
   std::optional<AxisPaths> FindPower(const Piece& piece, std::int64_t earliest);
   Timed Lay(std::uint32_t index, std::int64_t earliest, const AxisPaths& paths);
+  Status Place(std::uint32_t index, std::int64_t earliest);
+  [[nodiscard]] std::vector<std::uint32_t> FindStages() const;
+  Status RunInStages(Plan* plan);
   void Collect(Plan* plan);
 
   std::span<const Piece> order_;
@@ -156,34 +159,79 @@ Result<Plan> Scheduler::Run() {
   laid_.resize(scene_.size());
   plans_.resize(scene_.size());
   axis_end_.resize(scene_.size(), {-1, -1});
-  for (std::uint32_t index = 0; index < order_.size(); ++index) {
-    const Piece& piece = order_[index];
-    std::int64_t earliest = laid_[piece.unit].empty() ? 0 : laid_[piece.unit].back().end;
-    const std::size_t first_wait = waits_.size();
-    for (const NeighbourNeed& near : scene_.neighbours(piece.unit)) {
-      for (const Timed& other : laid_[near.unit]) {
-        if (!Meet(piece, order_[other.piece], near.need_mm)) continue;
-        earliest = std::max(earliest, After(other.end));
-        waits_.push_back({near.unit, piece.unit, other.end, 0});
-      }
-    }
-    AxisPaths paths = SegmentsOf(piece, earliest, earliest);
-    if (ledger_ != nullptr) {
-      const std::optional<AxisPaths> fed = FindPower(piece, earliest);
-      if (!fed) return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
-      paths = *fed;
-    }
-    for (const AxisPath& path : paths)
-      if (path.size() > 0 && path.segments().front().start_ticks > limits::kOffsetTicksMax)
-        return Fail(ErrorCode::kRefused,
-                    "the motion would take longer than a start offset can say");
-    const Timed timed = Lay(index, earliest, paths);
-    for (std::size_t k = first_wait; k < waits_.size(); ++k) waits_[k].begins = timed.begin;
-    laid_[piece.unit].push_back(timed);
-  }
   Plan plan;
+  if (options_.stall_tolerant) {
+    FOCALFLEET_TRY(RunInStages(&plan));
+  } else {
+    for (std::uint32_t index = 0; index < order_.size(); ++index) FOCALFLEET_TRY(Place(index, 0));
+  }
   Collect(&plan);
   return plan;
+}
+
+/// The piece begins as soon as it may, not before `earliest`.
+Status Scheduler::Place(std::uint32_t index, std::int64_t earliest) {
+  const Piece& piece = order_[index];
+  if (!laid_[piece.unit].empty()) earliest = std::max(earliest, laid_[piece.unit].back().end);
+  const std::size_t first_wait = waits_.size();
+  for (const NeighbourNeed& near : scene_.neighbours(piece.unit)) {
+    for (const Timed& other : laid_[near.unit]) {
+      if (!Meet(piece, order_[other.piece], near.need_mm)) continue;
+      earliest = std::max(earliest, After(other.end));
+      waits_.push_back({near.unit, piece.unit, other.end, 0});
+    }
+  }
+  AxisPaths paths = SegmentsOf(piece, earliest, earliest);
+  if (ledger_ != nullptr) {
+    const std::optional<AxisPaths> fed = FindPower(piece, earliest);
+    if (!fed) return Fail(ErrorCode::kRefused, "no plan within the limits of power was found");
+    paths = *fed;
+  }
+  for (const AxisPath& path : paths)
+    if (path.size() > 0 && path.segments().front().start_ticks > limits::kOffsetTicksMax)
+      return Fail(ErrorCode::kRefused, "the motion would take longer than a start offset can say");
+  const Timed timed = Lay(index, earliest, paths);
+  for (std::size_t k = first_wait; k < waits_.size(); ++k) waits_[k].begins = timed.begin;
+  laid_[piece.unit].push_back(timed);
+  return {};
+}
+
+/// The stage of every piece: behind all that come before it in the order and that it would meet,
+/// so pieces of one stage meet nobody's, wherever their units may halt. Shape: as the order.
+std::vector<std::uint32_t> Scheduler::FindStages() const {
+  std::vector<std::uint32_t> stages(order_.size(), 0);
+  std::vector<std::vector<std::uint32_t>> earlier(scene_.size());
+  for (std::uint32_t index = 0; index < order_.size(); ++index) {
+    const Piece& piece = order_[index];
+    std::uint32_t& stage = stages[index];
+    if (!earlier[piece.unit].empty()) stage = stages[earlier[piece.unit].back()];
+    for (const NeighbourNeed& near : scene_.neighbours(piece.unit))
+      for (const std::uint32_t other : earlier[near.unit])
+        if (stages[other] >= stage && Meet(piece, order_[other], near.need_mm))
+          stage = stages[other] + 1;
+    earlier[piece.unit].push_back(index);
+  }
+  return stages;
+}
+
+/// Each stage begins when all of the one before it have ended, and there is time to look.
+Status Scheduler::RunInStages(Plan* plan) {
+  const std::vector<std::uint32_t> stages = FindStages();
+  std::vector<std::uint32_t> sorted(order_.size());
+  for (std::uint32_t index = 0; index < order_.size(); ++index) sorted[index] = index;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](std::uint32_t a, std::uint32_t b) { return stages[a] < stages[b]; });
+  std::int64_t begin = 0;
+  std::int64_t end = 0;
+  for (std::size_t k = 0; k < sorted.size(); ++k) {
+    if (k == 0 || stages[sorted[k]] != stages[sorted[k - 1]]) {
+      if (k > 0) begin = After(end);
+      plan->stages_s.push_back(static_cast<double>(begin) / kTimerHz);
+    }
+    FOCALFLEET_TRY(Place(sorted[k], begin));
+    end = std::max(end, laid_[order_[sorted[k]].unit].back().end);
+  }
+  return {};
 }
 
 void Scheduler::Collect(Plan* plan) {

@@ -2,8 +2,9 @@
 // the other; here each gets its time under one rule: of two pieces of different units whose swept
 // boxes are not clear of each other, the later in the order begins only after the earlier has
 // ended, whatever the start skew and the clocks. docs/adr/0003-one-at-a-time-then-parallel.md
-// proves that this is enough. Times are kept in timer counts (1 / 144 MHz), in which a vector is a
-// whole number; segments begin on ticks.
+// proves that this is enough. In stages, all of one stage begin after all of the one before have
+// ended, and no two of one stage meet: whoever halts in it unseen is in nobody's way. Times are
+// kept in timer counts (1 / 144 MHz), in which a vector is a whole number; segments begin on ticks.
 #pragma once
 
 #include <span>

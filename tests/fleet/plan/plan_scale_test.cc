@@ -27,7 +27,9 @@ double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
     ADD_FAILURE() << plan.error().text;
     return 1e9;
   }
-  EXPECT_TRUE(plan->unserved.empty()) << plan->unserved.size() << " units";
+  // Who is not served has no way at all: next to disabled units that happens.
+  for (const Unserved& unserved : plan->unserved)
+    EXPECT_TRUE(unserved.proof) << "unit index " << unserved.unit.value;
   const double ratio = plan->makespan_s / plan->bound_s;
   // All at once hardly any of the pairs that cross may be noticed too late; an order has no notice.
   if (ratio < 1.25) {
@@ -42,15 +44,13 @@ double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
 
 constexpr std::uint64_t kSeedsPerTest = 5;
 
-/// Usual plates come within some thousandths of the bound; one in thirty has a pair that is hooked
-/// so tightly that the whole plate is planned in order, and takes up to 1.4 times as long.
-void ExpectCloseToTheBound(PlanningFleet* fleet, std::uint64_t first) {
+void ExpectCloseToTheBound(PlanningFleet* fleet, std::uint64_t first, double worst) {
   std::vector<double> ratios;
   for (std::uint64_t k = 0; k < kSeedsPerTest; ++k)
     ratios.push_back(ExpectAllServed(fleet, TestSeed(1 + first + k)));
   std::sort(ratios.begin(), ratios.end());
   EXPECT_LE(ratios[kSeedsPerTest / 2], 1.05);
-  EXPECT_LE(ratios.back(), 1.5);
+  EXPECT_LE(ratios.back(), worst);
 }
 
 class HexScale : public ::testing::TestWithParam<int> {};
@@ -58,9 +58,16 @@ class HexScale : public ::testing::TestWithParam<int> {};
 TEST_P(HexScale, Serves5000UnitsFromRandomToRandom) {
   PlanningFleet fleet = HexFleet(5000);
   const std::uint64_t first = static_cast<std::uint64_t>(GetParam()) * kSeedsPerTest;
-  ExpectCloseToTheBound(&fleet, first);
+  ExpectCloseToTheBound(&fleet, first, 1.25);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, HexScale, ::testing::Range(0, 4));
+
+TEST(DenseScale, ServesPlatesLikeThoseOfSdss) {
+  PlanningFleet small = FleetOf(MakeHexLayout(SdssLike(500)));
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) ExpectAllServed(&small, TestSeed(seed));
+  PlanningFleet large = FleetOf(MakeHexLayout(SdssLike(5000)));
+  ExpectAllServed(&large, TestSeed(7));
+}
 
 #ifdef FOCALFLEET_DESI_UNITS
 class DesiScale : public ::testing::TestWithParam<int> {};
@@ -74,7 +81,7 @@ TEST_P(DesiScale, ServesAllEnabledUnitsOfTheRealPlate) {
   PlanningFleet fleet = FleetOf(std::move(read->units));
   ASSERT_EQ(fleet.layout.size(), 5020u);
   const std::uint64_t first = static_cast<std::uint64_t>(GetParam()) * kSeedsPerTest;
-  ExpectCloseToTheBound(&fleet, first);
+  ExpectCloseToTheBound(&fleet, first, 1.4);
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, DesiScale, ::testing::Range(0, 2));
 #endif

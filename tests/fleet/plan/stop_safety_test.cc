@@ -302,7 +302,7 @@ class StopSafety : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
     seed_ = TestSeed(static_cast<std::uint64_t>(GetParam()));
-    PlanningFleet fleet = HexFleet(5000);
+    PlanningFleet fleet = FleetOf(Plate(), {});
     ASSERT_NO_FATAL_FAILURE(DrawStartAndTargets(&fleet, seed_));
     const PlanOptions options = Options();
     auto plan = MakePlan(fleet.request(), options);
@@ -311,6 +311,7 @@ class StopSafety : public ::testing::TestWithParam<int> {
     fleet_.emplace(std::move(fleet), std::move(*plan), options);
   }
   [[nodiscard]] virtual PlanOptions Options() const { return {}; }
+  [[nodiscard]] virtual std::vector<Unit> Plate() const { return MakeHexLayout({.count = 5000}); }
   [[nodiscard]] double DrawInstant(Rng* rng) const {
     return rng->Uniform(0, fleet_->plan().makespan_s);
   }
@@ -529,11 +530,11 @@ TEST_P(StopSafetyOnce, ALookAtTheNeighboursFindsWhatALookAtAllFinds) {
   EXPECT_GT(found, 0u) << "nothing was found, the test proves nothing";
 }
 
-// In an order, one after the other, no pair is proven with notice: what the plan says of the time
-// that is left must hold all the same.
+// Where units stand so dense that they go in an order, no pair is proven with notice: what the plan
+// says of the time that is left must hold all the same.
 class StopSafetyInOrder : public StopSafety {
  protected:
-  [[nodiscard]] PlanOptions Options() const override { return {.lead_apart = true}; }
+  [[nodiscard]] std::vector<Unit> Plate() const override { return MakeHexLayout(SdssLike(1000)); }
 };
 
 TEST_P(StopSafetyInOrder, EveryFollowerIsStoppedInTimeOrNamed) {
@@ -544,6 +545,56 @@ TEST_P(StopSafetyInOrder, EveryFollowerIsStoppedInTimeOrNamed) {
               plan.crossings, fleet_->UnnoticedPairs());
   StopEveryFollower(&*fleet_, &rng, 16);
 }
+
+// In stages a unit may halt unseen, with both axes, and nobody need be stopped before the next one.
+class StopSafetyInStages : public StopSafety {
+ protected:
+  [[nodiscard]] PlanOptions Options() const override { return {.stall_tolerant = true}; }
+  /// When any unit may begin the stage after the one of `t_s`, whatever its clock; for ever after
+  /// the last. Units: s.
+  [[nodiscard]] double NextStage(double t_s) const {
+    const auto& stages = fleet_->plan().stages_s;
+    const auto next = std::upper_bound(stages.begin(), stages.end(), t_s);
+    const PlanOptions& options = fleet_->options();
+    return next == stages.end() ? kNever : *next / (1 + options.clock_error) - options.start_skew_s;
+  }
+};
+
+TEST_P(StopSafetyInStages, AHaltThatNobodySeesTouchesNobody) {
+  FOCALFLEET_TRACE_SEED(seed_);
+  Rng rng = Rng::Stream(seed_, "halts");
+  const Plan& plan = fleet_->plan();
+  Tally tally;
+  int without_stages = 0;
+  for (int draw = 0; draw < kInstants; ++draw) {
+    fleet_->DrawClocks(&rng);
+    const double t_s = DrawInstant(&rng);
+    for (const bool in_stages : {true, false}) {
+      fleet_->GoOn();
+      if (in_stages)
+        for (const std::uint32_t i : fleet_->Everybody()) fleet_->StopAt(i, NextStage(t_s));
+      int halted = 0;
+      for (const std::uint32_t i : fleet_->Everybody()) {
+        if (i % 40 != static_cast<std::uint32_t>(draw % 40) || !fleet_->Moves(i, t_s)) continue;
+        fleet_->StopAt(i, t_s);
+        ++halted;
+      }
+      if (halted == 0) break;
+      if (in_stages)
+        tally.Count(*fleet_, halted, t_s - kBeforeS);
+      else
+        without_stages += static_cast<int>(
+            fleet_->Check(fleet_->StoppedAndNeighbours(), t_s - kBeforeS).pairs.size());
+    }
+  }
+  std::printf("%zu stages, makespan %.2f s, bound %.2f s; ", plan.stages_s.size(), plan.makespan_s,
+              plan.bound_s);
+  tally.Print("one in forty halts");
+  EXPECT_GT(tally.draws, kInstants / 2);
+  EXPECT_EQ(tally.unclear + tally.unnoticed, 0);
+  EXPECT_GT(without_stages, 0) << "the stages made no difference, the test proves nothing";
+}
+INSTANTIATE_TEST_SUITE_P(Seeds, StopSafetyInStages, ::testing::Range(1, 3));
 
 TEST(StopTimes, TheTimeThatIsLeftHoldsForBadClocks) {
   PlanningFleet fleet = HexFleet(127);
