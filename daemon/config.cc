@@ -70,6 +70,7 @@ void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Wait("reply_wait_ms", &c->timing.reply_wait);
   visit->Wait("identify_period_ms", &c->timing.identify_period);
   visit->Wait("poll_period_ms", &c->timing.poll_period);
+  visit->Wait("notice_ms", &c->timing.notice);
   visit->Wait("clock_period_ms", &c->timing.clock_period);
   visit->Wait("start_delay_ms", &c->timing.start_delay);
   visit->Wait("settle_margin_ms", &c->timing.settle_margin);

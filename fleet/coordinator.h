@@ -215,6 +215,9 @@ struct CoordinatorConfig {
   DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again
   DurationNs poll_period =
       Milliseconds(1000);  // progress of each moving unit; health of each resting one x10
+  /// From the end of a unit by itself to the stop of those that would come where it stands; what
+  /// plans are made with, unless reply_wait asks for more (fleet/coordinate/noticing.h).
+  DurationNs notice = Milliseconds(1000);
   DurationNs clock_period = Milliseconds(500);
   DurationNs start_delay = Milliseconds(250);    // start frame to start instant, all buses
   DurationNs settle_margin = Milliseconds(500);  // after the predicted end before a unit is asked

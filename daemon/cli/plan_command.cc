@@ -2,6 +2,7 @@
 // or look at it.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <ctime>
 #include <set>
@@ -105,6 +106,7 @@ Json GuaranteeJson(const Planned& planned, const PlanOptions& options) {
   return {{"start_skew_s", options.start_skew_s},
           {"clock_error", options.clock_error},
           {"notice_s", options.notice_s},
+          {"stages_s", planned.plan.stages_s},
           {"crossing_pairs", planned.plan.crossings},
           {"without_notice", late},
           {"tightest", tightest}};
@@ -146,6 +148,10 @@ Json Summary(const Planned& planned, const PlanCommandOptions& options) {
 
 std::string DescribeGuarantee(const Json& guarantee) {
   std::string text;
+  if (!guarantee["stages_s"].empty())
+    text += fmt::format("\n  in {} stages; measure all units before {:.2f} s",
+                        guarantee["stages_s"].size(),
+                        fmt::join(guarantee["stages_s"].get<std::vector<double>>(), ", "));
   if (!guarantee["tightest"].empty()) {
     const Json& nearest = guarantee["tightest"].front();
     text += fmt::format(
@@ -186,6 +192,13 @@ ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
   if (options.plan.within_s > 0 && options.plan.objective == Objective::kSoonest)
     return Report(context, {ErrorCode::kInvalid,
                             "--within-s goes with --least-energy, --least-peak or --even-power"});
+  if (options.plan.stall_tolerant &&
+      (options.sectors > 1 || options.plan.objective != Objective::kSoonest))
+    return Report(context, {ErrorCode::kInvalid,
+                            "--stall-tolerant goes with neither --sectors nor an objective"});
+  if (options.plot == options.out)
+    return Report(context, {ErrorCode::kInvalid,
+                            fmt::format("{}: --out and --plot name one file", options.out)});
   const auto planned = MakeAndWrite(context, options);
   if (!planned) return Report(context, planned.error());
   const Json summary = Summary(*planned, options);
@@ -255,6 +268,9 @@ void AddPlanCommand(CommandLine* line) {
                    "Time to notice that a unit has stopped by itself, and to stop those that "
                    "follow it, s [1]")
       ->check(CLI::Range(0.0, 60.0));
+  command->add_flag("--stall-tolerant", options->plan.stall_tolerant,
+                    "In stages, in which a unit that halts unseen touches nobody; all must be "
+                    "measured in between");
   AddObjectives(command, options.get());
   command
       ->add_option("--sectors", options->sectors,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "fleet/coordinate/noticing.h"
 #include "fleet/coordinate/reconcile.h"
 #include "protocol/base/check.h"
 
@@ -38,7 +39,15 @@ constexpr std::int64_t kRestPollFactor = 10;
 bool Contact::Service(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   if (record.question) {
-    if (!core_.AskAgain(i)) NoAnswer(i);
+    if (core_.now >= record.question->suspect_at) {
+      record.question->suspect_at = kNever;
+      core_.Tell(i, UnitEventKind::kUnheard);
+    }
+    if (core_.now < record.question->deadline) {
+      core_.SetDue(i, record.question->deadline);
+    } else if (!core_.AskAgain(i)) {
+      NoAnswer(i);
+    }
     return true;
   }
   const bool poll = core_.now >= record.next_poll;
@@ -69,6 +78,7 @@ bool Contact::Service(PositionerIndex i) {
       const bool moves = IsUnderWay(record.view.phase);
       record.next_poll = core_.now + core_.config.poll_period * (moves ? 1 : kRestPollFactor);
       core_.Ask(i, StatusRequest{});
+      if (record.view.phase == kMoving) Watch(i);
       return true;
     }
     case kStaging:
@@ -78,6 +88,19 @@ bool Contact::Service(PositionerIndex i) {
       return false;
   }
   return false;
+}
+
+/// Others pass where it may stand: it is asked more often, and missed sooner.
+void Contact::Watch(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  // As long as it may have ended while that mattered.
+  if (record.seen_moving >= record.watch_until) return;
+  const Noticing noticing = NoticingOf(core_.config);
+  record.next_poll =
+      std::min(record.next_poll, std::max(core_.now + noticing.poll, record.watch_from));
+  // Also where the answer may be awaited into the time in which it matters.
+  if (core_.now + core_.Patience() >= record.watch_from)
+    record.question->suspect_at = core_.now + noticing.suspicion;
 }
 
 void Contact::AskNext(PositionerIndex i) {
@@ -232,7 +255,10 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   const auto intent = core_.intents.find(core_.unit(i).view.serial);
   const bool began = intent != core_.intents.end() && status.move == intent->second.move;
   const bool turns = status.state == UnitState::kMoving || status.state == UnitState::kHoming;
-  if (turns) return;
+  if (turns) {
+    if (began) core_.unit(i).seen_moving = core_.unit(i).answered_asked;
+    return;
+  }
   if (core_.unit(i).view.phase == kSettling) {
     Identify(i);  // a motion of an earlier run has ended
     return;
@@ -247,6 +273,7 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
     core_.Raise(Severity::kWarning, i, {}, core_.NameOf(i) + " did not begin to move");
   } else {
     Identify(i);  // its own report was lost; its FLASH says where it stands
+    core_.Tell(i, UnitEventKind::kEnded);
   }
 }
 

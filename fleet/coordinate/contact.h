@@ -38,6 +38,7 @@ class Contact {
   void AskNext(PositionerIndex i);  // the next question of the identification
   void Concluded(PositionerIndex i);
   void Bind(PositionerIndex i);
+  void Watch(PositionerIndex i);
   void NoAnswer(PositionerIndex i);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);

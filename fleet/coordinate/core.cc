@@ -149,7 +149,8 @@ void Core::Ask(PositionerIndex i, const HostMessage& message) {
     record.runs_freely = false;
   }
   const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
-  record.question = Question{message, AnswerFunction(frame), record.sequence, 0, kNever};
+  record.question = Question{
+      .message = message, .answer_function = AnswerFunction(frame), .sequence = record.sequence};
   if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
     record.question->deadline = now + kQueueFullWait;
     SetDue(i, record.question->deadline);
@@ -170,6 +171,11 @@ bool Core::AskAgain(PositionerIndex i) {
     SetDue(i, question.deadline);
   }
   return true;
+}
+
+DurationNs Core::Patience() const {
+  constexpr std::int64_t kWaits = (std::int64_t{1} << (limits::kRequestRetries + 1)) - 1;
+  return config.reply_wait * kWaits + config.transmit_horizon * (limits::kRequestRetries + 1);
 }
 
 void Core::Forget(PositionerIndex i) {
@@ -195,6 +201,7 @@ bool Core::Answers(PositionerIndex i, Function function, std::uint8_t sequence) 
   if (!record.question || record.question->answer_function != function ||
       record.question->sequence != sequence)
     return false;
+  record.answered_asked = record.question->asked;
   record.question.reset();
   SetDue(i, now);  // Service decides what comes next, unless the handler asks at once
   return true;
@@ -313,11 +320,14 @@ void Core::EndStep() {
     bus.schedule.Release(now, config.transmit_horizon, bus.id, &out->frames, &asked_);
     for (const PositionerIndex i : asked_) {
       if (!unit(i).question) continue;
+      Question& question = *unit(i).question;
+      question.asked = std::min(question.asked, now);
       // Each repeat waits twice as long as the one before: a host that was held up for a moment
       // must not take the silence for its units'.
-      const std::int64_t patience = std::int64_t{1} << unit(i).question->tries;
-      unit(i).question->deadline = now + config.transmit_horizon + config.reply_wait * patience;
-      SetDue(i, unit(i).question->deadline);
+      const std::int64_t patience = std::int64_t{1} << question.tries;
+      question.deadline = std::min(now + config.transmit_horizon + config.reply_wait * patience,
+                                   std::max(question.suspect_at, now + config.transmit_horizon));
+      SetDue(i, question.deadline);
     }
     out->wake_at =
         std::min({out->wake_at, bus.clock_due, bus.schedule.ReadyAt(config.transmit_horizon)});

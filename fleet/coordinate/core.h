@@ -32,6 +32,9 @@ struct Question {
   std::uint8_t sequence = 0;
   std::uint8_t tries = 0;
   HostInstant deadline = kNever;  // set when the frame leaves
+  HostInstant asked = kNever;     // when it first left
+  /// Where others depend on an answer by then: said once, before the retries are over.
+  HostInstant suspect_at = kNever;
 };
 
 /// What has been read of a unit since it was last identified.
@@ -52,6 +55,12 @@ struct UnitRecord {
   HostInstant due = kNever;  // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
+  // In motion: when others depend on where it is, and when the last question was asked to which it
+  // answered that it moves.
+  HostInstant watch_from = kNever;
+  HostInstant watch_until{INT64_MIN};
+  HostInstant seen_moving{INT64_MIN};
+  HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   // Stops of ours, so that one of somebody else's is told from them.
   std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
   HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
@@ -72,6 +81,8 @@ enum class UnitEventKind : std::uint8_t {
   kReady,        // read anew, or its motion ended where it should: its knowledge is settled
   kStopped,      // its motion ended before its end
   kNeverBegan,   // did not start with the others
+  kUnheard,      // in motion, does not answer at once: may have ended
+  kEnded,        // in motion, says that it stands, not yet where
   kLost,         // silent, restarted, foreign or faulty: not to be counted on
   kForeignStop,  // it obeyed a stop that is not ours
 };
@@ -107,6 +118,8 @@ class Core {
   void Forget(PositionerIndex i);  // its open question, and what waits for it on the bus
   /// True where a retry went out; false where the last one is over: nobody answers.
   [[nodiscard]] bool AskAgain(PositionerIndex i);
+  /// How long a question may stay open, all repeats included.
+  [[nodiscard]] DurationNs Patience() const;
   /// Frames past the queue: stops, starts, the clock.
   void SendNow(std::size_t bus, const HostMessage& message, NodeId node);
   /// A `done, stopped` under this sequence number, which no open question waits for, may answer a

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "fleet/coordinate/noticing.h"
 #include "protocol/base/check.h"
 #include "protocol/base/limits.h"
 
@@ -181,6 +182,7 @@ void Pursuit::BeginRound() {
       .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
   job.options.fixed = fixed_;
   job.options.lead_apart = true;
+  job.options.notice_s = NoticingOf(core_.config).notice.seconds();
   job.unproven = unproven_;
   bool any = !to_home_.empty();
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
@@ -345,15 +347,28 @@ void Pursuit::Take(const UnitEvent& event) {
       break;
     case UnitEventKind::kNeverBegan:
       Strike(i, "does not begin to move");
-      StopFollowers(i, core_.NameOf(i) + " stands in its way");
+      StopFollowers(i, {HostInstant{INT64_MIN}, core_.now}, core_.NameOf(i) + " stands in its way");
       break;  // settled when it has been read again
+    case UnitEventKind::kUnheard:
+      // Until it is heard, or given up, it may also end still.
+      if (part_[i.value] == Part::kMoving)
+        StopFollowers(i, SeenUntil(i, core_.now + core_.Patience()),
+                      core_.NameOf(i) + " is not heard and may stand in its way");
+      break;
+    case UnitEventKind::kEnded:
+      // Where its time is over it has arrived, most likely: its FLASH tells.
+      if (const auto course = CourseOf(i); course && !MayHaveArrived(*course))
+        StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " stands in its way");
+      break;
     case UnitEventKind::kLost:
       SetOutcome(
           i, TargetOutcome::kFailed,
           core_.unit(i).view.phase == kFault ? "it " + core_.TroubleOf(i) : "it " + event.reason);
       Exclude(i);
+      // Who is silent may move on, and end later.
       if (part_[i.value] == Part::kMoving)
-        StopFollowers(i, core_.NameOf(i) + " may stand in its way");
+        StopFollowers(i, SeenUntil(i, core_.unit(i).view.phase == kSilent ? kNever : core_.now),
+                      core_.NameOf(i) + " may stand in its way");
       if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];
       SetPart(i, Part::kNone);
       break;
@@ -375,7 +390,7 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
     // Not the target: whoever only makes way has none, and others may come to theirs by stages.
     const std::size_t plan = plan_of_[i.value];
     if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
-      StopFollowers(i, core_.NameOf(i) + " did not get out of its way");
+      StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " did not get out of its way");
   }
   if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];
   SetPart(i, Part::kNone);

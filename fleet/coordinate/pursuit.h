@@ -53,6 +53,8 @@ class Pursuit {
     HostInstant began;
   };
   [[nodiscard]] std::optional<Course> CourseOf(PositionerIndex i) const;
+  /// Its nominal end may be over by the quickest clock.
+  [[nodiscard]] bool MayHaveArrived(const Course& course) const;
 
  private:
   enum class State : std::uint8_t {
@@ -97,7 +99,14 @@ class Pursuit {
   void StopOne(PositionerIndex i, const std::string& reason);
   void Take(const UnitEvent& event);
   void Settled(PositionerIndex i, UnitEventKind how);
-  void StopFollowers(PositionerIndex first, const std::string& reason);
+  /// When a unit may have ended, both included.
+  struct Ended {
+    HostInstant from;
+    HostInstant until;
+  };
+  [[nodiscard]] Ended SeenUntil(PositionerIndex i, HostInstant until) const;
+  void StopFollowers(PositionerIndex first, const Ended& ended, const std::string& reason);
+  void WatchLeader(PositionerIndex i);
   void SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string reason = {});
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
@@ -106,6 +115,7 @@ class Pursuit {
   void Record();
   void CountPrediction();
   void SayWhatIsWaitedFor();
+  [[nodiscard]] HostInstant AtPlanTime(double t_s) const { return view_.started + Seconds(t_s); }
   [[nodiscard]] StagedMove StagedMoveOf(PositionerIndex i) const;
   [[nodiscard]] IntentRow IntentOf(PositionerIndex i) const;
   [[nodiscard]] IntentRow HomingIntentOf(PositionerIndex i) const;

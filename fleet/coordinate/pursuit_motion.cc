@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "fleet/coordinate/noticing.h"
 #include "fleet/coordinate/pursuit.h"
 #include "fleet/estimate.h"
 
@@ -75,9 +76,8 @@ void Pursuit::Start() {
     SetPart(move.unit, Part::kMoving);
     core_.SetPhase(move.unit, kMoving);
     before_[move.unit.value].reset();
-    // Spread over a poll period, so that a bus never hears all its units at once.
-    unit.next_poll = view_.started + core_.config.poll_period +
-                     DurationNs{core_.config.poll_period.ns * (move.unit.value % 97) / 97};
+    unit.seen_moving = HostInstant{INT64_MIN};
+    WatchLeader(move.unit);
     core_.SetDue(move.unit, unit.next_poll);
   }
   SetState(State::kMoving);
@@ -100,24 +100,62 @@ void Pursuit::RepeatStart() {
   due_ = start_repeat_;
 }
 
+// When it is asked first, and when others pass where it may stand.
+void Pursuit::WatchLeader(PositionerIndex i) {
+  constexpr DurationNs kBegun = Milliseconds(50);  // everybody has, whatever the skew
+  UnitRecord& unit = core_.unit(i);
+  unit.watch_from = kNever;
+  unit.watch_until = HostInstant{INT64_MIN};
+  for (const auto& follower : plan_.moves[plan_of_[i.value]].followers) {
+    unit.watch_from = std::min(unit.watch_from, AtPlanTime(follower.since_s));
+    unit.watch_until = std::max(unit.watch_until, AtPlanTime(follower.left_s));
+  }
+  // Spread over a period, so that a bus never hears all its units at once.
+  const auto spread = [&](DurationNs period) {
+    return DurationNs{period.ns * (i.value % 97) / 97};
+  };
+  const DurationNs poll = core_.config.poll_period;
+  const DurationNs watch = NoticingOf(core_.config).poll;
+  unit.next_poll = view_.started + poll + spread(poll);
+  if (unit.watch_from < unit.watch_until)
+    unit.next_poll = std::min(
+        unit.next_poll, std::max(view_.started + kBegun, unit.watch_from) + spread(watch - kBegun));
+}
+
 std::optional<Pursuit::Course> Pursuit::CourseOf(PositionerIndex i) const {
   if (part_[i.value] != Part::kMoving || plan_of_[i.value] == kNoPlan) return std::nullopt;
   return Course{&plan_.moves[plan_of_[i.value]], view_.started};
 }
 
-void Pursuit::StopFollowers(PositionerIndex first, const std::string& reason) {
-  std::vector<PositionerIndex> open{first};
+bool Pursuit::MayHaveArrived(const Course& course) const {
+  const PlanOptions allowed;
+  const double end_s = EndOf(*course.plan, core_.drives[course.plan->unit.value]);
+  return core_.now >=
+         course.began + Seconds(end_s * (1 - allowed.clock_error) - allowed.start_skew_s);
+}
+
+Pursuit::Ended Pursuit::SeenUntil(PositionerIndex i, HostInstant until) const {
+  return {core_.units[i.value].seen_moving, until};
+}
+
+// Those that come where it may stand. Who passes only where it has been already, or will not have
+// come yet, goes on.
+void Pursuit::StopFollowers(PositionerIndex first, const Ended& ended, const std::string& reason) {
+  std::vector<std::pair<PositionerIndex, Ended>> open{{first, ended}};
   while (!open.empty()) {
-    const PositionerIndex i = open.back();
+    const auto [i, when] = open.back();
     open.pop_back();
     if (plan_of_[i.value] == kNoPlan) continue;
     for (const auto& follower : plan_.moves[plan_of_[i.value]].followers) {
+      if (AtPlanTime(follower.left_s) < when.from || AtPlanTime(follower.since_s) > when.until)
+        continue;
       UnitRecord& unit = core_.unit(follower.unit);
       const bool asked = unit.question && std::holds_alternative<Stop>(unit.question->message);
       if (part_[follower.unit.value] != Part::kMoving || unit.view.phase != kMoving || asked)
         continue;
       StopOne(follower.unit, reason);
-      open.push_back(follower.unit);
+      // It ends when the stop gets through; should that take longer, it is looked at anew then.
+      open.push_back({follower.unit, {core_.now, core_.now + core_.Patience()}});
     }
   }
 }
@@ -286,7 +324,8 @@ void Pursuit::StopUnit(PositionerIndex i) {
     core_.SendNow(core_.unit(i).bus, Stop{}, core_.layout.unit(i).node);
     return;
   }
-  StopFollowers(i, core_.NameOf(i) + " was stopped and may stand in its way");
+  StopFollowers(i, {core_.now, core_.now + core_.Patience()},
+                core_.NameOf(i) + " was stopped and may stand in its way");
   StopOne(i, "by the operator");
 }
 

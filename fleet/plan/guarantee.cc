@@ -156,20 +156,61 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
   return tightest;
 }
 
-void FindFollowers(const FollowersQuestion& question, Plan* plan) {
+std::optional<Following> FindFollowing(const FollowingQuestion& q) {
   constexpr double h = Track::kSliceS;
   constexpr int kGroup = Track::kSlicesPerBounds;
+  const Track& mine = *q.ends;
+  const Track& other = *q.comes;
+  const double error = q.proven.clock_error;
+  Tolerance plain = q.proven;
+  plain.notice_s = 0;
+  std::optional<Following> found;
+  for (int n = std::max(0, static_cast<int>(q.from_s / h)); n < mine.slice_count(); ++n) {
+    if (n % kGroup == 0) {
+      // Nothing in this group of slices is met later: on to the next.
+      bool apart = true;
+      for (int g = n / kGroup; g * kGroup <= other.slice_count() && apart; ++g)
+        apart = Apart(mine.bounds(n / kGroup), other.bounds(g), q.need_mm);
+      if (apart) {
+        n += kGroup - 1;
+        continue;
+      }
+    }
+    const Slice& stands = mine.slice(n);
+    // Times within the slip are proven clear already.
+    const double after_s = n * h + q.proven.Slip(n * h);
+    for (int m = static_cast<int>(after_s / h); m <= other.slice_count(); ++m) {
+      const Slice& comes = other.slice(m);
+      const double enough = q.need_mm + stands.travel_mm + comes.travel_mm;
+      if (SquaredDistance(stands.line, comes.line) > enough * enough) continue;
+      const double meets_s = std::max(m * h, after_s);
+      const double begins_s = meets_s * (1 - error) - q.skew_s;
+      if (!found)
+        found = Following{.since_s = n * h * (1 - error) - q.skew_s,
+                          .begins_s = begins_s,
+                          .leaves_s = q.notice_s};
+      found->begins_s = std::min(found->begins_s, begins_s);
+      found->left_s = (n + 1) * h / (1 - error) + q.skew_s;
+      // What is proven holds for each instant of the slice, what is seen only for all of it;
+      // and the other may be ahead by its clock when this one ends.
+      const double ends_s = (n + 1) * h;
+      const double seen_s = (m * h - ends_s - plain.Slip(ends_s)) / (1 + error);
+      found->leaves_s = std::min(found->leaves_s, std::max(seen_s, q.proven.notice_s));
+      break;
+    }
+  }
+  return found;
+}
+
+void FindFollowers(const FollowersQuestion& question, Plan* plan) {
   const Scene& scene = *question.scene;
   Tolerance plain = question.tolerance;
   plain.notice_s = 0;
-  const double error = plain.clock_error;
-  const double skew_s = plain.start_skew_s;
   plan->unnoticed.clear();
   std::vector<std::pair<std::uint32_t, std::uint32_t>> crossing;
   for (UnitPlan& move : plan->moves) {
     move.followers.clear();
     const std::uint32_t i = move.unit.value;
-    const Track& mine = question.tracks[i];
     for (const NeighbourNeed& near : scene.neighbours(i)) {
       const Track& other = question.tracks[near.unit];
       if (other.legs().size() < 2) continue;
@@ -177,47 +218,17 @@ void FindFollowers(const FollowersQuestion& question, Plan* plan) {
       const bool excepted =
           std::binary_search(question.without_notice.begin(), question.without_notice.end(),
                              std::pair<std::uint32_t, std::uint32_t>(pair));
-      const Tolerance& proven = excepted ? plain : question.tolerance;
-      UnitPlan::Follower follower{{near.unit}, 0, 0, 0};
-      Unnoticed late{{i}, {near.unit}, 0, question.notice_s};
-      bool any = false;
-      for (int n = 0; n < mine.slice_count(); ++n) {
-        if (n % kGroup == 0) {
-          // Nothing in this group of slices is met later: on to the next.
-          bool apart = true;
-          for (int g = n / kGroup; g * kGroup <= other.slice_count() && apart; ++g)
-            apart = Apart(mine.bounds(n / kGroup), other.bounds(g), near.need_mm);
-          if (apart) {
-            n += kGroup - 1;
-            continue;
-          }
-        }
-        const Slice& stands = mine.slice(n);
-        // Times within the slip are proven clear already.
-        const double after_s = n * h + proven.Slip(n * h);
-        for (int m = static_cast<int>(after_s / h); m <= other.slice_count(); ++m) {
-          const Slice& comes = other.slice(m);
-          const double enough = near.need_mm + stands.travel_mm + comes.travel_mm;
-          if (SquaredDistance(stands.line, comes.line) > enough * enough) continue;
-          const double meets_s = std::max(m * h, after_s);
-          const double begins_s = meets_s * (1 - error) - skew_s;
-          if (!any) follower.since_s = n * h * (1 - error) - skew_s;
-          follower.begins_s = any ? std::min(follower.begins_s, begins_s) : begins_s;
-          follower.left_s = (n + 1) * h / (1 - error) + skew_s;
-          any = true;
-          // What is proven holds for each instant of the slice, what is seen only for all of it;
-          // and the other may be ahead by its clock when this one ends.
-          const double ends_s = (n + 1) * h;
-          const double seen_s = (m * h - ends_s - plain.Slip(ends_s)) / (1 + error);
-          const double leaves_s = std::max(seen_s, proven.notice_s);
-          if (leaves_s < late.leaves_s) late = {{i}, {near.unit}, follower.since_s, leaves_s};
-          break;
-        }
-      }
-      if (!any) continue;
+      const auto following = FindFollowing({.ends = &question.tracks[i],
+                                            .comes = &other,
+                                            .need_mm = near.need_mm,
+                                            .proven = excepted ? plain : question.tolerance,
+                                            .skew_s = plain.start_skew_s,
+                                            .notice_s = question.notice_s});
+      if (!following) continue;
       crossing.push_back(pair);
-      move.followers.push_back(follower);
-      if (late.leaves_s < question.notice_s) plan->unnoticed.push_back(late);
+      move.followers.push_back(following->FollowerOf({near.unit}));
+      if (following->leaves_s < question.notice_s)
+        plan->unnoticed.push_back({{i}, {near.unit}, following->since_s, following->leaves_s});
     }
   }
   std::sort(crossing.begin(), crossing.end());

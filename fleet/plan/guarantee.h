@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -18,6 +19,29 @@ namespace focalfleet {
 /// Cost: O(n), most pairs are dismissed by their bounds.
 std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> tracks,
                                     const Tolerance& tolerance, std::size_t count);
+
+/// One that may end early, and one that comes later where it was. Times after the start signal.
+struct FollowingQuestion {
+  const Track* ends = nullptr;
+  const Track* comes = nullptr;
+  double need_mm = 0;
+  Tolerance proven;     // the two are clear of each other with this, its notice included
+  double skew_s = 0;    // either may start this early or late
+  double from_s = 0;    // it has not ended before
+  double notice_s = 0;  // wanted
+};
+struct Following {
+  double since_s = 0;
+  double begins_s = 0;
+  double left_s = 0;
+  double leaves_s = 0;  // at least, from the end of the one to the stop of the other
+  [[nodiscard]] UnitPlan::Follower FollowerOf(PositionerIndex unit) const {
+    return {unit, begins_s, left_s, since_s};
+  }
+};
+/// None: the other never comes where this one was before. Cost: a distance for each two slices of
+/// half a second that are near.
+std::optional<Following> FindFollowing(const FollowingQuestion& question);
 
 /// Fills the followers of every move (who must be stopped before when, should that unit end early),
 /// counts the pairs that follow each other, and names those for which less than `notice_s` is left

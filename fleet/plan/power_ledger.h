@@ -29,6 +29,8 @@ class PowerLedger {
   /// Enters the motion of a unit where it keeps the limits. False: it does not, nothing changes.
   bool Enter(std::uint32_t unit, const AxisPaths& path);
   void Remove(std::uint32_t unit, const AxisPaths& path);
+  /// Units that are entered from now on may start this early or late.
+  void WidenSkew(double start_skew_s) { tolerance_.start_skew_s = start_skew_s; }
   /// Whether `path` would keep the limits if the unit left `instead_of`, which is entered.
   bool Fits(std::uint32_t unit, const AxisPaths& path, const AxisPaths& instead_of);
 

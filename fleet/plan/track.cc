@@ -250,16 +250,18 @@ bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
 
 }  // namespace
 
-bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
-                 double need_mm, const Tolerance& tolerance, int budget) {
+bool PassesClearSince(double since_s, const ArmGeometry& arm_a, const Track& a,
+                      const ArmGeometry& arm_b, const Track& b, double need_mm,
+                      const Tolerance& tolerance, int budget) {
   const double reach = need_mm + a.reach_mm() + b.reach_mm();
   if (SquaredDistance(arm_a.base_fp(), arm_b.base_fp()) > reach * reach) return true;
   constexpr double h = Track::kSliceS;
   constexpr int kGroup = Track::kSlicesPerBounds;
   const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
   const int last = std::max(a.slice_count(), b.slice_count());
-  for (int group = -1; group * kGroup <= last; ++group) {
-    const int first_n = std::max(group * kGroup, -1);
+  const int first = since_s < 0 ? -1 : static_cast<int>(std::min<double>(since_s / h, last));
+  for (int group = first < 0 ? -1 : first / kGroup; group * kGroup <= last; ++group) {
+    const int first_n = std::max(group * kGroup, first);
     const int last_n = std::min(group * kGroup + kGroup - 1, last);
     if (first_n > last_n) continue;
     const double slip_s = tolerance.Slip((last_n + 1) * h + tolerance.Slip((last_n + 1) * h));
@@ -287,12 +289,19 @@ bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& ar
           return Span1{k < 0 ? -Track::kForever : k * h,
                        k >= track.slice_count() ? Track::kForever : (k + 1) * h};
         };
-        if (!PartsClear(arm_a, a, time_of(n, a), arm_b, b, time_of(m, b), slip_s, need_mm, &budget))
+        Span1 time_a = time_of(n, a);
+        time_a.low = std::max(time_a.low, since_s);
+        if (!PartsClear(arm_a, a, time_a, arm_b, b, time_of(m, b), slip_s, need_mm, &budget))
           return false;
       }
     }
   }
   return true;
+}
+
+bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
+                 double need_mm, const Tolerance& tolerance, int budget) {
+  return PassesClearSince(-Track::kForever, arm_a, a, arm_b, b, need_mm, tolerance, budget);
 }
 
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,

@@ -117,6 +117,11 @@ inline SegmentFp ArmAt(const ArmGeometry& arm, const Leg& leg, double own_s) {
 bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
                  double need_mm, const Tolerance& tolerance, int budget = 2000);
 
+/// The same, asked of `a` from `since_s` of its own time on only: where it was before is no matter.
+bool PassesClearSince(double since_s, const ArmGeometry& arm_a, const Track& a,
+                      const ArmGeometry& arm_b, const Track& b, double need_mm,
+                      const Tolerance& tolerance, int budget = 2000);
+
 /// The same for one leg of `a`; before and after it nothing is asked.
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget = 500);

@@ -125,6 +125,7 @@ void InProcessFleet::StepOnce() {
   while (!planning_.empty() && planning_.front().at <= now_) {
     plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
     planning_.pop_front();
+    if (plans.back().plan) last_plan_ = *plans.back().plan;
   }
   while (!store_fails && !commits_.empty() && commits_.front().at <= now_) {
     store_.Commit(commits_.front().rows);

@@ -82,6 +82,8 @@ class InProcessFleet {
   [[nodiscard]] sim::World& world() { return *world_; }
   [[nodiscard]] const Layout& layout() const { return *layout_; }
   [[nodiscard]] MemoryStore& store() { return store_; }
+  /// That the coordinator was given last.
+  [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
@@ -115,6 +117,7 @@ class InProcessFleet {
   std::vector<ReplyEffect> replies_;
   std::vector<ReceivedFrame> heard_;
   Effects effects_;
+  Plan last_plan_;
   std::uint64_t next_request_ = 1;
   std::uint64_t digest_ = 0xcbf29ce484222325u;
 };

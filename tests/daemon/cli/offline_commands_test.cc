@@ -246,6 +246,30 @@ TEST_F(OfflineCommands, PlanBySectorsServesAll) {
   EXPECT_THAT(refused.err, HasSubstr("38 sectors: between 1 and 37 are possible"));
 }
 
+TEST_F(OfflineCommands, PlanInStagesSaysWhereToMeasureAndWhatItCosts) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto result = Plan(targets, {"--stall-tolerant", "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out, nullptr, false);
+  const Json& stages = told["guarantee"]["stages_s"];
+  ASSERT_GT(stages.size(), 1u);
+  EXPECT_EQ(stages[0], 0.0);
+  EXPECT_LT(stages.back().get<double>(), told["makespan_s"].get<double>());
+  EXPECT_GT(told["makespan_s"].get<double>(), told["bound_s"].get<double>());
+  EXPECT_THAT(Plan(targets, {"--stall-tolerant"}).out,
+              HasSubstr("measure all units before 0.00, "));
+  EXPECT_EQ(Plan(targets, {"--stall-tolerant", "--sectors", "2"}).exit, 1);
+}
+
+TEST_F(OfflineCommands, PlanRefusesOneNameForTwoFiles) {
+  const std::string targets = scratch_ / "t.csv";
+  ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
+  const auto result = Plan(targets, {"--plot", scratch_ / "plan.csv"});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.err, HasSubstr("--out and --plot name one file"));
+}
+
 TEST_F(OfflineCommands, PlanWritesAPageToLookAt) {
   const std::string targets = scratch_ / "t.csv";
   ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);

@@ -1,0 +1,105 @@
+// A new way for one unit while all others go on as they are: a target of opportunity, a unit that
+// was held back or comes late, one that goes on after a stop. The motions of the others are given,
+// bit for bit; the unit finds its way among them (candidates.h, time_search.h) and starts by a
+// signal of its own.
+//
+// Times. Everything here is counted in seconds after the start signal of the configuration, but
+// the segments of a late move count from its own start signal, as they go on the bus. Two start
+// signals are known apart only to the host's own timing, so a unit with one of its own has a wider
+// skew. Clocks part no faster than those of units that started together, so the slip of track.h
+// holds for such a pair with the mean of the two skews.
+//
+// Cost. A unit has some tens of neighbours at most, so one answer looks at them alone; what is
+// needed of the whole plate (the scene) is made once for each configuration.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "fleet/knowledge.h"
+#include "fleet/layout.h"
+#include "fleet/plan/plan.h"
+#include "fleet/plan/planner.h"
+#include "fleet/plan/power_ledger.h"
+#include "fleet/plan/scene.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+/// A move with a start signal of its own. Segments count from that signal, `move.followers` from
+/// the configuration's.
+struct LateMove {
+  UnitPlan move;
+  double start_s = 0;       // its start signal
+  double start_skew_s = 0;  // which may come this early or late
+  double end_s = 0;         // of the last segment
+  /// The plan of `unit` gets this follower: the unit of `move` has to be stopped if `unit` ends
+  /// early.
+  struct Leader {
+    PositionerIndex unit;
+    UnitPlan::Follower follower;
+  };
+  std::vector<Leader> leaders;
+  std::vector<Unnoticed> unnoticed;  // pairs with this unit that the notice does not cover
+};
+
+/// What is otherwise than planned with a unit: it has ended and stands (at a place, within an
+/// interval, or nobody knows where), or has a late move.
+struct Deviation {
+  PositionerIndex unit;
+  UnitKnowledge stands{};
+  std::optional<LateMove> goes;  // then `stands` is not looked at
+};
+
+struct ReplanQuestion {
+  PositionerIndex unit;
+  Pose from{};  // it stands there from `now_s` on, until it starts
+  Pose to{};
+  double now_s = 0;
+  double start_s = 0;  // when its own start signal can come: upload, read-back, arming, store
+  double start_skew_s = 0.040;
+};
+
+/// A configuration under way. Cannot be changed: who deviates from the plan is told with each
+/// question.
+class RunningPlan {
+ public:
+  /// Pre: `moves` are a plan for `request`, made with `options`; `request.layout` outlives this.
+  /// Cost: O(n), about 1 us a unit.
+  RunningPlan(const PlanRequest& request, std::span<const UnitPlan> moves,
+              const PlanOptions& options);
+  RunningPlan(const RunningPlan&) = delete;
+  RunningPlan& operator=(const RunningPlan&) = delete;
+
+  /// A move of the unit that is clear of everybody else's, for all clocks and skews, with notice
+  /// where that can be had, and within the limits of power. The soonest end among the ways that
+  /// are looked at. Deviations: at most one for each unit; that of the unit itself does not count.
+  /// Errors: kInvalid where a time or the target makes no sense, the target is out of range or not
+  /// clear of where others end (all of them named); kRefused where no way is found (who is in the
+  /// way most often is named).
+  /// Cost: O(neighbours), with limits of power O(n).
+  [[nodiscard]] Result<LateMove> Replan(const ReplanQuestion& question,
+                                        std::span<const Deviation> deviations) const;
+
+  /// One after the other; each sees the late moves of those before it, and where those stand that
+  /// come after it or found no way. Who found none asks again once one of the others has left.
+  [[nodiscard]] std::vector<Result<LateMove>> ReplanAll(
+      std::span<const ReplanQuestion> questions, std::span<const Deviation> deviations) const;
+
+ private:
+  friend class Replanner;
+
+  const Layout* layout_;
+  std::vector<UnitDrive> drives_;
+  PlanOptions options_;
+  Scene scene_;
+  std::vector<Pose> from_;        // of units without a place: meaningless
+  std::vector<Pose> to_;          // as above
+  std::vector<AxisPaths> paths_;  // empty: stands
+  double end_s_ = 0;
+  std::optional<PowerLedger> ledger_;  // of the moves as planned; none: power has no limit
+};
+
+}  // namespace focalfleet
