@@ -14,7 +14,7 @@
 #include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
-#include "fleet/plan/objective.h"
+#include "fleet/plan/power_statement.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -14,11 +14,6 @@
 // bisection: what exceeds a limit, squared, goes to zero or the limit is too low.
 #pragma once
 
-#include <algorithm>
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "fleet/plan/plan.h"
 #include "fleet/plan/planner.h"
 
@@ -30,29 +25,5 @@ namespace focalfleet {
 /// Errors: kRefused where `plan` ends later than `within_s`: names the time that it takes.
 /// Cost: some passes over all units, each some 100 us a unit.
 Result<Plan> ImprovePlan(const PlanRequest& request, const PlanOptions& options, Plan plan);
-
-/// What a plan draws.
-struct RailStatement {
-  RailId rail;
-  double energy_J = 0;
-  double peak_W = 0;       // by nominal clocks
-  double peak_most_W = 0;  // whatever skew and clocks do
-  double flatness = 0;     // mean squared over mean square until the plan's end: 1 is even
-};
-struct PowerStatement {
-  double energy_J = 0;
-  double peak_W = 0;
-  double peak_most_W = 0;
-  double flatness = 0;
-  std::vector<RailStatement> rails;  // ascending by rail
-  [[nodiscard]] double LargestRail_W() const {
-    double most_W = 0;
-    for (const RailStatement& rail : rails) most_W = std::max(most_W, rail.peak_most_W);
-    return most_W;
-  }
-};
-/// Exact, from the segments. Cost: O(s log s) for s segments.
-PowerStatement StatePower(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives,
-                          const PlanOptions& options);
 
 }  // namespace focalfleet

@@ -621,6 +621,12 @@ Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) 
 
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
+  // Stages are an order in time: whoever goes at another time would leave them.
+  if (options.stall_tolerant &&
+      (options.objective != Objective::kSoonest || !request.given.empty()))
+    return Fail(ErrorCode::kInvalid,
+                "a plan in stages that unseen halts leave clear can neither have another objective "
+                "nor go around given motions");
   if (options.objective == Objective::kSoonest) return Planner(request, options).Run();
   PlanOptions soonest = options;
   soonest.objective = Objective::kSoonest;

@@ -318,6 +318,10 @@ Result<SectoredPlan> PlanBySectors(const PlanRequest& request, const PlanOptions
   FOCALFLEET_TRY(CheckPlanRequest(request, options));
   if (!request.given.empty() || !request.motions.empty())
     return Fail(ErrorCode::kInvalid, "sectors find given motions among themselves");
+  if (options.stall_tolerant)
+    return Fail(ErrorCode::kInvalid,
+                "stages that unseen halts leave clear are of the whole plate: "
+                "no sectors");
   SectorOptions split = sectors;
   split.whole_rails = sectors.whole_rails || options.power.rail_W > 0;
   SectoredPlan made;

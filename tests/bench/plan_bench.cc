@@ -16,8 +16,8 @@
 
 #include "fleet/files/layout_file.h"
 #include "fleet/hex_layout.h"
-#include "fleet/plan/objective.h"
 #include "fleet/plan/planner.h"
+#include "fleet/plan/power_statement.h"
 #include "fleet/plan/scene.h"
 #include "fleet/targets.h"
 #include "tests/bench/options.h"

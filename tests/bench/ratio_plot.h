@@ -65,7 +65,7 @@ inline std::string PlotRatios(const std::string& title, std::vector<RatioSeries>
   }
   svg += Text(kLeft + kWidth / 2, kTop + kHeight + 40, "middle",
               "makespan over the slowest unit's time alone");
-  double key_y = kTop + 28;
+  double key_y = kTop + kHeight * 0.6;
   for (const RatioSeries& series : all) {
     const auto n = static_cast<double>(series.ratios.size());
     std::string path = "M" + Number(x_of(1)) + " " + Number(y_of(0));
@@ -76,7 +76,7 @@ inline std::string PlotRatios(const std::string& title, std::vector<RatioSeries>
     svg += "<path d=\"" + path + "\" fill=\"none\" stroke-width=\"2\" stroke=\"" +
            std::string(series.colour) + "\"/>\n";
     svg += "<g fill=\"" + std::string(series.colour) + "\">" +
-           Text(kLeft + kWidth * 0.3, key_y, "start",
+           Text(kLeft + kWidth * 0.05, key_y, "start",
                 series.name + ": median " + Number(series.ratios[series.ratios.size() / 2], 3) +
                     ", worst " + Number(series.ratios.back(), 3)) +
            "</g>";

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "fleet/estimate.h"
+#include "fleet/plan/power_statement.h"
+#include "fleet/plan/sectors.h"
 #include "tests/fleet/plan/planning.h"
 
 namespace focalfleet::testing {
@@ -135,6 +137,17 @@ TEST(Objectives, SayWhatTimeIsFeasible) {
   char expected[60];
   std::snprintf(expected, sizeof expected, "the soonest one takes %.2f s", soonest.plan.makespan_s);
   EXPECT_NE(plan.error().text.find(expected), std::string::npos) << plan.error().text;
+}
+
+TEST(Objectives, AndSectorsAreNotForPlansInStages) {
+  const PlanningFleet fleet = Drawn(TestSeed(835));
+  PlanOptions options;
+  options.stall_tolerant = true;
+  EXPECT_FALSE(PlanBySectors(fleet.request(), options, {.count = 2}));
+  options.objective = Objective::kEvenPower;
+  const auto plan = MakePlan(fleet.request(), options);
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(plan.error().code, ErrorCode::kInvalid);
 }
 
 TEST(PowerOfAPlan, IsThatOfTheEstimateByNominalClocks) {

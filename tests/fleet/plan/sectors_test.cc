@@ -10,6 +10,7 @@
 #include <numbers>
 #include <thread>
 
+#include "fleet/plan/power_statement.h"
 #include "tests/fleet/plan/planning.h"
 
 namespace focalfleet::testing {
@@ -327,6 +328,26 @@ TEST(Sectors, GoAroundWhatStandsOnEitherSide) {
   ASSERT_TRUE(made) << made.error().text;
   ExpectSound(fleet, made->plan);
   for (std::uint32_t i = 0; i < 217; i += 9) EXPECT_EQ(MoveOf(made->plan, i), nullptr);
+}
+
+TEST(Sectors, KeepLimitsOfPowerTogether) {
+  const std::uint64_t seed = TestSeed(745);
+  FOCALFLEET_TRACE_SEED(seed);
+  PlanningFleet fleet = FleetOf(MakeHexLayout({.count = 127, .units_per_rail = 32}));
+  DrawStartAndTargets(&fleet, seed);
+  const auto free = MakePlan(fleet.request(), {});
+  ASSERT_TRUE(free);
+  const PowerStatement drawn = StatePower(*free, fleet.layout, fleet.drives, {});
+  PlanOptions options;
+  options.power = {.rail_W = 0.7 * drawn.LargestRail_W(), .total_W = 0.6 * drawn.peak_most_W};
+  const auto made = PlanBySectors(fleet.request(), options, {.count = 2});
+  ASSERT_TRUE(made) << made.error().text;
+  EXPECT_TRUE(made->plan.unserved.empty());
+  ExpectSound(fleet, made->plan);
+  const PowerStatement power = StatePower(made->plan, fleet.layout, fleet.drives, options);
+  EXPECT_LE(power.LargestRail_W(), options.power.rail_W + 1e-6);
+  EXPECT_LE(power.peak_most_W, options.power.total_W + 1e-6);
+  EXPECT_FALSE(PlanBySectors(fleet.request(), options, {.count = 5})) << "there are four rails";
 }
 
 TEST(Sectors, BadTargetsAreAllNamedAtOnce) {
