@@ -150,6 +150,7 @@ class Pursuit {
   [[nodiscard]] std::vector<Deviation> Deviations() const;
   [[nodiscard]] std::vector<Deviation> DeviationsNear(PositionerIndex i) const;
   [[nodiscard]] bool IsStale(const Late& late) const;
+  [[nodiscard]] bool IsUnheard(const LateMove& late) const;
   Status MayRetarget(const RetargetCommand& command);
   void GoOnLate(PositionerIndex i);
   void AdvanceLate();
@@ -158,6 +159,7 @@ class Pursuit {
   void PlanLate(Late* late);
   void OnLatePlan(const PlanDone& done);
   void TakeLate(Late* late, const LateMove& move);
+  void TellOtherLate(PositionerIndex i);
   bool TryAgain(Late* late);
   void Withdraw(PositionerIndex i);
   bool Load(Late* late);

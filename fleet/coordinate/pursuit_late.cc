@@ -94,6 +94,15 @@ std::vector<Deviation> Pursuit::DeviationsNear(PositionerIndex i) const {
   return near;
 }
 
+/// Somebody who would have to stop this one has not been heard for too long.
+bool Pursuit::IsUnheard(const LateMove& late) const {
+  return std::any_of(late.leaders.begin(), late.leaders.end(), [&](const LateMove::Leader& leader) {
+    const UnitRecord& unit = core_.units[leader.unit.value];
+    return unit.view.phase == kMoving && unit.question && unit.question->asked != kNever &&
+           core_.now >= unit.question->asked + NoticingOf(core_.config).suspicion;
+  });
+}
+
 bool Pursuit::IsStale(const Late& late) const {
   const std::vector<Deviation> now = DeviationsNear(late.unit);
   return !std::equal(now.begin(), now.end(), late.near.begin(), late.near.end(), IsSame);
@@ -287,7 +296,30 @@ void Pursuit::TakeLate(Late* late, const LateMove& move) {
   late->stage = Late::Stage::kUploading;
   SetPart(i, Part::kWaiting);
   core_.SetPhase(i, kStaging);
+  TellOtherLate(i);
+  // Watched from now on: who has ended already is noticed before this one starts.
+  for (const LateMove::Leader& leader : move.leaders) {
+    const PositionerIndex j = leader.unit;
+    if (part_[j.value] != Part::kMoving || plan_of_[j.value] == kNoPlan) continue;
+    plan_.moves[plan_of_[j.value]].followers.push_back(leader.follower);
+    WatchSoon(j);
+  }
   Upload(i);
+}
+
+/// This one was planned around those that are to start, so to them it is no news that it goes.
+void Pursuit::TellOtherLate(PositionerIndex i) {
+  const std::optional<Deviation> deviation = DeviationOf(i);
+  for (Late& other : late_) {
+    const auto near = core_.layout.neighbours(other.unit);
+    if (other.unit == i || !IsLoaded(core_.unit(other.unit).view.phase) ||
+        !std::binary_search(near.begin(), near.end(), i))
+      continue;
+    std::erase_if(other.near, [i](const Deviation& known) { return known.unit == i; });
+    const auto place = std::find_if(other.near.begin(), other.near.end(),
+                                    [i](const Deviation& known) { return i < known.unit; });
+    if (deviation) other.near.insert(place, *deviation);
+  }
 }
 
 /// The unit gives its move back.
@@ -312,7 +344,7 @@ bool Pursuit::Load(Late* late) {
   }
   const HostInstant start = BeganOf(i);
   const HostInstant last = start - DurationNs{core_.config.start_delay.ns / 2};
-  if (core_.now > last || IsStale(*late)) {
+  if (core_.now > last || IsStale(*late) || IsUnheard(courses_.at(i.value).late)) {
     Withdraw(i);
     return TryAgain(late);
   }
@@ -344,12 +376,6 @@ void Pursuit::StartLate(Late* late) {
   core_.unit(i).seen_moving = HostInstant{INT64_MIN};
   WatchLeader(i);
   core_.SetDue(i, core_.unit(i).next_poll);
-  for (const LateMove::Leader& leader : move.leaders) {
-    const PositionerIndex j = leader.unit;
-    if (part_[j.value] != Part::kMoving || plan_of_[j.value] == kNoPlan) continue;
-    plan_.moves[plan_of_[j.value]].followers.push_back(leader.follower);
-    WatchSoon(j);
-  }
   view_.energy_J += late->predicted.energy_J;
   view_.makespan_predicted_s += std::max(0.0, move.end_s - round_end_s_);
   round_end_s_ = std::max(round_end_s_, move.end_s);
