@@ -91,6 +91,9 @@ class Coordinator::Impl {
   }
 
   Status Do(std::uint64_t request, const ApplyCommand& c) { return pursuit_.Apply(request, c); }
+  Status Do(std::uint64_t request, const RetargetCommand& c) {
+    return pursuit_.Retarget(request, c);
+  }
   Status Do(std::uint64_t request, const HomeCommand& c) { return pursuit_.Home(request, c); }
   Status Do(std::uint64_t, const StopCommand& c) {
     if (c.unit) {

@@ -24,6 +24,7 @@
 #include "fleet/knowledge.h"
 #include "fleet/layout.h"
 #include "fleet/plan/planner.h"
+#include "fleet/plan/replan.h"
 #include "fleet/records.h"
 #include "protocol/base/instants.h"
 #include "protocol/link/frame_port.h"
@@ -42,6 +43,12 @@ struct ApplyCommand {
   std::string source;
   std::vector<std::optional<Pose>> targets;  // Shape: (n)
   bool fixed = false;
+};
+/// Another target for one unit of the configuration that is under way; it need not have had one.
+/// A unit that moves is stopped first. Answered when it starts, or with why it does not.
+struct RetargetCommand {
+  PositionerIndex unit;
+  Pose target{};
 };
 struct StopCommand {
   std::optional<PositionerIndex> unit;  // none: all
@@ -67,7 +74,7 @@ struct WriteParameterCommand {
 };
 struct Command {
   std::uint64_t request = 0;
-  std::variant<ApplyCommand, StopCommand, HomeCommand, EnableCommand, AdoptCommand,
+  std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, EnableCommand, AdoptCommand,
                WriteParameterCommand>
       what;
 };
@@ -86,6 +93,9 @@ struct PlanDone {
   std::vector<PositionerIndex>
       homing;  // units that may home at once when `plan` has been carried out
   PlanPrediction predicted;
+  /// Of a plan for a configuration: what late moves in it are planned with.
+  std::shared_ptr<const RunningPlan> running;
+  std::optional<Result<LateMove>> late;  // of a job for a late move; `plan` is empty then
 };
 
 struct Inputs {
@@ -105,6 +115,13 @@ struct OutFrame {
   CanFrame frame;
 };
 
+/// A late move within a configuration under way (fleet/plan/replan.h).
+struct LateJob {
+  std::shared_ptr<const RunningPlan> running;
+  ReplanQuestion question;
+  std::vector<Deviation> deviations;
+};
+
 struct PlanJob {
   std::uint64_t job = 0;
   std::vector<UnitKnowledge> start;
@@ -112,8 +129,9 @@ struct PlanJob {
   std::vector<std::uint8_t> frozen;
   PlanOptions options;
   std::vector<PositionerIndex>
-      to_home;            // not empty: plan the next wave of homing, `targets` is empty
-  bool unproven = false;  // of homing, see HomeCommand
+      to_home;                  // not empty: plan the next wave of homing, `targets` is empty
+  bool unproven = false;        // of homing, see HomeCommand
+  std::optional<LateJob> late;  // then nothing else is looked at
 };
 
 struct ReplyEffect {

@@ -38,7 +38,8 @@ Pursuit::Pursuit(Core* core, Contact* contact)
       part_(core->units.size(), Part::kNone),
       stage_tries_(core->units.size(), 0),
       waiting_(core->buses.size()),
-      uploading_(core->buses.size(), 0) {
+      uploading_(core->buses.size(), 0),
+      goes_on_(core->units.size(), 0) {
   if (core_.earlier_configurations.empty()) return;
   const ConfigurationRow& last = core_.earlier_configurations.back();
   view_ = {.id = last.id,
@@ -216,6 +217,7 @@ void Pursuit::BeginRound() {
 }
 
 void Pursuit::OnPlan(const PlanDone& done) {
+  if (done.late) return OnLatePlan(done);
   if (state_ != State::kPlanning || done.job != job_) return;  // of a goal that was stopped
   if (!done.plan) {
     failure_ = done.plan.error().text;
@@ -237,6 +239,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
   if (!plan_.too_near.empty())
     core_.Raise(Severity::kWarning, {}, {}, plan_.too_near + ": they may touch, and are led apart");
   homing_ = done.homing;
+  running_ = done.running;
   const bool stale = std::any_of(plan_.moves.begin(), plan_.moves.end(), [&](const UnitPlan& move) {
     const UnitView& view = core_.unit(move.unit).view;
     return view.phase != kReady || !IsPlace(view.knowledge) || PlaceOf(view.knowledge) != move.from;
@@ -271,6 +274,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
 }
 
 void Pursuit::CountPrediction() {
+  round_end_s_ = prediction_.makespan_s;
   view_.makespan_predicted_s += prediction_.makespan_s;
   view_.energy_J += prediction_.energy_J;
   view_.peak_power_W = std::max(view_.peak_power_W, prediction_.peak_power_W);
@@ -312,6 +316,9 @@ void Pursuit::Advance() {
       if (core_.committed_through >= commit_batch_) StartHoming();
       break;
     case State::kMoving:
+      AdvanceLate();
+      if (RoundIsOver()) RoundOver();
+      break;
     case State::kHoming:
       if (count(Part::kMoving) == 0) RoundOver();
       break;
@@ -392,8 +399,15 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
     if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
       StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " did not get out of its way");
   }
+  const bool moved = part_[i.value] == Part::kMoving;
   if (part_[i.value] == Part::kUploading) --uploading_[core_.unit(i).bus];
   SetPart(i, Part::kNone);
+  if (moved) GoOnLate(i);
+}
+
+bool Pursuit::RoundIsOver() const {
+  return late_.empty() &&
+         std::all_of(parts_.begin(), parts_.end(), [](std::uint32_t count) { return count == 0; });
 }
 
 void Pursuit::ReportArrivals() {
@@ -410,6 +424,9 @@ void Pursuit::RoundOver() {
   for (const UnitPlan& move : plan_.moves) plan_of_[move.unit.value] = kNoPlan;
   const bool was_homing = state_ == State::kHoming;
   plan_.moves.clear();
+  courses_.clear();
+  running_.reset();
+  std::fill(goes_on_.begin(), goes_on_.end(), std::uint8_t{0});
   if (stopping_) {
     FinishWhenDurable(ConfigurationState::kStopped);
     return;
@@ -468,6 +485,9 @@ void Pursuit::Finish() {
   }
   parts_ = {};
   plan_ = {};
+  late_.clear();
+  courses_.clear();
+  running_.reset();
   homing_.clear();
   to_home_.clear();
   std::fill(uploading_.begin(), uploading_.end(), 0u);

@@ -7,14 +7,18 @@
 // Nothing starts before every unit of the plan holds its move, and before the store holds the
 // intent of each. A unit that falls out before the start costs a new plan; one that falls out in
 // motion stops those whose way leads through where it may stand (UnitPlan::followers), and the next
-// round takes them on. Every round uses a new move id, so a unit that kept an old move never starts
-// with the others.
+// round takes them on, unless they find a way while the others still move (pursuit_late.cc). Every
+// round and every late move uses a new move id, so a unit that kept an old move never starts with
+// the others.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "fleet/coordinate/contact.h"
@@ -27,6 +31,8 @@ class Pursuit {
   Pursuit(Core* core, Contact* contact);
 
   Status Apply(std::uint64_t request, const ApplyCommand& command);
+  /// Another target for one unit while the others move.
+  Status Retarget(std::uint64_t request, const RetargetCommand& command);
   Status Home(std::uint64_t request, const HomeCommand& command);
   void StopAll() { StopAll("stopped by the operator"); }
   /// By the operator: it takes no further part in this goal.
@@ -46,7 +52,7 @@ class Pursuit {
 
   [[nodiscard]] const ConfigurationView& view() const { return view_; }
   [[nodiscard]] bool busy() const { return state_ != State::kIdle; }
-  [[nodiscard]] HostInstant due() const { return due_; }
+  [[nodiscard]] HostInstant due() const { return std::min(due_, late_due_); }
   /// The plan that `i` is carrying out now, and when its clock of the plan began.
   struct Course {
     const UnitPlan* plan = nullptr;
@@ -72,6 +78,33 @@ class Pursuit {
   /// Where a unit is in this round.
   enum class Part : std::uint8_t { kNone, kWaiting, kUploading, kHolding, kMoving };
 
+  /// A late move in the making (pursuit_late.cc).
+  struct Late {
+    enum class Stage : std::uint8_t {
+      kSettling,  // it was moving, or gives a move back
+      kPlanning,
+      kUploading,
+      kCommitting,
+      kStarting,
+      kStarted,  // the start is said some more times
+    };
+    PositionerIndex unit;
+    std::uint64_t request = 0;  // 0: nobody asked, it goes on to the target that it had
+    Stage stage = Stage::kSettling;
+    int tries = 0;
+    std::uint64_t job = 0;
+    std::vector<Deviation> near;  // of its neighbours, when it was planned
+    PlanPrediction predicted;
+    std::uint64_t batch = 0;  // of its intent
+    int starts_said = 0;
+    HostInstant say_start_at{INT64_MIN};
+  };
+  /// A late move from when it is planned until the round is over or it gets another.
+  struct LateCourse {
+    LateMove late;
+    MoveId move;
+  };
+
   void Begin(std::uint64_t request, std::string source);
   void Gather();
   void GatherIfDue();
@@ -84,6 +117,7 @@ class Pursuit {
   void Disarm();
   void CommitRound();
   void Intend(PositionerIndex i, const IntentRow& intent);
+  void TakeBackIntent(PositionerIndex i);
   void TakeBackIntents();
   void Start();
   void RepeatStart();
@@ -106,7 +140,34 @@ class Pursuit {
   };
   [[nodiscard]] Ended SeenUntil(PositionerIndex i, HostInstant until) const;
   void StopFollowers(PositionerIndex first, const Ended& ended, const std::string& reason);
+  void SetWatch(PositionerIndex i);
   void WatchLeader(PositionerIndex i);
+  void WatchSoon(PositionerIndex i);
+  Late* FindLate(PositionerIndex i);
+  [[nodiscard]] MoveId MoveOf(PositionerIndex i) const;
+  [[nodiscard]] HostInstant BeganOf(PositionerIndex i) const;
+  [[nodiscard]] std::optional<Deviation> DeviationOf(PositionerIndex i) const;
+  [[nodiscard]] std::vector<Deviation> Deviations() const;
+  [[nodiscard]] std::vector<Deviation> DeviationsNear(PositionerIndex i) const;
+  [[nodiscard]] bool IsStale(const Late& late) const;
+  [[nodiscard]] bool IsUnheard(const LateMove& late) const;
+  Status MayRetarget(const RetargetCommand& command);
+  void GoOnLate(PositionerIndex i);
+  void AdvanceLate();
+  bool AdvanceOne(Late* late);
+  bool Settle(Late* late);
+  void PlanLate(Late* late);
+  void OnLatePlan(const PlanDone& done);
+  void TakeLate(Late* late, const LateMove& move);
+  void TellOtherLate(PositionerIndex i);
+  bool TryAgain(Late* late);
+  void Withdraw(PositionerIndex i);
+  bool Load(Late* late);
+  void StartLate(Late* late);
+  void SayStart(Late* late);
+  void EndLate(const Late& late, Error error);
+  void EndAllLate(const std::string& reason);
+  [[nodiscard]] bool RoundIsOver() const;
   void SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string reason = {});
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
@@ -153,6 +214,14 @@ class Pursuit {
   std::vector<PositionerIndex> homing_;
   // What this round's motion is predicted to take and draw; added to the view when it starts.
   PlanPrediction prediction_;
+  // Late moves, and what they are planned with.
+  std::shared_ptr<const RunningPlan> running_;
+  std::vector<Late> late_;
+  std::unordered_map<std::uint32_t, LateCourse> courses_;  // by unit
+  std::vector<std::uint8_t> goes_on_;  // how often a unit was taken up again in this round
+  std::uint64_t late_job_ = 0;         // under way; 0: none
+  HostInstant late_due_ = kNever;
+  double round_end_s_ = 0;  // predicted, after the start signal
   std::uint64_t commit_batch_ = 0;
   HostInstant last_arrival_;
   HostInstant start_repeat_ = kNever;

@@ -23,7 +23,7 @@ IntentRow Pursuit::IntentOf(PositionerIndex i) const {
   IntentRow row{.configuration = view_.id,
                 .serial = core_.units[i.value].view.serial,
                 .unit = core_.layout.unit(i).id,
-                .move = move_,
+                .move = MoveOf(i),
                 .from = plan.from,
                 .to = plan.to,
                 .hull = {}};
@@ -42,17 +42,19 @@ void Pursuit::Intend(PositionerIndex i, const IntentRow& intent) {
   core_.Know(i, intent.hull, Origin::kMove);
 }
 
-void Pursuit::TakeBackIntents() {
-  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
-    if (!before_[n]) continue;
-    const PositionerIndex i{n};
-    // Who was lost meanwhile keeps its intent: its return decides.
-    if (core_.unit(i).view.phase == kArmed || core_.unit(i).view.phase == kReady) {
-      core_.EndIntent(i, IntentEnd::kNeverBegan);
-      core_.Know(i, *before_[n], Origin::kMove);
-    }
-    before_[n].reset();
+void Pursuit::TakeBackIntent(PositionerIndex i) {
+  std::optional<UnitKnowledge>& before = before_[i.value];
+  if (!before) return;
+  // Who was lost meanwhile keeps its intent: its return decides.
+  if (core_.unit(i).view.phase == kArmed || core_.unit(i).view.phase == kReady) {
+    core_.EndIntent(i, IntentEnd::kNeverBegan);
+    core_.Know(i, *before, Origin::kMove);
   }
+  before.reset();
+}
+
+void Pursuit::TakeBackIntents() {
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) TakeBackIntent({n});
 }
 
 void Pursuit::CommitRound() {
@@ -100,9 +102,8 @@ void Pursuit::RepeatStart() {
   due_ = start_repeat_;
 }
 
-// When it is asked first, and when others pass where it may stand.
-void Pursuit::WatchLeader(PositionerIndex i) {
-  constexpr DurationNs kBegun = Milliseconds(50);  // everybody has, whatever the skew
+// When others pass where it may stand.
+void Pursuit::SetWatch(PositionerIndex i) {
   UnitRecord& unit = core_.unit(i);
   unit.watch_from = kNever;
   unit.watch_until = HostInstant{INT64_MIN};
@@ -110,28 +111,44 @@ void Pursuit::WatchLeader(PositionerIndex i) {
     unit.watch_from = std::min(unit.watch_from, AtPlanTime(follower.since_s));
     unit.watch_until = std::max(unit.watch_until, AtPlanTime(follower.left_s));
   }
+}
+
+// When a unit that starts is asked first.
+void Pursuit::WatchLeader(PositionerIndex i) {
+  constexpr DurationNs kBegun = Milliseconds(50);  // everybody has, whatever the skew
+  SetWatch(i);
+  UnitRecord& unit = core_.unit(i);
   // Spread over a period, so that a bus never hears all its units at once.
   const auto spread = [&](DurationNs period) {
     return DurationNs{period.ns * (i.value % 97) / 97};
   };
+  const HostInstant began = BeganOf(i);
   const DurationNs poll = core_.config.poll_period;
   const DurationNs watch = NoticingOf(core_.config).poll;
-  unit.next_poll = view_.started + poll + spread(poll);
+  unit.next_poll = began + poll + spread(poll);
   if (unit.watch_from < unit.watch_until)
-    unit.next_poll = std::min(
-        unit.next_poll, std::max(view_.started + kBegun, unit.watch_from) + spread(watch - kBegun));
+    unit.next_poll = std::min(unit.next_poll,
+                              std::max(began + kBegun, unit.watch_from) + spread(watch - kBegun));
+}
+
+// One that moves already has got one more follower.
+void Pursuit::WatchSoon(PositionerIndex i) {
+  SetWatch(i);
+  UnitRecord& unit = core_.unit(i);
+  unit.next_poll = std::min(unit.next_poll, std::max(core_.now, unit.watch_from));
+  if (!unit.question) core_.SetDue(i, unit.next_poll);
 }
 
 std::optional<Pursuit::Course> Pursuit::CourseOf(PositionerIndex i) const {
   if (part_[i.value] != Part::kMoving || plan_of_[i.value] == kNoPlan) return std::nullopt;
-  return Course{&plan_.moves[plan_of_[i.value]], view_.started};
+  return Course{&plan_.moves[plan_of_[i.value]], BeganOf(i)};
 }
 
 bool Pursuit::MayHaveArrived(const Course& course) const {
   const PlanOptions allowed;
   const double end_s = EndOf(*course.plan, core_.drives[course.plan->unit.value]);
   return core_.now >=
-         course.began + Seconds(end_s * (1 - allowed.clock_error) - allowed.start_skew_s);
+         course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * allowed.start_skew_s);
 }
 
 Pursuit::Ended Pursuit::SeenUntil(PositionerIndex i, HostInstant until) const {
@@ -285,6 +302,7 @@ void Pursuit::StopAll(const std::string& reason) {
   if (!busy()) return;
   stopping_ = true;
   failure_ = reason;
+  EndAllLate(reason);
   start_repeat_ = kNever;
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const PositionerIndex i{n};
@@ -320,6 +338,12 @@ void Pursuit::StopAll(const std::string& reason) {
 void Pursuit::StopUnit(PositionerIndex i) {
   SetOutcome(i, TargetOutcome::kFailed, "stopped by the operator");
   if (busy()) Exclude(i);
+  if (const Late* late = FindLate(i); late != nullptr && late->stage != Late::Stage::kStarted) {
+    EndLate(*late, {ErrorCode::kRefused, core_.NameOf(i) + " was stopped by the operator"});
+    Withdraw(i);
+    std::erase_if(late_, [i](const Late& other) { return other.unit == i; });
+    if (core_.unit(i).question) return;  // it gives its move back, or is stopped already
+  }
   if (!IsUnderWay(core_.unit(i).view.phase)) {
     core_.SendNow(core_.unit(i).bus, Stop{}, core_.layout.unit(i).node);
     return;

@@ -18,7 +18,7 @@ constexpr std::uint32_t kUploadsPerBus = 16;
 
 StagedMove Pursuit::StagedMoveOf(PositionerIndex i) const {
   const UnitPlan& plan = plan_.moves[plan_of_[i.value]];
-  return {.move = move_, .mode = plan.mode, .path = plan.path};
+  return {.move = MoveOf(i), .mode = plan.mode, .path = plan.path};
 }
 
 void Pursuit::PumpUploads() {
@@ -50,16 +50,16 @@ void Pursuit::Upload(PositionerIndex i) {
       send(StageSegment{axis, index++, segment});
   }
   core_.SetPhase(i, kConfirming);
-  core_.Ask(i, Confirm{move_});
+  core_.Ask(i, Confirm{move.move});
 }
 
 void Pursuit::OnConfirm(PositionerIndex i, const ConfirmReply& reply) {
-  if (core_.unit(i).view.phase != kConfirming || reply.move != move_) return;
+  if (core_.unit(i).view.phase != kConfirming || reply.move != MoveOf(i)) return;
   const StagedMove move = StagedMoveOf(i);
   const std::uint32_t digest = Digest(move);
   if (reply.answer == Answer::kOk && reply.digest == digest) {
     core_.SetPhase(i, kArming);
-    core_.Ask(i, Arm{move_, digest});
+    core_.Ask(i, Arm{move.move, digest});
   } else if ((reply.answer == Answer::kOk || reply.answer == Answer::kIncomplete ||
               reply.answer == Answer::kWrongMove) &&
              ++stage_tries_[i.value] <= limits::kStageRetries) {
@@ -73,7 +73,7 @@ void Pursuit::OnConfirm(PositionerIndex i, const ConfirmReply& reply) {
 }
 
 void Pursuit::OnArm(PositionerIndex i, const ArmReply& reply) {
-  if (core_.unit(i).view.phase != kArming || reply.move != move_) return;
+  if (core_.unit(i).view.phase != kArming || reply.move != MoveOf(i)) return;
   if (reply.answer != Answer::kOk) {
     FallOut(i, std::string("refuses to arm: ") + Name(reply.answer));
     return;

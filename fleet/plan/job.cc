@@ -1,6 +1,7 @@
 #include "fleet/plan/job.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "fleet/estimate.h"
@@ -31,7 +32,7 @@ Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Po
 }
 
 PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
-  PlanDone done{job.job, Plan{}, {}, {}};
+  PlanDone done{.job = job.job, .plan = Plan{}};
   Error refusal;
   std::vector<std::pair<PositionerIndex, std::vector<std::optional<Pose>>>> crowded;
   for (const PositionerIndex unit : job.to_home) {
@@ -63,14 +64,29 @@ PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
   return done;
 }
 
+PlanDone PlanLateMove(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives) {
+  PlanDone done{.job = job.job, .plan = Plan{}};
+  done.late = job.late->running->Replan(job.late->question, job.late->deviations);
+  if (!*done.late) return done;
+  Plan alone;
+  alone.moves.push_back((*done.late)->move);
+  const PlanEstimate estimate = Estimate(alone, layout, drives, MotorModel{});
+  done.predicted = {(*done.late)->end_s, estimate.energy_J, estimate.peak_power_W};
+  return done;
+}
+
 PlanDone PlanOf(const PlanJob& job, const PlanRequest& request) {
   if (!job.to_home.empty()) return PlanHomingWave(job, request);
-  return {job.job, MakePlan(request, job.options), {}, {}};
+  PlanDone done{.job = job.job, .plan = MakePlan(request, job.options)};
+  if (done.plan)
+    done.running = std::make_shared<const RunningPlan>(request, done.plan->moves, job.options);
+  return done;
 }
 
 }  // namespace
 
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives) {
+  if (job.late) return PlanLateMove(job, layout, drives);
   const PlanRequest request{.layout = &layout,
                             .drives = drives,
                             .start = job.start,

@@ -9,7 +9,8 @@ namespace focalfleet {
 
 /// Plans a configuration, or the next wave of homing: as many of `job.to_home` as can home at once
 /// with nobody stepping aside (no two of them neighbours), else one of them with the moves that
-/// make way for it.
+/// make way for it. Or a late move in one that is under way; its predicted makespan is its end,
+/// counted from the configuration's start signal.
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives);
 
 }  // namespace focalfleet

@@ -10,13 +10,11 @@
 #include "fleet/plan/candidates.h"
 #include "fleet/plan/guarantee.h"
 #include "fleet/plan/time_search.h"
-#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-constexpr double kLastS = limits::kOffsetTicksMax * kTickS;  // that a segment can begin
 constexpr double kGuardMm = 1.5e-4;  // of a pair that may be as near as the rule allows
 constexpr double kCoverSlackMm = 0.05;
 /// Grids of the searches among the others as they go, and as they stand in the end: as fine as an
@@ -66,6 +64,7 @@ class Replanner {
       : running_(running), scene_(running.scene_), q_(question), deviations_(deviations) {}
 
   Result<LateMove> Run();
+  Status Check();
 
  private:
   /// A neighbour with a place, in the configuration's time.
@@ -132,9 +131,11 @@ Status Replanner::CheckQuestion() const {
   if (q_.unit.value >= scene_.size()) return Fail(ErrorCode::kInvalid, "there is no such unit");
   const std::string name = NameOf(q_.unit.value);
   // Written so that what is not a number fails.
-  if (!(q_.start_s >= 0 && q_.start_s < kLastS && q_.now_s <= q_.start_s && q_.start_skew_s >= 0 &&
-        q_.start_skew_s < 1))
+  if (!(q_.start_s >= 0 && q_.start_s < kOffsetMaxS && q_.now_s <= q_.start_s &&
+        q_.start_skew_s >= 0 && q_.start_skew_s < 1))
     return Fail(ErrorCode::kInvalid, name + " cannot start then");
+  if (running_.options_.stall_tolerant)
+    return Fail(ErrorCode::kRefused, "a plan in stages takes no late moves");
   if (!running_.layout_->unit(q_.unit).enabled)
     return Fail(ErrorCode::kRefused, name + " is disabled in the units file");
   if (!arm().range().Contains(q_.to))
@@ -292,7 +293,7 @@ bool Replanner::TakeOneOf(bool with_notice) {
     return candidates_[a].end_s < candidates_[b].end_s;
   });
   return std::any_of(by_end_.begin(), by_end_.end(), [&](std::size_t c) {
-    return candidates_[c].end_s < kLastS && Take(candidates_[c].path, with_notice);
+    return candidates_[c].end_s < kOffsetMaxS && Take(candidates_[c].path, with_notice);
   });
 }
 
@@ -481,12 +482,16 @@ Error Replanner::NoWay() const {
   return {ErrorCode::kRefused, text};
 }
 
-Result<LateMove> Replanner::Run() {
+Status Replanner::Check() {
   FOCALFLEET_TRY(CheckQuestion());
+  LookAround();
+  return CheckTarget();
+}
+
+Result<LateMove> Replanner::Run() {
+  FOCALFLEET_TRY(Check());
   start_ticks_ = static_cast<std::uint32_t>(std::ceil(q_.start_s / kTickS - 1e-6));
   start_s_ = start_ticks_ * kTickS;
-  LookAround();
-  FOCALFLEET_TRY(CheckTarget());
   EnterPower();
   if (FindWay()) return Finish();
   return tl::unexpected(NoWay());
@@ -501,12 +506,14 @@ RunningPlan::RunningPlan(const PlanRequest& request, std::span<const UnitPlan> m
       paths_(drives_.size()) {
   for (const UnitKnowledge& k : request.start) from_.push_back(IsPlace(k) ? PlaceOf(k) : Pose{});
   to_ = from_;
+  ends_.assign(request.start.begin(), request.start.end());
   const Tolerance tolerance{options.start_skew_s, options.clock_error, options.notice_s};
   if (options.power.any())
     ledger_.emplace(*layout_, drives_, options.motor, options.power, tolerance);
   for (const UnitPlan& move : moves) {
     const std::uint32_t i = move.unit.value;
     to_[i] = move.to;
+    ends_[i] = Exactly(Witness::kReported, move.to);
     paths_[i] = move.path;
     end_s_ = std::max(end_s_, EndOf(move, drives_[i]));
     if (ledger_) static_cast<void>(ledger_->Enter(i, move.path));  // as the plan did
@@ -518,6 +525,11 @@ RunningPlan::RunningPlan(const PlanRequest& request, std::span<const UnitPlan> m
 Result<LateMove> RunningPlan::Replan(const ReplanQuestion& question,
                                      std::span<const Deviation> deviations) const {
   return Replanner(*this, question, deviations).Run();
+}
+
+Status RunningPlan::CheckTarget(const ReplanQuestion& question,
+                                std::span<const Deviation> deviations) const {
+  return Replanner(*this, question, deviations).Check();
 }
 
 std::vector<Result<LateMove>> RunningPlan::ReplanAll(std::span<const ReplanQuestion> questions,

@@ -83,6 +83,15 @@ class RunningPlan {
   [[nodiscard]] Result<LateMove> Replan(const ReplanQuestion& question,
                                         std::span<const Deviation> deviations) const;
 
+  /// The part of it that looks at the question and the target alone. Cost: some microseconds.
+  [[nodiscard]] Status CheckTarget(const ReplanQuestion& question,
+                                   std::span<const Deviation> deviations) const;
+
+  /// Where the plan leaves a unit, as far as that is known.
+  [[nodiscard]] const UnitKnowledge& PlannedEnd(PositionerIndex unit) const {
+    return ends_[unit.value];
+  }
+
   /// One after the other; each sees the late moves of those before it, and where those stand that
   /// come after it or found no way. Who found none asks again once one of the others has left.
   [[nodiscard]] std::vector<Result<LateMove>> ReplanAll(
@@ -95,8 +104,9 @@ class RunningPlan {
   std::vector<UnitDrive> drives_;
   PlanOptions options_;
   Scene scene_;
-  std::vector<Pose> from_;        // of units without a place: meaningless
-  std::vector<Pose> to_;          // as above
+  std::vector<Pose> from_;  // of units without a place: meaningless
+  std::vector<Pose> to_;    // as above
+  std::vector<UnitKnowledge> ends_;
   std::vector<AxisPaths> paths_;  // empty: stands
   double end_s_ = 0;
   std::optional<PowerLedger> ledger_;  // of the moves as planned; none: power has no limit
