@@ -1,5 +1,6 @@
 #include "protocol/wire/message_rows.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <utility>
@@ -44,6 +45,11 @@ constexpr std::array<MessageRow, kHostRows + kUnitRows> kRows = [] {
   rows.back() = RowOf<ParameterReply>(true);
   rows.back().name = "parameter_write_reply";
   rows.back().function = Function::kParameterWrite;
+  const auto place = [](const MessageRow& row) {
+    return (row.from_unit ? 256u : 0u) + 8u * static_cast<unsigned>(row.function) + row.detail;
+  };
+  std::sort(rows.begin(), rows.end(),
+            [&](const MessageRow& a, const MessageRow& b) { return place(a) < place(b); });
   return rows;
 }();
 

@@ -41,7 +41,7 @@ struct MessageRow {
   }
 };
 
-/// All kinds of frames, those from the host first.
+/// All kinds of frames, those from the host first, by function and detail.
 std::span<const MessageRow> MessageRows();
 
 /// The row of a frame that DecodeHost or DecodeUnit takes; null where no row has its function,
