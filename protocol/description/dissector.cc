@@ -101,7 +101,9 @@ local function show(message, id, data, length, tree)
       problem = problem or (field.detail and "reserved" or "value")
     end
   end
-  if message.name == "vector_reply" and not is_position(values) then problem = problem or "value" end
+  if message.name == "vector_reply" and not is_position(values) then
+    problem = problem or "value"
+  end
   return problem
 end
 
