@@ -29,6 +29,7 @@ class Firmware {
   explicit Firmware(const Hardware& hardware);
   Firmware(const Firmware&) = delete;  // the machine's board points to it
   Firmware& operator=(const Firmware&) = delete;
+  ~Firmware() = default;
 
   void PowerOn(HostInstant now);
   void PowerOff(HostInstant now);
