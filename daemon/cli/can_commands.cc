@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <system_error>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/text_file.h"
@@ -132,13 +133,12 @@ ExitCode RunCanDecode(const Context& context, const CanDecodeOptions& options) {
   const std::string name = from_stdin ? "standard input" : options.file;
   std::ifstream file;
   if (!from_stdin) {
-    errno = 0;
     file.open(options.file, std::ios::binary);
+    const std::error_code why(errno, std::generic_category());
     std::error_code ignored;
     if (!file || std::filesystem::is_directory(options.file, ignored))
-      return Report(context,
-                    {ErrorCode::kUnavailable,
-                     fmt::format("{}: {}", name, file ? "a directory" : std::strerror(errno))});
+      return Report(context, {ErrorCode::kUnavailable,
+                              fmt::format("{}: {}", name, file ? "a directory" : why.message())});
   }
   const Tally tally = DecodeAll(context, name, from_stdin ? std::cin : file);
   if (tally.bad == 0) return ExitCode::kOk;

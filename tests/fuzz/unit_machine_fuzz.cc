@@ -42,14 +42,7 @@ struct Motor {
 
 class Bench {
  public:
-  Bench() : machine_(kNode, MakeBoard(), &flash_) {
-    flash_.serial = {4711};
-    for (AxisFlash& axis : flash_.axis) {
-      axis.min_position = -9600;
-      axis.max_position = 9600;
-      axis.home_position = 9600;
-    }
-    kept_ = flash_;
+  Bench() : flash_(FirstFlash()), kept_(flash_), machine_(kNode, MakeBoard(), &flash_) {
     PowerOn();
   }
 
@@ -114,6 +107,17 @@ class Bench {
   }
 
  private:
+  static Flash FirstFlash() {
+    Flash flash;
+    flash.serial = {4711};
+    for (AxisFlash& axis : flash.axis) {
+      axis.min_position = -9600;
+      axis.max_position = 9600;
+      axis.home_position = 9600;
+    }
+    return flash;
+  }
+
   void CheckAll() {
     FOCALFLEET_CHECK(kept_ == flash_);
     for (const AxisFlash& axis : flash_.axis) {
