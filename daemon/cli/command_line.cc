@@ -28,8 +28,8 @@ void AddGlobalOptions(CommandLine* line) {
 }
 
 // What never asks a daemon ends with kRefused where its answer cannot be told.
-constexpr std::array<std::string_view, 8> kOffline = {"completion", "estimate", "layout",  "plan",
-                                                      "reproduce",  "simulate", "targets", "tune"};
+constexpr std::array<std::string_view, 9> kOffline = {
+    "can", "completion", "estimate", "layout", "plan", "reproduce", "simulate", "targets", "tune"};
 
 /// The deepest command of the tree that the line named.
 const CLI::App& Chosen(const CLI::App& app) {
@@ -132,6 +132,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddSimulateCommand(line.get());
   AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
+  AddCanCommands(line.get());
   AddCompletionCommand(line.get());
   return line;
 }

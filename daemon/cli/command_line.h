@@ -61,6 +61,7 @@ void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, param
 void AddSimulateCommand(CommandLine* line);
 void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
+void AddCanCommands(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

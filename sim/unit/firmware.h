@@ -1,18 +1,6 @@
-// One unit's firmware: a state machine driven by (frame, now) and by time alone. It answers every
-// addressed request with exactly one frame that carries the request's sequence number; it speaks
-// unasked only to say that a motion ended (sequence 0). Its FLASH is written before the first step
-// and after the last.
-//
-// What keeps a repeated frame from becoming a second move: the move begun last stands in FLASH, and
-// that id is refused from then on; a repeated request that was granted is granted again without
-// being done again.
-//
-//   stage_begin, stage_segment...   no answer; a repeated one changes nothing
-//   confirm, arm                    answered by what is held; arm needs the digest of exactly that
-//   start                           begins the armed move `delay_ticks` later, by the unit's own
-//   clock stop                            answered by `done`, whatever the unit was doing
-//
-// Reads may be broadcast (every unit answers); of the rest only stop, start and clock.
+// One simulated unit's firmware: the protocol's state machine (unit_machine.h), the very code that
+// firmware starts from, on a board whose motors are simulated axes and whose clock runs by its own
+// rate; and around it the misbehaviour that tests plant.
 #pragma once
 
 #include <array>
@@ -20,25 +8,11 @@
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
-#include "protocol/wire/codec.h"
-#include "protocol/wire/staged_move.h"
 #include "sim/axis/axis.h"
 #include "sim/faults.h"
-#include "sim/unit/flash.h"
-#include "sim/unit/transitions.h"
+#include "sim/unit/unit_machine.h"
 
 namespace focalfleet::sim {
-
-/// What one frame or one instant made the unit say; never more than two frames.
-class Outbox {
- public:
-  void Add(const CanFrame& frame);
-  [[nodiscard]] std::span<const CanFrame> frames() const { return {frames_.data(), count_}; }
-
- private:
-  std::array<CanFrame, 4> frames_{};
-  std::size_t count_ = 0;
-};
 
 class Firmware {
  public:
@@ -50,7 +24,12 @@ class Firmware {
     std::array<AxisModel*, kAxisCount> axis{};
     UnitFaults* faults = nullptr;
   };
+  using Trip = UnitMachine::Trip;
+
   explicit Firmware(const Hardware& hardware);
+  Firmware(const Firmware&) = delete;  // the machine's board points to it
+  Firmware& operator=(const Firmware&) = delete;
+  ~Firmware() = default;
 
   void PowerOn(HostInstant now);
   void PowerOff(HostInstant now);
@@ -62,96 +41,29 @@ class Firmware {
   [[nodiscard]] HostInstant deadline() const;
 
   /// Stops at once and stays in kFault until the fault is cleared.
-  struct Trip {
-    FaultCode code = FaultCode::kOverTemperature;
-    Axis axis = Axis::kTheta;
-  };
   void RaiseFault(const Trip& trip, HostInstant now, Outbox* out);
 
-  [[nodiscard]] UnitState state() const { return state_; }
-  [[nodiscard]] FaultCode fault() const { return trip_.code; }
-  [[nodiscard]] bool powered() const { return powered_; }
-  [[nodiscard]] bool interrupted() const;
-  [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
+  [[nodiscard]] UnitState state() const { return machine_.state(); }
+  [[nodiscard]] FaultCode fault() const { return machine_.fault(); }
+  [[nodiscard]] bool powered() const { return machine_.powered(); }
+  [[nodiscard]] bool interrupted() const { return machine_.interrupted(); }
+  [[nodiscard]] std::uint64_t malformed() const { return machine_.malformed(); }
 
  private:
-  struct Context {
-    Address address;
-    HostInstant now;
-    const CanFrame* frame = nullptr;
-    Outbox* out = nullptr;
-    [[nodiscard]] bool broadcast() const { return address.node == kBroadcastNode; }
-  };
-  struct Staged {
-    StageBegin begin;  // move 0: nothing is staged
-    std::array<std::array<Segment, limits::kSegmentsPerAxis>, kAxisCount> segments{};
-    std::array<std::uint16_t, kAxisCount> received{};  // bit per index
-  };
-  struct Granted {  // the last request of its kind that was granted
-    bool any = false;
-    CanFrame request;
-  };
-
-  void On(const Stop& m, const Context& c);
-  void On(const Start& m, const Context& c);
-  void On(const Clock& m, const Context& c);
-  void On(const ClockRequest& m, const Context& c);
-  void On(const Arm& m, const Context& c);
-  void On(const Confirm& m, const Context& c);
-  void On(const StageBegin& m, const Context& c);
-  void On(const StageSegment& m, const Context& c);
-  void On(const Home& m, const Context& c);
-  void On(const ProgressRequest& m, const Context& c);
-  void On(const StatusRequest& m, const Context& c);
-  void On(const VectorRequest& m, const Context& c);
-  void On(const FaultRequest& m, const Context& c);
-  void On(const IdentifyRequest& m, const Context& c);
-  void On(const ParameterRead& m, const Context& c);
-  void On(const ParameterWrite& m, const Context& c);
-
-  void Enter(UnitState next);
-  void Say(const UnitMessage& message, const Context& c);
-  void SayDone(Outcome outcome, std::uint8_t sequence, Outbox* out);
-  void Begin(HostInstant now);
-  void End(HostInstant now, Outbox* out);
-  /// Both axes halt, FLASH takes what they show, the mark goes (unless an axis is lost).
-  void HaltAndStore(HostInstant now);
-  void RunHoming(Axis axis, HostInstant now);
-  void EndHomingAxis(HostInstant now);
-  void StoreCutHoming(HostInstant now);
-  void LoseHost();
-  [[nodiscard]] UnitState AtRest() const;
-  [[nodiscard]] Answer JudgeMove(MoveId move) const;
-  [[nodiscard]] bool PathInRange() const;
-  [[nodiscard]] StagedMove Held() const;
-  [[nodiscard]] std::int32_t Position(Axis axis, HostInstant now) const;
-  [[nodiscard]] std::int32_t Read(Axis axis, Parameter parameter, HostInstant now) const;
-  [[nodiscard]] Answer Write(const ParameterWrite& m, HostInstant now);
-  [[nodiscard]] Answer WritePosition(Axis axis, std::int32_t value);
-  [[nodiscard]] Answer WriteSubdivision(Axis axis, std::int32_t value);
-  [[nodiscard]] std::uint8_t ProgressPercent(HostInstant now) const;
+  [[nodiscard]] Board MakeBoard();
+  /// After whatever may have begun or ended a motion: when the planted fault is due.
+  void FollowMotion();
+  void TripIfDue(HostInstant now, Outbox* out);
+  /// Hands on what the machine said, with what is planted done to it.
+  enum class Cause { kFrame, kTime };
+  void Pass(const Outbox& said, Cause cause, Outbox* out) const;
+  [[nodiscard]] CanFrame Distorted(const CanFrame& frame) const;
 
   Hardware hardware_;
-  UnitState state_ = UnitState::kRest;
-  bool powered_ = false;
-  bool host_lost_ = false;
-  bool restarted_ = false;
-  bool restarted_told_ = false;  // what the last resume was answered, for its repetition
-  std::uint32_t resume_id_ = 0;  // identifier of the last resume; 0: something else came since
-  Trip trip_{FaultCode::kNone, Axis::kTheta};
-  std::uint16_t fault_count_ = 0;
+  UnitMachine machine_;
   HostInstant powered_at_;
-  HostInstant heard_at_;
-  HostInstant begin_at_ = kNever;  // armed: the start signal came
-  HostInstant began_at_;
-  HostInstant end_at_ = kNever;   // moving, homing: of this path
-  HostInstant trip_at_ = kNever;  // planted
-  Axis homing_axis_ = Axis::kPhi;
-  std::uint8_t lost_before_homing_ = 0;
-  Staged staged_;
-  Granted granted_arm_;
-  Granted granted_home_;
-  std::uint64_t malformed_ = 0;
+  std::uint32_t motions_seen_ = 0;  // of Flash::moves_begun
+  HostInstant trip_at_ = kNever;    // planted
 };
 
 }  // namespace focalfleet::sim

@@ -32,6 +32,11 @@ T Whole(Rng& rng) {
 std::int32_t Signed24(Rng& rng) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(Wide(rng, 24)) << 8) >> 8;
 }
+// A position: one value of the 24 bits is none.
+std::int32_t Position24(Rng& rng) {
+  const std::int32_t drawn = Signed24(rng);
+  return drawn < -8388607 ? -8388607 : drawn;
+}
 Axis AnyAxis(Rng& rng) { return Draw<Axis>(rng, 2); }
 MoveId AnyMove(Rng& rng) { return {Whole<std::uint16_t>(rng)}; }
 Parameter AnyParameter(Rng& rng) { return Draw<Parameter>(rng, 9); }
@@ -62,7 +67,7 @@ void Fill(Rng& rng, ParameterWrite* m) {
 }
 
 void Fill(Rng& rng, Done* m) {
-  *m = {Draw<Outcome>(rng, 4), {Signed24(rng), Signed24(rng)}, AnyMove(rng)};
+  *m = {Draw<Outcome>(rng, 4), {Position24(rng), Position24(rng)}, AnyMove(rng)};
 }
 void Fill(Rng& rng, ClockReply* m) { m->ticks = Whole<std::uint32_t>(rng); }
 void Fill(Rng& rng, ArmReply* m) { *m = {AnyMove(rng), AnyAnswer(rng)}; }
@@ -74,7 +79,7 @@ void Fill(Rng& rng, ConfirmReply* m) {
 }
 void Fill(Rng& rng, HomeReply* m) { *m = {AnyMove(rng), AnyAnswer(rng)}; }
 void Fill(Rng& rng, ProgressReply* m) {
-  *m = {Draw<UnitState>(rng, 7), {Signed24(rng), Signed24(rng)}, AnyMove(rng)};
+  *m = {Draw<UnitState>(rng, 7), {Position24(rng), Position24(rng)}, AnyMove(rng)};
 }
 void Fill(Rng& rng, StatusReply* m) {
   *m = {.state = Draw<UnitState>(rng, 7),

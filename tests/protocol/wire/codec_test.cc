@@ -160,8 +160,8 @@ std::vector<Golden> GoldenUnitFrames() {
       {"107952E0#3412EFBEADDE3F02",
        unit(ConfirmReply{{0x1234}, 0xDEADBEEF, {15, 3}, Answer::kIncomplete})},
       {"108952E0#341207", unit(HomeReply{{0x1234}, Answer::kInterrupted})},
-      {"149952E3#000080FFFF7F3412",
-       unit(ProgressReply{UnitState::kMoving, {-0x800000, 0x7FFFFF}, {0x1234}})},
+      {"149952E3#010080FFFF7F3412",
+       unit(ProgressReply{UnitState::kMoving, {-0x7FFFFF, 0x7FFFFF}, {0x1234}})},
       {"14A952E0#0501056434120201", unit(StatusReply{UnitState::kFault,
                                                      FaultCode::kOverTemperature,
                                                      true,
@@ -344,6 +344,16 @@ TEST(Codec, AVectorReplyOutsideItsRangeIsRefused) {
   EXPECT_TRUE(decode({Axis::kTheta, 0, 1, -8388607}));
   EXPECT_FALSE(decode({Axis::kTheta, 0, 1, -8388608}));
   EXPECT_FALSE(decode({Axis::kTheta, 0, 65535, INT32_MIN}));
+}
+
+TEST(Codec, TheLowestNumberOf24BitsIsNoPosition) {
+  for (const UnitMessage& m : {UnitMessage{Done{Outcome::kArrived, {-0x7FFFFF, 0}, {1}}},
+                               UnitMessage{ProgressReply{UnitState::kRest, {-0x7FFFFF, 0}, {1}}}}) {
+    CanFrame frame = Encode(m, {{1}, 1});
+    EXPECT_TRUE(DecodeUnit(frame));
+    frame.data[0] = 0;
+    EXPECT_FALSE(DecodeUnit(frame));
+  }
 }
 
 TEST(Codec, UsesNoHeap) {

@@ -1,0 +1,67 @@
+// What a unit's protocol asks of the board that it runs on: two motors, a clock and a FLASH, as a
+// table of plain functions, so that C can fill it in. `context` is the board's own and handed back.
+//
+// The simulator fills it in with axes that turn and a clock that runs fast or slow; firmware fills
+// it in with a timer interrupt, the bridge's PWM and a page of FLASH.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "protocol/base/ids.h"
+#include "protocol/base/instants.h"
+#include "protocol/wire/messages.h"
+
+namespace focalfleet::sim {
+
+/// Nanoseconds of whatever clock the board counts in. The protocol only compares them and asks
+/// `after` for later ones, so the board alone knows how its clock runs.
+using BoardInstant = HostInstant;
+
+/// A vector to be applied, whole turns included: `position` vectors from the axis' zero.
+struct Field {
+  std::int32_t position = 0;
+  std::uint16_t subdivision = 96;
+};
+
+/// A path to be run from the vector that is applied now. Each segment begins at its start_ticks
+/// after `begin`, or when the one before has ended, and shows its |delta| vectors one by one, each
+/// for repeat * counter1 timer counts.
+struct PathOrder {
+  std::int32_t from = 0;  // vectors
+  BoardInstant begin;
+  std::uint16_t counter1 = 500;
+  const Segment* segments = nullptr;  // only during the call
+  std::size_t count = 0;
+};
+
+struct Board {
+  void* context = nullptr;
+
+  // ---- motors; none of them waits
+
+  /// Applies a vector at rest.
+  void (*energise)(void* context, Axis axis, Field field) = nullptr;
+  /// Begins a path. Returns when its last vector will have been shown for its time.
+  BoardInstant (*run)(void* context, Axis axis, PathOrder order) = nullptr;
+  /// The field stays at the vector that is applied at `now`; nothing where none runs.
+  void (*halt)(void* context, Axis axis, BoardInstant now) = nullptr;
+  /// The position that is applied, counted on through the path.
+  std::int32_t (*applied)(void* context, Axis axis, BoardInstant now) = nullptr;
+  /// Counts on from another number for the same vector.
+  void (*recount)(void* context, Axis axis, std::int32_t position) = nullptr;
+
+  // ---- clock
+
+  /// When `duration` of the unit's own time has passed since `from`.
+  BoardInstant (*after)(void* context, BoardInstant from, DurationNs duration) = nullptr;
+  /// 100 us counts of the unit's own clock since power-on, low 32 bits.
+  std::uint32_t (*ticks)(void* context, BoardInstant now) = nullptr;
+
+  // ---- FLASH
+
+  /// What stands in Flash now outlives a power cut from the return of this call on.
+  void (*keep)(void* context) = nullptr;
+};
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,110 @@
+// can decode as a process: words, JSON lines, bad lines, pipes.
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+#include "daemon/control/messages.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using test::Focalfleet;
+using test::FocalfleetInto;
+using test::ScratchDirectory;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::vector<Json> Objects(const std::string& text) {
+  std::vector<Json> objects;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) objects.push_back(Json::parse(line));
+  return objects;
+}
+
+constexpr const char* kLog =
+    "(1436509052.249713) vcan0 106152E1#03E80300FFFFFF25\n"
+    "(1436509052.249913) vcan1 14A952E0#0501056434120201\n"
+    "\n"
+    "(1436509052.250000) vcan1 0007F800#\n"
+    "(1436509052.250001) vcan1 123#11\n"
+    "(1436509052.250002) vcan1 14A952E0#05\n";
+
+TEST(CanDecodeCommand, PutsFramesIntoWords) {
+  const ScratchDirectory scratch;
+  const auto result = Focalfleet({"can", "decode", scratch.Put("bus.log", kLog)});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_EQ(result.out,
+            "1436509052.249713  vcan0   42 <- host  #92   stage_segment  axis phi  index 3  "
+            "start_ticks 1000  delta -1  repeat 37\n"
+            "1436509052.249913  vcan1   42 -> host  #92   status_reply  state fault  fault "
+            "over_temperature  interrupted yes  host_lost no  restarted yes  progress_percent 100  "
+            "move 4660  moves_begun 258\n"
+            "1436509052.250000  vcan1  all <- host  #0    stop\n"
+            "1436509052.250001  vcan1  not ours: an 11-bit identifier\n"
+            "1436509052.250002  vcan1  malformed (length): 14A952E0#05\n");
+}
+
+TEST(CanDecodeCommand, GivesAnObjectALine) {
+  const ScratchDirectory scratch;
+  const auto result = Focalfleet({"can", "decode", scratch.Put("bus.log", kLog), "--json"});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  const std::vector<Json> objects = Objects(result.out);
+  ASSERT_EQ(objects.size(), 5u);
+  EXPECT_EQ(objects[0], Json({{"time", "1436509052.249713"},
+                              {"interface", "vcan0"},
+                              {"id", "106152E1"},
+                              {"data", "03E80300FFFFFF25"},
+                              {"message", "stage_segment"},
+                              {"from", "host"},
+                              {"node", 42},
+                              {"sequence", 92},
+                              {"fields",
+                               {{"axis", "phi"},
+                                {"index", 3},
+                                {"start_ticks", 1000},
+                                {"delta", -1},
+                                {"repeat", 37}}}}));
+  EXPECT_EQ(objects[3]["foreign"], "an 11-bit identifier");
+  EXPECT_EQ(objects[4]["malformed"], "length");
+}
+
+TEST(CanDecodeCommand, NamesBadLinesAndDecodesTheOthers) {
+  const ScratchDirectory scratch;
+  const std::string log = scratch.Put("bus.log", std::string(kLog) + "hello\n" + kLog + "x y z\n");
+  const auto result = Focalfleet({"can", "decode", log});
+  EXPECT_EQ(result.exit, 1);
+  EXPECT_THAT(result.err, HasSubstr(log + ":7: not a line of candump: "));
+  EXPECT_THAT(result.err, HasSubstr(log + ":14: not a line of candump: "));
+  EXPECT_THAT(result.err, HasSubstr("2 of 14 lines not candump's, first " + log + ":7"));
+  EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 10);
+  const auto json = Focalfleet({"can", "decode", log, "--json"});
+  EXPECT_EQ(Objects(json.out).back()["exit"], 1);
+  EXPECT_EQ(Objects(json.out).back()["error"]["code"], "invalid");
+}
+
+TEST(CanDecodeCommand, ReadsStandardInput) {
+  const ScratchDirectory scratch;
+  const std::string log = scratch.Put("bus.log", "  vcan0  0007F800   [0] \n");
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"can", "decode"}, {"can", "decode", "-"}}) {
+    const auto result = FocalfleetInto("<" + log, arguments);
+    EXPECT_EQ(result.exit, 0) << result.err;
+    EXPECT_EQ(result.out, "vcan0  all <- host  #0    stop\n");
+  }
+}
+
+TEST(CanDecodeCommand, RefusesAFileThatItCannotRead) {
+  const ScratchDirectory scratch;
+  EXPECT_EQ(Focalfleet({"can"}).exit, 2);
+  EXPECT_EQ(Focalfleet({"can", "decode", "a", "b"}).exit, 2);
+  const auto missing = Focalfleet({"can", "decode", scratch / "none.log"});
+  EXPECT_EQ(missing.exit, 1);
+  EXPECT_THAT(missing.err, HasSubstr("none.log: No such file"));
+  const auto folder = Focalfleet({"can", "decode", scratch.path()});
+  EXPECT_EQ(folder.exit, 1);
+  EXPECT_THAT(folder.err, HasSubstr("a directory"));
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,45 @@
+// Any bytes as lines of candump: a frame, a foreign one or the reason why not. A frame that is
+// taken stands in bounds, and written as `candump -l` would write it, it is read as the same frame.
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string_view>
+
+#include "protocol/base/check.h"
+#include "protocol/wire/candump_line.h"
+
+namespace focalfleet {
+namespace {
+
+void TryAgain(const CanFrame& frame) {
+  char text[64];
+  int end = std::snprintf(text, sizeof text, "(1.000000) can0 %08X#", frame.id);
+  for (const std::uint8_t byte : frame.payload())
+    end += std::snprintf(text + end, sizeof text - static_cast<std::size_t>(end), "%02X", byte);
+  const auto again = ParseCandumpLine(text);
+  FOCALFLEET_CHECK(again && again->foreign == nullptr && again->frame == frame);
+}
+
+void Try(std::string_view line) {
+  const auto parsed = ParseCandumpLine(line);
+  if (!parsed) {
+    FOCALFLEET_CHECK(parsed.error() != nullptr && *parsed.error() != 0);
+    return;
+  }
+  FOCALFLEET_CHECK(parsed->frame.length <= 8 && parsed->frame.id <= kCanIdMax);
+  FOCALFLEET_CHECK(!parsed->interface.empty());
+  if (parsed->foreign == nullptr) TryAgain(parsed->frame);
+}
+
+}  // namespace
+}  // namespace focalfleet
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  std::string_view text(static_cast<const char*>(static_cast<const void*>(data)), size);
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    focalfleet::Try(text.substr(0, end));
+    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
+  }
+  return 0;
+}

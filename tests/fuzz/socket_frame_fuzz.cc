@@ -1,0 +1,27 @@
+// Any bytes as what a socket hands over as a frame: taken only where it is a 29-bit data frame,
+// with nothing past its length, and then the same again on its way back.
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+#include "daemon/ports/socket_frames.h"
+#include "protocol/base/check.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
+                               // function
+  for (; size >= sizeof(can_frame); data += sizeof(can_frame), size -= sizeof(can_frame)) {
+    can_frame raw{};
+    std::memcpy(&raw, data, sizeof raw);
+    const auto frame = FromSocketFrame(raw);
+    const bool ours = (raw.can_id & CAN_EFF_FLAG) != 0 &&
+                      (raw.can_id & (CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 && raw.len <= CAN_MAX_DLEN;
+    FOCALFLEET_CHECK(frame.has_value() == ours);
+    if (!frame) continue;
+    FOCALFLEET_CHECK(frame->id <= kCanIdMax && frame->length == raw.len);
+    for (std::size_t i = frame->length; i < frame->data.size(); ++i)
+      FOCALFLEET_CHECK(frame->data[i] == 0);
+    FOCALFLEET_CHECK(FromSocketFrame(ToSocketFrame(*frame)) == frame);
+  }
+  return 0;
+}

@@ -1,0 +1,72 @@
+#include "protocol/wire/candump_line.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace focalfleet {
+namespace {
+
+CanFrame Frame(std::uint32_t id, const std::vector<std::uint8_t>& data) {
+  CanFrame frame{id, static_cast<std::uint8_t>(data.size()), {}};
+  std::copy(data.begin(), data.end(), frame.data.begin());
+  return frame;
+}
+
+// Lines as candump 2020.11 printed them.
+TEST(CandumpLine, ReadsBothFormsOfCandump) {
+  struct Case {
+    const char* line;
+    const char* time;
+    CanFrame frame;
+  };
+  const std::vector<Case> cases = {
+      {"(1436509052.249713) vcan0 14A952E0#0501056434120201", "1436509052.249713",
+       Frame(0x14A952E0, {5, 1, 5, 100, 0x34, 0x12, 2, 1})},
+      {"(1436509052.249713) vcan0 00002A00#", "1436509052.249713", Frame(0x2A00, {})},
+      {"  vcan0  00002A00   [0] ", "", Frame(0x2A00, {})},
+      {"  vcan0  04007F80   [5]  01 00 E8 03 00", "", Frame(0x04007F80, {1, 0, 0xE8, 3, 0})},
+      {" (000.000123)  vcan0  04007F80   [2]  01 AB", "000.000123", Frame(0x04007F80, {1, 0xAB})},
+      {" (2026-02-01 20:15:00.000001)  vcan0  04007F80   [1]  01", "2026-02-01 20:15:00.000001",
+       Frame(0x04007F80, {1})},
+      {"  vcan0  TX - -  04007F80   [2]  41 42   'AB'", "", Frame(0x04007F80, {0x41, 0x42})},
+      {"  vcan0  RX B E  04007F80   [1]  41\r", "", Frame(0x04007F80, {0x41})},
+  };
+  for (const Case& c : cases) {
+    const auto line = ParseCandumpLine(c.line);
+    ASSERT_TRUE(line) << c.line << ": " << line.error();
+    EXPECT_EQ(line->time, c.time) << c.line;
+    EXPECT_EQ(line->interface, "vcan0") << c.line;
+    EXPECT_EQ(line->foreign, nullptr) << c.line;
+    EXPECT_EQ(line->frame, c.frame) << c.line;
+  }
+}
+
+TEST(CandumpLine, TellsForeignFramesApart) {
+  for (const char* text :
+       {"(1.000000) vcan0 123#11", "(1.000000) vcan0 14A952E0#R", "(1.000000) vcan0 14A952E0##1AB",
+        "(1.000000) vcan0 20000080#0000000000000000", "  vcan0  123   [1]  11",
+        "  vcan0  14A952E0  [12]  00 01 02 03 04 05 06 07 08 09 0A 0B",
+        "  vcan0  14A952E0   [0]  remote request",
+        "  vcan0  20000080   [8]  00 00 00 00 00 00 00 00   ERRORFRAME"}) {
+    const auto line = ParseCandumpLine(text);
+    ASSERT_TRUE(line) << text << ": " << line.error();
+    EXPECT_NE(line->foreign, nullptr) << text;
+  }
+}
+
+TEST(CandumpLine, RefusesWhatCandumpDoesNotWrite) {
+  for (const char* text :
+       {"", " ", "vcan0", "(1.0 vcan0 14A952E0#", "(1.0) vcan0", "(1.0) vcan0 14A952E#",
+        "(1.0) vcan0 14A952E0#0", "(1.0) vcan0 14A952E0#0G",
+        "(1.0) vcan0 14A952E0#001122334455667788", "(1.0) vcan0 C4A952E0#", "vcan0 14A952E0",
+        "vcan0 14A952E0 [", "vcan0 14A952E0 [x] 00", "vcan0 14A952E0 [9] 00",
+        "vcan0 14A952E0 [2] 00", "vcan0 14A952E0 [2] 00 1", "vcan0 hello [2] 00 11",
+        "() vcan0 14A952E0#"}) {
+    EXPECT_FALSE(ParseCandumpLine(text)) << text;
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet
