@@ -27,7 +27,8 @@ class SpscQueue {
   std::optional<T> Pop() {
     const std::size_t taken = taken_.load(std::memory_order_relaxed);
     if (taken == put_.load(std::memory_order_acquire)) return std::nullopt;
-    std::optional<T> item(std::move(slots_[taken % slots_.size()]));
+    std::optional<T> item;
+    item.emplace(std::move(slots_[taken % slots_.size()]));
     taken_.store(taken + 1, std::memory_order_release);
     return item;
   }
