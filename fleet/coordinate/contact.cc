@@ -267,6 +267,9 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
     Identify(i);
     core_.Tell(i, UnitEventKind::kLost, "lost power in mid-move");
     core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " lost power in mid-move");
+  } else if (!began && status.state == UnitState::kArmed &&
+             core_.unit(i).answered_asked < core_.unit(i).begun_by) {
+    return;  // the start signal may still be on its way
   } else if (!began) {
     Identify(i);  // takes the move back, if it still holds one
     core_.Tell(i, UnitEventKind::kNeverBegan, "did not begin to move");

@@ -60,6 +60,8 @@ struct UnitRecord {
   HostInstant watch_from = kNever;
   HostInstant watch_until{INT64_MIN};
   HostInstant seen_moving{INT64_MIN};
+  /// Whoever was asked later than this and has not begun never will: the start may have been late.
+  HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   // Stops of ours, so that one of somebody else's is told from them.
   std::uint8_t stop_sequence = 0;       // of the last one that it was asked for

@@ -125,6 +125,7 @@ void Pursuit::WatchLeader(PositionerIndex i) {
   const HostInstant began = BeganOf(i);
   const DurationNs poll = core_.config.poll_period;
   const DurationNs watch = NoticingOf(core_.config).poll;
+  unit.begun_by = began + poll;
   unit.next_poll = began + poll + spread(poll);
   if (unit.watch_from < unit.watch_until)
     unit.next_poll = std::min(unit.next_poll,

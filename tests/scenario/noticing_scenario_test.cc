@@ -205,5 +205,36 @@ TEST(Noticing, IsNoLongerThanAskedForUnlessAnswersAreSlow) {
   EXPECT_LT(slow.poll + slow.suspicion, slow.notice);
 }
 
+// The host may be held up between the start signal's instant and its frame on the bus. A unit that
+// says meanwhile that it is armed has not failed to begin.
+TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
+  const std::uint64_t seed = TestSeed(3);
+  FOCALFLEET_TRACE_SEED(seed);
+  InProcessFleet fleet(
+      {.count = 61, .units_per_bus = 20, .seed = seed, .commit_delay = Milliseconds(400)});
+  fleet.ApplyRandom(seed);
+  const auto each_bus = [&](const sim::BusFaults& faults) {
+    for (const BusId bus : fleet.layout().buses()) *fleet.world().faults(bus) = faults;
+  };
+  const auto all_armed = [&] {
+    for (std::uint32_t i = 0; i < fleet.layout().size(); ++i)
+      if (fleet.coordinator().unit({i}).phase != UnitPhase::kArmed) return false;
+    return true;
+  };
+  ASSERT_TRUE(fleet.RunUntil(all_armed, Seconds(60)));
+  // The first start frame comes 350 ms late, its repeats are lost.
+  each_bus({.late = 1, .late_by = Milliseconds(350)});
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] { return fleet.coordinator().configuration().state == ConfigurationState::kMoving; },
+      Seconds(1)));
+  each_bus({.drop = 1});
+  fleet.Run(Milliseconds(240));
+  each_bus({});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 61u);
+  EXPECT_EQ(fleet.coordinator().configuration().round, 1u);
+  fleet.ExpectStoreTellsTheTruth("after a late start");
+}
+
 }  // namespace
 }  // namespace focalfleet::testing
