@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "fleet/files/targets_file.h"
+#include "fleet/targets.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -51,6 +52,42 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(command.targets,
                         ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
   return command;
+}
+
+/// Where it will stand, for choosing a side of its neighbours' elbows.
+UnitKnowledge GoesTo(const UnitView& unit) {
+  const bool goes = unit.target && (unit.outcome == TargetOutcome::kPending ||
+                                    unit.outcome == TargetOutcome::kArrived);
+  return goes ? Exactly(Witness::kReported, *unit.target) : unit.knowledge;
+}
+
+Result<RetargetCommand> RetargetOf(const Json& args, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(args, *view.layout));
+  TargetRow row{.unit = view.layout->unit(i).id, .place = {}, .target_id = {}};
+  if (args.contains("theta_deg") || args.contains("phi_deg")) {
+    TargetAngles angles;
+    FOCALFLEET_TRY_ASSIGN(angles.theta_deg, NumberArgument(args, "theta_deg"));
+    FOCALFLEET_TRY_ASSIGN(angles.phi_deg, NumberArgument(args, "phi_deg"));
+    row.place = angles;
+  } else {
+    PointFp place;
+    FOCALFLEET_TRY_ASSIGN(place.x_mm, NumberArgument(args, "x_mm"));
+    FOCALFLEET_TRY_ASSIGN(place.y_mm, NumberArgument(args, "y_mm"));
+    row.place = place;
+  }
+  std::vector<UnitKnowledge> now;
+  now.reserve(view.layout->size());
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n)
+    now.push_back(i.value == n ? view.coordinator->KnowledgeAt(i, view.now)
+                               : GoesTo(view.coordinator->unit({n})));
+  const auto poses = ResolveTargets({.source = "retarget", .rows = {row}}, *view.layout,
+                                    view.coordinator->drives(), now);
+  if (!poses) {
+    // There is no file whose line would have to be named.
+    const std::string& text = poses.error().text;
+    return Fail(poses.error().code, text.substr(text.find(": ") + 2));
+  }
+  return RetargetCommand{i, *(*poses)[i.value]};
 }
 
 /// Units whose place is not known and that can be homed now.
@@ -192,6 +229,7 @@ Result<Command> CommandOf(const ControlRequest& request, const FleetView& view) 
   const std::string& verb = request.verb;
   const Json& args = request.args;
   if (verb == "apply") return Wrapped(ApplyOf(args, view));
+  if (verb == "retarget") return Wrapped(RetargetOf(args, view));
   if (verb == "stop") return Wrapped(StopOf(args, view));
   if (verb == "home") return Wrapped(HomeOf(args, view));
   if (verb == "disable") return Wrapped(EnableOf(args, view, false));
@@ -225,6 +263,7 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
   pending.pursues = request->verb == "apply" || request->verb == "home";
+  pending.retargets = request->verb == "retarget";
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.pursues;
@@ -308,11 +347,13 @@ void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
   const Pending pending = it->second;
   // The first word on a configuration is that it began; who waits wants the last.
   it->second.began = true;
-  if (!reply.last && pending.wait) return;
+  if (!reply.last && (pending.wait || pending.retargets)) return;
   pending_.erase(it);
   waiting_ -= pending.wait ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
+    if (pending.retargets && pending.began)
+      return Answer(pending, Json{{"goes", false}, {"text", reply.error->text}});
     // An error means that nothing happened. What failed on the way is a summary with a reason.
     if (!pending.began || !HasMoved(view.coordinator->configuration()))
       return Answer(pending, tl::unexpected<Error>(*reply.error));
@@ -320,6 +361,7 @@ void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
     summary["error"] = reply.error->text;
     return Answer(pending, summary);
   }
+  if (pending.retargets) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
   if (!pending.pursues) return Answer(pending, Json{{"text", reply.text}});
   if (!pending.wait)
     return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});

@@ -21,8 +21,8 @@ namespace focalfleet {
 Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
                                                const std::vector<std::uint32_t>& ids);
 
-/// A request that changes something, as the coordinator's command. Verbs: apply stop home disable
-/// enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened then.
+/// A request that changes something, as the coordinator's command. Verbs: apply retarget stop home
+/// disable enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened then.
 Result<Command> CommandOf(const ControlRequest& request, const FleetView& view);
 
 class ControlDesk {
@@ -54,6 +54,7 @@ class ControlDesk {
     std::uint64_t id = 0;  // of the client's request
     bool wait = false;
     bool pursues = false;  // apply or home: its summary is the configuration
+    bool retargets = false;
     bool began = false;    // and the coordinator took it up
   };
 

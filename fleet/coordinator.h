@@ -129,9 +129,9 @@ struct PlanJob {
   std::vector<std::uint8_t> frozen;
   PlanOptions options;
   std::vector<PositionerIndex>
-      to_home;                  // not empty: plan the next wave of homing, `targets` is empty
-  bool unproven = false;        // of homing, see HomeCommand
-  std::optional<LateJob> late;  // then nothing else is looked at
+      to_home;            // not empty: plan the next wave of homing, `targets` is empty
+  bool unproven = false;  // of homing, see HomeCommand
+  std::shared_ptr<const LateJob> late;  // then nothing else is looked at
 };
 
 struct ReplyEffect {

@@ -54,6 +54,7 @@ void AddTargetsCommand(CommandLine* line);
 void AddPlanCommand(CommandLine* line);
 void AddEstimateCommand(CommandLine* line);
 void AddApplyCommand(CommandLine* line);
+void AddRetargetCommand(CommandLine* line);
 void AddStatusCommands(CommandLine* line);  // status, unit, state, history
 void AddWatchCommand(CommandLine* line);
 void AddStopCommand(CommandLine* line);

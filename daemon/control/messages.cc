@@ -145,6 +145,12 @@ Result<std::int64_t> IntegerArgument(const Json& args, const char* name) {
   return value->get<std::int64_t>();
 }
 
+Result<double> NumberArgument(const Json& args, const char* name) {
+  const Json* value = Member(args, name);
+  if (value == nullptr || !value->is_number()) return BadArgument(name, "a number");
+  return value->get<double>();
+}
+
 Result<std::string> TextArgument(const Json& args, const char* name) {
   const Json* value = Member(args, name);
   if (value == nullptr || !value->is_string()) return BadArgument(name, "a text");

@@ -56,6 +56,7 @@ std::string EncodeError(std::uint64_t id, const Error& error);
 // Arguments by name, checked. Errors of all: kInvalid, names the argument.
 Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name);
 Result<std::int64_t> IntegerArgument(const Json& args, const char* name);
+Result<double> NumberArgument(const Json& args, const char* name);
 Result<std::string> TextArgument(const Json& args, const char* name);
 /// Absent: `otherwise`.
 Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise);

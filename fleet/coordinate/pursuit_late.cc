@@ -164,6 +164,7 @@ Status Pursuit::Retarget(std::uint64_t request, const RetargetCommand& command) 
     StopOne(i, "it gets another target");
   }
   late_.push_back({.unit = i, .request = request, .near = {}});
+  core_.out->replies.push_back({request, false, {}, core_.NameOf(i) + " gets another target"});
   return {};
 }
 
@@ -247,13 +248,12 @@ void Pursuit::PlanLate(Late* late) {
   late->job = late_job_;
   late->near = DeviationsNear(i);
   PlanJob job{.job = job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = {}};
-  job.late = LateJob{running_,
-                     {.unit = i,
-                      .from = PlaceOf(core_.unit(i).view.knowledge),
-                      .to = *targets_[i.value],
-                      .now_s = (core_.now - view_.started).seconds(),
-                      .start_s = (start - view_.started).seconds()},
-                     Deviations()};
+  const ReplanQuestion question{.unit = i,
+                                .from = PlaceOf(core_.unit(i).view.knowledge),
+                                .to = *targets_[i.value],
+                                .now_s = (core_.now - view_.started).seconds(),
+                                .start_s = (start - view_.started).seconds()};
+  job.late = std::make_shared<const LateJob>(LateJob{running_, question, Deviations()});
   core_.out->plan_job = std::move(job);
 }
 

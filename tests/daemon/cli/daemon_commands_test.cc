@@ -338,6 +338,21 @@ TEST_F(DaemonCommands, StopPointsToTheDirectWayWhereNoDaemonAnswers) {
   EXPECT_THAT(result.err, HasSubstr("stop --direct"));
 }
 
+TEST_F(DaemonCommands, RetargetSaysWhetherTheUnitGoes) {
+  const auto goes = Ask({"retarget", "7", "12.5", "-3"},
+                        {{"retarget", {.result = Json{{"goes", true}, {"text", "unit 7 goes"}}}}});
+  EXPECT_EQ(goes.exit, 0);
+  EXPECT_THAT(goes.out, HasSubstr("unit 7 goes"));
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 7}, {"x_mm", 12.5}, {"y_mm", -3.0}}));
+  const auto stays =
+      Ask({"retarget", "7", "35", "120", "--angles"},
+          {{"retarget", {.result = Json{{"goes", false}, {"text", "unit 8 is in the way"}}}}});
+  EXPECT_EQ(stays.exit, 3);
+  EXPECT_THAT(stays.err, HasSubstr("unit 8 is in the way"));
+  EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 7}, {"theta_deg", 35.0}, {"phi_deg", 120.0}}));
+  EXPECT_EQ(Ask({"retarget", "7", "1"}, {{"retarget", {}}}).exit, 2);
+}
+
 TEST_F(DaemonCommands, HomeWantsUnitsOrNotKnownButNotBoth) {
   EXPECT_EQ(Ask({"home"}, {{"home", {}}}).exit, 2);
   EXPECT_EQ(Ask({"home", "1", "--not-known"}, {{"home", {}}}).exit, 2);

@@ -58,6 +58,27 @@ TEST(ControlDesk, ResolvesTargets) {
   EXPECT_TRUE(command.targets[1]);
 }
 
+TEST(ControlDesk, RetargetTakesAPlaceOrTwoAngles) {
+  const SmallFleet fleet;
+  const auto place = Try(fleet, "retarget", {{"unit_id", 2}, {"x_mm", 30.5}, {"y_mm", 4}});
+  ASSERT_TRUE(place) << place.error().text;
+  EXPECT_EQ(std::get<RetargetCommand>(place->what).unit, PositionerIndex{1});
+  const auto angles = Try(fleet, "retarget", {{"unit_id", 2}, {"theta_deg", 10}, {"phi_deg", 90}});
+  ASSERT_TRUE(angles) << angles.error().text;
+  const Pose pose = std::get<RetargetCommand>(angles->what).target;
+  const auto applied = Try(fleet, "apply",
+                           {{"source", "t.csv"},
+                            {"targets_csv", "unit_id,theta_deg,phi_deg\n2,10,90\n"},
+                            {"fixed", true}});
+  EXPECT_EQ(pose, *std::get<ApplyCommand>(applied->what).targets[1]);
+  EXPECT_THAT(ErrorOf(fleet, "retarget", {{"unit_id", 2}, {"x_mm", 30.5}}), HasSubstr("y_mm"));
+  EXPECT_THAT(ErrorOf(fleet, "retarget", {{"unit_id", 9}, {"x_mm", 0}, {"y_mm", 0}}),
+              HasSubstr("no unit 9"));
+  const std::string far = ErrorOf(fleet, "retarget", {{"unit_id", 2}, {"x_mm", 99}, {"y_mm", 0}});
+  EXPECT_EQ(far.find("unit 2: x_mm"), 0u) << far;
+  EXPECT_THAT(far, HasSubstr("out of patrol"));
+}
+
 TEST(ControlDesk, NamesWhatIsWrong) {
   const SmallFleet fleet;
   EXPECT_THAT(ErrorOf(fleet, "dance", Json::object()), HasSubstr("no verb 'dance'"));
