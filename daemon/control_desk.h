@@ -22,7 +22,8 @@ Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
                                                const std::vector<std::uint32_t>& ids);
 
 /// A request that changes something, as the coordinator's command. Verbs: apply retarget stop home
-/// disable enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened then.
+/// disable enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened
+/// then.
 Result<Command> CommandOf(const ControlRequest& request, const FleetView& view);
 
 class ControlDesk {

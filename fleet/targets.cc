@@ -173,10 +173,11 @@ class SideChooser {
 };
 
 // Two fibres wanted where their arms touch is the author's error, so it is told with the author's
-// lines.
+// lines: all such pairs.
 Status CheckClear(const Targets& targets, const Layout& layout, std::span<const UnitDrive> drives,
                   std::span<const std::optional<Pose>> poses) {
   constexpr double kToleranceMm = 0.002;  // "2 um less is still clear"
+  std::string text;
   std::unordered_map<std::uint32_t, const TargetRow*> row_of;
   for (const TargetRow& row : targets.rows) {
     const PositionerIndex i = *layout.Find(row.unit);
@@ -187,15 +188,16 @@ Status CheckClear(const Targets& targets, const Layout& layout, std::span<const 
       if (earlier == row_of.end()) continue;
       const ArmOf other{j, ArmAt(layout.unit(j), drives[j.value], *poses[j.value])};
       if (IsClear(layout, arm, other, -kToleranceMm)) continue;
-      return Fail(ErrorCode::kInvalid,
-                  At(targets, row) + ": its target collides with that of unit " +
-                      std::to_string(earlier->second->unit.value) + " in line " +
-                      std::to_string(earlier->second->line) + ": their arms would be " +
-                      Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
-                      Number(ClearDistanceMm(layout, i, j)) + " mm are needed");
+      if (!text.empty()) text += "; ";
+      text += At(targets, row) + ": its target collides with that of unit " +
+              std::to_string(earlier->second->unit.value) + " in line " +
+              std::to_string(earlier->second->line) + ": their arms would be " +
+              Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
+              Number(ClearDistanceMm(layout, i, j)) + " mm are needed";
     }
     row_of.emplace(i.value, &row);
   }
+  if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
   return {};
 }
 

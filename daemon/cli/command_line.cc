@@ -125,6 +125,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddPlanCommand(line.get());
   AddEstimateCommand(line.get());
   AddApplyCommand(line.get());
+  AddRetargetCommand(line.get());
   AddStatusCommands(line.get());
   AddWatchCommand(line.get());
   AddStopCommand(line.get());

@@ -238,7 +238,7 @@ void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
       ->add_option("--within-s", options->plan.within_s,
                    "All have arrived by then, s; with one of the three above "
                    "[the end of the soonest plan]")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.001, 1677.0));
 }
 
 }  // namespace

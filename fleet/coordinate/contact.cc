@@ -269,7 +269,13 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
     core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " lost power in mid-move");
   } else if (!began && status.state == UnitState::kArmed &&
              core_.unit(i).answered_asked < core_.unit(i).begun_by) {
-    return;  // the start signal may still be on its way
+    // The start signal may still be on its way. Whoever starts late within the notice is clear of
+    // all others; the next answer may come too late to stop them if it never starts.
+    const Noticing noticing = NoticingOf(core_.config);
+    const HostInstant start = core_.unit(i).begun_by - core_.config.poll_period;
+    if (core_.now + noticing.poll + noticing.suspicion >= start + noticing.notice)
+      core_.Tell(i, UnitEventKind::kUnheard);
+    return;
   } else if (!began) {
     Identify(i);  // takes the move back, if it still holds one
     core_.Tell(i, UnitEventKind::kNeverBegan, "did not begin to move");

@@ -83,7 +83,7 @@ enum class UnitEventKind : std::uint8_t {
   kReady,        // read anew, or its motion ended where it should: its knowledge is settled
   kStopped,      // its motion ended before its end
   kNeverBegan,   // did not start with the others
-  kUnheard,      // in motion, does not answer at once: may have ended
+  kUnheard,      // in motion, does not answer at once, or has not begun yet: may have ended
   kEnded,        // in motion, says that it stands, not yet where
   kLost,         // silent, restarted, foreign or faulty: not to be counted on
   kForeignStop,  // it obeyed a stop that is not ours

@@ -300,9 +300,10 @@ void Pursuit::TakeLate(Late* late, const LateMove& move) {
   // Watched from now on: who has ended already is noticed before this one starts.
   for (const LateMove::Leader& leader : move.leaders) {
     const PositionerIndex j = leader.unit;
-    if (part_[j.value] != Part::kMoving || plan_of_[j.value] == kNoPlan) continue;
+    if (part_[j.value] == Part::kNone || plan_of_[j.value] == kNoPlan) continue;
     plan_.moves[plan_of_[j.value]].followers.push_back(leader.follower);
-    WatchSoon(j);
+    // One that is late itself is watched from its own start on.
+    if (part_[j.value] == Part::kMoving) WatchSoon(j);
   }
   Upload(i);
 }
@@ -322,8 +323,9 @@ void Pursuit::TellOtherLate(PositionerIndex i) {
   }
 }
 
-/// The unit gives its move back.
+/// The unit gives its move back. Who was to come where it stands, and has started, is stopped.
 void Pursuit::Withdraw(PositionerIndex i) {
+  StopFollowers(i, {HostInstant{INT64_MIN}, kNever}, core_.NameOf(i) + " stays in its way");
   TakeBackIntent(i);
   courses_.erase(i.value);
   plan_of_[i.value] = kNoPlan;
@@ -336,6 +338,7 @@ void Pursuit::Withdraw(PositionerIndex i) {
 bool Pursuit::Load(Late* late) {
   const PositionerIndex i = late->unit;
   if (part_[i.value] == Part::kNone) {  // fell out; who it was and why is said already
+    StopFollowers(i, {HostInstant{INT64_MIN}, kNever}, core_.NameOf(i) + " stays in its way");
     before_[i.value].reset();
     courses_.erase(i.value);
     plan_of_[i.value] = kNoPlan;

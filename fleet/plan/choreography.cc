@@ -572,6 +572,7 @@ void Repair::Drain(int turns_most) {
 /// Straight again and repaired again, in less time. False: that found no end, and all go as before.
 bool Repair::Tighten(std::uint32_t unit, double extend) {
   before_.clear();
+  const std::vector<std::vector<std::uint8_t>> unnoticed = unnoticed_;
   tightens_ = true;
   looks_most_ = kLooksToTighten;
   extend_most_ = extend;
@@ -588,6 +589,7 @@ bool Repair::Tighten(std::uint32_t unit, double extend) {
     out_.paths[it->first] = std::move(it->second.path);
     out_.tracks[it->first] = std::move(it->second.track);
   }
+  unnoticed_ = unnoticed;
   return false;
 }
 

@@ -145,7 +145,9 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
     const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
                                 .Run(seen_mm + need_mm + kTightToMm);
     // Clear by the planned need it is proven to be; the search stops short of the very least.
-    const double proven_mm = NeedOf(scene, i, j) - need_mm;
+    // A pair that is led apart is not: it may start nearer.
+    const bool proven = nearest.distance_mm >= NeedOf(scene, i, j) - kTightToMm;
+    const double proven_mm = proven ? NeedOf(scene, i, j) - need_mm : -1e9;
     const double clearance_mm = std::max(proven_mm, nearest.distance_mm - kTightToMm - need_mm);
     tightest.push_back({{i}, {j}, clearance_mm, nearest.t_s});
     std::sort(tightest.begin(), tightest.end(), nearer);

@@ -41,12 +41,12 @@ enum class UnservedWhy : std::uint8_t {
 };
 const char* Name(UnservedWhy why);
 
-/// A proof that no way leads to a target, however all that can move gets out of the way
+/// A proof that no way leads to a pose, however all that can move gets out of the way
 /// (no_way.h).
 struct NoWay {
   double grid_deg = 0;                 // of the boxes that were enough for it
   std::vector<PositionerIndex> walls;  // units that never move and close the way; ascending
-  bool obstacle = false;               // fixed obstacles, or covers of uncertain units, do, too
+  bool obstacle = false;               // fixed obstacles do, too
 };
 
 struct Unserved {

@@ -74,6 +74,7 @@ class Planner {
   void GiveWay();
   void Abandon(std::uint32_t unit);
   bool CanEver(std::uint32_t unit, std::optional<NoWay>* proof);
+  [[nodiscard]] std::optional<NoWay> NoWayFor(std::uint32_t unit) const;
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
   [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
@@ -339,11 +340,29 @@ bool Planner::CanEver(std::uint32_t unit, std::optional<NoWay>* proof) {
     question.grid_deg = grid_deg;
     if (!surroundings_.search().Find(question).empty()) return true;
   }
-  *proof = ProveNoWay({.arm = question.arm,
-                       .never_move = question.blockers,
-                       .from = start_[unit],
-                       .to = goal_[unit]});
+  *proof = NoWayFor(unit);
   return false;
+}
+
+/// A proof that whatever never moves leaves the unit no way to this pose. Covers of uncertain units
+/// are wider than these may be, so next to one there is none.
+std::optional<NoWay> Planner::NoWayFor(std::uint32_t unit) const {
+  std::vector<Blocker> never_move;
+  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
+    const std::uint32_t j = near.unit;
+    if (!scene_.is_place(j)) continue;
+    if (layout_.unit({j}).enabled && request_.frozen[j] == 0) continue;
+    const double least_mm = std::min(scene_.FullNeed(unit, j) - kClearToleranceMm, near.need_mm);
+    never_move.push_back({{scene_.arm(j).At(start_[j]), 0}, least_mm, j});
+  }
+  for (const StandingThing& thing : scene_.standing(unit)) {
+    if (thing.by != kNobody) continue;
+    never_move.push_back({thing.capsule, thing.least_mm, thing.by});
+  }
+  return ProveNoWay({.arm = &scene_.arm(unit),
+                     .never_move = never_move,
+                     .from = start_[unit],
+                     .to = goal_[unit]});
 }
 
 /// Gives up on stuck units that no order of moves can help. True: there was one.
@@ -392,16 +411,19 @@ void Planner::GiveWay() {
 /// leaves some no time.
 Status Planner::CheckPower() const {
   PowerLedger ledger(layout_, request_.drives, options_.motor, options_.power, {});
-  const double least_W = ledger.largest_motor_W();
+  double least_W = 0;  // of those that go somewhere
+  for (std::uint32_t i = 0; i < scene_.size(); ++i)
+    for (std::size_t k = 0; k < kAxisCount; ++k)
+      if (served_[i] != 0 && goal_[i][k] != start_[i][k])
+        least_W = std::max(least_W, ledger.Motor_W(i, k));
   std::array<char, 160> text{};
   for (const auto& [limit_W, name] :
        {std::pair{options_.power.rail_W, "rail"}, std::pair{options_.power.total_W, "total"}}) {
     if (limit_W <= 0 || limit_W >= least_W) continue;
-    std::snprintf(
-        text.data(), text.size(),
-        "the %s limit of %.4f W is below what one motor draws; the least that is feasible "
-        "is %.4f W",
-        name, limit_W, least_W);
+    std::snprintf(text.data(), text.size(),
+                  "the %s limit of %.4f W is below what one motor draws; at least %.4f W "
+                  "are needed",
+                  name, limit_W, least_W);
     return Fail(ErrorCode::kRefused, text.data());
   }
   const double least_s = PowerBoundS(&ledger);
@@ -468,7 +490,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
       // Where power is what takes the time, rails that are full leave no room to give way.
       const double power_s = PowerBoundS(&*ledger);
       if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
-      within_s = std::max(within_s, power_s) * slack;
+      within_s = std::min(std::max(within_s, power_s) * slack, kOffsetMaxS);
     }
     choreography_ = Choreograph({.scene = &scene_,
                                  .drives = request_.drives,
@@ -531,6 +553,8 @@ void Planner::TracksOfPlan() {
 /// Those that found no turn in the order go among the others as these are planned.
 void Planner::ServeTheRest() {
   const std::vector<Unserved> unserved = unserved_;
+  const std::vector<std::uint8_t> served = served_;
+  const std::vector<Pose> goal = goal_;
   const Plan ordered = plan_;
   std::vector<AxisPaths> paths(scene_.size());
   for (const UnitPlan& move : plan_.moves) paths[move.unit.value] = move.path;
@@ -540,10 +564,8 @@ void Planner::ServeTheRest() {
     std::erase_if(unserved_, [i](const Unserved& u) { return u.unit.value == i; });
   }
   if (AllAtOnce(paths)) return;
-  for (const std::uint32_t i : stuck_for_order_) {
-    served_[i] = 0;
-    goal_[i] = start_[i];
-  }
+  served_ = served;
+  goal_ = goal;
   unserved_ = unserved;
   plan_ = ordered;
 }
@@ -616,6 +638,10 @@ Result<Plan> Planner::Run() {
 
 Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
+  if (options.within_s > kOffsetMaxS)
+    return Fail(ErrorCode::kInvalid, "a start can be put off for " +
+                                         std::to_string(static_cast<int>(kOffsetMaxS)) +
+                                         " s at most: no plan can use more time");
   return Planner(request, options).CheckOnly();
 }
 

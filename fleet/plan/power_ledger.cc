@@ -19,9 +19,6 @@ PowerLedger::PowerLedger(const Layout& layout, std::span<const UnitDrive> drives
     rail_.push_back(it->second);
   }
   rails_.resize(index.size());
-  for (const UnitDrive& drive : drives_)
-    for (const AxisDrive& axis : drive.axis)
-      largest_W_ = std::max(largest_W_, powers_.Of({axis, drive.mode, drive.v_bus_V}).total_W());
 }
 
 double PowerLedger::Power(std::uint32_t unit, std::size_t axis, const Segment& segment) {

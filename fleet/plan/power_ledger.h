@@ -28,6 +28,8 @@ class PowerLedger {
 
   /// Enters the motion of a unit where it keeps the limits. False: it does not, nothing changes.
   bool Enter(std::uint32_t unit, const AxisPaths& path);
+  /// Enters what moves already, whatever the limits say of it.
+  void EnterAnyway(std::uint32_t unit, const AxisPaths& path) { Add(unit, path, 1); }
   void Remove(std::uint32_t unit, const AxisPaths& path);
   /// Units that are entered from now on may start this early or late.
   void WidenSkew(double start_skew_s) { tolerance_.start_skew_s = start_skew_s; }
@@ -39,8 +41,11 @@ class PowerLedger {
 
   /// Energy that the motion takes by nominal clocks. Units: J.
   double Energy(std::uint32_t unit, const AxisPaths& path);
-  /// The most that one motor of the fleet draws: no limit below it can be kept. Units: W.
-  [[nodiscard]] double largest_motor_W() const { return largest_W_; }
+  /// What one motor draws as it is driven: no limit below it lets it turn. Units: W.
+  [[nodiscard]] double Motor_W(std::uint32_t unit, std::size_t axis) {
+    const UnitDrive& drive = drives_[unit];
+    return powers_.Of({drive.axis[axis], drive.mode, drive.v_bus_V}).total_W();
+  }
 
  private:
   static constexpr double kSlotS = 0.05;
@@ -61,7 +66,6 @@ class PowerLedger {
   DrivePowers powers_;
   PowerLimits limits_;
   Tolerance tolerance_;
-  double largest_W_ = 0;
   std::vector<std::uint32_t> rail_;               // by unit: index into rails_
   std::vector<std::vector<std::int64_t>> rails_;  // nanowatts by slot, so that sums are exact
   std::vector<std::int64_t> total_;

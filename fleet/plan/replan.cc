@@ -415,9 +415,8 @@ void Replanner::EnterPower() {
   for (const Deviation& deviation : deviations_) {
     if (deviation.unit == q_.unit || !deviation.goes) continue;
     ledger_->WidenSkew(deviation.goes->start_skew_s);
-    // It fitted when it was planned, and nobody has been entered since that it did not know of.
-    static_cast<void>(ledger_->Enter(
-        deviation.unit.value, Later(deviation.goes->move.path, TicksOf(deviation.goes->start_s))));
+    ledger_->EnterAnyway(deviation.unit.value,
+                         Later(deviation.goes->move.path, TicksOf(deviation.goes->start_s)));
   }
   ledger_->WidenSkew(q_.start_skew_s);
 }
@@ -516,7 +515,7 @@ RunningPlan::RunningPlan(const PlanRequest& request, std::span<const UnitPlan> m
     ends_[i] = Exactly(Witness::kReported, move.to);
     paths_[i] = move.path;
     end_s_ = std::max(end_s_, EndOf(move, drives_[i]));
-    if (ledger_) static_cast<void>(ledger_->Enter(i, move.path));  // as the plan did
+    if (ledger_) ledger_->EnterAnyway(i, move.path);
   }
   scene_.AllowFor(from_);
   scene_.AllowFor(to_);

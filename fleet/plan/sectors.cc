@@ -290,7 +290,9 @@ Result<Plan> JoinSectors(const PlanRequest& request, const PlanOptions& options,
     const Plan& plan = plans[s]->plan;
     whole.moves.insert(whole.moves.end(), plan.moves.begin(), plan.moves.end());
     whole.unserved.insert(whole.unserved.end(), plan.unserved.begin(), plan.unserved.end());
-    if (whole.too_near.empty()) whole.too_near = plan.too_near;
+    // A pair across a border is named by both sides.
+    if (whole.too_near.find(plan.too_near) == std::string::npos)
+      whole.too_near += (whole.too_near.empty() ? "" : "; ") + plan.too_near;
   }
   const auto by_unit = [](const auto& a, const auto& b) { return a.unit < b.unit; };
   std::sort(whole.moves.begin(), whole.moves.end(), by_unit);

@@ -314,7 +314,9 @@ bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& a
   const SegmentFp line = ArmAt(arm_a, a, middle_s);
   const double travel_a = a.speed_mm_per_s * span_a.half();
   const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
-  const int first = static_cast<int>(std::floor((span_a.low - slip_s) / h));
+  // Beyond the end it stands: that is the last slice.
+  const int first =
+      std::min(static_cast<int>(std::floor((span_a.low - slip_s) / h)), b.slice_count());
   const int last =
       std::min(static_cast<int>(std::floor((span_a.high + slip_s) / h)), b.slice_count());
   // What meets for certain is found at once; only then is it worth to look closely at the rest.

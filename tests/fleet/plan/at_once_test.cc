@@ -107,7 +107,7 @@ TEST(PlanAtOnce, NamesTheLeastLimitThatIsFeasible) {
   EXPECT_EQ(plan.error().code, ErrorCode::kRefused);
   const double least_W = SteadyPower({}, {}).total_W();
   char expected[60];
-  std::snprintf(expected, sizeof expected, "the least that is feasible is %.4f W", least_W);
+  std::snprintf(expected, sizeof expected, "at least %.4f W are needed", least_W);
   EXPECT_NE(plan.error().text.find(expected), std::string::npos) << plan.error().text;
   options.power.total_W = 1.01 * least_W;
   const auto just = MakePlan(fleet.request(), options);
