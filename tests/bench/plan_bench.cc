@@ -9,6 +9,7 @@
 #include <sys/resource.h>
 
 #include <array>
+#include <algorithm>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -142,12 +143,17 @@ int Run(int argc, char** argv) {
                                              testing::CheckedObstacles(*layout), check_options);
       verdict = report.ok() ? "clear" : report.Text();
     }
-    if (!plan->unserved.empty() || (check && verdict != "clear")) ++faults;
+    // Who has no way at all, proven, is no fault of the plan.
+    const auto proven = static_cast<std::size_t>(
+        std::count_if(plan->unserved.begin(), plan->unserved.end(),
+                      [](const Unserved& unserved) { return unserved.proof.has_value(); }));
+    if (proven != plan->unserved.size() || (check && verdict != "clear")) ++faults;
     std::printf(
-        "seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu crossing %u "
+        "seed %llu bound %.2f s makespan %.2f s ratio %.4f cpu %.3f s unserved %zu (%zu proven) "
+        "crossing %u "
         "unnoticed %zu clearance %.1f um at %.2f s %s\n",
         static_cast<unsigned long long>(seed + static_cast<std::uint64_t>(c)), bound_s,
-        plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), plan->crossings,
+        plan->makespan_s, rows.back().ratio, cpu_s, plan->unserved.size(), proven, plan->crossings,
         plan->unnoticed.size(),
         plan->tightest.empty() ? 0 : 1e3 * plan->tightest.front().clearance_mm,
         plan->tightest.empty() ? 0 : plan->tightest.front().t_s, verdict.c_str());
