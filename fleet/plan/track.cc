@@ -307,7 +307,8 @@ bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& ar
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget) {
   constexpr double h = Track::kSliceS;
-  const double last_s = std::max(a.begin_s, b.end_s()) + h;
+  // A stand may last for ever; when the other stands too, nothing is new.
+  const double last_s = a.stands() ? std::max(a.begin_s, b.end_s()) + h : a.end_s;
   const Span1 span_a{a.begin_s, std::min(a.end_s, last_s)};
   const double slip_s = tolerance.Slip(span_a.high + tolerance.Slip(span_a.high));
   const double middle_s = span_a.middle();

@@ -139,5 +139,31 @@ TEST(PassesClear, HoldsForAllTimesThatCanMeetAndNotForMuchMore) {
   EXPECT_LT(reserved, touching / 4);
 }
 
+TEST(LegPassesClear, SeesWhereTheOtherStandsLongAfterItsEnd) {
+  const PlanningFleet fleet = HexFleet(2);
+  std::array<ArmGeometry, 2> arms{ArmGeometry(fleet.layout.unit({0}), fleet.drives[0]),
+                                  ArmGeometry(fleet.layout.unit({1}), fleet.drives[1])};
+  const Tolerance tolerance;
+  Rng rng(TestSeed(14));
+  FOCALFLEET_TRACE_SEED(TestSeed(14));
+  int touching = 0;
+  for (int k = 0; k < 4000; ++k) {
+    const std::array<Motion, 2> motions{DrawMotion(arms[0], &rng), DrawMotion(arms[1], &rng)};
+    const Track a(arms[0], fleet.drives[0], motions[0].from, motions[0].paths);
+    const Track b(arms[1], fleet.drives[1], motions[1].from, motions[1].paths);
+    const SegmentFp stands = LineAt(fleet.layout.unit({1}), motions[1], b.end_s() + 1);
+    for (Leg leg : a.legs()) {
+      if (leg.stands()) continue;
+      const double later_s = 500 - leg.begin_s;
+      leg.begin_s += later_s;
+      leg.end_s += later_s;
+      if (DistanceMm(ArmAt(arms[0], leg, leg.end_s), stands) > 2) continue;
+      ++touching;
+      EXPECT_FALSE(LegPassesClear(arms[0], leg, arms[1], b, 2, tolerance));
+    }
+  }
+  EXPECT_GT(touching, 20);
+}
+
 }  // namespace
 }  // namespace focalfleet
