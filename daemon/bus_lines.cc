@@ -7,10 +7,6 @@
 namespace focalfleet {
 namespace {
 
-/// A full interface queue is not told by any descriptor; in real time, about eight frames at 1
-/// Mbit/s.
-constexpr DurationNs kRetryFull = Milliseconds(1);
-
 /// Nothing gets through, and what waits would be stale when the link lives again.
 bool Dead(LinkState state) { return state == LinkState::kDown || state == LinkState::kOff; }
 
@@ -35,11 +31,15 @@ void BusLines::Receive(HostInstant now, std::vector<ReceivedFrame>* frames,
     if (line.ready || line.port->wake_at() <= now) line.port->Receive(now, frames);
     line.ready = false;
     const LinkState state = line.port->state();
-    if (line.told && state == line.last) continue;
+    // A link that is looked for in vain has one trouble after another; it is down all the same.
+    const std::string& trouble = line.port->trouble();
+    const bool more = state != LinkState::kDown && !trouble.empty() && trouble != line.trouble;
+    if (line.told && state == line.last && !more) continue;
     if (Dead(state)) line.outbox.Clear();
     line.told = true;
     line.last = state;
-    links->push_back({line.bus, state});
+    line.trouble = trouble;
+    links->push_back({line.bus, state, trouble});
   }
 }
 
@@ -59,7 +59,8 @@ HostInstant BusLines::wake_at(HostInstant now, const HostClock& clock) const {
   for (const Line& line : lines_) {
     at = std::min(at, line.port->wake_at());
     const bool dead = Dead(line.port->state());
-    if (line.outbox.size() > 0) at = std::min(at, dead ? now : now + clock.Real(kRetryFull));
+    if (line.outbox.size() > 0)
+      at = std::min(at, dead ? now : now + clock.Real(line.port->retry_full()));
   }
   return at;
 }

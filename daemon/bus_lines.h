@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "daemon/clock.h"
@@ -22,8 +23,8 @@ class BusLines {
   [[nodiscard]] int fd(std::size_t line) const { return lines_[line].port->fd(); }
   void MarkReady(std::size_t line) { lines_[line].ready = true; }
 
-  /// Receives on every line that is ready or due, and notes links that changed. The first call
-  /// notes all links.
+  /// Receives on every line that is ready or due, and notes links that changed, or
+  /// have something else the matter. The first call notes all links.
   void Receive(HostInstant now, std::vector<ReceivedFrame>* frames, std::vector<LinkEvent>* links);
 
   void Put(const OutFrame& frame, HostInstant decided_at);
@@ -45,6 +46,7 @@ class BusLines {
     bool ready = true;
     bool told = false;  // the coordinator knows of the link at all
     LinkState last = LinkState::kUp;
+    std::string trouble;  // as last told
   };
   [[nodiscard]] std::size_t IndexOf(BusId bus) const;
 

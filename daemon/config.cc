@@ -283,8 +283,6 @@ class Writer {
 
 void CheckTogether(const DaemonConfig& config, Reader* reader) {
   const bool socketcan = config.bus.port == PortKind::kSocketCan;
-  reader->Require(!socketcan || config.clock.speed == 1, "clock", "speed",
-                  "clock.speed must be 1 on SocketCAN: real motors do not hurry");
   reader->Require(!socketcan || !config.bus.interfaces.empty(), "bus", "interfaces",
                   "bus.interfaces must name one interface a bus for bus.port = \"socketcan\"");
   const std::set<std::string> names(config.bus.interfaces.begin(), config.bus.interfaces.end());

@@ -44,6 +44,15 @@ Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const H
   return ports;
 }
 
+/// A fleet that runs faster or slower than life is simulated, on interfaces that carry nothing
+/// else.
+Status CheckSpeed(const DaemonConfig& config, const HostClock& clock, const SocketCanPort& port) {
+  if (clock.speed() == 1 || (port.found() && !port.link().real())) return {};
+  return Fail(ErrorCode::kInvalid,
+              config.bus.interfaces_at + ": clock.speed must be 1: '" + port.name() +
+                  "' is no virtual CAN interface, and real motors do not hurry");
+}
+
 Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
                             const HostClock& clock, const InterfaceOpener& open) {
   FOCALFLEET_TRY(CheckInterfaces(config, layout));
@@ -52,9 +61,12 @@ Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
   for (std::size_t b = 0; b < config.bus.interfaces.size(); ++b) {
     auto port = SocketCanPort::Create({.bus = layout.buses()[b],
                                        .interface = config.bus.interfaces[b],
-                                       .retry_period = clock.Real(kRetryPeriod),
+                                       .bit_rate_bps = config.bus.bit_rate_bps,
+                                       .clock = clock,
+                                       .retry_period = kRetryPeriod,
                                        .open = open});
     if (!port) return Fail(port.error().code, config.bus.interfaces_at + ": " + port.error().text);
+    FOCALFLEET_TRY(CheckSpeed(config, clock, **port));
     any |= (*port)->found();
     ports.push_back(std::move(*port));
   }

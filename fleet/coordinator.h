@@ -36,6 +36,7 @@ namespace focalfleet {
 struct LinkEvent {
   BusId bus;
   LinkState state = LinkState::kUp;
+  std::string cause = {};  // for people; empty: not known
 };
 
 /// Commands carry the number that their replies name.

@@ -23,6 +23,9 @@ class PollablePort : public FramePort {
   /// Readable when Receive or another Send is worth while. -1: this port only goes by wake_at.
   [[nodiscard]] virtual int fd() const = 0;
   [[nodiscard]] virtual HostInstant wake_at() const = 0;
+  /// How soon another Send is worth while where one was refused and nothing tells of room. In real
+  /// time; as it is, about eight frames at 1 Mbit/s.
+  [[nodiscard]] virtual DurationNs retry_full() const { return Milliseconds(1); }
   [[nodiscard]] virtual const PortCounters& counters() const = 0;
   /// The interface or path, for people.
   [[nodiscard]] virtual const std::string& name() const = 0;

@@ -6,6 +6,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
+#include <optional>
 
 namespace focalfleet {
 namespace {
@@ -18,7 +20,9 @@ struct Batch {
   std::array<iovec, kBatch> vectors{};
   std::array<mmsghdr, kBatch> messages{};
   struct Control {
-    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(std::uint32_t))> bytes{};
+    static constexpr std::size_t kBytes =
+        CMSG_SPACE(sizeof(std::uint32_t)) + CMSG_SPACE(sizeof(timespec));
+    alignas(cmsghdr) std::array<char, kBytes> bytes{};
   };
   std::array<Control, kBatch> control{};
 
@@ -34,14 +38,58 @@ struct Batch {
   }
 };
 
-/// The kernel's count of frames that found its receive queue full, where the socket asks for it.
-void NoteOverflow(msghdr* header, PortCounters* counters) {
+struct Told {
+  std::uint32_t dropped = 0;            // frames that found the receive queue full, in all
+  std::optional<std::int64_t> wall_ns;  // when this one was taken in
+};
+
+/// What the kernel tells of a frame, where the socket asks for it.
+Told ReadControl(msghdr* header) {
+  Told told;
   for (cmsghdr* item = CMSG_FIRSTHDR(header); item != nullptr; item = CMSG_NXTHDR(header, item)) {
-    if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SO_RXQ_OVFL) continue;
-    std::uint32_t dropped = 0;
-    std::memcpy(&dropped, CMSG_DATA(item), sizeof dropped);
-    counters->lost = std::max<std::uint64_t>(counters->lost, dropped);
+    if (item->cmsg_level != SOL_SOCKET) continue;
+    if (item->cmsg_type == SO_RXQ_OVFL) {
+      std::memcpy(&told.dropped, CMSG_DATA(item), sizeof told.dropped);
+    } else if (item->cmsg_type == SO_TIMESTAMPNS) {
+      timespec at{};
+      std::memcpy(&at, CMSG_DATA(item), sizeof at);
+      told.wall_ns = at.tv_sec * std::int64_t{1'000'000'000} + at.tv_nsec;
+    }
   }
+  return told;
+}
+
+bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
+
+/// One packet that was read.
+struct Packet {
+  const can_frame* raw = nullptr;
+  bool whole = false;  // as long as a frame
+  bool own = false;    // our own, come back
+  Told told;
+};
+
+void Sort(const Packet& packet, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+          PortCounters* counters, Aside* aside) {
+  counters->lost = std::max<std::uint64_t>(counters->lost, packet.told.dropped);
+  if (packet.own && aside != nullptr) {
+    ++aside->confirmed;
+    return;
+  }
+  const auto frame = packet.whole ? FromSocketFrame(*packet.raw) : std::nullopt;
+  if (!frame) {
+    if (packet.whole && aside != nullptr && (packet.raw->can_id & CAN_ERR_FLAG) != 0)
+      aside->errors.push_back(*packet.raw);
+    else
+      ++counters->rejected;
+    return;
+  }
+  HostInstant at = stamp.at;
+  if (aside != nullptr) {
+    if (aside->only_units && !IsFromUnit(*frame)) return;  // another host's
+    if (aside->stamps && packet.told.wall_ns) at = aside->stamps->At(*packet.told.wall_ns);
+  }
+  out->push_back({stamp.bus, at, *frame});
 }
 
 }  // namespace
@@ -84,8 +132,13 @@ BatchSent SendFrames(int fd, std::span<const CanFrame> frames) {
   return sent;
 }
 
+HostInstant FrameStamps::At(std::int64_t wall_ns) const {
+  const DurationNs age{wall_now_ns - wall_ns};
+  return age.ns < 0 || age > kOldest ? now : now - clock.Real(age);
+}
+
 BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
-                            PortCounters* counters, std::vector<can_frame>* errors) {
+                            PortCounters* counters, Aside* aside) {
   for (std::size_t total = 0; total < kFramesPerReceive;) {
     Batch batch(/*with_control=*/true);
     const int got = ::recvmmsg(fd, batch.messages.data(), kBatch, MSG_DONTWAIT, nullptr);
@@ -97,17 +150,12 @@ BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<Rece
     for (std::size_t i = 0; i < count; ++i) {
       mmsghdr& message = batch.messages[i];
       if (message.msg_len == 0) return {.closed = true, .error = 0};
-      NoteOverflow(&message.msg_hdr, counters);
-      const bool whole =
-          message.msg_len == sizeof(can_frame) && (message.msg_hdr.msg_flags & MSG_TRUNC) == 0;
-      const auto frame = whole ? FromSocketFrame(batch.frames[i]) : std::nullopt;
-      if (frame) {
-        out->push_back({stamp.bus, stamp.at, *frame});
-      } else if (whole && errors != nullptr && (batch.frames[i].can_id & CAN_ERR_FLAG) != 0) {
-        errors->push_back(batch.frames[i]);
-      } else {
-        ++counters->rejected;
-      }
+      const auto flags = static_cast<unsigned>(message.msg_hdr.msg_flags);
+      Sort({.raw = &batch.frames[i],
+            .whole = message.msg_len == sizeof(can_frame) && (flags & MSG_TRUNC) == 0,
+            .own = (flags & MSG_CONFIRM) != 0,
+            .told = ReadControl(&message.msg_hdr)},
+           stamp, out, counters, aside);
     }
     total += count;
     if (count < kBatch) return {};

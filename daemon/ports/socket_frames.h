@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "daemon/clock.h"
 #include "daemon/ports/pollable_port.h"
 #include "protocol/link/frame_port.h"
 
@@ -29,10 +30,31 @@ struct BatchReceived {
   bool closed = false;  // the other end is gone (of a connected socket)
   int error = 0;        // errno that ended it, but EAGAIN
 };
-/// Reads until nothing is left, at most kFramesPerReceive. Error frames (CAN_ERR_FLAG) go to
-/// `errors` where that is given; the rest that is no data frame is counted as rejected.
+
+/// When the kernel took a frame in, on the host's clock. It stamps with the wall clock; what counts
+/// is the frame's age, so a step of that clock spoils at most what was stamped before it.
+struct FrameStamps {
+  HostInstant now;               // one instant ...
+  std::int64_t wall_now_ns = 0;  // ... on both clocks
+  HostClock clock;
+
+  /// Never later than now; an age beyond kOldest is a step of the clock: now.
+  [[nodiscard]] HostInstant At(std::int64_t wall_ns) const;
+  static constexpr DurationNs kOldest = Milliseconds(2000);  // of real time
+};
+
+/// What a CAN_RAW socket tells beside the frames of others.
+struct Aside {
+  std::vector<can_frame> errors;
+  std::size_t confirmed = 0;          // our own frames that came back
+  std::optional<FrameStamps> stamps;  // given: frames are stamped by the kernel
+  bool only_units = false;            // of others' frames, drop those of hosts
+};
+
+/// Reads until nothing is left, at most kFramesPerReceive. What is no data frame is counted as
+/// rejected, but for error frames where `aside` takes them.
 BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
-                            PortCounters* counters, std::vector<can_frame>* errors = nullptr);
+                            PortCounters* counters, Aside* aside = nullptr);
 
 /// One bus must not keep the others waiting; what is left makes the descriptor readable again.
 inline constexpr std::size_t kFramesPerReceive = 1024;

@@ -1,170 +1,244 @@
 #include "daemon/ports/socketcan_port.h"
 
-#include <linux/can/error.h>
-#include <linux/can/raw.h>
-#include <net/if.h>
-#include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <utility>
-
-#include "daemon/ports/socket_frames.h"
 
 namespace focalfleet {
 namespace {
 
-/// Room for the answers of a whole bus while the daemon is busy elsewhere.
-constexpr int kReceiveBufferBytes = 1 << 20;
+constexpr DurationNs kLookPeriod = Milliseconds(1000);  // real time
+/// A confirmation that is not back by then is lost, unless the kernel still holds the frame. On a
+/// bus at its limit that is 6000 frames.
+constexpr DurationNs kConfirmationLost = Milliseconds(1000);
+constexpr DurationNs kFull = Milliseconds(1);
 
-Status Configure(int fd) {
-  const int on = 1;
-  const int off = 0;
-  const can_err_mask_t errors =
-      CAN_ERR_CRTL | CAN_ERR_BUSOFF | CAN_ERR_RESTARTED | CAN_ERR_TX_TIMEOUT;
-  // Answers of units and questions of other hosts alike; 11-bit frames do not even wake us.
-  const can_filter extended{CAN_EFF_FLAG, CAN_EFF_FLAG | CAN_RTR_FLAG};
-  if (::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &off, sizeof off) != 0 ||
-      ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) != 0 ||
-      ::setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &extended, sizeof extended) != 0)
-    return Fail(ErrorCode::kUnavailable,
-                std::string("cannot set up CAN_RAW: ") + std::strerror(errno));
-  // Both are help, not need: refused by a hardened kernel, the port works as well.
-  ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBufferBytes, sizeof kReceiveBufferBytes);
-  ::setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
-  return {};
+std::int64_t ReadClock(clockid_t which) {
+  timespec now{};
+  ::clock_gettime(which, &now);
+  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
-struct InterfaceState {
-  int index = 0;
-  bool up = false;
-};
-Result<InterfaceState> Look(int fd, const std::string& name) {
-  ifreq request{};
-  if (name.size() >= sizeof request.ifr_name)
-    return Fail(ErrorCode::kInvalid, "no CAN interface can be called '" + name + "'");
-  std::memcpy(request.ifr_name, name.data(), name.size());
-  if (::ioctl(fd, SIOCGIFINDEX, &request) != 0)
-    return Fail(ErrorCode::kUnavailable,
-                "no CAN interface '" + name + "': " + std::strerror(errno));
-  InterfaceState state{.index = request.ifr_ifindex, .up = false};
-  if (::ioctl(fd, SIOCGIFFLAGS, &request) != 0)
-    return Fail(ErrorCode::kUnavailable, "CAN interface '" + name + "': " + std::strerror(errno));
-  state.up = (request.ifr_flags & IFF_UP) != 0;
-  return state;
+/// What the window goes by: bits do not hurry when the host's clock does.
+HostInstant Monotonic() { return {ReadClock(CLOCK_MONOTONIC)}; }
+
+bool IsUrgent(const CanFrame& frame) { return frame.id >> 26 == 0; }
+
+Status CheckBitRate(const CanLink& link, const SocketCanPort* port, std::uint32_t wanted_bps) {
+  if (wanted_bps == 0 || link.bit_rate_bps == 0 || link.bit_rate_bps == wanted_bps) return {};
+  return Fail(ErrorCode::kRefused, "CAN interface '" + port->name() + "' has " +
+                                       std::to_string(link.bit_rate_bps) + " bit/s, not " +
+                                       std::to_string(wanted_bps));
+}
+
+LinkState LinkStateOf(const CanLink& link) {
+  if (link.state == ControllerState::kBusOff) return LinkState::kOff;
+  return link.state == ControllerState::kPassive ? LinkState::kPassive : LinkState::kUp;
 }
 
 }  // namespace
 
-Result<int> OpenInterface(const std::string& name) {
-  const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
-  if (fd < 0)
-    return Fail(ErrorCode::kUnavailable,
-                "this kernel offers no SocketCAN (for '" + name + "'): " + std::strerror(errno));
-  const auto give_up = [fd](Error error) -> Result<int> {
-    ::close(fd);
-    return tl::unexpected<Error>(std::move(error));
-  };
-  const auto interface = Look(fd, name);
-  if (!interface) return give_up(interface.error());
-  if (const auto configured = Configure(fd); !configured) return give_up(configured.error());
-  if (!interface->up) {
-    ::close(fd);
-    return -1;
-  }
-  sockaddr_can address{};
-  address.can_family = AF_CAN;
-  address.can_ifindex = interface->index;
-  const auto* raw = static_cast<const sockaddr*>(static_cast<const void*>(&address));
-  if (::bind(fd, raw, sizeof address) != 0)
-    return give_up({ErrorCode::kUnavailable,
-                    "cannot use CAN interface '" + name + "': " + std::strerror(errno)});
-  return fd;
-}
-
-std::optional<LinkState> LinkStateOf(const can_frame& error) {
-  if ((error.can_id & CAN_ERR_BUSOFF) != 0) return LinkState::kOff;
-  if ((error.can_id & CAN_ERR_RESTARTED) != 0) return LinkState::kUp;
-  if ((error.can_id & CAN_ERR_CRTL) == 0) return std::nullopt;
-  const std::uint8_t controller = error.data[1];
-  if ((controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0)
-    return LinkState::kPassive;
-  const std::uint8_t better =
-      CAN_ERR_CRTL_ACTIVE | CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING;
-  if ((controller & better) != 0) return LinkState::kUp;
-  return std::nullopt;
+SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
+    : options_(std::move(options)),
+      socket_(std::move(socket)),
+      recovery_({.revive = options_.revive
+                               ? options_.revive
+                               : [name = options_.interface] { return ReviveLink(name); },
+                 .first_wait = options_.clock.Real(Milliseconds(1000)),
+                 .longest_wait = options_.clock.Real(Milliseconds(60'000)),
+                 .poll_period = options_.clock.Real(Milliseconds(10))}) {
+  aside_.only_units = options_.hears == Hears::kUnits;
 }
 
 Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
   FOCALFLEET_TRY_ASSIGN(WatchedSocket socket, WatchedSocket::Create());
   std::unique_ptr<SocketCanPort> port(new SocketCanPort(std::move(options), std::move(socket)));
   const auto opened = port->Open();
-  if (!opened && opened.error().code == ErrorCode::kInvalid)
+  if (!opened && opened.error().code != ErrorCode::kUnavailable)
     return tl::unexpected<Error>(opened.error());
   return port;
 }
 
 Status SocketCanPort::Open() {
-  const auto fd = options_.open(options_.interface);
-  found_ = fd.has_value();
-  if (!fd || *fd < 0) {
-    trouble_ = fd ? "the interface is down" : fd.error().text;
-    return fd ? Status() : tl::unexpected<Error>(fd.error());
+  auto opened = options_.open(options_.interface, options_.hears);
+  found_ = opened.has_value();
+  if (!opened) {
+    trouble_ = opened.error().text;
+    return tl::unexpected<Error>(std::move(opened).error());
   }
-  socket_.Open(*fd);
-  state_ = LinkState::kUp;
-  wake_at_ = kNever;
+  link_ = std::move(opened->link);
+  if (opened->socket < 0) {
+    trouble_ = "the interface is down";
+    return {};
+  }
+  socket_.Open(opened->socket);
+  if (auto right = CheckBitRate(link_, this, options_.bit_rate_bps); !right) {
+    socket_.Close();
+    trouble_ = right.error().text;
+    return right;
+  }
+  window_ = TransmitWindow(
+      {.confirms = link_.echoes, .bit_rate_bps = link_.echoes ? 0 : link_.bit_rate_bps});
+  waits_since_ = kNever;
   trouble_.clear();
   counters_.reconnects += std::exchange(was_up_, true) ? 1u : 0u;
+  // How it was before is told once it is looked at, at once.
+  state_ = LinkStateOf(link_);
+  look_at_ = state_ == LinkState::kUp ? kNever : HostInstant{0};
   return {};
 }
 
 void SocketCanPort::Lose(const std::string& why) {
   socket_.Close();
+  window_.Clear();
   state_ = LinkState::kDown;
-  wake_at_ = HostInstant{0};
+  retry_at_ = HostInstant{0};
+  look_at_ = kNever;
   trouble_ = why;
   ++counters_.link_errors;
 }
 
+HostInstant SocketCanPort::wake_at() const {
+  return std::min(socket_.open() ? look_at_ : retry_at_, recovery_.wake_at());
+}
+
+// A driver that echoes wakes us when there is room; else the bit clock tells, or nobody.
+DurationNs SocketCanPort::retry_full() const {
+  if (window_.options().confirms) return Milliseconds(20);
+  const HostInstant room_at = window_.RoomAt();
+  if (room_at == kNever) return kFull;
+  return std::clamp(room_at - Monotonic(), Microseconds(20), kFull);
+}
+
+std::size_t SocketCanPort::Room(bool urgent) {
+  const HostInstant now = Monotonic();
+  if (!window_.options().confirms) {
+    window_.Charged(BytesBelow(socket_.socket()));
+  } else if (window_.unconfirmed() > 0 && now - waits_since_ > kConfirmationLost &&
+             BytesBelow(socket_.socket()) == 0) {
+    ++counters_.link_errors;
+    window_.Clear();
+  }
+  return window_.Room(urgent, now);
+}
+
 std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
-  if (!socket_.open() || frames.empty()) return 0;
-  const BatchSent sent = SendFrames(socket_.socket(), frames);
-  // ENOBUFS: the interface's own queue is full, which no poll tells; the caller tries again soon.
-  const bool full = sent.error == EAGAIN || sent.error == ENOBUFS;
-  if (sent.error != 0 && !full) Lose(std::string("cannot send: ") + std::strerror(sent.error));
-  socket_.WatchSending(sent.error == EAGAIN);
-  return sent.taken;
+  if (!socket_.open() || state_ == LinkState::kOff) return 0;
+  std::size_t taken = 0;
+  while (taken < frames.size()) {
+    const bool urgent = IsUrgent(frames[taken]);
+    const std::size_t room = std::min(Room(urgent), frames.size() - taken);
+    if (room == 0) return taken;
+    // The last place is not for those behind a stop.
+    const auto batch = frames.subspan(taken, urgent ? 1 : room);
+    if (urgent) SetUrgent(socket_.socket(), true);
+    const BatchSent sent = SendFrames(socket_.socket(), batch);
+    if (urgent) SetUrgent(socket_.socket(), false);
+    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = Monotonic();
+    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, Monotonic());
+    taken += sent.taken;
+    // ENOBUFS: others have filled the interface's queue, which no poll tells.
+    socket_.WatchSending(sent.error == EAGAIN);
+    if (sent.error == EAGAIN || sent.error == ENOBUFS) return taken;
+    if (sent.error != 0) {
+      Lose(std::string("cannot send: ") + std::strerror(sent.error));
+      return taken;
+    }
+  }
+  return taken;
 }
 
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
+  Recover(now);
   if (!socket_.open()) {
-    if (now < wake_at_) return;
+    if (now < retry_at_) return;
     static_cast<void>(Open());  // what failed is the trouble
     if (!socket_.open()) {
-      wake_at_ = now + options_.retry_period;
+      retry_at_ = now + options_.clock.Real(options_.retry_period);
       return;
     }
+    if (state_ != LinkState::kOff) recovery_.Well(now);
   }
-  errors_.clear();
+  aside_.errors.clear();
+  aside_.confirmed = 0;
+  aside_.stamps = FrameStamps{now, ReadClock(CLOCK_REALTIME), options_.clock};
+  const std::size_t before = out->size();
   const BatchReceived received =
-      ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_, &errors_);
-  for (const can_frame& error : errors_) NoteError(error);
+      ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_, &aside_);
+  window_.Confirmed(aside_.confirmed);
+  if (aside_.confirmed > 0) waits_since_ = Monotonic();
+  HearBits(now, std::span(*out).subspan(before));
+  for (const can_frame& error : aside_.errors) NoteError(error, now);
+  if (now >= look_at_) LookAgain(now);
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
-  wake_at_ = now + options_.retry_period;
+  retry_at_ = now + options_.clock.Real(options_.retry_period);
 }
 
-void SocketCanPort::NoteError(const can_frame& error) {
+void SocketCanPort::HearBits(HostInstant now, std::span<const ReceivedFrame> frames) {
+  if (window_.options().bit_rate_bps == 0) return;
+  const HostInstant monotonic = Monotonic();
+  for (const ReceivedFrame& received : frames)
+    window_.Heard(received.frame, monotonic - (now - received.at));
+}
+
+std::string SocketCanPort::WithCauses(const std::string& what) const {
+  const std::string causes = errors_.Causes();
+  return causes.empty() ? what : what + " (" + causes + ")";
+}
+
+void SocketCanPort::NoteError(const can_frame& error, HostInstant now) {
   ++counters_.link_errors;
-  const auto state = LinkStateOf(error);
-  if (!state || *state == state_) return;
-  state_ = *state;
-  trouble_ = state_ == LinkState::kUp        ? std::string()
-             : state_ == LinkState::kPassive ? std::string("the controller is error-passive")
-                                             : std::string("the controller is bus-off");
+  errors_.Note(error);
+  if (const auto state = LinkStateOf(error)) SetState(*state, now);
+  if (IsWarning(error) && trouble_.empty()) trouble_ = WithCauses("the controller warns of errors");
+}
+
+void SocketCanPort::SetState(LinkState state, HostInstant now) {
+  if (state == LinkState::kUp) {
+    recovery_.Well(now);
+    if (state_ == LinkState::kOff) window_.Clear();  // a restart flushes what was below
+  }
+  if (state == LinkState::kOff) {
+    // Where the kernel restarts it by itself, two would only get into each other's way.
+    if (link_.restart_ms == 0) recovery_.BusOff(now);
+    window_.Clear();
+  }
+  look_at_ = state == LinkState::kUp ? kNever : now + options_.clock.Real(kLookPeriod);
+  if (state == state_) return;
+  state_ = state;
+  trouble_ = state == LinkState::kUp        ? std::string()
+             : state == LinkState::kPassive ? WithCauses("the controller is error-passive")
+                                            : WithCauses("the controller is bus-off");
+  if (state == LinkState::kUp) errors_.Clear();
+}
+
+// The controller is not well, or was not when it was opened: an error frame that says that it is
+// again may be lost.
+void SocketCanPort::LookAgain(HostInstant now) {
+  look_at_ = now + options_.clock.Real(kLookPeriod);
+  const auto link = LookAtLink(options_.interface);
+  if (!link || link->index != link_.index) return;  // gone: the socket will say so
+  link_ = *link;
+  const LinkState state = LinkStateOf(link_);
+  if (trouble_.empty()) state_ = LinkState::kUp;  // as Open left it, untold
+  SetState(state, now);
+}
+
+void SocketCanPort::Recover(HostInstant now) {
+  const auto outcome = recovery_.Poll(now);
+  if (!outcome) return;
+  if (!*outcome) {
+    if (state_ == LinkState::kOff)
+      trouble_ = WithCauses("the controller is bus-off") + "; " + outcome->error().text;
+    return;
+  }
+  // A restart says so by an error frame, down and up by an error of the socket: look in any case.
+  if (socket_.open()) look_at_ = now;
 }
 
 }  // namespace focalfleet

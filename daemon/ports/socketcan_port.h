@@ -1,72 +1,86 @@
 // One bus on a SocketCAN interface: can0 of an adapter, or vcan0. A CAN_RAW socket, never waiting,
-// in batches.
+// in batches, with at most three of our frames below it (transmit_window.h). Own frames are looped
+// back to other sockets of this host (candump sees them).
 //
-// Own frames are looped back to other sockets of this host (candump sees them), not to this one.
-// Error frames of the controller say when it goes passive or bus-off. An interface that is down or
-// not there takes the link down, no more: it is looked for again and opened when it is up.
+// An interface that is down or not there takes the link down, no more: it is looked for again and
+// opened when it is up, be it the same or another of the same name. One whose bit rate is wrong is
+// not used. A controller that goes bus-off is brought back where that is possible
+// (link_recovery.h), otherwise `trouble` says what a person has to do.
 #pragma once
 
-#include <linux/can.h>
-
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
+#include "daemon/clock.h"
+#include "daemon/ports/can_errors.h"
+#include "daemon/ports/can_socket.h"
+#include "daemon/ports/link_recovery.h"
 #include "daemon/ports/pollable_port.h"
+#include "daemon/ports/socket_frames.h"
+#include "daemon/ports/transmit_window.h"
 #include "daemon/ports/watched_socket.h"
 
 namespace focalfleet {
-
-/// A bound socket, or -1 where the interface is there but down.
-/// Errors: kUnavailable: the kernel has no CAN, or no such interface (named); kInvalid: none can
-/// have this name.
-Result<int> OpenInterface(const std::string& name);
-/// As OpenInterface; another one in tests on a kernel without CAN.
-using InterfaceOpener = std::function<Result<int>(const std::string& name)>;
 
 class SocketCanPort : public PollablePort {
  public:
   struct Options {
     BusId bus;
     std::string interface;
-    DurationNs retry_period = Milliseconds(200);
+    Hears hears = Hears::kUnits;
+    std::uint32_t bit_rate_bps = 0;  // that the interface must have, if it has any; 0: whatever
+    HostClock clock = HostClock();
+    DurationNs retry_period = Milliseconds(200);  // real time
     InterfaceOpener open = OpenInterface;
+    LinkRecovery::Reviver revive = {};  // none: ReviveLink
   };
   /// Tries to open it once; an interface that is down or not there is down, no error.
-  /// Errors: kInvalid: none can have this name; kUnavailable: no descriptors left.
+  /// Errors: kInvalid: none can have this name; kRefused: it has another bit rate; kUnavailable: no
+  /// descriptors left.
   static Result<std::unique_ptr<SocketCanPort>> Create(Options options);
 
   std::size_t Send(std::span<const CanFrame> frames) override;
   void Receive(HostInstant now, std::vector<ReceivedFrame>* out) override;
   [[nodiscard]] LinkState state() const override { return state_; }
-  /// The interface was there when it was last looked for, be it up or down.
-  [[nodiscard]] bool found() const { return found_; }
   [[nodiscard]] int fd() const override { return socket_.fd(); }
-  [[nodiscard]] HostInstant wake_at() const override { return wake_at_; }
+  [[nodiscard]] HostInstant wake_at() const override;
+  [[nodiscard]] DurationNs retry_full() const override;
   [[nodiscard]] const PortCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::string& name() const override { return options_.interface; }
   [[nodiscard]] const std::string& trouble() const override { return trouble_; }
 
+  /// The interface was there when it was last looked for, be it up or down.
+  [[nodiscard]] bool found() const { return found_; }
+  /// As it was when it was last looked at.
+  [[nodiscard]] const CanLink& link() const { return link_; }
+
  private:
-  SocketCanPort(Options options, WatchedSocket socket)
-      : options_(std::move(options)), socket_(std::move(socket)) {}
+  SocketCanPort(Options options, WatchedSocket socket);
   Status Open();
   void Lose(const std::string& why);
-  void NoteError(const can_frame& error);
+  void NoteError(const can_frame& error, HostInstant now);
+  void SetState(LinkState state, HostInstant now);
+  void LookAgain(HostInstant now);
+  void Recover(HostInstant now);
+  [[nodiscard]] std::size_t Room(bool urgent);
+  [[nodiscard]] std::string WithCauses(const std::string& what) const;
+  void HearBits(HostInstant now, std::span<const ReceivedFrame> frames);
 
   Options options_;
   WatchedSocket socket_;
+  CanLink link_;
+  TransmitWindow window_;
+  LinkRecovery recovery_;
+  ErrorTally errors_;
   LinkState state_ = LinkState::kDown;
   bool found_ = false;
-  bool was_up_ = false;  // ever
-  HostInstant wake_at_{0};
+  bool was_up_ = false;               // ever
+  HostInstant retry_at_{0};           // while there is no socket
+  HostInstant look_at_ = kNever;      // while the controller is not well: its state is asked for
+  HostInstant waits_since_ = kNever;  // monotonic: confirmations are outstanding since
   PortCounters counters_;
   std::string trouble_;
-  std::vector<can_frame> errors_;  // of one Receive, kept for its room
+  Aside aside_;  // of one Receive, kept for its room
 };
-
-/// What an error frame says of the controller's state; none where it says nothing of it.
-std::optional<LinkState> LinkStateOf(const can_frame& error);
 
 }  // namespace focalfleet

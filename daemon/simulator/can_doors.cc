@@ -29,6 +29,8 @@ Result<std::unique_ptr<CanDoors>> CanDoors::Create(const Options& options) {
     SocketCanPort::Options port_options;
     port_options.bus = options.buses[i];
     port_options.interface = options.interfaces[i];
+    port_options.hears = Hears::kHosts;
+    port_options.clock = options.clock;
     FOCALFLEET_TRY_ASSIGN(auto port, SocketCanPort::Create(port_options));
     if (port->state() == LinkState::kDown)
       return Fail(ErrorCode::kUnavailable,

@@ -18,6 +18,7 @@ class CanDoors : public BusDoors {
   struct Options {
     std::vector<std::string> interfaces;  // Shape: as buses
     std::vector<BusId> buses;
+    HostClock clock = HostClock();
   };
   /// Errors: kInvalid where the numbers differ; kUnavailable, names the interface.
   static Result<std::unique_ptr<CanDoors>> Create(const Options& options);

@@ -81,13 +81,13 @@ Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostCl
 }
 
 Result<std::unique_ptr<BusDoors>> OpenDoors(const SimulatorOptions& options,
-                                            std::span<const BusId> buses) {
+                                            std::span<const BusId> buses, const HostClock& clock) {
   const std::vector<BusId> all(buses.begin(), buses.end());
   if (options.interfaces.empty()) {
     FOCALFLEET_TRY_ASSIGN(auto doors, UnixDoors::Create({options.unix_directory, all}));
     return doors;
   }
-  FOCALFLEET_TRY_ASSIGN(auto doors, CanDoors::Create({options.interfaces, all}));
+  FOCALFLEET_TRY_ASSIGN(auto doors, CanDoors::Create({options.interfaces, all, clock}));
   return doors;
 }
 
@@ -228,7 +228,7 @@ Status RunSimulator(const SimulatorOptions& options) {
   FOCALFLEET_TRY_ASSIGN(sim::WorldConfig config, Configure(options, clock));
   FOCALFLEET_TRY_ASSIGN(const Wakers wakers, Wakers::Create());
   sim::World world(std::move(config));
-  FOCALFLEET_TRY_ASSIGN(const auto doors, OpenDoors(options, world.buses()));
+  FOCALFLEET_TRY_ASSIGN(const auto doors, OpenDoors(options, world.buses(), clock));
   std::optional<LineServer> control;
   if (!options.control_path.empty()) {
     FOCALFLEET_TRY_ASSIGN(control, LineServer::Create(options.control_path));

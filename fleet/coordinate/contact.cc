@@ -163,10 +163,15 @@ void Contact::NoAnswer(PositionerIndex i) {
 
 void Contact::LinkChanged(const LinkEvent& event) {
   BusRecord* bus = core_.FindBus(event.bus);
-  if (bus == nullptr || bus->view.link == event.state) return;
-  const bool was_up = bus->view.link == LinkState::kUp;
-  bus->view.link = event.state;
+  if (bus == nullptr) return;
+  const LinkState before = bus->view.link;
   const std::string name = "bus " + std::to_string(event.bus.value);
+  const std::string cause = event.cause.empty() ? "" : ": " + event.cause;
+  if (before == event.state) {
+    if (!cause.empty()) core_.Raise(Severity::kWarning, {}, event.bus, name + cause);
+    return;
+  }
+  bus->view.link = event.state;
   if (event.state == LinkState::kUp) {
     core_.Raise(Severity::kInfo, {}, event.bus, name + " is up");
     for (const PositionerIndex i : bus->units) {
@@ -175,10 +180,13 @@ void Contact::LinkChanged(const LinkEvent& event) {
     }
     return;
   }
-  if (!was_up || event.state == LinkState::kPassive) return;
+  if (event.state == LinkState::kPassive) {
+    core_.Raise(Severity::kWarning, {}, event.bus, name + " is passive" + cause);
+    return;
+  }
   core_.Raise(Severity::kError, {}, event.bus,
-              name + " is " + Name(event.state) + "; its " + std::to_string(bus->units.size()) +
-                  " units cannot be reached");
+              name + " is " + Name(event.state) + cause + "; its " +
+                  std::to_string(bus->units.size()) + " units cannot be reached");
   for (const PositionerIndex i : bus->units) {
     const UnitPhase phase = core_.unit(i).view.phase;
     if (phase != kAbsent && phase != kSilent)

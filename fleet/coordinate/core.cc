@@ -312,7 +312,7 @@ void Core::EndStep() {
     if (now >= bus.clock_due) {
       const auto host_us =
           static_cast<std::uint64_t>(now.ns / 1000) & ((std::uint64_t{1} << 48) - 1);
-      if (bus.view.link == LinkState::kUp)
+      if (bus.view.link == LinkState::kUp || bus.view.link == LinkState::kPassive)
         SendNow(static_cast<std::size_t>(&bus - buses.data()), Clock{host_us}, kBroadcastNode);
       bus.clock_due = now + config.clock_period;
     }

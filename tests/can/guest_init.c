@@ -3,9 +3,9 @@
 // output on the first console, leaves the exit status in $focalfleet_run/status and powers the
 // guest off.
 //
-// The kernel hands unknown words of its command line to process 1 as environment, so focalfleet_run
-// and focalfleet_modules are plain environment variables here. Static, because it runs before
-// anything is set up.
+// The kernel hands unknown words of its command line to process 1 as environment, so
+// focalfleet_run, focalfleet_modules and focalfleet_vcan (parameters of that module) are plain
+// environment variables here. Static, because it runs before anything is set up.
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -63,8 +63,12 @@ static void take_console(void) {
 
 // A kernel with CAN built in has no such files; that is as good.
 static void load_modules(void) {
-  static const char* const names[] = {"net/can/can", "net/can/can-raw",
-                                      "drivers/net/can/dev/can-dev", "drivers/net/can/vcan"};
+  static const char* const names[] = {"net/can/can",
+                                      "net/can/can-raw",
+                                      "drivers/net/can/dev/can-dev",
+                                      "drivers/net/can/vcan",
+                                      "drivers/net/can/slcan/slcan",
+                                      "net/sched/sch_netem"};
   const char* folder = getenv("focalfleet_modules");
   struct utsname kernel;
   uname(&kernel);
@@ -74,7 +78,9 @@ static void load_modules(void) {
              kernel.release, names[i]);
     const int file = open(path, O_RDONLY | O_CLOEXEC);
     if (file < 0) continue;
-    if (syscall(SYS_finit_module, file, "", 0) != 0 && errno != EEXIST) perror(path);
+    const char* vcan = getenv("focalfleet_vcan");
+    const char* parameters = vcan != NULL && strstr(names[i], "/vcan") != NULL ? vcan : "";
+    if (syscall(SYS_finit_module, file, parameters, 0) != 0 && errno != EEXIST) perror(path);
     close(file);
   }
 }

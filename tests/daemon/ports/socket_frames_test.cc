@@ -109,10 +109,10 @@ TEST(SocketFrames, ErrorFramesGoApart) {
   error.len = CAN_ERR_DLC;
   pair.Write(error);
   std::vector<ReceivedFrame> received;
-  std::vector<can_frame> errors;
+  Aside aside;
   PortCounters counters;
-  ReceiveFrames(pair.b(), kStamp, &received, &counters, &errors);
-  EXPECT_EQ(errors.size(), 1u);
+  ReceiveFrames(pair.b(), kStamp, &received, &counters, &aside);
+  EXPECT_EQ(aside.errors.size(), 1u);
   EXPECT_EQ(counters.rejected, 0u);
 }
 

@@ -7,6 +7,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <thread>
+#include <utility>
+
 namespace focalfleet {
 namespace {
 
@@ -37,11 +41,12 @@ struct Interface {
     ::close(ends[0]);
     ::close(ends[1]);
   }
-  Result<int> Open(const std::string& name) const {
+  Result<OpenedInterface> Open(const std::string& name) const {
     if (!there) return Fail(ErrorCode::kUnavailable, "no CAN interface '" + name + "'");
-    return up ? ::dup(ends[0]) : -1;
+    return OpenedInterface{up ? ::dup(ends[0]) : -1, link};
   }
   int ends[2] = {-1, -1};
+  CanLink link;
   bool there = false;
   bool up = true;
 };
@@ -49,7 +54,7 @@ struct Interface {
 TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   Interface interface;
   const auto port = SocketCanPort::Create(
-      {.bus = BusId{1}, .interface = "can7", .open = [&](const std::string& name) {
+      {.bus = BusId{1}, .interface = "can7", .open = [&](const std::string& name, Hears) {
          return interface.Open(name);
        }});
   ASSERT_TRUE(port) << port.error().text;
@@ -83,11 +88,182 @@ TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
 
 TEST(SocketCanPort, RefusesANameThatNoInterfaceCanHave) {
   const auto port = SocketCanPort::Create(
-      {.bus = BusId{1}, .interface = "can7", .open = [](const std::string&) -> Result<int> {
+      {.bus = BusId{1},
+       .interface = "can7",
+       .open = [](const std::string&, Hears) -> Result<OpenedInterface> {
          return Fail(ErrorCode::kInvalid, "no CAN interface can be called so");
        }});
   ASSERT_FALSE(port);
   EXPECT_EQ(port.error().code, ErrorCode::kInvalid);
+}
+
+std::vector<CanFrame> Frames(std::uint32_t count, std::uint32_t first_id) {
+  std::vector<CanFrame> frames;
+  for (std::uint32_t i = 0; i < count; ++i)
+    frames.push_back({.id = first_id + i, .length = 8, .data = {}});
+  return frames;
+}
+
+// What the kernel charges for frames that the other end has not taken is what is below.
+TEST(SocketCanPort, HandsDownNoMoreThanTheKernelHasLet) {
+  Interface interface;
+  interface.there = true;
+  const auto port = SocketCanPort::Create(
+      {.bus = BusId{1}, .interface = "can7", .open = [&](const std::string& name, Hears) {
+         return interface.Open(name);
+       }});
+  ASSERT_TRUE(port) << port.error().text;
+  constexpr std::uint32_t kOrdinaryId = 5u << 26;
+  const auto frames = Frames(40, kOrdinaryId);
+  const auto take = [&] {
+    can_frame frame{};
+    return ::recv(interface.ends[1], &frame, sizeof frame, MSG_DONTWAIT) == sizeof frame;
+  };
+  std::size_t sent = 0;
+  std::size_t taken = 0;
+  for (int turn = 0; turn < 200 && taken < frames.size(); ++turn) {
+    sent += (*port)->Send(std::span(frames).subspan(sent));
+    EXPECT_LE(sent - taken, TransmitWindow::kOrdinary);
+    // A stop finds room where the others find none, but only one does.
+    if (turn == 3) {
+      const auto stops = Frames(2, 0);
+      EXPECT_EQ((*port)->Send(stops), 1u);
+      EXPECT_TRUE(take());
+    }
+    if (take()) ++taken;
+  }
+  EXPECT_EQ(sent, frames.size());
+}
+
+TEST(SocketCanPort, RefusesAnotherBitRate) {
+  Interface interface;
+  interface.there = true;
+  interface.link.bit_rate_bps = 500'000;
+  const auto open = [&](const std::string& name, Hears) { return interface.Open(name); };
+  const auto port = SocketCanPort::Create(
+      {.bus = BusId{1}, .interface = "can7", .bit_rate_bps = 1'000'000, .open = open});
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(port.error().text, "CAN interface 'can7' has 500000 bit/s, not 1000000");
+  interface.link.bit_rate_bps = 1'000'000;
+  EXPECT_TRUE(SocketCanPort::Create(
+      {.bus = BusId{1}, .interface = "can7", .bit_rate_bps = 1'000'000, .open = open}));
+}
+
+TEST(SocketCanPort, DoesNotUseOneThatComesBackWithAnotherBitRate) {
+  Interface interface;
+  const auto port = SocketCanPort::Create(
+      {.bus = BusId{1},
+       .interface = "can7",
+       .bit_rate_bps = 1'000'000,
+       .open = [&](const std::string& name, Hears) { return interface.Open(name); }});
+  ASSERT_TRUE(port) << port.error().text;
+  interface.there = true;
+  interface.link.bit_rate_bps = 250'000;
+  std::vector<ReceivedFrame> in;
+  (*port)->Receive(HostInstant{} + Milliseconds(1000), &in);
+  EXPECT_EQ((*port)->state(), LinkState::kDown);
+  EXPECT_THAT((*port)->trouble(), HasSubstr("250000 bit/s, not 1000000"));
+  interface.link.bit_rate_bps = 1'000'000;
+  (*port)->Receive(HostInstant{} + Milliseconds(1200), &in);
+  EXPECT_EQ((*port)->state(), LinkState::kUp);
+}
+
+// Error frames that the controller's driver would write.
+class TroubledPort : public ::testing::Test {
+ protected:
+  void SetUp() override { Open(); }
+  void Open() {
+    interface_.there = true;
+    auto port = SocketCanPort::Create(
+        {.bus = BusId{1},
+         .interface = "can7",
+         .open = [this](const std::string& name, Hears) { return interface_.Open(name); },
+         .revive = [this]() -> Status {
+           ++attempts_;
+           if (works_) return {};
+           return Fail(ErrorCode::kRefused, "no privilege to restart it");
+         }});
+    ASSERT_TRUE(port) << port.error().text;
+    port_ = std::move(*port);
+  }
+  void Write(const can_frame& frame) const {
+    ASSERT_EQ(::send(interface_.ends[1], &frame, sizeof frame, 0),
+              static_cast<ssize_t>(sizeof frame));
+  }
+  void ReceiveAt(std::int64_t ms) { port_->Receive(HostInstant{} + Milliseconds(ms), &in_); }
+  /// An attempt is due at `ms`; when the port had its outcome. It has a thread of its own, so how
+  /// often the port asks until then is left to chance.
+  std::int64_t AwaitAttempt(int number, std::int64_t ms) {
+    ReceiveAt(ms);
+    while (attempts_ < number) std::this_thread::yield();
+    while (port_->wake_at() <= HostInstant{} + Milliseconds(ms + 10)) ReceiveAt(ms += 10);
+    return ms;
+  }
+
+  Interface interface_;
+  std::unique_ptr<SocketCanPort> port_;
+  std::vector<ReceivedFrame> in_;
+  std::atomic<int> attempts_{0};
+  std::atomic<bool> works_{false};
+};
+
+TEST_F(TroubledPort, NamesStateAndCause) {
+  can_frame lonely = ErrorFrame(CAN_ERR_ACK);
+  Write(lonely);
+  Write(lonely);
+  can_frame bit = ErrorFrame(CAN_ERR_PROT);
+  bit.data[2] = CAN_ERR_PROT_BIT0;
+  Write(bit);
+  Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+  ReceiveAt(1);
+  EXPECT_EQ(port_->state(), LinkState::kUp);
+  EXPECT_EQ(port_->trouble(), "the controller warns of errors (no acknowledgement, bit error)");
+  Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_PASSIVE));
+  ReceiveAt(2);
+  EXPECT_EQ(port_->state(), LinkState::kPassive);
+  EXPECT_EQ(port_->trouble(), "the controller is error-passive (no acknowledgement, bit error)");
+  Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+  ReceiveAt(3);
+  EXPECT_EQ(port_->state(), LinkState::kUp);
+  EXPECT_EQ(port_->trouble(), "");
+  EXPECT_EQ(port_->counters().link_errors, 6u);
+}
+
+TEST_F(TroubledPort, IsBroughtBackFromBusOffAgainAndAgain) {
+  Write(ErrorFrame(CAN_ERR_BUSOFF));
+  ReceiveAt(1000);
+  EXPECT_EQ(port_->state(), LinkState::kOff);
+  const CanFrame frame{.id = 77, .length = 0, .data = {}};
+  EXPECT_EQ(port_->Send({&frame, 1}), 0u);
+  ReceiveAt(1999);
+  EXPECT_EQ(attempts_, 0) << "not before its time";
+  std::int64_t at = AwaitAttempt(1, 2000);
+  EXPECT_EQ(port_->trouble(), "the controller is bus-off; no privilege to restart it");
+  works_ = true;
+  ReceiveAt(at + 1999);
+  EXPECT_EQ(attempts_, 1) << "twice the first wait";
+  at = AwaitAttempt(2, at + 2000);
+  Write(ErrorFrame(CAN_ERR_RESTARTED));
+  ReceiveAt(at += 100);
+  EXPECT_EQ(port_->state(), LinkState::kUp);
+  EXPECT_EQ(port_->trouble(), "");
+  // Off again at once: the next attempt waits longer than the last.
+  Write(ErrorFrame(CAN_ERR_BUSOFF));
+  ReceiveAt(at);
+  ReceiveAt(at + 3999);
+  EXPECT_EQ(attempts_, 2);
+  AwaitAttempt(3, at + 4000);
+}
+
+TEST_F(TroubledPort, LeavesTheRestartToAKernelThatDoesIt) {
+  interface_.link.restart_ms = 100;
+  Open();
+  Write(ErrorFrame(CAN_ERR_BUSOFF));
+  ReceiveAt(1000);
+  EXPECT_EQ(port_->state(), LinkState::kOff);
+  ReceiveAt(100'000);
+  EXPECT_EQ(attempts_, 0);
 }
 
 TEST(SocketCanPort, ReadsTheControllersStateFromErrorFrames) {

@@ -140,8 +140,6 @@ TEST(Config, ValueOutOfRangeIsAnErrorWithItsLine) {
 }
 
 TEST(Config, WhatDoesNotGoTogetherIsSaid) {
-  EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\"\ninterfaces = [\"can0\"]\n[clock]\nspeed = 2"),
-              HasSubstr(":5: clock.speed must be 1 on SocketCAN"));
   EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\""), HasSubstr("bus.interfaces must name"));
   EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\"\ninterfaces = [\"a\", \"a\"]"),
               HasSubstr(":3: bus.interfaces must name each interface once"));

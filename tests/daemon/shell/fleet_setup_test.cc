@@ -23,14 +23,30 @@ class OpenPortsTest : public ::testing::Test {
     EXPECT_TRUE(config) << config.error().text;
     const auto layout = Layout::Create(MakeHexLayout({.count = 3, .units_per_bus = 1}), {});
     EXPECT_TRUE(layout) << layout.error().text;
-    const InterfaceOpener open = [&](const std::string& name) -> Result<int> {
+    const InterfaceOpener open = [&](const std::string& name, Hears) -> Result<OpenedInterface> {
       if (name.size() > 15) return Fail(ErrorCode::kInvalid, "none can be called " + name);
       if (!there.contains(name)) return Fail(ErrorCode::kUnavailable, "no interface " + name);
-      return -1;  // there, and down
+      return OpenedInterface{-1, {.kind = kind}};  // there, and down
     };
-    return OpenPorts(*config, *layout, HostClock(), open);
+    return OpenPorts(*config, *layout, HostClock(speed), open);
   }
+
+  std::string kind = "can";
+  double speed = 1;
 };
+
+TEST_F(OpenPortsTest, OnlyVirtualInterfacesMayRunInAnotherTime) {
+  const std::set<std::string> all{"can0", "can1", "can2"};
+  speed = 0.5;
+  const auto real = Open(all);
+  ASSERT_FALSE(real);
+  EXPECT_EQ(real.error().text,
+            "/etc/f.toml:3: clock.speed must be 1: 'can0' is no virtual CAN interface, and real "
+            "motors do not hurry");
+  kind = "vcan";
+  EXPECT_TRUE(Open(all));
+  EXPECT_FALSE(Open({"can0", "can2"})) << "nobody knows what can1 will be";
+}
 
 TEST_F(OpenPortsTest, AnInterfaceThatIsMissingIsABusThatIsDown) {
   const auto ports = Open({"can0", "can2"});

@@ -1,0 +1,93 @@
+#include "daemon/ports/can_socket.h"
+
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <linux/sock_diag.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "daemon/ports/can_errors.h"
+
+namespace focalfleet {
+namespace {
+
+/// Room for the answers of a whole bus while the daemon is busy elsewhere: the kernel charges 768
+/// bytes a frame.
+constexpr int kReceiveBufferBytes = 1 << 20;
+
+// protocol/wire/identifier.h: bit 19 says who sends; functions above 15 do not exist.
+constexpr canid_t kFromUnit = 1u << 19;
+constexpr canid_t kNoFunction = 0x30u << 20;
+
+bool Set(int fd, int level, int option, const void* value, socklen_t size) {
+  return ::setsockopt(fd, level, option, value, size) == 0;
+}
+
+/// A driver that echoes gives our own frames back as confirmations; the filter must let them in.
+Status Configure(int fd, Hears hears, bool confirms) {
+  const int on = 1;
+  const int own = confirms ? 1 : 0;
+  const can_err_mask_t errors = ErrorsOfInterest();
+  const canid_t theirs = hears == Hears::kUnits ? kFromUnit : 0;
+  const canid_t exact = CAN_EFF_FLAG | CAN_RTR_FLAG | kNoFunction;
+  const can_filter filter{CAN_EFF_FLAG | (confirms ? 0 : theirs),
+                          exact | (confirms ? 0 : kFromUnit)};
+  if (!Set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &own, sizeof own) ||
+      !Set(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) ||
+      !Set(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof filter))
+    return Fail(ErrorCode::kUnavailable,
+                std::string("cannot set up CAN_RAW: ") + std::strerror(errno));
+  // All of these are help, not need: refused by a hardened kernel, the port works as well.
+  if (!Set(fd, SOL_SOCKET, SO_RCVBUFFORCE, &kReceiveBufferBytes, sizeof kReceiveBufferBytes))
+    Set(fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBufferBytes, sizeof kReceiveBufferBytes);
+  Set(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);
+  Set(fd, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on);
+  return {};
+}
+
+}  // namespace
+
+Result<OpenedInterface> OpenInterface(const std::string& name, Hears hears) {
+  FOCALFLEET_TRY(QuestionAboutLink(name));
+  const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
+  if (fd < 0)
+    return Fail(ErrorCode::kUnavailable,
+                "this kernel offers no SocketCAN (for '" + name + "'): " + std::strerror(errno));
+  const auto give_up = [fd](Error error) -> Result<OpenedInterface> {
+    ::close(fd);
+    return tl::unexpected<Error>(std::move(error));
+  };
+  const auto link = LookAtLink(name);
+  if (!link) return give_up(link.error());
+  if (!link->up) {
+    ::close(fd);
+    return OpenedInterface{-1, *link};
+  }
+  if (const auto done = Configure(fd, hears, link->echoes); !done) return give_up(done.error());
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = link->index;
+  const auto* raw = static_cast<const sockaddr*>(static_cast<const void*>(&address));
+  if (::bind(fd, raw, sizeof address) != 0)
+    return give_up({ErrorCode::kUnavailable,
+                    "cannot use CAN interface '" + name + "': " + std::strerror(errno)});
+  return OpenedInterface{fd, *link};
+}
+
+std::size_t BytesBelow(int socket) {
+  std::array<std::uint32_t, SK_MEMINFO_VARS> info{};
+  socklen_t size = sizeof info;
+  if (::getsockopt(socket, SOL_SOCKET, SO_MEMINFO, info.data(), &size) != 0) return 0;
+  return info[SK_MEMINFO_WMEM_ALLOC];
+}
+
+void SetUrgent(int socket, bool urgent) {
+  const int priority = urgent ? 6 : 0;  // 6: the highest that needs no privilege
+  Set(socket, SOL_SOCKET, SO_PRIORITY, &priority, sizeof priority);
+}
+
+}  // namespace focalfleet

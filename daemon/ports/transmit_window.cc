@@ -1,0 +1,68 @@
+#include "daemon/ports/transmit_window.h"
+
+#include <algorithm>
+
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+
+std::size_t TransmitWindow::ByMemory() const {
+  if (charged_bytes_ == 0) return 0;
+  // How much one frame is charged is the kernel's affair: until a frame went down alone, anything
+  // charged may be all of them.
+  if (frame_bytes_ == 0) return kAll;
+  return (charged_bytes_ + frame_bytes_ - 1) / frame_bytes_;
+}
+
+std::size_t TransmitWindow::ByBitClock(HostInstant now) const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(ends_, [now](HostInstant end) { return end > now; }));
+}
+
+std::size_t TransmitWindow::Room(bool urgent, HostInstant now) const {
+  const std::size_t below = std::max({unconfirmed_, ByMemory(), ByBitClock(now)});
+  // One alone shows what a frame is charged.
+  const bool to_learn = held_ && frame_bytes_ == 0 && !urgent;
+  const std::size_t allowed = urgent ? kAll : to_learn ? 1 : kOrdinary;
+  return allowed > below ? allowed - below : 0;
+}
+
+HostInstant TransmitWindow::RoomAt() const {
+  return ends_.size() < kOrdinary ? kNever : ends_[ends_.size() - kOrdinary];
+}
+
+void TransmitWindow::Sent(const CanFrame& frame, HostInstant now) {
+  if (options_.confirms) ++unconfirmed_;
+  ++sent_when_empty_;
+  if (options_.bit_rate_bps == 0) return;
+  const HostInstant idle = ends_.empty() ? now : std::max(now, ends_.back());
+  ends_.push_back(idle + BitTime(FrameBits(frame), options_.bit_rate_bps));
+  if (ends_.size() > kAll) ends_.pop_front();
+}
+
+void TransmitWindow::Confirmed(std::size_t frames) {
+  unconfirmed_ -= std::min(unconfirmed_, frames);
+}
+
+void TransmitWindow::Heard(const CanFrame& frame, HostInstant at) {
+  if (options_.bit_rate_bps == 0) return;
+  const DurationNs took = BitTime(FrameBits(frame), options_.bit_rate_bps);
+  for (HostInstant& end : ends_)
+    if (end > at - took) end = end + took;
+}
+
+void TransmitWindow::Charged(std::size_t bytes) {
+  if (bytes > 0 && charged_bytes_ == 0 && sent_when_empty_ == 1) frame_bytes_ = bytes;
+  charged_bytes_ = bytes;
+  held_ = held_ || bytes > 0;
+  if (bytes == 0) sent_when_empty_ = 0;
+}
+
+void TransmitWindow::Clear() {
+  unconfirmed_ = 0;
+  charged_bytes_ = 0;
+  sent_when_empty_ = 0;
+  ends_.clear();
+}
+
+}  // namespace focalfleet

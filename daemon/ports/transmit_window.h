@@ -1,0 +1,70 @@
+// How many of our frames are below the socket: in the interface's queue, in the controller, on the
+// wire. Down there a stop can pass nothing, so frames wait above, where it can. At most three are
+// below, and the third place is a stop's alone: ahead of it are at most the frame on the wire and
+// one more, 2 x 160 bits.
+//
+// Two frames keep a bus busy: one is on the wire (131 us and more at 1 Mbit/s for 8 bytes), and
+// that long there is to learn that the one before has left and to hand down the next.
+//
+// Three witnesses, the most pessimistic holds:
+//   confirmations  a driver that echoes gives each frame back when it has left (IFF_ECHO)
+//   memory         what the kernel still charges to the socket; blind past a queue that disowns
+//   bit clock      a frame cannot have left before its bits have; where a controller does not echo
+// Pure: time, bits and charges are arguments.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+
+#include "protocol/base/instants.h"
+#include "protocol/wire/can_frame.h"
+
+namespace focalfleet {
+
+class TransmitWindow {
+ public:
+  static constexpr std::size_t kAll = 3;
+  static constexpr std::size_t kOrdinary = 2;
+
+  struct Options {
+    bool confirms = false;           // the driver echoes: confirmations come
+    std::uint32_t bit_rate_bps = 0;  // 0: frames take no time that is known
+  };
+  TransmitWindow() = default;
+  explicit TransmitWindow(const Options& options) : options_(options) {}
+
+  /// How many more frames may be handed down now; `urgent` (a stop) may take the last place.
+  [[nodiscard]] std::size_t Room(bool urgent, HostInstant now) const;
+  /// When the bit clock makes room for an ordinary frame; kNever where something else will tell.
+  [[nodiscard]] HostInstant RoomAt() const;
+
+  void Sent(const CanFrame& frame, HostInstant now);
+  /// So many of ours have come back.
+  void Confirmed(std::size_t frames);
+  /// Another node's frame ended at `at`: what we had waiting then waited so much longer.
+  void Heard(const CanFrame& frame, HostInstant at);
+  /// What the kernel charges to the socket now. Units: bytes.
+  void Charged(std::size_t bytes);
+  /// Nothing of ours is below any more (the link came up anew), or nobody will ever tell.
+  void Clear();
+
+  [[nodiscard]] const Options& options() const { return options_; }
+  [[nodiscard]] std::size_t unconfirmed() const { return unconfirmed_; }
+  /// The kernel still holds some.
+  [[nodiscard]] bool charged() const { return charged_bytes_ > 0; }
+
+ private:
+  [[nodiscard]] std::size_t ByMemory() const;
+  [[nodiscard]] std::size_t ByBitClock(HostInstant now) const;
+
+  Options options_;
+  std::size_t unconfirmed_ = 0;
+  std::size_t charged_bytes_ = 0;
+  std::size_t frame_bytes_ = 0;      // what one frame is charged; 0: not seen yet
+  bool held_ = false;                // the kernel was ever seen to hold some
+  std::size_t sent_when_empty_ = 0;  // frames handed down since the kernel held none
+  std::deque<HostInstant> ends_;     // by the bit clock, of the last kAll frames
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,93 @@
+#include "daemon/ports/transmit_window.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/wire/frame_bits.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr HostInstant kNow{1'000'000};
+const CanFrame kFrame{.id = 5u << 26, .length = 8, .data = {1, 2, 3, 4, 5, 6, 7, 8}};
+
+TEST(TransmitWindow, ConfirmationsMakeRoomOneByOne) {
+  TransmitWindow window({.confirms = true});
+  EXPECT_EQ(window.Room(false, kNow), 2u);
+  window.Sent(kFrame, kNow);
+  window.Sent(kFrame, kNow);
+  EXPECT_EQ(window.Room(false, kNow), 0u);
+  EXPECT_EQ(window.Room(true, kNow), 1u) << "the third place is a stop's";
+  window.Sent(kFrame, kNow);
+  EXPECT_EQ(window.Room(true, kNow), 0u);
+  window.Confirmed(1);
+  EXPECT_EQ(window.Room(false, kNow), 0u) << "two are below still";
+  window.Confirmed(1);
+  EXPECT_EQ(window.Room(false, kNow), 1u);
+  window.Confirmed(7);
+  EXPECT_EQ(window.Room(false, kNow), 2u) << "more than were sent means none is left";
+  EXPECT_EQ(window.RoomAt(), kNever);
+}
+
+TEST(TransmitWindow, LearnsWhatTheKernelChargesFromOneFrameAlone) {
+  TransmitWindow window;
+  window.Charged(0);
+  EXPECT_EQ(window.Room(false, kNow), 2u);
+  window.Sent(kFrame, kNow);
+  window.Sent(kFrame, kNow);
+  window.Charged(1536);
+  EXPECT_EQ(window.Room(true, kNow), 0u) << "may be three of 512 bytes";
+  window.Charged(768);
+  EXPECT_EQ(window.Room(true, kNow), 0u) << "still not known";
+  window.Charged(0);
+  EXPECT_EQ(window.Room(false, kNow), 1u) << "one alone, to learn";
+  window.Sent(kFrame, kNow);
+  window.Charged(768);
+  EXPECT_EQ(window.Room(false, kNow), 1u);
+  window.Sent(kFrame, kNow);
+  window.Charged(1536);
+  EXPECT_EQ(window.Room(false, kNow), 0u);
+  EXPECT_EQ(window.Room(true, kNow), 1u);
+  window.Charged(1537);
+  EXPECT_EQ(window.Room(true, kNow), 0u) << "part of a third is a third";
+}
+
+TEST(TransmitWindow, AnInterfaceThatHoldsNothingIsNeverFull) {
+  TransmitWindow window;
+  for (int i = 0; i < 100; ++i) {
+    window.Charged(0);
+    EXPECT_EQ(window.Room(false, kNow), 2u);
+    window.Sent(kFrame, kNow);
+    window.Sent(kFrame, kNow);
+  }
+}
+
+TEST(TransmitWindow, TheBitClockHoldsAFrameForItsBits) {
+  TransmitWindow window({.bit_rate_bps = 1'000'000});
+  const DurationNs took = Microseconds(FrameBits(kFrame));
+  window.Sent(kFrame, kNow);
+  window.Sent(kFrame, kNow);
+  EXPECT_EQ(window.Room(false, kNow), 0u);
+  EXPECT_EQ(window.RoomAt(), kNow + took);
+  EXPECT_EQ(window.Room(false, kNow + took - DurationNs{1}), 0u);
+  EXPECT_EQ(window.Room(false, kNow + took), 1u);
+  EXPECT_EQ(window.Room(false, kNow + took * 2), 2u);
+  // The wire was idle: it begins anew.
+  window.Sent(kFrame, kNow + took * 10);
+  window.Sent(kFrame, kNow + took * 10);
+  EXPECT_EQ(window.RoomAt(), kNow + took * 11);
+}
+
+TEST(TransmitWindow, AFrameOfAnotherNodeDelaysOursThatWaited) {
+  TransmitWindow window({.bit_rate_bps = 1'000'000});
+  const DurationNs took = Microseconds(FrameBits(kFrame));
+  window.Sent(kFrame, kNow);
+  window.Sent(kFrame, kNow);
+  // It won the wire after our first: it ended when our second would have.
+  window.Heard(kFrame, kNow + took * 2);
+  EXPECT_EQ(window.Room(false, kNow + took), 1u) << "the first left before";
+  EXPECT_EQ(window.Room(false, kNow + took * 3 - DurationNs{1}), 1u);
+  EXPECT_EQ(window.Room(false, kNow + took * 3), 2u);
+}
+
+}  // namespace
+}  // namespace focalfleet
