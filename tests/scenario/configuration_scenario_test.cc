@@ -297,6 +297,66 @@ TEST(Configuration, DeadBusTakesOnlyItsUnits) {
   ExpectOthersArrive(&fleet, 0);
 }
 
+// A controller warns, goes passive, then off in mid-move, and comes back.
+TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
+  InProcessFleet fleet(Small(23));
+  const BusId sick = fleet.layout().buses()[2];
+  const auto phases = [&](UnitPhase phase) {
+    int count = 0;
+    for (std::uint32_t n = 0; n < fleet.layout().size(); ++n)
+      count += fleet.layout().units()[n].bus == sick && fleet.coordinator().unit({n}).phase == phase
+                   ? 1
+                   : 0;
+    return count;
+  };
+  const auto of_bus =
+      static_cast<int>(std::ranges::count(fleet.layout().units(), sick, &Unit::bus));
+  fleet.Run(Seconds(2));
+  fleet.TellLink({sick, LinkState::kUp, "the controller warns of errors (bit error)"});
+  fleet.TellLink({sick, LinkState::kPassive, "the controller is error-passive (bit error)"});
+  fleet.ApplyRandom(23);
+  RunIntoMotion(&fleet, Seconds(2));
+  EXPECT_GT(phases(UnitPhase::kMoving), 0) << "a passive controller still carries frames";
+  fleet.world().KillBus(sick);
+  fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off (no acknowledgement)"});
+  fleet.Run(Milliseconds(10));
+  EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
+  fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.ExpectStoreTellsTheTruth("while the bus is off");
+  const std::string name = "bus " + std::to_string(sick.value);
+  for (const std::string& part :
+       {name + ": the controller warns of errors (bit error)",
+        name + " is passive: the controller is error-passive (bit error)",
+        name + " is off: the controller is bus-off (no acknowledgement); its " +
+            std::to_string(of_bus) + " units cannot be",
+        name + ": the controller is bus-off; no privilege to restart it"})
+    EXPECT_TRUE(HasAlarm(fleet, part)) << part;
+  fleet.world().ReviveBus(sick);
+  fleet.TellLink({sick, LinkState::kUp, ""});
+  fleet.Run(Seconds(10));
+  EXPECT_EQ(phases(UnitPhase::kReady), of_bus);
+  fleet.ApplyRandom(24);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+// Its units hear the host's clock through a passive controller, or they would give the host up.
+TEST(Configuration, UnitsBehindAPassiveControllerKeepTheirHost) {
+  InProcessFleet fleet(Small(24));
+  fleet.Run(Seconds(2));
+  const auto sent = [&](std::size_t bus) {
+    return fleet.coordinator().bus(fleet.layout().buses()[bus]).frames_sent;
+  };
+  const std::uint64_t passive_before = sent(0);
+  const std::uint64_t up_before = sent(1);
+  fleet.TellLink({fleet.layout().buses()[0], LinkState::kPassive, ""});
+  fleet.Run(Seconds(20));
+  const auto passive = static_cast<double>(sent(0) - passive_before);
+  const auto up = static_cast<double>(sent(1) - up_before);
+  EXPECT_NEAR(passive / up, 1, 0.1) << "clock frames and polls";
+}
+
 TEST(Configuration, PowerCutInMidMoveLeavesAnIntervalThatHoldsTheTruth) {
   InProcessFleet fleet(Small(22));
   fleet.ApplyRandom(22);

@@ -135,7 +135,7 @@ void InProcessFleet::StepOnce() {
   effects_.Clear();
   coordinator_->Step({.now = now_,
                       .frames = heard_,
-                      .links = {},
+                      .links = links_,
                       .commands = commands_,
                       .plans = plans,
                       .committed_through = committed_through_,
@@ -143,6 +143,7 @@ void InProcessFleet::StepOnce() {
                      &effects_);
   heard_.clear();
   commands_.clear();
+  links_.clear();
   Perform(effects_);
 }
 
@@ -169,7 +170,7 @@ bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limi
     HostInstant next = std::min(wake_at_, world_->NextEvent());
     if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
     if (!planning_.empty()) next = std::min(next, planning_.front().at);
-    if (!commands_.empty()) next = now_;
+    if (!commands_.empty() || !links_.empty()) next = now_;
     next = std::max(next, now_ + kTurn);
     if (next > end) {
       now_ = end;

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "fleet/coordinator.h"
@@ -58,6 +59,10 @@ class InProcessFleet {
   void Freeze(DurationNs duration, Heard heard);
   /// A stop of all that somebody else puts on every bus, as `stop --direct` does.
   void StopDirectly();
+
+  /// What the port of a bus tells of its link. Frames pass all the same: only what the coordinator
+  /// makes of it is tried; KillBus is the other half.
+  void TellLink(LinkEvent event) { links_.push_back(std::move(event)); }
 
   void Send(Command command);
   /// Applies a random configuration that is clear of what stands; returns its request number.
@@ -114,6 +119,7 @@ class InProcessFleet {
   std::deque<Planning> planning_;
   std::uint64_t committed_through_ = 0;
   std::vector<Command> commands_;
+  std::vector<LinkEvent> links_;
   std::vector<ReplyEffect> replies_;
   std::vector<ReceivedFrame> heard_;
   Effects effects_;

@@ -66,6 +66,28 @@ TEST_F(BusLinesTest, TellsEveryLinkAtFirstAndThenOnlyChanges) {
   EXPECT_EQ(links_[0].state, LinkState::kPassive);
 }
 
+TEST_F(BusLinesTest, TellsAnotherTroubleOfALinkThatIsThere) {
+  Receive(1);
+  fakes_[0]->text = "the controller warns of errors";
+  Receive(2);
+  ASSERT_EQ(links_.size(), 1u);
+  EXPECT_EQ(links_[0].state, LinkState::kUp);
+  EXPECT_EQ(links_[0].cause, "the controller warns of errors");
+  Receive(3);
+  EXPECT_TRUE(links_.empty()) << "once";
+  fakes_[0]->text.clear();
+  Receive(4);
+  EXPECT_TRUE(links_.empty()) << "an end of trouble is no trouble";
+  fakes_[0]->link = LinkState::kDown;
+  fakes_[0]->text = "unplugged";
+  Receive(5);
+  ASSERT_EQ(links_.size(), 1u);
+  EXPECT_EQ(links_[0].cause, "unplugged");
+  fakes_[0]->text = "not there";
+  Receive(6);
+  EXPECT_TRUE(links_.empty()) << "looking for it in vain is no news";
+}
+
 TEST_F(BusLinesTest, ReceivesOnlyWhereSomethingIsReadyOrDue) {
   Receive(1);
   EXPECT_EQ(fakes_[0]->received, 1);
