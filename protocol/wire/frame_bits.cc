@@ -16,6 +16,10 @@ class BitWalk {
     const std::uint32_t crc = crc_;
     for (int i = 14; i >= 0; --i) Stuff(crc >> i & 1);
   }
+  /// A stuff bit is sent with the bit after it; none follows the last bit before fixed stuffing.
+  void DropLastStuffBit() {
+    if (stuffed_last_) --bits_;
+  }
   [[nodiscard]] std::uint32_t bits() const { return bits_; }
   [[nodiscard]] std::uint16_t crc() const { return static_cast<std::uint16_t>(crc_); }
 
@@ -30,7 +34,8 @@ class BitWalk {
     ++bits_;
     run_ = bit == last_ ? run_ + 1 : 1;
     last_ = bit;
-    if (run_ == 5) {
+    stuffed_last_ = run_ == 5;
+    if (stuffed_last_) {
       ++bits_;
       last_ = bit ^ 1;
       run_ = 1;
@@ -41,6 +46,7 @@ class BitWalk {
   std::uint32_t bits_ = 0;
   std::uint32_t last_ = 2;  // neither 0 nor 1: the first bit starts a run
   int run_ = 0;
+  bool stuffed_last_ = false;
 };
 
 BitWalk Walk(const CanFrame& frame) {
@@ -61,6 +67,24 @@ std::uint32_t FrameBits(const CanFrame& frame) {
   BitWalk walk = Walk(frame);
   walk.Crc();
   return walk.bits() + kUnstuffedTail;
+}
+
+FdFrameBits FrameBits(const FdFrame& frame) {
+  BitWalk walk;
+  walk.Bits(0, 1);                    // start of frame
+  walk.Bits(frame.id >> 18, 11);      // base identifier
+  walk.Bits(0b11, 2);                 // SRR, IDE
+  walk.Bits(frame.id & 0x3ffff, 18);  // identifier extension
+  walk.Bits(0b0101, 4);               // RRS, FDF, res, BRS
+  const std::uint32_t before_switch = walk.bits();
+  walk.Bits(0, 1);  // ESI: error active
+  walk.Bits(FdLengthCode(frame.length), 4);
+  for (const std::uint8_t byte : frame.payload()) walk.Bits(byte, 8);
+  walk.DropLastStuffBit();  // the fixed one comes in its place
+  const std::uint32_t check_bits = 4 + (frame.length > 16 ? 21 : 17);
+  const std::uint32_t fixed_stuff_bits = 1 + (check_bits - 1) / 4;
+  return {.nominal = before_switch + kUnstuffedTail - 1,
+          .data = walk.bits() - before_switch + check_bits + fixed_stuff_bits + 1};
 }
 
 std::uint16_t FrameCrc(const CanFrame& frame) { return Walk(frame).crc(); }

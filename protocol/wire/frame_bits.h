@@ -5,12 +5,23 @@
 //   unstuffed  CRC delimiter 1, ACK slot 1, ACK delimiter 1, EOF 7, intermission 3
 //
 // so 54 + 8n + 13 bits and a stuff bit after every five equal ones: 131..160 bits for 8 bytes.
+//
+// A group is a CAN FD frame (extended format, with bit rate switch), the inner part of which goes
+// at the data bit rate:
+//
+//   nominal    SOF 1, base id 11, SRR 1, IDE 1, id extension 18, RRS 1, FDF 1, res 1, BRS 1
+//   data rate  ESI 1, DLC 4, data 8n; stuff count 4 and CRC 17 (21 beyond 16 bytes), with a fixed
+//              stuff bit before the first and after every fourth of these; CRC delimiter 1
+//   nominal    ACK slot 1, ACK delimiter 1, EOF 7, intermission 3
+//
+// The rate changes at the sample points of BRS and of the CRC delimiter: this is exact to a bit.
 #pragma once
 
 #include <cstdint>
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
 
@@ -21,10 +32,22 @@ std::uint32_t FrameBits(const CanFrame& frame);
 /// CRC-15 of the frame as the controller computes it (polynomial 0x4599).
 std::uint16_t FrameCrc(const CanFrame& frame);
 
+/// Bits of a CAN FD frame at each of its two rates.
+struct FdFrameBits {
+  std::uint32_t nominal = 0;
+  std::uint32_t data = 0;
+};
+FdFrameBits FrameBits(const FdFrame& frame);
+
 inline constexpr std::uint32_t kFrameBitsMax = 160;  // 8 bytes, worst stuffing
 
 constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {
   return {static_cast<std::int64_t>(bits) * 1'000'000'000 / bit_rate_bps};
+}
+
+constexpr DurationNs BitTime(const FdFrameBits& bits, std::uint32_t bit_rate_bps,
+                             std::uint32_t data_bit_rate_bps) {
+  return BitTime(bits.nominal, bit_rate_bps) + BitTime(bits.data, data_bit_rate_bps);
 }
 
 }  // namespace focalfleet

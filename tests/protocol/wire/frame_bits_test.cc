@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 
 #include "protocol/base/rng.h"
@@ -106,6 +107,43 @@ TEST(FrameBits, StaysWithinTheKnownBounds) {
     ASSERT_LE(FrameBits(frame), kFrameBitsMax);
   }
   static_assert(kFrameBitsMax == 54 + 64 + 13 + (54 + 64 - 1) / 4);
+}
+
+// The same for CAN FD: what is stuffed by looking at the string, the rest by counting its fields.
+FdFrameBits OracleBits(const FdFrame& frame) {
+  const std::string nominal = "0" + Binary(frame.id >> 18, 11) + "11" + Binary(frame.id, 18) +
+                              "0"
+                              "1"
+                              "0"
+                              "1";
+  const auto code = std::find(kFdLengths.begin(), kFdLengths.end(), frame.length);
+  std::string all =
+      nominal + "0" + Binary(static_cast<std::uint32_t>(code - kFdLengths.begin()), 4);
+  for (const std::uint8_t byte : frame.payload()) all += Binary(byte, 8);
+  // Nothing is stuffed behind the last bit, where the fixed stuff bits begin.
+  const std::string wire = Stuffed(all.substr(0, all.size() - 1)) + all.back();
+  const std::string start = Stuffed(nominal);
+  const std::uint32_t fixed = frame.length > 16 ? 4 + 21 + 7 : 4 + 17 + 6;
+  return {static_cast<std::uint32_t>(start.size()) + 1 + 1 + 7 + 3,
+          static_cast<std::uint32_t>(wire.size() - start.size()) + fixed + 1};
+}
+
+TEST(FrameBits, OfCanFdEqualTheFrameWrittenOut) {
+  const auto seed = testing::TestSeed(14);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  for (int i = 0; i < 20'000; ++i) {
+    FdFrame frame{static_cast<std::uint32_t>(rng.Below(1u << 29)), kFdLengths[rng.Below(16)], {}};
+    const bool runs = rng.Below(2) == 0;
+    for (auto& byte : frame.data) {
+      constexpr std::uint8_t kRuns[] = {0x00, 0xFF, 0x0F, 0xF0, 0x87, 0x78, 0xC3, 0x1F};
+      byte = runs ? kRuns[rng.Below(8)] : static_cast<std::uint8_t>(rng.Below(256));
+    }
+    const FdFrameBits bits = FrameBits(frame);
+    const FdFrameBits oracle = OracleBits(frame);
+    ASSERT_EQ(bits.nominal, oracle.nominal) << i;
+    ASSERT_EQ(bits.data, oracle.data) << i;
+  }
 }
 
 TEST(FrameBits, IgnoresBytesBeyondTheLength) {
