@@ -97,6 +97,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
   config.start = now_;
+  config.clock_error_max = options.clock_error_max;
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
   world_ = std::make_unique<sim::World>(std::move(config));
   Restart();
@@ -120,7 +121,7 @@ void InProcessFleet::End() {
 }
 
 void InProcessFleet::StepOnce() {
-  world_->AdvanceTo(now_, &heard_);
+  world_->AdvanceTo(now_, &heard_, wire);
   std::vector<PlanDone> plans;
   while (!planning_.empty() && planning_.front().at <= now_) {
     plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
@@ -191,7 +192,7 @@ bool InProcessFleet::RunUntilIdle(DurationNs limit) {
 
 void InProcessFleet::Freeze(DurationNs duration, Heard heard) {
   now_ = now_ + duration;
-  world_->AdvanceTo(now_, &heard_);
+  world_->AdvanceTo(now_, &heard_, wire);
   if (heard == Heard::kLost) heard_.clear();
 }
 

@@ -41,6 +41,7 @@ class InProcessFleet {
     DurationNs plan_delay = Milliseconds(20);
     CoordinatorConfig config;
     sim::Spread spread = sim::Spread::kNominal;
+    double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
   };
 
   explicit InProcessFleet(const Options& options);
@@ -92,6 +93,7 @@ class InProcessFleet {
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
+  std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
 
  private:
   void StepOnce();
