@@ -197,6 +197,15 @@ struct UnitView {
   std::optional<Pose> target;
 };
 
+/// Getting the moves of a configuration onto the wire. Counted are the frames without which a unit
+/// is not armed: stage_begin, stage_segment, confirm and arm with their answers.
+struct UploadView {
+  std::uint64_t bits_predicted = 0;  // exact, each frame once; known before the first is sent
+  std::uint64_t bits = 0;            // of the same frames as they passed, repeats included
+  double predicted_s = 0;            // bits_predicted by the bit rate; of all buses the longest
+  double measured_s = 0;  // first frame let go to last unit armed; of all buses the longest
+};
+
 struct BusView {
   LinkState link = LinkState::kUp;
   std::uint64_t frames_sent = 0;
@@ -206,6 +215,7 @@ struct BusView {
   std::uint64_t retries = 0;
   double load = 0;      // of the last second
   double load_max = 0;  // highest second since the configuration began
+  UploadView upload;    // of the configuration, all rounds
 };
 
 struct ConfigurationView {
@@ -222,6 +232,7 @@ struct ConfigurationView {
   double energy_J = 0;              // predicted, of the same
   double peak_power_W = 0;          // predicted, of the same
   std::uint64_t frames = 0;         // both directions, all buses, since it began
+  UploadView upload;                // bits of all buses, all rounds
   HostInstant began;
   HostInstant started;      // start signal of this round; kNever before it
   std::string waiting_for;  // what holds it up, for people; usually empty

@@ -138,20 +138,25 @@ std::optional<PositionerIndex> Core::NextDue() {
   return std::nullopt;
 }
 
-void Core::Ask(PositionerIndex i, const HostMessage& message) {
+std::uint8_t Core::SequenceAfter(PositionerIndex i, int questions) const {
+  const int last = units[i.value].sequence;  // 0: none was asked yet
+  return static_cast<std::uint8_t>((last + questions - 1) % kLastSequence + 1);
+}
+
+void Core::Ask(PositionerIndex i, const HostMessage& message, std::uint32_t answer_bits) {
   UnitRecord& record = unit(i);
   DropQuestion(i);
-  record.sequence = record.sequence == kLastSequence
-                        ? std::uint8_t{1}
-                        : static_cast<std::uint8_t>(record.sequence + 1);
+  record.sequence = SequenceAfter(i, 1);
   if (std::holds_alternative<Stop>(message)) {
     record.stop_sequence = record.sequence;
     record.runs_freely = false;
   }
   const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
-  record.question = Question{
-      .message = message, .answer_function = AnswerFunction(frame), .sequence = record.sequence};
-  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+  record.question = Question{.message = message,
+                             .answer_function = AnswerFunction(frame),
+                             .sequence = record.sequence,
+                             .answer_bits = answer_bits == 0 ? kAnswerBits : answer_bits};
+  if (!bus_of(i).schedule.Enqueue({frame, record.question->answer_bits, i})) {
     record.question->deadline = now + kQueueFullWait;
     SetDue(i, record.question->deadline);
   } else {
@@ -166,7 +171,7 @@ bool Core::AskAgain(PositionerIndex i) {
   ++bus_of(i).view.retries;
   const CanFrame frame = Encode(question.message, {layout.unit(i).node, question.sequence});
   question.deadline = kNever;
-  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+  if (!bus_of(i).schedule.Enqueue({frame, question.answer_bits, i})) {
     question.deadline = now + kQueueFullWait;
     SetDue(i, question.deadline);
   }
@@ -290,9 +295,11 @@ void Core::BeginStep(const Inputs& inputs, Effects* effects) {
   std::fill(is_changed_.begin(), is_changed_.end(), std::uint8_t{0});
 }
 
-void Core::Count(BusRecord* bus, std::uint32_t bits) {
+void Core::Count(BusRecord* bus, const CanFrame& frame) {
+  const std::uint32_t bits = FrameBits(frame);
   bus->view.bits += bits;
   bus->window_bits += bits;
+  if (IsOfUpload(frame)) bus->view.upload.bits += bits;
 }
 
 void Core::CloseLoadWindow(BusRecord* bus) const {
@@ -336,7 +343,8 @@ void Core::EndStep() {
   for (const OutFrame& sent : out->frames) {
     BusRecord* bus = FindBus(sent.bus);
     ++bus->view.frames_sent;
-    Count(bus, FrameBits(sent.frame));
+    Count(bus, sent.frame);
+    if (IsOfUpload(sent.frame)) bus->upload_began = std::min(bus->upload_began, now);
   }
   if (!timers_.empty()) out->wake_at = std::min(out->wake_at, timers_.top().at);
   if (!out->rows.empty()) out->batch = next_batch++;

@@ -31,6 +31,7 @@ struct Question {
   Function answer_function{};
   std::uint8_t sequence = 0;
   std::uint8_t tries = 0;
+  std::uint32_t answer_bits = 0;  // that its answer will take
   HostInstant deadline = kNever;  // set when the frame leaves
   HostInstant asked = kNever;     // when it first left
   /// Where others depend on an answer by then: said once, before the retries are over.
@@ -76,8 +77,18 @@ struct BusRecord {
   HostInstant clock_due{INT64_MIN};
   HostInstant window_began = kNever;  // of the second over which the load is taken
   std::uint64_t window_bits = 0;
+  // Of the upload under way: its first frame let go, its last unit armed.
+  HostInstant upload_began = kNever;
+  HostInstant upload_ended{INT64_MIN};
   std::vector<PositionerIndex> units;
 };
+
+/// Frames that an upload consists of, both directions.
+constexpr bool IsOfUpload(const CanFrame& frame) {
+  const auto function = static_cast<Function>(frame.id >> 20 & 63);
+  return function == Function::kStageBegin || function == Function::kStageSegment ||
+         function == Function::kConfirm || function == Function::kArm;
+}
 
 enum class UnitEventKind : std::uint8_t {
   kReady,        // read anew, or its motion ended where it should: its knowledge is settled
@@ -115,8 +126,10 @@ class Core {
   void Changed(PositionerIndex i);
   void SetDue(PositionerIndex i, HostInstant at);
   /// Replaces any open question. Where the bus's queue is full the question is asked when it has
-  /// room.
-  void Ask(PositionerIndex i, const HostMessage& message);
+  /// room. `answer_bits`: what the answer will take, where that is known; else a fair guess.
+  void Ask(PositionerIndex i, const HostMessage& message, std::uint32_t answer_bits = 0);
+  /// The sequence number of the question after `questions` more ones.
+  [[nodiscard]] std::uint8_t SequenceAfter(PositionerIndex i, int questions) const;
   void Forget(PositionerIndex i);  // its open question, and what waits for it on the bus
   /// True where a retry went out; false where the last one is over: nobody answers.
   [[nodiscard]] bool AskAgain(PositionerIndex i);
@@ -151,7 +164,7 @@ class Core {
   void BeginStep(const Inputs& inputs, Effects* effects);
   /// Matches an answer to the open question; false: late, doubled, or never asked.
   [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
-  void Count(BusRecord* bus, std::uint32_t bits);
+  void Count(BusRecord* bus, const CanFrame& frame);
   void EndStep();
   /// Units that are due at `now`, in the order of their times.
   [[nodiscard]] std::optional<PositionerIndex> NextDue();

@@ -21,6 +21,12 @@ std::uint64_t FramesOf(const Core& core) {
   return frames;
 }
 
+std::uint64_t UploadBitsOf(const Core& core) {
+  std::uint64_t bits = 0;
+  for (const BusRecord& bus : core.buses) bits += bus.view.upload.bits;
+  return bits;
+}
+
 std::string DaemonEnded(std::uint64_t configuration) {
   return "configuration " + std::to_string(configuration) +
          " has failed: the daemon ended; what moves finishes by itself";
@@ -146,7 +152,10 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   std::fill(excluded_.begin(), excluded_.end(), std::uint8_t{0});
   std::fill(strikes_.begin(), strikes_.end(), std::uint8_t{0});
   frames_before_ = FramesOf(core_);
-  for (BusRecord& bus : core_.buses) bus.view.load_max = 0;
+  for (BusRecord& bus : core_.buses) {
+    bus.view.load_max = 0;
+    bus.view.upload = {};
+  }
   Gather();
   core_.out->replies.push_back({request_, false, {}, "configuration " + std::to_string(view_.id)});
 }
@@ -270,6 +279,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
     core_.SetPhase(i, kStaging);
     waiting_[core_.unit(i).bus].push_back(i);
   }
+  PredictUpload();
   PumpUploads();
 }
 
@@ -287,7 +297,10 @@ void Pursuit::Advance() {
   for (std::size_t n = 0; n < core_.events.size(); ++n) Take(core_.events[n]);
   core_.events.clear();
   ReportArrivals();
-  if (busy()) view_.frames = FramesOf(core_) - frames_before_;
+  if (busy()) {
+    view_.frames = FramesOf(core_) - frames_before_;
+    view_.upload.bits = UploadBitsOf(core_);
+  }
   if (core_.now >= due_) {
     due_ = kNever;
     if (state_ == State::kGathering) GatherIfDue();

@@ -112,6 +112,9 @@ class Pursuit {
   void TakePlan(const PlanDone& done);
   void PumpUploads();
   void Upload(PositionerIndex i);
+  [[nodiscard]] std::uint32_t UploadBits(PositionerIndex i) const;
+  void PredictUpload();
+  void MeasureUpload();
   void FallOut(PositionerIndex i, const std::string& reason);
   void UploadsOver();
   void Disarm();
