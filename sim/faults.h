@@ -16,6 +16,7 @@ namespace focalfleet::sim {
 struct UnitFaults {
   bool silent = false;        // hears, acts, never sends
   bool deaf = false;          // hears nothing
+  bool deaf_to_sync = false;  // its SYNC wire is broken
   DurationNs late{0};         // every answer comes this much later
   std::uint8_t copies = 1;    // every answer is sent so many times
   bool wrong_digest = false;  // what it says it holds is not what was staged

@@ -151,6 +151,14 @@ class World::Impl {
     now_ = std::max(now_, at);
   }
 
+  void PulseSync() {
+    for (std::uint32_t row = 0; row < units_.size(); ++row) {
+      if (units_[row]->faults().deaf_to_sync) continue;
+      Outbox out;
+      units_[row]->OnSync(now_, &out);
+      Send(row, out);
+    }
+  }
   void PowerCut(std::uint32_t row) {
     units_[row]->firmware().PowerOff(now_);
     Reschedule(row);
@@ -346,6 +354,7 @@ void World::AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
 HostInstant World::NextEvent() const { return impl_->NextEvent(); }
 HostInstant World::now() const { return impl_->now(); }
 
+void World::PulseSync() { impl_->PulseSync(); }
 void World::PowerCut(UnitId unit) { impl_->PowerCut(impl_->Row(unit)); }
 void World::PowerOn(UnitId unit) { impl_->PowerOn(impl_->Row(unit)); }
 void World::KillBus(BusId bus) { impl_->KillBus(bus); }

@@ -110,6 +110,9 @@ class World {
   [[nodiscard]] HostInstant NextEvent() const;
   [[nodiscard]] HostInstant now() const;
 
+  /// An edge of the SYNC line, which goes to every unit of every bus; at now().
+  void PulseSync();
+
   // ---- chance and violence; all at now()
 
   void PowerCut(UnitId unit);  // at once, whatever it does

@@ -88,6 +88,12 @@ void Firmware::OnTime(HostInstant now, Outbox* out) {
   TripIfDue(now, out);
 }
 
+void Firmware::OnSync(HostInstant now, Outbox* out) {
+  OnTime(now, out);
+  machine_.OnSync(now);
+  FollowMotion();
+}
+
 void Firmware::RaiseFault(const Trip& trip, HostInstant now, Outbox* out) {
   Outbox said;
   machine_.RaiseFault(trip, now, &said);

@@ -37,6 +37,8 @@ class Firmware {
   void OnFrame(const CanFrame& frame, HostInstant now, Outbox* out);
   /// Does what is due. Pre: now is not before anything told so far.
   void OnTime(HostInstant now, Outbox* out);
+  /// An edge of the SYNC line.
+  void OnSync(HostInstant now, Outbox* out);
   /// When OnTime is due next; kNever without power.
   [[nodiscard]] HostInstant deadline() const;
 
