@@ -72,7 +72,7 @@ class Coordinator::Impl {
     } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
       if (core_.Answers(*i, Function::kHome, sequence)) pursuit_.OnHomeReply(*i, *home);
     } else {
-      contact_.Hear(*i, *heard);
+      contact_.Hear(*i, *heard, received.at);
     }
   }
 
@@ -130,6 +130,7 @@ void Effects::Clear() {
   frames.clear();
   plan_job.reset();
   replies.clear();
+  sync_at.reset();
   changed.clear();
   wake_at = kNever;
 }

@@ -1,11 +1,13 @@
 #include "fleet/coordinate/contact.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "fleet/coordinate/noticing.h"
 #include "fleet/coordinate/reconcile.h"
 #include "protocol/base/check.h"
+#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 namespace {
@@ -13,7 +15,7 @@ namespace {
 using enum UnitPhase;
 
 // The questions of an identification, in order.
-constexpr int kSteps = 6;
+constexpr int kSteps = 7;
 HostMessage StepQuestion(int step) {
   switch (step) {
     case 0:
@@ -26,13 +28,21 @@ HostMessage StepQuestion(int step) {
       return VectorRequest{Axis::kPhi};
     case 4:
       return ParameterRead{Axis::kTheta, Parameter::kCounter1};
-    default:
+    case 5:
       return ParameterRead{Axis::kPhi, Parameter::kCounter1};
+    default:
+      return ClockRequest{};
   }
 }
 
 // A resting unit is asked for its health ten times less often than a moving one for its progress.
 constexpr std::int64_t kRestPollFactor = 10;
+
+std::string InPercent(double share) {
+  const auto hundredths = std::llround(std::abs(share) * 1e4);
+  return (share < 0 ? "-" : "") + std::to_string(hundredths / 100) + "." +
+         std::to_string(hundredths % 100 / 10) + std::to_string(hundredths % 10) + " %";
+}
 
 }  // namespace
 
@@ -116,6 +126,7 @@ void Contact::Identify(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   core_.Forget(i);
   record.reading = {};
+  record.wants_start = false;
   core_.SetPhase(i, kIdentifying);
   AskNext(i);
 }
@@ -131,6 +142,7 @@ void Contact::Lose(PositionerIndex i, UnitPhase phase, const std::string& reason
                Origin::kMove);
   }
   core_.Forget(i);
+  record.wants_start = false;
   core_.SetPhase(i, phase);
   record.next_poll = core_.now + core_.config.identify_period;
   core_.SetDue(i, record.next_poll);
@@ -194,7 +206,7 @@ void Contact::LinkChanged(const LinkEvent& event) {
   }
 }
 
-void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
+void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostInstant at) {
   UnitRecord& record = core_.unit(i);
   const std::uint8_t sequence = heard.address.sequence;
   const auto answers = [&](Function function) { return core_.Answers(i, function, sequence); };
@@ -228,8 +240,37 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   } else if (const auto* parameter = std::get_if<ParameterReply>(&heard.message)) {
     if (answers(parameter->written ? Function::kParameterWrite : Function::kParameterRead))
       OnParameter(i, *parameter);
+  } else if (const auto* clock = std::get_if<ClockReply>(&heard.message)) {
+    if (answers(Function::kClock)) OnClock(i, *clock, at);
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
+  }
+}
+
+void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at) {
+  UnitRecord& record = core_.unit(i);
+  // Its request was on the bus in between: not before it was let go, nor while the answer was.
+  const auto bits = [&](std::uint32_t count) { return BitTime(count, core_.config.bit_rate_bps); };
+  const HostInstant earliest = record.answered_asked + bits(kFrameBitsMin);
+  record.clock.Observe(
+      {reply.ticks, earliest, std::max(earliest, at - bits(kFrameBitsMin + 8 * 8))});
+  const ClockMap::Rate rate = record.clock.rate();
+  record.view.clock = {.readings = static_cast<std::uint32_t>(record.clock.readings()),
+                       .rate_error = rate.error,
+                       .rate_bound = rate.bound,
+                       .bound_s = record.clock.TimeOf(reply.ticks).bound.seconds()};
+  const double off = std::abs(rate.error) - rate.bound;
+  if (off > PlanOptions{}.clock_error && !record.clock_told)
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) + "'s clock is off by " + InPercent(rate.error) + " (+- " +
+                    InPercent(rate.bound) + "), more than the " +
+                    InPercent(PlanOptions{}.clock_error) + " that plans allow for");
+  record.clock_told = off > PlanOptions{}.clock_error;
+  if (record.view.phase == kIdentifying) {
+    ++record.reading.step;
+  } else if (std::exchange(record.wants_start, false)) {
+    record.began = record.clock.TimeOf(reply.began_ticks);
+    core_.Tell(i, UnitEventKind::kStartTold);
   }
 }
 
@@ -256,6 +297,8 @@ void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
       Lose(i, kFault, std::string("reports fault ") + Name(status.fault));
     else
       Identify(i);
+  } else if (view.phase == kReady) {
+    core_.Ask(i, ClockRequest{});
   }
 }
 
@@ -264,7 +307,9 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   const bool began = intent != core_.intents.end() && status.move == intent->second.move;
   const bool turns = status.state == UnitState::kMoving || status.state == UnitState::kHoming;
   if (turns) {
-    if (began) core_.unit(i).seen_moving = core_.unit(i).answered_asked;
+    if (!began) return;
+    core_.unit(i).seen_moving = core_.unit(i).answered_asked;
+    if (core_.unit(i).wants_start) core_.Ask(i, ClockRequest{});
     return;
   }
   if (core_.unit(i).view.phase == kSettling) {
@@ -358,6 +403,7 @@ void Contact::MotionEnded(PositionerIndex i, const Done& done) {
   core_.SetPhase(i, kReady);
   record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
   core_.SetDue(i, record.next_poll);
+  if (record.wants_start) core_.Ask(i, ClockRequest{});
   core_.Tell(i, arrived || homed ? UnitEventKind::kReady : UnitEventKind::kStopped);
 }
 

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "fleet/coordinate/bus_schedule.h"
+#include "fleet/coordinate/clock_map.h"
 #include "fleet/coordinate/unit_phase.h"
 #include "fleet/coordinator.h"
 #include "protocol/wire/codec.h"
@@ -64,6 +65,10 @@ struct UnitRecord {
   /// Whoever was asked later than this and has not begun never will: the start may have been late.
   HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
+  ClockMap clock;
+  bool clock_told = false;   // that its clock is off by more than plans allow for
+  bool wants_start = false;  // began with the others; when, is not known yet
+  ClockMap::Instant began;   // told last
   // Stops of ours, so that one of somebody else's is told from them.
   std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
   HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
@@ -98,6 +103,7 @@ enum class UnitEventKind : std::uint8_t {
   kEnded,        // in motion, says that it stands, not yet where
   kLost,         // silent, restarted, foreign or faulty: not to be counted on
   kForeignStop,  // it obeyed a stop that is not ours
+  kStartTold,    // when it began is known
 };
 struct UnitEvent {
   PositionerIndex unit;

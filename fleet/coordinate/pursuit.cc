@@ -192,6 +192,7 @@ void Pursuit::BeginRound() {
       .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
   job.options.fixed = fixed_;
   job.options.lead_apart = true;
+  job.options.start_skew_s = round_skew_s_ = planned_skew_s_;
   job.options.notice_s = NoticingOf(core_.config).notice.seconds();
   job.unproven = unproven_;
   bool any = !to_home_.empty();
@@ -359,6 +360,10 @@ void Pursuit::Take(const UnitEvent& event) {
     StoppedBySomebodyElse(i);
     return;
   }
+  if (event.kind == UnitEventKind::kStartTold) {
+    NoteStart(i);
+    return;
+  }
   if (part_[i.value] == Part::kNone) return;
   switch (event.kind) {
     case UnitEventKind::kReady:
@@ -393,6 +398,7 @@ void Pursuit::Take(const UnitEvent& event) {
       SetPart(i, Part::kNone);
       break;
     case UnitEventKind::kForeignStop:
+    case UnitEventKind::kStartTold:
       break;  // above
   }
 }
@@ -420,7 +426,10 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
 
 bool Pursuit::RoundIsOver() const {
   return late_.empty() &&
-         std::all_of(parts_.begin(), parts_.end(), [](std::uint32_t count) { return count == 0; });
+         std::all_of(parts_.begin(), parts_.end(),
+                     [](std::uint32_t count) { return count == 0; }) &&
+         std::none_of(plan_.moves.begin(), plan_.moves.end(),
+                      [this](const UnitPlan& move) { return AwaitsStart(move.unit); });
 }
 
 void Pursuit::ReportArrivals() {
@@ -434,6 +443,7 @@ void Pursuit::RoundOver() {
   if (view_.started != kNever && last_arrival_ > view_.started)
     view_.makespan_s += (last_arrival_ - view_.started).seconds();
   view_.started = kNever;
+  if (state_ == State::kMoving) JudgeStarts();
   for (const UnitPlan& move : plan_.moves) plan_of_[move.unit.value] = kNoPlan;
   const bool was_homing = state_ == State::kHoming;
   plan_.moves.clear();

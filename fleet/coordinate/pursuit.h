@@ -23,6 +23,7 @@
 
 #include "fleet/coordinate/contact.h"
 #include "fleet/coordinate/core.h"
+#include "fleet/coordinate/start_skew.h"
 
 namespace focalfleet {
 
@@ -124,6 +125,10 @@ class Pursuit {
   void TakeBackIntents();
   void Start();
   void RepeatStart();
+  void ExpectStarts();
+  void NoteStart(PositionerIndex i);
+  [[nodiscard]] bool AwaitsStart(PositionerIndex i) const;
+  void JudgeStarts();
   void RoundOver();
   void CommitHoming();
   void StartHoming();
@@ -226,6 +231,11 @@ class Pursuit {
   HostInstant late_due_ = kNever;
   double round_end_s_ = 0;  // predicted, after the start signal
   std::uint64_t commit_batch_ = 0;
+  // When the units of this round began; what it was planned for, and what the next one will be:
+  // any unit may start so much early or late.
+  StartSkew skew_;
+  double round_skew_s_ = PlanOptions{}.start_skew_s;
+  double planned_skew_s_ = PlanOptions{}.start_skew_s;
   HostInstant last_arrival_;
   HostInstant start_repeat_ = kNever;
   int start_repeats_ = 0;

@@ -248,11 +248,13 @@ void Pursuit::PlanLate(Late* late) {
   late->job = late_job_;
   late->near = DeviationsNear(i);
   PlanJob job{.job = job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = {}};
-  const ReplanQuestion question{.unit = i,
-                                .from = PlaceOf(core_.unit(i).view.knowledge),
-                                .to = *targets_[i.value],
-                                .now_s = (core_.now - view_.started).seconds(),
-                                .start_s = (start - view_.started).seconds()};
+  const ReplanQuestion question{
+      .unit = i,
+      .from = PlaceOf(core_.unit(i).view.knowledge),
+      .to = *targets_[i.value],
+      .now_s = (core_.now - view_.started).seconds(),
+      .start_s = (start - view_.started).seconds(),
+      .start_skew_s = std::max(ReplanQuestion{}.start_skew_s, 2 * planned_skew_s_)};
   job.late = std::make_shared<const LateJob>(LateJob{running_, question, Deviations()});
   core_.out->plan_job = std::move(job);
 }

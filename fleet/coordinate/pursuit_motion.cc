@@ -82,12 +82,15 @@ void Pursuit::Start() {
     WatchLeader(move.unit);
     core_.SetDue(move.unit, unit.next_poll);
   }
+  ExpectStarts();
+  if (core_.config.sync_line) core_.out->sync_at = view_.started;
   SetState(State::kMoving);
   RepeatStart();
 }
 
 void Pursuit::RepeatStart() {
-  const DurationNs left = view_.started - core_.now;
+  DurationNs left = view_.started - core_.now;
+  if (core_.config.sync_line) left = left + core_.config.sync_lead;
   const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
   std::vector<bool> told(core_.buses.size());
   for (const UnitPlan& move : plan_.moves) {
@@ -148,8 +151,7 @@ std::optional<Pursuit::Course> Pursuit::CourseOf(PositionerIndex i) const {
 bool Pursuit::MayHaveArrived(const Course& course) const {
   const PlanOptions allowed;
   const double end_s = EndOf(*course.plan, core_.drives[course.plan->unit.value]);
-  return core_.now >=
-         course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * allowed.start_skew_s);
+  return core_.now >= course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * round_skew_s_);
 }
 
 Pursuit::Ended Pursuit::SeenUntil(PositionerIndex i, HostInstant until) const {

@@ -39,6 +39,7 @@ struct FdFrameBits {
 };
 FdFrameBits FrameBits(const FdFrame& frame);
 
+inline constexpr std::uint32_t kFrameBitsMin = 67;   // no data, no stuffing; 8 bits a byte more
 inline constexpr std::uint32_t kFrameBitsMax = 160;  // 8 bytes, worst stuffing
 
 constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {

@@ -122,6 +122,10 @@ void InProcessFleet::End() {
 
 void InProcessFleet::StepOnce() {
   world_->AdvanceTo(now_, &heard_, wire);
+  if (now_ >= sync_at_) {
+    world_->PulseSync();
+    sync_at_ = kNever;
+  }
   std::vector<PlanDone> plans;
   while (!planning_.empty() && planning_.front().at <= now_) {
     plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
@@ -151,6 +155,7 @@ void InProcessFleet::StepOnce() {
 void InProcessFleet::Perform(const Effects& effects) {
   if (!effects.rows.empty())
     commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});
+  if (effects.sync_at) sync_at_ = *effects.sync_at;
   for (const OutFrame& out : effects.frames) {
     world_->Inject(out.bus, out.frame, now_);
     for (const std::uint64_t word : {std::uint64_t{out.bus.value}, std::uint64_t{out.frame.id},
@@ -171,6 +176,7 @@ bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limi
     HostInstant next = std::min(wake_at_, world_->NextEvent());
     if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
     if (!planning_.empty()) next = std::min(next, planning_.front().at);
+    next = std::min(next, sync_at_);
     if (!commands_.empty() || !links_.empty()) next = now_;
     next = std::max(next, now_ + kTurn);
     if (next > end) {

@@ -117,6 +117,7 @@ class InProcessFleet {
   MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
+  HostInstant sync_at_ = kNever;
   std::deque<Commit> commits_;
   std::deque<Planning> planning_;
   std::uint64_t committed_through_ = 0;
