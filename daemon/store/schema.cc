@@ -207,7 +207,13 @@ CREATE VIEW tuned AS SELECT
   FROM tuning LEFT JOIN unit ON unit.serial = tuning.serial;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2};
+// How far apart the units of a configuration began.
+constexpr const char* kVersion3 = R"sql(
+ALTER TABLE configuration ADD COLUMN start_skew_s REAL;        -- NULL: not known
+ALTER TABLE configuration ADD COLUMN start_skew_bound_s REAL;  -- the true skew is within +- of it
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -1,6 +1,7 @@
 #include "fleet/coordinate/pursuit.h"
 
 #include <algorithm>
+#include <limits>
 
 #include "fleet/coordinate/noticing.h"
 #include "protocol/base/check.h"
@@ -546,6 +547,8 @@ void Pursuit::SetPart(PositionerIndex i, Part part) {
 void Pursuit::SetState(State state) { state_ = state; }
 
 void Pursuit::Record() {
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  const bool known = view_.starts.told > 0;
   core_.Note(ConfigurationRow{.id = view_.id,
                               .source = view_.source,
                               .state = view_.state,
@@ -556,7 +559,9 @@ void Pursuit::Record() {
                               .makespan_predicted_s = view_.makespan_predicted_s,
                               .makespan_s = view_.makespan_s,
                               .energy_J = view_.energy_J,
-                              .peak_power_W = view_.peak_power_W});
+                              .peak_power_W = view_.peak_power_W,
+                              .start_skew_s = known ? view_.starts.skew_s : kNotKnown,
+                              .start_skew_bound_s = known ? view_.starts.bound_s : kNotKnown});
 }
 
 }  // namespace focalfleet

@@ -32,6 +32,17 @@ Json Configuration(const std::string& state, std::uint64_t arrived, std::uint64_
          {"energy_J", 3.5},
          {"peak_power_W", 0.5},
          {"frames", 420},
+         {"upload_bits_predicted", 1800},
+         {"upload_bits", 1900},
+         {"upload_predicted_s", 0.0018},
+         {"upload_s", 0.002},
+         {"starts", 2},
+         {"starts_known", 2},
+         {"start_skew_s", 0.0021},
+         {"start_skew_bound_s", 0.0004},
+         {"start_skew_allowed_s", 0.04},
+         {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
+         {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
          {"unserved", Json::array()}};
   if (failed != 0) {
     c["unserved"].push_back(
