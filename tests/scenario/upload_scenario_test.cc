@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/scenario/in_process_fleet.h"
-#include "tests/scenario/upload_measure.h"
+#include "tests/scenario/upload_on_wire.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet::testing {

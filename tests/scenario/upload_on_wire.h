@@ -23,6 +23,7 @@ struct UploadOnWire {
   std::uint32_t frames = 0;
   std::uint32_t units = 0;
   std::uint32_t segments = 0;
+  std::uint64_t segment_bits = 0;
 
   [[nodiscard]] double ratio() const {
     return static_cast<double>(elapsed_bits) / static_cast<double>(needed_bits);
@@ -77,7 +78,10 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
     ++upload.frames;
     const auto function = static_cast<Function>(w.frame.id >> 20 & 63);
     if (function == Function::kStageBegin) ++upload.units;
-    if (function == Function::kStageSegment) ++upload.segments;
+    if (function == Function::kStageSegment) {
+      ++upload.segments;
+      upload.segment_bits += bits;
+    }
   }
   return out;
 }
