@@ -98,8 +98,12 @@ void BoundTheRest(const ConfigurationFrames& reference, const ConfigurationFrame
     if (is > at_most) Complain(std::string("too many: ") + what);
   };
   bound("configuration frames again", more, kRepeatsMax * static_cast<double>(frames));
-  bound("clock", static_cast<double>(of(Function::kClock).host),
-        buses * (life_s / kClockPeriod_s + 2));
+  // Each unit's clock is read while it is read, once in its move, and with polls at rest.
+  bound("clock and its readings", static_cast<double>(of(Function::kClock).host),
+        buses * (life_s / kClockPeriod_s + 2) + 2 * units +
+            static_cast<double>(of(Function::kStatus).host));
+  bound("clock answers", static_cast<double>(of(Function::kClock).unit),
+        static_cast<double>(of(Function::kClock).host));
   // Each unit is asked once while it is read, and then at most once a poll period.
   bound("status polls", static_cast<double>(of(Function::kStatus).host),
         units * (life_s / kPollPeriodMin_s + 2));
