@@ -1,5 +1,5 @@
 // Pursuit, once a round has begun: when each unit did, and whether the plan had allowed for it.
-// docs/adr/0008-start-skew.md
+// docs/adr/0010-start-skew.md
 
 #include <algorithm>
 #include <cmath>
