@@ -105,12 +105,18 @@ void Contact::Watch(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   // As long as it may have ended while that mattered.
   if (record.seen_moving >= record.watch_until) return;
-  const Noticing noticing = NoticingOf(core_.config);
-  record.next_poll =
-      std::min(record.next_poll, std::max(core_.now + noticing.poll, record.watch_from));
-  // Also where the answer may be awaited into the time in which it matters.
+  record.next_poll = std::min(
+      record.next_poll, std::max(core_.now + NoticingOf(core_.config).poll, record.watch_from));
+  MissSoon(i);
+}
+
+/// Its open question is to be missed in time, also where the answer may be awaited into the time in
+/// which it matters.
+void Contact::MissSoon(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  if (record.seen_moving >= record.watch_until) return;
   if (core_.now + core_.Patience() >= record.watch_from)
-    record.question->suspect_at = core_.now + noticing.suspicion;
+    record.question->suspect_at = core_.now + NoticingOf(core_.config).suspicion;
 }
 
 void Contact::AskNext(PositionerIndex i) {
@@ -268,7 +274,7 @@ void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at
   record.clock_told = off > PlanOptions{}.clock_error;
   if (record.view.phase == kIdentifying) {
     ++record.reading.step;
-  } else if (std::exchange(record.wants_start, false)) {
+  } else if (std::exchange(record.wants_start, false) && reply.began_ticks != 0) {
     record.began = record.clock.TimeOf(reply.began_ticks);
     core_.Tell(i, UnitEventKind::kStartTold);
   }
@@ -309,7 +315,10 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   if (turns) {
     if (!began) return;
     core_.unit(i).seen_moving = core_.unit(i).answered_asked;
-    if (core_.unit(i).wants_start) core_.Ask(i, ClockRequest{});
+    if (core_.unit(i).wants_start) {
+      core_.Ask(i, ClockRequest{});
+      MissSoon(i);
+    }
     return;
   }
   if (core_.unit(i).view.phase == kSettling) {

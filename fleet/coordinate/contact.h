@@ -39,6 +39,7 @@ class Contact {
   void Concluded(PositionerIndex i);
   void Bind(PositionerIndex i);
   void Watch(PositionerIndex i);
+  void MissSoon(PositionerIndex i);
   void NoAnswer(PositionerIndex i);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
