@@ -1,13 +1,11 @@
 #include "fleet/coordinate/contact.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "fleet/coordinate/noticing.h"
 #include "fleet/coordinate/reconcile.h"
 #include "protocol/base/check.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 namespace {
@@ -37,12 +35,6 @@ HostMessage StepQuestion(int step) {
 
 // A resting unit is asked for its health ten times less often than a moving one for its progress.
 constexpr std::int64_t kRestPollFactor = 10;
-
-std::string InPercent(double share) {
-  const auto hundredths = std::llround(std::abs(share) * 1e4);
-  return (share < 0 ? "-" : "") + std::to_string(hundredths / 100) + "." +
-         std::to_string(hundredths % 100 / 10) + std::to_string(hundredths % 10) + " %";
-}
 
 }  // namespace
 
@@ -250,33 +242,6 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
     if (answers(Function::kClock)) OnClock(i, *clock, at);
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
-  }
-}
-
-void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at) {
-  UnitRecord& record = core_.unit(i);
-  // Its request was on the bus in between: not before it was let go, nor while the answer was.
-  const auto bits = [&](std::uint32_t count) { return BitTime(count, core_.config.bit_rate_bps); };
-  const HostInstant earliest = record.answered_asked + bits(kFrameBitsMin);
-  record.clock.Observe(
-      {reply.ticks, earliest, std::max(earliest, at - bits(kFrameBitsMin + 8 * 8))});
-  const ClockMap::Rate rate = record.clock.rate();
-  record.view.clock = {.readings = static_cast<std::uint32_t>(record.clock.readings()),
-                       .rate_error = rate.error,
-                       .rate_bound = rate.bound,
-                       .bound_s = record.clock.TimeOf(reply.ticks).bound.seconds()};
-  const double off = std::abs(rate.error) - rate.bound;
-  if (off > PlanOptions{}.clock_error && !record.clock_told)
-    core_.Raise(Severity::kError, i, {},
-                core_.NameOf(i) + "'s clock is off by " + InPercent(rate.error) + " (+- " +
-                    InPercent(rate.bound) + "), more than the " +
-                    InPercent(PlanOptions{}.clock_error) + " that plans allow for");
-  record.clock_told = off > PlanOptions{}.clock_error;
-  if (record.view.phase == kIdentifying) {
-    ++record.reading.step;
-  } else if (std::exchange(record.wants_start, false) && reply.began_ticks != 0) {
-    record.began = record.clock.TimeOf(reply.began_ticks);
-    core_.Tell(i, UnitEventKind::kStartTold);
   }
 }
 
