@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "fleet/coordinate/contact.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 namespace {
@@ -21,11 +20,10 @@ std::string InPercent(double share) {
 
 void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at) {
   UnitRecord& record = core_.unit(i);
-  // Its request was on the bus in between: not before it was let go, nor while the answer was.
-  const auto bits = [&](std::uint32_t count) { return BitTime(count, core_.config.bit_rate_bps); };
-  const HostInstant earliest = record.answered_asked + bits(kFrameBitsMin);
-  record.clock.Observe(
-      {reply.ticks, earliest, std::max(earliest, at - bits(kFrameBitsMin + 8 * 8))});
+  // Its request ended in between. By how much later and sooner the bits of both would tell, but
+  // virtual interfaces take no time.
+  const HostInstant earliest = std::min(record.answered_asked, at);
+  record.clock.Observe({reply.ticks, earliest, at});
   const ClockMap::Rate rate = record.clock.rate();
   record.view.clock = {.readings = static_cast<std::uint32_t>(record.clock.readings()),
                        .rate_error = rate.error,
