@@ -24,13 +24,21 @@ class Kernel : public GpioKernel {
   void Close(int fd) override { ::close(fd); }
 };
 
-/// A descriptor for the length of a scope.
-struct OpenChip {
-  GpioKernel& kernel;
-  int fd;
+/// A descriptor for the length of a scope; -1: none.
+class OpenChip {
+ public:
+  OpenChip(GpioKernel& kernel, const std::string& path)
+      : kernel_(kernel), fd_(kernel.Open(path.c_str())) {}
   OpenChip(const OpenChip&) = delete;
   OpenChip& operator=(const OpenChip&) = delete;
-  ~OpenChip() { kernel.Close(fd); }
+  ~OpenChip() {
+    if (fd_ >= 0) kernel_.Close(fd_);
+  }
+  [[nodiscard]] int fd() const { return fd_; }
+
+ private:
+  GpioKernel& kernel_;
+  int fd_;
 };
 
 /// The kernel fills such a field without a promise that it ends.
@@ -71,9 +79,10 @@ GpioKernel& RealGpioKernel() {
 
 Result<std::unique_ptr<SyncLine>> GpioLine::Create(const GpioLineOptions& options,
                                                    GpioKernel& kernel) {
-  const OpenChip chip{kernel, kernel.Open(options.chip.c_str())};
-  if (chip.fd < 0) return Fail(ErrorCode::kUnavailable, options.chip + ": " + std::strerror(errno));
-  FOCALFLEET_TRY(CheckLine(options, kernel, chip.fd));
+  const OpenChip chip(kernel, options.chip);
+  if (chip.fd() < 0)
+    return Fail(ErrorCode::kUnavailable, options.chip + ": " + std::strerror(errno));
+  FOCALFLEET_TRY(CheckLine(options, kernel, chip.fd()));
   gpio_v2_line_request request{};
   request.offsets[0] = options.line;
   request.num_lines = 1;
@@ -85,7 +94,7 @@ Result<std::unique_ptr<SyncLine>> GpioLine::Create(const GpioLineOptions& option
   request.config.attrs[0].attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;
   request.config.attrs[0].attr.values = 0;
   std::memcpy(request.consumer, kConsumer, sizeof kConsumer);
-  if (kernel.Control(chip.fd, GPIO_V2_GET_LINE_IOCTL, &request) < 0)
+  if (kernel.Control(chip.fd(), GPIO_V2_GET_LINE_IOCTL, &request) < 0)
     return Fail(ErrorCode::kUnavailable, options.chip + ": line " + std::to_string(options.line) +
                                              " cannot be an output: " + std::strerror(errno));
   return std::unique_ptr<SyncLine>(
