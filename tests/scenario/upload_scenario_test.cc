@@ -24,7 +24,9 @@ std::vector<sim::WireFrame> UploadOf(InProcessFleet* fleet, std::uint64_t seed) 
 }
 
 TEST(Upload, TakesHardlyLongerThanItsBits) {
-  for (std::uint64_t k = 0; k < 10; ++k) {
+  constexpr int kRuns = 10;
+  double sum = 0;
+  for (std::uint64_t k = 0; k < kRuns; ++k) {
     const std::uint64_t seed = TestSeed(1) + k;
     SCOPED_TRACE(seed);
     InProcessFleet fleet({.count = 100, .units_per_bus = 100, .seed = seed});
@@ -33,8 +35,10 @@ TEST(Upload, TakesHardlyLongerThanItsBits) {
     const UploadOnWire& upload = uploads.begin()->second;
     EXPECT_EQ(upload.units, 100u);
     EXPECT_LE(upload.ratio(), 1.05);
-    if (k == 0) RecordProperty("ratio", std::to_string(upload.ratio()));
+    sum += upload.ratio();
   }
+  // What a guess of the answers' lengths would already cost is 0.018.
+  EXPECT_LE(sum / kRuns, 1.005);
 }
 
 TEST(Upload, IsPredictedToTheBit) {
