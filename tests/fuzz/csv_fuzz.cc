@@ -8,6 +8,7 @@
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/plan_file.h"
+#include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"
@@ -24,18 +25,22 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } else {
     FOCALFLEET_CHECK(!table.error().text.empty());
   }
+  static const auto layout = Layout::Create(MakeHexLayout({.count = 7}), {});
+  static const std::vector<UnitDrive> drives(7);
   if (const auto targets = ReadTargets(text, "fuzz.csv")) {
     const auto again = ReadTargets(WriteTargets(*targets), "again.csv");
     FOCALFLEET_CHECK(again && again->rows.size() == targets->rows.size());
-    static const auto layout = Layout::Create(MakeHexLayout({.count = 7}), {});
-    static const std::vector<UnitDrive> drives(7);
     if (const auto poses = ResolveTargets(*targets, *layout, drives, {}); !poses) {
       FOCALFLEET_CHECK(!poses.error().text.empty());
     }
   }
-  if (const auto layout = ReadLayout(text, "fuzz.csv", {})) {
-    const auto again = ReadLayout(WriteUnits(layout->units()), "again.csv", {});
-    FOCALFLEET_CHECK(again && again->size() == layout->size());
+  if (const auto poses = ReadState(text, "fuzz.csv", *layout, drives)) {
+    const auto again = ReadState(WriteState(*layout, drives, *poses), "again.csv", *layout, drives);
+    FOCALFLEET_CHECK(again && *again == *poses);
+  }
+  if (const auto units = ReadLayout(text, "fuzz.csv", {})) {
+    const auto again = ReadLayout(WriteUnits(units->units()), "again.csv", {});
+    FOCALFLEET_CHECK(again && again->size() == units->size());
   }
   if (const auto obstacles = ReadObstacles(text, "fuzz.csv")) {
     const auto again = ReadObstacles(WriteObstacles(*obstacles), "again.csv");
