@@ -364,6 +364,8 @@ void Contact::MotionEnded(PositionerIndex i, const Done& done) {
 void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
   UnitRecord& record = core_.unit(i);
   AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
+  if (record.view.phase == kIdentifying && reply.parameter == Parameter::kCounter1)
+    record.reading.counter1[Index(reply.axis)] = reply.value;
   if (reply.written) {
     if (record.view.phase != kIdentifying) OnWritten(i, reply);
     if (reply.answer != Answer::kOk)
@@ -397,7 +399,7 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
   core_.ReplyWhenDurable(request,
                          core_.NameOf(i) + ": " + what + " = " + std::to_string(reply.value));
   TakeParameter(row, &core_.drives[i.value]);
-  if (reply.parameter == Parameter::kSubdivision) Identify(i);
+  if (reply.parameter == Parameter::kSubdivision || !record.unfit.empty()) return Identify(i);
   if (reply.parameter == Parameter::kPosition) {
     UnitKnowledge knowledge = record.view.knowledge;
     knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);
@@ -412,12 +414,9 @@ void Contact::Bind(PositionerIndex i) {
   core_.Note(BindingRow{core_.layout.unit(i).id, view.serial});
 }
 
-void Contact::Concluded(PositionerIndex i) {
-  UnitRecord& record = core_.unit(i);
-  UnitView& view = record.view;
-  const Reading& reading = record.reading;
-  record.next_poll = core_.now + core_.config.poll_period;
-  core_.SetDue(i, record.next_poll);
+/// The unit is bound to its place, or is now; false: it is foreign there.
+bool Contact::Belongs(PositionerIndex i) {
+  UnitView& view = core_.unit(i).view;
   const auto place = core_.place_of.find(view.serial);
   if (view.bound_serial.value == 0 && place == core_.place_of.end()) {
     Bind(i);
@@ -430,8 +429,18 @@ void Contact::Concluded(PositionerIndex i) {
                     std::to_string(view.bound_serial.value) +
                     ": it is not moved until it is adopted");
     core_.Tell(i, UnitEventKind::kLost, "has another serial number");
-    return;
+    return false;
   }
+  return true;
+}
+
+void Contact::Concluded(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  const Reading& reading = record.reading;
+  record.next_poll = core_.now + core_.config.poll_period;
+  core_.SetDue(i, record.next_poll);
+  if (!Belongs(i)) return;
   StoreSays store;
   if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end())
     store.vector = it->second;
@@ -446,6 +455,17 @@ void Contact::Concluded(PositionerIndex i) {
              reading.status.state == UnitState::kHoming) {
     view.knowledge = {};
     core_.SetPhase(i, kSettling);
+    return;
+  }
+  const std::string unfit = MisfitOf(i);
+  if (!unfit.empty() && unfit != record.unfit)
+    core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " is not fit to move: " + unfit);
+  record.unfit = unfit;
+  for (const Axis axis : kAxes) {
+    if (reading.subdivision[Index(axis)] == core_.drives[i.value].axis[Index(axis)].subdivision)
+      continue;
+    view.knowledge = {};  // its vectors are not the host's: nothing that it says is a place
+    Unfit(i);
     return;
   }
   const Reconciled result =
@@ -467,9 +487,37 @@ void Contact::Concluded(PositionerIndex i) {
     core_.Tell(i, UnitEventKind::kLost, "is in fault");
     return;
   }
+  if (!unfit.empty()) {
+    Unfit(i);
+    return;
+  }
   core_.SetPhase(i, kReady);
   const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
   core_.Tell(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+}
+
+std::string Contact::MisfitOf(PositionerIndex i) const {
+  const Reading& reading = core_.units[i.value].reading;
+  for (const Axis axis : kAxes) {
+    const AxisDrive& drive = core_.drives[i.value].axis[Index(axis)];
+    const auto told = [&](Parameter parameter, std::int32_t is, std::int32_t wanted) {
+      return std::string(Name(axis)) + " " + Name(parameter) + " is " + std::to_string(is) +
+             ", not " + std::to_string(wanted) + " as set";
+    };
+    if (reading.subdivision[Index(axis)] != drive.subdivision)
+      return told(Parameter::kSubdivision, reading.subdivision[Index(axis)], drive.subdivision);
+    if (reading.counter1[Index(axis)] != drive.counter1)
+      return told(Parameter::kCounter1, reading.counter1[Index(axis)], drive.counter1);
+  }
+  return {};
+}
+
+void Contact::Unfit(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  core_.SetPhase(i, kFault);
+  record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "is not fit to move");
 }
 
 Status Contact::Adopt(PositionerIndex i) {
@@ -501,8 +549,10 @@ void Contact::Enable(const EnableCommand& command) {
 }
 
 Status Contact::WriteParameter(std::uint64_t request, const WriteParameterCommand& command) {
-  const UnitPhase phase = core_.unit(command.unit).view.phase;
-  if (phase != kReady || core_.unit(command.unit).question)
+  const UnitRecord& record = core_.unit(command.unit);
+  const UnitPhase phase = record.view.phase;
+  const bool misfit = phase == kFault && !record.unfit.empty();  // a parameter may help it
+  if ((phase != kReady && !misfit) || record.question)
     return Fail(
         ErrorCode::kRefused,
         core_.NameOf(command.unit) + " takes parameters only at rest; its phase is " + Name(phase));

@@ -36,7 +36,11 @@ class Contact {
 
  private:
   void AskNext(PositionerIndex i);  // the next question of the identification
+  [[nodiscard]] bool Belongs(PositionerIndex i);
   void Concluded(PositionerIndex i);
+  /// See UnitRecord::unfit.
+  [[nodiscard]] std::string MisfitOf(PositionerIndex i) const;
+  void Unfit(PositionerIndex i);
   void Bind(PositionerIndex i);
   void Watch(PositionerIndex i);
   void NoAnswer(PositionerIndex i);

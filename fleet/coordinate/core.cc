@@ -75,6 +75,8 @@ std::string Core::TroubleOf(PositionerIndex i) const {
   const std::string id = std::to_string(layout.unit(i).id.value);
   switch (view.phase) {
     case UnitPhase::kFault:
+      if (!units[i.value].unfit.empty() && view.reported_state != UnitState::kFault)
+        return "is not fit to move: " + units[i.value].unfit;
       return "is in fault" +
              (view.fault == FaultCode::kNone ? "" : " (" + std::string(Name(view.fault)) + ")") +
              ": `focalfleet enable " + id + "` clears it";

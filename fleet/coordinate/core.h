@@ -43,6 +43,7 @@ struct Reading {
   StatusReply status;
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
+  std::array<std::int32_t, kAxisCount> counter1{};
 };
 
 struct UnitRecord {
@@ -52,6 +53,9 @@ struct UnitRecord {
   std::optional<Question> question;
   std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter
   Reading reading;
+  /// What it holds otherwise than plans are made with, for people; empty: nothing. Such a unit is
+  /// kFault, and read again with every poll.
+  std::string unfit;
   HostInstant due = kNever;  // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
