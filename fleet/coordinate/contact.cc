@@ -368,7 +368,8 @@ void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
     record.reading.counter1[Index(reply.axis)] = reply.value;
   if (reply.written) {
     if (record.view.phase != kIdentifying) OnWritten(i, reply);
-    if (reply.answer != Answer::kOk)
+    // A misfit is read again and again.
+    if (reply.answer != Answer::kOk && record.unfit.empty())
       core_.Raise(
           Severity::kWarning, i, {},
           core_.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
@@ -478,7 +479,8 @@ void Contact::Concluded(PositionerIndex i) {
   if (!store.vector || store.vector->knowledge != result.knowledge)
     core_.Know(i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;
-  if (!IsPlace(result.knowledge) && (result.intent_end || !store.vector))
+  const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
+  if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
     core_.Raise(
         Severity::kWarning, i, {},
         core_.NameOf(i) + ": position " + Name(result.knowledge[0].witness) + ", " + result.reason);

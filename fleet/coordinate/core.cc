@@ -15,6 +15,11 @@ constexpr DurationNs kQueueFullWait = Milliseconds(20);
 // 255 is left to those who stop the units past the coordinator (daemon/cli/direct_stop.cc).
 constexpr std::uint8_t kLastSequence = 254;
 
+MoveId MoveAfter(MoveId move, std::uint32_t count) {
+  constexpr std::uint32_t kIds = 65'535;  // 0 is none
+  return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
+}
+
 Function AnswerFunction(const CanFrame& question) {
   const auto function = static_cast<Function>(question.id >> 20 & 63);
   return function == Function::kStop ? Function::kDone : function;
@@ -29,9 +34,9 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
       drives(std::move(drives_in)),
       units(layout_in->size()),
       earlier_configurations(std::move(stored.configurations)),
-      next_move(stored.next_move),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
+      next_move_(MoveAfter(stored.next_move, limits::kMovesNotStored)),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
@@ -225,6 +230,13 @@ bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
   const UnitRecord& record = units[i.value];
   if (sequence != 0) return sequence == record.stop_sequence;
   return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
+}
+
+MoveId Core::TakeMoveId() {
+  const MoveId taken = next_move_;
+  next_move_ = MoveAfter(taken, 1);
+  Note(NextMoveRow{next_move_});
+  return taken;
 }
 
 void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,

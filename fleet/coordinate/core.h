@@ -150,6 +150,9 @@ class Core {
   /// The batch number that this step's rows will carry.
   [[nodiscard]] std::uint64_t batch_now() const { return next_batch; }
 
+  /// A number that no unit holds a move under, also of an earlier run.
+  MoveId TakeMoveId();
+
   // ---- being driven
 
   void BeginStep(const Inputs& inputs, Effects* effects);
@@ -170,7 +173,6 @@ class Core {
   std::unordered_map<SerialNumber, PositionerIndex> place_of;
   std::vector<ConfigurationRow> earlier_configurations;  // as stored
   std::vector<UnitEvent> events;
-  MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
   std::uint64_t next_batch = 1;
@@ -194,6 +196,8 @@ class Core {
     PositionerIndex unit;
     bool operator>(const Timer& o) const { return at != o.at ? at > o.at : unit > o.unit; }
   };
+
+  MoveId next_move_;
 
   void CloseLoadWindow(BusRecord* bus) const;
   void DropQuestion(PositionerIndex i);

@@ -254,8 +254,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
   prediction_ = done.predicted;
-  move_ = core_.next_move;
-  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  move_ = core_.TakeMoveId();
   if (plan_.moves.empty()) {
     RoundOver();
     return;

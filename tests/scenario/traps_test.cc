@@ -135,6 +135,26 @@ TEST(HostGone, UnitThatWasMovedMeanwhileIsNotBelievedToStandWhereItStood) {
   fleet.ExpectStoreTellsTheTruth("after it was moved by somebody else");
 }
 
+// Armed by a run that is killed, and not heard since: it must not go with somebody else's start.
+TEST(HostGone, WhatAnEarlierRunArmedNeverStarts) {
+  for (const int ms : {100, 110, 120, 130, 140, 150}) {
+    InProcessFleet fleet({.count = 37, .seed = 97, .commit_delay = Milliseconds(60)});
+    fleet.Run(Seconds(5));
+    fleet.ApplyRandom(97);
+    ASSERT_TRUE(fleet.RunUntil(
+        [&] { return fleet.world().Truth(std::size_t{12}).state == UnitState::kArmed; },
+        Seconds(60)));
+    fleet.world().faults(fleet.id(12))->silent = true;
+    fleet.Run(Milliseconds(ms - 100));
+    ASSERT_EQ(fleet.world().Truth(std::size_t{12}).moves_begun, 0u);
+    fleet.Restart();
+    fleet.ApplyRandom(98);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_EQ(fleet.world().Truth(std::size_t{12}).moves_begun, 0u) << ms;
+    EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 30u) << Unserved(fleet);
+  }
+}
+
 TEST(Rest, UnitThatLosesPowerBetweenConfigurationsIsNoticed) {
   InProcessFleet fleet({.count = 7, .seed = 86});
   fleet.ApplyRandom(86);
@@ -172,7 +192,10 @@ TEST(Stop, LeavesTheEvidenceOfAFault) {
       EXPECT_EQ(fleet.world().Truth(std::size_t{3}).fault, FaultCode::kOverCurrent) << when;
       EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kFault) << when;
       EXPECT_EQ(fleet.coordinator().unit({3}).fault, FaultCode::kOverCurrent) << when;
-      EXPECT_TRUE(HasAlarm(fleet, "unit 4 stopped with a fault")) << when;
+      // By which of the two it is learnt is a matter of arbitration.
+      EXPECT_TRUE(HasAlarm(fleet, "unit 4 stopped with a fault") ||
+                  HasAlarm(fleet, "unit 4 reports a fault"))
+          << when;
     };
     look("after the stop");
     fleet.Restart();
