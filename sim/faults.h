@@ -37,8 +37,9 @@ struct UnitFaults {
   };
   std::optional<Refusal> refuses;
   std::uint32_t loses_segments = 0;  // so many more stage_segment frames do not reach it
-  bool stale_sequence = false;       // answers under the sequence number of the request before
-  bool claims_arrival = false;       // a start that it holds a move for: stays, and says `arrived`
+  std::optional<std::uint8_t> protocol_version;  // that it says it speaks
+  bool stale_sequence = false;  // answers under the sequence number of the request before
+  bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
 };
 
 /// How one bus misbehaves: chances per frame.

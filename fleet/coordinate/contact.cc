@@ -206,16 +206,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
     if (!answers(Function::kIdentify)) return;
     record.asked_once = true;
-    if (identity->protocol_version != kProtocolVersion) {
-      const bool known = record.view.serial == identity->serial;
-      record.view.serial = identity->serial;
-      if (known) return;  // said before
-      core_.Raise(Severity::kError, i, {},
-                  core_.NameOf(i) + " speaks protocol version " +
-                      std::to_string(identity->protocol_version) + ", not " +
-                      std::to_string(kProtocolVersion));
-      return;
-    }
+    if (identity->protocol_version != kProtocolVersion) return OnOtherVersion(i, *identity);
+    record.other_version.reset();
     record.view.serial = identity->serial;
     if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
     record.reading.step = 1;
@@ -231,6 +223,25 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
   }
+}
+
+/// Another firmware, or a boot loader (version 0): nothing that was known of its place counts, and
+/// nothing but its identity is asked until it speaks ours.
+void Contact::OnOtherVersion(PositionerIndex i, const IdentifyReply& identity) {
+  UnitRecord& record = core_.unit(i);
+  if (record.other_version != identity.protocol_version)
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) + " speaks protocol version " +
+                    std::to_string(identity.protocol_version) + ", not " +
+                    std::to_string(kProtocolVersion) + ": it is not moved");
+  record.other_version = identity.protocol_version;
+  record.view.serial = identity.serial;
+  record.view.knowledge = {};
+  core_.Changed(i);
+  if (record.view.phase == kIdentifying) core_.SetPhase(i, kAbsent);
+  record.next_poll = core_.now + core_.config.identify_period;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "speaks another protocol version");
 }
 
 void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {

@@ -44,6 +44,7 @@ class Contact {
   void Bind(PositionerIndex i);
   void Watch(PositionerIndex i);
   void NoAnswer(PositionerIndex i);
+  void OnOtherVersion(PositionerIndex i, const IdentifyReply& identity);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
   void OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence);

@@ -89,9 +89,11 @@ std::string Core::TroubleOf(PositionerIndex i) const {
       return "has another serial number than the one that belongs there: `focalfleet adopt " + id +
              "` accepts it";
     case UnitPhase::kSilent:
-      return "does not answer any more";
     case UnitPhase::kAbsent:
-      return "has never answered";
+      if (units[i.value].other_version)
+        return "speaks protocol version " + std::to_string(*units[i.value].other_version) +
+               ", not " + std::to_string(kProtocolVersion);
+      return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
       return "is still being read";
     case UnitPhase::kMoving:

@@ -56,7 +56,8 @@ struct UnitRecord {
   /// What it holds otherwise than plans are made with, for people; empty: nothing. Such a unit is
   /// kFault, and read again with every poll.
   std::string unfit;
-  HostInstant due = kNever;  // when Service has something to do
+  std::optional<std::uint8_t> other_version;  // of the protocol, that it said last
+  HostInstant due = kNever;                   // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
   // In motion: when others depend on where it is, and when the last question was asked to which it

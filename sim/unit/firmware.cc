@@ -177,15 +177,18 @@ void Firmware::Pass(const Outbox& said, Cause cause, Outbox* out) const {
 
 CanFrame Firmware::Distorted(const CanFrame& frame) const {
   const UnitFaults& faults = *hardware_.faults;
-  if (!faults.wrong_digest && !faults.foreign_serial && !faults.stale_sequence) return frame;
+  if (!faults.wrong_digest && !faults.foreign_serial && !faults.stale_sequence &&
+      !faults.protocol_version)
+    return frame;
   auto decoded = DecodeUnit(frame);
   if (!decoded) return frame;
   if (auto* confirm = std::get_if<ConfirmReply>(&decoded->message);
       confirm != nullptr && faults.wrong_digest)
     confirm->digest ^= 0x00ff00ffu;
-  if (auto* identify = std::get_if<IdentifyReply>(&decoded->message);
-      identify != nullptr && faults.foreign_serial)
-    identify->serial = *faults.foreign_serial;
+  if (auto* identify = std::get_if<IdentifyReply>(&decoded->message)) {
+    identify->serial = faults.foreign_serial.value_or(identify->serial);
+    identify->protocol_version = faults.protocol_version.value_or(identify->protocol_version);
+  }
   // Sequence number 0 is of what it says unasked.
   if (faults.stale_sequence && decoded->address.sequence != 0)
     decoded->address.sequence = sequence_before_;

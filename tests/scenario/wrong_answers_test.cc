@@ -249,6 +249,48 @@ TEST(WrongAnswer, OfAnotherBusOrOfNobodysNodeConcernsNobody) {
   EXPECT_EQ(digests[0], digests[1]);
 }
 
+// Another firmware, or a boot loader, in a unit that was known before.
+TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
+  InProcessFleet fleet({.count = 37, .seed = 78});
+  fleet.ApplyRandom(77);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.world().faults(fleet.id(11))->protocol_version = 0;
+  fleet.world().PowerCut(fleet.id(11));
+  fleet.world().PowerOn(fleet.id(11));
+  fleet.Run(Seconds(12));  // the next question finds it restarted
+  std::vector<OutFrame> sent;
+  fleet.sent = &sent;
+  fleet.ApplyRandom(78);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.Run(Seconds(40));
+  EXPECT_EQ(fleet.coordinator().unit({11}).outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(fleet.coordinator().unit({11}).outcome_reason, "it speaks protocol version 0, not 1");
+  EXPECT_EQ(fleet.coordinator().unit({11}).knowledge[0].witness, Witness::kUnknown);
+  EXPECT_EQ(fleet.world().Truth(std::size_t{11}).moves_begun, 1u);
+  EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 30u) << Unserved(fleet);
+  const Unit& unit = fleet.layout().units()[11];
+  int asked = 0;
+  for (const OutFrame& out : sent) {
+    const auto heard = DecodeHost(out.frame);
+    if (out.bus != unit.bus || heard->address.node != unit.node) continue;
+    EXPECT_TRUE(std::holds_alternative<IdentifyRequest>(heard->message));
+    ++asked;
+  }
+  EXPECT_GT(asked, 20);
+  EXPECT_LT(asked, 60) << "every 2 s";
+  const auto said = std::count_if(fleet.store().alarms.begin(), fleet.store().alarms.end(),
+                                  [](const AlarmRow& alarm) {
+                                    return alarm.text.find("protocol version") != std::string::npos;
+                                  });
+  EXPECT_EQ(said, 1);
+  fleet.world().faults(fleet.id(11))->protocol_version.reset();
+  fleet.Run(Seconds(4));
+  EXPECT_EQ(fleet.coordinator().unit({11}).phase, UnitPhase::kReady);
+  fleet.ApplyRandom(79);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
 // ---- liars
 
 TEST(Liar, WhoSaysThatItHasArrivedAndNeverStartedIsNotBelieved) {
