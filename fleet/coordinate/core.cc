@@ -36,7 +36,7 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
       earlier_configurations(std::move(stored.configurations)),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
-      next_move_(MoveAfter(stored.next_move, limits::kMovesNotStored)),
+      next_move_(stored.next_move),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
@@ -237,8 +237,14 @@ bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
 MoveId Core::TakeMoveId() {
   const MoveId taken = next_move_;
   next_move_ = MoveAfter(taken, 1);
-  Note(NextMoveRow{next_move_});
+  if (--moves_left_ < limits::kMovesReserved / 2) ReserveMoves();
   return taken;
+}
+
+void Core::ReserveMoves() {
+  moves_left_ = limits::kMovesReserved;
+  Note(NextMoveRow{MoveAfter(next_move_, moves_left_)});
+  if (reserved_by_ == 0) reserved_by_ = batch_now();
 }
 
 void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,
@@ -304,6 +310,7 @@ void Core::BeginStep(const Inputs& inputs, Effects* effects) {
   committed_through = inputs.committed_through;
   store_failing = inputs.store_failing;
   std::fill(is_changed_.begin(), is_changed_.end(), std::uint8_t{0});
+  if (reserved_by_ == 0) ReserveMoves();
 }
 
 void Core::Count(BusRecord* bus, std::uint32_t bits) {

@@ -151,8 +151,11 @@ class Core {
   /// The batch number that this step's rows will carry.
   [[nodiscard]] std::uint64_t batch_now() const { return next_batch; }
 
-  /// A number that no unit holds a move under, also of an earlier run.
+  /// A number that no unit holds a move under. Numbers are taken from a stock that the store knows
+  /// as used: a run that is killed may have armed units that nobody hears any more, and the next
+  /// one's start signals reach them. Pre: MovesAreReserved().
   MoveId TakeMoveId();
+  [[nodiscard]] bool MovesAreReserved() const { return committed_through >= reserved_by_; }
 
   // ---- being driven
 
@@ -198,7 +201,11 @@ class Core {
     bool operator>(const Timer& o) const { return at != o.at ? at > o.at : unit > o.unit; }
   };
 
+  void ReserveMoves();
+
   MoveId next_move_;
+  std::uint32_t moves_left_ = 0;
+  std::uint64_t reserved_by_ = 0;  // the batch of the first stock
 
   void CloseLoadWindow(BusRecord* bus) const;
   void DropQuestion(PositionerIndex i);

@@ -163,7 +163,7 @@ void Pursuit::GatherIfDue() {
         return unit.view.phase == kIdentifying ||
                (unit.view.phase == kAbsent && !unit.asked_once) || unit.view.phase == kSettling;
       });
-  if (waiting && core_.now < gather_until_) {
+  if ((waiting && core_.now < gather_until_) || !core_.MovesAreReserved()) {
     due_ = core_.now + kGatherStep;
     return;
   }
@@ -333,7 +333,8 @@ void Pursuit::Advance() {
 }
 
 void Pursuit::SayWhatIsWaitedFor() {
-  const bool needs_the_store = state_ == State::kCommitting || state_ == State::kHomeCommitting ||
+  const bool needs_the_store = (state_ == State::kGathering && !core_.MovesAreReserved()) ||
+                               state_ == State::kCommitting || state_ == State::kHomeCommitting ||
                                (state_ == State::kReporting && !arrivals_.empty());
   view_.waiting_for =
       needs_the_store && core_.store_failing ? "the store, which cannot be written" : "";

@@ -174,7 +174,7 @@ class Theatre {
         Order(WriteParameterCommand{{who},
                                     static_cast<Axis>(record[3] % 2),
                                     static_cast<Parameter>(record[4] % kParameterCount),
-                                    static_cast<std::int32_t>(record[5] * 64)});
+                                    record[5] * 64});
         break;
       case 8:
         Order(RetargetCommand{{who}, *Targets(record)[who]});
