@@ -238,7 +238,7 @@ TEST(WrongAnswer, OfAnotherBusOrOfNobodysNodeConcernsNobody) {
     fleet.ApplyRandom(70);
     for (int k = 0; k < 200; ++k) {
       shout(smaller, 10);
-      shout({0}, 77);  // nobody's
+      shout(larger, 77);  // nobody's
       fleet.Run(Milliseconds(10));
     }
     ASSERT_TRUE(fleet.RunUntilIdle());
