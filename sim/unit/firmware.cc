@@ -116,8 +116,11 @@ void Firmware::TripIfDue(HostInstant now, Outbox* out) {
 
 bool Firmware::Withheld(const CanFrame& frame, HostInstant now, Outbox* out) {
   UnitFaults& faults = *hardware_.faults;
+  const bool planted = faults.ignores || faults.refuses || faults.loses_segments > 0 ||
+                       faults.stale_sequence || faults.claims_arrival;
+  if (!planted || !powered()) return false;
   const auto request = DecodeHost(frame);
-  if (!request || !powered()) return false;
+  if (!request) return false;
   const NodeId node = request->address.node;
   if (node != hardware_.node && node != kBroadcastNode) return false;
   // A repeat has the number of the request that it repeats.
