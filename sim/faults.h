@@ -8,6 +8,7 @@
 
 #include "protocol/base/ids.h"
 #include "protocol/base/instants.h"
+#include "protocol/wire/identifier.h"
 #include "protocol/wire/messages.h"
 
 namespace focalfleet::sim {
@@ -29,6 +30,17 @@ struct UnitFaults {
     Axis axis = Axis::kTheta;
   };
   std::optional<InMotion> in_motion;
+  std::optional<Function> ignores;  // such a request: hears it, does nothing, says nothing
+  /// Such a request (confirm, arm, home, parameter_write): does nothing, and answers so.
+  struct Refusal {
+    Function what{};
+    Answer answer = Answer::kWrongState;
+  };
+  std::optional<Refusal> refuses;
+  std::uint32_t loses_segments = 0;  // so many more stage_segment frames do not reach it
+  std::optional<std::uint8_t> protocol_version;  // that it says it speaks
+  bool stale_sequence = false;  // answers under the sequence number of the request before
+  bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
 };
 
 /// How one bus misbehaves: chances per frame.

@@ -209,7 +209,10 @@ NetlinkMessage OrderToRaise(int index, bool up) {
 Result<int> ReadAcknowledgement(std::span<const std::byte> answer) {
   FOCALFLEET_TRY_ASSIGN(const Head head, ReadHead(answer));
   const auto error = Value<nlmsgerr>(head.body);
-  if (head.type != NLMSG_ERROR || !error || error->error > 0) return NoAnswer();
+  // Not only because -INT_MIN is none: no errno is beyond what the kernel encodes in a pointer.
+  constexpr int kErrnoMax = 4095;
+  if (head.type != NLMSG_ERROR || !error || error->error > 0 || error->error < -kErrnoMax)
+    return NoAnswer();
   return -error->error;
 }
 

@@ -216,16 +216,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
   } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
     if (!answers(Function::kIdentify)) return;
     record.asked_once = true;
-    if (identity->protocol_version != kProtocolVersion) {
-      const bool known = record.view.serial == identity->serial;
-      record.view.serial = identity->serial;
-      if (known) return;  // said before
-      core_.Raise(Severity::kError, i, {},
-                  core_.NameOf(i) + " speaks protocol version " +
-                      std::to_string(identity->protocol_version) + ", not " +
-                      std::to_string(kProtocolVersion));
-      return;
-    }
+    if (identity->protocol_version != kProtocolVersion) return OnOtherVersion(i, *identity);
+    record.other_version.reset();
     record.view.serial = identity->serial;
     if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
     record.reading.step = 1;
@@ -243,6 +235,25 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
   }
+}
+
+/// Another firmware, or a boot loader (version 0): nothing that was known of its place counts, and
+/// nothing but its identity is asked until it speaks ours.
+void Contact::OnOtherVersion(PositionerIndex i, const IdentifyReply& identity) {
+  UnitRecord& record = core_.unit(i);
+  if (record.other_version != identity.protocol_version)
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) + " speaks protocol version " +
+                    std::to_string(identity.protocol_version) + ", not " +
+                    std::to_string(kProtocolVersion) + ": it is not moved");
+  record.other_version = identity.protocol_version;
+  record.view.serial = identity.serial;
+  record.view.knowledge = {};
+  core_.Changed(i);
+  if (record.view.phase == kIdentifying) core_.SetPhase(i, kAbsent);
+  record.next_poll = core_.now + core_.config.identify_period;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "speaks another protocol version");
 }
 
 void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
@@ -384,9 +395,12 @@ void Contact::MotionEnded(PositionerIndex i, const Done& done) {
 void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
   UnitRecord& record = core_.unit(i);
   AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
+  if (record.view.phase == kIdentifying && reply.parameter == Parameter::kCounter1)
+    record.reading.counter1[Index(reply.axis)] = reply.value;
   if (reply.written) {
     if (record.view.phase != kIdentifying) OnWritten(i, reply);
-    if (reply.answer != Answer::kOk)
+    // A misfit is read again and again.
+    if (reply.answer != Answer::kOk && record.unfit.empty())
       core_.Raise(
           Severity::kWarning, i, {},
           core_.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
@@ -417,7 +431,7 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
   core_.ReplyWhenDurable(request,
                          core_.NameOf(i) + ": " + what + " = " + std::to_string(reply.value));
   TakeParameter(row, &core_.drives[i.value]);
-  if (reply.parameter == Parameter::kSubdivision) Identify(i);
+  if (reply.parameter == Parameter::kSubdivision || !record.unfit.empty()) return Identify(i);
   if (reply.parameter == Parameter::kPosition) {
     UnitKnowledge knowledge = record.view.knowledge;
     knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);
@@ -432,12 +446,9 @@ void Contact::Bind(PositionerIndex i) {
   core_.Note(BindingRow{core_.layout.unit(i).id, view.serial});
 }
 
-void Contact::Concluded(PositionerIndex i) {
-  UnitRecord& record = core_.unit(i);
-  UnitView& view = record.view;
-  const Reading& reading = record.reading;
-  record.next_poll = core_.now + core_.config.poll_period;
-  core_.SetDue(i, record.next_poll);
+/// The unit is bound to its place, or is now; false: it is foreign there.
+bool Contact::Belongs(PositionerIndex i) {
+  UnitView& view = core_.unit(i).view;
   const auto place = core_.place_of.find(view.serial);
   if (view.bound_serial.value == 0 && place == core_.place_of.end()) {
     Bind(i);
@@ -450,8 +461,18 @@ void Contact::Concluded(PositionerIndex i) {
                     std::to_string(view.bound_serial.value) +
                     ": it is not moved until it is adopted");
     core_.Tell(i, UnitEventKind::kLost, "has another serial number");
-    return;
+    return false;
   }
+  return true;
+}
+
+void Contact::Concluded(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  const Reading& reading = record.reading;
+  record.next_poll = core_.now + core_.config.poll_period;
+  core_.SetDue(i, record.next_poll);
+  if (!Belongs(i)) return;
   StoreSays store;
   if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end())
     store.vector = it->second;
@@ -468,6 +489,17 @@ void Contact::Concluded(PositionerIndex i) {
     core_.SetPhase(i, kSettling);
     return;
   }
+  const std::string unfit = MisfitOf(i);
+  if (!unfit.empty() && unfit != record.unfit)
+    core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " is not fit to move: " + unfit);
+  record.unfit = unfit;
+  for (const Axis axis : kAxes) {
+    if (reading.subdivision[Index(axis)] == core_.drives[i.value].axis[Index(axis)].subdivision)
+      continue;
+    view.knowledge = {};  // its vectors are not the host's: nothing that it says is a place
+    Unfit(i);
+    return;
+  }
   const Reconciled result =
       Reconcile({reading.status, reading.position, reading.subdivision}, store);
   if (result.intent_end) core_.EndIntent(i, *result.intent_end);
@@ -478,7 +510,8 @@ void Contact::Concluded(PositionerIndex i) {
   if (!store.vector || store.vector->knowledge != result.knowledge)
     core_.Know(i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;
-  if (!IsPlace(result.knowledge) && (result.intent_end || !store.vector))
+  const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
+  if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
     core_.Raise(
         Severity::kWarning, i, {},
         core_.NameOf(i) + ": position " + Name(result.knowledge[0].witness) + ", " + result.reason);
@@ -487,9 +520,37 @@ void Contact::Concluded(PositionerIndex i) {
     core_.Tell(i, UnitEventKind::kLost, "is in fault");
     return;
   }
+  if (!unfit.empty()) {
+    Unfit(i);
+    return;
+  }
   core_.SetPhase(i, kReady);
   const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
   core_.Tell(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+}
+
+std::string Contact::MisfitOf(PositionerIndex i) const {
+  const Reading& reading = core_.units[i.value].reading;
+  for (const Axis axis : kAxes) {
+    const AxisDrive& drive = core_.drives[i.value].axis[Index(axis)];
+    const auto told = [&](Parameter parameter, std::int32_t is, std::int32_t wanted) {
+      return std::string(Name(axis)) + " " + Name(parameter) + " is " + std::to_string(is) +
+             ", not " + std::to_string(wanted) + " as set";
+    };
+    if (reading.subdivision[Index(axis)] != drive.subdivision)
+      return told(Parameter::kSubdivision, reading.subdivision[Index(axis)], drive.subdivision);
+    if (reading.counter1[Index(axis)] != drive.counter1)
+      return told(Parameter::kCounter1, reading.counter1[Index(axis)], drive.counter1);
+  }
+  return {};
+}
+
+void Contact::Unfit(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  core_.SetPhase(i, kFault);
+  record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "is not fit to move");
 }
 
 Status Contact::Adopt(PositionerIndex i) {
@@ -521,8 +582,10 @@ void Contact::Enable(const EnableCommand& command) {
 }
 
 Status Contact::WriteParameter(std::uint64_t request, const WriteParameterCommand& command) {
-  const UnitPhase phase = core_.unit(command.unit).view.phase;
-  if (phase != kReady || core_.unit(command.unit).question)
+  const UnitRecord& record = core_.unit(command.unit);
+  const UnitPhase phase = record.view.phase;
+  const bool misfit = phase == kFault && !record.unfit.empty();  // a parameter may help it
+  if ((phase != kReady && !misfit) || record.question)
     return Fail(
         ErrorCode::kRefused,
         core_.NameOf(command.unit) + " takes parameters only at rest; its phase is " + Name(phase));

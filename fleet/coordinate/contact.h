@@ -36,11 +36,16 @@ class Contact {
 
  private:
   void AskNext(PositionerIndex i);  // the next question of the identification
+  [[nodiscard]] bool Belongs(PositionerIndex i);
   void Concluded(PositionerIndex i);
+  /// See UnitRecord::unfit.
+  [[nodiscard]] std::string MisfitOf(PositionerIndex i) const;
+  void Unfit(PositionerIndex i);
   void Bind(PositionerIndex i);
   void Watch(PositionerIndex i);
   void MissSoon(PositionerIndex i);
   void NoAnswer(PositionerIndex i);
+  void OnOtherVersion(PositionerIndex i, const IdentifyReply& identity);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
   void OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence);

@@ -15,6 +15,11 @@ constexpr DurationNs kQueueFullWait = Milliseconds(20);
 // 255 is left to those who stop the units past the coordinator (daemon/cli/direct_stop.cc).
 constexpr std::uint8_t kLastSequence = 254;
 
+MoveId MoveAfter(MoveId move, std::uint32_t count) {
+  constexpr std::uint32_t kIds = 65'535;  // 0 is none
+  return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
+}
+
 Function AnswerFunction(const CanFrame& question) {
   const auto function = static_cast<Function>(question.id >> 20 & 63);
   return function == Function::kStop ? Function::kDone : function;
@@ -29,9 +34,9 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
       drives(std::move(drives_in)),
       units(layout_in->size()),
       earlier_configurations(std::move(stored.configurations)),
-      next_move(stored.next_move),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
+      next_move_(stored.next_move),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
@@ -75,6 +80,8 @@ std::string Core::TroubleOf(PositionerIndex i) const {
   const std::string id = std::to_string(layout.unit(i).id.value);
   switch (view.phase) {
     case UnitPhase::kFault:
+      if (!units[i.value].unfit.empty() && view.reported_state != UnitState::kFault)
+        return "is not fit to move: " + units[i.value].unfit;
       return "is in fault" +
              (view.fault == FaultCode::kNone ? "" : " (" + std::string(Name(view.fault)) + ")") +
              ": `focalfleet enable " + id + "` clears it";
@@ -82,9 +89,11 @@ std::string Core::TroubleOf(PositionerIndex i) const {
       return "has another serial number than the one that belongs there: `focalfleet adopt " + id +
              "` accepts it";
     case UnitPhase::kSilent:
-      return "does not answer any more";
     case UnitPhase::kAbsent:
-      return "has never answered";
+      if (units[i.value].other_version)
+        return "speaks protocol version " + std::to_string(*units[i.value].other_version) +
+               ", not " + std::to_string(kProtocolVersion);
+      return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
       return "is still being read";
     case UnitPhase::kMoving:
@@ -230,6 +239,19 @@ bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
   return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
 }
 
+MoveId Core::TakeMoveId() {
+  const MoveId taken = next_move_;
+  next_move_ = MoveAfter(taken, 1);
+  if (--moves_left_ < limits::kMovesReserved / 2) ReserveMoves();
+  return taken;
+}
+
+void Core::ReserveMoves() {
+  moves_left_ = limits::kMovesReserved;
+  Note(NextMoveRow{MoveAfter(next_move_, moves_left_)});
+  if (reserved_by_ == 0) reserved_by_ = batch_now();
+}
+
 void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,
                  std::string text) {
   AlarmRow row{
@@ -293,6 +315,7 @@ void Core::BeginStep(const Inputs& inputs, Effects* effects) {
   committed_through = inputs.committed_through;
   store_failing = inputs.store_failing;
   std::fill(is_changed_.begin(), is_changed_.end(), std::uint8_t{0});
+  if (reserved_by_ == 0) ReserveMoves();
 }
 
 void Core::Count(BusRecord* bus, const CanFrame& frame) {

@@ -45,6 +45,7 @@ struct Reading {
   StatusReply status;
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
+  std::array<std::int32_t, kAxisCount> counter1{};
 };
 
 struct UnitRecord {
@@ -54,7 +55,11 @@ struct UnitRecord {
   std::optional<Question> question;
   std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter
   Reading reading;
-  HostInstant due = kNever;  // when Service has something to do
+  /// What it holds otherwise than plans are made with, for people; empty: nothing. Such a unit is
+  /// kFault, and read again with every poll.
+  std::string unfit;
+  std::optional<std::uint8_t> other_version;  // of the protocol, that it said last
+  HostInstant due = kNever;                   // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
   // In motion: when others depend on where it is, and when the last question was asked to which it
@@ -165,6 +170,12 @@ class Core {
   /// The batch number that this step's rows will carry.
   [[nodiscard]] std::uint64_t batch_now() const { return next_batch; }
 
+  /// A number that no unit holds a move under. Numbers are taken from a stock that the store knows
+  /// as used: a run that is killed may have armed units that nobody hears any more, and the next
+  /// one's start signals reach them. Pre: MovesAreReserved().
+  MoveId TakeMoveId();
+  [[nodiscard]] bool MovesAreReserved() const { return committed_through >= reserved_by_; }
+
   // ---- being driven
 
   void BeginStep(const Inputs& inputs, Effects* effects);
@@ -185,7 +196,6 @@ class Core {
   std::unordered_map<SerialNumber, PositionerIndex> place_of;
   std::vector<ConfigurationRow> earlier_configurations;  // as stored
   std::vector<UnitEvent> events;
-  MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
   std::uint64_t next_batch = 1;
@@ -209,6 +219,12 @@ class Core {
     PositionerIndex unit;
     bool operator>(const Timer& o) const { return at != o.at ? at > o.at : unit > o.unit; }
   };
+
+  void ReserveMoves();
+
+  MoveId next_move_;
+  std::uint32_t moves_left_ = 0;
+  std::uint64_t reserved_by_ = 0;  // the batch of the first stock
 
   void CloseLoadWindow(BusRecord* bus) const;
   void DropQuestion(PositionerIndex i);

@@ -173,7 +173,7 @@ void Pursuit::GatherIfDue() {
         return unit.view.phase == kIdentifying ||
                (unit.view.phase == kAbsent && !unit.asked_once) || unit.view.phase == kSettling;
       });
-  if (waiting && core_.now < gather_until_) {
+  if ((waiting && core_.now < gather_until_) || !core_.MovesAreReserved()) {
     due_ = core_.now + kGatherStep;
     return;
   }
@@ -265,8 +265,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
   prediction_ = done.predicted;
-  move_ = core_.next_move;
-  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  move_ = core_.TakeMoveId();
   if (plan_.moves.empty()) {
     RoundOver();
     return;
@@ -349,7 +348,8 @@ void Pursuit::Advance() {
 }
 
 void Pursuit::SayWhatIsWaitedFor() {
-  const bool needs_the_store = state_ == State::kCommitting || state_ == State::kHomeCommitting ||
+  const bool needs_the_store = (state_ == State::kGathering && !core_.MovesAreReserved()) ||
+                               state_ == State::kCommitting || state_ == State::kHomeCommitting ||
                                (state_ == State::kReporting && !arrivals_.empty());
   view_.waiting_for =
       needs_the_store && core_.store_failing ? "the store, which cannot be written" : "";

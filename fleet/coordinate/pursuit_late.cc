@@ -289,9 +289,7 @@ bool Pursuit::TryAgain(Late* late) {
 
 void Pursuit::TakeLate(Late* late, const LateMove& move) {
   const PositionerIndex i = late->unit;
-  courses_[i.value] = {move, core_.next_move};
-  core_.next_move = {
-      static_cast<std::uint16_t>(core_.next_move.value == 65'535 ? 1 : core_.next_move.value + 1)};
+  courses_[i.value] = {move, core_.TakeMoveId()};
   plan_of_[i.value] = plan_.moves.size();
   plan_.moves.push_back(move.move);
   stage_tries_[i.value] = 0;
@@ -357,7 +355,6 @@ bool Pursuit::Load(Late* late) {
   if (part_[i.value] != Part::kHolding) return true;
   if (late->stage == Late::Stage::kUploading) {
     Intend(i, IntentOf(i));
-    core_.Note(NextMoveRow{core_.next_move});
     late->batch = core_.batch_now();
     late->stage = Late::Stage::kCommitting;
   }

@@ -61,7 +61,6 @@ void Pursuit::CommitRound() {
   for (const UnitPlan& move : plan_.moves) {
     Intend(move.unit, IntentOf(move.unit));
   }
-  core_.Note(NextMoveRow{core_.next_move});
   commit_batch_ = core_.batch_now();
   SetState(State::kCommitting);
 }
@@ -247,12 +246,10 @@ void Pursuit::CommitHoming() {
     return;
   }
   // A new id: the moves that made way for these units had their own.
-  move_ = core_.next_move;
-  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  move_ = core_.TakeMoveId();
   for (const PositionerIndex i : homing_) {
     Intend(i, HomingIntentOf(i));
   }
-  core_.Note(NextMoveRow{core_.next_move});
   // A few feeds: no work for the planner's thread.
   const PlanEstimate estimate = Estimate(HomingMotion(), core_.layout, core_.drives, MotorModel{});
   prediction_ = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};

@@ -16,6 +16,7 @@ inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each
 inline constexpr std::uint32_t kRequestRetries = 4;  // waits double: 31 times the first in all
 inline constexpr std::uint32_t kStageRetries = 3;
 inline constexpr std::uint32_t kRoundsPerConfiguration = 6;
+inline constexpr std::uint32_t kMovesReserved = 1024;  // numbers that the store knows as taken
 inline constexpr std::uint32_t kFramesPerBusQueued = 4096;
 inline constexpr std::uint32_t kFramesPerStep = 65'536;
 

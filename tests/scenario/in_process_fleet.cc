@@ -86,14 +86,17 @@ const VectorRow* MemoryStore::Vector(SerialNumber serial) const {
 }
 
 InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
-  auto layout = Layout::Create(
-      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus}), {});
+  std::vector<focalfleet::Unit> units =
+      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus});
+  for (focalfleet::Unit& unit : units) unit.id.value += options.first_id - 1;
+  auto layout = Layout::Create(std::move(units), {});
   FOCALFLEET_CHECK(layout.has_value());
   layout_ = std::make_unique<Layout>(std::move(*layout));
   drives_.assign(layout_->size(), UnitDrive{});
   const auto start = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(options.seed, "start"));
   FOCALFLEET_CHECK(start.has_value());
-  sim::WorldConfig config{.units = {}, .seed = options.seed, .spread = options.spread};
+  sim::WorldConfig config{
+      .units = {}, .seed = options.seed, .spread = options.spread, .drive = options.factory};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
   config.start = now_;
@@ -153,6 +156,7 @@ void InProcessFleet::StepOnce() {
 }
 
 void InProcessFleet::Perform(const Effects& effects) {
+  if (sent != nullptr) sent->insert(sent->end(), effects.frames.begin(), effects.frames.end());
   if (!effects.rows.empty())
     commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});
   if (effects.sync_at) sync_at_ = *effects.sync_at;

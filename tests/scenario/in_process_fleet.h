@@ -42,6 +42,8 @@ class InProcessFleet {
     CoordinatorConfig config;
     sim::Spread spread = sim::Spread::kNominal;
     double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
+    std::uint32_t first_id = 1;
+    sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
   };
 
   explicit InProcessFleet(const Options& options);
@@ -64,6 +66,9 @@ class InProcessFleet {
   /// What the port of a bus tells of its link. Frames pass all the same: only what the coordinator
   /// makes of it is tried; KillBus is the other half.
   void TellLink(LinkEvent event) { links_.push_back(std::move(event)); }
+
+  /// A frame that no unit sent, heard with the next step.
+  void Hear(const ReceivedFrame& frame) { heard_.push_back(frame); }
 
   void Send(Command command);
   /// Applies a random configuration that is clear of what stands; returns its request number.
@@ -88,12 +93,14 @@ class InProcessFleet {
   [[nodiscard]] sim::World& world() { return *world_; }
   [[nodiscard]] const Layout& layout() const { return *layout_; }
   [[nodiscard]] MemoryStore& store() { return store_; }
+  [[nodiscard]] const MemoryStore& store() const { return store_; }
   /// That the coordinator was given last.
   [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
   std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
+  std::vector<OutFrame>* sent = nullptr;  // where it is given: all frames of the coordinator
 
  private:
   void StepOnce();
