@@ -109,6 +109,7 @@ TEST(BusFaults, BusOffInMidMotionIsToldWithItsCauseAndTheBusComesBack) {
   const auto state = [&] { return fleet.coordinator().bus(sick).link; };
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kPassive; }, Seconds(20)));
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kOff; }, Seconds(20)));
+  fleet.Run(Milliseconds(20));  // it becomes durable
   const std::string name = "bus " + std::to_string(sick.value);
   for (const std::string& part :
        {name + ": the controller warns of errors (", name + " is passive: the controller is error-",
