@@ -1,6 +1,7 @@
 #include "daemon/simulator/faults_file.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
 #include <map>
 #include <utility>
@@ -114,8 +115,10 @@ class Reader {
       PlannedFault one = fault;
       (info.of_unit ? one.unit.value : one.bus.value) = number;
       if (const int line = OverlappingLine(one, number); line != 0)
-        return row->Reject(column, std::to_string(number) + " has this fault at that time already, "
-                                       "by line " + std::to_string(line));
+        return row->Reject(column, std::to_string(number) +
+                                       " has this fault at that time already, "
+                                       "by line " +
+                                       std::to_string(line));
       if (row->error()) return;
       by_target_[{fault.kind, number}].push_back({one.from, one.to, row->line()});
       plan_.push_back(one);
@@ -149,8 +152,8 @@ Result<std::vector<PlannedFault>> ReadFaults(std::string_view text, std::string 
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(text, std::move(file)));
   FOCALFLEET_TRY(
       table.Require({"fault", "bus_id", "unit_id", "from_s", "to_s", "chance", "value"}));
-  if (const auto others = table.Others(
-          {"fault", "bus_id", "unit_id", "from_s", "to_s", "chance", "value"});
+  if (const auto others =
+          table.Others({"fault", "bus_id", "unit_id", "from_s", "to_s", "chance", "value"});
       !others.empty())
     return Fail(ErrorCode::kInvalid,
                 table.file() + ": no column is called '" + others.front() + "'");

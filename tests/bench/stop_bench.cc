@@ -60,7 +60,8 @@ class StopBench {
     fleet_ = SimulatedFleet::Create(std::move(config)).value();
     coordinator_ =
         std::make_unique<Coordinator>(&layout_, drives_, CoordinatorConfig{}, StoredFleet{});
-    for (const BusId bus : layout_.buses()) lines_.push_back({bus, SimulatedPort(fleet_, bus), {}});
+    for (const BusId bus : layout_.buses())
+      lines_.push_back({bus, std::make_unique<SimulatedPort>(fleet_, bus), Outbox()});
     while (!AllReady()) Turn();
     for (const Unit& unit : layout_.units())
       fleet_->world().faults(unit.id)->copies = kAnswerCopies;
@@ -96,7 +97,7 @@ class StopBench {
  private:
   struct Line {
     BusId bus;
-    SimulatedPort port;
+    std::unique_ptr<SimulatedPort> port;
     Outbox outbox;
   };
 
@@ -159,7 +160,7 @@ class StopBench {
     for (const OutFrame& out : effects_.frames)
       std::ranges::lower_bound(lines_, out.bus, {}, &Line::bus)->outbox.Put(out.frame, now_);
     for (Line& line : lines_) {
-      if (line.outbox.size() > 0) line.outbox.Flush(&line.port, now_);
+      if (line.outbox.size() > 0) line.outbox.Flush(line.port.get(), now_);
       if (saturating_) Poll(line.bus);
     }
   }
