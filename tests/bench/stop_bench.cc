@@ -1,9 +1,10 @@
 // How long a stop of all takes on buses at their limit: from the command to the end of arbitration
 // of the last bus' stop frame, in frame times of the simulated bit clock. The real coordinator
 // uploads to every unit through the daemon's outboxes and simulated ports; a second host polls so
-// that no bit is left, and units answer everything several times over. Ends with 1 where a stop
-// took more than two frame times, or a bus was not saturated: simulated time, so no matter of the
-// machine.
+// that no bit is left, and units answer everything several times over. The stop is one broadcast a
+// bus; what comes behind it (loaded units are asked to disarm) ends no motion. Ends with 1 where a
+// stop took more than two frame times, or a bus was not saturated: simulated time, so no matter of
+// the machine.
 //   stop_bench [--buses 50] [--units-per-bus 100] [--stops 200] [--seed 1]
 #include <algorithm>
 #include <cstdio>
@@ -125,7 +126,8 @@ class StopBench {
     for (const sim::WireFrame& carried : wire_) {
       const auto decoded = DecodeHost(carried.frame);
       if (carried.from_unit || carried.at < at || !decoded ||
-          !std::holds_alternative<Stop>(decoded->message))
+          !std::holds_alternative<Stop>(decoded->message) ||
+          decoded->address.node != kBroadcastNode)
         continue;
       const std::uint32_t behind = FrameBits(carried.frame) - LevelsOf(carried.frame).arbitration;
       waits.push_back(static_cast<double>((carried.at - at).ns - behind * kBit.ns) / 1000);
