@@ -428,7 +428,7 @@ void World::Plug(UnitId unit) {
 }
 void World::Babble(UnitId unit, const std::optional<CanFrame>& frame) {
   impl_->OnBusOf(impl_->Row(unit),
-                 [&](Bus* wire, std::uint32_t node) { wire->Babble(node, frame); });
+                 [&](Bus* wire, std::uint32_t node) { wire->Babble(node, frame, now()); });
 }
 bool World::dead(BusId bus) const { return impl_->At(bus).bus.dead(); }
 std::size_t World::waiting(BusId bus) const { return impl_->At(bus).bus.waiting(); }

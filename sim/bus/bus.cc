@@ -80,10 +80,12 @@ HostInstant Bus::NextBegin() const {
   HostInstant at = kNever;
   if (!ready_.empty()) at = held_until_;
   if (!later_.empty()) at = std::min(at, std::max(idle_at_, later_.top().ready));
-  for (const Babbler& babbler : babblers_)
-    if (Hears(babbler.node))
-      at = std::min(
-          at, std::max(idle_at_, babbler.node == suspended_ ? suspended_until_ : HostInstant{0}));
+  for (const Babbler& babbler : babblers_) {
+    if (!Hears(babbler.node)) continue;
+    const HostInstant free =
+        babbler.node == suspended_ ? std::max(idle_at_, suspended_until_) : idle_at_;
+    at = std::min(at, std::max(free, babbler.since));
+  }
   return at;
 }
 
@@ -131,7 +133,8 @@ std::optional<Bus::Entry> Bus::Arbitrate(HostInstant now) {
   std::optional<Entry> best = TakeReady(now);
   babbling_ = false;
   for (const Babbler& babbler : babblers_) {
-    if (!Hears(babbler.node) || (now < suspended_until_ && babbler.node == suspended_)) continue;
+    const bool suspended = babbler.node == suspended_ && now < suspended_until_;
+    if (!Hears(babbler.node) || suspended || now < babbler.since) continue;
     if (best && best->waiting.frame.id <= babbler.frame.id) continue;
     if (best && !babbling_) ready_.push(*best);
     best = Entry{.ready = now, .waiting = {babbler.frame, babbler.node != kHost, babbler.node}};
@@ -430,9 +433,9 @@ void Bus::Plug(std::uint32_t number, HostInstant now) {
   Rejoin(number, now);
 }
 
-void Bus::Babble(std::uint32_t node, std::optional<CanFrame> frame) {
+void Bus::Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now) {
   std::erase_if(babblers_, [node](const Babbler& babbler) { return babbler.node == node; });
-  if (frame) babblers_.push_back({node, *frame});
+  if (frame) babblers_.push_back({node, *frame, now});
 }
 
 // ---- a wire that is dead or stuck

@@ -118,7 +118,7 @@ class Bus {
   void Unplug(std::uint32_t node, HostInstant now);
   void Plug(std::uint32_t node, HostInstant now);
   /// From now on `node` sends this frame whenever arbitration lets it; none: no more.
-  void Babble(std::uint32_t node, std::optional<CanFrame> frame);
+  void Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now);
   /// The wire is dominant, whatever anybody drives, until it is released.
   void Stick(HostInstant now);
   void Release(HostInstant now);
@@ -180,6 +180,7 @@ class Bus {
   struct Babbler {
     std::uint32_t node;
     CanFrame frame;
+    HostInstant since;
   };
 
   [[nodiscard]] DurationNs Bits(std::uint32_t bits) const;

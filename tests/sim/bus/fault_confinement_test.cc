@@ -354,7 +354,7 @@ TEST(FaultConfinement, TheHostComesBackWhenItIsToldToOrByItself) {
 
 TEST(FaultConfinement, ABabblerStarvesAllBelowItAndNobodyAbove) {
   Bus bus = BusOf(3);
-  bus.Babble(2, FrameOf(100));
+  bus.Babble(2, FrameOf(100), {0});
   bus.Offer({FrameOf(200), false, 0}, {0});
   bus.Offer({FrameOf(99), true, 1}, {1'000'000});
   const auto heard = RunUntil(&bus, {Milliseconds(10).ns});
@@ -364,7 +364,7 @@ TEST(FaultConfinement, ABabblerStarvesAllBelowItAndNobodyAbove) {
   ASSERT_NE(other, heard.end());
   EXPECT_LE(other->at.ns, 1'000'000 + (FrameBits(FrameOf(100)) + FrameBits(FrameOf(99))) * kBit);
   EXPECT_EQ(bus.waiting(), 2u) << "the host's frame and the one on the wire";
-  bus.Babble(2, std::nullopt);
+  bus.Babble(2, std::nullopt, {Milliseconds(10).ns});
   EXPECT_EQ(RunUntil(&bus, {Milliseconds(20).ns}).back().sent.frame.id, 200u);
 }
 
