@@ -69,6 +69,7 @@ void Bus::Admit(const Entry& entry) {
 }
 
 HostInstant Bus::NextEvent() const {
+  if (dead_) return kNever;
   if (stuck_at_ != kNever) return stuck_step_at_;
   if (sending_) return idle_at_;
   const HostInstant begin = NextBegin();
@@ -381,6 +382,8 @@ void Bus::Rejoin(std::uint32_t number, HostInstant now) {
   Node& node = nodes_[number];
   if (!Hears(number)) return;
   ++hearing_;
+  for (Babbler& babbler : babblers_)
+    if (babbler.node == number) babbler.since = std::max(babbler.since, now);
   for (Entry& entry : node.kept) {
     entry.ready = std::max(entry.ready, now);
     Admit(entry);

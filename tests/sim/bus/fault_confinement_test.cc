@@ -368,6 +368,23 @@ TEST(FaultConfinement, ABabblerStarvesAllBelowItAndNobodyAbove) {
   EXPECT_EQ(RunUntil(&bus, {Milliseconds(20).ns}).back().sent.frame.id, 200u);
 }
 
+TEST(FaultConfinement, ABabblerNeverSendsBeforeItCan) {
+  Bus bus = BusOf(3);
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  bus.Babble(2, FrameOf(100), {kSecond});
+  EXPECT_EQ(bus.NextEvent().ns, kSecond);
+  RunUntil(&bus, {kSecond + 1'000'000});
+  bus.PowerOff(2, {kSecond + 1'000'000});
+  RunUntil(&bus, {2 * kSecond});
+  bus.PowerOn(2, {2 * kSecond});
+  EXPECT_EQ(bus.NextEvent().ns, 2 * kSecond);
+  RunUntil(&bus, {2 * kSecond + 1'000'000});
+  bus.Kill({2 * kSecond + 1'000'000});
+  EXPECT_EQ(bus.NextEvent(), kNever);
+  bus.Revive({3 * kSecond});
+  EXPECT_EQ(bus.NextEvent().ns, 3 * kSecond);
+}
+
 TEST(FaultConfinement, ADominantWireThrowsTheSenderOffAndMakesAllOthersPassive) {
   Bus bus = BusOf(3);
   bus.Offer({FrameOf(7), true, 1}, {0});
