@@ -43,11 +43,12 @@ struct UnitFaults {
   bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
 };
 
-/// How one bus misbehaves: chances per frame.
+/// How one bus misbehaves: chances per frame, but for noise.
 struct BusFaults {
-  double drop = 0;       // it occupies the bus, nobody hears it
-  double duplicate = 0;  // it is sent twice
-  double late = 0;       // it enters arbitration only after `late_by`
+  double bit_error_rate = 0;  // a bit is seen inverted by all: the frame is destroyed and repeated
+  double drop = 0;            // it occupies the bus and is acknowledged, but nobody takes it in
+  double duplicate = 0;       // one receiver refuses it when all others have it: they get it twice
+  double late = 0;            // it enters arbitration only after `late_by`
   DurationNs late_by = Milliseconds(5);
 };
 

@@ -14,6 +14,9 @@ constexpr std::uint32_t kAnswerBits = 145;
 constexpr DurationNs kQueueFullWait = Milliseconds(20);
 // 255 is left to those who stop the units past the coordinator (daemon/cli/direct_stop.cc).
 constexpr std::uint8_t kLastSequence = 254;
+/// Bus time that a stop of all has to itself: the frame on the wire, one that must be sent again,
+/// and the stop.
+constexpr std::uint32_t kStopAloneBits = 4 * kFrameBitsMax;
 
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
@@ -226,6 +229,8 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
   out->frames.push_back({buses[bus].id, frame});
   buses[bus].schedule.Charge(now, FrameBits(frame));
   if (!std::holds_alternative<Stop>(message)) return;
+  if (node == kBroadcastNode)
+    buses[bus].schedule.Hold(now + BitTime(kStopAloneBits, config.bit_rate_bps));
   for (const PositionerIndex i : buses[bus].units) {
     if (node != kBroadcastNode && node != layout.unit(i).node) continue;
     unit(i).told_to_stop = now;

@@ -96,13 +96,18 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
   const auto start = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(options.seed, "start"));
   FOCALFLEET_CHECK(start.has_value());
   sim::WorldConfig config{
-      .units = {}, .seed = options.seed, .spread = options.spread, .drive = options.factory};
+      .units = {},
+      .seed = options.seed,
+      .spread = options.spread,
+      .drive = options.factory,
+      .faults = options.faults};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
   config.start = now_;
   config.clock_error_max = options.clock_error_max;
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
   world_ = std::make_unique<sim::World>(std::move(config));
+  for (const BusId bus : layout_->buses()) controllers_.emplace_back(bus);
   Restart();
 }
 
@@ -129,6 +134,9 @@ void InProcessFleet::StepOnce() {
     world_->PulseSync();
     sync_at_ = kNever;
   }
+  for (std::size_t i = 0; i < controllers_.size(); ++i)
+    if (controllers_[i].Look(*world_))
+      links_.push_back({layout_->buses()[i], controllers_[i].state(), controllers_[i].trouble()});
   std::vector<PlanDone> plans;
   while (!planning_.empty() && planning_.front().at <= now_) {
     plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));

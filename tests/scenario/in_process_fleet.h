@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/ports/simulated_port.h"
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
 #include "sim/world.h"
@@ -44,6 +45,7 @@ class InProcessFleet {
     double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
     std::uint32_t first_id = 1;
     sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
+    std::vector<sim::PlannedFault> faults = {};
   };
 
   explicit InProcessFleet(const Options& options);
@@ -63,8 +65,9 @@ class InProcessFleet {
   /// A stop of all that somebody else puts on every bus, as `stop --direct` does.
   void StopDirectly();
 
-  /// What the port of a bus tells of its link. Frames pass all the same: only what the coordinator
-  /// makes of it is tried; KillBus is the other half.
+  /// What the port of a bus tells of its link, beside what it tells of its controller by itself.
+  /// Frames pass all the same: only what the coordinator makes of it is tried; KillBus is the other
+  /// half.
   void TellLink(LinkEvent event) { links_.push_back(std::move(event)); }
 
   /// A frame that no unit sent, heard with the next step.
@@ -120,6 +123,7 @@ class InProcessFleet {
   std::unique_ptr<Layout> layout_;
   std::vector<UnitDrive> drives_;
   std::unique_ptr<sim::World> world_;
+  std::vector<SimulatedLink> controllers_;  // Shape: as the layout's buses
   std::unique_ptr<Coordinator> coordinator_;
   MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
