@@ -8,6 +8,7 @@
 // due.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -64,7 +65,8 @@ struct UnitRecord {
   HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   // Stops of ours, so that one of somebody else's is told from them.
-  std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
+  /// Of the last ones that it was asked for, newest first: answers may come late, and repeated.
+  std::array<std::uint8_t, 4> stop_sequences{};
   HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
   bool runs_freely = false;             // set in motion, and not stopped by us since
 };

@@ -544,6 +544,21 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
   }
 }
 
+// Answers that come late or twice, to stops of ours of which there may be several.
+TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
+  for (std::uint64_t seed = testing::TestSeed(60); seed < testing::TestSeed(60) + 30; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet(Small(seed));
+    fleet.Run(Seconds(2));
+    for (const BusId bus : fleet.layout().buses())
+      *fleet.world().faults(bus) = {.duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(1200)};
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
+    fleet.ExpectStoreTellsTheTruth("with late answers");
+  }
+}
+
 TEST(Configuration, StopOfOneUnitBySomebodyElseStopsAll) {
   InProcessFleet fleet(Small(25));
   fleet.ApplyRandom(25);
