@@ -322,6 +322,7 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
   fleet.Run(Milliseconds(10));
   EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
   fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
+  fleet.TellLink({sick, LinkState::kDown, "the interface is down"});
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.ExpectStoreTellsTheTruth("while the bus is off");
   const std::string name = "bus " + std::to_string(sick.value);
@@ -330,8 +331,12 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
         name + " is passive: the controller is error-passive (bit error)",
         name + " is off: the controller is bus-off (no acknowledgement); its " +
             std::to_string(of_bus) + " units cannot be",
-        name + ": the controller is bus-off; no privilege to restart it"})
+        name + ": the controller is bus-off; no privilege to restart it",
+        name + " is down: the interface is down"})
     EXPECT_TRUE(HasAlarm(fleet, part)) << part;
+  EXPECT_FALSE(HasAlarm(fleet, "the interface is down; its")) << "they were lost before";
+  EXPECT_NE(Unserved(fleet).find("it cannot be reached: " + name + " is off"), std::string::npos)
+      << Unserved(fleet);
   fleet.world().ReviveBus(sick);
   fleet.TellLink({sick, LinkState::kUp, ""});
   fleet.Run(Seconds(10));
