@@ -23,7 +23,6 @@ std::int64_t ReadClock(clockid_t which) {
   return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
-/// What the window goes by: bits do not hurry when the host's clock does.
 HostInstant Monotonic() { return {ReadClock(CLOCK_MONOTONIC)}; }
 
 bool IsUrgent(const CanFrame& frame) { return frame.id >> 26 == 0; }
@@ -51,6 +50,7 @@ SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
                  .first_wait = options_.clock.Real(Milliseconds(1000)),
                  .longest_wait = options_.clock.Real(Milliseconds(60'000)),
                  .poll_period = options_.clock.Real(Milliseconds(10))}) {
+  if (!options_.wire_clock) options_.wire_clock = Monotonic;
   aside_.only_units = options_.hears == Hears::kUnits;
 }
 
@@ -111,19 +111,18 @@ DurationNs SocketCanPort::retry_full() const {
   if (window_.options().confirms) return Milliseconds(20);
   const HostInstant room_at = window_.RoomAt();
   if (room_at == kNever) return kFull;
-  return std::clamp(room_at - Monotonic(), Microseconds(20), kFull);
+  return std::clamp(room_at - options_.wire_clock(), Microseconds(20), kFull);
 }
 
-std::size_t SocketCanPort::Room(bool urgent) {
-  const HostInstant now = Monotonic();
+std::size_t SocketCanPort::Room(bool urgent, HostInstant monotonic) {
   if (!window_.options().confirms) {
     window_.Charged(BytesBelow(socket_.socket()));
-  } else if (window_.unconfirmed() > 0 && now - waits_since_ > kConfirmationLost &&
+  } else if (window_.unconfirmed() > 0 && monotonic - waits_since_ > kConfirmationLost &&
              BytesBelow(socket_.socket()) == 0) {
     ++counters_.link_errors;
     window_.Clear();
   }
-  return window_.Room(urgent, now);
+  return window_.Room(urgent, monotonic);
 }
 
 std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
@@ -131,15 +130,19 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
   std::size_t taken = 0;
   while (taken < frames.size()) {
     const bool urgent = IsUrgent(frames[taken]);
-    const std::size_t room = std::min(Room(urgent), frames.size() - taken);
+    const HostInstant monotonic = window_.needs_time() ? options_.wire_clock() : HostInstant{0};
+    const std::size_t room = std::min(Room(urgent, monotonic), frames.size() - taken);
     if (room == 0) return taken;
     // The last place is not for those behind a stop.
     const auto batch = frames.subspan(taken, urgent ? 1 : room);
     if (urgent) SetUrgent(socket_.socket(), true);
     const BatchSent sent = SendFrames(socket_.socket(), batch);
     if (urgent) SetUrgent(socket_.socket(), false);
-    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = Monotonic();
-    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, Monotonic());
+    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = monotonic;
+    // Their bits begin no sooner than now.
+    const HostInstant below =
+        window_.options().bit_rate_bps > 0 ? options_.wire_clock() : monotonic;
+    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, below);
     taken += sent.taken;
     // ENOBUFS: others have filled the interface's queue, which no poll tells.
     socket_.WatchSending(sent.error == EAGAIN);
@@ -165,13 +168,16 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   }
   aside_.errors.clear();
   aside_.confirmed = 0;
-  aside_.stamps = FrameStamps{now, ReadClock(CLOCK_REALTIME), options_.clock};
+  aside_.stamps = Stamps(now);
   const std::size_t before = out->size();
   const BatchReceived received =
       ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_, &aside_);
   window_.Confirmed(aside_.confirmed);
-  if (aside_.confirmed > 0) waits_since_ = Monotonic();
-  HearBits(now, std::span(*out).subspan(before));
+  if (aside_.confirmed > 0) waits_since_ = options_.wire_clock();
+  // Only on a bus in real time does the window go by bits, and there the host's clock is monotonic.
+  if (window_.options().bit_rate_bps > 0)
+    for (const ReceivedFrame& heard : std::span(*out).subspan(before))
+      window_.Heard(heard.frame, heard.at);
   for (const can_frame& error : aside_.errors) NoteError(error, now);
   if (now >= look_at_) LookAgain(now);
   if (received.error == 0) return;
@@ -179,11 +185,13 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   retry_at_ = now + options_.clock.Real(options_.retry_period);
 }
 
-void SocketCanPort::HearBits(HostInstant now, std::span<const ReceivedFrame> frames) {
-  if (window_.options().bit_rate_bps == 0) return;
-  const HostInstant monotonic = Monotonic();
-  for (const ReceivedFrame& received : frames)
-    window_.Heard(received.frame, monotonic - (now - received.at));
+// Slewed by at most 500 ppm, the wall clock gains half a millisecond between two looks at it.
+FrameStamps SocketCanPort::Stamps(HostInstant now) {
+  if (clocks_read_ == kNever || now - clocks_read_ > options_.clock.Real(Milliseconds(1000))) {
+    clocks_read_ = now;
+    wall_ahead_ns_ = ReadClock(CLOCK_REALTIME) - Monotonic().ns;
+  }
+  return {now, wall_ahead_ns_, options_.clock};
 }
 
 std::string SocketCanPort::WithCauses(const std::string& what) const {

@@ -194,13 +194,17 @@ void Contact::LinkChanged(const LinkEvent& event) {
     core_.Raise(Severity::kWarning, {}, event.bus, name + " is passive" + cause);
     return;
   }
+  if (before == LinkState::kOff || before == LinkState::kDown) {
+    core_.Raise(Severity::kWarning, {}, event.bus, name + " is " + Name(event.state) + cause);
+    return;
+  }
   core_.Raise(Severity::kError, {}, event.bus,
               name + " is " + Name(event.state) + cause + "; its " +
                   std::to_string(bus->units.size()) + " units cannot be reached");
   for (const PositionerIndex i : bus->units) {
     const UnitPhase phase = core_.unit(i).view.phase;
     if (phase != kAbsent && phase != kSilent)
-      Lose(i, kSilent, name + " is " + Name(event.state), false);
+      Lose(i, kSilent, "cannot be reached: " + name + " is " + Name(event.state), false);
   }
 }
 

@@ -160,7 +160,8 @@ void Core::Ask(PositionerIndex i, const HostMessage& message, std::uint32_t answ
   DropQuestion(i);
   record.sequence = SequenceAfter(i, 1);
   if (std::holds_alternative<Stop>(message)) {
-    record.stop_sequence = record.sequence;
+    std::shift_right(record.stop_sequences.begin(), record.stop_sequences.end(), 1);
+    record.stop_sequences.front() = record.sequence;
     record.runs_freely = false;
   }
   const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
@@ -240,7 +241,7 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
 
 bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
   const UnitRecord& record = units[i.value];
-  if (sequence != 0) return sequence == record.stop_sequence;
+  if (sequence != 0) return std::ranges::count(record.stop_sequences, sequence) > 0;
   return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
 }
 

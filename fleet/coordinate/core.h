@@ -8,6 +8,7 @@
 // due.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -75,7 +76,8 @@ struct UnitRecord {
   bool wants_start = false;  // began with the others; when, is not known yet
   ClockMap::Instant began;   // told last
   // Stops of ours, so that one of somebody else's is told from them.
-  std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
+  /// Of the last ones that it was asked for, newest first: answers may come late, and repeated.
+  std::array<std::uint8_t, 4> stop_sequences{};
   HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
   bool runs_freely = false;             // set in motion, and not stopped by us since
 };

@@ -280,6 +280,7 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
   fleet.Run(Milliseconds(10));
   EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
   fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
+  fleet.TellLink({sick, LinkState::kDown, "the interface is down"});
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.ExpectStoreTellsTheTruth("while the bus is off");
   const std::string name = "bus " + std::to_string(sick.value);
@@ -288,8 +289,12 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
         name + " is passive: the controller is error-passive (bit error)",
         name + " is off: the controller is bus-off (no acknowledgement); its " +
             std::to_string(of_bus) + " units cannot be",
-        name + ": the controller is bus-off; no privilege to restart it"})
+        name + ": the controller is bus-off; no privilege to restart it",
+        name + " is down: the interface is down"})
     EXPECT_TRUE(HasAlarm(fleet, part)) << part;
+  EXPECT_FALSE(HasAlarm(fleet, "the interface is down; its")) << "they were lost before";
+  EXPECT_NE(Unserved(fleet).find("it cannot be reached: " + name + " is off"), std::string::npos)
+      << Unserved(fleet);
   fleet.world().ReviveBus(sick);
   fleet.TellLink({sick, LinkState::kUp, ""});
   fleet.Run(Seconds(10));
@@ -499,6 +504,21 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
       fleet.Freeze(Milliseconds(ms), heard);
       ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
     }
+  }
+}
+
+// Answers that come late or twice, to stops of ours of which there may be several.
+TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
+  for (std::uint64_t seed = testing::TestSeed(60); seed < testing::TestSeed(60) + 30; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet(Small(seed));
+    fleet.Run(Seconds(2));
+    for (const BusId bus : fleet.layout().buses())
+      *fleet.world().faults(bus) = {.duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(1200)};
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
+    fleet.ExpectStoreTellsTheTruth("with late answers");
   }
 }
 
