@@ -95,12 +95,11 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
   drives_.assign(layout_->size(), UnitDrive{});
   const auto start = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(options.seed, "start"));
   FOCALFLEET_CHECK(start.has_value());
-  sim::WorldConfig config{
-      .units = {},
-      .seed = options.seed,
-      .spread = options.spread,
-      .drive = options.factory,
-      .faults = options.faults};
+  sim::WorldConfig config{.units = {},
+                          .seed = options.seed,
+                          .spread = options.spread,
+                          .drive = options.factory,
+                          .faults = options.faults};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
   config.start = now_;

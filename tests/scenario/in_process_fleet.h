@@ -103,7 +103,7 @@ class InProcessFleet {
 
   bool store_fails = false;
   std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
-  std::vector<OutFrame>* sent = nullptr;  // where it is given: all frames of the coordinator
+  std::vector<OutFrame>* sent = nullptr;        // where it is given: all frames of the coordinator
 
  private:
   void StepOnce();
