@@ -43,6 +43,10 @@ void Cholesky::SolveLower(std::span<double> b) const {
 
 void Cholesky::Solve(std::span<double> b) const {
   SolveLower(b);
+  SolveUpper(b);
+}
+
+void Cholesky::SolveUpper(std::span<double> b) const {
   for (std::size_t i = n_; i-- > 0;) {
     double sum = b[i];
     for (std::size_t k = i + 1; k < n_; ++k) sum -= lower_[k * n_ + i] * b[k];

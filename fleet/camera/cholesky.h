@@ -17,6 +17,8 @@ class Cholesky {
 
   /// b becomes L^-1 b.
   void SolveLower(std::span<double> b) const;
+  /// b becomes L^-T b.
+  void SolveUpper(std::span<double> b) const;
   /// b becomes A^-1 b.
   void Solve(std::span<double> b) const;
   [[nodiscard]] std::size_t size() const { return n_; }

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kWideShare = 0.05;
 constexpr double kWideVariances = 16;
+constexpr double kFarVariances = 200;
 
 double Density(double squared_sigmas, const CovarianceFp& covariance, double sigma_mm) {
   const double xx = covariance.xx + sigma_mm * sigma_mm;
@@ -68,6 +69,33 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   places->push_back({PlaceKind::kPhiStayed, FibreAt(unit, only_theta), at(only_theta), share});
 }
 
+namespace {
+
+// A spot where one axis or both may have stayed may also be where the unit strayed to, or a move
+// that ended far from its end by a rare large error: what a stay has to be likelier than.
+void AddOtherReasons(const ClaimSearch& search, std::uint32_t unit, std::size_t begin,
+                     const std::vector<ExpectedPlace>& places, double dark_and_dust,
+                     std::vector<Claim>* all) {
+  const IdentifyOptions& options = *search.options;
+  const std::size_t end = all->size();
+  for (std::size_t k = begin; k < end; ++k) {
+    const std::uint32_t spot = (*all)[k].spot;
+    if ((*all)[k].kind == PlaceKind::kExpected) continue;
+    double density = options.strayed_share / PatrolAreaMm2(search.request->layout->unit({unit}));
+    for (const ExpectedPlace& place : places) {
+      if (place.kind != PlaceKind::kExpected) continue;
+      const CovarianceFp far{place.covariance.xx * kFarVariances,
+                             place.covariance.xy * kFarVariances,
+                             place.covariance.yy * kFarVariances};
+      const double squared = SquaredSigmas(place.at_fp, search.spots->at_fp[spot], far, 0);
+      density += options.strayed_share * Density(squared, far, 0);
+    }
+    all->push_back({unit, spot, PlaceKind::kAnywhere, std::log(density / dark_and_dust)});
+  }
+}
+
+}  // namespace
+
 Claims FindClaims(const ClaimSearch& search) {
   const Layout& layout = *search.request->layout;
   const IdentifyOptions& options = *search.options;
@@ -99,6 +127,7 @@ Claims FindClaims(const ClaimSearch& search) {
       });
     }
     if (places.empty()) continue;
+    AddOtherReasons(search, i, before, places, odds.dark_and_dust, &claims.all);
     ++claims.units;
     if (claims.all.size() > before) ++claims.recognised;
   }

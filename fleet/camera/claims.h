@@ -14,7 +14,7 @@
 namespace focalfleet {
 
 struct ClaimSearch {
-  const IdentifyRequest* request = nullptr;
+  const IdentificationRequest* request = nullptr;
   const IdentifyOptions* options = nullptr;
   const MappedSpots* spots = nullptr;
   const SpotGrid* grid = nullptr;  // over spots->at_fp

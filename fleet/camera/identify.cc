@@ -18,8 +18,8 @@ constexpr std::uint32_t kStrayFibresMin = 9;  // fewer say nothing about a whole
 // Who has which spot, in the order in which certainty falls.
 class Matching {
  public:
-  Matching(const IdentifyRequest& request, const IdentifyOptions& options, const MappedSpots& spots,
-           const SpotGrid& grid, Claims claims)
+  Matching(const IdentificationRequest& request, const IdentifyOptions& options,
+           const MappedSpots& spots, const SpotGrid& grid, Claims claims)
       : request_(request),
         options_(options),
         spots_(spots),
@@ -116,8 +116,10 @@ class Matching {
   }
 
   void GiveExpected(const Decision& decision) {
-    const bool stayed = decision.kind != PlaceKind::kExpected;
-    const bool known = decision.kind_doubt <= options_.doubt_max;
+    const bool stayed =
+        decision.kind != PlaceKind::kExpected && decision.kind != PlaceKind::kAnywhere;
+    const bool known =
+        decision.kind != PlaceKind::kAnywhere && decision.kind_doubt <= options_.motion_doubt_max;
     Give(decision.unit, decision.spot,
          stayed && known ? SightingStatus::kDidNotMove : SightingStatus::kMeasured, decision.doubt);
     UnitSighting& sighting = sightings_[decision.unit];
@@ -253,7 +255,7 @@ class Matching {
     return *middle;
   }
 
-  const IdentifyRequest& request_;
+  const IdentificationRequest& request_;
   const IdentifyOptions& options_;
   const MappedSpots& spots_;
   ClaimSearch search_;
@@ -270,7 +272,8 @@ bool IsOtherField(const Claims& claims, const IdentifyOptions& options) {
          claims.stray_spots > std::max(claims.recognised, kStrayFibresMin);
 }
 
-std::optional<Refusal> Implausible(const IdentifyRequest& request, const IdentifyOptions& options) {
+std::optional<Refusal> Implausible(const IdentificationRequest& request,
+                                   const IdentifyOptions& options) {
   const auto lights = static_cast<double>(request.layout->size() + request.fiducials.size());
   const auto spots = static_cast<double>(request.exposure->spots.size());
   char text[120];
@@ -291,8 +294,9 @@ struct Looked {
   Claims claims;
 };
 
-tl::expected<Looked, Refusal> Look(const IdentifyRequest& request, const IdentifyOptions& options,
-                                   Orientation orientation, Identification* result) {
+tl::expected<Looked, Refusal> Look(const IdentificationRequest& request,
+                                   const IdentifyOptions& options, Orientation orientation,
+                                   Identification* result) {
   auto spots = MapSpots(request, options, orientation, result);
   if (!spots) return tl::unexpected<Refusal>(std::move(spots.error()));
   SpotGrid grid(spots->at_fp, kCellMm);
@@ -302,7 +306,8 @@ tl::expected<Looked, Refusal> Look(const IdentifyRequest& request, const Identif
 
 // The field that was expected, seen the wrong way round: fiducials and fibres fit when it is
 // turned.
-std::optional<Refusal> Turned(const IdentifyRequest& request, const IdentifyOptions& options) {
+std::optional<Refusal> Turned(const IdentificationRequest& request,
+                              const IdentifyOptions& options) {
   for (const bool mirrored : {false, true}) {
     for (int quarters = mirrored ? 0 : 1; quarters < 4; ++quarters) {
       Identification ignored;
@@ -327,7 +332,7 @@ const char* Name(SightingStatus status) {
   return kNames[static_cast<std::size_t>(status)];
 }
 
-tl::expected<Identification, Refusal> Identify(const IdentifyRequest& request,
+tl::expected<Identification, Refusal> Identify(const IdentificationRequest& request,
                                                const IdentifyOptions& options) {
   FOCALFLEET_CHECK(request.layout != nullptr && request.camera != nullptr &&
                    request.exposure != nullptr &&

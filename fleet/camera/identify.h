@@ -58,7 +58,8 @@ struct UnitSighting {
   std::array<bool, kAxisCount> stayed{};  // did not move: these axes
   /// Swapped, or suspected: whose command it carried out. Ambiguous: a rival, where there is one.
   PositionerIndex other = kNobody;
-  /// False: seen, but both the end and the start of its move are near enough.
+  /// False: its spot, for more than one reason: start and end of its move are near each other, or
+  /// one axis may have stayed, or slipped. The place is good, the status is kMeasured.
   bool motion_is_known = true;
   double doubt = 0;  // probability that the spot is not its, by the odds in the options
 };
@@ -74,6 +75,7 @@ struct IdentifyOptions {
   double gate_squared_sigmas = 18;   // of the blind error: one unit in 8000 is beyond
   double doubt_max = 1e-3;
   double stray_doubt_max = 0.05;
+  double motion_doubt_max = 0.01;  // whose spot it is may be certain, and why it is there not
   double blend_mm = 0.5;           // two fibres nearer than this are one spot
   double blend_width_ratio = 1.2;  // a spot wider than this times the median is more than one
   double blend_flux_ratio = 1.6;   // and one brighter than this times the unit's usual
@@ -89,7 +91,7 @@ struct IdentifyOptions {
   double spots_share_max = 1.5;
 };
 
-struct IdentifyRequest {
+struct IdentificationRequest {
   const Layout* layout = nullptr;
   std::span<const UnitExpectation> expectations;  // Shape: (n), as the layout
   std::span<const Fiducial> fiducials;
@@ -117,7 +119,7 @@ struct Identification {
 };
 
 /// Pre: `layout`, `camera`, `exposure` are there; one expectation a unit.
-tl::expected<Identification, Refusal> Identify(const IdentifyRequest& request,
+tl::expected<Identification, Refusal> Identify(const IdentificationRequest& request,
                                                const IdentifyOptions& options);
 
 }  // namespace focalfleet

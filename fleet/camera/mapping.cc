@@ -31,7 +31,8 @@ std::vector<PointFp> SeenBy(const CameraModel& camera, std::span<const Spot> spo
 
 class Mapping {
  public:
-  Mapping(const IdentifyRequest& request, const IdentifyOptions& options, Identification* result)
+  Mapping(const IdentificationRequest& request, const IdentifyOptions& options,
+          Identification* result)
       : request_(request), options_(options), result_(*result) {}
 
   tl::expected<MappedSpots, Refusal> Run(Orientation orientation) {
@@ -109,11 +110,9 @@ class Mapping {
     }
     if (still.empty() || used->size() >= kLightsMax) return;
     // By the fit without the air; its error is the residual.
-    const auto rough = PlateMap::Solve(*used, fit.degree, 0, options_.map);
-    if (!rough) return;
     std::vector<PointFp> at;
     at.reserve(seen_.size());
-    for (const PointFp& p : seen_) at.push_back(rough->At(p).at_fp);
+    for (const PointFp& p : seen_) at.push_back(PlateBy(fit, options_.map, p));
     const SpotGrid grid(at, kCellMm);
     // Every k-th, so that they stand all over the plate.
     const std::size_t room = kLightsMax - used->size();
@@ -162,7 +161,7 @@ class Mapping {
 
   static constexpr double kWellKnownMm = 0.03;
 
-  const IdentifyRequest& request_;
+  const IdentificationRequest& request_;
   const IdentifyOptions& options_;
   Identification& result_;
   std::vector<PointFp> seen_;
@@ -171,7 +170,7 @@ class Mapping {
 
 }  // namespace
 
-tl::expected<MappedSpots, Refusal> MapSpots(const IdentifyRequest& request,
+tl::expected<MappedSpots, Refusal> MapSpots(const IdentificationRequest& request,
                                             const IdentifyOptions& options, Orientation orientation,
                                             Identification* result) {
   return Mapping(request, options, result).Run(orientation);

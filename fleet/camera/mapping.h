@@ -19,7 +19,7 @@ struct Orientation {
 };
 
 /// Fills the fields of `result` that tell about the camera.
-tl::expected<MappedSpots, Refusal> MapSpots(const IdentifyRequest& request,
+tl::expected<MappedSpots, Refusal> MapSpots(const IdentificationRequest& request,
                                             const IdentifyOptions& options, Orientation orientation,
                                             Identification* result);
 

@@ -123,6 +123,11 @@ std::optional<PolynomialFit> FitPolynomial(std::span<const KnownLight> lights,
   return fit;
 }
 
+PointFp PlateBy(const PolynomialFit& fit, const PlateMapOptions& options, PointFp seen_fp) {
+  const PointFp p = Polynomial(fit.coefficients, TermsAt(seen_fp, options.radius_mm, fit.degree));
+  return {seen_fp.x_mm + p.x_mm, seen_fp.y_mm + p.y_mm};
+}
+
 double AirOf(std::span<const KnownLight> lights, const PolynomialFit& fit,
              const PlateMapOptions& options) {
   const std::size_t terms = fit.coefficients.size();
@@ -204,26 +209,34 @@ class PlateSolution {
     return both;
   }
 
-  /// The air's part at a place, and the variance of both parts together.
-  void At(PointFp p, PointFp* air_fp, double* variance_mm2) {
-    scratch_.resize(n_);
-    for (std::size_t k = 0; k < n_; ++k)
-      scratch_[k] = air2_ > 0 ? Covariance(p, lights_[k].seen_fp) : 0;
+  [[nodiscard]] PointFp AirAt(PointFp p) {
+    SetCovariances(p);
+    return {Dot(scratch_.data(), x_.weights.data(), n_),
+            Dot(scratch_.data(), y_.weights.data(), n_)};
+  }
+
+  /// Of the air's part and the polynomial together. Units: mm^2, of one coordinate.
+  [[nodiscard]] double VarianceAt(PointFp p) {
+    SetCovariances(p);
     of_lights_->SolveLower(scratch_);
-    *air_fp = {Dot(scratch_.data(), x_.rest.data(), n_), Dot(scratch_.data(), y_.rest.data(), n_)};
     Terms f = TermsAt(p, radius_mm_, degree_);
     for (std::size_t t = 0; t < terms_; ++t) f[t] -= Dot(&whitened_[t * n_], scratch_.data(), n_);
-    const std::span<double> left(f.data(), terms_);
-    of_terms_->SolveLower(left);
-    *variance_mm2 = std::max(0.0, air2_ - Dot(scratch_.data(), scratch_.data(), n_)) +
-                    Dot(f.data(), f.data(), terms_);
+    of_terms_->SolveLower(std::span<double>(f.data(), terms_));
+    return std::max(0.0, air2_ - Dot(scratch_.data(), scratch_.data(), n_)) +
+           Dot(f.data(), f.data(), terms_);
   }
 
  private:
   struct Solved {
     std::vector<double> coefficients;
-    std::vector<double> rest;  // L^-1 (y - F b)
+    std::vector<double> weights;  // C^-1 (y - F b)
   };
+
+  void SetCovariances(PointFp p) {
+    scratch_.resize(n_);
+    for (std::size_t k = 0; k < n_; ++k)
+      scratch_[k] = air2_ > 0 ? Covariance(p, lights_[k].seen_fp) : 0;
+  }
 
   [[nodiscard]] double Covariance(PointFp p, PointFp q) const {
     const double dx = (p.x_mm - q.x_mm) / length_mm_;
@@ -234,17 +247,18 @@ class PlateSolution {
   template <class Pick>
   Solved Coordinate(Pick pick) const {
     Solved solved;
-    solved.rest.resize(n_);
+    solved.weights.resize(n_);
     for (std::size_t k = 0; k < n_; ++k)
-      solved.rest[k] = pick(lights_[k].true_fp) - pick(lights_[k].seen_fp);
-    of_lights_->SolveLower(solved.rest);
+      solved.weights[k] = pick(lights_[k].true_fp) - pick(lights_[k].seen_fp);
+    of_lights_->SolveLower(solved.weights);
     solved.coefficients.resize(terms_);
     for (std::size_t t = 0; t < terms_; ++t)
-      solved.coefficients[t] = Dot(&whitened_[t * n_], solved.rest.data(), n_);
+      solved.coefficients[t] = Dot(&whitened_[t * n_], solved.weights.data(), n_);
     of_terms_->Solve(solved.coefficients);
     for (std::size_t t = 0; t < terms_; ++t)
       for (std::size_t k = 0; k < n_; ++k)
-        solved.rest[k] -= solved.coefficients[t] * whitened_[t * n_ + k];
+        solved.weights[k] -= solved.coefficients[t] * whitened_[t * n_ + k];
+    of_lights_->SolveUpper(solved.weights);
     return solved;
   }
 
@@ -285,17 +299,33 @@ std::optional<PlateMap> PlateMap::Solve(std::span<const KnownLight> lights, int 
   const double width = high.x_mm + margin - map.low_.x_mm;
   const double height = high.y_mm + margin - map.low_.y_mm;
   map.step_mm_ = std::max(options.air_length_mm / 3, std::sqrt(width * height / kNodesMax));
-  map.columns_ = static_cast<std::size_t>(width / map.step_mm_) + 2;
-  map.rows_ = static_cast<std::size_t>(height / map.step_mm_) + 2;
+  // Odd counts: every node without a variance of its own lies between two that have one.
+  map.columns_ = static_cast<std::size_t>(width / map.step_mm_ / 2) * 2 + 3;
+  map.rows_ = static_cast<std::size_t>(height / map.step_mm_ / 2) * 2 + 3;
   map.nodes_.resize(map.columns_ * map.rows_);
-  for (std::size_t row = 0; row < map.rows_; ++row)
-    for (std::size_t column = 0; column < map.columns_; ++column) {
-      Node& node = map.nodes_[row * map.columns_ + column];
-      solution.At({map.low_.x_mm + static_cast<double>(column) * map.step_mm_,
-                   map.low_.y_mm + static_cast<double>(row) * map.step_mm_},
-                  &node.air_fp, &node.variance_mm2);
-    }
+  map.FillNodes(&solution);
   return map;
+}
+
+void PlateMap::FillNodes(PlateSolution* solution) {
+  const auto node = [this](std::size_t row, std::size_t column) -> Node& {
+    return nodes_[row * columns_ + column];
+  };
+  for (std::size_t row = 0; row < rows_; ++row)
+    for (std::size_t column = 0; column < columns_; ++column) {
+      const PointFp p{low_.x_mm + static_cast<double>(column) * step_mm_,
+                      low_.y_mm + static_cast<double>(row) * step_mm_};
+      node(row, column).air_fp = solution->AirAt(p);
+      if (row % 2 == 0 && column % 2 == 0) node(row, column).variance_mm2 = solution->VarianceAt(p);
+    }
+  for (std::size_t row = 0; row < rows_; row += 2)
+    for (std::size_t column = 1; column < columns_; column += 2)
+      node(row, column).variance_mm2 =
+          (node(row, column - 1).variance_mm2 + node(row, column + 1).variance_mm2) / 2;
+  for (std::size_t row = 1; row < rows_; row += 2)
+    for (std::size_t column = 0; column < columns_; ++column)
+      node(row, column).variance_mm2 =
+          (node(row - 1, column).variance_mm2 + node(row + 1, column).variance_mm2) / 2;
 }
 
 PlateMap::Place PlateMap::At(PointFp seen_fp) const {

@@ -10,8 +10,8 @@
 //
 // s is not assumed: it is what the fiducials' residuals have beyond their noise. The air's part and
 // the variance are computed on a grid of l / 3 and interpolated (error of the air's part below
-// 1.5 % of s). Cost: n^3 / 6 + 3 n^2 nodes / 4 for n lights: 3 ms for 120, 25 ms for 400.
-// Source: [RasmussenWilliams2006] section 2.7.
+// 1.5 % of s), the variance, which is dear and smooth, at every second node each way. Cost: n^3 / 6
+// + n^2 nodes / 8 for n lights: XX Source: [RasmussenWilliams2006] section 2.7.
 #pragma once
 
 #include <optional>
@@ -51,6 +51,9 @@ struct PolynomialFit {
 std::optional<PolynomialFit> FitPolynomial(std::span<const KnownLight> lights,
                                            const PlateMapOptions& options);
 
+/// Where the fit puts a light that the camera's model sees at `seen_fp`.
+PointFp PlateBy(const PolynomialFit& fit, const PlateMapOptions& options, PointFp seen_fp);
+
 /// s, one coordinate's standard deviation of the air: what the residuals of the fit have beyond the
 /// lights' own noise, the share that the polynomial has taken up counted back in:
 /// s^2 = (sum of squares - noise) / (n - tr(H K)), H the fit's projection. Units: mm. At least 0.
@@ -75,6 +78,7 @@ class PlateMap {
     PointFp air_fp;
     double variance_mm2 = 0;
   };
+  void FillNodes(class PlateSolution* solution);
 
   std::size_t light_count_ = 0;
   int degree_ = 1;

@@ -37,7 +37,7 @@ struct SwapFindings {
 };
 
 struct SwapSearch {
-  const IdentifyRequest* request = nullptr;
+  const IdentificationRequest* request = nullptr;
   const IdentifyOptions* options = nullptr;
   const MappedSpots* spots = nullptr;
   const SpotGrid* grid = nullptr;        // over spots->at_fp
