@@ -314,9 +314,11 @@ std::optional<Refusal> Turned(const IdentificationRequest& request,
       const auto looked = Look(request, options, {quarters, mirrored}, &ignored);
       if (!looked || IsOtherField(looked->claims, options)) continue;
       if (looked->claims.recognised < options.recognised_share_min * looked->claims.units) continue;
-      std::string text = "the picture is ";
-      if (mirrored) text += quarters == 0 ? "mirrored" : "mirrored and ";
-      if (quarters != 0) text += "turned by " + std::to_string(360 - 90 * quarters) + " degrees";
+      // Undone on the plate; on a mirrored sensor the sense is the other.
+      const int degrees = request.camera->mirrored ? 90 * quarters : 360 - 90 * quarters;
+      const std::string text =
+          mirrored ? std::string("the picture is mirrored") + (quarters == 0 ? "" : " and turned")
+                   : "the picture is turned by " + std::to_string(degrees) + " degrees";
       return Refusal{mirrored ? RefusalReason::kMirrored : RefusalReason::kTurned, text};
     }
   }

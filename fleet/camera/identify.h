@@ -66,12 +66,12 @@ struct UnitSighting {
 
 struct IdentifyOptions {
   CameraBounds bounds;
-  PlateMapOptions map;
+  PlateMapOptions map;  // its radius is taken from the fiducials
   double centroid_sigma_mm = 0.002;
   double fiducial_sigma_mm = 0.002;  // how well their places are known
   double residual_mm_max = 0.05;     // rms of the fiducials, one coordinate: beyond it is not air
   bool use_still_units = true;       // as further lights of known place
-  double still_sigma_mm = 0.005;     // how exactly a unit that does not move stays
+  double still_sigma_mm = 0.002;     // how exactly a unit that does not move stays
   double gate_squared_sigmas = 18;   // of the blind error: one unit in 8000 is beyond
   double doubt_max = 1e-3;
   double stray_doubt_max = 0.05;

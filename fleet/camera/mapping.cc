@@ -14,6 +14,7 @@ using Complex = std::complex<double>;
 constexpr double kCellMm = 12;
 constexpr std::size_t kLightsMax = 400;  // the map's cost grows with the square
 constexpr double kStillSigmas = 6;
+constexpr std::size_t kFreedomMin = 40;
 
 std::vector<PointFp> SeenBy(const CameraModel& camera, std::span<const Spot> spots,
                             Orientation orientation) {
@@ -33,7 +34,12 @@ class Mapping {
  public:
   Mapping(const IdentificationRequest& request, const IdentifyOptions& options,
           Identification* result)
-      : request_(request), options_(options), result_(*result) {}
+      : request_(request), options_(options), map_options_(options.map), result_(*result) {
+    map_options_.radius_mm = 1;
+    for (const Fiducial& f : request.fiducials)
+      map_options_.radius_mm =
+          std::max(map_options_.radius_mm, std::hypot(f.at_fp.x_mm, f.at_fp.y_mm));
+  }
 
   tl::expected<MappedSpots, Refusal> Run(Orientation orientation) {
     seen_ = SeenBy(*request_.camera, request_.exposure->spots, orientation);
@@ -47,7 +53,7 @@ class Mapping {
     if (auto refusal = OutOfBounds(*alignment, options_.bounds))
       return tl::unexpected<Refusal>(std::move(*refusal));
     Align(*alignment);
-    const auto fit = FitPolynomial(lights_, options_.map);
+    const auto fit = FitPolynomial(lights_, map_options_);
     if (auto refusal = Rough(fit ? &*fit : nullptr))
       return tl::unexpected<Refusal>(std::move(*refusal));
     Tell(*alignment, *fit);
@@ -55,7 +61,7 @@ class Mapping {
     for (std::size_t k = 0; k < lights_.size(); ++k)
       if (fit->used[k]) used.push_back(lights_[k]);
     if (options_.use_still_units) AddStillUnits(*fit, &used);
-    const auto map = PlateMap::Solve(used, fit->degree, result_.air_mm, options_.map);
+    const auto map = PlateMap::Solve(used, fit->degree, result_.air_mm, map_options_);
     if (!map)
       return tl::unexpected<Refusal>(
           {RefusalReason::kRough, "the fiducials seen do not determine the camera"});
@@ -91,18 +97,19 @@ class Mapping {
     result_.scale_change = std::abs(alignment.gain) - 1;
     result_.rotation_deg = std::arg(alignment.gain) * 180 / std::numbers::pi;
     result_.shift_fp = {alignment.shift.real(), alignment.shift.imag()};
-    result_.degree = fit.degree;
+
     result_.fiducials_used = static_cast<std::uint32_t>(fit.used_count);
     result_.fiducials_missing =
         static_cast<std::uint32_t>(request_.fiducials.size() - lights_.size());
     result_.fiducials_false = static_cast<std::uint32_t>(lights_.size() - fit.used_count);
     result_.residual_mm = fit.residual_mm;
-    result_.air_mm = AirOf(lights_, fit, options_.map);
+    result_.air_mm = AirOf(lights_, fit, map_options_);
   }
 
   // Units that were not told to move and were measured before are lights of known place, too, where
-  // exactly one spot is near.
-  void AddStillUnits(const PolynomialFit& fit, std::vector<KnownLight>* used) const {
+  // exactly one spot is near. Fiducials stay whatever the units say; units that do not fit go.
+  // The degree stays: the process follows what is left of the distortion, too.
+  void AddStillUnits(const PolynomialFit& fit, std::vector<KnownLight>* used) {
     std::vector<std::uint32_t> still;
     for (std::uint32_t i = 0; i < request_.expectations.size(); ++i) {
       const UnitExpectation& e = request_.expectations[i];
@@ -112,17 +119,27 @@ class Mapping {
     // By the fit without the air; its error is the residual.
     std::vector<PointFp> at;
     at.reserve(seen_.size());
-    for (const PointFp& p : seen_) at.push_back(PlateBy(fit, options_.map, p));
+    for (const PointFp& p : seen_) at.push_back(PlateBy(fit, map_options_, p));
     const SpotGrid grid(at, kCellMm);
     // Every k-th, so that they stand all over the plate.
     const std::size_t room = kLightsMax - used->size();
     const std::size_t stride = (still.size() + room - 1) / room;
+    const std::size_t fiducials = used->size();
+    std::vector<KnownLight> all = *used;
     for (std::size_t k = 0; k < still.size(); k += stride)
-      TakeStillUnit(request_.expectations[still[k]], grid, fit.residual_mm, used);
+      TakeStillUnit(request_.expectations[still[k]], grid, fit.residual_mm, &all);
+    const auto of_all = FitPolynomial(all, map_options_);
+    if (!of_all) return;
+    for (std::size_t k = fiducials; k < all.size(); ++k)
+      if (of_all->used[k]) used->push_back(all[k]);
+    // How exactly units stand still is known less well than the fiducials: these say how strong the
+    // air is, where they are enough.
+    if (fiducials < MonomialCount(fit.degree) + kFreedomMin)
+      result_.air_mm = AirOf(all, *of_all, map_options_);
   }
 
   void TakeStillUnit(const UnitExpectation& unit, const SpotGrid& grid, double residual_mm,
-                     std::vector<KnownLight>* used) const {
+                     std::vector<KnownLight>* lights) const {
     const double noise = std::hypot(std::hypot(options_.centroid_sigma_mm, options_.still_sigma_mm),
                                     unit.before_sigma_mm);
     const double gate_mm = kStillSigmas * std::hypot(residual_mm, noise);
@@ -133,7 +150,7 @@ class Mapping {
       ++near;
       spot = d2 <= gate_mm * gate_mm ? s : kNoSpot;
     });
-    if (near == 1 && spot != kNoSpot) used->push_back({seen_[spot], *unit.before_fp, noise});
+    if (near == 1 && spot != kNoSpot) lights->push_back({seen_[spot], *unit.before_fp, noise});
   }
 
   [[nodiscard]] MappedSpots Mapped(const PlateMap& map, const PolynomialFit& fit,
@@ -149,6 +166,7 @@ class Mapping {
     mapped.is_fiducial.assign(seen_.size(), false);
     for (std::size_t k = 0; k < alignment.matches.size(); ++k)
       if (fit.used[k]) mapped.is_fiducial[alignment.matches[k].spot] = true;
+    result_.degree = map.degree();
     std::vector<double> sigmas = mapped.sigma_mm;
     if (!sigmas.empty()) {
       const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
@@ -163,6 +181,7 @@ class Mapping {
 
   const IdentificationRequest& request_;
   const IdentifyOptions& options_;
+  PlateMapOptions map_options_;  // the polynomial normalised to these fiducials
   Identification& result_;
   std::vector<PointFp> seen_;
   std::vector<KnownLight> lights_;  // Shape: as the alignment's matches

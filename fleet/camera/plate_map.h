@@ -71,6 +71,7 @@ class PlateMap {
     double sigma_mm = 0;  // of one coordinate, of the map alone
   };
   [[nodiscard]] Place At(PointFp seen_fp) const;
+  [[nodiscard]] int degree() const { return degree_; }
   [[nodiscard]] std::size_t light_count() const { return light_count_; }
 
  private:

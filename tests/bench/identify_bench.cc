@@ -4,8 +4,7 @@
 // can be seen passed for something else.
 //   identify_bench --units 5000 --fiducials 120 --exposures 1000 --seed 1 --swaps 20 --air-um 8
 //                  --length-mm 150 --crowded 0
-// The calibration loop is 1e7 draws of Rng::Normal's kind of work (10 ms-odd on a usual core): CPU
-// times are to be read beside it.
+// The calibration loop is a million draws of Rng::Normal: CPU times are to be read beside it.
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -46,6 +45,7 @@ void Add(const Judgement& one, Judgement* all) {
   all->pairs_dark += one.pairs_dark;
   all->pairs_alike += one.pairs_alike;
   all->pairs_flagged += one.pairs_flagged;
+  all->pairs_suspected += one.pairs_suspected;
   all->pairs_unseen += one.pairs_unseen;
   all->squared_mm2 += one.squared_mm2;
   all->squared_sigmas += one.squared_sigmas;

@@ -265,6 +265,11 @@ class Judging {
       return std::abs(field_.PlaceOf(unit, field_.units()[unit].commanded) -
                       field_.units()[unit].place_mm) < kAlikeMm;
     };
+    const auto suspects = [this](std::uint32_t unit, std::uint32_t other) {
+      return result_.units[unit].status == SightingStatus::kSwapSuspected &&
+             result_.units[unit].other.value == other;
+    };
+    if (suspects(a, b) || suspects(b, a)) ++judgement_.pairs_suspected;
     if (names(a, b) && names(b, a)) {
       ++judgement_.pairs_found;
     } else if (visible_[a] == 0 || visible_[b] == 0) {

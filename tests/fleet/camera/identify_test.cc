@@ -211,14 +211,12 @@ TEST_F(Identify, APairThatExchangedItsCommandsIsNamed) {
     FieldTroubles troubles = kNoTroubles;
     troubles.swaps = 6;
     field_.Move(troubles);
-    const Judgement judged = testing::Judge(field_, image_ = {}, Identification{});
     const Identification seen = See();
     const Judgement result = testing::Judge(field_, image_, seen);
     EXPECT_EQ(result.pairs, 6u);
     EXPECT_EQ(result.pairs_unseen, 0u);
     EXPECT_GE(result.pairs_found + result.pairs_alike + result.pairs_flagged, 6u);
     EXPECT_EQ(result.wrong + result.wrong_story, 0u);
-    EXPECT_EQ(judged.pairs_found, 0u);
   }
 }
 
@@ -313,8 +311,9 @@ TEST_F(Identify, EverythingAtOnceIsNeverWrongUnseen) {
   for (const bool collision_free : {true, false}) {
     for (int k = 0; k < 25; ++k) {
       field_.Move({.swaps = 2, .collision_free = collision_free});
-      const Judgement judged = testing::Judge(field_, image_, See());
-      // Again with the picture that was taken.
+      const Identification seen = See();
+      const Judgement judged = testing::Judge(field_, image_, seen);
+      EXPECT_EQ(judged.wrong, 0u);
       EXPECT_EQ(judged.pairs_unseen, 0u);
       EXPECT_LE(judged.lost, 6u);
     }
@@ -337,8 +336,8 @@ TEST_F(Identify, MissingFalseAndExtraFiducialsAreBorne) {
 }
 
 TEST_F(Identify, UnitsThatStandStillHelp) {
-  traits_.air.sigma_mm = 0.008;
-  traits_.air.length_mm = 80;
+  field_ = CameraField({.count = 217, .fiducials = 8}, testing::TestSeed(1));
+  traits_.air = {.sigma_mm = 0.008, .length_mm = 80};
   options_.map.air_length_mm = 80;
   FieldTroubles troubles = kNoTroubles;
   troubles.disabled_share = 0.4;
@@ -357,7 +356,7 @@ TEST_F(Identify, UnitsThatStandStillHelp) {
     with2 += with.squared_mm2 / with.placed;
     without2 += without.squared_mm2 / without.placed;
   }
-  EXPECT_LT(with2, 0.7 * without2);
+  EXPECT_LT(with2, 0.6 * without2);
 }
 
 TEST_F(Identify, TurnedAndMirroredPicturesAreRefusedByName) {
@@ -371,7 +370,7 @@ TEST_F(Identify, TurnedAndMirroredPicturesAreRefusedByName) {
     EXPECT_NE(result.error().text.find(std::to_string(degrees)), std::string::npos)
         << result.error().text;
   }
-  traits_.optics.rotation_deg = -3;
+  traits_.optics.rotation_deg = 3;
   traits_.optics.mirrored = false;
   Picture(field_.Sources());
   EXPECT_EQ(RefusedAs(), "mirrored");
@@ -460,7 +459,9 @@ TEST_F(Identify, AnyNoiseOfSpotsIsAnAnswerOrARefusal) {
     for (const UnitSighting& unit : result->units) {
       if (unit.spot == kNoSpot) continue;
       ASSERT_LT(unit.spot, exposure_.spots.size());
-      if (unit.status != SightingStatus::kBlended) EXPECT_EQ(++uses[unit.spot], 1);
+      if (unit.status != SightingStatus::kBlended) {
+        EXPECT_EQ(++uses[unit.spot], 1);
+      }
       EXPECT_TRUE(std::isfinite(unit.at_fp.x_mm) && unit.covariance.xx > 0);
     }
   }

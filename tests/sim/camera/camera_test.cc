@@ -100,7 +100,9 @@ TEST(Camera, WithoutTroublesEveryLightIsASpotInItsPlace) {
     const Complex seen(image.spots[k].x_px, image.spots[k].y_px);
     EXPECT_LT(std::abs(seen - PixelOf(Quiet().optics, sources[image.light[k][0]].place_mm)), 1e-9);
     EXPECT_EQ(image.spots[k].flux, 1);
-    if (k > 0) EXPECT_LE(image.spots[k - 1].y_px, image.spots[k].y_px);
+    if (k > 0) {
+      EXPECT_LE(image.spots[k - 1].y_px, image.spots[k].y_px);
+    }
   }
 }
 
