@@ -54,4 +54,10 @@ void Cholesky::SolveUpper(std::span<double> b) const {
   }
 }
 
+double Cholesky::LogDeterminant() const {
+  double sum = 0;
+  for (std::size_t i = 0; i < n_; ++i) sum -= 2 * std::log(lower_[i * n_ + i]);
+  return sum;
+}
+
 }  // namespace focalfleet

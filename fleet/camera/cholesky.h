@@ -21,7 +21,8 @@ class Cholesky {
   void SolveUpper(std::span<double> b) const;
   /// b becomes A^-1 b.
   void Solve(std::span<double> b) const;
-  [[nodiscard]] std::size_t size() const { return n_; }
+  /// Natural logarithm of det A.
+  [[nodiscard]] double LogDeterminant() const;
 
  private:
   Cholesky(std::vector<double> lower, std::size_t n) : lower_(std::move(lower)), n_(n) {}

@@ -113,7 +113,7 @@ struct Identification {
   std::uint32_t fiducials_false = 0;    // a spot near that does not fit the others
   std::uint32_t still_units_used = 0;
   double residual_mm = 0;         // of the fiducials, one coordinate, before the air is removed
-  double air_mm = 0;              // the air's standard deviation, one coordinate
+  AirLaw air;                     // as it was during this exposure
   double map_sigma_mm = 0;        // median over the spots of what is left of both
   std::vector<PointFp> spots_fp;  // every spot on the plate, as the exposure's rows
 };

@@ -60,8 +60,14 @@ class Mapping {
     std::vector<KnownLight> used;
     for (std::size_t k = 0; k < lights_.size(); ++k)
       if (fit->used[k]) used.push_back(lights_[k]);
+    const std::size_t fiducials = used.size();
     if (options_.use_still_units) AddStillUnits(*fit, &used);
-    const auto map = PlateMap::Solve(used, fit->degree, result_.air_mm, map_options_);
+    // How exactly units stand still is known less well than the fiducials: these say how the air
+    // is, where they are enough.
+    const bool enough = fiducials >= MonomialCount(fit->degree) + kFreedomMin;
+    result_.air =
+        AirOf(std::span(used).first(enough ? fiducials : used.size()), fit->degree, map_options_);
+    const auto map = PlateMap::Solve(used, fit->degree, result_.air, map_options_);
     if (!map)
       return tl::unexpected<Refusal>(
           {RefusalReason::kRough, "the fiducials seen do not determine the camera"});
@@ -103,7 +109,6 @@ class Mapping {
         static_cast<std::uint32_t>(request_.fiducials.size() - lights_.size());
     result_.fiducials_false = static_cast<std::uint32_t>(lights_.size() - fit.used_count);
     result_.residual_mm = fit.residual_mm;
-    result_.air_mm = AirOf(lights_, fit, map_options_);
   }
 
   // Units that were not told to move and were measured before are lights of known place, too, where
@@ -132,10 +137,6 @@ class Mapping {
     if (!of_all) return;
     for (std::size_t k = fiducials; k < all.size(); ++k)
       if (of_all->used[k]) used->push_back(all[k]);
-    // How exactly units stand still is known less well than the fiducials: these say how strong the
-    // air is, where they are enough.
-    if (fiducials < MonomialCount(fit.degree) + kFreedomMin)
-      result_.air_mm = AirOf(all, *of_all, map_options_);
   }
 
   void TakeStillUnit(const UnitExpectation& unit, const SpotGrid& grid, double residual_mm,

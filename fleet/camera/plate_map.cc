@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "fleet/camera/camera_model.h"
 #include "fleet/camera/cholesky.h"
@@ -128,50 +129,17 @@ PointFp PlateBy(const PolynomialFit& fit, const PlateMapOptions& options, PointF
   return {seen_fp.x_mm + p.x_mm, seen_fp.y_mm + p.y_mm};
 }
 
-double AirOf(std::span<const KnownLight> lights, const PolynomialFit& fit,
-             const PlateMapOptions& options) {
-  const std::size_t terms = fit.coefficients.size();
-  std::vector<double> normal(terms * terms, 0);
-  std::vector<Terms> rows;
-  std::vector<PointFp> places;
-  double noise2 = 0;
-  for (std::size_t k = 0; k < lights.size(); ++k) {
-    if (!fit.used[k]) continue;
-    rows.push_back(TermsAt(lights[k].seen_fp, options.radius_mm, fit.degree));
-    places.push_back(lights[k].seen_fp);
-    noise2 += lights[k].noise_mm * lights[k].noise_mm;
-    for (std::size_t i = 0; i < terms; ++i)
-      for (std::size_t j = 0; j <= i; ++j) normal[i * terms + j] += rows.back()[i] * rows.back()[j];
-  }
-  const auto factor = Cholesky::Of(std::move(normal), terms);
-  if (!factor) return 0;
-  for (Terms& row : rows) factor->SolveLower(std::span(row.data(), terms));
-  double taken = 0;
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    for (std::size_t j = 0; j <= i; ++j) {
-      const double dx = (places[i].x_mm - places[j].x_mm) / options.air_length_mm;
-      const double dy = (places[i].y_mm - places[j].y_mm) / options.air_length_mm;
-      const double k = std::exp(-0.5 * (dx * dx + dy * dy));
-      taken += (i == j ? 1 : 2) * k * Dot(rows[i].data(), rows[j].data(), terms);
-    }
-  const auto count = static_cast<double>(rows.size());
-  const double freedom = count - static_cast<double>(terms);
-  const double left = fit.residual_mm * fit.residual_mm * freedom - noise2 / count * freedom;
-  const double share = count - taken;
-  return share > 0.05 * count && left > 0 ? std::sqrt(left / share) : 0;
-}
-
 // C and F'C^-1F factored, and what is needed at each place.
 class PlateSolution {
  public:
-  PlateSolution(std::span<const KnownLight> lights, int degree, double air_mm,
+  PlateSolution(std::span<const KnownLight> lights, int degree, const AirLaw& air,
                 const PlateMapOptions& options)
       : lights_(lights),
         n_(lights.size()),
         terms_(MonomialCount(degree)),
         degree_(degree),
-        air2_(air_mm * air_mm),
-        length_mm_(options.air_length_mm),
+        air2_(air.sigma_mm * air.sigma_mm),
+        length_mm_(air.length_mm),
         radius_mm_(options.radius_mm) {}
 
   bool Solve() {
@@ -209,6 +177,12 @@ class PlateSolution {
     return both;
   }
 
+  /// Minus the logarithm of the restricted likelihood, but for a constant.
+  [[nodiscard]] double Unlikelihood() const {
+    return of_lights_->LogDeterminant() + of_terms_->LogDeterminant() +
+           (x_.squared_sigmas + y_.squared_sigmas) / 2;
+  }
+
   [[nodiscard]] PointFp AirAt(PointFp p) {
     SetCovariances(p);
     return {Dot(scratch_.data(), x_.weights.data(), n_),
@@ -230,6 +204,7 @@ class PlateSolution {
   struct Solved {
     std::vector<double> coefficients;
     std::vector<double> weights;  // C^-1 (y - F b)
+    double squared_sigmas = 0;    // (y - F b)' C^-1 (y - F b)
   };
 
   void SetCovariances(PointFp p) {
@@ -258,6 +233,7 @@ class PlateSolution {
     for (std::size_t t = 0; t < terms_; ++t)
       for (std::size_t k = 0; k < n_; ++k)
         solved.weights[k] -= solved.coefficients[t] * whitened_[t * n_ + k];
+    solved.squared_sigmas = Dot(solved.weights.data(), solved.weights.data(), n_);
     of_lights_->SolveUpper(solved.weights);
     return solved;
   }
@@ -277,9 +253,75 @@ class PlateSolution {
   std::vector<double> scratch_;
 };
 
+namespace {
+
+// Laws on a lattice: sigma = usual 1.5^j, length = usual 1.5^i.
+class AirSearch {
+ public:
+  AirSearch(std::span<const KnownLight> lights, int degree, const PlateMapOptions& options)
+      : degree_(degree), options_(options) {
+    const std::size_t stride = (lights.size() + kLightsMax - 1) / kLightsMax;
+    for (std::size_t k = 0; k < lights.size(); k += stride) lights_.push_back(lights[k]);
+  }
+
+  AirLaw Likeliest() {
+    int i = 0;
+    int j = 0;
+    for (bool climbing = true; climbing;) {
+      climbing = false;
+      constexpr std::array<std::array<int, 2>, 4> kSteps = {{{0, 1}, {0, -1}, {1, 0}, {-1, 0}}};
+      for (const auto& step : kSteps) {
+        if (At(i + step[0], j + step[1]) >= At(i, j)) continue;
+        i += step[0];
+        j += step[1];
+        climbing = true;
+      }
+    }
+    return LawAt(i, j);
+  }
+
+ private:
+  [[nodiscard]] AirLaw LawAt(int i, int j) const {
+    return {options_.usual_air.sigma_mm * std::pow(kFactor, j),
+            options_.usual_air.length_mm * std::pow(kFactor, i)};
+  }
+
+  double At(int i, int j) {
+    if (std::abs(i) > kStepsMax || std::abs(j) > kStepsMax)
+      return std::numeric_limits<double>::infinity();
+    const std::size_t key = static_cast<std::size_t>(i + kStepsMax) * (2 * kStepsMax + 1) +
+                            static_cast<std::size_t>(j + kStepsMax);
+    if (known_[key]) return *known_[key];
+    PlateSolution solution(lights_, degree_, LawAt(i, j), options_);
+    const double of_length = i * std::log(kFactor) / kLengthPrior;
+    const double of_sigma = j * std::log(kFactor) / kSigmaPrior;
+    known_[key] = solution.Solve()
+                      ? solution.Unlikelihood() + (of_length * of_length + of_sigma * of_sigma) / 2
+                      : std::numeric_limits<double>::infinity();
+    return *known_[key];
+  }
+
+  static constexpr std::size_t kLightsMax = 150;
+  static constexpr int kStepsMax = 6;
+  static constexpr double kFactor = 1.5;
+  static constexpr double kLengthPrior = 0.7;  // standard deviations of the logarithms
+  static constexpr double kSigmaPrior = 1;
+
+  int degree_;
+  const PlateMapOptions& options_;
+  std::vector<KnownLight> lights_;
+  std::array<std::optional<double>, (2 * kStepsMax + 1) * (2 * kStepsMax + 1)> known_;
+};
+
+}  // namespace
+
+AirLaw AirOf(std::span<const KnownLight> lights, int degree, const PlateMapOptions& options) {
+  return AirSearch(lights, degree, options).Likeliest();
+}
+
 std::optional<PlateMap> PlateMap::Solve(std::span<const KnownLight> lights, int degree,
-                                        double air_mm, const PlateMapOptions& options) {
-  PlateSolution solution(lights, degree, air_mm, options);
+                                        const AirLaw& air, const PlateMapOptions& options) {
+  PlateSolution solution(lights, degree, air, options);
   if (lights.size() < MonomialCount(degree) || !solution.Solve()) return std::nullopt;
   PlateMap map;
   map.light_count_ = lights.size();
@@ -294,11 +336,11 @@ std::optional<PlateMap> PlateMap::Solve(std::span<const KnownLight> lights, int 
     high = {std::max(high.x_mm, light.seen_fp.x_mm), std::max(high.y_mm, light.seen_fp.y_mm)};
   }
   // Units stand a little outside the outermost fiducials.
-  const double margin = options.air_length_mm / 2;
+  const double margin = air.length_mm / 2;
   map.low_ = {map.low_.x_mm - margin, map.low_.y_mm - margin};
   const double width = high.x_mm + margin - map.low_.x_mm;
   const double height = high.y_mm + margin - map.low_.y_mm;
-  map.step_mm_ = std::max(options.air_length_mm / 3, std::sqrt(width * height / kNodesMax));
+  map.step_mm_ = std::max(air.length_mm / 3, std::sqrt(width * height / kNodesMax));
   // Odd counts: every node without a variance of its own lies between two that have one.
   map.columns_ = static_cast<std::size_t>(width / map.step_mm_ / 2) * 2 + 3;
   map.rows_ = static_cast<std::size_t>(height / map.step_mm_ / 2) * 2 + 3;

@@ -81,6 +81,7 @@ int Run(int argc, char** argv) {
   std::vector<double> cpu_ms;
   std::vector<double> calibration_ms;
   double air_mm = 0;
+  double length_mm = 0;
   double residual_mm = 0;
   for (int k = 0; k < exposures; ++k) {
     field.Move(troubles);
@@ -108,7 +109,8 @@ int Run(int argc, char** argv) {
     if (one.wrong + one.pairs_unseen > 0)
       std::printf("exposure %d: %u wrong, %u swaps unseen\n", k, one.wrong, one.pairs_unseen);
     Add(one, &all);
-    air_mm += result->air_mm;
+    air_mm += result->air.sigma_mm;
+    length_mm += result->air.length_mm;
     residual_mm += result->map_sigma_mm;
   }
   std::printf("%d exposures of %d units, %zu fiducials, air %.1f um; refused %d\n", exposures,
@@ -121,16 +123,16 @@ int Run(int argc, char** argv) {
       all.wrong, all.wrong_story, all.flagged_wrong, all.lost);
   std::printf(
       "swaps: %u pairs, found %u, one or both not visible %u, same place %u, undecided and "
-      "said %u, unseen %u\n",
+      "said %u (with those not visible %u suspected by name), unseen %u\n",
       all.pairs, all.pairs_found, all.pairs_dark, all.pairs_alike, all.pairs_flagged,
-      all.pairs_unseen);
+      all.pairs_suspected, all.pairs_unseen);
   const double placed = std::max(1.0, static_cast<double>(all.placed));
   const double taken = std::max(1, exposures - refused);
   std::printf(
       "places: %.2f um rms of a coordinate, %.3f of the variance claimed; air found %.2f "
-      "um, of which %.2f um are left by the map's own account\n",
+      "um over %.0f mm, of which %.2f um are left by the map's own account\n",
       std::sqrt(all.squared_mm2 / placed / 2) * 1e3, all.squared_sigmas / placed,
-      air_mm / taken * 1e3, residual_mm / taken * 1e3);
+      air_mm / taken * 1e3, length_mm / taken, residual_mm / taken * 1e3);
   std::printf("CPU ms an exposure: median %.1f, 95 %% %.1f, worst %.1f; calibration loop %.1f\n",
               Median(cpu_ms), Quantile(cpu_ms, 0.95), Quantile(cpu_ms, 1), Median(calibration_ms));
   return all.wrong + all.pairs_unseen == 0 ? 0 : 1;

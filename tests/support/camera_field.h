@@ -87,13 +87,14 @@ struct Judgement {
   std::uint32_t flagged_wrong = 0;  // has a spot that is not its, and says that it is not certain
   std::uint32_t lost = 0;           // visible, alone in its spot, and still not certain
   std::uint32_t pairs = 0;
-  std::uint32_t pairs_found = 0;    // both name each other
-  std::uint32_t pairs_dark = 0;     // one or both give no light of their own: cannot be closed
-  std::uint32_t pairs_alike = 0;    // the two commands lead to the same place: cannot be seen
-  std::uint32_t pairs_flagged = 0;  // not decided, but neither is called measured
-  std::uint32_t pairs_unseen = 0;   // none of these: a swap passed for something else
-  double squared_mm2 = 0;           // of certain units' place errors, those alone in their spot
-  double squared_sigmas = 0;        // the same in units of the variance that was claimed, per axis
+  std::uint32_t pairs_found = 0;      // both name each other
+  std::uint32_t pairs_dark = 0;       // one or both give no light of their own: cannot be closed
+  std::uint32_t pairs_alike = 0;      // the two commands lead to the same place: cannot be seen
+  std::uint32_t pairs_flagged = 0;    // not decided, but neither is called measured
+  std::uint32_t pairs_suspected = 0;  // of those not found: one names the other
+  std::uint32_t pairs_unseen = 0;     // none of these: a swap passed for something else
+  double squared_mm2 = 0;             // of certain units' place errors, those alone in their spot
+  double squared_sigmas = 0;  // the same in units of the variance that was claimed, per axis
   std::uint32_t placed = 0;
 };
 

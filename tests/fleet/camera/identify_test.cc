@@ -338,7 +338,6 @@ TEST_F(Identify, MissingFalseAndExtraFiducialsAreBorne) {
 TEST_F(Identify, UnitsThatStandStillHelp) {
   field_ = CameraField({.count = 217, .fiducials = 8}, testing::TestSeed(1));
   traits_.air = {.sigma_mm = 0.008, .length_mm = 80};
-  options_.map.air_length_mm = 80;
   FieldTroubles troubles = kNoTroubles;
   troubles.disabled_share = 0.4;
   double with2 = 0;
