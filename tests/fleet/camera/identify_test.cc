@@ -152,6 +152,21 @@ TEST_F(Identify, WhoDidNotMoveIsNamedWithItsAxes) {
   EXPECT_EQ(stayed(phi), (std::array<bool, 2>{false, true}));
 }
 
+TEST_F(Identify, AStayThatALargeErrorExplainsAsWellIsNotClaimed) {
+  field_.Move(kNoTroubles);
+  const std::uint32_t i = FarMover(0);
+  auto& unit = field_.units()[i];
+  unit.commanded.phi_deg = unit.before.phi_deg + (unit.before.phi_deg < 90 ? 3 : -3);
+  // Near where phi's stay would have left it, and not far from where the move ends.
+  unit.place_mm = field_.PlaceOf(i, {unit.commanded.theta_deg - 0.6,
+                                     unit.before.phi_deg * 0.9 + unit.commanded.phi_deg * 0.1});
+  const Identification seen = See();
+  EXPECT_EQ(seen.units[i].status, SightingStatus::kMeasured) << Name(seen.units[i].status);
+  EXPECT_FALSE(seen.units[i].motion_is_known);
+  ASSERT_NE(seen.units[i].spot, kNoSpot);
+  EXPECT_EQ(image_.light[seen.units[i].spot], std::vector<std::uint32_t>{i});
+}
+
 TEST_F(Identify, AMoveTooShortToTellIsMeasuredAndSaysSo) {
   field_.Move(kNoTroubles);
   field_.units()[8].commanded = field_.units()[8].before;

@@ -31,7 +31,7 @@ TEST(FiducialsFile, SaysWhereAndWhy) {
   EXPECT_EQ(ErrorOf("2,7,7\n"), "f.csv:4: fiducial 2: is there twice, first in line 3");
   EXPECT_EQ(ErrorOf("3,5,0\n"), "f.csv:4: fiducial 3: is where another one is, first in line 3");
   EXPECT_EQ(ErrorOf("3,5,\n").substr(0, 8), "f.csv:4:");
-  EXPECT_EQ(ErrorOf("3,1e6,0\n"), "f.csv:4: x_mm: 1e6 is not on any plate");
+  EXPECT_EQ(ErrorOf("3,1e6,0\n"), "f.csv:4: column x_mm: 1e6 is not on any plate");
 }
 
 // ---- where they come from

@@ -66,9 +66,10 @@ TEST(SpotsFile, SaysWhereAndWhy) {
             "s.csv:2: taken_utc: not a time like 2026-11-22T03:04:05.678Z");
   EXPECT_EQ(ErrorOf(kHead + table + "1,2,2,1\n"),
             "s.csv:5: spot 1: is there twice, first in line 4");
-  EXPECT_EQ(ErrorOf(kHead + table + "2,1000,2,1\n"), "s.csv:5: x_px: 1000 is off the sensor");
-  EXPECT_EQ(ErrorOf(kHead + table + "2,1,-3,1\n"), "s.csv:5: y_px: -3 is off the sensor");
-  EXPECT_EQ(ErrorOf(kHead + table + "2,2,2,0\n"), "s.csv:5: flux: 0 is not above 0");
+  EXPECT_EQ(ErrorOf(kHead + table + "2,1000,2,1\n"),
+            "s.csv:5: column x_px: 1000 is off the sensor");
+  EXPECT_EQ(ErrorOf(kHead + table + "2,1,-3,1\n"), "s.csv:5: column y_px: -3 is off the sensor");
+  EXPECT_EQ(ErrorOf(kHead + table + "2,2,2,0\n"), "s.csv:5: column flux: 0 is not above 0");
   EXPECT_EQ(ErrorOf(kHead + table + "2,nan,2,1\n").substr(0, 8), "s.csv:5:");
   EXPECT_EQ(ErrorOf(kHead + table + "2,1,1,5\n"), "s.csv: spots 1 and 2 are at one place");
   EXPECT_EQ(ErrorOf(kHead + "spot_id,x_px,flux\n").substr(0, 6), "s.csv:");
