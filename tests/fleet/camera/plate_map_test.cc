@@ -51,7 +51,7 @@ TEST(Cholesky, SolvesWhatWasMultiplied) {
 TEST(Cholesky, RefusesWhatIsNotPositive) {
   EXPECT_FALSE(Cholesky::Of({1, 0, 2, 1}, 2));
   EXPECT_FALSE(Cholesky::Of({1, 0, 1, 1}, 2)) << "singular";
-  EXPECT_FALSE(Cholesky::Of({NAN}, 1));
+  EXPECT_FALSE(Cholesky::Of({std::nan("")}, 1));
 }
 
 TEST(FitPolynomial, FindsAPolynomialAndPutsAsideWhatDoesNotBelong) {
