@@ -75,6 +75,7 @@ class Search {
     std::sort(near.begin(), near.end());
     if (near.size() > kCandidatesMax) near.resize(kCandidatesMax);
     std::vector<std::uint32_t> spots;
+    spots.reserve(near.size());
     for (const auto& [d2, spot] : near) spots.push_back(spot);
     return spots;
   }

@@ -304,23 +304,31 @@ tl::expected<Looked, Refusal> Look(const IdentificationRequest& request,
   return Looked{std::move(*spots), std::move(grid), std::move(claims)};
 }
 
+bool Fits(const IdentificationRequest& request, const IdentifyOptions& options,
+          Orientation orientation) {
+  Identification ignored;
+  const auto looked = Look(request, options, orientation, &ignored);
+  return looked && looked->claims.recognised >= options.recognised_share_min * looked->claims.units;
+}
+
+std::string Said(Orientation orientation, bool model_is_mirrored) {
+  if (orientation.mirrored)
+    return std::string("the picture is mirrored") +
+           (orientation.quarters == 0 ? "" : " and turned");
+  // Undone on the plate; on a mirrored sensor the sense is the other.
+  const int quarters = model_is_mirrored ? orientation.quarters : 4 - orientation.quarters;
+  return "the picture is turned by " + std::to_string(90 * quarters) + " degrees";
+}
+
 // The field that was expected, seen the wrong way round: fiducials and fibres fit when it is
 // turned.
 std::optional<Refusal> Turned(const IdentificationRequest& request,
                               const IdentifyOptions& options) {
-  for (const bool mirrored : {false, true}) {
-    for (int quarters = mirrored ? 0 : 1; quarters < 4; ++quarters) {
-      Identification ignored;
-      const auto looked = Look(request, options, {quarters, mirrored}, &ignored);
-      if (!looked || IsOtherField(looked->claims, options)) continue;
-      if (looked->claims.recognised < options.recognised_share_min * looked->claims.units) continue;
-      // Undone on the plate; on a mirrored sensor the sense is the other.
-      const int degrees = request.camera->mirrored ? 90 * quarters : 360 - 90 * quarters;
-      const std::string text =
-          mirrored ? std::string("the picture is mirrored") + (quarters == 0 ? "" : " and turned")
-                   : "the picture is turned by " + std::to_string(degrees) + " degrees";
-      return Refusal{mirrored ? RefusalReason::kMirrored : RefusalReason::kTurned, text};
-    }
+  for (int k = 1; k < 8; ++k) {
+    const Orientation orientation{k % 4, k >= 4};
+    if (!Fits(request, options, orientation)) continue;
+    return Refusal{orientation.mirrored ? RefusalReason::kMirrored : RefusalReason::kTurned,
+                   Said(orientation, request.camera->mirrored)};
   }
   return std::nullopt;
 }

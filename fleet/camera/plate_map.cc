@@ -220,7 +220,7 @@ class PlateSolution {
   }
 
   template <class Pick>
-  Solved Coordinate(Pick pick) const {
+  [[nodiscard]] Solved Coordinate(Pick pick) const {
     Solved solved;
     solved.weights.resize(n_);
     for (std::size_t k = 0; k < n_; ++k)
@@ -289,8 +289,8 @@ class AirSearch {
   double At(int i, int j) {
     if (std::abs(i) > kStepsMax || std::abs(j) > kStepsMax)
       return std::numeric_limits<double>::infinity();
-    const std::size_t key = static_cast<std::size_t>(i + kStepsMax) * (2 * kStepsMax + 1) +
-                            static_cast<std::size_t>(j + kStepsMax);
+    const std::size_t key =
+        static_cast<std::size_t>(i + kStepsMax) * kSide + static_cast<std::size_t>(j + kStepsMax);
     if (known_[key]) return *known_[key];
     PlateSolution solution(lights_, degree_, LawAt(i, j), options_);
     const double of_length = i * std::log(kFactor) / kLengthPrior;
@@ -303,6 +303,7 @@ class AirSearch {
 
   static constexpr std::size_t kLightsMax = 150;
   static constexpr int kStepsMax = 6;
+  static constexpr std::size_t kSide = 2 * kStepsMax + 1;
   static constexpr double kFactor = 1.5;
   static constexpr double kLengthPrior = 0.7;  // standard deviations of the logarithms
   static constexpr double kSigmaPrior = 1;
@@ -310,7 +311,7 @@ class AirSearch {
   int degree_;
   const PlateMapOptions& options_;
   std::vector<KnownLight> lights_;
-  std::array<std::optional<double>, (2 * kStepsMax + 1) * (2 * kStepsMax + 1)> known_;
+  std::array<std::optional<double>, kSide * kSide> known_;
 };
 
 }  // namespace

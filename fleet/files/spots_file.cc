@@ -184,8 +184,8 @@ std::optional<std::int64_t> UnixNsOf(std::string_view utc) {
     if (digit_ns == kNsPerSecond) return std::nullopt;
   }
   if (!utc.empty() && utc != "Z") return std::nullopt;
-  const std::int64_t seconds =
-      DaysOf(year, month, day) * kSecondsPerDay + hour * 3600 + minute * 60 + second;
+  const std::int64_t seconds = DaysOf(year, month, day) * kSecondsPerDay +
+                               std::int64_t{hour} * 3600 + std::int64_t{minute} * 60 + second;
   return seconds * kNsPerSecond + fraction_ns;
 }
 
