@@ -10,7 +10,7 @@
 // light takes by chance: with the default odds one in some 20,000 exposures of 5000 units that have
 // 1 % dark fibres and 25 spots of dust.
 //
-// Cost: 5000 units, 120 fiducials: 10 to 20 ms.
+// Cost: 5000 units, 120 fiducials: about 25 ms.
 #pragma once
 
 #include <array>
