@@ -145,11 +145,12 @@ void ReportSkew(const CandumpLog& log, double speed) {
       first[start->move.value].Add(at_s * 1e3);
   }
   for (const auto& [move, spread] : first) {
-    const double skew_ms = spread.width();
+    const double skew_ms = spread.width() * speed;
     std::printf(
-        "  move %d begins on %zu buses within %.2f ms of real time (any of its start frames: "
-        "%.2f ms); the planner allows %.0f ms\n",
-        int{move}, begun[move].size(), skew_ms, all[move].width(), kSkewTolerance_ms);
+        "  move %d begins on %zu buses within %.2f ms of real time, %.2f ms of the fleet's (any of "
+        "its start frames: %.2f ms); the planner allows %.0f ms\n",
+        int{move}, begun[move].size(), spread.width(), skew_ms, all[move].width() * speed,
+        kSkewTolerance_ms);
     if (skew_ms > kSkewTolerance_ms) Complain("the buses began too far apart");
   }
 }
