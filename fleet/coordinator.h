@@ -223,7 +223,7 @@ struct StartView {
 /// is not armed: stage_begin, stage_segment, confirm and arm with their answers.
 struct UploadView {
   std::uint64_t bits_predicted = 0;  // exact, each frame once; known before the first is sent
-  std::uint64_t bits = 0;            // of the same frames as they passed, repeats included
+  std::uint64_t bits = 0;            // as they passed: repeats and late moves included
   double predicted_s = 0;            // bits_predicted by the bit rate; of all buses the longest
   double measured_s = 0;  // first frame let go to last unit armed; of all buses the longest
 };

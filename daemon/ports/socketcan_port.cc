@@ -44,12 +44,16 @@ LinkState LinkStateOf(const CanLink& link) {
 SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
     : options_(std::move(options)),
       socket_(std::move(socket)),
-      recovery_({.revive = options_.revive
-                               ? options_.revive
-                               : [name = options_.interface] { return ReviveLink(name); },
-                 .first_wait = options_.clock.Real(Milliseconds(1000)),
-                 .longest_wait = options_.clock.Real(Milliseconds(60'000)),
-                 .poll_period = options_.clock.Real(Milliseconds(10))}) {
+      recovery_(
+          {.revive =
+               options_.revive
+                   ? options_.revive
+                   : [name = options_.interface,
+                      taken_down =
+                          std::make_shared<bool>()] { return ReviveLink(name, taken_down.get()); },
+           .first_wait = options_.clock.Real(Milliseconds(1000)),
+           .longest_wait = options_.clock.Real(Milliseconds(60'000)),
+           .poll_period = options_.clock.Real(Milliseconds(10))}) {
   if (!options_.wire_clock) options_.wire_clock = Monotonic;
   aside_.only_units = options_.hears == Hears::kUnits;
 }
@@ -108,7 +112,8 @@ HostInstant SocketCanPort::wake_at() const {
 
 // A driver that echoes wakes us when there is room; else the bit clock tells, or nobody.
 DurationNs SocketCanPort::retry_full() const {
-  if (window_.options().confirms) return Milliseconds(20);
+  if (window_.unconfirmed() > 0) return Milliseconds(20);
+  if (window_.options().confirms) return kFull;  // others fill the queue, and nothing tells
   const HostInstant room_at = window_.RoomAt();
   if (room_at == kNever) return kFull;
   return std::clamp(room_at - options_.wire_clock(), Microseconds(20), kFull);
@@ -149,6 +154,7 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return taken;
     if (sent.error != 0) {
       Lose(std::string("cannot send: ") + std::strerror(sent.error));
+      lost_untold_ = true;
       return taken;
     }
   }
@@ -158,6 +164,9 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   Recover(now);
   if (!socket_.open()) {
+    // Down is seen as such before it may be up again: what waited for it is not true any more.
+    if (std::exchange(lost_untold_, false))
+      retry_at_ = now + options_.clock.Real(options_.retry_period);
     if (now < retry_at_) return;
     static_cast<void>(Open());  // what failed is the trouble
     if (!socket_.open()) {
@@ -179,15 +188,16 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
     for (const ReceivedFrame& heard : std::span(*out).subspan(before))
       window_.Heard(heard.frame, heard.at);
   for (const can_frame& error : aside_.errors) NoteError(error, now);
-  if (now >= look_at_) LookAgain(now);
+  // While an attempt is under way the kernel may not answer before it is over.
+  if (now >= look_at_ && !recovery_.trying()) LookAgain(now);
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
   retry_at_ = now + options_.clock.Real(options_.retry_period);
 }
 
-// Slewed by at most 500 ppm, the wall clock gains half a millisecond between two looks at it.
+// A step of the wall clock spoils the stamps of so long; more often would cost a slow kernel.
 FrameStamps SocketCanPort::Stamps(HostInstant now) {
-  if (clocks_read_ == kNever || now - clocks_read_ > options_.clock.Real(Milliseconds(1000))) {
+  if (clocks_read_ == kNever || now - clocks_read_ > options_.clock.Real(Milliseconds(20))) {
     clocks_read_ = now;
     wall_ahead_ns_ = ReadClock(CLOCK_REALTIME) - Monotonic().ns;
   }
@@ -202,16 +212,20 @@ std::string SocketCanPort::WithCauses(const std::string& what) const {
 void SocketCanPort::NoteError(const can_frame& error, HostInstant now) {
   ++counters_.link_errors;
   errors_.Note(error);
-  if (const auto state = LinkStateOf(error)) SetState(*state, now);
+  const auto state = LinkStateOf(error);
+  if (state == LinkState::kUp && state_ == LinkState::kUp && !IsWarning(error)) {
+    trouble_.clear();  // it warns no more
+    errors_.Clear();
+  }
+  if (state) SetState(*state, now);
   if (IsWarning(error) && trouble_.empty()) trouble_ = WithCauses("the controller warns of errors");
 }
 
 void SocketCanPort::SetState(LinkState state, HostInstant now) {
-  if (state == LinkState::kUp) {
+  if (state != LinkState::kOff) {
     recovery_.Well(now);
     if (state_ == LinkState::kOff) window_.Clear();  // a restart flushes what was below
-  }
-  if (state == LinkState::kOff) {
+  } else {
     // Where the kernel restarts it by itself, two would only get into each other's way.
     if (link_.restart_ms == 0) recovery_.BusOff(now);
     window_.Clear();

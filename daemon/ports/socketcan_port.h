@@ -79,6 +79,7 @@ class SocketCanPort : public PollablePort {
   LinkState state_ = LinkState::kDown;
   bool found_ = false;
   bool was_up_ = false;               // ever
+  bool lost_untold_ = false;          // by Send, and no Receive has been since
   HostInstant retry_at_{0};           // while there is no socket
   HostInstant look_at_ = kNever;      // while the controller is not well: its state is asked for
   HostInstant waits_since_ = kNever;  // monotonic: confirmations are outstanding since

@@ -125,6 +125,7 @@ void Contact::Identify(PositionerIndex i) {
   core_.Forget(i);
   record.reading = {};
   record.wants_start = false;
+  record.clock_told = false;
   core_.SetPhase(i, kIdentifying);
   AskNext(i);
 }

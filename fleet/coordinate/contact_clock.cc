@@ -35,7 +35,7 @@ void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at
                 core_.NameOf(i) + "'s clock is off by " + InPercent(rate.error) + " (+- " +
                     InPercent(rate.bound) + "), more than the " +
                     InPercent(PlanOptions{}.clock_error) + " that plans allow for");
-  record.clock_told = off > PlanOptions{}.clock_error;
+  if (off > PlanOptions{}.clock_error) record.clock_told = true;  // once; anew when it is read anew
   if (record.view.phase == UnitPhase::kIdentifying) {
     ++record.reading.step;
   } else if (std::exchange(record.wants_start, false) && reply.began_ticks != 0) {

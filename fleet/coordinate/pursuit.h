@@ -158,6 +158,7 @@ class Pursuit {
   [[nodiscard]] std::vector<Deviation> Deviations() const;
   [[nodiscard]] std::vector<Deviation> DeviationsNear(PositionerIndex i) const;
   [[nodiscard]] bool IsStale(const Late& late) const;
+  [[nodiscard]] bool StandsAt(PositionerIndex i, const Pose& from) const;
   [[nodiscard]] bool IsUnheard(const LateMove& late) const;
   Status MayRetarget(const RetargetCommand& command);
   void GoOnLate(PositionerIndex i);

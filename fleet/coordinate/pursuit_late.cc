@@ -103,6 +103,12 @@ bool Pursuit::IsUnheard(const LateMove& late) const {
   });
 }
 
+/// It may be read anew while its way is planned (a late answer, a restart).
+bool Pursuit::StandsAt(PositionerIndex i, const Pose& from) const {
+  const UnitView& view = core_.unit(i).view;
+  return view.phase == kReady && IsPlace(view.knowledge) && PlaceOf(view.knowledge) == from;
+}
+
 bool Pursuit::IsStale(const Late& late) const {
   const std::vector<Deviation> now = DeviationsNear(late.unit);
   return !std::equal(now.begin(), now.end(), late.near.begin(), late.near.end(), IsSame);
@@ -269,7 +275,7 @@ void Pursuit::OnLatePlan(const PlanDone& done) {
     if (late->request != 0) SetOutcome(late->unit, TargetOutcome::kRefused, error.text);
     EndLate(*late, error);
     late_.erase(late);
-  } else if (IsStale(*late)) {
+  } else if (!StandsAt(late->unit, (*done.late)->move.from) || IsStale(*late)) {
     if (!TryAgain(&*late)) late_.erase(late);
   } else {
     late->predicted = done.predicted;

@@ -7,10 +7,11 @@
 // jaeger 1.11 (its source; paths of kaiju on its nominal grid, greedy, seed 3): 7548 frames for 500
 // robots, that is one SEND_NEW_TRAJECTORY (two u32), 13.1 points (steps i32, ticks i32; a chunk of
 // them is as many frames) and one TRAJECTORY_DATA_END a robot, each answered by an empty frame.
-// Abort, stop and status of each robot before that are left out. DESI's frames are made by a program
-// that is not public. From what is: rows of a move table, one upload command a row at least, a
-// checksum and an arming command, both answered; a usual move has at least three rows (the move, the
-// jog against backlash, the final creep). Each frame is taken to be as short as such a frame can be.
+// Abort, stop and status of each robot before that are left out. DESI's frames are made by a
+// program that is not public. From what is: rows of a move table, one upload command a row at
+// least, a checksum and an arming command, both answered; a usual move has at least three rows (the
+// move, the jog against backlash, the final creep). Each frame is taken to be as short as such a
+// frame can be.
 
 #include <cinttypes>
 #include <cstdio>
@@ -117,11 +118,13 @@ int Run(int argc, char** argv) {
   const double segments_per_unit = static_cast<double>(segments) / n;
   const double jaeger = JaegerBitsPerRobot(seed);
   const double bits_per_segment = static_cast<double>(segment_bits) / static_cast<double>(segments);
-  const double with_their_points = per_unit + (kJaegerPoints - segments_per_unit) * bits_per_segment;
-  std::printf("%d configurations, %u units on one bus of 1 Mbit/s: time over needed bits %.4f, worst "
-              "%.4f; longest %.1f ms\n",
-              configurations, units, Median(ratios), *std::max_element(ratios.begin(), ratios.end()),
-              longest_ms);
+  const double with_their_points =
+      per_unit + (kJaegerPoints - segments_per_unit) * bits_per_segment;
+  std::printf(
+      "%d configurations, %u units on one bus of 1 Mbit/s: time over needed bits %.4f, worst "
+      "%.4f; longest %.1f ms\n",
+      configurations, units, Median(ratios), *std::max_element(ratios.begin(), ratios.end()),
+      longest_ms);
   std::printf("bits a configured unit, both directions:\n");
   std::printf("  focalfleet  %7.0f  %.1f frames, %.2f segments\n", per_unit,
               static_cast<double>(frames) / n, segments_per_unit);

@@ -13,12 +13,12 @@
 
 namespace focalfleet::testing {
 
-/// Of one bus, all in bits of its own clock. Needed is each frame without which a unit is not armed,
-/// once: stage_begin, stage_segment, confirm and its answer, arm and its answer. Repeats, clock
-/// frames, polls and the time in which nobody sends are not.
+/// Of one bus, all in bits of its own clock. Needed is each frame without which a unit is not
+/// armed, once: stage_begin, stage_segment, confirm and its answer, arm and its answer. Repeats,
+/// clock frames, polls and the time in which nobody sends are not.
 struct UploadOnWire {
   std::uint64_t needed_bits = 0;
-  std::uint64_t other_bits = 0;  // of all other frames between the first and the last needed one
+  std::uint64_t other_bits = 0;    // of all other frames between the first and the last needed one
   std::uint64_t elapsed_bits = 0;  // first stage_begin's start to last arm_reply's end
   std::uint32_t frames = 0;
   std::uint32_t units = 0;

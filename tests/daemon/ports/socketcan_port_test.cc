@@ -230,6 +230,18 @@ TEST_F(TroubledPort, NamesStateAndCause) {
   EXPECT_EQ(port_->counters().link_errors, 6u);
 }
 
+TEST_F(TroubledPort, WarnsNoMoreWhenTheControllerIsWellAgain) {
+  for (int time = 0; time < 2; ++time) {  // the second warning is as new as the first
+    Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+    ReceiveAt(10 * time + 1);
+    EXPECT_EQ(port_->trouble(), "the controller warns of errors");
+    Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+    ReceiveAt(10 * time + 2);
+    EXPECT_EQ(port_->state(), LinkState::kUp);
+    EXPECT_EQ(port_->trouble(), "");
+  }
+}
+
 TEST_F(TroubledPort, IsBroughtBackFromBusOffAgainAndAgain) {
   Write(ErrorFrame(CAN_ERR_BUSOFF));
   ReceiveAt(1000);
