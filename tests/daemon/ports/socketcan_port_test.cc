@@ -82,7 +82,9 @@ TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   const CanFrame frame{.id = 77, .length = 0, .data = {}};
   EXPECT_EQ((*port)->Send({&frame, 1}), 0u);
   EXPECT_EQ((*port)->state(), LinkState::kDown);
-  EXPECT_EQ(receive_at(1600), LinkState::kUp);
+  EXPECT_EQ(receive_at(1600), LinkState::kDown) << "told before it may be up again";
+  EXPECT_EQ((*port)->wake_at(), HostInstant{} + Milliseconds(1800));
+  EXPECT_EQ(receive_at(1800), LinkState::kUp);
   EXPECT_EQ((*port)->counters().reconnects, 1u);
 }
 
