@@ -1,0 +1,82 @@
+#include "sim/effects/effect.h"
+
+#include <cstdio>
+
+namespace focalfleet::sim {
+
+void PoseErrors::Reset(std::size_t moves) {
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    angle_deg[axis].assign(moves, 0);
+    arm_mm[axis].assign(moves, 0);
+  }
+  x_mm.assign(moves, 0);
+  y_mm.assign(moves, 0);
+}
+
+std::string_view Name(EffectAxis axis) {
+  switch (axis) {
+    case EffectAxis::kTheta:
+      return "theta";
+    case EffectAxis::kPhi:
+      return "phi";
+    case EffectAxis::kBoth:
+      return "both";
+    case EffectAxis::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string_view Name(Owner owner) {
+  switch (owner) {
+    case Owner::kRail:
+      return "rail";
+    case Owner::kBus:
+      return "bus";
+    case Owner::kPlate:
+      return "plate";
+    case Owner::kCamera:
+      return "camera";
+    case Owner::kUnit:
+      break;
+  }
+  return "unit";
+}
+
+std::string_view Name(Memory memory) {
+  switch (memory) {
+    case Memory::kNow:
+      return "for one exposure";
+    case Memory::kChain:
+      return "adding up";
+    case Memory::kHold:
+      break;
+  }
+  return "until the next move";
+}
+
+std::size_t AxisIndex(const Template& form) {
+  return form.axis == EffectAxis::kPhi ? kPhi : kTheta;
+}
+
+void ListGrid(const Grid& grid, Templates* out) {
+  for (const EffectAxis axis : grid.axes)
+    for (const Memory memory : grid.memories)
+      for (const double shape : grid.shapes) {
+        Template made{.axis = axis,
+                      .columns = grid.columns,
+                      .memory = memory,
+                      .form = grid.form,
+                      .shape = shape};
+        made.label = Name(memory);
+        if (!grid.shape_name.empty()) {
+          char text[96];
+          std::snprintf(text, sizeof text, "; %.*s %.4g", static_cast<int>(grid.shape_name.size()),
+                        grid.shape_name.data(), shape);
+          made.label += text;
+        }
+        out->push_back(std::move(made));
+      }
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,111 @@
+// An effect is one physical way in which a unit, a rail, a bus, the plate or the camera departs
+// from ideal kinematics. It is a small stateful operator: it runs along a unit's moves and adds
+// what it does to the pose (angles, arms) or to the place of the fibre. One file an effect; the
+// registry (registry.h) lists them all.
+//
+// An effect offers templates: the same physics with its shape parameters at grid values (a gap, a
+// time constant, a threshold), on one axis, with one kind of memory. In its amplitudes a template
+// is linear, so that (sim(+e) - sim(-e)) / 2e is its signature at any e. A template has one
+// amplitude, or a few where the phase or the direction is free (sine and cosine).
+//
+// Angles are in degrees, places in mm; amplitudes are in `amplitude_unit`.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/effects/track.h"
+
+namespace focalfleet::sim {
+
+/// What an effect does to every move of one unit.
+struct PoseErrors {
+  std::vector<double> angle_deg[2];
+  std::vector<double> arm_mm[2];
+  std::vector<double> x_mm;
+  std::vector<double> y_mm;
+  void Reset(std::size_t moves);
+};
+
+enum class EffectAxis { kTheta, kPhi, kBoth, kNone };
+/// Who has it, if the data do not say otherwise.
+enum class Owner { kUnit, kRail, kBus, kPlate, kCamera };
+
+/// What happens to an error between the moves that make it.
+enum class Memory {
+  kHold,   // it stays until the axis moves again
+  kNow,    // it is there after the move that made it, and gone after the next exposure
+  kChain,  // it adds up, open loop, until the unit is homed
+};
+
+inline constexpr std::size_t kColumnsMax = 4;
+
+struct Effect;
+
+struct Template {
+  const Effect* effect = nullptr;
+  EffectAxis axis = EffectAxis::kNone;
+  std::size_t columns = 1;
+  Memory memory = Memory::kHold;
+  int form = 0;       // of the effect's own forms
+  double shape = 0;   // of the effect's own shape parameter
+  std::string label;  // the shape in words
+};
+
+using Templates = std::vector<Template>;
+
+struct Effect {
+  std::string_view cause;  // id of docs/diagnosis.md
+  std::string_view amplitude_unit;
+  double prior_size;  // of an amplitude, as large as it is usual
+  Owner owner;
+  std::vector<std::string_view> needs;  // covariates
+  std::string_view paragraph;           // for the operator
+  void (*list)(const CampaignFacts&, Templates*);
+  void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
+};
+
+std::string_view Name(EffectAxis axis);
+std::string_view Name(Owner owner);
+std::string_view Name(Memory memory);
+/// Index of the axis whose angle the template changes. Pre: kTheta or kPhi.
+std::size_t AxisIndex(const Template& form);
+
+// ---- for the files of effects
+
+/// `prototype` once for each axis, memory and shape.
+struct Grid {
+  std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi};
+  std::vector<Memory> memories = {Memory::kHold};
+  std::vector<double> shapes = {0};
+  std::string_view shape_name = "";  // "travel of %s deg" without the number: "travel, deg"
+  int form = 0;
+  std::size_t columns = 1;
+};
+void ListGrid(const Grid& grid, Templates* out);
+
+/// Adds to angle_deg[axis] what `made(i)` makes at each move of the axis, remembered as `memory`
+/// says.
+template <class Made>
+void AddRemembered(const UnitTrack& track, std::size_t moving_axis, Memory memory, Made&& made,
+                   std::vector<double>* angle_deg) {
+  double state = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i]) state = 0;
+    if (track.step_deg[moving_axis][i] != 0) {
+      const double value = made(i);
+      state = memory == Memory::kChain ? state + value : value;
+    } else if (memory == Memory::kNow) {
+      state = 0;
+    }
+    (*angle_deg)[i] += state;
+  }
+}
+
+/// Direction of the move, as a factor. Pre: the axis moves.
+inline double Direction(double step_deg) { return step_deg > 0 ? 1.0 : -1.0; }
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,50 @@
+// Mode threshold: short moves run in another mode.
+#include <cmath>
+
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void List(const CampaignFacts&, Templates* out) {
+  ListGrid({.memories = {Memory::kHold, Memory::kNow},
+            .shapes = {1, 2, 3, 5, 10, 20},
+            .shape_name = "below, deg,"},
+           out);
+  ListGrid({.memories = {Memory::kHold, Memory::kNow},
+            .shapes = {1, 2, 3, 5, 10, 20},
+            .shape_name = "along the motion; below, deg,",
+            .form = 1},
+           out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const std::span<const double> step = track.step_deg[axis];
+  AddRemembered(
+      track, axis, form.memory,
+      [&](std::size_t i) {
+        return std::abs(step[i]) < form.shape
+                   ? amplitude[0] * (form.form == 0 ? 1.0 : Direction(step[i]))
+                   : 0.0;
+      },
+      &errors->angle_deg[axis]);
+}
+
+}  // namespace
+
+Effect MakeModeThreshold() {
+  return {.cause = "mode_threshold",
+          .amplitude_unit = "deg",
+          .prior_size = 0.02,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "Moves below a length run in another mode of the firmware (creep instead of "
+              "cruise), which ends a little elsewhere: the error steps at that length.",
+          .list = List,
+          .apply = Apply};
+}
+
+}  // namespace focalfleet::sim

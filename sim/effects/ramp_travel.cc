@@ -1,0 +1,34 @@
+// Ramp travel: a constant extra travel per move.
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void List(const CampaignFacts&, Templates* out) { ListGrid({.memories = {Memory::kChain}}, out); }
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const std::span<const double> step = track.step_deg[axis];
+  AddRemembered(
+      track, axis, form.memory, [&](std::size_t i) { return amplitude[0] * Direction(step[i]); },
+      &errors->angle_deg[axis]);
+}
+
+}  // namespace
+
+Effect MakeRampTravel() {
+  return {.cause = "ramp_travel",
+          .amplitude_unit = "deg",
+          .prior_size = 0.02,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "Each move ends a constant angle too far (or short), however long it was: "
+              "motion in the ramps at its ends that the command does not count. As long as "
+              "all moves have one length it looks like a scale error.",
+          .list = List,
+          .apply = Apply};
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,66 @@
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+
+const std::vector<Effect>& EffectLibrary() {
+  static const std::vector<Effect> library = {
+      MakeAxisCrosstalk(),
+      MakeAxisTilt(),
+      MakeBacklash(),
+      MakeCameraDistortion(),
+      MakeCentroidBias(),
+      MakeCogging(),
+      MakeCommandQuantisation(),
+      MakeEccentricity(),
+      MakeFibreTorque(),
+      MakeFrictionWindup(),
+      MakeGearScale(),
+      MakeGravitySag(),
+      MakeGravityTorque(),
+      MakeHardStop(),
+      MakeLoadAngleLag(),
+      MakeModeThreshold(),
+      MakeNeighbourCoupling(),
+      MakePhaseImbalance(),
+      MakePinionRunout(),
+      MakePlateExpansion(),
+      MakePlateGradient(),
+      MakeRampTravel(),
+      MakeRelaxation(),
+      MakeScaleAsymmetry(),
+      MakeSelfHeating(),
+      MakeStageRipple(),
+      MakeStartSkew(),
+      MakeStiction(),
+      MakeSupplyDrift(),
+      MakeSupplyDroop(),
+      MakeThermalArmGrowth(),
+      MakeThermalBacklash(),
+      MakeToothDamage(),
+      MakeToothMesh(),
+      MakeWear(),
+  };
+  return library;
+}
+
+const Effect* FindEffect(std::string_view cause) {
+  for (const Effect& effect : EffectLibrary())
+    if (effect.cause == cause) return &effect;
+  return nullptr;
+}
+
+std::string_view MissingCovariate(const Effect& effect, const CampaignFacts& facts) {
+  for (const std::string_view name : effect.needs)
+    if (!facts.Has(name)) return name;
+  return {};
+}
+
+Templates ListTemplates(const Effect& effect, const CampaignFacts& facts) {
+  Templates templates;
+  if (!MissingCovariate(effect, facts).empty()) return templates;
+  effect.list(facts, &templates);
+  for (Template& made : templates) made.effect = &effect;
+  return templates;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,38 @@
+// Thermal arm growth: the arms are longer when warm.
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void List(const CampaignFacts&, Templates* out) {
+  ListGrid({.axes = {EffectAxis::kBoth, EffectAxis::kTheta, EffectAxis::kPhi}}, out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::span<const double> temperature = track.Column("temp_C");
+  const double usual_C = track.facts->Find("temp_C")->mean;
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    if (form.axis == (axis == kTheta ? EffectAxis::kPhi : EffectAxis::kTheta)) continue;
+    for (std::size_t i = 0; i < track.moves; ++i)
+      errors->arm_mm[axis][i] +=
+          amplitude[0] * track.unit->arm_mm[axis] * (temperature[i] - usual_C);
+  }
+}
+
+}  // namespace
+
+Effect MakeThermalArmGrowth() {
+  return {.cause = "thermal_arm_growth",
+          .amplitude_unit = "1/K",
+          .prior_size = 2.3e-5,
+          .owner = Owner::kUnit,
+          .needs = {"temp_C"},
+          .paragraph =
+              "Both arms grow with temperature (aluminium: 23 parts in a million a kelvin). "
+              "The error is along the arms and follows the unit's temperature.",
+          .list = List,
+          .apply = Apply};
+}
+
+}  // namespace focalfleet::sim

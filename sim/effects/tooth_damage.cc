@@ -1,0 +1,48 @@
+// Tooth damage: a bump at one angle of a gear.
+#include <cmath>
+#include <vector>
+
+#include "sim/effects/harmonic.h"
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void List(const CampaignFacts& facts, Templates* out) {
+  // Form 0: the pinion's tooth, which comes round with the pinion; form 1: the output gear's.
+  constexpr int kPlaces = 24;
+  std::vector<double> places_deg;
+  for (int k = 0; k < kPlaces; ++k) places_deg.push_back(360.0 / kPlaces * k);
+  if (HasPinion(facts))
+    ListGrid({.shapes = places_deg, .shape_name = "at the pinion's angle, deg,"}, out);
+  ListGrid({.shapes = places_deg, .shape_name = "at the gear's angle, deg,", .form = 1}, out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const double order = form.form == 0 ? PinionRatio(*track.unit, axis) : 1.0;
+  constexpr double kWidth_deg = 12;  // of the damaged gear, standard deviation
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double away_deg = std::remainder(order * track.cmd_deg[axis][i] - form.shape, 360.0);
+    const double in_widths = away_deg / kWidth_deg;
+    errors->angle_deg[axis][i] += amplitude[0] * std::exp(-in_widths * in_widths / 2);
+  }
+}
+
+}  // namespace
+
+Effect MakeToothDamage() {
+  return {.cause = "tooth_damage",
+          .amplitude_unit = "deg",
+          .prior_size = 0.1,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "One tooth is worn or chipped: the angle errs by a bump whenever the gear "
+              "passes that tooth, at the same place each turn of it and in both directions.",
+          .list = List,
+          .apply = Apply};
+}
+
+}  // namespace focalfleet::sim

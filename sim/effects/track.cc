@@ -1,0 +1,257 @@
+#include "sim/effects/track.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kTurn_deg = 360;
+constexpr double kMissingShareMax = 0.5;
+constexpr std::size_t kNeighboursMax = 6;
+
+double MedianOf(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+FilledColumn Fill(std::span<const double> raw) {
+  FilledColumn column;
+  std::vector<double> known;
+  for (const double value : raw)
+    if (std::isfinite(value)) known.push_back(value);
+  column.missing_share = 1 - static_cast<double>(known.size()) /
+                                 static_cast<double>(std::max<std::size_t>(raw.size(), 1));
+  if (known.empty()) return column;
+  column.low = *std::min_element(known.begin(), known.end());
+  column.high = *std::max_element(known.begin(), known.end());
+  column.first = known.front();
+  column.mean =
+      std::accumulate(known.begin(), known.end(), 0.0) / static_cast<double>(known.size());
+  const double median = MedianOf(known);
+  column.values.reserve(raw.size());
+  for (const double value : raw) column.values.push_back(std::isfinite(value) ? value : median);
+  return column;
+}
+
+void FindPlate(const Campaign& campaign, CampaignFacts* facts) {
+  const auto n = static_cast<double>(campaign.units.size());
+  for (const CampaignUnit& unit : campaign.units) {
+    facts->centre_x_mm += unit.base_x_mm / n;
+    facts->centre_y_mm += unit.base_y_mm / n;
+  }
+  facts->radius_mm = 1;
+  std::vector<double> nearest;
+  for (const CampaignUnit& unit : campaign.units) {
+    facts->radius_mm = std::max(facts->radius_mm, std::hypot(unit.base_x_mm - facts->centre_x_mm,
+                                                             unit.base_y_mm - facts->centre_y_mm));
+    if (campaign.units.size() < 2 || nearest.size() >= 200) continue;
+    double least_mm = std::numeric_limits<double>::infinity();
+    for (const CampaignUnit& other : campaign.units)
+      if (&other != &unit)
+        least_mm = std::min(least_mm, std::hypot(unit.base_x_mm - other.base_x_mm,
+                                                 unit.base_y_mm - other.base_y_mm));
+    nearest.push_back(least_mm);
+  }
+  facts->pitch_mm = MedianOf(nearest);
+}
+
+// A command that is written a whole turn off moves the axis as the short one does.
+double StepOf(double from_deg, double cmd_deg) {
+  const double step_deg = cmd_deg - from_deg;
+  const double turns = std::round(step_deg / kTurn_deg);
+  // Real moves may be a whole turn long; what is beyond one is a slip of the table.
+  return std::abs(step_deg) > 1.5 * kTurn_deg ? step_deg - turns * kTurn_deg : step_deg;
+}
+
+void FindHistory(const Campaign& campaign, CampaignFacts* facts) {
+  const std::size_t rows = campaign.rows();
+  const std::span<const double> rehomed = campaign.Find("rehomed");
+  facts->restarts.assign(rows, 0);
+  for (std::size_t row = 0; row < rows; ++row)
+    if (!rehomed.empty() && rehomed[row] > 0.5) {
+      facts->restarts[row] = 1;
+      ++facts->homings;
+    }
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const std::size_t first = campaign.first_row[unit];
+    if (first == campaign.first_row[unit + 1]) continue;
+    if (facts->restarts[first] != 0) --facts->homings;
+    facts->restarts[first] = 1;
+  }
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    facts->step_deg[axis].resize(rows);
+    for (std::size_t row = 0; row < rows; ++row)
+      facts->step_deg[axis][row] =
+          StepOf(campaign.from_deg[axis][row], campaign.cmd_deg[axis][row]);
+  }
+}
+
+// Normal equations of a plane over the plate, one an exposure.
+struct PlaneSums {
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, t = 0, xt = 0, yt = 0;
+  double least = std::numeric_limits<double>::infinity();
+  double most = -std::numeric_limits<double>::infinity();
+};
+
+std::array<double, 2> Slope(const PlaneSums& s) {
+  if (s.n < 6 || s.most - s.least < 1e-6) return {0, 0};
+  const double xx = s.xx - s.x * s.x / s.n, yy = s.yy - s.y * s.y / s.n;
+  const double xy = s.xy - s.x * s.y / s.n;
+  const double xt = s.xt - s.x * s.t / s.n, yt = s.yt - s.y * s.t / s.n;
+  const double determinant = xx * yy - xy * xy;
+  if (!(determinant > 1e-9 * xx * yy)) return {0, 0};
+  return {(yy * xt - xy * yt) / determinant, (xx * yt - xy * xt) / determinant};
+}
+
+void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
+  const FilledColumn* temperature = facts->Find("temp_C");
+  if (temperature == nullptr || campaign.units.size() < 6) return;
+  std::vector<PlaneSums> sums(facts->exposures.size());
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const double x = campaign.units[unit].base_x_mm - facts->centre_x_mm;
+    const double y = campaign.units[unit].base_y_mm - facts->centre_y_mm;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      PlaneSums& s = sums[facts->exposures.of_row[row]];
+      const double t = temperature->values[row];
+      s.n += 1, s.x += x, s.y += y, s.xx += x * x, s.xy += x * y, s.yy += y * y;
+      s.t += t, s.xt += x * t, s.yt += y * t;
+      s.least = std::min(s.least, t), s.most = std::max(s.most, t);
+    }
+  }
+  std::vector<double> gradient[2] = {std::vector<double>(campaign.rows()),
+                                     std::vector<double>(campaign.rows())};
+  bool any = false;
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const auto slope = Slope(sums[facts->exposures.of_row[row]]);
+    gradient[0][row] = slope[0];
+    gradient[1][row] = slope[1];
+    any = any || slope[0] != 0 || slope[1] != 0;
+  }
+  if (!any) return;
+  facts->columns[std::string(kGradientX)] = Fill(gradient[0]);
+  facts->columns[std::string(kGradientY)] = Fill(gradient[1]);
+}
+
+std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, double reach_mm) {
+  std::vector<std::vector<std::size_t>> neighbours(campaign.units.size());
+  for (std::size_t u = 0; u < campaign.units.size(); ++u)
+    for (std::size_t v = 0; v < campaign.units.size() && neighbours[u].size() < kNeighboursMax;
+         ++v) {
+      const double dx = campaign.units[u].base_x_mm - campaign.units[v].base_x_mm;
+      const double dy = campaign.units[u].base_y_mm - campaign.units[v].base_y_mm;
+      if (u != v && dx * dx + dy * dy < reach_mm * reach_mm) neighbours[u].push_back(v);
+    }
+  return neighbours;
+}
+
+// Sum of sin(psi_u - psi_v) (pitch / distance)^3 over the neighbours, psi the motor's angle.
+void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
+  if (campaign.units.size() < 2) return;
+  const auto neighbours = NeighboursOf(campaign, 1.3 * facts->pitch_mm);
+  std::vector<double> pull[2] = {std::vector<double>(campaign.rows()),
+                                 std::vector<double>(campaign.rows())};
+  std::vector<std::size_t> row_of(facts->exposures.size());
+  for (std::size_t u = 0; u < campaign.units.size(); ++u)
+    for (const std::size_t v : neighbours[u]) {
+      std::fill(row_of.begin(), row_of.end(), SIZE_MAX);
+      for (std::size_t row = campaign.first_row[v]; row < campaign.first_row[v + 1]; ++row)
+        row_of[facts->exposures.of_row[row]] = row;
+      const CampaignUnit& a = campaign.units[u];
+      const CampaignUnit& b = campaign.units[v];
+      const double near =
+          facts->pitch_mm / std::hypot(a.base_x_mm - b.base_x_mm, a.base_y_mm - b.base_y_mm);
+      for (std::size_t row = campaign.first_row[u]; row < campaign.first_row[u + 1]; ++row) {
+        const std::size_t other = row_of[facts->exposures.of_row[row]];
+        if (other == SIZE_MAX) continue;
+        for (const std::size_t axis : {kTheta, kPhi})
+          pull[axis][row] += near * near * near *
+                             std::sin(kRadians * (a.gear[axis] * campaign.cmd_deg[axis][row] -
+                                                  b.gear[axis] * campaign.cmd_deg[axis][other]));
+      }
+    }
+  facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta]);
+  facts->columns[std::string(kNeighbourPhi)] = Fill(pull[kPhi]);
+}
+
+// Columns that the units' table has and the moves' table lacks.
+void AddUnitColumns(const Campaign& campaign, CampaignFacts* facts) {
+  struct UnitColumn {
+    const char* name;
+    double CampaignUnit::*value;
+  };
+  constexpr UnitColumn kColumns[] = {{"rail_id", &CampaignUnit::rail},
+                                     {"rail_slot", &CampaignUnit::rail_slot},
+                                     {"bus_id", &CampaignUnit::bus},
+                                     {"bus_slot", &CampaignUnit::bus_slot}};
+  for (const UnitColumn& column : kColumns) {
+    if (facts->Has(column.name)) continue;
+    std::vector<double> values(campaign.rows());
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+        values[row] = campaign.units[unit].*column.value;
+    FilledColumn filled = Fill(values);
+    if (filled.missing_share <= kMissingShareMax) facts->columns[column.name] = std::move(filled);
+  }
+}
+
+}  // namespace
+
+const FilledColumn* CampaignFacts::Find(std::string_view name) const {
+  const auto it = columns.find(name);
+  return it == columns.end() ? nullptr : &it->second;
+}
+
+CampaignFacts MakeFacts(const Campaign& campaign) {
+  CampaignFacts facts;
+  facts.campaign = &campaign;
+  facts.exposures = FindExposures(campaign);
+  for (const Covariate& covariate : campaign.covariates) {
+    FilledColumn column = Fill(covariate.values);
+    if (column.missing_share <= kMissingShareMax) facts.columns[covariate.name] = std::move(column);
+  }
+  AddUnitColumns(campaign, &facts);
+  FindPlate(campaign, &facts);
+  FindHistory(campaign, &facts);
+  FindGradients(campaign, &facts);
+  FindNeighbourPull(campaign, &facts);
+  return facts;
+}
+
+std::span<const double> UnitTrack::Column(std::string_view name) const {
+  return std::span<const double>(facts->Find(name)->values).subspan(first_row, moves);
+}
+
+UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry) {
+  const Campaign& campaign = *facts.campaign;
+  UnitTrack track;
+  track.facts = &facts;
+  track.unit = &geometry;
+  track.first_row = campaign.first_row[unit];
+  track.moves = campaign.first_row[unit + 1] - track.first_row;
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    track.cmd_deg[axis] = std::span(campaign.cmd_deg[axis]).subspan(track.first_row, track.moves);
+    track.from_deg[axis] = std::span(campaign.from_deg[axis]).subspan(track.first_row, track.moves);
+    track.step_deg[axis] = std::span(facts.step_deg[axis]).subspan(track.first_row, track.moves);
+  }
+  track.restarts = std::span(facts.restarts).subspan(track.first_row, track.moves);
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double theta = (track.cmd_deg[kTheta][i] + geometry.zero_deg[kTheta]) * kRadians;
+    const double both = theta + (track.cmd_deg[kPhi][i] + geometry.zero_deg[kPhi]) * kRadians;
+    track.elbow_x_mm.push_back(geometry.arm_mm[kTheta] * std::cos(theta));
+    track.elbow_y_mm.push_back(geometry.arm_mm[kTheta] * std::sin(theta));
+    track.reach_x_mm.push_back(geometry.arm_mm[kPhi] * std::cos(both));
+    track.reach_y_mm.push_back(geometry.arm_mm[kPhi] * std::sin(both));
+    track.fibre_x_mm.push_back(geometry.base_x_mm + track.elbow_x_mm[i] + track.reach_x_mm[i]);
+    track.fibre_y_mm.push_back(geometry.base_y_mm + track.elbow_y_mm[i] + track.reach_y_mm[i]);
+  }
+  return track;
+}
+
+}  // namespace focalfleet::sim
