@@ -50,9 +50,10 @@ struct Template {
   EffectAxis axis = EffectAxis::kNone;
   std::size_t columns = 1;
   Memory memory = Memory::kHold;
-  int form = 0;       // of the effect's own forms
-  double shape = 0;   // of the effect's own shape parameter
-  std::string label;  // the shape in words
+  int form = 0;           // of the effect's own forms
+  double shape = 0;       // of the effect's own shape parameter
+  std::string label;      // the shape in words
+  std::string covariate;  // of the screen for what no effect explains: the column it looks at
 };
 
 using Templates = std::vector<Template>;

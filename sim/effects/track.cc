@@ -21,6 +21,24 @@ double MedianOf(std::vector<double> values) {
   return *middle;
 }
 
+// Against at most kSamples of the values, which is fine enough for a smooth curve.
+void Rank(FilledColumn* column) {
+  constexpr std::size_t kSamples = 2048;
+  const std::size_t stride = std::max<std::size_t>(1, column->values.size() / kSamples);
+  std::vector<double> sample;
+  for (std::size_t row = 0; row < column->values.size(); row += stride)
+    sample.push_back(column->values[row]);
+  std::sort(sample.begin(), sample.end());
+  column->rank.reserve(column->values.size());
+  for (const double value : column->values) {
+    const auto range = std::equal_range(sample.begin(), sample.end(), value);
+    const auto below = static_cast<double>(range.first - sample.begin());
+    const auto upto = static_cast<double>(range.second - sample.begin());
+    column->rank.push_back(
+        static_cast<float>((below + upto) / 2 / static_cast<double>(sample.size())));
+  }
+}
+
 FilledColumn Fill(std::span<const double> raw) {
   FilledColumn column;
   std::vector<double> known;
@@ -37,6 +55,7 @@ FilledColumn Fill(std::span<const double> raw) {
   const double median = MedianOf(known);
   column.values.reserve(raw.size());
   for (const double value : raw) column.values.push_back(std::isfinite(value) ? value : median);
+  Rank(&column);
   return column;
 }
 
@@ -219,6 +238,14 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   AddUnitColumns(campaign, &facts);
   FindPlate(campaign, &facts);
   FindHistory(campaign, &facts);
+  std::vector<double> order(campaign.rows());
+  for (std::size_t row = 0; row < order.size(); ++row)
+    order[row] = static_cast<double>(facts.exposures.of_row[row]);
+  facts.columns[std::string(kOrder)] = Fill(order);
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    facts.columns[std::string(kCommand[axis])] = Fill(campaign.cmd_deg[axis]);
+    facts.columns[std::string(kStep[axis])] = Fill(facts.step_deg[axis]);
+  }
   FindGradients(campaign, &facts);
   FindNeighbourPull(campaign, &facts);
   return facts;

@@ -19,6 +19,7 @@ namespace focalfleet::sim {
 /// One covariate without gaps: missing values are the column's median.
 struct FilledColumn {
   std::vector<double> values;  // Shape: (rows)
+  std::vector<float> rank;     // Shape: (rows): share of the rows below, 0..1
   double low = 0;
   double high = 0;
   double mean = 0;
@@ -28,6 +29,9 @@ struct FilledColumn {
 };
 
 /// Columns that are computed, with names that no table has.
+inline constexpr std::string_view kCommand[] = {"theta_cmd_deg", "phi_cmd_deg"};
+inline constexpr std::string_view kStep[] = {"theta step", "phi step"};
+inline constexpr std::string_view kOrder = "move order";
 inline constexpr std::string_view kGradientX = "temperature gradient x";
 inline constexpr std::string_view kGradientY = "temperature gradient y";
 inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";

@@ -1,0 +1,24 @@
+// How likely a statistic is by chance, down to where ordinary numbers underflow: natural
+// logarithms of tail probabilities throughout. And how a family of correlated tests counts.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace focalfleet::sim {
+
+/// ln P(chi-square of `dof` degrees of freedom > x). 0 for x <= 0. Pre: dof > 0.
+double LogChiSquareTail(double x, double dof);
+
+/// ln of the probability that the least of `tests` independent p-values is below exp(log_p).
+double LogLeastOf(double log_p, double tests);
+
+/// ln(sum exp(terms)); -infinity for none.
+double LogSum(std::span<const double> terms);
+
+/// Lower quantile of unsorted values, by nearest rank. Pre: not empty, 0 <= share <= 1.
+double Quantile(std::vector<double> values, double share);
+inline double Median(std::vector<double> values) { return Quantile(std::move(values), 0.5); }
+
+}  // namespace focalfleet::sim

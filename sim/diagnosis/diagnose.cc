@@ -1,0 +1,343 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "protocol/base/rng.h"
+#include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/gain.h"
+#include "sim/diagnosis/geometry_causes.h"
+#include "sim/diagnosis/outliers.h"
+#include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/select.h"
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kMovesMin = 8;  // of a unit, seen
+constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
+constexpr double kKeptMin = 0.01;
+// Causes that come from other looks than a template's.
+constexpr std::string_view kEventCauses[] = {"step_loss", "lost_command", "collision_contact",
+                                             "sensor_bias", "air_turbulence"};
+
+bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
+  return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
+         options.leave_out.end();
+}
+
+// Templates that the data can test; why the others cannot.
+Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
+                      std::vector<NotTestable>* not_testable) {
+  Templates templates;
+  for (const Effect& effect : EffectLibrary()) {
+    if (IsLeftOut(options, effect.cause)) continue;
+    const std::string_view missing = MissingCovariate(effect, facts);
+    if (!missing.empty()) {
+      not_testable->push_back(
+          {std::string(effect.cause), "column " + std::string(missing) + " is missing"});
+      continue;
+    }
+    Templates made = ListTemplates(effect, facts);
+    if (made.empty())
+      not_testable->push_back(
+          {std::string(effect.cause), "these units or moves have no such part"});
+    templates.insert(templates.end(), made.begin(), made.end());
+  }
+  if (options.shuffle_library != 0) {
+    Rng rng = Rng::Stream(options.shuffle_library, "library");
+    for (std::size_t k = templates.size(); k > 1; --k)
+      std::swap(templates[k - 1], templates[rng.Below(k)]);
+  }
+  return templates;
+}
+
+// Causes of which no template has a signature of its own in these moves.
+void FindNotExcited(const Templates& templates, const Selection& selection,
+                    std::vector<NotTestable>* out) {
+  std::map<std::string_view, double> best;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    double& most = best[templates[k].effect->cause];
+    most = std::max(most, selection.kept_share[k]);
+  }
+  for (const auto& [cause, most] : best)
+    if (most < kKeptMin)
+      out->push_back({std::string(cause), most > 0 ? "static geometry explains the same as well"
+                                                   : "the moves never excite it"});
+}
+
+std::string ScopeOf(const ModelTerm& term, std::size_t units) {
+  if (term.sharing == Sharing::kUnit || units == 1)
+    return std::string(Name(units == 1 && term.form.effect->owner != Owner::kUnit
+                                ? term.form.effect->owner
+                                : Owner::kUnit));
+  if (term.sharing == Sharing::kRail) return "rail";
+  if (term.sharing == Sharing::kBus) return "bus";
+  return std::string(
+      Name(term.form.effect->owner == Owner::kUnit ? Owner::kPlate : term.form.effect->owner));
+}
+
+void TakeAmplitude(const ModelTerm& term, CauseFound* cause) {
+  // One number: the mean over groups where it has a sign, else the rms of the vectors.
+  const std::size_t c = term.form.columns;
+  double mean = 0, square = 0, weight = 0, variance = 0;
+  std::set<std::uint32_t> groups;
+  for (const std::uint32_t group : term.group_of_unit)
+    if (group != kNoGroup) groups.insert(group);
+  for (const std::uint32_t group : groups) {
+    double s = 0, sigma2 = 0;
+    for (std::size_t k = 0; k < c; ++k) {
+      const double a = term.amplitude[group * c + k];
+      s += a * a;
+      sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
+    }
+    mean += c == 1 ? term.amplitude[group] : 0;
+    square += s, weight += 1, variance += sigma2;
+  }
+  if (!(weight > 0)) return;
+  const double rms = std::sqrt(square / weight);
+  cause->amplitude = c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms;
+  const double sigma = std::sqrt(variance) / weight;
+  cause->ci95[0] = cause->amplitude - 1.96 * sigma;
+  cause->ci95[1] = cause->amplitude + 1.96 * sigma;
+}
+
+CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
+  CauseFound cause;
+  const Effect& effect = *term.form.effect;
+  cause.cause = effect.cause;
+  cause.candidates = {cause.cause};
+  for (const Rival& rival : accepted.rivals) cause.candidates.emplace_back(rival.cause);
+  cause.axis = Name(term.form.axis);
+  cause.scope = ScopeOf(term, fit.model.units.size());
+  std::size_t have = 0, all = 0;
+  const Campaign& campaign = *fit.facts->campaign;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    if (campaign.first_row[unit] == campaign.first_row[unit + 1]) continue;
+    ++all;
+    if (term.group_of_unit[unit] == kNoGroup) continue;
+    ++have;
+    cause.units.push_back(campaign.units[unit].id);
+  }
+  constexpr double kNearlyAll = 0.9;
+  cause.all_units = static_cast<double>(have) >= kNearlyAll * static_cast<double>(all);
+  cause.amplitude_unit = effect.amplitude_unit;
+  TakeAmplitude(term, &cause);
+  cause.size_um = SizeOf(fit, term);
+  cause.delta_log_likelihood = accepted.standing.chi_square / 2;
+  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+  cause.shape = term.form.label;
+  cause.paragraph = effect.paragraph;
+  return cause;
+}
+
+// One entry a cause: both axes, or several shapes, of one name belong together.
+void MergeCauses(std::vector<CauseFound>* causes) {
+  std::vector<CauseFound> merged;
+  for (CauseFound& cause : *causes) {
+    const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
+      return other.cause == cause.cause && other.scope == cause.scope;
+    });
+    if (same == merged.end()) {
+      merged.push_back(std::move(cause));
+      continue;
+    }
+    if (same->axis != cause.axis) same->axis = "both";
+    if (cause.size_um > same->size_um) {
+      same->amplitude = cause.amplitude;
+      same->ci95[0] = cause.ci95[0], same->ci95[1] = cause.ci95[1];
+      same->shape = cause.shape;
+    }
+    std::set<std::uint32_t> units(same->units.begin(), same->units.end());
+    units.insert(cause.units.begin(), cause.units.end());
+    same->units.assign(units.begin(), units.end());
+    same->all_units = same->all_units || cause.all_units;
+    same->size_um = std::hypot(same->size_um, cause.size_um);
+    same->delta_log_likelihood += cause.delta_log_likelihood;
+    same->predicted_gain_um += cause.predicted_gain_um;
+    // Rivals of one part only do not explain the whole.
+    std::erase_if(same->candidates, [&](const std::string& candidate) {
+      return candidate != cause.cause && std::find(cause.candidates.begin(), cause.candidates.end(),
+                                                   candidate) == cause.candidates.end();
+    });
+  }
+  std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
+    return a.delta_log_likelihood > b.delta_log_likelihood;
+  });
+  *causes = std::move(merged);
+}
+
+double RmsOf(const Fit& fit) {
+  double sum = 0, count = 0;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.weight[row] > 0.5)
+      sum += fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row], count += 1;
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+// The clearest structures that are left, a column once.
+std::vector<UnknownFound> Screen(const Fit& fit, const DiagnoseOptions& options) {
+  const Templates looks = ScreenTemplates(*fit.facts);
+  if (looks.empty()) return {};
+  const FleetGroups groups = GroupsOf(*fit.facts);
+  const ScorePass pass = ScoreTemplates(fit, looks);
+  const double tests = EffectiveTests(pass.scores, looks, options.seed);
+  std::vector<UnknownFound> found;
+  const Best best = FindBest(pass, looks, groups, tests, options.family_wise);
+  if (best.at == kNoTerm) return found;
+  UnknownFound unknown{looks[best.at].covariate, ChannelOf(looks[best.at]),
+                       std::exp(best.log_p_family), 0};
+  Fit patched = fit;
+  patched.parallel = fit.parallel;
+  patched.model.terms.push_back(MakeTerm(looks[best.at], best.standing, groups));
+  StepFit(&patched);
+  unknown.size_um = SizeOf(patched, patched.model.terms.back());
+  found.push_back(unknown);
+  return found;
+}
+
+std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
+  const Campaign& campaign = *facts.campaign;
+  std::size_t most = 0;
+  bool moved = false;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    std::size_t seen = 0;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      if (aside[row] == 0 && std::isfinite(campaign.x_mm[row])) ++seen;
+      moved = moved || facts.step_deg[0][row] != 0 || facts.step_deg[1][row] != 0;
+    }
+    most = std::max(most, seen);
+  }
+  if (most < kMovesMin)
+    return "no unit was seen after " + std::to_string(kMovesMin) + " moves or more (the most is " +
+           std::to_string(most) + ")";
+  if (!moved) return "no axis was moved";
+  return {};
+}
+
+double MedianMiss(const Fit& fit) {
+  std::vector<double> misses;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
+  return misses.empty() ? 0 : Median(std::move(misses));
+}
+
+CauseFound SwapCause(const Campaign& campaign,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
+  CauseFound cause;
+  cause.cause = "identity_swap";
+  cause.candidates = {cause.cause};
+  cause.axis = "none";
+  cause.scope = "unit";
+  cause.amplitude_unit = "pairs";
+  cause.amplitude = static_cast<double>(swaps.size());
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  double square = 0;
+  for (const auto& [a, b] : swaps) {
+    cause.units.push_back(campaign.units[a].id);
+    cause.units.push_back(campaign.units[b].id);
+    square += std::pow(1e3 * std::hypot(campaign.units[a].base_x_mm - campaign.units[b].base_x_mm,
+                                        campaign.units[a].base_y_mm - campaign.units[b].base_y_mm),
+                       2);
+  }
+  cause.size_um = std::sqrt(square / static_cast<double>(swaps.size()));
+  cause.predicted_gain_um = cause.size_um;
+  cause.delta_log_likelihood = 1e6;
+  cause.paragraph = "Two fibres are known under each other's name: exchange the names.";
+  return cause;
+}
+
+void Conclude(Diagnosis* diagnosis) {
+  bool ambiguous = false;
+  for (const CauseFound& cause : diagnosis->causes)
+    ambiguous = ambiguous || cause.candidates.size() > 1;
+  diagnosis->verdict = !diagnosis->unknown.empty() ? Verdict::kUnknown
+                       : ambiguous                 ? Verdict::kAmbiguous
+                       : diagnosis->causes.empty() ? Verdict::kConsistent
+                                                   : Verdict::kExplained;
+}
+
+}  // namespace
+
+std::string_view Name(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::kConsistent:
+      return "consistent";
+    case Verdict::kExplained:
+      return "explained";
+    case Verdict::kAmbiguous:
+      return "ambiguous";
+    case Verdict::kUnknown:
+      return "unknown";
+    case Verdict::kInsufficient:
+      break;
+  }
+  return "insufficient";
+}
+
+Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
+  Campaign campaign = given;
+  Diagnosis diagnosis;
+  options.progress(0, "reading the moves");
+  CampaignFacts facts = MakeFacts(campaign);
+  diagnosis.rows = campaign.rows();
+  diagnosis.units = campaign.units.size();
+  diagnosis.moves = facts.exposures.size();
+  std::vector<char> aside;
+  diagnosis.outliers = FindBeforeFit(facts, &aside);
+  diagnosis.model.units = campaign.units;
+  diagnosis.insufficient = WhyInsufficient(facts, aside);
+  if (!diagnosis.insufficient.empty()) return diagnosis;
+  options.progress(0.02, "static geometry");
+  Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
+  const auto swaps = FindSwaps(fit);
+  if (!swaps.empty()) {
+    for (const auto& [a, b] : swaps) UndoSwap(facts.exposures, a, b, &campaign);
+    diagnosis.causes.push_back(SwapCause(campaign, swaps));
+    fit = StartFit(facts, diagnosis.model, aside, options.parallel);
+  }
+  if (MedianMiss(fit) > kMissMax_mm) {
+    diagnosis.insufficient =
+        "the places do not belong to these units: half of them are more than " +
+        std::to_string(static_cast<int>(kMissMax_mm)) +
+        " mm from every pose that their geometry allows";
+    return diagnosis;
+  }
+  diagnosis.x_before_um = fit.x_um, diagnosis.y_before_um = fit.y_um;
+  const Templates templates = ListLibrary(facts, options, &diagnosis.not_testable);
+  SelectionRule rule{.family_wise = options.family_wise, .seed = options.seed};
+  double share = 0.1;
+  rule.progress = [&](std::string_view stage) {
+    share += (0.75 - share) * 0.15;
+    options.progress(share, stage);
+  };
+  const Selection selection = Select(templates, rule, &fit);
+  FindNotExcited(templates, selection, &diagnosis.not_testable);
+  const double rms_um = RmsOf(fit);
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    diagnosis.causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
+  options.progress(0.8, "geometry against the table");
+  for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
+    cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+    if (!IsLeftOut(options, cause.cause)) diagnosis.causes.push_back(std::move(cause));
+  }
+  MergeCauses(&diagnosis.causes);
+  options.progress(0.85, "what is left");
+  diagnosis.unknown = Screen(fit, options);
+  FindAfterFit(fit, &diagnosis.outliers);
+  for (const std::string_view cause : kEventCauses)
+    diagnosis.not_testable.push_back({std::string(cause), "this version has no test for it"});
+  Conclude(&diagnosis);
+  if (options.with_gain) {
+    options.progress(0.9, "held-out moves");
+    diagnosis.gain = MeasureGain(fit);
+  }
+  diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
+  diagnosis.model = fit.model;
+  options.progress(1, "done");
+  return diagnosis;
+}
+
+}  // namespace focalfleet::sim

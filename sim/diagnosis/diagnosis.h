@@ -1,0 +1,92 @@
+// The verdict on a campaign: what the simulation gets wrong, by name. docs/diagnosis.md has the
+// fields as programs read them. Everything is a function of the campaign, the options and nothing
+// else: the same data give the same verdict, at any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/diagnosis/model.h"
+
+namespace focalfleet::sim {
+
+struct CauseFound {
+  std::string cause;
+  std::vector<std::string> candidates;  // the cause itself first
+  std::string axis;
+  std::string scope;
+  std::vector<std::uint32_t> units;
+  bool all_units = false;
+  double amplitude = 0;
+  std::string amplitude_unit;
+  double ci95[2] = {0, 0};
+  double size_um = 0;  // rms at the fibre
+  double delta_log_likelihood = 0;
+  double predicted_gain_um = 0;
+  std::string shape;      // of the template, in words
+  std::string paragraph;  // for the operator
+};
+
+struct UnknownFound {
+  std::string covariate;
+  std::string channel;  // where it shows: "theta angle", "x" ...
+  double p_value = 0;
+  double size_um = 0;
+};
+
+struct NotTestable {
+  std::string cause;
+  std::string why;
+};
+
+struct OutliersFound {
+  std::size_t rows = 0;
+  std::vector<std::uint32_t> units;
+  std::map<std::string, std::size_t> why;  // rows by reason
+};
+
+struct HeldOutGain {
+  double rms_before_um = 0, rms_after_um = 0;
+  double mad_before_um = 0, mad_after_um = 0;
+  double noise_floor_um = 0;
+  double explained_share = 0;
+  std::string held_out;
+};
+
+enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };
+std::string_view Name(Verdict verdict);
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kInsufficient;
+  std::string insufficient;  // what is missing
+  std::vector<CauseFound> causes;
+  std::vector<UnknownFound> unknown;
+  std::vector<NotTestable> not_testable;
+  OutliersFound outliers;
+  HeldOutGain gain;
+  std::size_t rows = 0, units = 0, moves = 0;
+  CampaignModel model;  // the extended one
+  // Residuals in um, for pictures. Shape: (rows); NaN where nothing was measured.
+  std::vector<double> x_before_um, y_before_um, x_after_um, y_after_um;
+};
+
+struct DiagnoseOptions {
+  std::uint64_t seed = 1;
+  double family_wise = 0.01;
+  std::vector<std::string> leave_out;  // causes that the library shall not have
+  std::uint64_t shuffle_library = 0;   // not 0: another order of its templates
+  bool with_gain = true;
+  ParallelFor parallel = OneAfterTheOther();
+  std::function<void(double share, std::string_view stage)> progress = [](double,
+                                                                          std::string_view) {};
+};
+
+/// Pre: Validate(campaign).
+Diagnosis Diagnose(const Campaign& campaign, const DiagnoseOptions& options);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,120 @@
+#include "sim/diagnosis/gain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/diagnosis/chances.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kFolds = 5;
+constexpr double kOutlier = 6;  // whitened length by the final model
+
+// Which fold each row is in.
+std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
+  const Campaign& campaign = *fit.facts->campaign;
+  const CampaignFacts& facts = *fit.facts;
+  std::vector<std::size_t> fold(campaign.rows());
+  const std::size_t homings_per_unit =
+      facts.homings / std::max<std::size_t>(campaign.units.size(), 1) + 1;
+  if (homings_per_unit >= kFolds) {
+    *how = "5 folds of whole homings; each fold predicted from the other four";
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      std::size_t homing = 0;
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+        if (facts.restarts[row] != 0 && row != campaign.first_row[unit]) ++homing;
+        fold[row] = homing % kFolds;
+      }
+    }
+    return fold;
+  }
+  // Blocks of neighbouring exposures, dealt out in turn: no fold is one end of a drift alone.
+  *how = "5 folds of blocks of exposures; each fold predicted from the other four";
+  const std::size_t exposures = facts.exposures.size();
+  const std::size_t block = std::max<std::size_t>(1, exposures / (4 * kFolds));
+  for (std::size_t row = 0; row < fold.size(); ++row)
+    fold[row] = facts.exposures.of_row[row] / block % kFolds;
+  return fold;
+}
+
+Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_terms) {
+  Fit fit = final_fit;
+  for (std::size_t row = 0; row < hold.size(); ++row)
+    if (hold[row] != 0) fit.aside[row] = 1;
+  if (!with_terms) {
+    fit.model.terms.clear();
+    fit.model.events.clear();
+    fit.model.exposures.clear();
+  }
+  UpdateResiduals(&fit);
+  SettleFit(&fit, 2);
+  StepFit(&fit);
+  return fit;
+}
+
+}  // namespace
+
+double NoiseFloor(const Fit& fit) {
+  double sum = 0, count = 0;
+  constexpr double kRadians = std::numbers::pi / 180;
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+    const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      if (!fit.Used(track.first_row + i)) continue;
+      const double theta_um = 1e3 * kRadians * fit.noise.angle_deg[0] *
+                              std::hypot(track.elbow_x_mm[i] + track.reach_x_mm[i],
+                                         track.elbow_y_mm[i] + track.reach_y_mm[i]);
+      const double phi_um = 1e3 * kRadians * fit.noise.angle_deg[1] *
+                            std::hypot(track.reach_x_mm[i], track.reach_y_mm[i]);
+      sum += f2 *
+             (2 * fit.noise.place_um * fit.noise.place_um + theta_um * theta_um + phi_um * phi_um);
+      count += 1;
+    }
+  }
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+HeldOutGain MeasureGain(const Fit& fit) {
+  const Campaign& campaign = *fit.facts->campaign;
+  HeldOutGain gain;
+  const std::vector<std::size_t> fold = FoldsOf(fit, &gain.held_out);
+  std::vector<char> judged(campaign.rows(), 0);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const std::size_t row = white.track.first_row + white.moves[k];
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      const double length = std::hypot(white.y[at], white.y[at + 1]) / std::sqrt(fit.weight[row]);
+      judged[row] = length <= kOutlier ? 1 : 0;
+    }
+  }
+  std::vector<double> before, after;
+  for (std::size_t k = 0; k < kFolds; ++k) {
+    std::vector<char> hold(campaign.rows(), 0);
+    for (std::size_t row = 0; row < hold.size(); ++row) hold[row] = fold[row] == k ? 1 : 0;
+    const Fit plain = FitWithout(fit, hold, false);
+    const Fit full = FitWithout(fit, hold, true);
+    for (std::size_t row = 0; row < hold.size(); ++row) {
+      if (hold[row] == 0 || judged[row] == 0) continue;
+      before.push_back(std::hypot(plain.x_um[row], plain.y_um[row]));
+      after.push_back(std::hypot(full.x_um[row], full.y_um[row]));
+    }
+  }
+  const auto rms = [](const std::vector<double>& values) {
+    double sum = 0;
+    for (const double value : values) sum += value * value;
+    return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+  };
+  gain.rms_before_um = rms(before), gain.rms_after_um = rms(after);
+  if (!before.empty()) gain.mad_before_um = Median(before), gain.mad_after_um = Median(after);
+  gain.noise_floor_um = NoiseFloor(fit);
+  const double all = gain.rms_before_um * gain.rms_before_um;
+  if (all > 0)
+    gain.explained_share = std::max(0.0, 1 - gain.rms_after_um * gain.rms_after_um / all);
+  return gain;
+}
+
+}  // namespace focalfleet::sim

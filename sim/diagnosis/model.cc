@@ -1,0 +1,93 @@
+#include "sim/diagnosis/model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kChunksMax = 32;
+
+void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
+               PoseErrors* errors) {
+  for (const EventTerm& event : model.events) {
+    if (event.unit != unit) continue;
+    for (std::size_t i = event.row - track.first_row; i < track.moves; ++i) {
+      const bool first = i == event.row - track.first_row;
+      if (!first && (!event.stays || track.restarts[i] != 0)) break;
+      errors->angle_deg[event.axis][i] += event.step_deg;
+    }
+  }
+}
+
+}  // namespace
+
+ParallelFor OneAfterTheOther() {
+  return [](std::size_t chunks, const std::function<void(std::size_t)>& work) {
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) work(chunk);
+  };
+}
+
+std::span<const double> ModelTerm::AmplitudeOf(std::size_t unit) const {
+  const std::uint32_t group = group_of_unit[unit];
+  if (group == kNoGroup) return {};
+  return std::span(amplitude).subspan(group * form.columns, form.columns);
+}
+
+std::vector<UnitChunk> ChunksOf(std::size_t units) {
+  const std::size_t chunks = std::min(units, kChunksMax);
+  std::vector<UnitChunk> out;
+  for (std::size_t k = 0; k < chunks; ++k)
+    out.push_back({units * k / chunks, units * (k + 1) / chunks});
+  return out;
+}
+
+void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
+                   PoseErrors* errors) {
+  for (const ModelTerm& term : model.terms) {
+    const std::span<const double> amplitude = term.AmplitudeOf(unit);
+    if (!amplitude.empty()) term.form.effect->apply(track, term.form, amplitude, errors);
+  }
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    if (model.homing_zero_deg[axis].empty()) continue;
+    for (std::size_t i = 0; i < track.moves; ++i)
+      errors->angle_deg[axis][i] += model.homing_zero_deg[axis][track.first_row + i];
+  }
+  AddEvents(model, unit, track, errors);
+}
+
+Places Predict(const CampaignModel& model, const CampaignFacts& facts,
+               const ParallelFor& parallel) {
+  const std::size_t rows = facts.campaign->rows();
+  Places places{std::vector<double>(rows), std::vector<double>(rows)};
+  const std::vector<UnitChunk> chunks = ChunksOf(model.units.size());
+  parallel(chunks.size(), [&](std::size_t chunk) {
+    PoseErrors errors;
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      const UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
+      errors.Reset(track.moves);
+      AddPoseErrors(model, unit, track, &errors);
+      CampaignUnit bent = model.units[unit];
+      for (std::size_t i = 0; i < track.moves; ++i) {
+        for (const std::size_t axis : {kTheta, kPhi})
+          bent.arm_mm[axis] = model.units[unit].arm_mm[axis] + errors.arm_mm[axis][i];
+        const PlacePoint place =
+            PlaceOf(bent, track.cmd_deg[kTheta][i] + errors.angle_deg[kTheta][i],
+                    track.cmd_deg[kPhi][i] + errors.angle_deg[kPhi][i]);
+        const std::size_t row = track.first_row + i;
+        places.x_mm[row] = place.x_mm + errors.x_mm[i];
+        places.y_mm[row] = place.y_mm + errors.y_mm[i];
+        if (model.exposures.empty()) continue;
+        const ExposureTerm& image = model.exposures[facts.exposures.of_row[row]];
+        const double x = place.x_mm - facts.centre_x_mm, y = place.y_mm - facts.centre_y_mm;
+        places.x_mm[row] +=
+            image.shift_x_um * 1e-3 + image.scale_ppm * 1e-6 * x - image.turn_urad * 1e-6 * y;
+        places.y_mm[row] +=
+            image.shift_y_um * 1e-3 + image.scale_ppm * 1e-6 * y + image.turn_urad * 1e-6 * x;
+      }
+    }
+  });
+  return places;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,168 @@
+#include "sim/diagnosis/outliers.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "sim/diagnosis/chances.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kFar = 6;  // whitened length
+constexpr double kStuckTravel_deg = 5;
+constexpr double kStuckSpread_mm = 0.03;
+constexpr double kBadUnit_mm = 0.3;  // median miss after the static fit
+constexpr double kSwapBetter = 0.2;  // of the miss that is left once names are exchanged
+constexpr double kMostRows = 0.3;    // of a unit's rows: the unit itself is named
+
+double SpreadOf(const std::vector<double>& values) {
+  return values.empty() ? 0 : Quantile(values, 0.95) - Quantile(values, 0.05);
+}
+
+// Commanded to move, and does not.
+bool IsStuck(const Campaign& campaign, std::size_t unit) {
+  std::vector<double> x, y;
+  double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
+  for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+    if (!std::isfinite(campaign.x_mm[row])) continue;
+    x.push_back(campaign.x_mm[row]);
+    y.push_back(campaign.y_mm[row]);
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      low[axis] = std::min(low[axis], campaign.cmd_deg[axis][row]);
+      high[axis] = std::max(high[axis], campaign.cmd_deg[axis][row]);
+    }
+  }
+  return x.size() >= 4 && std::max(high[0] - low[0], high[1] - low[1]) > kStuckTravel_deg &&
+         SpreadOf(x) < kStuckSpread_mm && SpreadOf(y) < kStuckSpread_mm;
+}
+
+double MissOf(const Fit& fit, std::size_t unit) {
+  const Campaign& campaign = *fit.facts->campaign;
+  std::vector<double> misses;
+  for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+    if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
+  return misses.empty() ? 0 : Median(std::move(misses));
+}
+
+// Median miss of a's measured places from b's commands with the table's geometry of b.
+double CrossMiss(const Fit& fit, std::size_t a, std::size_t b) {
+  const Campaign& campaign = *fit.facts->campaign;
+  std::vector<std::size_t> row_of(fit.facts->exposures.size(), SIZE_MAX);
+  for (std::size_t row = campaign.first_row[b]; row < campaign.first_row[b + 1]; ++row)
+    row_of[fit.facts->exposures.of_row[row]] = row;
+  std::vector<double> misses;
+  for (std::size_t row = campaign.first_row[a]; row < campaign.first_row[a + 1]; ++row) {
+    const std::size_t other = row_of[fit.facts->exposures.of_row[row]];
+    if (other == SIZE_MAX || !std::isfinite(campaign.x_mm[row])) continue;
+    const PlacePoint at =
+        PlaceOf(campaign.units[b], campaign.cmd_deg[0][other], campaign.cmd_deg[1][other]);
+    misses.push_back(std::hypot(campaign.x_mm[row] - at.x_mm, campaign.y_mm[row] - at.y_mm));
+  }
+  return misses.size() < 3 ? std::numeric_limits<double>::infinity() : Median(std::move(misses));
+}
+
+// Did the fibre stay where the move began?
+bool Stayed(const Fit& fit, std::size_t unit, std::size_t row) {
+  const Campaign& campaign = *fit.facts->campaign;
+  const double from_x_um = 1e3 * campaign.x_mm[row], from_y_um = 1e3 * campaign.y_mm[row];
+  const PlacePoint start =
+      PlaceOf(fit.model.units[unit], campaign.from_deg[kTheta][row], campaign.from_deg[kPhi][row]);
+  const double miss = std::hypot(fit.x_um[row], fit.y_um[row]);
+  return std::hypot(from_x_um - 1e3 * start.x_mm, from_y_um - 1e3 * start.y_mm) < 0.2 * miss;
+}
+
+}  // namespace
+
+OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside) {
+  const Campaign& campaign = *facts.campaign;
+  OutliersFound found;
+  aside->assign(campaign.rows(), 0);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const bool stuck = IsStuck(campaign, unit);
+    const CampaignUnit& u = campaign.units[unit];
+    if (stuck) found.units.push_back(u.id);
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      std::string why;
+      if (!std::isfinite(campaign.x_mm[row])) {
+        why = "not seen";
+      } else if (stuck) {
+        why = "stuck unit";
+        (*aside)[row] = 1;
+      }
+      if (why.empty()) continue;
+      ++found.why[why];
+      ++found.rows;
+    }
+  }
+  return found;
+}
+
+std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit) {
+  const Campaign& campaign = *fit.facts->campaign;
+  std::vector<std::size_t> bad;
+  std::vector<double> miss_mm;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const double miss = MissOf(fit, unit);
+    // A wrong name also drags the fitted base away.
+    const double dragged =
+        std::hypot(fit.model.units[unit].base_x_mm - campaign.units[unit].base_x_mm,
+                   fit.model.units[unit].base_y_mm - campaign.units[unit].base_y_mm);
+    if (miss > kBadUnit_mm || dragged > 1) bad.push_back(unit), miss_mm.push_back(miss);
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> swaps;
+  std::set<std::size_t> taken;
+  for (const std::size_t a : bad)
+    for (const std::size_t b : bad) {
+      if (b <= a || taken.count(a) != 0 || taken.count(b) != 0) continue;
+      const double own = CrossMiss(fit, a, a) + CrossMiss(fit, b, b);
+      const double crossed = CrossMiss(fit, a, b) + CrossMiss(fit, b, a);
+      if (crossed >= kSwapBetter * own) continue;
+      swaps.emplace_back(a, b);
+      taken.insert({a, b});
+    }
+  return swaps;
+}
+
+void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign) {
+  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+  std::vector<std::size_t> row_of(exposures.size(), SIZE_MAX);
+  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
+    row_of[exposures.of_row[row]] = row;
+  std::set<std::size_t> met;
+  for (std::size_t row = campaign->first_row[a]; row < campaign->first_row[a + 1]; ++row) {
+    const std::size_t other = row_of[exposures.of_row[row]];
+    if (other == SIZE_MAX) {
+      campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
+      continue;
+    }
+    met.insert(other);
+    std::swap(campaign->x_mm[row], campaign->x_mm[other]);
+    std::swap(campaign->y_mm[row], campaign->y_mm[other]);
+  }
+  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
+    if (met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
+}
+
+void FindAfterFit(const Fit& fit, OutliersFound* found) {
+  const Campaign& campaign = *fit.facts->campaign;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    std::size_t far = 0;
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const std::size_t row = white.track.first_row + white.moves[k];
+      const auto at = static_cast<Eigen::Index>(2 * k);
+      const double length = std::hypot(white.y[at], white.y[at + 1]) / std::sqrt(fit.weight[row]);
+      if (length <= kFar) continue;
+      ++far;
+      ++found->rows;
+      ++found->why[Stayed(fit, unit, row) ? "move did not happen" : "far from every prediction"];
+    }
+    if (static_cast<double>(far) > kMostRows * static_cast<double>(white.moves.size()))
+      found->units.push_back(campaign.units[unit].id);
+  }
+  std::sort(found->units.begin(), found->units.end());
+}
+
+}  // namespace focalfleet::sim

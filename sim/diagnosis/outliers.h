@@ -1,0 +1,27 @@
+// Rows that no smooth effect makes, found, counted and named before and after the fit: units that
+// do not move, spots that were not seen, moves that did not happen, fibres under another's name.
+#pragma once
+
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/fit.h"
+
+namespace focalfleet::sim {
+
+/// What can be told from the table alone. `aside` gets the rows that must not enter a fit.
+OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside);
+
+/// Pairs of units whose measured places belong to each other, for all of the campaign.
+std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit);
+
+/// Exchanges the measured places of two units where both were measured in one exposure; rows of
+/// only one become missing.
+void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign);
+
+/// Rows far from the final model, added by reason.
+void FindAfterFit(const Fit& fit, OutliersFound* found);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,231 @@
+#include "sim/diagnosis/select.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+
+#include "sim/diagnosis/chances.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kKeptMin = 0.01;  // of a signature: less is what geometry explains as well
+constexpr int kSwapSweepsMax = 3;
+constexpr double kBetterBy = 0.5;  // logarithm of evidence
+
+double UsualDispersion(const ScorePass& pass, const Templates& templates) {
+  std::vector<double> all;
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    if (pass.scores[k].kept > 0)
+      all.push_back(FleetDispersion(pass.scores[k], templates[k].columns));
+  return all.empty() ? 1 : std::max(1.0, Median(std::move(all)));
+}
+
+std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& templates,
+                                const FleetGroups& groups, const Fit& fit) {
+  const double usual = UsualDispersion(pass, templates);
+  std::vector<Standing> standings(templates.size());
+  constexpr std::size_t kBlock = 16;
+  const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
+  fit.parallel(blocks, [&](std::size_t block) {
+    const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
+    for (std::size_t k = block * kBlock; k < end; ++k)
+      standings[k] = Assess(pass.scores[k], templates[k], groups, usual);
+  });
+  return standings;
+}
+
+Best BestOf(const ScorePass& pass, const std::vector<Standing>& standings, double tests,
+            double family_wise) {
+  Best best;
+  double most = -std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < standings.size(); ++k) {
+    const Score& score = pass.scores[k];
+    if (!(score.kept > kKeptMin * score.raw)) continue;
+    const double log_p = LogLeastOf(standings[k].log_p, tests);
+    if (log_p > std::log(family_wise) || standings[k].evidence <= most) continue;
+    if (std::none_of(standings[k].has.begin(), standings[k].has.end(),
+                     [](char h) { return h != 0; }))
+      continue;
+    most = standings[k].evidence;
+    best = {k, standings[k], log_p};
+  }
+  return best;
+}
+
+bool SameForm(const Template& a, const Template& b) {
+  return a.effect == b.effect && a.axis == b.axis && a.memory == b.memory && a.form == b.form &&
+         a.shape == b.shape && a.covariate == b.covariate;
+}
+
+std::size_t IndexOf(const Templates& templates, const Template& form) {
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    if (SameForm(templates[k], form)) return k;
+  return kNoTerm;
+}
+
+// Amplitudes of a template move linearly: two rounds of noise, weights and step suffice.
+void Refit(Fit* fit) { SettleFit(fit, 2); }
+
+struct Look {
+  ScorePass pass;
+  std::vector<Standing> standings;
+};
+
+Look LookWithout(const Fit& fit, const Templates& templates, const FleetGroups& groups,
+                 std::size_t without) {
+  Look look;
+  look.pass = ScoreTemplates(fit, templates, without);
+  look.standings = AssessAll(look.pass, templates, groups, fit);
+  return look;
+}
+
+void DropTerm(std::size_t at, Fit* fit) {
+  fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(at));
+  StepFit(fit);
+  Refit(fit);
+}
+
+// One look at each term: exchanged, dropped, or kept. True if anything changed.
+bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
+               double tests, Fit* fit) {
+  bool changed = false;
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
+    const Look look = LookWithout(*fit, templates, groups, t);
+    const Best best = BestOf(look.pass, look.standings, tests, rule.family_wise);
+    if (best.at == kNoTerm) {
+      DropTerm(t, fit);
+      return true;
+    }
+    const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
+    const bool better =
+        best.at != own &&
+        (own == kNoTerm || best.standing.evidence > look.standings[own].evidence + kBetterBy);
+    const bool other_level =
+        best.at == own && (best.standing.sharing != fit->model.terms[t].sharing);
+    if (!better && !other_level) continue;
+    fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
+    StepFit(fit);
+    Refit(fit);
+    changed = true;
+  }
+  return changed;
+}
+
+std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const FleetGroups& groups,
+                            std::size_t own, const SelectionRule& rule) {
+  std::map<std::string_view, Rival> by_cause;
+  const Standing& best = look.standings[own];
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    const std::string_view cause = templates[k].effect->cause;
+    if (cause == templates[own].effect->cause) continue;
+    if (!(look.pass.scores[k].kept > kKeptMin * look.pass.scores[k].raw)) continue;
+    const double behind = 2 * (best.evidence - look.standings[k].evidence);
+    const double share =
+        ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
+    if (behind >= rule.rival_behind && share < rule.rival_share) continue;
+    const auto [it, fresh] = by_cause.emplace(cause, Rival{cause, behind, share});
+    if (!fresh && behind < it->second.behind) it->second = {cause, behind, share};
+  }
+  std::vector<Rival> rivals;
+  for (const auto& [cause, rival] : by_cause) rivals.push_back(rival);
+  return rivals;
+}
+
+}  // namespace
+
+ModelTerm MakeTerm(const Template& form, const Standing& standing, const FleetGroups& groups) {
+  ModelTerm term;
+  term.form = form;
+  term.sharing = standing.sharing;
+  const std::size_t units = standing.has.size();
+  std::size_t count = 1;
+  term.group_of_unit.assign(units, 0);
+  if (standing.sharing == Sharing::kUnit) {
+    std::iota(term.group_of_unit.begin(), term.group_of_unit.end(), 0u);
+    count = units;
+  } else if (standing.sharing == Sharing::kRail) {
+    term.group_of_unit = groups.rail, count = groups.rails;
+  } else if (standing.sharing == Sharing::kBus) {
+    term.group_of_unit = groups.bus, count = groups.buses;
+  }
+  for (std::size_t unit = 0; unit < units; ++unit)
+    if (standing.has[unit] == 0) term.group_of_unit[unit] = kNoGroup;
+  term.amplitude.assign(count * form.columns, 0);
+  term.sigma.assign(count * form.columns, 0);
+  // The mixture's size is a grid point: as a prior let it be loose.
+  if (standing.sharing == Sharing::kUnit && !standing.scattered && units > 1)
+    term.spread = 3 * standing.spread;
+  return term;
+}
+
+double SizeOf(const Fit& fit, const ModelTerm& term) {
+  CampaignModel only;
+  only.units = fit.model.units;
+  const Places without = Predict(only, *fit.facts, fit.parallel);
+  only.terms.push_back(term);
+  const Places with = Predict(only, *fit.facts, fit.parallel);
+  double sum = 0, count = 0;
+  const Campaign& campaign = *fit.facts->campaign;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    if (term.group_of_unit[unit] == kNoGroup) continue;
+    double x = 0, y = 0, square = 0, n = 0;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      const double dx = with.x_mm[row] - without.x_mm[row], dy = with.y_mm[row] - without.y_mm[row];
+      x += dx, y += dy, square += dx * dx + dy * dy, n += 1;
+    }
+    if (n == 0) continue;
+    sum += square, count += n;
+  }
+  return count > 0 ? 1e3 * std::sqrt(std::max(sum, 0.0) / count) : 0;
+}
+
+Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
+              double tests, double family_wise) {
+  const double usual = UsualDispersion(pass, templates);
+  std::vector<Standing> standings;
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    standings.push_back(Assess(pass.scores[k], templates[k], groups, usual));
+  return BestOf(pass, standings, tests, family_wise);
+}
+
+Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  const FleetGroups groups = GroupsOf(*fit->facts);
+  Selection selection;
+  for (std::size_t round = 0; round <= rule.terms_max; ++round) {
+    rule.progress("signatures");
+    const Look look = LookWithout(*fit, templates, groups, kNoTerm);
+    if (round == 0) {
+      selection.tests = EffectiveTests(look.pass.scores, templates, rule.seed);
+      for (const Score& score : look.pass.scores)
+        selection.kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
+    }
+    const Best best = BestOf(look.pass, look.standings, selection.tests, rule.family_wise);
+    if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) break;
+    const CampaignModel before = fit->model;
+    fit->model.terms.push_back(MakeTerm(templates[best.at], best.standing, groups));
+    StepFit(fit);
+    Refit(fit);
+    if (SizeOf(*fit, fit->model.terms.back()) < rule.size_min_um) {
+      fit->model = before;
+      UpdateResiduals(fit);
+      Refit(fit);
+      break;
+    }
+    rule.progress("exchanges");
+    for (int sweep = 0; sweep < kSwapSweepsMax; ++sweep)
+      if (!SwapSweep(templates, groups, rule, selection.tests, fit)) break;
+  }
+  rule.progress("rivals");
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
+    const Look look = LookWithout(*fit, templates, groups, t);
+    const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
+    selection.accepted.push_back(
+        {look.standings[own], RivalsOf(look, templates, groups, own, rule)});
+  }
+  return selection;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,388 @@
+#include "sim/diagnosis/standing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <optional>
+
+#include "protocol/base/rng.h"
+#include "sim/diagnosis/chances.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30};  // of the prior size
+constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
+constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
+
+// One group's score along its principal directions.
+struct Direction2 {
+  double b2 = 0;  // squared
+  double g = 0;
+};
+struct GroupScore {
+  std::vector<Direction2> along;
+  double chi_square = 0;
+  [[nodiscard]] double Evidence(double size) const {
+    double sum = 0;
+    const double a2 = size * size;
+    for (const Direction2& d : along)
+      sum += 0.5 * d.b2 * a2 / (1 + a2 * d.g) - 0.5 * std::log1p(a2 * d.g);
+    return sum;
+  }
+};
+
+GroupScore Decompose(const VectorXd& b, const MatrixXd& g, double dispersion) {
+  GroupScore out;
+  if (b.size() == 1) {
+    if (!(g(0, 0) > 0)) return out;
+    out.along.push_back({b[0] * b[0] / (dispersion * dispersion), g(0, 0) / dispersion});
+  } else {
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(g);
+    const double most = solver.eigenvalues().maxCoeff();
+    for (Index k = 0; k < b.size(); ++k) {
+      const double value = solver.eigenvalues()[k];
+      if (!(value > kFlat * most) || !(most > 0)) continue;
+      const double along = solver.eigenvectors().col(k).dot(b);
+      out.along.push_back({along * along / (dispersion * dispersion), value / dispersion});
+    }
+  }
+  for (const Direction2& d : out.along) out.chi_square += d.b2 / d.g;
+  return out;
+}
+
+VectorXd UnitB(const std::vector<double>& values, std::size_t unit, std::size_t c) {
+  return Eigen::Map<const VectorXd>(&values[unit * c], static_cast<Index>(c));
+}
+MatrixXd UnitG(const Score& score, std::size_t unit, std::size_t c) {
+  return Eigen::Map<const MatrixXd>(&score.g[unit * c * c], static_cast<Index>(c),
+                                    static_cast<Index>(c));
+}
+
+// A level: groups with an amplitude each.
+struct Level {
+  Sharing sharing = Sharing::kUnit;
+  std::vector<GroupScore> groups;
+  std::vector<std::uint32_t> group_of_unit;
+};
+
+Level SumLevel(const Score& score, std::size_t c, Sharing sharing,
+               const std::vector<std::uint32_t>& group_of_unit, std::size_t groups,
+               double dispersion) {
+  const auto ic = static_cast<Index>(c);
+  std::vector<VectorXd> b(groups, VectorXd::Zero(ic));
+  std::vector<MatrixXd> g(groups, MatrixXd::Zero(ic, ic));
+  for (std::size_t unit = 0; unit < group_of_unit.size(); ++unit) {
+    if (group_of_unit[unit] == kNoGroup) continue;
+    b[group_of_unit[unit]] += UnitB(score.b, unit, c);
+    g[group_of_unit[unit]] += UnitG(score, unit, c);
+  }
+  Level level{sharing, {}, group_of_unit};
+  for (std::size_t k = 0; k < groups; ++k)
+    level.groups.push_back(Decompose(b[k], g[k], dispersion));
+  return level;
+}
+
+// ln p of the level: its best group among all, or all together.
+double LevelLogP(const Level& level) {
+  double sum = 0, dof = 0, best = 0;
+  double tests = 0;
+  for (const GroupScore& group : level.groups) {
+    if (group.along.empty()) continue;
+    sum += group.chi_square;
+    dof += static_cast<double>(group.along.size());
+    tests += 1;
+    best =
+        std::min(best, LogChiSquareTail(group.chi_square, static_cast<double>(group.along.size())));
+  }
+  if (tests == 0) return 0;
+  const double all = LogChiSquareTail(sum, dof);
+  return tests == 1 ? all : std::min(all, LogLeastOf(best, tests)) + std::log(2.0);
+}
+
+struct MixtureFit {
+  double evidence = -std::numeric_limits<double>::infinity();
+  double size = 0, share = 1;
+};
+
+// Average over sizes and shares; the best of them tells who has it.
+MixtureFit Mix(const Level& level, double prior_size) {
+  MixtureFit best;
+  double most = -std::numeric_limits<double>::infinity();
+  std::vector<double> terms;
+  const bool mixes = level.groups.size() > 1;
+  for (const double relative : kSizes) {
+    const double size = prior_size * relative;
+    std::vector<double> evidence;
+    for (const GroupScore& group : level.groups) evidence.push_back(group.Evidence(size));
+    for (const double share : kShares) {
+      if (!mixes && share < 1) break;
+      double sum = 0;
+      for (const double e : evidence) {
+        if (share >= 1) {
+          sum += e;
+        } else {
+          const double pair[] = {std::log1p(-share), std::log(share) + e};
+          sum += LogSum(pair);
+        }
+      }
+      terms.push_back(sum);
+      if (sum > most) most = sum, best.size = size, best.share = share;
+    }
+  }
+  best.evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
+  return best;
+}
+
+// Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
+struct ScatterFit {
+  double evidence = -std::numeric_limits<double>::infinity();
+  double spread = 0;
+};
+ScatterFit Scatter(const Score& score, double prior_size, double dispersion) {
+  ScatterFit best;
+  std::vector<double> terms;
+  double most = -std::numeric_limits<double>::infinity();
+  const std::size_t units = score.b.size();
+  for (const double relative : {0.01, 0.03, 0.1, 0.3, 1.0, 3.0}) {
+    const double spread = relative * prior_size, s2 = spread * spread;
+    double weight = 0, mean = 0, sum = 0;
+    for (std::size_t u = 0; u < units; ++u) {
+      const double g = score.g[u] / dispersion;
+      if (!(g > 0)) continue;
+      const double w = g / (1 + s2 * g);
+      weight += w;
+      mean += w * score.b[u] / score.g[u];
+    }
+    if (!(weight > 0)) return best;
+    mean /= weight;
+    for (std::size_t u = 0; u < units; ++u) {
+      const double g = score.g[u] / dispersion;
+      if (!(g > 0)) continue;
+      const double own = score.b[u] / score.g[u];
+      sum += -0.5 * std::log1p(s2 * g) + 0.5 * own * own * g -
+             0.5 * (own - mean) * (own - mean) * g / (1 + s2 * g);
+    }
+    // The mean is free: it pays for its own size.
+    const double size = std::max(std::abs(mean), prior_size);
+    sum -= 0.5 * std::log1p(size * size * weight);
+    terms.push_back(sum);
+    if (sum > most) most = sum, best.spread = spread;
+  }
+  best.evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
+  return best;
+}
+
+void TakeMixture(const Level& level, const MixtureFit& fit, Standing* out) {
+  out->sharing = level.sharing;
+  out->evidence = fit.evidence;
+  out->spread = fit.size;
+  out->scattered = false;
+  out->chi_square = 0;
+  out->has.assign(level.group_of_unit.size(), 0);
+  std::vector<char> group_has(level.groups.size(), 0);
+  for (std::size_t k = 0; k < level.groups.size(); ++k) {
+    if (level.groups[k].along.empty()) continue;
+    const double odds = fit.share >= 1 ? 1
+                                       : std::log(fit.share) - std::log1p(-fit.share) +
+                                             level.groups[k].Evidence(fit.size);
+    group_has[k] = odds > 0 ? 1 : 0;
+    if (group_has[k] != 0) out->chi_square += level.groups[k].chi_square;
+  }
+  for (std::size_t u = 0; u < level.group_of_unit.size(); ++u)
+    if (level.group_of_unit[u] != kNoGroup) out->has[u] = group_has[level.group_of_unit[u]];
+}
+
+double UnitDispersion(const Score& score) {
+  // One unit's own estimate is noisy: some prior weight at 1.
+  constexpr double kPrior = 4;
+  return (score.spread_sum + kPrior) / (score.spread_count + kPrior);
+}
+
+std::vector<std::uint32_t> Each(std::size_t units) {
+  std::vector<std::uint32_t> each(units);
+  std::iota(each.begin(), each.end(), 0u);
+  return each;
+}
+
+std::vector<std::uint32_t> Numbered(std::span<const double> ids, std::span<const std::size_t> first,
+                                    std::size_t* groups) {
+  std::map<double, std::uint32_t> number;
+  std::vector<std::uint32_t> of;
+  for (std::size_t unit = 0; unit + 1 < first.size(); ++unit) {
+    if (first[unit] == first[unit + 1]) {
+      of.push_back(kNoGroup);
+      continue;
+    }
+    const auto [it, fresh] =
+        number.emplace(ids[first[unit]], static_cast<std::uint32_t>(number.size()));
+    of.push_back(it->second);
+  }
+  *groups = number.size();
+  return of;
+}
+
+}  // namespace
+
+FleetGroups GroupsOf(const CampaignFacts& facts) {
+  FleetGroups groups;
+  const Campaign& campaign = *facts.campaign;
+  if (const FilledColumn* rail = facts.Find("rail_id"))
+    groups.rail = Numbered(rail->values, campaign.first_row, &groups.rails);
+  if (const FilledColumn* bus = facts.Find("bus_id"))
+    groups.bus = Numbered(bus->values, campaign.first_row, &groups.buses);
+  if (groups.rails < 2) groups.rails = 0;
+  if (groups.buses < 2) groups.buses = 0;
+  return groups;
+}
+
+double FleetDispersion(const Score& score, std::size_t columns) {
+  const auto c = static_cast<Index>(columns);
+  VectorXd b = VectorXd::Zero(c);
+  MatrixXd g = MatrixXd::Zero(c, c);
+  const std::size_t exposures = score.exposure_b.size() / columns;
+  const auto at_b = [&](std::size_t e) {
+    return Eigen::Map<const VectorXd>(&score.exposure_b[e * columns], c);
+  };
+  const auto at_g = [&](std::size_t e) {
+    return Eigen::Map<const MatrixXd>(&score.exposure_g[e * columns * columns], c, c);
+  };
+  for (std::size_t e = 0; e < exposures; ++e) b += at_b(e), g += at_g(e);
+  if (!(g.trace() > 0)) return 1;
+  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(g);
+  const VectorXd own = solver.solve(b);
+  double sum = 0, fourth = 0;
+  for (std::size_t e = 0; e < exposures; ++e) {
+    const VectorXd v = at_b(e) - at_g(e) * own;
+    sum += v.dot(solver.solve(v));
+    fourth += at_g(e).trace() * at_g(e).trace();
+  }
+  // Few exposures carry the score: their own dispersion says little.
+  const double effective = g.trace() * g.trace() / std::max(fourth, 1e-300);
+  constexpr double kPrior = 6;
+  const double raw = sum / static_cast<double>(c) * effective / std::max(effective - 1, 1.0);
+  return (effective * raw + kPrior) / (effective + kPrior);
+}
+
+Standing Assess(const Score& score, const Template& form, const FleetGroups& groups,
+                double usual_dispersion) {
+  const std::size_t c = form.columns;
+  const std::size_t units = score.b.size() / c;
+  const double prior = form.effect->prior_size;
+  Standing best;
+  best.dispersion = std::max(1.0, UnitDispersion(score));
+  std::vector<Level> levels;
+  levels.push_back(SumLevel(score, c, Sharing::kUnit, Each(units), units, best.dispersion));
+  if (units > 1) {
+    // Shared noise counts for what is shared.
+    constexpr double kPrior = 8;
+    const double fleet = std::max(
+        1.0, (FleetDispersion(score, c) * kPrior + usual_dispersion * kPrior) / (2 * kPrior));
+    Level all{Sharing::kFleet,
+              {Decompose(score.fleet_b, score.fleet_g, fleet)},
+              std::vector<std::uint32_t>(units, 0)};
+    if (groups.rails > 0)
+      levels.push_back(
+          SumLevel(score, c, Sharing::kRail, groups.rail, groups.rails, best.dispersion));
+    if (groups.buses > 0)
+      levels.push_back(
+          SumLevel(score, c, Sharing::kBus, groups.bus, groups.buses, best.dispersion));
+    levels.push_back(std::move(all));
+  }
+  best.evidence = -std::numeric_limits<double>::infinity();
+  best.log_p = 0;
+  for (const Level& level : levels) best.log_p = std::min(best.log_p, LevelLogP(level));
+  best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
+  // Chance explains it: no need to know who has it.
+  constexpr double kWorthALook = -3;
+  if (best.log_p > kWorthALook) {
+    best.evidence = 0;
+    best.has.assign(units, 0);
+    return best;
+  }
+  for (const Level& level : levels) {
+    const MixtureFit fit = Mix(level, prior);
+    if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
+  }
+  if (units > 2 && c == 1) {
+    const ScatterFit scatter = Scatter(score, prior, best.dispersion);
+    // Only as a refinement of what is shared by all: a scatter that pays for itself.
+    if (scatter.evidence > best.evidence + 3) {
+      best.sharing = Sharing::kUnit;
+      best.evidence = scatter.evidence;
+      best.spread = 0;
+      best.scattered = true;
+      best.has.assign(units, 1);
+      best.chi_square = 0;
+      for (const GroupScore& group : levels.front().groups) best.chi_square += group.chi_square;
+    }
+  }
+  return best;
+}
+
+double ShareOfTarget(const Score& score, const Template& form, const Standing& as,
+                     const FleetGroups& groups, double target_square) {
+  if (!(target_square > 0)) return 0;
+  const std::size_t c = form.columns;
+  const std::size_t units = score.b.size() / c;
+  double taken = 0;
+  if (as.sharing == Sharing::kFleet) {
+    taken = Decompose(score.fleet_target_b, score.fleet_g, 1).chi_square;
+  } else {
+    std::vector<std::uint32_t> group_of = Each(units);
+    std::size_t count = units;
+    if (as.sharing == Sharing::kRail) group_of = groups.rail, count = groups.rails;
+    if (as.sharing == Sharing::kBus) group_of = groups.bus, count = groups.buses;
+    Score target = score;
+    target.b = score.target_b;
+    for (const GroupScore& group : SumLevel(target, c, as.sharing, group_of, count, 1).groups)
+      taken += group.chi_square;
+  }
+  return std::clamp(taken / target_square, 0.0, 1.0);
+}
+
+double EffectiveTests(const std::vector<Score>& scores, const Templates& templates,
+                      std::uint64_t seed) {
+  constexpr std::size_t kFlips = 200;
+  constexpr std::size_t kExposuresMin = 12;
+  constexpr double kShare = 0.1;
+  const auto all = static_cast<double>(templates.size());
+  if (scores.empty()) return 1;
+  const std::size_t exposures = scores[0].exposure_b.size() / templates[0].columns;
+  if (exposures < kExposuresMin) return std::max(all, 1.0);
+  // First columns only; further columns of a template go the same way.
+  std::vector<double> scale(scores.size());
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    const std::size_t c = templates[k].columns;
+    double square = 0;
+    for (std::size_t e = 0; e < exposures; ++e) {
+      const double b = scores[k].exposure_b[e * c];
+      square += b * b;
+    }
+    scale[k] = square > 0 ? 1 / square : 0;
+  }
+  Rng rng = Rng::Stream(seed, "flips");
+  std::vector<double> least(kFlips);
+  std::vector<double> sign(exposures);
+  for (double& p : least) {
+    for (double& s : sign) s = rng.Uniform() < 0.5 ? -1 : 1;
+    double most = 0;
+    for (std::size_t k = 0; k < scores.size(); ++k) {
+      const std::size_t c = templates[k].columns;
+      double sum = 0;
+      for (std::size_t e = 0; e < exposures; ++e) sum += sign[e] * scores[k].exposure_b[e * c];
+      most = std::max(most, sum * sum * scale[k]);
+    }
+    p = LogChiSquareTail(most, 1);
+  }
+  const double low = std::exp(Quantile(least, kShare));
+  return std::clamp(-std::log1p(-kShare) / std::max(low, 1e-12), 1.0, std::max(all, 1.0));
+}
+
+}  // namespace focalfleet::sim
