@@ -1,0 +1,185 @@
+#include "daemon/campaign/diagnosis_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "fleet/files/csv.h"
+
+namespace focalfleet {
+namespace {
+
+using nlohmann::json;
+
+json Finite(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json CauseJson(const sim::CauseFound& cause) {
+  json units = cause.all_units ? json("all") : json(cause.units);
+  return {{"cause", cause.cause},
+          {"candidates", cause.candidates},
+          {"axis", cause.axis},
+          {"scope", cause.scope},
+          {"units", units},
+          {"amplitude", Finite(cause.amplitude)},
+          {"amplitude_unit", cause.amplitude_unit},
+          {"ci95", {Finite(cause.ci95[0]), Finite(cause.ci95[1])}},
+          {"rms_um", Finite(cause.size_um)},
+          {"delta_log_likelihood", Finite(cause.delta_log_likelihood)},
+          {"predicted_gain_um", Finite(cause.predicted_gain_um)},
+          {"shape", cause.shape}};
+}
+
+json GainJson(const sim::HeldOutGain& gain) {
+  return {{"rms_before_um", Finite(gain.rms_before_um)},
+          {"rms_after_um", Finite(gain.rms_after_um)},
+          {"noise_floor_um", Finite(gain.noise_floor_um)},
+          {"explained_fraction", Finite(gain.explained_share)},
+          {"mad_before_um", Finite(gain.mad_before_um)},
+          {"mad_after_um", Finite(gain.mad_after_um)},
+          {"held_out", gain.held_out}};
+}
+
+std::string Quoted(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') out += '\\';
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "\"";
+}
+
+std::string NumberList(std::span<const double> values) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < values.size(); ++i)
+    text += (i == 0 ? "" : ", ") +
+            (std::isfinite(values[i]) ? fmt::format("{:.9g}", values[i]) : "nan");
+  return text + "]";
+}
+
+const char* SharingWord(sim::Sharing sharing) {
+  switch (sharing) {
+    case sim::Sharing::kRail:
+      return "rail";
+    case sim::Sharing::kBus:
+      return "bus";
+    case sim::Sharing::kFleet:
+      return "fleet";
+    case sim::Sharing::kUnit:
+      break;
+  }
+  return "unit";
+}
+
+std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis) {
+  std::string text = "\n[[effect]]\n";
+  text += "cause = " + Quoted(term.form.effect->cause) + "\n";
+  text += "axis = " + Quoted(sim::Name(term.form.axis)) + "\n";
+  text += fmt::format("form = {}\nshape = {:.9g}\nmemory = {}\n", term.form.form, term.form.shape,
+                      static_cast<int>(term.form.memory));
+  text += "shape_text = " + Quoted(term.form.label) + "\n";
+  text += "amplitude_unit = " + Quoted(term.form.effect->amplitude_unit) + "\n";
+  text += fmt::format("shared_by = \"{}\"\n", SharingWord(term.sharing));
+  for (const sim::CauseFound& cause : diagnosis.causes)
+    if (cause.cause == term.form.effect->cause) {
+      text += "candidates = [";
+      for (std::size_t i = 0; i < cause.candidates.size(); ++i)
+        text += (i == 0 ? "" : ", ") + Quoted(cause.candidates[i]);
+      text += "]\n";
+      break;
+    }
+  std::vector<double> units, amplitude, sigma;
+  for (std::size_t u = 0; u < term.group_of_unit.size(); ++u) {
+    const auto own = term.AmplitudeOf(u);
+    if (own.empty()) continue;
+    units.push_back(diagnosis.model.units[u].id);
+    amplitude.insert(amplitude.end(), own.begin(), own.end());
+    const std::size_t at = term.group_of_unit[u] * term.form.columns;
+    for (std::size_t c = 0; c < term.form.columns; ++c) sigma.push_back(term.sigma[at + c]);
+  }
+  text += fmt::format("columns = {}\n", term.form.columns);
+  text += "units = " + NumberList(units) + "\n";
+  text += "amplitude = " + NumberList(amplitude) + "\n";
+  text += "sigma = " + NumberList(sigma) + "\n";
+  return text;
+}
+
+}  // namespace
+
+json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
+  json causes = json::array();
+  for (const sim::CauseFound& cause : diagnosis.causes) causes.push_back(CauseJson(cause));
+  json unknown = json::array();
+  for (const sim::UnknownFound& found : diagnosis.unknown)
+    unknown.push_back({{"covariate", found.covariate},
+                       {"channel", found.channel},
+                       {"p_value", Finite(found.p_value)},
+                       {"rms_um", Finite(found.size_um)}});
+  json not_testable = json::array();
+  for (const sim::NotTestable& cause : diagnosis.not_testable)
+    not_testable.push_back({{"cause", cause.cause}, {"why", cause.why}});
+  json report{{"verdict", sim::Name(diagnosis.verdict)},
+              {"causes", causes},
+              {"unknown", unknown},
+              {"not_testable", not_testable},
+              {"outliers",
+               {{"rows", diagnosis.outliers.rows},
+                {"units", diagnosis.outliers.units},
+                {"why", json(diagnosis.outliers.why)}}},
+              {"gain", GainJson(diagnosis.gain)},
+              {"data",
+               {{"rows", diagnosis.rows},
+                {"units", diagnosis.units},
+                {"moves", diagnosis.moves},
+                {"sha256", names.sha256}}},
+              {"model", {{"before", names.model_before}, {"after", names.model_after}}}};
+  if (!diagnosis.insufficient.empty()) report["missing"] = diagnosis.insufficient;
+  return report;
+}
+
+std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names) {
+  std::string text = "# The extended model of a campaign, made by `focalfleet diagnose`.\n";
+  text += "name = " + Quoted(names.model_after) + "\n";
+  text += "campaign = " + Quoted(names.campaign) + "\n";
+  text += "campaign_sha256 = " + Quoted(names.sha256) + "\n";
+  text += "verdict = " + Quoted(sim::Name(diagnosis.verdict)) + "\n";
+  text += fmt::format("rms_before_um = {:.9g}\nrms_after_um = {:.9g}\n",
+                      diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
+  for (const sim::ModelTerm& term : diagnosis.model.terms) text += TermText(term, diagnosis);
+  for (const sim::CampaignUnit& unit : diagnosis.model.units) {
+    text += fmt::format("\n[[unit]]\nunit_id = {}\n", unit.id);
+    text += fmt::format("base_x_mm = {:.9g}\nbase_y_mm = {:.9g}\n", unit.base_x_mm, unit.base_y_mm);
+    text +=
+        fmt::format("arm_theta_mm = {:.9g}\narm_phi_mm = {:.9g}\n", unit.arm_mm[0], unit.arm_mm[1]);
+    text += fmt::format("theta_zero_deg = {:.9g}\nphi_zero_deg = {:.9g}\n", unit.zero_deg[0],
+                        unit.zero_deg[1]);
+  }
+  return text;
+}
+
+std::string VerdictSentence(const sim::Diagnosis& diagnosis) {
+  if (diagnosis.verdict == sim::Verdict::kInsufficient)
+    return "Insufficient: " + diagnosis.insufficient + ".";
+  if (diagnosis.verdict == sim::Verdict::kConsistent)
+    return fmt::format(
+        "Consistent: the simulation explains the data to their noise ({:.1f} um rms).",
+        diagnosis.gain.rms_after_um);
+  std::string what;
+  for (const sim::CauseFound& cause : diagnosis.causes) {
+    std::string name = cause.cause;
+    for (std::size_t i = 1; i < cause.candidates.size(); ++i) name += " or " + cause.candidates[i];
+    if (cause.axis == "theta" || cause.axis == "phi") name += " of " + cause.axis;
+    what += (what.empty() ? "" : ", ") + fmt::format("{} ({:.1f} um)", name, cause.size_um);
+  }
+  const char* word = diagnosis.verdict == sim::Verdict::kUnknown     ? "Unknown"
+                     : diagnosis.verdict == sim::Verdict::kAmbiguous ? "Ambiguous"
+                                                                     : "Explained";
+  std::string text = fmt::format("{}: {}", word, what.empty() ? "no named cause" : what);
+  if (!diagnosis.unknown.empty())
+    text += fmt::format("; structure that no candidate explains remains against {} ({:.1f} um)",
+                        diagnosis.unknown.front().covariate, diagnosis.unknown.front().size_um);
+  return text + fmt::format("; held-out rms {:.1f} um before, {:.1f} um after.",
+                            diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
+}
+
+}  // namespace focalfleet

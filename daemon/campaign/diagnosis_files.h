@@ -1,0 +1,29 @@
+// What `focalfleet diagnose` leaves behind for programs: report.json (the fields of
+// docs/diagnosis.md) and model.toml (the extended model: fitted geometry, and every accepted
+// effect with its amplitudes, their uncertainty and the campaign they came from).
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+
+#include "protocol/base/result.h"
+#include "sim/diagnosis/diagnosis.h"
+
+namespace focalfleet {
+
+struct ReportNames {
+  std::string sha256;  // of moves.csv and units.csv
+  std::string model_before = "nominal";
+  std::string model_after = "extended";
+  std::string campaign;
+};
+
+nlohmann::json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names);
+
+std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names);
+
+/// The verdict in one sentence, for people.
+std::string VerdictSentence(const sim::Diagnosis& diagnosis);
+
+}  // namespace focalfleet
