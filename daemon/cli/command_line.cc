@@ -28,8 +28,8 @@ void AddGlobalOptions(CommandLine* line) {
 }
 
 // What never asks a daemon ends with kRefused where its answer cannot be told.
-constexpr std::array<std::string_view, 9> kOffline = {
-    "can", "completion", "estimate", "layout", "plan", "reproduce", "simulate", "targets", "tune"};
+constexpr std::array<std::string_view, 10> kOffline = {
+    "can", "completion", "diagnose", "estimate", "layout", "plan", "reproduce", "simulate", "targets", "tune"};
 
 /// The deepest command of the tree that the line named.
 const CLI::App& Chosen(const CLI::App& app) {
@@ -131,6 +131,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddStopCommand(line.get());
   AddUnitCommands(line.get());
   AddSimulateCommand(line.get());
+  AddDiagnoseCommand(line.get());
   AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
   AddCanCommands(line.get());

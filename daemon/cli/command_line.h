@@ -60,6 +60,8 @@ void AddWatchCommand(CommandLine* line);
 void AddStopCommand(CommandLine* line);
 void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, params
 void AddSimulateCommand(CommandLine* line);
+void AddSimulateCampaign(CLI::App* parent, CommandLine* line);
+void AddDiagnoseCommand(CommandLine* line);
 void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
 void AddCanCommands(CommandLine* line);

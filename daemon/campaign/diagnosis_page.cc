@@ -1,0 +1,178 @@
+#include "daemon/campaign/diagnosis_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/report/page.h"
+#include "fleet/files/csv.h"
+
+namespace focalfleet {
+namespace {
+
+using report::Align;
+using sim::Campaign;
+using sim::Diagnosis;
+
+constexpr std::size_t kPointsMax = 4000;
+constexpr std::size_t kCovariatesMax = 6;
+
+void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
+  page->Heading("Causes");
+  if (diagnosis.causes.empty()) {
+    page->Paragraph("No misfit that chance does not explain.");
+    return;
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const sim::CauseFound& cause : diagnosis.causes) {
+    std::string rivals;
+    for (std::size_t k = 1; k < cause.candidates.size(); ++k)
+      rivals += (rivals.empty() ? "" : ", ") + cause.candidates[k];
+    rows.push_back({cause.cause, rivals.empty() ? "none" : rivals, cause.axis, cause.scope,
+                    cause.all_units ? "all" : std::to_string(cause.units.size()),
+                    fmt::format("{:.4g} ({:.4g} to {:.4g}) {}", cause.amplitude, cause.ci95[0],
+                                cause.ci95[1], cause.amplitude_unit),
+                    fmt::format("{:.2f}", cause.size_um),
+                    fmt::format("{:.0f}", 2 * cause.delta_log_likelihood), cause.shape});
+  }
+  page->Table({"cause", "cannot be told from", "axis", "scope", "units", "amplitude (95 %)",
+               "rms at the fibre (um)", "2 d ln L", "shape"},
+              rows,
+              {Align::kLeft, Align::kLeft, Align::kLeft, Align::kLeft, Align::kRight, Align::kLeft,
+               Align::kRight, Align::kRight, Align::kLeft});
+  for (const sim::CauseFound& cause : diagnosis.causes)
+    page->Paragraph(cause.cause + ": " + cause.paragraph);
+}
+
+void AddGain(const Diagnosis& diagnosis, report::Page* page) {
+  const sim::HeldOutGain& gain = diagnosis.gain;
+  page->Heading("Gain on moves that no fit has seen");
+  page->Paragraph(gain.held_out + ".");
+  page->Plot(report::DrawBars(
+      {.title = "2-D residual",
+       .categories = {"rms", "median"},
+       .y = {.label = "residual", .unit = "um"},
+       .groups = {{"static geometry alone", {gain.rms_before_um, gain.mad_before_um}},
+                  {"extended model", {gain.rms_after_um, gain.mad_after_um}}},
+       .horizontal = {{gain.noise_floor_um, "noise"}}}));
+}
+
+// x against y of at most kPointsMax rows.
+void AddScatter(const std::vector<double>& x, const std::vector<double>& y, std::size_t stride,
+                std::vector<double>* to_x, std::vector<double>* to_y) {
+  for (std::size_t row = 0; row < x.size(); row += stride)
+    if (std::isfinite(x[row]) && std::isfinite(y[row]))
+      to_x->push_back(x[row]), to_y->push_back(y[row]);
+}
+
+std::vector<double> Lengths(const std::vector<double>& x, const std::vector<double>& y) {
+  std::vector<double> lengths(x.size());
+  for (std::size_t row = 0; row < x.size(); ++row) lengths[row] = std::hypot(x[row], y[row]);
+  return lengths;
+}
+
+void AddAgainst(const std::string& name, const std::vector<double>& column,
+                const std::vector<double>& before, const std::vector<double>& after,
+                report::Page* page) {
+  const std::size_t stride = std::max<std::size_t>(1, column.size() / kPointsMax);
+  std::vector<double> bx, by, ax, ay;
+  AddScatter(column, before, stride, &bx, &by);
+  AddScatter(column, after, stride, &ax, &ay);
+  if (bx.empty() ||
+      *std::min_element(bx.begin(), bx.end()) == *std::max_element(bx.begin(), bx.end()))
+    return;
+  page->Plot(report::DrawLines(
+      {.title = "residual against " + name,
+       .x = {.label = name},
+       .y = {.label = "residual", .unit = "um"},
+       .series = {{.name = "before", .x = bx, .y = by, .style = report::Style::kDots},
+                  {.name = "after", .x = ax, .y = ay, .style = report::Style::kDots}}}));
+}
+
+void AddResiduals(const Campaign& campaign, const Diagnosis& diagnosis, report::Page* page) {
+  if (diagnosis.x_before_um.empty() || diagnosis.x_after_um.empty()) return;
+  page->Heading("Residuals");
+  const std::size_t stride = std::max<std::size_t>(1, campaign.rows() / kPointsMax);
+  std::vector<double> bx, by, ax, ay;
+  AddScatter(diagnosis.x_before_um, diagnosis.y_before_um, stride, &bx, &by);
+  AddScatter(diagnosis.x_after_um, diagnosis.y_after_um, stride, &ax, &ay);
+  page->Plot(report::DrawLines(
+      {.title = "residual vectors",
+       .x = {.label = "x", .unit = "um"},
+       .y = {.label = "y", .unit = "um"},
+       .series = {{.name = "before", .x = bx, .y = by, .style = report::Style::kDots},
+                  {.name = "after", .x = ax, .y = ay, .style = report::Style::kDots}},
+       .height_px = 480}));
+  const std::vector<double> before = Lengths(diagnosis.x_before_um, diagnosis.y_before_um);
+  const std::vector<double> after = Lengths(diagnosis.x_after_um, diagnosis.y_after_um);
+  AddAgainst("theta_cmd_deg", campaign.cmd_deg[sim::kTheta], before, after, page);
+  AddAgainst("phi_cmd_deg", campaign.cmd_deg[sim::kPhi], before, after, page);
+  std::size_t shown = 0;
+  for (const sim::Covariate& covariate : campaign.covariates)
+    if (shown < kCovariatesMax && covariate.name != "sigma_um") {
+      AddAgainst(covariate.name, covariate.values, before, after, page);
+      ++shown;
+    }
+}
+
+void AddRest(const Diagnosis& diagnosis, const std::vector<sim::ProposedMove>& moves,
+             report::Page* page) {
+  if (!diagnosis.unknown.empty()) {
+    page->Heading("What no candidate explains");
+    std::vector<std::vector<std::string>> rows;
+    for (const sim::UnknownFound& found : diagnosis.unknown)
+      rows.push_back({found.covariate, found.channel, fmt::format("{:.2g}", found.p_value),
+                      fmt::format("{:.2f}", found.size_um)});
+    page->Table({"against", "in", "p", "rms (um)"}, rows);
+  }
+  page->Heading("Moves to make next");
+  page->Paragraph(moves.empty()
+                      ? "Nothing is confusable: no further moves are needed to tell causes apart."
+                      : fmt::format("next_moves.csv has {} moves that would separate {}.",
+                                    moves.size(), moves.front().separates));
+  if (!diagnosis.outliers.why.empty()) {
+    page->Heading("Rows left out or far off");
+    std::vector<std::vector<std::string>> rows;
+    for (const auto& [why, count] : diagnosis.outliers.why)
+      rows.push_back({why, std::to_string(count)});
+    page->Table({"why", "rows"}, rows, {Align::kLeft, Align::kRight});
+  }
+  if (!diagnosis.not_testable.empty()) {
+    page->Heading("What these data cannot test");
+    std::vector<std::vector<std::string>> rows;
+    for (const sim::NotTestable& cause : diagnosis.not_testable)
+      rows.push_back({cause.cause, cause.why});
+    page->Table({"cause", "why"}, rows);
+  }
+}
+
+}  // namespace
+
+std::string DiagnosisPage(const Campaign& campaign, const Diagnosis& diagnosis,
+                          const ReportNames& names) {
+  report::Page page("Diagnosis of " + names.campaign);
+  page.Paragraph(VerdictSentence(diagnosis));
+  page.Paragraph(fmt::format("{} rows of {} units, {} moves; SHA-256 of the tables {}.",
+                             diagnosis.rows, diagnosis.units, diagnosis.moves, names.sha256));
+  if (diagnosis.verdict == sim::Verdict::kInsufficient) return page.Html();
+  AddCauses(diagnosis, &page);
+  AddGain(diagnosis, &page);
+  AddResiduals(campaign, diagnosis, &page);
+  AddRest(diagnosis, ProposeMoves(campaign, diagnosis), &page);
+  return page.Html();
+}
+
+std::string WriteNextMoves(const std::vector<sim::ProposedMove>& moves) {
+  CsvWriter csv({"move_id", "theta_from_middle_deg", "phi_from_middle_deg", "drive_amplitude",
+                 "delay_s", "movers_share", "rehomed", "separates"});
+  std::int64_t id = 1;
+  for (const sim::ProposedMove& move : moves) {
+    csv.Integer(id++).Number(move.theta_deg).Number(move.phi_deg).Number(move.drive_amplitude);
+    csv.Number(move.delay_s).Number(move.movers_share).Integer(move.home_first ? 1 : 0);
+    csv.Text(move.separates).EndRow();
+  }
+  return csv.Take();
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,250 @@
+// diagnose: what the simulation gets wrong about a measured campaign, by name.
+// simulate campaign: a made-up campaign with chosen effects in it.
+
+#include <fmt/format.h>
+
+#include <atomic>
+#include <charconv>
+#include <filesystem>
+#include <thread>
+
+#include "daemon/campaign/campaign_files.h"
+#include "daemon/campaign/diagnosis_files.h"
+#include "daemon/campaign/diagnosis_page.h"
+#include "daemon/campaign/sha256.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/progress_bar.h"
+#include "daemon/cli/table.h"
+#include "daemon/cli/text_file.h"
+#include "sim/diagnosis/next_moves.h"
+#include "sim/diagnosis/planted.h"
+#include "sim/effects/registry.h"
+
+namespace focalfleet::cli {
+namespace {
+
+struct DiagnoseCommandOptions {
+  std::string campaign;
+  std::string out;
+  std::uint64_t seed = 1;
+  int threads = 0;  // 0: as many as the machine has
+  std::vector<std::string> leave_out;
+  std::uint64_t shuffle = 0;
+};
+
+sim::ParallelFor OnThreads(int threads) {
+  const unsigned count = threads > 0 ? static_cast<unsigned>(threads)
+                                     : std::max(1u, std::thread::hardware_concurrency());
+  if (count == 1) return sim::OneAfterTheOther();
+  return [count](std::size_t chunks, const std::function<void(std::size_t)>& work) {
+    std::atomic<std::size_t> next{0};
+    const auto take = [&] {
+      for (std::size_t chunk = 0; (chunk = next++) < chunks;) work(chunk);
+    };
+    std::vector<std::thread> others;
+    for (unsigned k = 1; k < count; ++k) others.emplace_back(take);
+    take();
+    for (std::thread& other : others) other.join();
+  };
+}
+
+struct ReadIn {
+  sim::Campaign campaign;
+  ReportNames names;
+};
+
+Result<ReadIn> ReadFolder(const std::string& folder) {
+  const std::filesystem::path path(folder);
+  const std::string moves_file = path / "moves.csv", units_file = path / "units.csv";
+  FOCALFLEET_TRY_ASSIGN(const std::string moves, ReadTextFile(moves_file));
+  FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTextFile(units_file));
+  ReadIn in;
+  in.names.campaign = path.filename().empty() ? path.parent_path().filename() : path.filename();
+  FOCALFLEET_TRY_ASSIGN(in.campaign, ReadCampaign({.moves = moves,
+                                                   .units = units,
+                                                   .moves_file = moves_file,
+                                                   .units_file = units_file,
+                                                   .name = in.names.campaign}));
+  in.names.sha256 = Sha256Hex(moves + units);
+  in.names.model_after = in.names.campaign + "-extended";
+  return in;
+}
+
+Status CheckCauses(const std::vector<std::string>& causes) {
+  for (const std::string& cause : causes)
+    if (sim::FindEffect(cause) == nullptr)
+      return Fail(ErrorCode::kInvalid, "--without: there is no effect '" + cause + "'");
+  return {};
+}
+
+Status WriteReport(const std::filesystem::path& out, const ReadIn& in,
+                   const sim::Diagnosis& diagnosis, const Json& report) {
+  std::error_code failed;
+  std::filesystem::create_directories(out, failed);
+  if (failed)
+    return Fail(ErrorCode::kUnavailable, fmt::format("{}: {}", out.string(), failed.message()));
+  FOCALFLEET_TRY(WriteFileAtomically(out / "model.toml", WriteModel(diagnosis, in.names)));
+  FOCALFLEET_TRY(WriteFileAtomically(out / "next_moves.csv",
+                                     WriteNextMoves(sim::ProposeMoves(in.campaign, diagnosis))));
+  FOCALFLEET_TRY(
+      WriteFileAtomically(out / "report.html", DiagnosisPage(in.campaign, diagnosis, in.names)));
+  // Last: where it is, all is.
+  return WriteFileAtomically(out / "report.json",
+                             report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+std::string CauseTable(const sim::Diagnosis& diagnosis) {
+  TextRows rows = {
+      {"cause", "axis", "scope", "units", "amplitude", "um rms", "2 d ln L", "rivals"}};
+  for (const sim::CauseFound& cause : diagnosis.causes) {
+    std::string rivals;
+    for (std::size_t k = 1; k < cause.candidates.size(); ++k)
+      rivals += (rivals.empty() ? "" : ", ") + cause.candidates[k];
+    rows.push_back({cause.cause, cause.axis, cause.scope,
+                    cause.all_units ? "all" : std::to_string(cause.units.size()),
+                    fmt::format("{:.4g} {}", cause.amplitude, cause.amplitude_unit),
+                    fmt::format("{:.2f}", cause.size_um),
+                    fmt::format("{:.0f}", 2 * cause.delta_log_likelihood),
+                    rivals.empty() ? "-" : rivals});
+  }
+  return AlignColumns(rows);
+}
+
+ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& options) {
+  if (const auto known = CheckCauses(options.leave_out); !known)
+    return Report(context, known.error(), ExitCode::kUsage);
+  const auto in = ReadFolder(options.campaign);
+  if (!in) return Report(context, in.error());
+  sim::Diagnosis diagnosis;
+  {
+    ProgressBar bar(context);
+    sim::DiagnoseOptions wanted{.seed = options.seed,
+                                .leave_out = options.leave_out,
+                                .shuffle_library = options.shuffle,
+                                .parallel = OnThreads(options.threads)};
+    wanted.progress = [&](double share, std::string_view stage) {
+      bar.Show(share, "diagnosing", std::string(stage));
+    };
+    diagnosis = sim::Diagnose(in->campaign, wanted);
+  }
+  const Json report = ReportJson(diagnosis, in->names);
+  if (const auto written = WriteReport(options.out, *in, diagnosis, report); !written)
+    return Report(context, written.error());
+  if (context.json) PrintJson(report);
+  Say(context, VerdictSentence(diagnosis));
+  if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
+  Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv}");
+  return ExitCode::kOk;
+}
+
+// ---- simulate campaign
+
+struct SimulateCampaignOptions {
+  sim::PlantedOptions planted;
+  std::vector<std::string> effects;
+  std::string out;
+};
+
+Result<sim::PlantedEffect> EffectOf(const std::string& text) {
+  // cause[:axis]=amplitude
+  const std::size_t equals = text.find('=');
+  const std::size_t colon = text.find(':');
+  sim::PlantedEffect effect;
+  effect.cause = text.substr(0, std::min(equals, colon));
+  if (colon < equals) effect.axis = text.substr(colon + 1, equals - colon - 1);
+  const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
+  const auto [end, problem] =
+      std::from_chars(number.data(), number.data() + number.size(), effect.amplitude);
+  if (number.empty() || problem != std::errc() || end != number.data() + number.size())
+    return Fail(ErrorCode::kInvalid,
+                "--effect " + text + ": cause=amplitude or cause:axis=amplitude is expected");
+  return effect;
+}
+
+ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptions& options) {
+  sim::PlantedOptions planted = options.planted;
+  for (const std::string& text : options.effects) {
+    const auto effect = EffectOf(text);
+    if (!effect) return Report(context, effect.error(), ExitCode::kUsage);
+    planted.effects.push_back(*effect);
+  }
+  const auto campaign = sim::PlantCampaign(planted);
+  if (!campaign) return Report(context, campaign.error(), ExitCode::kUsage);
+  std::error_code failed;
+  std::filesystem::create_directories(options.out, failed);
+  if (failed)
+    return Report(context, Error{ErrorCode::kUnavailable, options.out + ": " + failed.message()});
+  const std::filesystem::path folder(options.out);
+  for (const auto& [name, text] : {std::pair("units.csv", WriteCampaignUnits(*campaign)),
+                                   std::pair("moves.csv", WriteMoves(*campaign))})
+    if (const auto written = WriteFileAtomically(folder / name, text); !written)
+      return Report(context, written.error());
+  if (context.json)
+    PrintJson({{"out", options.out},
+               {"units", campaign->units.size()},
+               {"rows", campaign->rows()},
+               {"seed", planted.seed}});
+  Say(context, fmt::format("{}/{{units.csv, moves.csv}}: {} rows of {} units", options.out,
+                           campaign->rows(), campaign->units.size()));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddDiagnoseCommand(CommandLine* line) {
+  CLI::App* command = AddCommand(
+      &line->app, "diagnose", "Name what the simulation gets wrong about a measured campaign",
+      "  focalfleet diagnose night-12 --out night-12-report\n"
+      "  focalfleet diagnose night-12 --out without --without backlash,relaxation --json");
+  auto options = std::make_shared<DiagnoseCommandOptions>();
+  command->add_option("campaign", options->campaign, "Folder with moves.csv and units.csv")
+      ->required()
+      ->type_name("DIR");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for report.json, report.html, model.toml, next_moves.csv")
+      ->required()
+      ->type_name("DIR");
+  command->add_option("--seed", options->seed, "Of the calibration by chance")
+      ->capture_default_str();
+  command
+      ->add_option("--threads", options->threads,
+                   "Threads (default: all cores); the verdict is the same with any number")
+      ->check(CLI::Range(1, 256).description(""));
+  command->add_option("--without", options->leave_out, "Causes to leave out of the library")
+      ->delimiter(',');
+  command->add_option("--shuffle", options->shuffle,
+                      "Look at the library in another order; the verdict is the same");
+  OnChosen(line, command, options, RunDiagnose);
+}
+
+void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
+  CLI::App* command = AddCommand(parent, "campaign", "A made-up campaign with chosen effects in it",
+                                 "  focalfleet simulate campaign --units 60 --moves 80 --effect "
+                                 "backlash:theta=0.1 --out made\n"
+                                 "  focalfleet simulate campaign --effect gravity_sag=5 --effect "
+                                 "eccentricity:phi=0.2 --out two");
+  auto options = std::make_shared<SimulateCampaignOptions>();
+  sim::PlantedOptions& planted = options->planted;
+  command->add_option("--effect", options->effects,
+                      "cause=amplitude or cause:axis=amplitude, in the cause's own unit; repeat");
+  command->add_option("--units", planted.units, "Units, on a hexagonal lattice")
+      ->check(CLI::Range(1, 20000).description(""))
+      ->capture_default_str();
+  command->add_option("--moves", planted.moves, "Moves of each unit")
+      ->check(CLI::Range(1, 2000).description(""))
+      ->capture_default_str();
+  command->add_option("--seed", planted.seed, "Of all that is drawn")->capture_default_str();
+  command->add_option("--noise-um", planted.noise_um, "Of one measured coordinate")
+      ->check(NumberBetween(0, 1e4))
+      ->capture_default_str();
+  command->add_option("--outliers", planted.outlier_share, "Share of places that are anywhere")
+      ->check(NumberBetween(0, 0.5))
+      ->capture_default_str();
+  command->add_option("--out", options->out, "Folder for units.csv and moves.csv; made if missing")
+      ->required()
+      ->type_name("DIR");
+  OnChosen(line, command, options, RunSimulateCampaign);
+}
+
+}  // namespace focalfleet::cli
