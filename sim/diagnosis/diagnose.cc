@@ -80,9 +80,10 @@ std::string ScopeOf(const ModelTerm& term, std::size_t units) {
 }
 
 void TakeAmplitude(const ModelTerm& term, CauseFound* cause) {
-  // One number: the mean over groups where it has a sign, else the rms of the vectors.
+  // One number: the mean over groups by their certainty, where it has a sign, else the rms of the
+  // vectors.
   const std::size_t c = term.form.columns;
-  double mean = 0, square = 0, weight = 0, variance = 0;
+  double mean = 0, square = 0, weight = 0;
   std::set<std::uint32_t> groups;
   for (const std::uint32_t group : term.group_of_unit)
     if (group != kNoGroup) groups.insert(group);
@@ -93,13 +94,14 @@ void TakeAmplitude(const ModelTerm& term, CauseFound* cause) {
       s += a * a;
       sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
     }
-    mean += c == 1 ? term.amplitude[group] : 0;
-    square += s, weight += 1, variance += sigma2;
+    const double w = 1 / std::max(sigma2, 1e-30);
+    mean += w * (c == 1 ? term.amplitude[group] : 0);
+    square += w * s, weight += w;
   }
   if (!(weight > 0)) return;
   const double rms = std::sqrt(square / weight);
   cause->amplitude = c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms;
-  const double sigma = std::sqrt(variance) / weight;
+  const double sigma = 1 / std::sqrt(weight);
   cause->ci95[0] = cause->amplitude - 1.96 * sigma;
   cause->ci95[1] = cause->amplitude + 1.96 * sigma;
 }

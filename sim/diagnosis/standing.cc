@@ -280,12 +280,17 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   std::vector<Level> levels;
   levels.push_back(SumLevel(score, c, Sharing::kUnit, Each(units), units, best.dispersion));
   if (units > 1) {
-    // Shared noise counts for what is shared.
+    // Noise that units share makes chance of what they share; the levels themselves are compared
+    // with one dispersion.
     constexpr double kPrior = 8;
     const double fleet = std::max(
         1.0, (FleetDispersion(score, c) * kPrior + usual_dispersion * kPrior) / (2 * kPrior));
+    const Level cautious{Sharing::kFleet,
+                         {Decompose(score.fleet_b, score.fleet_g, fleet)},
+                         std::vector<std::uint32_t>(units, 0)};
+    best.log_p = LevelLogP(cautious);
     Level all{Sharing::kFleet,
-              {Decompose(score.fleet_b, score.fleet_g, fleet)},
+              {Decompose(score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
     if (groups.rails > 0)
       levels.push_back(
@@ -296,8 +301,8 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     levels.push_back(std::move(all));
   }
   best.evidence = -std::numeric_limits<double>::infinity();
-  best.log_p = 0;
-  for (const Level& level : levels) best.log_p = std::min(best.log_p, LevelLogP(level));
+  for (const Level& level : levels)
+    if (level.sharing != Sharing::kFleet) best.log_p = std::min(best.log_p, LevelLogP(level));
   best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
   // Chance explains it: no need to know who has it.
   constexpr double kWorthALook = -3;

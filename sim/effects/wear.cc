@@ -1,7 +1,5 @@
 // Wear: a parameter drifts with the turns made.
-#include <algorithm>
 #include <string_view>
-#include <vector>
 
 #include "sim/effects/registry.h"
 
@@ -9,13 +7,9 @@ namespace focalfleet::sim {
 namespace {
 
 void List(const CampaignFacts&, Templates* out) {
-  for (const int form : {0, 1, 2})
-    ListGrid({.shapes = form == 0 ? std::vector<double>{0} : std::vector<double>{0, 1},
-              .shape_name = form == 0   ? "the zero creeps"
-                            : form == 1 ? "the clearance opens"
-                                        : "the scale drifts",
-              .form = form},
-             out);
+  ListGrid({}, out);
+  ListGrid({.shape_name = "the clearance opens", .form = 1}, out);
+  ListGrid({.shape_name = "the scale drifts", .form = 2}, out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -23,12 +17,11 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const std::string_view column = axis == kTheta ? "cycles_theta" : "cycles_phi";
   const std::span<const double> cycles = track.Column(column);
-  const FilledColumn& all = *track.facts->Find(column);
+  constexpr double kTurns = 100;
   double direction = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    // Since the campaign began, in parts of what it wore; or since the unit was new.
-    const double since = form.shape == 0 ? cycles[i] - cycles[0] : cycles[i];
-    const double worn = since / std::max(all.high - (form.shape == 0 ? all.low : 0), 1e-9);
+    // Since the campaign began: what was worn before it is backlash or scale already.
+    const double worn = (cycles[i] - cycles[0]) / kTurns;
     if (track.restarts[i]) direction = 0;
     if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
     double error = worn;
@@ -42,7 +35,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 
 Effect MakeWear() {
   return {.cause = "wear",
-          .amplitude_unit = "deg",
+          .amplitude_unit = "deg per 100 turns",
           .prior_size = 0.05,
           .owner = Owner::kUnit,
           .needs = {"cycles_theta", "cycles_phi"},
