@@ -1,13 +1,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <set>
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/events.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
+#include "sim/diagnosis/image.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/select.h"
@@ -20,8 +23,7 @@ constexpr std::size_t kMovesMin = 8;  // of a unit, seen
 constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
 constexpr double kKeptMin = 0.01;
 // Causes that come from other looks than a template's.
-constexpr std::string_view kEventCauses[] = {"step_loss", "lost_command", "collision_contact",
-                                             "sensor_bias", "air_turbulence"};
+constexpr std::string_view kEventCauses[] = {"collision_contact", "sensor_bias"};
 
 bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
   return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
@@ -32,7 +34,10 @@ bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
 Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
                       std::vector<NotTestable>* not_testable) {
   Templates templates;
-  for (const Effect& effect : EffectLibrary()) {
+  std::vector<const Effect*> effects = options.also;
+  for (const Effect& effect : EffectLibrary()) effects.push_back(&effect);
+  for (const Effect* one : effects) {
+    const Effect& effect = *one;
     if (IsLeftOut(options, effect.cause)) continue;
     const std::string_view missing = MissingCovariate(effect, facts);
     if (!missing.empty()) {
@@ -251,6 +256,68 @@ CauseFound SwapCause(const Campaign& campaign,
   return cause;
 }
 
+// Zeros that differ from homing to homing, where they are worth their number. The terms are then
+// chosen anew: what was one homing's zero may have passed for something else.
+bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
+                Fit* fit) {
+  constexpr double kBetterBy = 20;
+  Fit freed = *fit;
+  FreeHomings(&freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  freed.model.terms.clear();
+  UpdateResiduals(&freed);
+  FreeHomings(&freed);
+  Selection again = Select(templates, rule, &freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  *fit = std::move(freed);
+  *selection = std::move(again);
+  return true;
+}
+
+// With and without steps in single units' angles; the better fit for its price.
+Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  Fit stepped = *fit;
+  const std::size_t events = AddEvents(&stepped);
+  Selection selection = Select(templates, rule, fit);
+  if (events == 0) return selection;
+  Selection again = Select(templates, rule, &stepped);
+  if (Merit(stepped) <= Merit(*fit)) return selection;
+  *fit = std::move(stepped);
+  return again;
+}
+
+CauseFound HomingCause(const Fit& fit) {
+  CauseFound cause;
+  cause.cause = "zero_offset";
+  cause.candidates = {cause.cause};
+  cause.scope = "unit";
+  cause.amplitude_unit = "deg";
+  cause.shape = "differs from homing to homing; the amplitude is the rms of the larger axis";
+  cause.paragraph =
+      "The zero is not the same after each homing: measure it after every homing, and look at the "
+      "hard stop.";
+  double size_um2 = 0, most = 0;
+  const CampaignUnit& first = fit.model.units.front();
+  const double lever_mm[2] = {std::hypot(first.arm_mm[0], first.arm_mm[1]), first.arm_mm[1]};
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    double square = 0;
+    for (const double zero : fit.model.homing_zero_deg[axis]) square += zero * zero;
+    const double rms = std::sqrt(square / static_cast<double>(fit.weight.size()));
+    const double um = rms * std::numbers::pi / 180 * lever_mm[axis] * 1e3;
+    size_um2 += um * um;
+    if (um > most)
+      most = um, cause.amplitude = rms,
+      cause.axis = Name(axis == kTheta ? EffectAxis::kTheta : EffectAxis::kPhi);
+  }
+  cause.ci95[0] = 0.7 * cause.amplitude, cause.ci95[1] = 1.4 * cause.amplitude;
+  cause.size_um = std::sqrt(size_um2);
+  cause.delta_log_likelihood = static_cast<double>(fit.weight.size());
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit)
+    cause.units.push_back(fit.model.units[unit].id);
+  cause.all_units = true;
+  return cause;
+}
+
 void Conclude(Diagnosis* diagnosis) {
   bool ambiguous = false;
   for (const CauseFound& cause : diagnosis->causes)
@@ -315,8 +382,15 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     share += (0.75 - share) * 0.15;
     options.progress(share, stage);
   };
-  const Selection selection = Select(templates, rule, &fit);
+  Selection selection = SelectWithEvents(templates, rule, &fit);
+  if (facts.homings > 0 && TryHomings(templates, rule, &selection, &fit))
+    diagnosis.causes.push_back(HomingCause(fit));
+  if (std::optional<CauseFound> image = AddImageTerms(&fit, options.family_wise)) {
+    if (!IsLeftOut(options, image->cause)) diagnosis.causes.push_back(std::move(*image));
+    selection = Select(templates, rule, &fit);  // what the image's motion hid, or stood in for it
+  }
   FindNotExcited(templates, selection, &diagnosis.not_testable);
+  for (CauseFound& cause : EventCauses(fit)) diagnosis.causes.push_back(std::move(cause));
   const double rms_um = RmsOf(fit);
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
     diagnosis.causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));

@@ -79,6 +79,7 @@ struct DiagnoseOptions {
   std::uint64_t seed = 1;
   double family_wise = 0.01;
   std::vector<std::string> leave_out;  // causes that the library shall not have
+  std::vector<const Effect*> also;     // effects beside the library
   std::uint64_t shuffle_library = 0;   // not 0: another order of its templates
   bool with_gain = true;
   ParallelFor parallel = OneAfterTheOther();

@@ -55,6 +55,13 @@ void StepFit(Fit* fit);
 /// Steps, noise and weights in turn until the amplitudes rest.
 void SettleFit(Fit* fit, int rounds);
 
+/// Lets the zeros differ from homing to homing, and fits them.
+void FreeHomings(Fit* fit);
+
+/// 2 ln L of the fit less a price for its parameters (BIC); comparable between fits of one
+/// campaign.
+double Merit(const Fit& fit);
+
 /// Static geometry's covariance in mm and degrees, with the unit's own terms beside it.
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit);
 

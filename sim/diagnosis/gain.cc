@@ -39,6 +39,44 @@ std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   return fold;
 }
 
+// The zeros of a homing that no fit has seen are its own: from its exposures, everything else
+// fixed.
+void FitHeldOutHomings(const std::vector<char>& hold, Fit* fit) {
+  if (fit->model.homing_zero_deg[kTheta].empty()) return;
+  constexpr int kRounds = 3;
+  constexpr double kRadians = std::numbers::pi / 180;
+  const Campaign& campaign = *fit->facts->campaign;
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
+      for (std::size_t begin = 0; begin < track.moves;) {
+        std::size_t end = begin + 1;
+        while (end < track.moves && track.restarts[end] == 0) ++end;
+        Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * 1e-9;
+        Eigen::Vector2d right = Eigen::Vector2d::Zero();
+        for (std::size_t i = begin; i < end; ++i) {
+          const std::size_t row = track.first_row + i;
+          if (hold[row] == 0 || !std::isfinite(fit->x_um[row])) continue;
+          Eigen::Matrix2d j;
+          j << -(track.elbow_y_mm[i] + track.reach_y_mm[i]), -track.reach_y_mm[i],
+              track.elbow_x_mm[i] + track.reach_x_mm[i], track.reach_x_mm[i];
+          j *= 1e3 * kRadians;
+          normal += j.transpose() * j;
+          right += j.transpose() * Eigen::Vector2d(fit->x_um[row], fit->y_um[row]);
+        }
+        const Eigen::Vector2d step = normal.ldlt().solve(right);
+        for (std::size_t i = begin; i < end; ++i)
+          for (const std::size_t axis : {kTheta, kPhi})
+            if (hold[track.first_row + i] != 0)
+              fit->model.homing_zero_deg[axis][track.first_row + i] +=
+                  step[static_cast<Eigen::Index>(axis)];
+        begin = end;
+      }
+    }
+    UpdateResiduals(fit);
+  }
+}
+
 Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_terms) {
   Fit fit = final_fit;
   for (std::size_t row = 0; row < hold.size(); ++row)
@@ -51,6 +89,7 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_te
   UpdateResiduals(&fit);
   SettleFit(&fit, 2);
   StepFit(&fit);
+  FitHeldOutHomings(hold, &fit);
   return fit;
 }
 
@@ -81,6 +120,8 @@ HeldOutGain MeasureGain(const Fit& fit) {
   const Campaign& campaign = *fit.facts->campaign;
   HeldOutGain gain;
   const std::vector<std::size_t> fold = FoldsOf(fit, &gain.held_out);
+  if (!fit.model.homing_zero_deg[kTheta].empty())
+    gain.held_out += "; before and after, the two zeros of each held-out homing are its own";
   std::vector<char> judged(campaign.rows(), 0);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     const WhiteUnit white = Whiten(fit, unit);

@@ -253,6 +253,52 @@ void SettleFit(Fit* fit, int rounds) {
   UpdateWeights(fit);
 }
 
+void FreeHomings(Fit* fit) {
+  constexpr double kWide_deg = 60;
+  constexpr int kRounds = 6;
+  const std::size_t rows = fit->facts->campaign->rows();
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    fit->model.homing_zero_deg[axis].assign(rows, 0);
+    fit->model.homing_spread_deg[axis] = kWide_deg;
+  }
+  SettleFit(fit, kRounds);
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    double square = 0;
+    for (const double zero : fit->model.homing_zero_deg[axis]) square += zero * zero;
+    fit->model.homing_spread_deg[axis] = 2 * std::sqrt(square / static_cast<double>(rows)) + 0.001;
+  }
+  SettleFit(fit, 3);
+}
+
+double Merit(const Fit& fit) {
+  const Campaign& campaign = *fit.facts->campaign;
+  double values = 0, log_density = 0, parameters = 0;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const auto at = static_cast<Index>(2 * k);
+      const double* w = &white.whiten[3 * k];
+      const double weight = fit.weight[white.track.first_row + white.moves[k]];
+      const double square = white.y.segment(at, 2).squaredNorm() / weight;
+      // Huber's density: beyond the knee the logarithm falls linearly.
+      const double knee = weight < 1 ? std::sqrt(weight * square) : std::sqrt(square);
+      const double cost = weight < 1 ? 2 * knee * std::sqrt(square) - knee * knee : square;
+      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) - cost / 2;
+      values += 2;
+    }
+    if (HasHomings(fit.model)) {
+      Index homings = 0;
+      HomingOf(white.track, &homings);
+      parameters += 2 * static_cast<double>(homings - 1);
+    }
+  }
+  parameters += 2 * static_cast<double>(fit.model.events.size());
+  for (const ModelTerm& term : fit.model.terms)
+    for (std::size_t k = 0; k < term.amplitude.size(); ++k)
+      if (term.sigma[k] > 0) parameters += 1;
+  return 2 * log_density - parameters * std::log(std::max(values, 2.0));
+}
+
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit) {
   const WhiteUnit white = Whiten(fit, unit);
   std::vector<Index> none(fit.model.terms.size(), 0);

@@ -1,0 +1,180 @@
+#include "sim/diagnosis/diagnosis.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <thread>
+
+#include "sim/diagnosis/planted.h"
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using testing::Contains;
+using testing::UnorderedElementsAre;
+
+Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions options = {}) {
+  options.units = options.units == 60 ? 24 : options.units;
+  options.effects = std::move(effects);
+  auto campaign = PlantCampaign(options);
+  EXPECT_TRUE(campaign) << campaign.error().text;
+  return *campaign;
+}
+
+Diagnosis Verdicts(const Campaign& campaign, DiagnoseOptions options = {}) {
+  options.with_gain = false;
+  return Diagnose(campaign, options);
+}
+
+std::string Told(const Diagnosis& diagnosis) {
+  std::string text(Name(diagnosis.verdict));
+  for (const CauseFound& cause : diagnosis.causes) {
+    text += "; " + cause.cause + " " + cause.axis + " " + cause.scope + " " +
+            std::to_string(cause.amplitude);
+    for (const std::string& candidate : cause.candidates) text += " " + candidate;
+  }
+  for (const UnknownFound& unknown : diagnosis.unknown) text += "; against " + unknown.covariate;
+  return text;
+}
+
+TEST(Diagnosis, NothingWrongIsConsistent) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Diagnosis diagnosis = Verdicts(Planted({}, {.seed = seed}));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kConsistent)
+        << "seed " << seed << ": " << Told(diagnosis);
+  }
+}
+
+struct Plant {
+  const char* cause;
+  const char* axis;
+  double amplitude;
+};
+
+class EveryEffect : public testing::TestWithParam<Plant> {};
+
+TEST_P(EveryEffect, IsNamedAndMeasured) {
+  const Plant& plant = GetParam();
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = plant.cause, .amplitude = plant.amplitude, .axis = plant.axis}},
+                       {.moves = 80, .seed = 3}));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, Contains(plant.cause)) << Told(diagnosis);
+  EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+  if (diagnosis.causes[0].cause != plant.cause) return;  // an honest tie
+  EXPECT_NEAR(std::abs(diagnosis.causes[0].amplitude), plant.amplitude, 0.25 * plant.amplitude);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Planted, EveryEffect,
+    testing::Values(Plant{"gear_scale", "theta", 3e-4}, Plant{"scale_asymmetry", "phi", 5e-5},
+                    Plant{"ramp_travel", "theta", 0.004}, Plant{"backlash", "theta", 0.05},
+                    Plant{"friction_windup", "phi", 0.05}, Plant{"eccentricity", "theta", 0.1},
+                    Plant{"pinion_runout", "theta", 0.03}, Plant{"stage_ripple", "theta", 0.03},
+                    Plant{"tooth_mesh", "theta", 0.03}, Plant{"tooth_damage", "theta", 0.1},
+                    Plant{"cogging", "theta", 0.02}, Plant{"phase_imbalance", "theta", 0.03},
+                    Plant{"load_angle_lag", "theta", 0.03}, Plant{"supply_droop", "theta", 0.05},
+                    Plant{"supply_drift", "theta", 0.4}, Plant{"thermal_backlash", "theta", 0.006},
+                    Plant{"thermal_arm_growth", "both", 6e-5}, Plant{"self_heating", "theta", 0.1},
+                    Plant{"plate_expansion", "none", 3e-5}, Plant{"gravity_sag", "none", 6},
+                    Plant{"gravity_torque", "theta", 0.06}, Plant{"relaxation", "theta", 0.05},
+                    Plant{"axis_crosstalk", "theta", 5e-4}, Plant{"fibre_torque", "theta", 0.08},
+                    Plant{"axis_tilt", "theta", 5e-4}, Plant{"neighbour_coupling", "theta", 0.02},
+                    Plant{"mode_threshold", "theta", 0.04}),
+    [](const testing::TestParamInfo<Plant>& info) { return std::string(info.param.cause); });
+
+TEST(Diagnosis, TwoNamesForOneEffectAreAnAmbiguityOfTwo) {
+  Effect twin = *FindEffect("eccentricity");
+  twin.cause = "eccentricity_again";
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = "eccentricity", .amplitude = 0.1}}), {.also = {&twin}});
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kAmbiguous);
+  EXPECT_THAT(diagnosis.causes[0].candidates,
+              UnorderedElementsAre("eccentricity", "eccentricity_again"));
+}
+
+TEST(Diagnosis, WithoutTheTrueEffectItIsUnknown) {
+  const Diagnosis diagnosis = Verdicts(Planted({{.cause = "pinion_runout", .amplitude = 0.06}}),
+                                       {.leave_out = {"pinion_runout"}});
+  EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Told(diagnosis);
+}
+
+TEST(Diagnosis, TheOrderOfTheLibraryDoesNotMatter) {
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.04},
+                                     {.cause = "thermal_arm_growth", .amplitude = 5e-5}});
+  const std::string first = Told(Verdicts(campaign));
+  EXPECT_EQ(first, Told(Verdicts(campaign, {.shuffle_library = 7})));
+}
+
+TEST(Diagnosis, IsTheSameBitForBitOnTwoThreads) {
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.04}});
+  const Diagnosis one = Verdicts(campaign);
+  const Diagnosis two = Verdicts(
+      campaign, {.parallel = [](std::size_t chunks, const std::function<void(std::size_t)>& work) {
+        const auto half = [&](std::size_t from) {
+          for (std::size_t chunk = from; chunk < chunks; chunk += 2) work(chunk);
+        };
+        std::thread other(half, 1);
+        half(0);
+        other.join();
+      }});
+  EXPECT_EQ(Told(one), Told(two));
+  EXPECT_EQ(one.x_after_um, two.x_after_um);
+}
+
+TEST(Diagnosis, AMissingColumnIsNotTestable) {
+  Campaign campaign = Planted({});
+  std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "delay_s"; });
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_TRUE(std::any_of(
+      diagnosis.not_testable.begin(), diagnosis.not_testable.end(), [](const NotTestable& cause) {
+        return cause.cause == "relaxation" && cause.why.find("delay_s") != std::string::npos;
+      }));
+}
+
+TEST(Diagnosis, TooFewMovesAreInsufficient) {
+  const Diagnosis diagnosis = Verdicts(Planted({}, {.moves = 3}));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kInsufficient);
+  EXPECT_FALSE(diagnosis.insufficient.empty());
+}
+
+TEST(Diagnosis, OtherUnitsGeometryIsInsufficient) {
+  Campaign campaign = Planted({});
+  for (double& x : campaign.x_mm) x = 40 * std::sin(1e3 * x);
+  EXPECT_EQ(Verdicts(campaign).verdict, Verdict::kInsufficient);
+}
+
+TEST(Diagnosis, OutliersAreCountedAndNameNoCause) {
+  const Diagnosis diagnosis =
+      Verdicts(Planted({}, {.moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02}));
+  EXPECT_TRUE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_GT(diagnosis.outliers.rows, 20u);
+}
+
+TEST(Diagnosis, GeometryThatDiffersIsNamed) {
+  const Diagnosis diagnosis = Verdicts(Planted({}, {.seed = 2, .zero_offset_deg = 0.5}));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "zero_offset");
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.5, 0.15);
+}
+
+TEST(Diagnosis, SwappedFibresAreFound) {
+  Campaign campaign = Planted({});
+  for (std::size_t i = 0; i < 60; ++i) {
+    const std::size_t a = campaign.first_row[3] + i, b = campaign.first_row[9] + i;
+    std::swap(campaign.x_mm[a], campaign.x_mm[b]);
+    std::swap(campaign.y_mm[a], campaign.y_mm[b]);
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "identity_swap");
+  EXPECT_THAT(diagnosis.causes[0].units, UnorderedElementsAre(4u, 10u));
+}
+
+}  // namespace
+}  // namespace focalfleet::sim

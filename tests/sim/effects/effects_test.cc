@@ -1,0 +1,116 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "sim/diagnosis/planted.h"
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+Campaign Made() {
+  auto campaign = PlantCampaign({.units = 19, .moves = 30, .seed = 4, .homing_share = 0.05});
+  EXPECT_TRUE(campaign) << campaign.error().text;
+  // Columns that the plain campaign does not have.
+  for (const char* name : {"pixel_x", "pixel_y"}) {
+    campaign->covariates.push_back({name, {}});
+    for (std::size_t row = 0; row < campaign->rows(); ++row)
+      campaign->covariates.back().values.push_back(0.37 * static_cast<double>(row));
+  }
+  return *campaign;
+}
+
+std::vector<double> All(const PoseErrors& errors) {
+  std::vector<double> all;
+  for (const auto* part : {&errors.angle_deg[0], &errors.angle_deg[1], &errors.arm_mm[0],
+                           &errors.arm_mm[1], &errors.x_mm, &errors.y_mm})
+    all.insert(all.end(), part->begin(), part->end());
+  return all;
+}
+
+std::vector<double> Applied(const UnitTrack& track, const Template& form, double size) {
+  PoseErrors errors;
+  errors.Reset(track.moves);
+  std::vector<double> amplitude(form.columns);
+  for (std::size_t c = 0; c < form.columns; ++c) amplitude[c] = size * (1 + 0.3 * double(c));
+  form.effect->apply(track, form, amplitude, &errors);
+  return All(errors);
+}
+
+TEST(Effects, EveryEffectExplainsItselfOnce) {
+  std::set<std::string_view> causes;
+  for (const Effect& effect : EffectLibrary()) {
+    EXPECT_TRUE(causes.insert(effect.cause).second) << effect.cause << " is there twice";
+    EXPECT_GT(effect.prior_size, 0) << effect.cause;
+    EXPECT_GT(effect.paragraph.size(), 60u) << effect.cause;
+    EXPECT_EQ(FindEffect(effect.cause), &effect);
+  }
+}
+
+TEST(Effects, EveryTemplateIsFiniteAndLinearInItsAmplitude) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  for (const Effect& effect : EffectLibrary()) {
+    const Templates templates = ListTemplates(effect, facts);
+    EXPECT_FALSE(templates.empty()) << effect.cause;
+    for (const Template& form : templates)
+      for (const std::size_t unit : {std::size_t{0}, std::size_t{11}}) {
+        const UnitTrack track = MakeTrack(facts, unit, campaign.units[unit]);
+        const auto up = Applied(track, form, 0.01), down = Applied(track, form, -0.01);
+        const auto twice = Applied(track, form, 0.02);
+        for (std::size_t i = 0; i < up.size(); ++i) {
+          ASSERT_TRUE(std::isfinite(up[i])) << effect.cause << ", " << form.label;
+          ASSERT_NEAR(up[i], -down[i], 1e-12 + 1e-9 * std::abs(up[i])) << effect.cause;
+          ASSERT_NEAR(twice[i], 2 * up[i], 1e-12 + 1e-9 * std::abs(up[i])) << effect.cause;
+        }
+      }
+  }
+}
+
+TEST(Effects, BacklashIsASideOfTheGapAndHomingForgetsIt) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Templates templates = ListTemplates(*FindEffect("backlash"), facts);
+  const UnitTrack track = MakeTrack(facts, 3, campaign.units[3]);
+  for (const Template& form : templates) {
+    const auto errors = Applied(track, form, 0.2);
+    const std::size_t at = AxisIndex(form) * track.moves;
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      EXPECT_LE(std::abs(errors[at + i]), 0.1 + 1e-12);
+      const double step = track.step_deg[AxisIndex(form)][i];
+      if (std::abs(step) > std::max(form.shape, 1e-9))
+        EXPECT_NEAR(errors[at + i], step > 0 ? -0.1 : 0.1, 1e-12) << "the gap is crossed";
+      if (track.restarts[i] != 0 && step == 0) EXPECT_EQ(errors[at + i], 0);
+    }
+  }
+}
+
+TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Template form = ListTemplates(*FindEffect("gear_scale"), facts).front();
+  ASSERT_EQ(form.memory, Memory::kChain);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  const auto errors = Applied(track, form, 1e-3);
+  double origin_deg = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i] != 0) origin_deg = track.from_deg[kTheta][i];
+    EXPECT_NEAR(errors[i], 1e-3 * (track.cmd_deg[kTheta][i] - origin_deg), 1e-12);
+  }
+}
+
+TEST(Effects, AMissingColumnLeavesNoTemplates) {
+  Campaign campaign = Made();
+  std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "temp_C"; });
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Effect& effect = *FindEffect("thermal_backlash");
+  EXPECT_EQ(MissingCovariate(effect, facts), "temp_C");
+  EXPECT_TRUE(ListTemplates(effect, facts).empty());
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
