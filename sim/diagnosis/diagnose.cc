@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "protocol/base/rng.h"
@@ -387,7 +388,10 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     diagnosis.causes.push_back(HomingCause(fit));
   if (std::optional<CauseFound> image = AddImageTerms(&fit, options.family_wise)) {
     if (!IsLeftOut(options, image->cause)) diagnosis.causes.push_back(std::move(*image));
-    selection = Select(templates, rule, &fit);  // what the image's motion hid, or stood in for it
+    // What the image's motion hid, or what stood in for it.
+    std::vector<double> kept = std::move(selection.kept_share);
+    selection = Select(templates, rule, &fit);
+    selection.kept_share = std::move(kept);
   }
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   for (CauseFound& cause : EventCauses(fit)) diagnosis.causes.push_back(std::move(cause));
