@@ -6,11 +6,13 @@
 #include <atomic>
 #include <charconv>
 #include <filesystem>
+#include <optional>
 #include <thread>
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
+#include "daemon/campaign/model_file.h"
 #include "daemon/campaign/sha256.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
@@ -30,6 +32,7 @@ struct DiagnoseCommandOptions {
   int threads = 0;  // 0: as many as the machine has
   std::vector<std::string> leave_out;
   std::uint64_t shuffle = 0;
+  std::string model;
 };
 
 sim::ParallelFor OnThreads(int threads) {
@@ -113,14 +116,24 @@ std::string CauseTable(const sim::Diagnosis& diagnosis) {
 ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& options) {
   if (const auto known = CheckCauses(options.leave_out); !known)
     return Report(context, known.error(), ExitCode::kUsage);
-  const auto in = ReadFolder(options.campaign);
+  auto in = ReadFolder(options.campaign);
   if (!in) return Report(context, in.error());
+  std::optional<sim::CampaignModel> before;
+  if (!options.model.empty()) {
+    const auto text = ReadTextFile(options.model);
+    if (!text) return Report(context, text.error());
+    auto model = ReadModel(*text, options.model, in->campaign);
+    if (!model) return Report(context, model.error());
+    in->names.model_before = model->name;
+    before = std::move(*model);
+  }
   sim::Diagnosis diagnosis;
   {
     ProgressBar bar(context);
     sim::DiagnoseOptions wanted{.seed = options.seed,
                                 .leave_out = options.leave_out,
                                 .shuffle_library = options.shuffle,
+                                .before = before ? &*before : nullptr,
                                 .parallel = OnThreads(options.threads)};
     wanted.progress = [&](double share, std::string_view stage) {
       bar.Show(share, "diagnosing", std::string(stage));
@@ -215,6 +228,9 @@ void AddDiagnoseCommand(CommandLine* line) {
       ->delimiter(',');
   command->add_option("--shuffle", options->shuffle,
                       "Look at the library in another order; the verdict is the same");
+  AddFile(
+      command, "--model", &options->model,
+      "model.toml to start from: what it explains is no misfit (default: the ideal kinematics)");
   OnChosen(line, command, options, RunDiagnose);
 }
 

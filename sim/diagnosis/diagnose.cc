@@ -319,6 +319,20 @@ CauseFound HomingCause(const Fit& fit) {
   return cause;
 }
 
+// What the model that is there already explains is no misfit of it: its effects are taken off the
+// measured places, and its geometry stands for the table's.
+void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
+              Campaign* campaign) {
+  campaign->units = model.units;
+  CampaignModel plain;
+  plain.units = model.units;
+  const Places with = Predict(model, facts, parallel), without = Predict(plain, facts, parallel);
+  for (std::size_t row = 0; row < campaign->rows(); ++row) {
+    campaign->x_mm[row] -= with.x_mm[row] - without.x_mm[row];
+    campaign->y_mm[row] -= with.y_mm[row] - without.y_mm[row];
+  }
+}
+
 void Conclude(Diagnosis* diagnosis) {
   bool ambiguous = false;
   for (const CauseFound& cause : diagnosis->causes)
@@ -357,6 +371,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.moves = facts.exposures.size();
   std::vector<char> aside;
   diagnosis.outliers = FindBeforeFit(facts, &aside);
+  if (options.before != nullptr) TakeAway(*options.before, facts, options.parallel, &campaign);
   diagnosis.model.units = campaign.units;
   diagnosis.insufficient = WhyInsufficient(facts, aside);
   if (!diagnosis.insufficient.empty()) return diagnosis;

@@ -78,9 +78,10 @@ struct Diagnosis {
 struct DiagnoseOptions {
   std::uint64_t seed = 1;
   double family_wise = 0.01;
-  std::vector<std::string> leave_out;  // causes that the library shall not have
-  std::vector<const Effect*> also;     // effects beside the library
-  std::uint64_t shuffle_library = 0;   // not 0: another order of its templates
+  std::vector<std::string> leave_out;     // causes that the library shall not have
+  std::vector<const Effect*> also;        // effects beside the library
+  std::uint64_t shuffle_library = 0;      // not 0: another order of its templates
+  const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
   bool with_gain = true;
   ParallelFor parallel = OneAfterTheOther();
   std::function<void(double share, std::string_view stage)> progress = [](double,

@@ -5,6 +5,8 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <string_view>
+#include <tuple>
 
 #include "sim/diagnosis/chances.h"
 
@@ -37,15 +39,28 @@ std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& template
   return standings;
 }
 
-Best BestOf(const ScorePass& pass, const std::vector<Standing>& standings, double tests,
-            double family_wise) {
+// Templates that leave the same trace tie: the name decides, not the order of the library.
+bool ComesFirst(const Template& a, const Template& b) {
+  const auto key = [](const Template& t) {
+    return std::make_tuple(t.effect->cause, t.axis, t.memory, t.form, t.shape,
+                           std::string_view(t.covariate));
+  };
+  return key(a) < key(b);
+}
+
+Best BestOf(const ScorePass& pass, const Templates& templates,
+            const std::vector<Standing>& standings, double tests, double family_wise) {
+  constexpr double kTie = 1e-6;
   Best best;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < standings.size(); ++k) {
     const Score& score = pass.scores[k];
     if (!(score.kept > kKeptMin * score.raw)) continue;
     const double log_p = LogLeastOf(standings[k].log_p, tests);
-    if (log_p > std::log(family_wise) || standings[k].evidence <= most) continue;
+    if (log_p > std::log(family_wise) || standings[k].evidence < most - kTie) continue;
+    if (best.at != kNoTerm && standings[k].evidence < most + kTie &&
+        !ComesFirst(templates[k], templates[best.at]))
+      continue;
     if (std::none_of(standings[k].has.begin(), standings[k].has.end(),
                      [](char h) { return h != 0; }))
       continue;
@@ -94,7 +109,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
   bool changed = false;
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
     const Look look = LookWithout(*fit, templates, groups, t);
-    const Best best = BestOf(look.pass, look.standings, tests, rule.family_wise);
+    const Best best = BestOf(look.pass, templates, look.standings, tests, rule.family_wise);
     if (best.at == kNoTerm) {
       DropTerm(t, fit);
       return true;
@@ -188,7 +203,7 @@ Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGrou
   std::vector<Standing> standings;
   for (std::size_t k = 0; k < templates.size(); ++k)
     standings.push_back(Assess(pass.scores[k], templates[k], groups, usual));
-  return BestOf(pass, standings, tests, family_wise);
+  return BestOf(pass, templates, standings, tests, family_wise);
 }
 
 Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit) {
@@ -202,7 +217,8 @@ Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit
       for (const Score& score : look.pass.scores)
         selection.kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
     }
-    const Best best = BestOf(look.pass, look.standings, selection.tests, rule.family_wise);
+    const Best best =
+        BestOf(look.pass, templates, look.standings, selection.tests, rule.family_wise);
     if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) break;
     const CampaignModel before = fit->model;
     fit->model.terms.push_back(MakeTerm(templates[best.at], best.standing, groups));

@@ -1,0 +1,151 @@
+#include "daemon/campaign/model_file.h"
+
+#include <toml++/toml.h>
+
+#include <cmath>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "sim/effects/registry.h"
+
+namespace focalfleet {
+namespace {
+
+class ModelReader {
+ public:
+  ModelReader(const std::string& file, const sim::Campaign& campaign)
+      : file_(file), campaign_(campaign) {
+    model_.units = campaign.units;
+    for (std::size_t u = 0; u < campaign.units.size(); ++u) index_[campaign.units[u].id] = u;
+  }
+
+  Result<sim::CampaignModel> Read(const toml::table& table) {
+    model_.name = table["name"].value_or(std::string("unnamed"));
+    if (const toml::array* units = table["unit"].as_array())
+      for (const toml::node& node : *units) {
+        const toml::table* unit = node.as_table();
+        if (unit == nullptr) return Wrong(node, "[[unit]] is not a table");
+        FOCALFLEET_TRY(ReadUnit(*unit));
+      }
+    if (const toml::array* effects = table["effect"].as_array())
+      for (const toml::node& node : *effects) {
+        const toml::table* effect = node.as_table();
+        if (effect == nullptr) return Wrong(node, "[[effect]] is not a table");
+        FOCALFLEET_TRY(ReadEffect(*effect));
+      }
+    return std::move(model_);
+  }
+
+ private:
+  [[nodiscard]] tl::unexpected<Error> Wrong(const toml::node& node, const std::string& why) const {
+    return Fail(ErrorCode::kInvalid,
+                file_ + ":" + std::to_string(node.source().begin.line) + ": " + why);
+  }
+
+  Result<double> Number(const toml::table& table, std::string_view key) const {
+    const std::optional<double> value = table[key].value<double>();
+    if (!value || !std::isfinite(*value))
+      return Wrong(table, std::string(key) + " is missing or not a finite number");
+    return *value;
+  }
+
+  Result<std::vector<double>> Numbers(const toml::table& table, std::string_view key) const {
+    const toml::array* array = table[key].as_array();
+    if (array == nullptr) return Wrong(table, std::string(key) + " is missing or not a list");
+    std::vector<double> values;
+    for (const toml::node& node : *array) {
+      const std::optional<double> value = node.value<double>();
+      if (!value) return Wrong(node, std::string(key) + ": not a number");
+      values.push_back(*value);
+    }
+    return values;
+  }
+
+  Status ReadUnit(const toml::table& table) {
+    FOCALFLEET_TRY_ASSIGN(const double id, Number(table, "unit_id"));
+    const auto at = index_.find(static_cast<std::uint32_t>(id));
+    if (at == index_.end()) return {};
+    sim::CampaignUnit& unit = model_.units[at->second];
+    FOCALFLEET_TRY_ASSIGN(unit.base_x_mm, Number(table, "base_x_mm"));
+    FOCALFLEET_TRY_ASSIGN(unit.base_y_mm, Number(table, "base_y_mm"));
+    FOCALFLEET_TRY_ASSIGN(unit.arm_mm[0], Number(table, "arm_theta_mm"));
+    FOCALFLEET_TRY_ASSIGN(unit.arm_mm[1], Number(table, "arm_phi_mm"));
+    FOCALFLEET_TRY_ASSIGN(unit.zero_deg[0], Number(table, "theta_zero_deg"));
+    FOCALFLEET_TRY_ASSIGN(unit.zero_deg[1], Number(table, "phi_zero_deg"));
+    if (!(unit.arm_mm[0] > 0) || !(unit.arm_mm[1] > 0))
+      return Wrong(table, "an arm is not above 0");
+    return {};
+  }
+
+  Result<sim::Template> ReadForm(const toml::table& table) const {
+    const std::string cause = table["cause"].value_or(std::string());
+    const sim::Effect* effect = sim::FindEffect(cause);
+    if (effect == nullptr) return Wrong(table, "there is no effect '" + cause + "'");
+    sim::Template form;
+    form.effect = effect;
+    const std::string axis = table["axis"].value_or(std::string("none"));
+    for (const sim::EffectAxis candidate :
+         {sim::EffectAxis::kTheta, sim::EffectAxis::kPhi, sim::EffectAxis::kBoth})
+      if (sim::Name(candidate) == axis) form.axis = candidate;
+    FOCALFLEET_TRY_ASSIGN(const double number, Number(table, "form"));
+    FOCALFLEET_TRY_ASSIGN(form.shape, Number(table, "shape"));
+    FOCALFLEET_TRY_ASSIGN(const double memory, Number(table, "memory"));
+    FOCALFLEET_TRY_ASSIGN(const double columns, Number(table, "columns"));
+    if (memory < 0 || memory > 2) return Wrong(table, "memory is not 0, 1 or 2");
+    if (columns < 1 || columns > static_cast<double>(sim::kColumnsMax))
+      return Wrong(table, "columns is out of bounds");
+    form.form = static_cast<int>(number);
+    form.memory = static_cast<sim::Memory>(static_cast<int>(memory));
+    form.columns = static_cast<std::size_t>(columns);
+    form.label = table["shape_text"].value_or(std::string());
+    return form;
+  }
+
+  Status ReadEffect(const toml::table& table) {
+    sim::ModelTerm term;
+    FOCALFLEET_TRY_ASSIGN(term.form, ReadForm(table));
+    FOCALFLEET_TRY_ASSIGN(const std::vector<double> ids, Numbers(table, "units"));
+    FOCALFLEET_TRY_ASSIGN(const std::vector<double> amplitude, Numbers(table, "amplitude"));
+    const std::size_t c = term.form.columns;
+    if (amplitude.size() != ids.size() * c)
+      return Wrong(table, "amplitude: " + std::to_string(amplitude.size()) + " numbers for " +
+                              std::to_string(ids.size()) + " units");
+    term.sharing = sim::Sharing::kUnit;
+    term.group_of_unit.assign(campaign_.units.size(), sim::kNoGroup);
+    term.amplitude.assign(campaign_.units.size() * c, 0);
+    term.sigma.assign(campaign_.units.size() * c, 0);
+    for (std::size_t k = 0; k < ids.size(); ++k) {
+      const auto at = index_.find(static_cast<std::uint32_t>(ids[k]));
+      if (at == index_.end()) continue;
+      term.group_of_unit[at->second] = static_cast<std::uint32_t>(at->second);
+      for (std::size_t j = 0; j < c; ++j) {
+        if (!std::isfinite(amplitude[k * c + j])) return Wrong(table, "an amplitude is not finite");
+        term.amplitude[at->second * c + j] = amplitude[k * c + j];
+      }
+    }
+    model_.terms.push_back(std::move(term));
+    return {};
+  }
+
+  const std::string& file_;
+  const sim::Campaign& campaign_;
+  sim::CampaignModel model_;
+  std::map<std::uint32_t, std::size_t> index_;
+};
+
+}  // namespace
+
+Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
+                                     const sim::Campaign& campaign) {
+  // toml++ speaks in exceptions unless it is told not to; config.cc does the same.
+  try {
+    const toml::table table = toml::parse(text, file);
+    return ModelReader(file, campaign).Read(table);
+  } catch (const toml::parse_error& problem) {
+    return Fail(ErrorCode::kInvalid, file + ":" + std::to_string(problem.source().begin.line) +
+                                         ": " + std::string(problem.description()));
+  }
+}
+
+}  // namespace focalfleet
