@@ -1,3 +1,4 @@
+#define TOML_EXCEPTIONS 0
 #include "daemon/campaign/model_file.h"
 
 #include <toml++/toml.h>
@@ -138,14 +139,12 @@ class ModelReader {
 
 Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
                                      const sim::Campaign& campaign) {
-  // toml++ speaks in exceptions unless it is told not to; config.cc does the same.
-  try {
-    const toml::table table = toml::parse(text, file);
-    return ModelReader(file, campaign).Read(table);
-  } catch (const toml::parse_error& problem) {
-    return Fail(ErrorCode::kInvalid, file + ":" + std::to_string(problem.source().begin.line) +
-                                         ": " + std::string(problem.description()));
-  }
+  const toml::parse_result parsed = toml::parse(text, file);
+  if (!parsed)
+    return Fail(ErrorCode::kInvalid, file + ":" +
+                                         std::to_string(parsed.error().source().begin.line) + ": " +
+                                         std::string(parsed.error().description()));
+  return ModelReader(file, campaign).Read(parsed.table());
 }
 
 }  // namespace focalfleet

@@ -431,6 +431,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   }
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
+  if (options.before != nullptr)
+    diagnosis.model.terms.insert(diagnosis.model.terms.begin(), options.before->terms.begin(),
+                                 options.before->terms.end());
   options.progress(1, "done");
   return diagnosis;
 }

@@ -255,27 +255,25 @@ void UpdateNoise(Fit* fit) {
   std::vector<double> fleet;
   std::vector<double> own(campaign.units.size());
   std::vector<double> count(campaign.units.size());
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    fit->noise.unit_factor[unit] = 1;
-    const WhiteUnit white = Whiten(*fit, unit);
-    std::vector<double> lengths;
-    for (std::size_t i = 0; i < white.moves.size(); ++i) {
-      const std::size_t row = white.track.first_row + white.moves[i];
-      const double* w = &white.whiten[3 * i];
-      const double x = w[0] * fit->x_um[row] + w[1] * fit->y_um[row];
-      const double y = w[1] * fit->x_um[row] + w[2] * fit->y_um[row];
-      lengths.push_back(x * x + y * y);
+  noise.unit_factor.assign(campaign.units.size(), 1);
+  const std::vector<UnitChunk> chunks = ChunksOf(campaign.units.size());
+  fit->parallel(chunks.size(), [&](std::size_t chunk) {
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      const WhiteUnit white = Whiten(*fit, unit);
+      std::vector<double> lengths;
+      for (std::size_t i = 0; i < white.moves.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(2 * i);
+        lengths.push_back(white.y.segment<2>(k).squaredNorm() /
+                          fit->weight[white.track.first_row + white.moves[i]]);
+      }
+      const double n = static_cast<double>(2 * lengths.size());
+      const double left = n - static_cast<double>(OwnColumns(*fit, unit));
+      count[unit] = static_cast<double>(lengths.size());
+      own[unit] = left < 4 ? -1 : Median(lengths) / kMedianSquare * n / left;
     }
-    const double n = static_cast<double>(2 * lengths.size());
-    const double left = n - static_cast<double>(OwnColumns(*fit, unit));
-    count[unit] = static_cast<double>(lengths.size());
-    if (left < 4) {
-      own[unit] = -1;
-      continue;
-    }
-    own[unit] = Median(lengths) / kMedianSquare * n / left;
-    fleet.push_back(own[unit]);
-  }
+  });
+  for (const double factor : own)
+    if (factor >= 0) fleet.push_back(factor);
   constexpr double kShrink = 10;
   const double usual = fleet.empty() ? 1 : Median(fleet);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {

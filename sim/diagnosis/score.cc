@@ -158,6 +158,16 @@ struct ChunkPart {
 void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
              const Exposures& exposures, FleetPart* part) {
   const auto c = static_cast<std::size_t>(m.cols());
+  if (c == 1) {  // most templates
+    const double* a = m.data();
+    for (std::size_t k = 0; k < white.moves.size(); ++k, a += 2) {
+      const std::size_t e = exposures.of_row[white.track.first_row + white.moves[k]];
+      const auto at = static_cast<Index>(2 * k);
+      part->exposure_b[e] += a[0] * y[at] + a[1] * y[at + 1];
+      part->exposure_g[e] += a[0] * a[0] + a[1] * a[1];
+    }
+    return;
+  }
   for (std::size_t k = 0; k < white.moves.size(); ++k) {
     const std::size_t e = exposures.of_row[white.track.first_row + white.moves[k]];
     const auto at = static_cast<Index>(2 * k);
@@ -176,14 +186,24 @@ void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
 // Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled.
 void AddSpread(const MatrixXd& m, const VectorXd& y, Index spent, FleetPart* part) {
   const Index c = m.cols();
-  const MatrixXd g = m.transpose() * m;
-  const Eigen::LDLT<MatrixXd> solver(g);
-  if (solver.info() != Eigen::Success) return;
-  const VectorXd left = y - m * solver.solve(m.transpose() * y);
   double sum = 0;
-  for (Index at = 0; at + 1 < y.size(); at += 2) {
-    const VectorXd v = m.middleRows(at, 2).transpose() * left.segment(at, 2);
-    sum += v.dot(solver.solve(v));
+  if (c == 1) {
+    const double g = m.squaredNorm();
+    const double own = m.col(0).dot(y) / g;
+    const double* a = m.data();
+    for (Index at = 0; at + 1 < y.size(); at += 2) {
+      const double v = a[at] * (y[at] - a[at] * own) + a[at + 1] * (y[at + 1] - a[at + 1] * own);
+      sum += v * v;
+    }
+    sum /= g;
+  } else {
+    const MatrixXd inverse = (m.transpose() * m).ldlt().solve(MatrixXd::Identity(c, c));
+    const VectorXd left = y - m * (inverse * (m.transpose() * y));
+    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1> v(c);
+    for (Index at = 0; at + 1 < y.size(); at += 2) {
+      v.noalias() = m.row(at).transpose() * left[at] + m.row(at + 1).transpose() * left[at + 1];
+      sum += v.dot(inverse * v);
+    }
   }
   const double n = static_cast<double>(y.size());
   const double free = n - static_cast<double>(spent + c);

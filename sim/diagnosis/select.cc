@@ -103,32 +103,6 @@ void DropTerm(std::size_t at, Fit* fit) {
   Refit(fit);
 }
 
-// One look at each term: exchanged, dropped, or kept. True if anything changed.
-bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
-               double tests, Fit* fit) {
-  bool changed = false;
-  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
-    const Look look = LookWithout(*fit, templates, groups, t);
-    const Best best = BestOf(look.pass, templates, look.standings, tests, rule.family_wise);
-    if (best.at == kNoTerm) {
-      DropTerm(t, fit);
-      return true;
-    }
-    const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
-    const bool better =
-        best.at != own &&
-        (own == kNoTerm || best.standing.evidence > look.standings[own].evidence + kBetterBy);
-    const bool other_level =
-        best.at == own && (best.standing.sharing != fit->model.terms[t].sharing);
-    if (!better && !other_level) continue;
-    fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
-    StepFit(fit);
-    Refit(fit);
-    changed = true;
-  }
-  return changed;
-}
-
 std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const FleetGroups& groups,
                             std::size_t own, const SelectionRule& rule) {
   std::map<std::string_view, Rival> by_cause;
@@ -147,6 +121,47 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
   std::vector<Rival> rivals;
   for (const auto& [cause, rival] : by_cause) rivals.push_back(rival);
   return rivals;
+}
+
+// One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if
+// anything changed.
+bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
+               double tests, Fit* fit, std::vector<Accepted>* accepted) {
+  accepted->clear();
+  bool changed = false;
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
+    const Look look = LookWithout(*fit, templates, groups, t);
+    const Best best = BestOf(look.pass, templates, look.standings, tests, rule.family_wise);
+    if (best.at == kNoTerm) {
+      DropTerm(t, fit);
+      return true;
+    }
+    const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
+    const bool better =
+        best.at != own &&
+        (own == kNoTerm || best.standing.evidence > look.standings[own].evidence + kBetterBy);
+    const bool other_level =
+        best.at == own && (best.standing.sharing != fit->model.terms[t].sharing);
+    if (!better && !other_level) {
+      accepted->push_back({look.standings[own], RivalsOf(look, templates, groups, own, rule)});
+      continue;
+    }
+    fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
+    StepFit(fit);
+    Refit(fit);
+    changed = true;
+  }
+  return changed;
+}
+
+void TakeRivals(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
+                const Fit& fit, std::vector<Accepted>* accepted) {
+  accepted->clear();
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    const Look look = LookWithout(fit, templates, groups, t);
+    const std::size_t own = IndexOf(templates, fit.model.terms[t].form);
+    accepted->push_back({look.standings[own], RivalsOf(look, templates, groups, own, rule)});
+  }
 }
 
 }  // namespace
@@ -230,17 +245,16 @@ Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit
       Refit(fit);
       break;
     }
+    if (fit->model.terms.size() < 2) continue;
     rule.progress("exchanges");
     for (int sweep = 0; sweep < kSwapSweepsMax; ++sweep)
-      if (!SwapSweep(templates, groups, rule, selection.tests, fit)) break;
+      if (!SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted)) break;
   }
   rule.progress("rivals");
-  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
-    const Look look = LookWithout(*fit, templates, groups, t);
-    const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
-    selection.accepted.push_back(
-        {look.standings[own], RivalsOf(look, templates, groups, own, rule)});
-  }
+  bool rests = selection.accepted.size() == fit->model.terms.size() && fit->model.terms.size() > 1;
+  for (int sweep = 0; !rests && sweep < kSwapSweepsMax; ++sweep)
+    rests = !SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted);
+  if (!rests) TakeRivals(templates, groups, rule, *fit, &selection.accepted);
   return selection;
 }
 
