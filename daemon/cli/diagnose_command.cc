@@ -97,7 +97,7 @@ Status WriteReport(const std::filesystem::path& out, const ReadIn& in,
 }
 
 std::string CauseTable(const sim::Diagnosis& diagnosis) {
-  TextRows rows = {
+  std::vector<std::vector<std::string>> rows = {
       {"cause", "axis", "scope", "units", "amplitude", "um rms", "2 d ln L", "rivals"}};
   for (const sim::CauseFound& cause : diagnosis.causes) {
     std::string rivals;
