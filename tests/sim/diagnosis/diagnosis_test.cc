@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Plant{"axis_crosstalk", "theta", 5e-4}, Plant{"fibre_torque", "theta", 0.08},
                     Plant{"axis_tilt", "theta", 5e-4}, Plant{"neighbour_coupling", "theta", 0.02},
                     Plant{"mode_threshold", "theta", 0.04}),
-    [](const testing::TestParamInfo<Plant>& info) { return std::string(info.param.cause); });
+    [](const auto& plant) { return std::string(plant.param.cause); });
 
 TEST(Diagnosis, TwoNamesForOneEffectAreAnAmbiguityOfTwo) {
   Effect twin = *FindEffect("eccentricity");

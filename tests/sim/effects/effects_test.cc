@@ -82,9 +82,12 @@ TEST(Effects, BacklashIsASideOfTheGapAndHomingForgetsIt) {
     for (std::size_t i = 0; i < track.moves; ++i) {
       EXPECT_LE(std::abs(errors[at + i]), 0.1 + 1e-12);
       const double step = track.step_deg[AxisIndex(form)][i];
-      if (std::abs(step) > std::max(form.shape, 1e-9))
+      if (std::abs(step) > std::max(form.shape, 1e-9)) {
         EXPECT_NEAR(errors[at + i], step > 0 ? -0.1 : 0.1, 1e-12) << "the gap is crossed";
-      if (track.restarts[i] != 0 && step == 0) EXPECT_EQ(errors[at + i], 0);
+      }
+      if (track.restarts[i] != 0 && step == 0) {
+        EXPECT_EQ(errors[at + i], 0);
+      }
     }
   }
 }
