@@ -257,24 +257,6 @@ CauseFound SwapCause(const Campaign& campaign,
   return cause;
 }
 
-// Zeros that differ from homing to homing, where they are worth their number. The terms are then
-// chosen anew: what was one homing's zero may have passed for something else.
-bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
-                Fit* fit) {
-  constexpr double kBetterBy = 20;
-  Fit freed = *fit;
-  FreeHomings(&freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
-  freed.model.terms.clear();
-  UpdateResiduals(&freed);
-  FreeHomings(&freed);
-  Selection again = Select(templates, rule, &freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
-  *fit = std::move(freed);
-  *selection = std::move(again);
-  return true;
-}
-
 // With and without steps in single units' angles; the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
@@ -285,6 +267,25 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   if (Merit(stepped) <= Merit(*fit)) return selection;
   *fit = std::move(stepped);
   return again;
+}
+
+// Zeros that differ from homing to homing, where they are worth their number. The terms are then
+// and steps are chosen anew: what was one homing's zero may have passed for something else.
+bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
+                Fit* fit) {
+  constexpr double kBetterBy = 20;
+  Fit freed = *fit;
+  FreeHomings(&freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  freed.model.terms.clear();
+  freed.model.events.clear();
+  UpdateResiduals(&freed);
+  FreeHomings(&freed);
+  Selection again = SelectWithEvents(templates, rule, &freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  *fit = std::move(freed);
+  *selection = std::move(again);
+  return true;
 }
 
 CauseFound HomingCause(const Fit& fit) {

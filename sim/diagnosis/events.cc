@@ -14,6 +14,7 @@ using Eigen::VectorXd;
 
 constexpr double kChiSquareMin = 50;  // best of some hundred places and axes, in thousands of units
 constexpr std::size_t kEventsMax = 6;  // of a unit
+constexpr std::size_t kLastsMin = 3;   // exposures: fewer may be outliers
 constexpr double kNear = 3.5;          // sigmas from a size that physics has
 constexpr double kStepMin_deg = 2;     // a lost command below it cannot be told from other steps
 constexpr int kTurnsMax = 20;
@@ -36,10 +37,10 @@ StepFound BestStep(const WhiteUnit& white, const VectorXd& y) {
     for (std::size_t move = 1; move < white.track.moves; ++move) {
       if (white.track.step_deg[axis][move] == 0) continue;
       errors.Reset(white.track.moves);
-      for (std::size_t i = move; i < white.track.moves; ++i) {
-        if (i > move && white.track.restarts[i] != 0) break;
+      std::size_t i = move;
+      for (; i < white.track.moves && (i == move || white.track.restarts[i] == 0); ++i)
         errors.angle_deg[axis][i] = 1;
-      }
+      if (i - move < kLastsMin) continue;
       WhiteDisplacement(white, errors, m.data());
       m -= q * (q.transpose() * m);
       const double g = m.squaredNorm(), b = m.dot(left);
@@ -55,7 +56,8 @@ double SizeOfPhysics(const UnitTrack& track, const StepFound& found) {
   const double tolerance = std::max(kNear * found.sigma_deg, 1e-3);
   if (std::abs(step) > kStepMin_deg)
     for (const double size : {-step, step})
-      if (std::abs(found.size_deg - size) < std::max(tolerance, 0.02 * std::abs(step))) return size;
+      if (std::abs(found.size_deg - size) < std::max(tolerance, 0.005 * std::abs(step)))
+        return size;
   const double turn = 360 / track.unit->gear[found.axis];
   const double turns = std::round(found.size_deg / turn);
   const bool against = turns * step < 0;

@@ -14,7 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kSizeMin_um = 0.5;  // tables are rounded
+constexpr double kSizeMin_um = 1;  // tables are rounded, and shared terms leave a trace in it
 
 struct Group {
   const char* cause;
