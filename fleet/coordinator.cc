@@ -24,6 +24,7 @@ class Coordinator::Impl {
     for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
     for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
+    for (const ExposureDone& exposure : inputs.exposures) pursuit_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
     while (const auto due = core_.NextDue()) static_cast<void>(contact_.Service(*due));
     pursuit_.Advance();
@@ -130,6 +131,7 @@ void Effects::Clear() {
   rows.clear();
   frames.clear();
   plan_job.reset();
+  exposure.reset();
   replies.clear();
   changed.clear();
   wake_at = kNever;

@@ -13,6 +13,7 @@
 // number of rounds is bounded. docs/way_of_a_move.md follows one move through here.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -44,6 +45,13 @@ struct ApplyCommand {
   std::string source;
   std::vector<std::optional<Pose>> targets;  // Shape: (n)
   bool fixed = false;
+  /// Given: look with the camera when all have arrived, send those again that are farther off than
+  /// the tolerance, and look again, at most so many times.
+  struct Measure {
+    std::uint8_t corrections = 0;
+    double tolerance_um = 10;
+  };
+  std::optional<Measure> measure = {};
 };
 /// Another target for one unit of the configuration that is under way; it need not have had one.
 /// A unit that moves is stopped first. Answered when it starts, or with why it does not.
@@ -99,12 +107,19 @@ struct PlanDone {
   std::optional<Result<LateMove>> late;  // of a job for a late move; `plan` is empty then
 };
 
+/// The answer to an ExposureJob.
+struct ExposureDone {
+  std::uint64_t id = 0;
+  Result<Exposure> exposure;
+};
+
 struct Inputs {
   HostInstant now;
   std::span<const ReceivedFrame> frames;
   std::span<const LinkEvent> links;
   std::span<const Command> commands;
   std::span<const PlanDone> plans;
+  std::span<const ExposureDone> exposures = {};
   std::uint64_t committed_through = 0;  // highest batch that is durable
   bool store_failing = false;           // the last attempt to commit failed; the shell tries again
 };
@@ -135,6 +150,14 @@ struct PlanJob {
   std::shared_ptr<const LateJob> late;  // then nothing else is looked at
 };
 
+/// Take an exposure now, and say where each unit is found. All units rest.
+struct ExposureJob {
+  std::uint64_t id = 0;
+  HostInstant since;  // the exposure begins no earlier
+  std::vector<UnitKnowledge> expected;
+  std::vector<std::optional<Pose>> before;  // where it stood before it was sent; none: not known
+};
+
 struct ReplyEffect {
   std::uint64_t request = 0;
   bool last = true;  // false: progress, more will come
@@ -147,6 +170,7 @@ struct Effects {
   std::vector<Row> rows;
   std::vector<OutFrame> frames;
   std::optional<PlanJob> plan_job;
+  std::optional<ExposureJob> exposure;
   std::vector<ReplyEffect> replies;
   std::vector<PositionerIndex> changed;  // units whose status differs from what was last told
   HostInstant wake_at = kNever;
@@ -184,9 +208,12 @@ constexpr const char* Name(TargetOutcome outcome) {
 
 struct UnitView {
   UnitPhase phase = UnitPhase::kAbsent;
-  UnitKnowledge knowledge;    // while it moves: the hull
-  SerialNumber serial;        // that answers; 0: none yet
-  SerialNumber bound_serial;  // that belongs here; 0: none yet
+  UnitKnowledge knowledge;  // while it moves: the hull
+  Pose offset{};            // its place less its own count of vectors (VectorRow::offset)
+  std::optional<SightingStatus> sighting;  // of the last exposure; none: it was not looked for
+  std::optional<double> error_um;          // from its target, as last measured
+  SerialNumber serial;                     // that answers; 0: none yet
+  SerialNumber bound_serial;               // that belongs here; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;
@@ -208,6 +235,16 @@ struct BusView {
   double load_max = 0;  // highest second since the configuration began
 };
 
+/// What the exposures of a configuration found of the units that have targets.
+struct MeasuredRound {
+  std::uint64_t exposure = 0;
+  std::uint32_t measured = 0;
+  std::uint32_t unknown = 0;           // seen nowhere, or not to be told from another
+  std::uint32_t within_tolerance = 0;  // of `measured`
+  double rms_um = 0;                   // of the distances from the targets, of `measured`
+  double worst_um = 0;
+};
+
 struct ConfigurationView {
   std::uint64_t id = 0;
   std::string source;
@@ -223,8 +260,9 @@ struct ConfigurationView {
   double peak_power_W = 0;          // predicted, of the same
   std::uint64_t frames = 0;         // both directions, all buses, since it began
   HostInstant began;
-  HostInstant started;      // start signal of this round; kNever before it
-  std::string waiting_for;  // what holds it up, for people; usually empty
+  HostInstant started;                  // start signal of this round; kNever before it
+  std::string waiting_for;              // what holds it up, for people; usually empty
+  std::vector<MeasuredRound> measured;  // blind, then after each correction
 };
 
 struct CoordinatorConfig {
@@ -243,6 +281,13 @@ struct CoordinatorConfig {
   DurationNs transmit_horizon =
       Milliseconds(4);  // how far ahead of the bit clock frames are released
   DurationNs silence_limit = Milliseconds(3000);  // without an answer: silent
+  /// A configuration that is measured ends each axis' way with this last piece, in this direction,
+  /// so that play and wind-up of a gear are always on one side. 0: as the way comes.
+  std::array<double, kAxisCount> approach_deg = {-2, -2};
+  /// A correction that is not the last ends so far short of the target where it needed a run-up, so
+  /// that the last one is short and goes on in the same direction: a long way scatters, a short one
+  /// does not.
+  double creep_deg = 0.04;
 };
 
 class Coordinator {

@@ -12,7 +12,8 @@ namespace focalfleet::store_internal {
 namespace {
 
 // Codes are the enumerators of fleet/records.h and fleet/knowledge.h; the views spell them out for
-// people. Positions are vectors from the axis' zero; position = turns * subdivision + vector.
+// people. Positions are vectors from the axis' zero; turns * subdivision + vector is the unit's
+// count, which is the position less the axis' offset.
 constexpr const char* kVersion1 = R"sql(
 CREATE TABLE meta(
   key TEXT PRIMARY KEY,
@@ -207,7 +208,37 @@ CREATE VIEW tuned AS SELECT
   FROM tuning LEFT JOIN unit ON unit.serial = tuning.serial;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2};
+// What a camera found, and by how much the place of an axis differs from its count of vectors.
+constexpr const char* kVersion3 = R"sql(
+ALTER TABLE axis_state ADD COLUMN offset INTEGER NOT NULL DEFAULT 0;
+
+CREATE TABLE measurement(
+  exposure INTEGER NOT NULL,
+  unit_id INTEGER NOT NULL,
+  serial INTEGER NOT NULL,
+  configuration INTEGER NOT NULL,
+  status INTEGER NOT NULL,
+  other INTEGER,                -- unit_id of the one that it is confused with
+  x_mm REAL NOT NULL,
+  y_mm REAL NOT NULL,
+  sigma_um REAL NOT NULL,
+  theta INTEGER,                -- vectors; NULL: the unit was put nowhere
+  phi INTEGER,
+  error_um REAL,                -- from its target; NULL: it had none
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(exposure, unit_id)
+) STRICT, WITHOUT ROWID;
+
+CREATE VIEW measured AS SELECT
+  exposure, unit_id, configuration,
+  CASE status WHEN 0 THEN 'missing' WHEN 1 THEN 'measured' WHEN 2 THEN 'did_not_move'
+    WHEN 3 THEN 'ambiguous' WHEN 4 THEN 'swapped' ELSE 'out_of_reach' END AS status,
+  x_mm, y_mm, sigma_um, error_um,
+  datetime(at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM measurement;
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

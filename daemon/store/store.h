@@ -149,6 +149,10 @@ class StoreReader {
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
+  /// Of one exposure, by unit id.
+  Result<std::vector<MeasurementRow>> Measurements(std::uint64_t exposure);
+  /// The newest exposure of a configuration; none: it was never measured.
+  Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
 
  private:

@@ -42,7 +42,7 @@ class Contact {
   void NoAnswer(PositionerIndex i);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
-  void OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence);
+  void OnDone(PositionerIndex i, Done done, std::uint8_t sequence);
   void OnParameter(PositionerIndex i, const ParameterReply& reply);
   void OnWritten(PositionerIndex i, const ParameterReply& reply);
   void MotionEnded(PositionerIndex i, const Done& done);

@@ -32,6 +32,7 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
       next_move(stored.next_move),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
+      next_exposure(stored.next_exposure),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
@@ -261,6 +262,19 @@ void Core::SayWhatIsDurable() {
   }
 }
 
+Pose Core::PlaceAt(PositionerIndex i, const Pose& count) const {
+  const Pose& offset = units[i.value].view.offset;
+  return {count[0] + offset[0], count[1] + offset[1]};
+}
+
+void Core::See(PositionerIndex i, const Pose& place) {
+  UnitView& view = unit(i).view;
+  const Pose believed = PlaceOf(view.knowledge);
+  for (const Axis axis : kAxes)
+    view.offset[Index(axis)] += place[Index(axis)] - believed[Index(axis)];
+  Know(i, Exactly(Witness::kMeasured, place), Origin::kCamera);
+}
+
 void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin) {
   UnitRecord& record = unit(i);
   record.view.knowledge = knowledge;
@@ -268,6 +282,7 @@ void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin
   VectorRow row{
       .serial = record.view.serial,
       .knowledge = knowledge,
+      .offset = record.view.offset,
       .subdivision = {drives[i.value].axis[0].subdivision, drives[i.value].axis[1].subdivision},
       .move = record.view.move,
       .origin = origin};

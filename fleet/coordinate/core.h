@@ -138,6 +138,11 @@ class Core {
   /// written.
   void ReplyWhenDurable(std::uint64_t request, std::string text);
 
+  /// Where it stands when its own count of vectors says `count`.
+  [[nodiscard]] Pose PlaceAt(PositionerIndex i, const Pose& count) const;
+  /// The camera found it at `place`, where its count had it elsewhere: the count is right from here
+  /// on, but for the offset. Pre: it stands at one known place.
+  void See(PositionerIndex i, const Pose& place);
   /// Knowledge of a unit that is settled now: kept here and in the store.
   void Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin);
   /// Closes the unit's open intent, if there is one.
@@ -169,6 +174,7 @@ class Core {
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
+  std::uint64_t next_exposure = 1;
   std::uint64_t next_batch = 1;
   std::uint64_t committed_through = 0;
   bool store_failing = false;

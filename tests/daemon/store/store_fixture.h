@@ -66,7 +66,7 @@ inline void ExpectDone(const Status& status) { EXPECT_TRUE(status) << status.err
 
 inline VectorRow Vector(std::uint32_t serial, Witness witness, std::int32_t theta, std::int32_t phi,
                         std::uint16_t move = 1, Origin origin = Origin::kMove) {
-  return {{serial}, Exactly(witness, Pose{theta, phi}), {96, 96}, {move}, origin};
+  return {{serial}, Exactly(witness, Pose{theta, phi}), {}, {96, 96}, {move}, origin};
 }
 
 inline IntentRow Intent(std::uint32_t unit, std::uint32_t serial, std::uint16_t move, Pose from,
