@@ -51,7 +51,8 @@ void BusLines::Put(const OutFrame& frame, HostInstant decided_at) {
 
 void BusLines::Flush(const HostClock& clock) {
   for (Line& line : lines_)
-    if (line.outbox.size() > 0) line.outbox.Flush(line.port.get(), clock.Now());
+    if (line.outbox.size() > 0)
+      line.outbox.Flush(line.port.get(), line.outbox.holds_start() ? clock.Now() : HostInstant{0});
 }
 
 HostInstant BusLines::wake_at(HostInstant now, const HostClock& clock) const {

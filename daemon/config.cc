@@ -53,6 +53,10 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});
   visit->Path("unix_directory", &c->bus.unix_directory);
   visit->Texts("interfaces", &c->bus.interfaces);
+  visit->Section("sync");
+  visit->Path("chip", &c->sync.chip);
+  visit->Whole("line", &c->sync.line, {0, 1023});
+  visit->Flag("active_low", &c->sync.active_low);
   visit->Section("clock");
   visit->Real("speed", &c->clock.speed, {0.01, 1000});
   visit->Section("drive");
@@ -73,6 +77,7 @@ void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Wait("notice_ms", &c->timing.notice);
   visit->Wait("clock_period_ms", &c->timing.clock_period);
   visit->Wait("start_delay_ms", &c->timing.start_delay);
+  visit->Wait("sync_lead_ms", &c->timing.sync_lead);
   visit->Wait("settle_margin_ms", &c->timing.settle_margin);
   visit->Wait("silence_limit_ms", &c->timing.silence_limit);
   visit->Section("simulated");
@@ -291,6 +296,12 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   reader->Require(config.bus.port != PortKind::kUnix || !config.bus.unix_directory.empty(), "bus",
                   "unix_directory",
                   "bus.unix_directory must say where bus<ID>.sock are for bus.port = \"unix\"");
+  reader->Require(config.sync.chip.empty() || config.clock.speed == 1, "sync", "chip",
+                  "sync.chip asks for clock.speed = 1: a pulse is one of real time");
+  // The unit's window for the edge, docs/protocol.md.
+  reader->Require(config.timing.sync_lead < Milliseconds(20), "timing", "sync_lead_ms",
+                  "timing.sync_lead_ms must be below 20: units take an edge only so short before "
+                  "their start");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",
@@ -317,6 +328,8 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
+  config.timing.sync_line = !config.sync.chip.empty();
+  config.sync.chip_at = reader.At("sync", "chip");
   config.bus.interfaces_at = reader.At("bus", "interfaces");
   config.log.file_at = reader.At("log", "file");
   return config;

@@ -47,6 +47,12 @@ struct DaemonConfig {
     std::vector<std::string> interfaces;  // by ascending bus id
     std::string interfaces_at;            // file:line, for messages
   } bus;
+  struct Sync {
+    std::string chip;  // of the GPIO that pulses at the common start; empty: there is no such line
+    std::uint32_t line = 0;
+    bool active_low = false;
+    std::string chip_at;  // file:line, for messages
+  } sync;
   struct Clock {
     double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
   } clock;

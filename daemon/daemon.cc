@@ -60,6 +60,7 @@ class Daemon {
   std::unique_ptr<StoreThread> store_thread_;
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ControlDesk> desk_;
+  std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
 };
 
@@ -70,6 +71,10 @@ Status Daemon::Start() {
   FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
   FOCALFLEET_TRY(OpenDesk());
   FOCALFLEET_TRY_ASSIGN(auto ports, OpenPorts(config_, *layout_, clock_));
+  FOCALFLEET_TRY_ASSIGN(auto sync, OpenSync(config_.sync));
+  if (sync != nullptr)
+    sync_ = std::make_unique<SyncPulse>(std::move(sync),
+                                        SyncPulse::Options{.late_most = config_.timing.sync_lead});
   const auto buses = layout_->buses();
   lines_ =
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
@@ -140,6 +145,7 @@ Status Daemon::StartThreads() {
                                                   .planner = planner_.get(),
                                                   .store = store_thread_.get(),
                                                   .feed = feed_.get(),
+                                                  .sync = sync_.get(),
                                                   .threads = signal_.get(),
                                                   .clock = clock_}));
   return {};

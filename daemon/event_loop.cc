@@ -116,6 +116,7 @@ void EventLoop::Run() {
   effects_.wake_at = HostInstant{0};  // the first step is due at once
   while (!stopping_) {
     Wait();
+    ServeSync();
     Gather();
     if (StepIsDue()) {
       Step();
@@ -135,11 +136,19 @@ void EventLoop::Wait() {
   HostInstant wake = std::min(
       {effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock), parts_.desk->wake_at()});
   if (parts_.feed != nullptr) wake = std::min(wake, parts_.feed->wake_at());
+  if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
   if (wake > now_) ArmTimer(wake);
   std::array<epoll_event, 128> events;
   const int count =
       ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), wake > now_ ? -1 : 0);
   for (int i = 0; i < count; ++i) Dispatch(events[static_cast<std::size_t>(i)].data.u64);
+}
+
+// Before anything else is done: the edge is what an instant is told by.
+void EventLoop::ServeSync() {
+  if (parts_.sync == nullptr) return;
+  const std::string trouble = parts_.sync->Serve(parts_.clock.Now());
+  if (!trouble.empty()) spdlog::error("SYNC {}", trouble);
 }
 
 void EventLoop::ArmTimer(HostInstant at) {
@@ -216,6 +225,7 @@ void EventLoop::Perform() {
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
   }
   for (const OutFrame& frame : effects_.frames) parts_.lines->Put(frame, now_);
+  if (effects_.sync_at && parts_.sync != nullptr) parts_.sync->Plan(*effects_.sync_at);
   if (effects_.plan_job) {
     const auto drives = parts_.coordinator->drives();
     PlannerWork work{std::move(*effects_.plan_job), {drives.begin(), drives.end()}};

@@ -15,6 +15,7 @@
 #include "daemon/planner_thread.h"
 #include "daemon/status_feed.h"
 #include "daemon/store_thread.h"
+#include "daemon/sync_pulse.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
@@ -30,6 +31,7 @@ class EventLoop {
     PlannerThread* planner = nullptr;
     StoreThread* store = nullptr;
     StatusFeed* feed = nullptr;            // none: DDS is off
+    SyncPulse* sync = nullptr;             // none: no SYNC line
     const EventSignal* threads = nullptr;  // raised by planner and store
     HostClock clock;
   };
@@ -59,6 +61,7 @@ class EventLoop {
   void Gather();
   [[nodiscard]] bool StepIsDue() const;
   void Step();
+  void ServeSync();
   void Perform();
   void Tell();
   void LogChanges();

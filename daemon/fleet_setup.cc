@@ -117,6 +117,14 @@ Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {
   return {};
 }
 
+Result<std::unique_ptr<SyncLine>> OpenSync(const DaemonConfig::Sync& sync, GpioKernel& kernel) {
+  if (sync.chip.empty()) return std::unique_ptr<SyncLine>();
+  auto line = GpioLine::Create(
+      {.chip = sync.chip, .line = sync.line, .active_low = sync.active_low}, kernel);
+  if (!line) return Fail(line.error().code, sync.chip_at + ": " + line.error().text);
+  return line;
+}
+
 Result<Ports> OpenPorts(const DaemonConfig& config, const Layout& layout, const HostClock& clock,
                         const InterfaceOpener& open) {
   switch (config.bus.port) {

@@ -6,6 +6,7 @@
 
 #include "daemon/clock.h"
 #include "daemon/config.h"
+#include "daemon/ports/gpio_line.h"
 #include "daemon/ports/pollable_port.h"
 #include "daemon/ports/socketcan_port.h"
 #include "fleet/layout.h"
@@ -25,5 +26,10 @@ Status CheckInterfaces(const DaemonConfig& config, const Layout& layout);
 Result<std::vector<std::unique_ptr<PollablePort>>> OpenPorts(
     const DaemonConfig& config, const Layout& layout, const HostClock& clock,
     const InterfaceOpener& open = OpenInterface);
+
+/// None where the configuration has no [sync] chip. Errors: kUnavailable with file:line: the chip
+/// or line is not there, or in use.
+Result<std::unique_ptr<SyncLine>> OpenSync(const DaemonConfig::Sync& sync,
+                                           GpioKernel& kernel = RealGpioKernel());
 
 }  // namespace focalfleet

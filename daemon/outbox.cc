@@ -40,6 +40,7 @@ bool Outbox::Put(const CanFrame& frame, HostInstant decided_at) {
     return false;
   }
   queue.push_back({frame, decided_at});
+  starts_ += IsStart(frame) ? 1u : 0u;
   return true;
 }
 
@@ -60,12 +61,15 @@ bool Outbox::FlushOne(std::deque<Waiting>* queue, FramePort* port, HostInstant n
       // Alone at the front it is thrown away; else what stands before it goes first.
       if (i > 0) break;
       ++counters_.late_starts;
+      --starts_;
       queue->pop_front();
       return true;
     }
     batch_.push_back(frame);
   }
   const std::size_t taken = port->Send(batch_);
+  starts_ -= static_cast<std::size_t>(
+      std::count_if(batch_.begin(), batch_.begin() + static_cast<std::ptrdiff_t>(taken), IsStart));
   queue->erase(queue->begin(), queue->begin() + static_cast<std::ptrdiff_t>(taken));
   return taken == batch_.size();
 }
@@ -74,6 +78,7 @@ void Outbox::Clear() {
   counters_.stale += size();
   stops_.clear();
   others_.clear();
+  starts_ = 0;
 }
 
 }  // namespace focalfleet

@@ -32,13 +32,15 @@ class Outbox {
   /// for as many stop frames again.
   bool Put(const CanFrame& frame, HostInstant decided_at);
 
-  /// Offers the port what waits, until it takes no more. `now`: read just before, it shifts start
-  /// signals.
+  /// Offers the port what waits, until it takes no more. `now`: read just before where
+  /// holds_start(), it shifts start signals.
   void Flush(FramePort* port, HostInstant now);
 
   /// Throws away what waits: after a link was down nothing of it is true any more.
   void Clear();
 
+  /// Some of what waits has to be shifted: only then does Flush look at the time.
+  [[nodiscard]] bool holds_start() const { return starts_ > 0; }
   [[nodiscard]] std::size_t size() const { return stops_.size() + others_.size(); }
   [[nodiscard]] const OutboxCounters& counters() const { return counters_; }
 
@@ -52,6 +54,7 @@ class Outbox {
   std::size_t capacity_;
   std::deque<Waiting> stops_;
   std::deque<Waiting> others_;
+  std::size_t starts_ = 0;
   std::vector<CanFrame> batch_;
   OutboxCounters counters_;
 };

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 
 #include "fleet/kinematics.h"
 
@@ -14,6 +15,59 @@ namespace {
 constexpr const char* kSeverities[] = {"info", "warning", "error"};
 
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+void PutUpload(const UploadView& upload, Json* out) {
+  (*out)["upload_bits_predicted"] = upload.bits_predicted;
+  (*out)["upload_bits"] = upload.bits;
+  (*out)["upload_predicted_s"] = Number(upload.predicted_s);
+  (*out)["upload_s"] = Number(upload.measured_s);
+}
+
+Json PlaceJson(const FleetView& view, const std::optional<PositionerIndex>& i) {
+  if (!i) return nullptr;
+  const Unit& unit = view.layout->unit(*i);
+  return {{"unit_id", unit.id.value}, {"bus_id", unit.bus.value}};
+}
+
+void PutStarts(const FleetView& view, Json* out) {
+  const StartView& starts = view.coordinator->configuration().starts;
+  const bool known = starts.told > 0;
+  const auto seconds = [&](double s) { return known ? Number(s) : Json(nullptr); };
+  (*out)["starts"] = starts.begun;
+  (*out)["starts_known"] = starts.told;
+  (*out)["start_skew_s"] = seconds(starts.skew_s);
+  (*out)["start_skew_bound_s"] = seconds(starts.bound_s);
+  (*out)["start_skew_allowed_s"] = seconds(starts.allowed_s);
+  (*out)["start_first"] = PlaceJson(view, starts.first);
+  (*out)["start_last"] = PlaceJson(view, starts.last);
+}
+
+Json ClockJson(const ClockView& clock) {
+  const bool known = clock.readings > 0;
+  return {{"readings", clock.readings},
+          {"rate_error", known ? Json(clock.rate_error) : Json(nullptr)},
+          {"rate_bound", known ? Json(clock.rate_bound) : Json(nullptr)},
+          {"bound_s", known ? Json(clock.bound_s) : Json(nullptr)}};
+}
+
+/// Of the units of a bus: the widest bound and the rate that is off most.
+struct BusClocks {
+  std::uint32_t known = 0;
+  double bound_s = 0;
+  double rate_error = 0;
+};
+std::map<BusId, BusClocks> ClocksByBus(const FleetView& view) {
+  std::map<BusId, BusClocks> clocks;
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
+    const ClockView& clock = view.coordinator->unit({n}).clock;
+    if (clock.readings == 0) continue;
+    BusClocks& bus = clocks[view.layout->unit({n}).bus];
+    ++bus.known;
+    bus.bound_s = std::max(bus.bound_s, clock.bound_s);
+    if (std::abs(clock.rate_error) > std::abs(bus.rate_error)) bus.rate_error = clock.rate_error;
+  }
+  return clocks;
+}
 
 Json UnservedJson(const FleetView& view) {
   Json unserved = Json::array();
@@ -28,27 +82,33 @@ Json UnservedJson(const FleetView& view) {
   return unserved;
 }
 
-Json BusJson(const FleetView& view, BusId bus, const ShellFacts::Bus& shell) {
+Json BusJson(const FleetView& view, BusId bus, const ShellFacts::Bus& shell,
+             const BusClocks& clocks) {
   const BusView& seen = view.coordinator->bus(bus);
-  return {{"bus_id", bus.value},
-          {"link", Name(seen.link)},
-          {"load", seen.load},
-          {"load_max", seen.load_max},
-          {"frames_sent", seen.frames_sent},
-          {"frames_received", seen.frames_received},
-          {"bits", seen.bits},
-          {"malformed", seen.malformed},
-          {"retries", seen.retries},
-          {"port", shell.port},
-          {"trouble", shell.trouble},
-          {"waiting", shell.waiting},
-          {"rejected", shell.counters.rejected},
-          {"lost", shell.counters.lost},
-          {"link_errors", shell.counters.link_errors},
-          {"reconnects", shell.counters.reconnects},
-          {"refused", shell.outbox.refused},
-          {"stale", shell.outbox.stale},
-          {"late_starts", shell.outbox.late_starts}};
+  Json json{{"bus_id", bus.value},
+            {"link", Name(seen.link)},
+            {"load", seen.load},
+            {"load_max", seen.load_max},
+            {"frames_sent", seen.frames_sent},
+            {"frames_received", seen.frames_received},
+            {"bits", seen.bits},
+            {"malformed", seen.malformed},
+            {"retries", seen.retries},
+            {"port", shell.port},
+            {"trouble", shell.trouble},
+            {"waiting", shell.waiting},
+            {"rejected", shell.counters.rejected},
+            {"lost", shell.counters.lost},
+            {"link_errors", shell.counters.link_errors},
+            {"reconnects", shell.counters.reconnects},
+            {"refused", shell.outbox.refused},
+            {"stale", shell.outbox.stale},
+            {"late_starts", shell.outbox.late_starts}};
+  PutUpload(seen.upload, &json);
+  json["clocks"] = clocks.known;
+  json["clock_bound_s"] = clocks.known > 0 ? Json(clocks.bound_s) : Json(nullptr);
+  json["clock_rate_error"] = clocks.known > 0 ? Json(clocks.rate_error) : Json(nullptr);
+  return json;
 }
 
 Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& knowledge,
@@ -93,21 +153,24 @@ double FractionOf(const FleetView& fleet) {
 
 Json ConfigurationJson(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
-  return {{"id", c.id},
-          {"source", c.source},
-          {"state", Name(c.state)},
-          {"round", c.round},
-          {"targeted", c.targeted},
-          {"arrived", c.arrived},
-          {"refused", c.refused},
-          {"failed", c.failed},
-          {"makespan_predicted_s", Number(c.makespan_predicted_s)},
-          {"makespan_s", Number(MakespanSoFar(view))},
-          {"energy_J", Number(c.energy_J)},
-          {"peak_power_W", Number(c.peak_power_W)},
-          {"frames", c.frames},
-          {"bus_load_max", HighestBusLoad(view)},
-          {"unserved", UnservedJson(view)}};
+  Json json{{"id", c.id},
+            {"source", c.source},
+            {"state", Name(c.state)},
+            {"round", c.round},
+            {"targeted", c.targeted},
+            {"arrived", c.arrived},
+            {"refused", c.refused},
+            {"failed", c.failed},
+            {"makespan_predicted_s", Number(c.makespan_predicted_s)},
+            {"makespan_s", Number(MakespanSoFar(view))},
+            {"energy_J", Number(c.energy_J)},
+            {"peak_power_W", Number(c.peak_power_W)},
+            {"frames", c.frames},
+            {"bus_load_max", HighestBusLoad(view)},
+            {"unserved", UnservedJson(view)}};
+  PutUpload(c.upload, &json);
+  PutStarts(view, &json);
+  return json;
 }
 
 Json ProgressJson(const FleetView& view) {
@@ -134,8 +197,11 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
   for (std::size_t w = 0; w < counts.by_witness.size(); ++w)
     witnesses[Name(static_cast<Witness>(w))] = counts.by_witness[w];
   Json buses = Json::array();
-  for (std::size_t b = 0; b < facts.buses.size(); ++b)
-    buses.push_back(BusJson(view, view.layout->buses()[b], facts.buses[b]));
+  std::map<BusId, BusClocks> clocks = ClocksByBus(view);
+  for (std::size_t b = 0; b < facts.buses.size(); ++b) {
+    const BusId bus = view.layout->buses()[b];
+    buses.push_back(BusJson(view, bus, facts.buses[b], clocks[bus]));
+  }
   return {{"version", facts.version},
           {"time", ToIso8601(view.at)},
           {"started", ToIso8601(facts.started)},
@@ -190,6 +256,7 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
           {"target", std::move(target)},
           {"mode", Name(drive.mode)},
           {"v_bus_V", drive.v_bus_V},
+          {"clock", ClockJson(seen.clock)},
           {"theta", AxisJson(view, i, knowledge, Index(Axis::kTheta))},
           {"phi", AxisJson(view, i, knowledge, Index(Axis::kPhi))}};
 }
@@ -238,7 +305,9 @@ Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
                     {"makespan_predicted_s", Number(row.makespan_predicted_s)},
                     {"makespan_s", Number(row.makespan_s)},
                     {"energy_J", Number(row.energy_J)},
-                    {"peak_power_W", Number(row.peak_power_W)}});
+                    {"peak_power_W", Number(row.peak_power_W)},
+                    {"start_skew_s", Number(row.start_skew_s)},
+                    {"start_skew_bound_s", Number(row.start_skew_bound_s)}});
   return rows;
 }
 

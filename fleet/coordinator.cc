@@ -6,7 +6,6 @@
 #include "fleet/coordinate/core.h"
 #include "fleet/coordinate/pursuit.h"
 #include "protocol/base/check.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 
@@ -53,7 +52,7 @@ class Coordinator::Impl {
     BusRecord* bus = core_.FindBus(received.bus);
     FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
     ++bus->view.frames_received;
-    core_.Count(bus, FrameBits(received.frame));
+    core_.Count(bus, received.frame);
     const auto heard = DecodeUnit(received.frame);
     if (!heard) {
       // Another host may share the bus (a direct stop does): its frames are well formed and not for
@@ -74,7 +73,7 @@ class Coordinator::Impl {
     } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
       if (core_.Answers(*i, Function::kHome, sequence)) pursuit_.OnHomeReply(*i, *home);
     } else {
-      contact_.Hear(*i, *heard);
+      contact_.Hear(*i, *heard, received.at);
     }
   }
 
@@ -133,6 +132,7 @@ void Effects::Clear() {
   plan_job.reset();
   exposure.reset();
   replies.clear();
+  sync_at.reset();
   changed.clear();
   wake_at = kNever;
 }

@@ -172,6 +172,7 @@ struct Effects {
   std::optional<PlanJob> plan_job;
   std::optional<ExposureJob> exposure;
   std::vector<ReplyEffect> replies;
+  std::optional<HostInstant> sync_at;    // an edge on the SYNC line is due then
   std::vector<PositionerIndex> changed;  // units whose status differs from what was last told
   HostInstant wake_at = kNever;
 
@@ -206,6 +207,14 @@ constexpr const char* Name(TargetOutcome outcome) {
   return kNames[static_cast<std::size_t>(outcome)];
 }
 
+/// How a unit's clock runs against the host's (fleet/coordinate/clock_map.h).
+struct ClockView {
+  std::uint32_t readings = 0;  // that it is known from
+  double rate_error = 0;       // its seconds a second of the host's, less 1
+  double rate_bound = 0;       // the true one is within rate_error +- rate_bound
+  double bound_s = 0;          // what the newest reading is known to
+};
+
 struct UnitView {
   UnitPhase phase = UnitPhase::kAbsent;
   UnitKnowledge knowledge;  // while it moves: the hull
@@ -222,6 +231,28 @@ struct UnitView {
   TargetOutcome outcome = TargetOutcome::kNone;
   std::string outcome_reason;  // why refused or failed, for people
   std::optional<Pose> target;
+  ClockView clock;
+};
+
+/// How far apart the units of a round began, by their own clocks; of several rounds the widest.
+struct StartView {
+  std::uint32_t round = 0;  // 0: none yet
+  std::uint32_t begun = 0;  // units that were started
+  std::uint32_t told = 0;   // those of which it is known when they began
+  double skew_s = 0;        // from the first start to the last
+  double bound_s = 0;       // the true skew is within skew_s +- bound_s
+  double allowed_s = 0;     // that the plan was made for
+  std::optional<PositionerIndex> first = {};
+  std::optional<PositionerIndex> last = {};
+};
+
+/// Getting the moves of a configuration onto the wire. Counted are the frames without which a unit
+/// is not armed: stage_begin, stage_segment, confirm and arm with their answers.
+struct UploadView {
+  std::uint64_t bits_predicted = 0;  // exact, each frame once; known before the first is sent
+  std::uint64_t bits = 0;            // as they passed: repeats and late moves included
+  double predicted_s = 0;            // bits_predicted by the bit rate; of all buses the longest
+  double measured_s = 0;  // first frame let go to last unit armed; of all buses the longest
 };
 
 struct BusView {
@@ -233,6 +264,7 @@ struct BusView {
   std::uint64_t retries = 0;
   double load = 0;      // of the last second
   double load_max = 0;  // highest second since the configuration began
+  UploadView upload;    // of the configuration, all rounds
 };
 
 /// What the exposures of a configuration found of the units that have targets.
@@ -259,6 +291,8 @@ struct ConfigurationView {
   double energy_J = 0;              // predicted, of the same
   double peak_power_W = 0;          // predicted, of the same
   std::uint64_t frames = 0;         // both directions, all buses, since it began
+  UploadView upload;                // bits of all buses, all rounds
+  StartView starts;
   HostInstant began;
   HostInstant started;                  // start signal of this round; kNever before it
   std::string waiting_for;              // what holds it up, for people; usually empty
@@ -281,6 +315,10 @@ struct CoordinatorConfig {
   DurationNs transmit_horizon =
       Milliseconds(4);  // how far ahead of the bit clock frames are released
   DurationNs silence_limit = Milliseconds(3000);  // without an answer: silent
+  /// A SYNC line tells the common start by an edge. Start frames then say an instant `sync_lead`
+  /// after it, for units that have no such line or miss the edge.
+  bool sync_line = false;
+  DurationNs sync_lead = Milliseconds(5);
   /// A configuration that is measured ends each axis' way with this last piece, in this direction,
   /// so that play and wind-up of a gear are always on one side. 0: as the way comes.
   std::array<double, kAxisCount> approach_deg = {-2, -2};

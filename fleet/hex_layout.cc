@@ -13,6 +13,9 @@ constexpr double kGear = 337.0 * 45 / 17;
 constexpr double kArmPerPitch = 16.5 / 2 / 25.6;
 constexpr double kThetaEndDeg = 190;
 constexpr double kPhiMaxDeg = 180;
+constexpr double kHalfWidthShare = 0.08;  // of the pitch: what Layout gives the arms
+constexpr double kFiducialRoomMm = 1.5;   // a ferrule of 2 mm and the clearance
+constexpr double kGoldenTurn = 0.38196601125010515;
 
 struct LatticePoint {
   int q = 0;
@@ -67,18 +70,69 @@ void CutEvenly(const std::vector<PointFp>& points, std::span<std::uint32_t> regi
   CutEvenly(points, region.subspan(first_size), parts - first_parts, take);
 }
 
+PointFp Seed(std::uint32_t k, double radius_mm) {
+  const double turn = 2 * std::numbers::pi * kGoldenTurn * k;
+  return {radius_mm * std::cos(turn), radius_mm * std::sin(turn)};
+}
+
+// A sunflower's seeds, each at the nearest place that is left; the places are taken out, the order
+// of the others stays.
+std::vector<Fiducial> TakePlaces(std::uint32_t count, std::vector<PointFp>* places) {
+  const double rim_mm = std::hypot(places->back().x_mm, places->back().y_mm);
+  std::vector<char> taken(places->size(), 0);
+  std::vector<Fiducial> fiducials;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const PointFp seed = Seed(k, rim_mm * std::sqrt((k + 0.5) / count));
+    std::size_t best = places->size();
+    double best2 = 0;
+    for (std::size_t i = 0; i < places->size(); ++i) {
+      const double dx = (*places)[i].x_mm - seed.x_mm;
+      const double dy = (*places)[i].y_mm - seed.y_mm;
+      const double d2 = dx * dx + dy * dy;
+      if (taken[i] != 0 || (best < places->size() && d2 >= best2)) continue;
+      best = i;
+      best2 = d2;
+    }
+    taken[best] = 1;
+    fiducials.push_back({k + 1, (*places)[best]});
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < places->size(); ++i)
+    if (taken[i] == 0) (*places)[kept++] = (*places)[i];
+  places->resize(kept);
+  return fiducials;
+}
+
+std::vector<Fiducial> RingOutside(std::uint32_t count, const std::vector<PointFp>& bases,
+                                  double beyond_mm) {
+  const double rim_mm = std::hypot(bases.back().x_mm, bases.back().y_mm);
+  std::vector<Fiducial> fiducials;
+  for (std::uint32_t k = 0; k < count; ++k)
+    fiducials.push_back({k + 1, Seed(k, rim_mm + beyond_mm)});
+  return fiducials;
+}
+
 std::size_t PartsOf(std::size_t size, std::uint32_t per_part) {
   return (size + per_part - 1) / per_part;
 }
 
 }  // namespace
 
-std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options) {
-  const std::vector<PointFp> points = LatticeNearestFirst(options.count, options.pitch_mm);
+HexPlate MakeHexPlate(const HexLayoutOptions& options) {
   const double theta_arm_mm =
       options.theta_arm_mm > 0 ? options.theta_arm_mm : kArmPerPitch * options.pitch_mm;
   const double phi_arm_mm = options.phi_arm_mm > 0 ? options.phi_arm_mm : theta_arm_mm;
-  std::vector<Unit> units(points.size());
+  const double reach_mm = theta_arm_mm + phi_arm_mm + kHalfWidthShare * options.pitch_mm;
+  const bool place_is_free = options.pitch_mm - reach_mm > kFiducialRoomMm;
+  HexPlate plate;
+  std::vector<PointFp> points = LatticeNearestFirst(
+      options.count + (place_is_free ? options.fiducials : 0), options.pitch_mm);
+  if (options.fiducials > 0)
+    plate.fiducials = place_is_free
+                          ? TakePlaces(options.fiducials, &points)
+                          : RingOutside(options.fiducials, points, reach_mm + kFiducialRoomMm);
+  std::vector<Unit>& units = plate.units;
+  units.resize(points.size());
   std::vector<std::uint32_t> order(points.size());
   for (std::uint32_t i = 0; i < units.size(); ++i) {
     order[i] = i;
@@ -103,7 +157,11 @@ std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options) {
             });
   std::unordered_map<BusId, std::uint8_t> nodes;
   for (Unit& unit : units) unit.node = NodeId{++nodes[unit.bus]};
-  return units;
+  return plate;
+}
+
+std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options) {
+  return MakeHexPlate(options).units;
 }
 
 }  // namespace focalfleet

@@ -18,6 +18,7 @@ struct HexLayoutOptions {
   double phi_arm_mm = 0;    // 0: as long as the theta arm
   std::uint32_t units_per_bus = 100;
   std::uint32_t units_per_rail = 500;
+  std::uint32_t fiducials = 0;
 };
 
 /// SDSS-V's proportions: arms of 7.4 and 14.3 mm at 22.4 mm pitch, so that a fibre reaches its
@@ -29,5 +30,17 @@ inline HexLayoutOptions SdssLike(std::uint32_t count) {
 /// Exactly `count` units, ids from 1, nearest the centre first; nodes are given on each bus in that
 /// order. Frame: focal plane, the centre unit at 0, 0. Cost: O(n log n).
 std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options);
+
+struct HexPlate {
+  std::vector<Unit> units;
+  std::vector<Fiducial> fiducials;
+};
+
+/// Units and fiducials, ids from 1 each. No arm reaches a fiducial. On the lattice of LAMOST's
+/// proportions every gap is reached, so fiducials take places of the lattice, evenly over the
+/// plate; the units fill the others. Where neighbours' arms reach an empty place, too (as SDSS-V's
+/// do), fiducials stand on a ring outside all patrol areas. Either way they follow the golden angle
+/// (a sunflower's seeds), so that no turn or reflection of the plate brings them onto themselves.
+HexPlate MakeHexPlate(const HexLayoutOptions& options);
 
 }  // namespace focalfleet

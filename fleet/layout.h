@@ -66,6 +66,12 @@ struct Obstacle {
   double radius_mm = 0;
 };
 
+/// A light at a known place of the plate, for the camera.
+struct Fiducial {
+  std::uint32_t id = 0;
+  PointFp at_fp;
+};
+
 /// Why this unit by itself cannot be (a number that is not finite, an arm without length, an empty
 /// range), or an empty text. Bus, node and neighbours are not looked at.
 std::string FaultOf(const Unit& unit);

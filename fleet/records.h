@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <variant>
@@ -157,6 +158,9 @@ struct ConfigurationRow {
   double makespan_s = 0;
   double energy_J = 0;
   double peak_power_W = 0;
+  // Of the starts of its units, where they are known; else not a number.
+  double start_skew_s = std::numeric_limits<double>::quiet_NaN();
+  double start_skew_bound_s = std::numeric_limits<double>::quiet_NaN();
 };
 
 enum class Severity : std::uint8_t { kInfo, kWarning, kError };

@@ -77,8 +77,9 @@ local messages = {
     {name = "phi", first = 24, bits = 24, signed = true, min = -8388607, max = 8388607},
     {name = "move", first = 48, bits = 16, min = 0, max = 65535},
   }},
-  {name = "clock_reply", head = 131, from_unit = 1, length = 4, constant_detail = 0, reserved = {}, fields = {
+  {name = "clock_reply", head = 131, from_unit = 1, length = 8, constant_detail = 0, reserved = {}, fields = {
     {name = "ticks", first = 0, bits = 32, min = 0, max = 4294967295},
+    {name = "began_ticks", first = 32, bits = 32, min = 0, max = 4294967295},
   }},
   {name = "arm_reply", head = 196, from_unit = 1, length = 3, constant_detail = 0, reserved = {}, fields = {
     {name = "move", first = 0, bits = 16, min = 0, max = 65535},

@@ -8,6 +8,7 @@
 
 #include "protocol/base/ids.h"
 #include "protocol/base/instants.h"
+#include "protocol/wire/identifier.h"
 #include "protocol/wire/messages.h"
 
 namespace focalfleet::sim {
@@ -16,6 +17,7 @@ namespace focalfleet::sim {
 struct UnitFaults {
   bool silent = false;        // hears, acts, never sends
   bool deaf = false;          // hears nothing
+  bool deaf_to_sync = false;  // its SYNC wire is broken
   DurationNs late{0};         // every answer comes this much later
   std::uint8_t copies = 1;    // every answer is sent so many times
   bool wrong_digest = false;  // what it says it holds is not what was staged
@@ -28,13 +30,25 @@ struct UnitFaults {
     Axis axis = Axis::kTheta;
   };
   std::optional<InMotion> in_motion;
+  std::optional<Function> ignores;  // such a request: hears it, does nothing, says nothing
+  /// Such a request (confirm, arm, home, parameter_write): does nothing, and answers so.
+  struct Refusal {
+    Function what{};
+    Answer answer = Answer::kWrongState;
+  };
+  std::optional<Refusal> refuses;
+  std::uint32_t loses_segments = 0;  // so many more stage_segment frames do not reach it
+  std::optional<std::uint8_t> protocol_version;  // that it says it speaks
+  bool stale_sequence = false;  // answers under the sequence number of the request before
+  bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
 };
 
-/// How one bus misbehaves: chances per frame.
+/// How one bus misbehaves: chances per frame, but for noise.
 struct BusFaults {
-  double drop = 0;       // it occupies the bus, nobody hears it
-  double duplicate = 0;  // it is sent twice
-  double late = 0;       // it enters arbitration only after `late_by`
+  double bit_error_rate = 0;  // a bit is seen inverted by all: the frame is destroyed and repeated
+  double drop = 0;            // it occupies the bus and is acknowledged, but nobody takes it in
+  double duplicate = 0;       // one receiver refuses it when all others have it: they get it twice
+  double late = 0;            // it enters arbitration only after `late_by`
   DurationNs late_by = Milliseconds(5);
 };
 

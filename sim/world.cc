@@ -62,8 +62,13 @@ struct Wire {  // one bus with its nodes
   BusId id;
   Bus bus;
   std::array<std::uint32_t, 256> row_of_node{};
-  std::vector<std::uint32_t> rows;
+  std::vector<std::uint32_t> rows;  // of the bus' nodes 1, 2 ... : it counts the host as 0
 };
+
+Controller ControllerOf(const Bus& bus, std::uint32_t node) {
+  const ErrorCounters& errors = bus.errors(node);
+  return {bus.state(node), errors.warns(), errors.transmit(), errors.receive()};
+}
 
 Status Complain(const UnitDescription& unit, const std::string& what) {
   return Fail(ErrorCode::kInvalid, "unit " + std::to_string(unit.id.value) + ": " + what);
@@ -89,6 +94,30 @@ Status ValidateUnit(const UnitDescription& unit, const FactoryDrive& drive) {
   return {};
 }
 
+Status ValidateFaults(const WorldConfig& config) {
+  const auto complain = [](const PlannedFault& fault, const std::string& what) {
+    return Fail(ErrorCode::kInvalid,
+                "planned fault '" + std::string(InfoOf(fault.kind).name) + "': " + what);
+  };
+  for (const PlannedFault& fault : config.faults) {
+    const FaultKindInfo& info = InfoOf(fault.kind);
+    const bool known = std::ranges::any_of(config.units, [&](const UnitDescription& unit) {
+      return info.of_unit ? unit.id == fault.unit : unit.bus == fault.bus;
+    });
+    if (!known)
+      return complain(fault, info.of_unit ? "no unit " + std::to_string(fault.unit.value)
+                                          : "no bus " + std::to_string(fault.bus.value));
+    if (!(fault.chance >= 0 && fault.chance <= 1)) return complain(fault, "chance is not in 0..1");
+    if (fault.from.ns < 0 || fault.to <= fault.from)
+      return complain(fault, "does not end after it begins");
+    if (info.value != nullptr && !(fault.value >= info.value_min && fault.value <= info.value_max))
+      return complain(fault, std::string(info.value) + " is out of range");
+    if (info.needs_bit_clock && !config.bit_clock)
+      return complain(fault, "needs a bit clock; a real interface has its own");
+  }
+  return {};
+}
+
 }  // namespace
 
 Status World::Validate(const WorldConfig& config) {
@@ -107,7 +136,7 @@ Status World::Validate(const WorldConfig& config) {
       return Complain(unit, "bus " + std::to_string(unit.bus.value) + " node " +
                                 std::to_string(unit.node.value) + " is taken already");
   }
-  return {};
+  return ValidateFaults(config);
 }
 
 class World::Impl {
@@ -151,24 +180,40 @@ class World::Impl {
     now_ = std::max(now_, at);
   }
 
+  void PulseSync() {
+    for (std::uint32_t row = 0; row < units_.size(); ++row) {
+      if (units_[row]->faults().deaf_to_sync) continue;
+      Outbox out;
+      units_[row]->OnSync(now_, &out);
+      Send(row, out);
+    }
+  }
   void PowerCut(std::uint32_t row) {
     units_[row]->firmware().PowerOff(now_);
+    OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->PowerOff(node, now_); });
     Reschedule(row);
   }
   void PowerOn(std::uint32_t row) {
     units_[row]->firmware().PowerOn(now_);
+    OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->PowerOn(node, now_); });
     Reschedule(row);
+  }
+  /// What is done to a bus changes when it next does something.
+  template <class Act>
+  void OnBus(std::size_t slot, const Act& act) {
+    act(&segments_[slot].bus);
+    events_->Set(slot, segments_[slot].bus.NextEvent());
+  }
+  template <class Act>
+  void OnBusOf(std::uint32_t row, const Act& act) {
+    OnBus(bus_of_row_[row], [&](Bus* bus) { act(bus, node_of_row_[row]); });
   }
   void RaiseFault(std::uint32_t row, const Firmware::Trip& trip) {
     Outbox out;
     units_[row]->firmware().RaiseFault(trip, now_, &out);
     Send(row, out);
   }
-  void KillBus(BusId bus) {
-    const std::size_t i = segment_of_.at(bus);
-    segments_[i].bus.Kill();
-    events_->Set(i, segments_[i].bus.NextEvent());
-  }
+  [[nodiscard]] std::size_t Slot(BusId bus) const { return segment_of_.at(bus); }
 
   [[nodiscard]] UnitTruth Truth(std::size_t row) const;
   [[nodiscard]] std::vector<UnitMemory> Memory() const;
@@ -203,12 +248,15 @@ class World::Impl {
     segments_.reserve(buses_.size());
     for (const BusId id : buses_) {
       segment_of_[id] = segments_.size();
-      segments_.push_back(
-          {id,
-           Bus({config_.bit_rate_bps, config_.bit_clock, limits::kFramesPerBusQueued},
-               Rng::Stream(config_.seed, "bus", id.value)),
-           {},
-           {}});
+      segments_.push_back({id,
+                           Bus({.bit_rate_bps = config_.bit_rate_bps,
+                                .bit_clock = config_.bit_clock,
+                                .mailboxes_max = limits::kFramesPerBusQueued,
+                                .start = config_.start,
+                                .host_restart = config_.host_restart},
+                               Rng::Stream(config_.seed, "bus", id.value)),
+                           {},
+                           {}});
       segments_.back().row_of_node.fill(kNobody);
     }
   }
@@ -227,6 +275,7 @@ class World::Impl {
       Wire& segment = segments_[bus_of_row_.back()];
       segment.row_of_node[described.node.value] = row;
       segment.rows.push_back(row);
+      node_of_row_.push_back(segment.bus.Attach());
       PowerOn(row);
     }
     config_.memory.clear();
@@ -241,10 +290,10 @@ class World::Impl {
       if (wire != nullptr)
         wire->push_back(
             {segment.id, heard.at, sent.frame, sent.from_unit, sent.from_unit ? 0 : sent.sender});
-      if (sent.from_unit) {
+      if (!sent.from_unit) {
+        Deliver(segment, heard);
+      } else if (segment.bus.Hears(Bus::kHost) && heard.but_not != Bus::kHost) {
         delivered->push_back({segment.id, heard.at, sent.frame});
-      } else {
-        Deliver(segment, sent.frame);
       }
     }
     events_->Set(slot, segment.bus.NextEvent());
@@ -252,19 +301,21 @@ class World::Impl {
 
   // What the acceptance filters of the units let through: their own node's frames and the
   // broadcast.
-  void Deliver(Wire& segment, const CanFrame& frame) {
-    const auto node = static_cast<std::uint8_t>(frame.id >> 11);
+  void Deliver(Wire& segment, const Bus::Heard& heard) {
+    const auto node = static_cast<std::uint8_t>(heard.sent.frame.id >> 11);
     if (node == kBroadcastNode.value) {
-      for (const std::uint32_t row : segment.rows) DeliverTo(row, frame);
+      for (const std::uint32_t row : segment.rows) DeliverTo(row, heard);
     } else if (segment.row_of_node[node] != kNobody) {
-      DeliverTo(segment.row_of_node[node], frame);
+      DeliverTo(segment.row_of_node[node], heard);
     }
   }
 
-  void DeliverTo(std::uint32_t row, const CanFrame& frame) {
+  void DeliverTo(std::uint32_t row, const Bus::Heard& heard) {
+    const std::uint32_t node = node_of_row_[row];
+    if (!segments_[bus_of_row_[row]].bus.Hears(node) || heard.but_not == node) return;
     if (units_[row]->faults().deaf) return;
     Outbox out;
-    units_[row]->OnFrame(frame, now_, &out);
+    units_[row]->OnFrame(heard.sent.frame, now_, &out);
     Send(row, out);
   }
 
@@ -275,7 +326,7 @@ class World::Impl {
       const HostInstant ready = now_ + config_.answer_delay + faults.late;
       for (const CanFrame& frame : out.frames())
         for (int copy = 0; copy < faults.copies; ++copy)
-          segment.bus.Offer({frame, true, row}, ready);
+          segment.bus.Offer({frame, true, node_of_row_[row]}, ready);
       events_->Set(bus_of_row_[row], segment.bus.NextEvent());
     }
     Reschedule(row);
@@ -293,6 +344,7 @@ class World::Impl {
   std::map<BusId, std::size_t> segment_of_;
   std::vector<std::unique_ptr<Unit>> units_;
   std::vector<std::size_t> bus_of_row_;
+  std::vector<std::uint32_t> node_of_row_;  // on its bus
   std::unordered_map<UnitId, std::uint32_t> row_of_;
   std::optional<EventQueue> events_;  // slots: buses, then units
 };
@@ -333,7 +385,10 @@ std::vector<UnitMemory> World::Impl::Memory() const {
   return memory;
 }
 
-World::World(WorldConfig config) : impl_(std::make_unique<Impl>(std::move(config))) {}
+World::World(WorldConfig config) : schedule_(std::move(config.faults), config.start, config.seed) {
+  impl_ = std::make_unique<Impl>(std::move(config));
+  schedule_.Apply(this);
+}
 World::~World() = default;
 
 bool World::Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32_t client) {
@@ -341,16 +396,48 @@ bool World::Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32
 }
 void World::AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
                       std::vector<WireFrame>* wire) {
+  while (schedule_.next() <= at) {
+    impl_->AdvanceTo(schedule_.next(), delivered, wire);
+    schedule_.Apply(this);
+  }
   impl_->AdvanceTo(at, delivered, wire);
 }
-HostInstant World::NextEvent() const { return impl_->NextEvent(); }
+HostInstant World::NextEvent() const { return std::min(impl_->NextEvent(), schedule_.next()); }
 HostInstant World::now() const { return impl_->now(); }
 
+void World::PulseSync() { impl_->PulseSync(); }
 void World::PowerCut(UnitId unit) { impl_->PowerCut(impl_->Row(unit)); }
 void World::PowerOn(UnitId unit) { impl_->PowerOn(impl_->Row(unit)); }
-void World::KillBus(BusId bus) { impl_->KillBus(bus); }
+void World::KillBus(BusId bus) {
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->Kill(now()); });
+}
 void World::ReviveBus(BusId bus) {
-  if (Wire* segment = impl_->Find(bus)) segment->bus.Revive();
+  if (impl_->Find(bus) == nullptr) return;
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->Revive(now()); });
+}
+void World::StickBus(BusId bus) {
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->Stick(now()); });
+}
+void World::ReleaseBus(BusId bus) {
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->Release(now()); });
+}
+void World::RestartHost(BusId bus) {
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->RestartHost(now()); });
+}
+void World::ThrowHostOff(BusId bus) {
+  impl_->OnBus(impl_->Slot(bus), [this](Bus* wire) { wire->ThrowHostOff(now()); });
+}
+void World::Unplug(UnitId unit) {
+  impl_->OnBusOf(impl_->Row(unit),
+                 [this](Bus* wire, std::uint32_t node) { wire->Unplug(node, now()); });
+}
+void World::Plug(UnitId unit) {
+  impl_->OnBusOf(impl_->Row(unit),
+                 [this](Bus* wire, std::uint32_t node) { wire->Plug(node, now()); });
+}
+void World::Babble(UnitId unit, const std::optional<CanFrame>& frame) {
+  impl_->OnBusOf(impl_->Row(unit),
+                 [&](Bus* wire, std::uint32_t node) { wire->Babble(node, frame, now()); });
 }
 bool World::dead(BusId bus) const { return impl_->At(bus).bus.dead(); }
 std::size_t World::waiting(BusId bus) const { return impl_->At(bus).bus.waiting(); }
@@ -373,6 +460,16 @@ UnitTruth World::Truth(std::size_t row) const { return impl_->Truth(row); }
 UnitTruth World::Truth(UnitId unit) const { return impl_->Truth(impl_->Row(unit)); }
 const Flash& World::flash(UnitId unit) const { return impl_->unit(impl_->Row(unit)).flash(); }
 const BusCounters& World::counters(BusId bus) const { return impl_->At(bus).bus.counters(); }
+Controller World::controller(BusId bus) const {
+  return ControllerOf(impl_->At(bus).bus, Bus::kHost);
+}
+Controller World::controller(UnitId unit) const {
+  Controller controller;
+  impl_->OnBusOf(impl_->Row(unit), [&](const Bus* wire, std::uint32_t node) {
+    controller = ControllerOf(*wire, node);
+  });
+  return controller;
+}
 std::vector<UnitMemory> World::Memory() const { return impl_->Memory(); }
 
 }  // namespace focalfleet::sim

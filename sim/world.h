@@ -30,6 +30,7 @@
 #include "protocol/link/frame_port.h"
 #include "sim/axis/axis_memory.h"
 #include "sim/bus/bus.h"
+#include "sim/fault_plan.h"
 #include "sim/faults.h"
 #include "sim/spread.h"
 #include "sim/unit/flash.h"
@@ -56,6 +57,17 @@ struct WorldConfig {
   /// False where a real bus arbitrates and takes its time: frames pass at once, in order.
   bool bit_clock = true;
   std::vector<UnitMemory> memory;  // of an earlier run, matched by unit id
+  /// From the bus-off of a bus' host controller to its restart; kNever: it waits for RestartHost.
+  DurationNs host_restart = Milliseconds(1000);
+  std::vector<PlannedFault> faults;  // by the clock, from `start` on
+};
+
+/// How a CAN controller stands.
+struct Controller {
+  Confinement state = Confinement::kActive;
+  bool warns = false;
+  std::uint32_t transmit_errors = 0;
+  std::uint32_t receive_errors = 0;
 };
 
 /// True things about one unit, at World::now().
@@ -110,6 +122,9 @@ class World {
   [[nodiscard]] HostInstant NextEvent() const;
   [[nodiscard]] HostInstant now() const;
 
+  /// An edge of the SYNC line, which goes to every unit of every bus; at now().
+  void PulseSync();
+
   // ---- chance and violence; all at now()
 
   void PowerCut(UnitId unit);  // at once, whatever it does
@@ -117,6 +132,14 @@ class World {
   void KillBus(BusId bus);  // what waits is lost
   void ReviveBus(BusId bus);
   [[nodiscard]] bool dead(BusId bus) const;
+  void StickBus(BusId bus);  // dominant, until it is released
+  void ReleaseBus(BusId bus);
+  void RestartHost(BusId bus);   // its controller, if it is bus-off
+  void ThrowHostOff(BusId bus);  // as after a short circuit
+  void Unplug(UnitId unit);      // from its bus; it keeps its power
+  void Plug(UnitId unit);
+  /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
+  void Babble(UnitId unit, const std::optional<CanFrame>& frame);
   /// Frames that wait or are on their way on this bus.
   [[nodiscard]] std::size_t waiting(BusId bus) const;
   void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
@@ -133,12 +156,15 @@ class World {
   [[nodiscard]] UnitTruth Truth(UnitId unit) const;      // Pre: it exists
   [[nodiscard]] const Flash& flash(UnitId unit) const;   // Pre: it exists
   [[nodiscard]] const BusCounters& counters(BusId bus) const;
+  [[nodiscard]] Controller controller(BusId bus) const;    // the host's. Pre: there is such a bus
+  [[nodiscard]] Controller controller(UnitId unit) const;  // Pre: it exists
   /// FLASH and mechanics of all units at now(), as a later run would find them.
   [[nodiscard]] std::vector<UnitMemory> Memory() const;
 
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
+  FaultSchedule schedule_;
 };
 
 }  // namespace focalfleet::sim

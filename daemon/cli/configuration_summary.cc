@@ -48,6 +48,25 @@ std::string DescribeByReason(const Json& unserved, std::size_t first) {
   return text + "  --json names them all\n";
 }
 
+/// What is known of it: nothing before the upload, nothing of the starts before units told.
+std::string DescribeUploadAndStarts(const Json& c) {
+  std::string text;
+  if (NumberIn(c, "upload_s") > 0) {
+    text += fmt::format("\n  upload {:.3f} s (its bits take {:.3f} s), {} bits ({} predicted)",
+                        NumberIn(c, "upload_s"), NumberIn(c, "upload_predicted_s"),
+                        CountIn(c, "upload_bits"), CountIn(c, "upload_bits_predicted"));
+  }
+  if (CountIn(c, "starts_known") > 0) {
+    text += fmt::format(
+        "\n  units began within {:.1f} ms of each other (+- {:.1f}; {} of {} told; plans allow for "
+        "{:.0f} ms)",
+        1e3 * NumberIn(c, "start_skew_s"), 1e3 * NumberIn(c, "start_skew_bound_s"),
+        CountIn(c, "starts_known"), CountIn(c, "starts"),
+        1e3 * NumberIn(c, "start_skew_allowed_s"));
+  }
+  return text;
+}
+
 Colour ColourOf(ExitCode exit) {
   return exit == ExitCode::kOk             ? Colour::kGreen
          : exit == ExitCode::kSomeUnserved ? Colour::kYellow
@@ -84,6 +103,7 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
                       span("makespan_s"), over || NumberIn(c, "makespan_s") <= 0 ? "" : " so far",
                       span("makespan_predicted_s"), Shown(c, "energy_J", "J", 1),
                       Shown(c, "peak_power_W", "W", 1), CountIn(c, "frames"));
+  text += DescribeUploadAndStarts(c);
   if (const std::string error = TextIn(c, "error"); !error.empty()) {
     text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
   }
@@ -118,6 +138,13 @@ Json ApplySummary(const Json& configuration, const Json& status) {
   }
   for (const char* key : {"makespan_predicted_s", "makespan_s", "energy_J", "peak_power_W"}) {
     summary[key] = NumberIn(configuration, key);
+  }
+  for (const char* key : {"upload_bits_predicted", "upload_bits", "starts", "starts_known"}) {
+    summary[key] = CountIn(configuration, key);
+  }
+  for (const char* key : {"upload_predicted_s", "upload_s", "start_skew_s", "start_skew_bound_s",
+                          "start_skew_allowed_s", "start_first", "start_last"}) {
+    summary[key] = configuration.value(key, Json(nullptr));
   }
   summary["bus_load_max"] =
       NumberIn(configuration, "bus_load_max", NumberIn(status, "bus_load_max"));

@@ -4,6 +4,7 @@
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/text_file.h"
+#include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/hex_layout.h"
 #include "protocol/base/limits.h"
@@ -16,6 +17,7 @@ struct LayoutOptions {
   std::vector<double> arms_mm;  // none, one for both arms, or theta and phi
   std::vector<double> gears;  // none, one for both axes, or theta and phi
   std::string out;
+  std::string fiducials_out;
 };
 
 ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
@@ -24,7 +26,8 @@ ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
     hex.theta_arm_mm = options.arms_mm.front();
     hex.phi_arm_mm = options.arms_mm.back();
   }
-  std::vector<Unit> units = MakeHexLayout(hex);
+  HexPlate plate = MakeHexPlate(hex);
+  std::vector<Unit>& units = plate.units;
   if (!options.gears.empty()) {
     for (Unit& unit : units) {
       unit.axis[0].gear = options.gears.front();
@@ -38,12 +41,19 @@ ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
   if (const auto written = WriteFileAtomically(options.out, text); !written) {
     return Report(context, written.error());
   }
+  if (!options.fiducials_out.empty()) {
+    const std::string fiducials = WriteFiducials(plate.fiducials);
+    if (const auto written = WriteFileAtomically(options.fiducials_out, fiducials); !written) {
+      return Report(context, written.error());
+    }
+  }
   const std::size_t buses = layout->buses().size();
   if (context.json) {
     PrintJson({{"units", layout->size()},
                {"buses", buses},
                {"pitch_mm", layout->pitch_mm()},
                {"clearance_mm", layout->clearance_mm()},
+               {"fiducials", plate.fiducials.size()},
                {"out", options.out}});
   }
   Say(context, fmt::format("{}: {} on {}, pitch {:g} mm", options.out,
@@ -84,6 +94,14 @@ void AddLayoutCommand(CommandLine* line) {
   command->add_option("--units-per-rail", options->hex.units_per_rail, "Units on one supply rail")
       ->check(CLI::Range(1u, limits::kUnits).description(""))
       ->capture_default_str();
+  CLI::Option* fiducials =
+      command
+          ->add_option("--fiducials", options->hex.fiducials,
+                       "Lights for the camera, on places that no arm reaches")
+          ->check(CLI::Range(3u, limits::kFiducials).description(""));
+  fiducials->needs(
+      AddFile(command, "--fiducials-out", &options->fiducials_out, "fiducials.csv to write")
+          ->needs(fiducials));
   AddFile(command, "--out", &options->out, "units.csv to write")->required();
   OnChosen(line, command, options, RunLayoutHex);
 }

@@ -87,7 +87,13 @@ Json JsonOf(const ConfigurationProgressValue& value) {
           {"makespan_s", view.makespan_s},
           {"energy_J", view.energy_J},
           {"peak_power_W", view.peak_power_W},
-          {"frames", view.frames}};
+          {"frames", view.frames},
+          {"starts", view.starts.begun},
+          {"starts_known", view.starts.told},
+          {"start_skew_s", view.starts.told > 0 ? Json(view.starts.skew_s) : Json(nullptr)},
+          {"start_skew_bound_s", view.starts.told > 0 ? Json(view.starts.bound_s) : Json(nullptr)},
+          {"upload_predicted_s", view.upload.predicted_s},
+          {"upload_s", view.upload.measured_s}};
 }
 
 Json JsonOf(const UnitStatusValue& unit) {

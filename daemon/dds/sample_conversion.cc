@@ -68,6 +68,21 @@ const char* Flaw(const UnitStatusValue& value) {
   if (value.outcome > kLastOutcome) return "outcome";
   return nullptr;
 }
+template <class Sample>
+void PutUpload(const UploadView& upload, Sample* sample) {
+  sample->upload_predicted_s = upload.predicted_s;
+  sample->upload_s = upload.measured_s;
+  sample->upload_bits_predicted = upload.bits_predicted;
+  sample->upload_bits = upload.bits;
+}
+template <class Sample>
+UploadView UploadOf(const Sample& sample) {
+  return {.bits_predicted = sample.upload_bits_predicted,
+          .bits = sample.upload_bits,
+          .predicted_s = sample.upload_predicted_s,
+          .measured_s = sample.upload_s};
+}
+
 const char* Flaw(const BusStatusValue& value) {
   return value.view.link > kLastLink ? "link" : nullptr;
 }
@@ -112,6 +127,7 @@ void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample) {
   sample->retries = value.view.retries;
   sample->load = value.view.load;
   sample->load_max = value.view.load_max;
+  PutUpload(value.view.upload, sample);
   sample->bus_id = value.bus.value;
   sample->link = Code(value.view.link);
 }
@@ -138,6 +154,14 @@ void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationP
   sample->makespan_s = value.view.makespan_s;
   sample->energy_J = value.view.energy_J;
   sample->peak_power_W = value.view.peak_power_W;
+  const StartView& starts = value.view.starts;
+  const bool known = starts.told > 0;
+  sample->start_skew_s = known ? starts.skew_s : kNoNumber;
+  sample->start_skew_bound_s = known ? starts.bound_s : kNoNumber;
+  sample->start_skew_allowed_s = known ? starts.allowed_s : kNoNumber;
+  sample->starts = starts.begun;
+  sample->starts_known = starts.told;
+  PutUpload(value.view.upload, sample);
   sample->frames = value.view.frames;
   sample->round = value.view.round;
   sample->targeted = value.view.targeted;
@@ -188,6 +212,7 @@ bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value) {
   value->view.retries = sample.retries;
   value->view.load = sample.load;
   value->view.load_max = sample.load_max;
+  value->view.upload = UploadOf(sample);
   value->bus = {sample.bus_id};
   return Take(sample.link, kLastLink, &value->view.link);
 }
@@ -215,6 +240,13 @@ bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationPro
   value->view.makespan_s = sample.makespan_s;
   value->view.energy_J = sample.energy_J;
   value->view.peak_power_W = sample.peak_power_W;
+  value->view.starts = {.begun = sample.starts, .told = sample.starts_known};
+  if (sample.starts_known > 0) {
+    value->view.starts.skew_s = sample.start_skew_s;
+    value->view.starts.bound_s = sample.start_skew_bound_s;
+    value->view.starts.allowed_s = sample.start_skew_allowed_s;
+  }
+  value->view.upload = UploadOf(sample);
   value->view.frames = sample.frames;
   value->view.round = sample.round;
   value->view.targeted = sample.targeted;

@@ -38,8 +38,8 @@ bool IsWarning(const can_frame& error) {
          (error.data[1] & kWarningBits) != 0 && (error.data[1] & kPassiveBits) == 0;
 }
 
-void ErrorTally::Note(const can_frame& error) {
-  const auto count = [this](Kind kind, bool seen) { counts_[kind] += seen ? 1u : 0u; };
+void ErrorTally::Note(const can_frame& error, std::uint64_t times) {
+  const auto count = [&](Kind kind, bool seen) { counts_[kind] += seen ? times : 0u; };
   const bool violation = IsAbout(error, CAN_ERR_PROT);
   const std::uint8_t how = violation ? error.data[2] : std::uint8_t{0};
   const bool crc = violation && (error.data[3] == CAN_ERR_PROT_LOC_CRC_SEQ ||

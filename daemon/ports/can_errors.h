@@ -26,7 +26,7 @@ bool IsWarning(const can_frame& error);
 /// Counts what went wrong since the bus was last well, and names it.
 class ErrorTally {
  public:
-  void Note(const can_frame& error);
+  void Note(const can_frame& error, std::uint64_t times = 1);
   void Clear() { counts_.fill(0); }
   /// "no acknowledgement, bit error": the most frequent first, at most three; empty: none was seen.
   [[nodiscard]] std::string Causes() const;

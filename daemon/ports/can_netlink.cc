@@ -209,7 +209,10 @@ NetlinkMessage OrderToRaise(int index, bool up) {
 Result<int> ReadAcknowledgement(std::span<const std::byte> answer) {
   FOCALFLEET_TRY_ASSIGN(const Head head, ReadHead(answer));
   const auto error = Value<nlmsgerr>(head.body);
-  if (head.type != NLMSG_ERROR || !error || error->error > 0) return NoAnswer();
+  // Not only because -INT_MIN is none: no errno is beyond what the kernel encodes in a pointer.
+  constexpr int kErrnoMax = 4095;
+  if (head.type != NLMSG_ERROR || !error || error->error > 0 || error->error < -kErrnoMax)
+    return NoAnswer();
   return -error->error;
 }
 
@@ -246,8 +249,15 @@ Result<CanLink> LookAtLink(const std::string& interface) {
   return link;
 }
 
-Status ReviveLink(const std::string& interface) {
+Status ReviveLink(const std::string& interface, bool* taken_down) {
   FOCALFLEET_TRY_ASSIGN(const CanLink link, LookAtLink(interface));
+  const auto bring_up = [&]() -> Status {
+    FOCALFLEET_TRY_ASSIGN(const int up, Order(OrderToRaise(link.index, true)));
+    if (up != 0) return Failure(interface, "bring up", up);
+    *taken_down = false;
+    return {};
+  };
+  if (!link.up) return *taken_down ? bring_up() : Status{};
   if (link.state && *link.state != ControllerState::kBusOff) return {};
   FOCALFLEET_TRY_ASSIGN(const int restart, Order(OrderToRestart(link.index)));
   if (restart == 0) return {};
@@ -255,9 +265,8 @@ Status ReviveLink(const std::string& interface) {
   // The driver knows no restart: down and up begins anew.
   FOCALFLEET_TRY_ASSIGN(const int down, Order(OrderToRaise(link.index, false)));
   if (down != 0) return Failure(interface, "take down", down);
-  FOCALFLEET_TRY_ASSIGN(const int up, Order(OrderToRaise(link.index, true)));
-  if (up != 0) return Failure(interface, "bring up", up);
-  return {};
+  *taken_down = true;
+  return bring_up();
 }
 
 }  // namespace focalfleet

@@ -65,8 +65,9 @@ Result<int> ReadAcknowledgement(std::span<const std::byte> answer);
 Result<CanLink> LookAtLink(const std::string& interface);
 
 /// Brings a controller back from bus-off: by a restart where the driver has one, else by taking the
-/// interface down and up. May wait for the driver.
+/// interface down and up. May wait for the driver. `taken_down` is the caller's memory of one
+/// interface: down by us, so the next attempt brings it up; one that others took down stays so.
 /// Errors: kRefused: no privilege for it; kUnavailable: it does not work. The text says what to do.
-Status ReviveLink(const std::string& interface);
+Status ReviveLink(const std::string& interface, bool* taken_down);
 
 }  // namespace focalfleet

@@ -38,6 +38,8 @@ class LinkRecovery {
   /// Begins what is due. The outcome of an attempt, once.
   std::optional<Status> Poll(HostInstant now);
   [[nodiscard]] HostInstant wake_at() const { return wake_at_; }
+  /// An attempt is under way.
+  [[nodiscard]] bool trying() const { return attempt_ != nullptr; }
 
  private:
   struct Attempt {

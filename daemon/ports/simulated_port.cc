@@ -1,8 +1,37 @@
 #include "daemon/ports/simulated_port.h"
 
+#include <linux/can/error.h>
+
 #include <utility>
 
 namespace focalfleet {
+namespace {
+
+/// The error frame by which a SocketCAN driver would tell it.
+can_frame ErrorFrameOf(sim::FrameError error) {
+  can_frame frame{};
+  frame.can_id = CAN_ERR_FLAG;
+  switch (error) {
+    case sim::FrameError::kAcknowledgement:
+      frame.can_id |= CAN_ERR_ACK;
+      break;
+    case sim::FrameError::kBit:
+      frame.can_id |= CAN_ERR_PROT;
+      frame.data[2] = CAN_ERR_PROT_BIT;
+      break;
+    case sim::FrameError::kStuff:
+      frame.can_id |= CAN_ERR_PROT;
+      frame.data[2] = CAN_ERR_PROT_STUFF;
+      break;
+    case sim::FrameError::kForm:
+    case sim::FrameError::kNone:
+      frame.can_id |= CAN_ERR_PROT;
+      frame.data[2] = CAN_ERR_PROT_FORM;
+  }
+  return frame;
+}
+
+}  // namespace
 
 Result<std::shared_ptr<SimulatedFleet>> SimulatedFleet::Create(sim::WorldConfig config) {
   FOCALFLEET_TRY(sim::World::Validate(config));
@@ -54,8 +83,41 @@ std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
   return units;
 }
 
+bool SimulatedLink::Look(const sim::World& world) {
+  const sim::Controller controller = world.controller(bus_);
+  const auto& errors = world.counters(bus_).errors;
+  for (std::size_t kind = 0; kind < errors.size(); ++kind) {
+    const std::uint64_t more = errors[kind] - std::exchange(counted_[kind], errors[kind]);
+    if (more == 0) continue;
+    tally_.Note(ErrorFrameOf(static_cast<sim::FrameError>(kind)), more);
+    errors_seen_ += more;
+  }
+  LinkState state = LinkState::kUp;
+  std::string trouble;
+  if (controller.state == sim::Confinement::kOff) {
+    state = LinkState::kOff;
+    trouble = "the controller is bus-off";
+  } else if (controller.state == sim::Confinement::kPassive) {
+    state = LinkState::kPassive;
+    trouble = "the controller is error-passive";
+  } else if (controller.warns) {
+    trouble = "the controller warns of errors";
+  }
+  // Told once: its causes go on to be counted.
+  if (state == state_ && trouble.empty() == trouble_.empty()) return false;
+  if (!trouble.empty())
+    if (const std::string causes = tally_.Causes(); !causes.empty()) trouble += " (" + causes + ")";
+  state_ = state;
+  trouble_ = std::move(trouble);
+  if (trouble_.empty()) tally_.Clear();
+  return true;
+}
+
 SimulatedPort::SimulatedPort(std::shared_ptr<SimulatedFleet> fleet, BusId bus)
-    : fleet_(std::move(fleet)), bus_(bus), name_("simulated bus " + std::to_string(bus.value)) {}
+    : fleet_(std::move(fleet)),
+      bus_(bus),
+      name_("simulated bus " + std::to_string(bus.value)),
+      link_(bus) {}
 
 std::size_t SimulatedPort::Send(std::span<const CanFrame> frames) {
   std::size_t taken = 0;
@@ -65,10 +127,12 @@ std::size_t SimulatedPort::Send(std::span<const CanFrame> frames) {
 
 void SimulatedPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   fleet_->Take(bus_, now, out);
+  link_.Look(fleet_->world());
+  counters_.link_errors = link_.errors();
 }
 
 LinkState SimulatedPort::state() const {
-  return fleet_->dead(bus_) ? LinkState::kDown : LinkState::kUp;
+  return fleet_->dead(bus_) ? LinkState::kDown : link_.state();
 }
 
 }  // namespace focalfleet

@@ -1,13 +1,16 @@
 // The fleet in the daemon's own process, for a first look and for tests: all buses share one
 // simulated world on the daemon's clock. It forgets where it stood when the daemon ends;
-// focalfleet-sim does not.
+// focalfleet-sim does not. A port tells how its host controller stands as a SocketCAN port does.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "daemon/ports/can_errors.h"
 #include "daemon/ports/pollable_port.h"
 #include "fleet/layout.h"
 #include "sim/world.h"
@@ -39,6 +42,26 @@ class SimulatedFleet {
 /// The units of a layout as the simulation describes them.
 std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout);
 
+/// What a port tells of the simulated controller behind it: state and trouble, in the words of the
+/// SocketCAN port.
+class SimulatedLink {
+ public:
+  explicit SimulatedLink(BusId bus) : bus_(bus) {}
+  /// True: state or trouble differ from what they were.
+  bool Look(const sim::World& world);
+  [[nodiscard]] LinkState state() const { return state_; }
+  [[nodiscard]] const std::string& trouble() const { return trouble_; }
+  [[nodiscard]] std::uint64_t errors() const { return errors_seen_; }  // error frames
+
+ private:
+  BusId bus_;
+  LinkState state_ = LinkState::kUp;
+  std::string trouble_;
+  ErrorTally tally_;
+  std::array<std::uint64_t, sim::kFrameErrorCount> counted_{};
+  std::uint64_t errors_seen_ = 0;
+};
+
 class SimulatedPort : public PollablePort {
  public:
   SimulatedPort(std::shared_ptr<SimulatedFleet> fleet, BusId bus);
@@ -50,14 +73,14 @@ class SimulatedPort : public PollablePort {
   [[nodiscard]] HostInstant wake_at() const override { return fleet_->NextEvent(bus_); }
   [[nodiscard]] const PortCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
-  [[nodiscard]] const std::string& trouble() const override { return trouble_; }
+  [[nodiscard]] const std::string& trouble() const override { return link_.trouble(); }
 
  private:
   std::shared_ptr<SimulatedFleet> fleet_;
   BusId bus_;
   PortCounters counters_;
   std::string name_;
-  std::string trouble_;
+  SimulatedLink link_;
 };
 
 }  // namespace focalfleet

@@ -16,18 +16,21 @@ constexpr std::size_t kBatch = 64;
 
 /// The room that one batch needs, wired up once a call.
 struct Batch {
-  std::array<can_frame, kBatch> frames{};
-  std::array<iovec, kBatch> vectors{};
-  std::array<mmsghdr, kBatch> messages{};
+  std::array<can_frame, kBatch> frames;
+  std::array<iovec, kBatch> vectors;
+  std::array<mmsghdr, kBatch> messages;
   struct Control {
     static constexpr std::size_t kBytes =
         CMSG_SPACE(sizeof(std::uint32_t)) + CMSG_SPACE(sizeof(timespec));
-    alignas(cmsghdr) std::array<char, kBytes> bytes{};
+    alignas(cmsghdr) std::array<char, kBytes> bytes;
   };
-  std::array<Control, kBatch> control{};
+  std::array<Control, kBatch> control;
 
-  explicit Batch(bool with_control) {
-    for (std::size_t i = 0; i < kBatch; ++i) {
+  // Only as much of it is touched as is needed: most batches are small.
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init)
+  Batch(std::size_t count, bool with_control) {
+    for (std::size_t i = 0; i < count; ++i) {
+      messages[i] = {};
       vectors[i] = {&frames[i], sizeof(can_frame)};
       messages[i].msg_hdr.msg_iov = &vectors[i];
       messages[i].msg_hdr.msg_iovlen = 1;
@@ -116,7 +119,7 @@ std::optional<CanFrame> FromSocketFrame(const can_frame& frame) {
 
 BatchSent SendFrames(int fd, std::span<const CanFrame> frames) {
   BatchSent sent;
-  Batch batch(/*with_control=*/false);
+  Batch batch(std::min(kBatch, frames.size()), /*with_control=*/false);
   while (sent.taken < frames.size()) {
     const auto chunk = frames.subspan(sent.taken, std::min(kBatch, frames.size() - sent.taken));
     std::ranges::transform(chunk, batch.frames.begin(), ToSocketFrame);
@@ -133,14 +136,14 @@ BatchSent SendFrames(int fd, std::span<const CanFrame> frames) {
 }
 
 HostInstant FrameStamps::At(std::int64_t wall_ns) const {
-  const DurationNs age{wall_now_ns - wall_ns};
-  return age.ns < 0 || age > kOldest ? now : now - clock.Real(age);
+  const HostInstant at = clock.FromMonotonic(wall_ns - wall_ahead_ns);
+  return at > now || now - at > clock.Real(kOldest) ? now : at;
 }
 
 BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
                             PortCounters* counters, Aside* aside) {
   for (std::size_t total = 0; total < kFramesPerReceive;) {
-    Batch batch(/*with_control=*/true);
+    Batch batch(kBatch, /*with_control=*/true);
     const int got = ::recvmmsg(fd, batch.messages.data(), kBatch, MSG_DONTWAIT, nullptr);
     if (got < 0) {
       if (errno == EINTR) continue;

@@ -31,14 +31,13 @@ struct BatchReceived {
   int error = 0;        // errno that ended it, but EAGAIN
 };
 
-/// When the kernel took a frame in, on the host's clock. It stamps with the wall clock; what counts
-/// is the frame's age, so a step of that clock spoils at most what was stamped before it.
+/// When the kernel took a frame in, on the host's clock. The kernel stamps with the wall clock.
 struct FrameStamps {
-  HostInstant now;               // one instant ...
-  std::int64_t wall_now_ns = 0;  // ... on both clocks
+  HostInstant now;
+  std::int64_t wall_ahead_ns = 0;  // of CLOCK_MONOTONIC
   HostClock clock;
 
-  /// Never later than now; an age beyond kOldest is a step of the clock: now.
+  /// Never later than now; older than kOldest is a step of the wall clock: now.
   [[nodiscard]] HostInstant At(std::int64_t wall_ns) const;
   static constexpr DurationNs kOldest = Milliseconds(2000);  // of real time
 };

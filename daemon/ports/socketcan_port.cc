@@ -23,7 +23,6 @@ std::int64_t ReadClock(clockid_t which) {
   return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
-/// What the window goes by: bits do not hurry when the host's clock does.
 HostInstant Monotonic() { return {ReadClock(CLOCK_MONOTONIC)}; }
 
 bool IsUrgent(const CanFrame& frame) { return frame.id >> 26 == 0; }
@@ -45,12 +44,17 @@ LinkState LinkStateOf(const CanLink& link) {
 SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
     : options_(std::move(options)),
       socket_(std::move(socket)),
-      recovery_({.revive = options_.revive
-                               ? options_.revive
-                               : [name = options_.interface] { return ReviveLink(name); },
-                 .first_wait = options_.clock.Real(Milliseconds(1000)),
-                 .longest_wait = options_.clock.Real(Milliseconds(60'000)),
-                 .poll_period = options_.clock.Real(Milliseconds(10))}) {
+      recovery_(
+          {.revive =
+               options_.revive
+                   ? options_.revive
+                   : [name = options_.interface,
+                      taken_down =
+                          std::make_shared<bool>()] { return ReviveLink(name, taken_down.get()); },
+           .first_wait = options_.clock.Real(Milliseconds(1000)),
+           .longest_wait = options_.clock.Real(Milliseconds(60'000)),
+           .poll_period = options_.clock.Real(Milliseconds(10))}) {
+  if (!options_.wire_clock) options_.wire_clock = Monotonic;
   aside_.only_units = options_.hears == Hears::kUnits;
 }
 
@@ -108,22 +112,22 @@ HostInstant SocketCanPort::wake_at() const {
 
 // A driver that echoes wakes us when there is room; else the bit clock tells, or nobody.
 DurationNs SocketCanPort::retry_full() const {
-  if (window_.options().confirms) return Milliseconds(20);
+  if (window_.unconfirmed() > 0) return Milliseconds(20);
+  if (window_.options().confirms) return kFull;  // others fill the queue, and nothing tells
   const HostInstant room_at = window_.RoomAt();
   if (room_at == kNever) return kFull;
-  return std::clamp(room_at - Monotonic(), Microseconds(20), kFull);
+  return std::clamp(room_at - options_.wire_clock(), Microseconds(20), kFull);
 }
 
-std::size_t SocketCanPort::Room(bool urgent) {
-  const HostInstant now = Monotonic();
+std::size_t SocketCanPort::Room(bool urgent, HostInstant monotonic) {
   if (!window_.options().confirms) {
     window_.Charged(BytesBelow(socket_.socket()));
-  } else if (window_.unconfirmed() > 0 && now - waits_since_ > kConfirmationLost &&
+  } else if (window_.unconfirmed() > 0 && monotonic - waits_since_ > kConfirmationLost &&
              BytesBelow(socket_.socket()) == 0) {
     ++counters_.link_errors;
     window_.Clear();
   }
-  return window_.Room(urgent, now);
+  return window_.Room(urgent, monotonic);
 }
 
 std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
@@ -131,21 +135,26 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
   std::size_t taken = 0;
   while (taken < frames.size()) {
     const bool urgent = IsUrgent(frames[taken]);
-    const std::size_t room = std::min(Room(urgent), frames.size() - taken);
+    const HostInstant monotonic = window_.needs_time() ? options_.wire_clock() : HostInstant{0};
+    const std::size_t room = std::min(Room(urgent, monotonic), frames.size() - taken);
     if (room == 0) return taken;
     // The last place is not for those behind a stop.
     const auto batch = frames.subspan(taken, urgent ? 1 : room);
     if (urgent) SetUrgent(socket_.socket(), true);
     const BatchSent sent = SendFrames(socket_.socket(), batch);
     if (urgent) SetUrgent(socket_.socket(), false);
-    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = Monotonic();
-    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, Monotonic());
+    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = monotonic;
+    // Their bits begin no sooner than now.
+    const HostInstant below =
+        window_.options().bit_rate_bps > 0 ? options_.wire_clock() : monotonic;
+    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, below);
     taken += sent.taken;
     // ENOBUFS: others have filled the interface's queue, which no poll tells.
     socket_.WatchSending(sent.error == EAGAIN);
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return taken;
     if (sent.error != 0) {
       Lose(std::string("cannot send: ") + std::strerror(sent.error));
+      lost_untold_ = true;
       return taken;
     }
   }
@@ -155,6 +164,9 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   Recover(now);
   if (!socket_.open()) {
+    // Down is seen as such before it may be up again: what waited for it is not true any more.
+    if (std::exchange(lost_untold_, false))
+      retry_at_ = now + options_.clock.Real(options_.retry_period);
     if (now < retry_at_) return;
     static_cast<void>(Open());  // what failed is the trouble
     if (!socket_.open()) {
@@ -165,25 +177,31 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   }
   aside_.errors.clear();
   aside_.confirmed = 0;
-  aside_.stamps = FrameStamps{now, ReadClock(CLOCK_REALTIME), options_.clock};
+  aside_.stamps = Stamps(now);
   const std::size_t before = out->size();
   const BatchReceived received =
       ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_, &aside_);
   window_.Confirmed(aside_.confirmed);
-  if (aside_.confirmed > 0) waits_since_ = Monotonic();
-  HearBits(now, std::span(*out).subspan(before));
+  if (aside_.confirmed > 0) waits_since_ = options_.wire_clock();
+  // Only on a bus in real time does the window go by bits, and there the host's clock is monotonic.
+  if (window_.options().bit_rate_bps > 0)
+    for (const ReceivedFrame& heard : std::span(*out).subspan(before))
+      window_.Heard(heard.frame, heard.at);
   for (const can_frame& error : aside_.errors) NoteError(error, now);
-  if (now >= look_at_) LookAgain(now);
+  // While an attempt is under way the kernel may not answer before it is over.
+  if (now >= look_at_ && !recovery_.trying()) LookAgain(now);
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
   retry_at_ = now + options_.clock.Real(options_.retry_period);
 }
 
-void SocketCanPort::HearBits(HostInstant now, std::span<const ReceivedFrame> frames) {
-  if (window_.options().bit_rate_bps == 0) return;
-  const HostInstant monotonic = Monotonic();
-  for (const ReceivedFrame& received : frames)
-    window_.Heard(received.frame, monotonic - (now - received.at));
+// A step of the wall clock spoils the stamps of so long; more often would cost a slow kernel.
+FrameStamps SocketCanPort::Stamps(HostInstant now) {
+  if (clocks_read_ == kNever || now - clocks_read_ > options_.clock.Real(Milliseconds(20))) {
+    clocks_read_ = now;
+    wall_ahead_ns_ = ReadClock(CLOCK_REALTIME) - Monotonic().ns;
+  }
+  return {now, wall_ahead_ns_, options_.clock};
 }
 
 std::string SocketCanPort::WithCauses(const std::string& what) const {
@@ -194,16 +212,20 @@ std::string SocketCanPort::WithCauses(const std::string& what) const {
 void SocketCanPort::NoteError(const can_frame& error, HostInstant now) {
   ++counters_.link_errors;
   errors_.Note(error);
-  if (const auto state = LinkStateOf(error)) SetState(*state, now);
+  const auto state = LinkStateOf(error);
+  if (state == LinkState::kUp && state_ == LinkState::kUp && !IsWarning(error)) {
+    trouble_.clear();  // it warns no more
+    errors_.Clear();
+  }
+  if (state) SetState(*state, now);
   if (IsWarning(error) && trouble_.empty()) trouble_ = WithCauses("the controller warns of errors");
 }
 
 void SocketCanPort::SetState(LinkState state, HostInstant now) {
-  if (state == LinkState::kUp) {
+  if (state != LinkState::kOff) {
     recovery_.Well(now);
     if (state_ == LinkState::kOff) window_.Clear();  // a restart flushes what was below
-  }
-  if (state == LinkState::kOff) {
+  } else {
     // Where the kernel restarts it by itself, two would only get into each other's way.
     if (link_.restart_ms == 0) recovery_.BusOff(now);
     window_.Clear();

@@ -8,6 +8,7 @@
 // (link_recovery.h), otherwise `trouble` says what a person has to do.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -31,6 +32,9 @@ class SocketCanPort : public PollablePort {
     std::uint32_t bit_rate_bps = 0;  // that the interface must have, if it has any; 0: whatever
     HostClock clock = HostClock();
     DurationNs retry_period = Milliseconds(200);  // real time
+    // What the frames below go by: bits do not hurry when the host's clock does. None: the
+    // monotonic clock.
+    std::function<HostInstant()> wire_clock = {};
     InterfaceOpener open = OpenInterface;
     LinkRecovery::Reviver revive = {};  // none: ReviveLink
   };
@@ -62,9 +66,9 @@ class SocketCanPort : public PollablePort {
   void SetState(LinkState state, HostInstant now);
   void LookAgain(HostInstant now);
   void Recover(HostInstant now);
-  [[nodiscard]] std::size_t Room(bool urgent);
+  [[nodiscard]] std::size_t Room(bool urgent, HostInstant monotonic);
+  [[nodiscard]] FrameStamps Stamps(HostInstant now);
   [[nodiscard]] std::string WithCauses(const std::string& what) const;
-  void HearBits(HostInstant now, std::span<const ReceivedFrame> frames);
 
   Options options_;
   WatchedSocket socket_;
@@ -75,9 +79,12 @@ class SocketCanPort : public PollablePort {
   LinkState state_ = LinkState::kDown;
   bool found_ = false;
   bool was_up_ = false;               // ever
+  bool lost_untold_ = false;          // by Send, and no Receive has been since
   HostInstant retry_at_{0};           // while there is no socket
   HostInstant look_at_ = kNever;      // while the controller is not well: its state is asked for
   HostInstant waits_since_ = kNever;  // monotonic: confirmations are outstanding since
+  HostInstant clocks_read_ = kNever;  // when wall_ahead_ns_ was
+  std::int64_t wall_ahead_ns_ = 0;
   PortCounters counters_;
   std::string trouble_;
   Aside aside_;  // of one Receive, kept for its room

@@ -9,8 +9,8 @@ namespace focalfleet {
 std::size_t TransmitWindow::ByMemory() const {
   if (charged_bytes_ == 0) return 0;
   // How much one frame is charged is the kernel's affair: until a frame went down alone, anything
-  // charged may be all of them.
-  if (frame_bytes_ == 0) return kAll;
+  // charged may be all that went down since nothing was.
+  if (frame_bytes_ == 0) return std::min(kAll, sent_when_empty_);
   return (charged_bytes_ + frame_bytes_ - 1) / frame_bytes_;
 }
 
@@ -20,9 +20,10 @@ std::size_t TransmitWindow::ByBitClock(HostInstant now) const {
 }
 
 std::size_t TransmitWindow::Room(bool urgent, HostInstant now) const {
+  if (!held_ && !needs_time()) return at_once_;
   const std::size_t below = std::max({unconfirmed_, ByMemory(), ByBitClock(now)});
-  // One alone shows what a frame is charged.
-  const bool to_learn = held_ && frame_bytes_ == 0 && !urgent;
+  // One alone shows what a frame is charged. A bit clock tells enough without.
+  const bool to_learn = held_ && frame_bytes_ == 0 && !urgent && options_.bit_rate_bps == 0;
   const std::size_t allowed = urgent ? kAll : to_learn ? 1 : kOrdinary;
   return allowed > below ? allowed - below : 0;
 }
@@ -55,7 +56,9 @@ void TransmitWindow::Charged(std::size_t bytes) {
   if (bytes > 0 && charged_bytes_ == 0 && sent_when_empty_ == 1) frame_bytes_ = bytes;
   charged_bytes_ = bytes;
   held_ = held_ || bytes > 0;
-  if (bytes == 0) sent_when_empty_ = 0;
+  if (bytes > 0) return;
+  if (sent_when_empty_ >= at_once_) at_once_ = std::min(2 * at_once_, kUnheldMax);
+  sent_when_empty_ = 0;
 }
 
 void TransmitWindow::Clear() {

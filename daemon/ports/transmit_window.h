@@ -10,6 +10,9 @@
 //   confirmations  a driver that echoes gives each frame back when it has left (IFF_ECHO)
 //   memory         what the kernel still charges to the socket; blind past a queue that disowns
 //   bit clock      a frame cannot have left before its bits have; where a controller does not echo
+//
+// A virtual interface without a queue passes a frame on while it takes it. One that was never seen
+// to hold any takes ever more at once, until it is.
 // Pure: time, bits and charges are arguments.
 #pragma once
 
@@ -26,6 +29,7 @@ class TransmitWindow {
  public:
   static constexpr std::size_t kAll = 3;
   static constexpr std::size_t kOrdinary = 2;
+  static constexpr std::size_t kUnheldMax = 64;  // at once, where nothing is ever held
 
   struct Options {
     bool confirms = false;           // the driver echoes: confirmations come
@@ -34,6 +38,8 @@ class TransmitWindow {
   TransmitWindow() = default;
   explicit TransmitWindow(const Options& options) : options_(options) {}
 
+  /// Its bits take their time, or confirmations may be lost: `now` matters, and is monotonic.
+  [[nodiscard]] bool needs_time() const { return options_.confirms || options_.bit_rate_bps > 0; }
   /// How many more frames may be handed down now; `urgent` (a stop) may take the last place.
   [[nodiscard]] std::size_t Room(bool urgent, HostInstant now) const;
   /// When the bit clock makes room for an ordinary frame; kNever where something else will tell.
@@ -63,6 +69,7 @@ class TransmitWindow {
   std::size_t charged_bytes_ = 0;
   std::size_t frame_bytes_ = 0;      // what one frame is charged; 0: not seen yet
   bool held_ = false;                // the kernel was ever seen to hold some
+  std::size_t at_once_ = kOrdinary;  // that were seen not to be held
   std::size_t sent_when_empty_ = 0;  // frames handed down since the kernel held none
   std::deque<HostInstant> ends_;     // by the bit clock, of the last kAll frames
 };

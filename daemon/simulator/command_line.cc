@@ -183,6 +183,9 @@ void AddRunOptions(CLI::App* app, Given* given) {
   app->add_option("--control", given->control, "control socket for the subcommands");
   app->add_option("--flash", run.flash_path,
                   "what survives power-off: read at the start where it is, written at the end");
+  app->add_option(
+      "--faults", run.faults_path,
+      "faults.csv: which bus or unit misbehaves how, from when to when; chance by --seed");
   app->add_option("--speed", run.speed, "times faster than life")
       ->check(cli::NumberBetween(0.01, 1000))
       ->capture_default_str();

@@ -22,6 +22,7 @@
 #include "daemon/control/line_server.h"
 #include "daemon/ports/simulated_port.h"
 #include "daemon/simulator/can_doors.h"
+#include "daemon/simulator/faults_file.h"
 #include "daemon/simulator/memory_file.h"
 #include "daemon/simulator/unix_doors.h"
 #include "daemon/simulator/verbs.h"
@@ -63,6 +64,14 @@ Status Remember(const SimulatorOptions& options, sim::WorldConfig* config) {
   return {};
 }
 
+Status PlanFaults(const SimulatorOptions& options, sim::WorldConfig* config) {
+  if (options.faults_path.empty()) return {};
+  FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(options.faults_path));
+  FOCALFLEET_TRY_ASSIGN(config->faults,
+                        ReadFaults(text, options.faults_path, {config->units, config->bit_clock}));
+  return {};
+}
+
 Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostClock& clock) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(options.units_path));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, options.units_path, {}));
@@ -74,6 +83,7 @@ Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostCl
   config.bit_clock = options.interfaces.empty();
   FOCALFLEET_TRY(PlaceUnits(options.state_path, layout, &config));
   FOCALFLEET_TRY(Remember(options, &config));
+  FOCALFLEET_TRY(PlanFaults(options, &config));
   if (const auto valid = sim::World::Validate(config); !valid)
     return Fail(valid.error().code, options.units_path + ": " + valid.error().text);
   config.start = clock.Now();

@@ -18,6 +18,7 @@ struct SimulatorOptions {
   std::vector<std::string> interfaces;  // or these, in ascending order of bus_id
   std::string control_path;             // empty: none
   std::string flash_path;               // empty: forgotten at the end
+  std::string faults_path;              // empty: none by the clock
   double speed = 1;
   std::uint64_t seed = 1;
   sim::Spread spread = sim::Spread::kNominal;

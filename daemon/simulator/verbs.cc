@@ -190,6 +190,16 @@ Json Verbs::StatusOfAll() const {
                      {"bits", c.bits},
                      {"busy_s", c.busy.seconds()},
                      {"dropped", c.dropped},
+                     {"host_controller", Name(world_->controller(bus).state)},
+                     {"error_frames", c.error_frames()},
+                     {"error_bits", c.error_bits},
+                     {"repeats", c.repeats},
+                     {"received_twice", c.received_twice},
+                     {"babbled", c.babbled},
+                     {"went_passive", c.went_passive},
+                     {"went_off", c.went_off},
+                     {"recovered", c.recovered},
+                     {"stuck_s", c.stuck.seconds()},
                      {"refused", c.refused},
                      {"waiting_max", c.waiting_max}});
   }

@@ -68,7 +68,9 @@ ConfigurationRow ReadConfiguration(Cells& cells) {
           .makespan_predicted_s = cells.Real(7),
           .makespan_s = cells.Real(8),
           .energy_J = cells.Real(9),
-          .peak_power_W = cells.Real(10)};
+          .peak_power_W = cells.Real(10),
+          .start_skew_s = cells.Real(11),
+          .start_skew_bound_s = cells.Real(12)};
 }
 
 void Cells::Require(bool condition, const char* what) {

@@ -86,7 +86,8 @@ inline constexpr Severity kLastSeverity = Severity::kError;
 inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
 
 /// The columns id, source, state, targeted, arrived, refused, failed, makespan_predicted_s,
-/// makespan_s, energy_J, peak_power_W, in this order from the first on.
+/// makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, in this order from the
+/// first on.
 ConfigurationRow ReadConfiguration(Cells& cells);
 
 /// serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, mode, origin,

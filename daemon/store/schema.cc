@@ -208,8 +208,14 @@ CREATE VIEW tuned AS SELECT
   FROM tuning LEFT JOIN unit ON unit.serial = tuning.serial;
 )sql";
 
-// What a camera found, and by how much the place of an axis differs from its count of vectors.
+// How far apart the units of a configuration began.
 constexpr const char* kVersion3 = R"sql(
+ALTER TABLE configuration ADD COLUMN start_skew_s REAL;        -- NULL: not known
+ALTER TABLE configuration ADD COLUMN start_skew_bound_s REAL;  -- the true skew is within +- of it
+)sql";
+
+// What a camera found, and by how much the place of an axis differs from its count of vectors.
+constexpr const char* kVersion4 = R"sql(
 ALTER TABLE axis_state ADD COLUMN offset INTEGER NOT NULL DEFAULT 0;
 
 CREATE TABLE measurement(
@@ -238,7 +244,7 @@ CREATE VIEW measured AS SELECT
   FROM measurement;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3};
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -95,12 +95,15 @@ constexpr const char* kMeasurement =
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
-    "makespan_s, energy_J, peak_power_W, began_ns, changed_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?12) ON CONFLICT(id) DO UPDATE SET "
+    "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, began_ns, changed_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?14) "
+    "ON CONFLICT(id) DO UPDATE SET "
     "source = ?2, "
     "state = ?3, targeted = ?4, arrived = ?5, refused = ?6, failed = ?7, makespan_predicted_s = "
     "?8, "
-    "makespan_s = ?9, energy_J = ?10, peak_power_W = ?11, changed_ns = ?12";
+    "makespan_s = ?9, energy_J = ?10, peak_power_W = ?11, start_skew_s = ?12, start_skew_bound_s = "
+    "?13, "
+    "changed_ns = ?14";
 constexpr const char* kAlarm =
     "INSERT INTO alarm(id, severity, unit_id, bus_id, text, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6) "
     "ON CONFLICT(id) DO UPDATE SET severity = ?2, unit_id = ?3, bus_id = ?4, text = ?5";
@@ -307,7 +310,9 @@ class RowWriter {
     s.BindReal(9, row.makespan_s);
     s.BindReal(10, row.energy_J);
     s.BindReal(11, row.peak_power_W);
-    s.Bind(12, now_.ns);
+    s.BindReal(12, row.start_skew_s);
+    s.BindReal(13, row.start_skew_bound_s);
+    s.Bind(14, now_.ns);
     FOCALFLEET_TRY(s.Run());
     return Meta(statements_.raise_meta, "next_configuration", row.id + 1);
   }

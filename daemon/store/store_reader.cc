@@ -114,12 +114,13 @@ Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(std::uint3
       *connection_, "configuration",
       "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
       "makespan_s, energy_J, "
-      "peak_power_W, began_ns, changed_ns FROM configuration ORDER BY id DESC LIMIT ?1",
+      "peak_power_W, start_skew_s, start_skew_bound_s, began_ns, changed_ns FROM configuration "
+      "ORDER BY id DESC LIMIT ?1",
       limit, std::nullopt, [](Cells& cells) {
         ConfigurationHistory entry;
         entry.row = ReadConfiguration(cells);
-        entry.began = cells.Time(11);
-        entry.changed = cells.Time(12);
+        entry.began = cells.Time(13);
+        entry.changed = cells.Time(14);
         return entry;
       });
 }

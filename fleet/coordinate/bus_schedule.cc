@@ -17,6 +17,7 @@ bool BusSchedule::Enqueue(const Entry& entry) {
 void BusSchedule::Release(HostInstant now, DurationNs horizon, BusId bus,
                           std::vector<OutFrame>* frames, std::vector<PositionerIndex>* asked) {
   busy_until_ = std::max(busy_until_, now);
+  if (now < held_until_) return;
   for (auto& queue : queue_) {
     while (!queue.empty() && busy_until_ < now + horizon) {
       const Entry& entry = queue.front();
@@ -37,7 +38,7 @@ HostInstant BusSchedule::ReadyAt(DurationNs horizon) const {
   if (waiting_ == 0) return kNever;
   // Half a horizon is refilled at a time: frequent enough to keep the bus busy, rare enough to
   // batch.
-  return busy_until_ - DurationNs{horizon.ns / 2};
+  return std::max(busy_until_ - DurationNs{horizon.ns / 2}, held_until_);
 }
 
 std::size_t BusSchedule::Drop(NodeId node) {

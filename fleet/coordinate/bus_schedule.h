@@ -4,6 +4,7 @@
 // the replies. Frames of one priority leave in the order in which they came.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <deque>
@@ -37,6 +38,10 @@ class BusSchedule {
   /// Time on the bus that a frame took which did not pass through here (a stop, an unasked report).
   void Charge(HostInstant now, std::uint32_t bits);
 
+  /// Releases nothing before `until`: a stop of all has the highest identifier of all stops, and
+  /// whatever is handed to a controller beside it may win arbitration against it.
+  void Hold(HostInstant until) { held_until_ = std::max(held_until_, until); }
+
   /// When Release has something to do again; kNever while the queue is empty.
   [[nodiscard]] HostInstant ReadyAt(DurationNs horizon) const;
 
@@ -52,6 +57,7 @@ class BusSchedule {
   std::array<std::deque<Entry>, kPriorities> queue_;
   std::size_t waiting_ = 0;
   HostInstant busy_until_{INT64_MIN};
+  HostInstant held_until_{INT64_MIN};
   std::uint32_t bit_rate_bps_;
 };
 

@@ -13,7 +13,7 @@ namespace {
 using enum UnitPhase;
 
 // The questions of an identification, in order.
-constexpr int kSteps = 6;
+constexpr int kSteps = 7;
 HostMessage StepQuestion(int step) {
   switch (step) {
     case 0:
@@ -26,8 +26,10 @@ HostMessage StepQuestion(int step) {
       return VectorRequest{Axis::kPhi};
     case 4:
       return ParameterRead{Axis::kTheta, Parameter::kCounter1};
-    default:
+    case 5:
       return ParameterRead{Axis::kPhi, Parameter::kCounter1};
+    default:
+      return ClockRequest{};
   }
 }
 
@@ -95,12 +97,18 @@ void Contact::Watch(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   // As long as it may have ended while that mattered.
   if (record.seen_moving >= record.watch_until) return;
-  const Noticing noticing = NoticingOf(core_.config);
-  record.next_poll =
-      std::min(record.next_poll, std::max(core_.now + noticing.poll, record.watch_from));
-  // Also where the answer may be awaited into the time in which it matters.
+  record.next_poll = std::min(
+      record.next_poll, std::max(core_.now + NoticingOf(core_.config).poll, record.watch_from));
+  MissSoon(i);
+}
+
+/// Its open question is to be missed in time, also where the answer may be awaited into the time in
+/// which it matters.
+void Contact::MissSoon(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  if (record.seen_moving >= record.watch_until) return;
   if (core_.now + core_.Patience() >= record.watch_from)
-    record.question->suspect_at = core_.now + noticing.suspicion;
+    record.question->suspect_at = core_.now + NoticingOf(core_.config).suspicion;
 }
 
 void Contact::AskNext(PositionerIndex i) {
@@ -116,6 +124,8 @@ void Contact::Identify(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   core_.Forget(i);
   record.reading = {};
+  record.wants_start = false;
+  record.clock_told = false;
   core_.SetPhase(i, kIdentifying);
   AskNext(i);
 }
@@ -131,6 +141,7 @@ void Contact::Lose(PositionerIndex i, UnitPhase phase, const std::string& reason
                Origin::kMove);
   }
   core_.Forget(i);
+  record.wants_start = false;
   core_.SetPhase(i, phase);
   record.next_poll = core_.now + core_.config.identify_period;
   core_.SetDue(i, record.next_poll);
@@ -184,17 +195,21 @@ void Contact::LinkChanged(const LinkEvent& event) {
     core_.Raise(Severity::kWarning, {}, event.bus, name + " is passive" + cause);
     return;
   }
+  if (before == LinkState::kOff || before == LinkState::kDown) {
+    core_.Raise(Severity::kWarning, {}, event.bus, name + " is " + Name(event.state) + cause);
+    return;
+  }
   core_.Raise(Severity::kError, {}, event.bus,
               name + " is " + Name(event.state) + cause + "; its " +
                   std::to_string(bus->units.size()) + " units cannot be reached");
   for (const PositionerIndex i : bus->units) {
     const UnitPhase phase = core_.unit(i).view.phase;
     if (phase != kAbsent && phase != kSilent)
-      Lose(i, kSilent, name + " is " + Name(event.state), false);
+      Lose(i, kSilent, "cannot be reached: " + name + " is " + Name(event.state), false);
   }
 }
 
-void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
+void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostInstant at) {
   UnitRecord& record = core_.unit(i);
   const std::uint8_t sequence = heard.address.sequence;
   const auto answers = [&](Function function) { return core_.Answers(i, function, sequence); };
@@ -206,16 +221,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
     if (!answers(Function::kIdentify)) return;
     record.asked_once = true;
-    if (identity->protocol_version != kProtocolVersion) {
-      const bool known = record.view.serial == identity->serial;
-      record.view.serial = identity->serial;
-      if (known) return;  // said before
-      core_.Raise(Severity::kError, i, {},
-                  core_.NameOf(i) + " speaks protocol version " +
-                      std::to_string(identity->protocol_version) + ", not " +
-                      std::to_string(kProtocolVersion));
-      return;
-    }
+    if (identity->protocol_version != kProtocolVersion) return OnOtherVersion(i, *identity);
+    record.other_version.reset();
     record.view.serial = identity->serial;
     if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
     record.reading.step = 1;
@@ -228,9 +235,30 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard) {
   } else if (const auto* parameter = std::get_if<ParameterReply>(&heard.message)) {
     if (answers(parameter->written ? Function::kParameterWrite : Function::kParameterRead))
       OnParameter(i, *parameter);
+  } else if (const auto* clock = std::get_if<ClockReply>(&heard.message)) {
+    if (answers(Function::kClock)) OnClock(i, *clock, at);
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
   }
+}
+
+/// Another firmware, or a boot loader (version 0): nothing that was known of its place counts, and
+/// nothing but its identity is asked until it speaks ours.
+void Contact::OnOtherVersion(PositionerIndex i, const IdentifyReply& identity) {
+  UnitRecord& record = core_.unit(i);
+  if (record.other_version != identity.protocol_version)
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) + " speaks protocol version " +
+                    std::to_string(identity.protocol_version) + ", not " +
+                    std::to_string(kProtocolVersion) + ": it is not moved");
+  record.other_version = identity.protocol_version;
+  record.view.serial = identity.serial;
+  record.view.knowledge = {};
+  core_.Changed(i);
+  if (record.view.phase == kIdentifying) core_.SetPhase(i, kAbsent);
+  record.next_poll = core_.now + core_.config.identify_period;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "speaks another protocol version");
 }
 
 void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
@@ -256,6 +284,8 @@ void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
       Lose(i, kFault, std::string("reports fault ") + Name(status.fault));
     else
       Identify(i);
+  } else if (view.phase == kReady) {
+    core_.Ask(i, ClockRequest{});
   }
 }
 
@@ -264,7 +294,12 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   const bool began = intent != core_.intents.end() && status.move == intent->second.move;
   const bool turns = status.state == UnitState::kMoving || status.state == UnitState::kHoming;
   if (turns) {
-    if (began) core_.unit(i).seen_moving = core_.unit(i).answered_asked;
+    if (!began) return;
+    core_.unit(i).seen_moving = core_.unit(i).answered_asked;
+    if (core_.unit(i).wants_start) {
+      core_.Ask(i, ClockRequest{});
+      MissSoon(i);
+    }
     return;
   }
   if (core_.unit(i).view.phase == kSettling) {
@@ -359,15 +394,19 @@ void Contact::MotionEnded(PositionerIndex i, const Done& done) {
   core_.SetPhase(i, kReady);
   record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
   core_.SetDue(i, record.next_poll);
+  if (record.wants_start) core_.Ask(i, ClockRequest{});
   core_.Tell(i, arrived || homed ? UnitEventKind::kReady : UnitEventKind::kStopped);
 }
 
 void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
   UnitRecord& record = core_.unit(i);
   AxisDrive& drive = core_.drives[i.value].axis[Index(reply.axis)];
+  if (record.view.phase == kIdentifying && reply.parameter == Parameter::kCounter1)
+    record.reading.counter1[Index(reply.axis)] = reply.value;
   if (reply.written) {
     if (record.view.phase != kIdentifying) OnWritten(i, reply);
-    if (reply.answer != Answer::kOk)
+    // A misfit is read again and again.
+    if (reply.answer != Answer::kOk && record.unfit.empty())
       core_.Raise(
           Severity::kWarning, i, {},
           core_.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
@@ -398,7 +437,7 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
   core_.ReplyWhenDurable(request,
                          core_.NameOf(i) + ": " + what + " = " + std::to_string(reply.value));
   TakeParameter(row, &core_.drives[i.value]);
-  if (reply.parameter == Parameter::kSubdivision) Identify(i);
+  if (reply.parameter == Parameter::kSubdivision || !record.unfit.empty()) return Identify(i);
   if (reply.parameter == Parameter::kPosition) {
     UnitKnowledge knowledge = record.view.knowledge;
     knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);
@@ -414,12 +453,9 @@ void Contact::Bind(PositionerIndex i) {
   core_.Note(BindingRow{core_.layout.unit(i).id, view.serial});
 }
 
-void Contact::Concluded(PositionerIndex i) {
-  UnitRecord& record = core_.unit(i);
-  UnitView& view = record.view;
-  const Reading& reading = record.reading;
-  record.next_poll = core_.now + core_.config.poll_period;
-  core_.SetDue(i, record.next_poll);
+/// The unit is bound to its place, or is now; false: it is foreign there.
+bool Contact::Belongs(PositionerIndex i) {
+  UnitView& view = core_.unit(i).view;
   const auto place = core_.place_of.find(view.serial);
   if (view.bound_serial.value == 0 && place == core_.place_of.end()) {
     Bind(i);
@@ -432,8 +468,18 @@ void Contact::Concluded(PositionerIndex i) {
                     std::to_string(view.bound_serial.value) +
                     ": it is not moved until it is adopted");
     core_.Tell(i, UnitEventKind::kLost, "has another serial number");
-    return;
+    return false;
   }
+  return true;
+}
+
+void Contact::Concluded(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  UnitView& view = record.view;
+  const Reading& reading = record.reading;
+  record.next_poll = core_.now + core_.config.poll_period;
+  core_.SetDue(i, record.next_poll);
+  if (!Belongs(i)) return;
   StoreSays store;
   view.offset = {};
   if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end()) {
@@ -453,6 +499,17 @@ void Contact::Concluded(PositionerIndex i) {
     core_.SetPhase(i, kSettling);
     return;
   }
+  const std::string unfit = MisfitOf(i);
+  if (!unfit.empty() && unfit != record.unfit)
+    core_.Raise(Severity::kError, i, {}, core_.NameOf(i) + " is not fit to move: " + unfit);
+  record.unfit = unfit;
+  for (const Axis axis : kAxes) {
+    if (reading.subdivision[Index(axis)] == core_.drives[i.value].axis[Index(axis)].subdivision)
+      continue;
+    view.knowledge = {};  // its vectors are not the host's: nothing that it says is a place
+    Unfit(i);
+    return;
+  }
   const Reconciled result =
       Reconcile({reading.status, core_.PlaceAt(i, reading.position), reading.subdivision}, store);
   if (result.intent_end) core_.EndIntent(i, *result.intent_end);
@@ -463,7 +520,8 @@ void Contact::Concluded(PositionerIndex i) {
   if (!store.vector || store.vector->knowledge != result.knowledge)
     core_.Know(i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;
-  if (!IsPlace(result.knowledge) && (result.intent_end || !store.vector))
+  const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
+  if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
     core_.Raise(
         Severity::kWarning, i, {},
         core_.NameOf(i) + ": position " + Name(result.knowledge[0].witness) + ", " + result.reason);
@@ -472,9 +530,37 @@ void Contact::Concluded(PositionerIndex i) {
     core_.Tell(i, UnitEventKind::kLost, "is in fault");
     return;
   }
+  if (!unfit.empty()) {
+    Unfit(i);
+    return;
+  }
   core_.SetPhase(i, kReady);
   const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
   core_.Tell(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
+}
+
+std::string Contact::MisfitOf(PositionerIndex i) const {
+  const Reading& reading = core_.units[i.value].reading;
+  for (const Axis axis : kAxes) {
+    const AxisDrive& drive = core_.drives[i.value].axis[Index(axis)];
+    const auto told = [&](Parameter parameter, std::int32_t is, std::int32_t wanted) {
+      return std::string(Name(axis)) + " " + Name(parameter) + " is " + std::to_string(is) +
+             ", not " + std::to_string(wanted) + " as set";
+    };
+    if (reading.subdivision[Index(axis)] != drive.subdivision)
+      return told(Parameter::kSubdivision, reading.subdivision[Index(axis)], drive.subdivision);
+    if (reading.counter1[Index(axis)] != drive.counter1)
+      return told(Parameter::kCounter1, reading.counter1[Index(axis)], drive.counter1);
+  }
+  return {};
+}
+
+void Contact::Unfit(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  core_.SetPhase(i, kFault);
+  record.next_poll = core_.now + core_.config.poll_period * kRestPollFactor;
+  core_.SetDue(i, record.next_poll);
+  core_.Tell(i, UnitEventKind::kLost, "is not fit to move");
 }
 
 Status Contact::Adopt(PositionerIndex i) {
@@ -506,8 +592,10 @@ void Contact::Enable(const EnableCommand& command) {
 }
 
 Status Contact::WriteParameter(std::uint64_t request, const WriteParameterCommand& command) {
-  const UnitPhase phase = core_.unit(command.unit).view.phase;
-  if (phase != kReady || core_.unit(command.unit).question)
+  const UnitRecord& record = core_.unit(command.unit);
+  const UnitPhase phase = record.view.phase;
+  const bool misfit = phase == kFault && !record.unfit.empty();  // a parameter may help it
+  if ((phase != kReady && !misfit) || record.question)
     return Fail(
         ErrorCode::kRefused,
         core_.NameOf(command.unit) + " takes parameters only at rest; its phase is " + Name(phase));

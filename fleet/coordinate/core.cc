@@ -14,6 +14,14 @@ constexpr std::uint32_t kAnswerBits = 145;
 constexpr DurationNs kQueueFullWait = Milliseconds(20);
 // 255 is left to those who stop the units past the coordinator (daemon/cli/direct_stop.cc).
 constexpr std::uint8_t kLastSequence = 254;
+/// Bus time that a stop of all has to itself: the frame on the wire, one that must be sent again,
+/// and the stop.
+constexpr std::uint32_t kStopAloneBits = 4 * kFrameBitsMax;
+
+MoveId MoveAfter(MoveId move, std::uint32_t count) {
+  constexpr std::uint32_t kIds = 65'535;  // 0 is none
+  return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
+}
 
 Function AnswerFunction(const CanFrame& question) {
   const auto function = static_cast<Function>(question.id >> 20 & 63);
@@ -29,10 +37,10 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
       drives(std::move(drives_in)),
       units(layout_in->size()),
       earlier_configurations(std::move(stored.configurations)),
-      next_move(stored.next_move),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
       next_exposure(stored.next_exposure),
+      next_move_(stored.next_move),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
@@ -76,6 +84,8 @@ std::string Core::TroubleOf(PositionerIndex i) const {
   const std::string id = std::to_string(layout.unit(i).id.value);
   switch (view.phase) {
     case UnitPhase::kFault:
+      if (!units[i.value].unfit.empty() && view.reported_state != UnitState::kFault)
+        return "is not fit to move: " + units[i.value].unfit;
       return "is in fault" +
              (view.fault == FaultCode::kNone ? "" : " (" + std::string(Name(view.fault)) + ")") +
              ": `focalfleet enable " + id + "` clears it";
@@ -83,9 +93,11 @@ std::string Core::TroubleOf(PositionerIndex i) const {
       return "has another serial number than the one that belongs there: `focalfleet adopt " + id +
              "` accepts it";
     case UnitPhase::kSilent:
-      return "does not answer any more";
     case UnitPhase::kAbsent:
-      return "has never answered";
+      if (units[i.value].other_version)
+        return "speaks protocol version " + std::to_string(*units[i.value].other_version) +
+               ", not " + std::to_string(kProtocolVersion);
+      return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
       return "is still being read";
     case UnitPhase::kMoving:
@@ -139,20 +151,26 @@ std::optional<PositionerIndex> Core::NextDue() {
   return std::nullopt;
 }
 
-void Core::Ask(PositionerIndex i, const HostMessage& message) {
+std::uint8_t Core::SequenceAfter(PositionerIndex i, int questions) const {
+  const int last = units[i.value].sequence;  // 0: none was asked yet
+  return static_cast<std::uint8_t>((last + questions - 1) % kLastSequence + 1);
+}
+
+void Core::Ask(PositionerIndex i, const HostMessage& message, std::uint32_t answer_bits) {
   UnitRecord& record = unit(i);
   DropQuestion(i);
-  record.sequence = record.sequence == kLastSequence
-                        ? std::uint8_t{1}
-                        : static_cast<std::uint8_t>(record.sequence + 1);
+  record.sequence = SequenceAfter(i, 1);
   if (std::holds_alternative<Stop>(message)) {
-    record.stop_sequence = record.sequence;
+    std::shift_right(record.stop_sequences.begin(), record.stop_sequences.end(), 1);
+    record.stop_sequences.front() = record.sequence;
     record.runs_freely = false;
   }
   const CanFrame frame = Encode(message, {layout.unit(i).node, record.sequence});
-  record.question = Question{
-      .message = message, .answer_function = AnswerFunction(frame), .sequence = record.sequence};
-  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+  record.question = Question{.message = message,
+                             .answer_function = AnswerFunction(frame),
+                             .sequence = record.sequence,
+                             .answer_bits = answer_bits == 0 ? kAnswerBits : answer_bits};
+  if (!bus_of(i).schedule.Enqueue({frame, record.question->answer_bits, i})) {
     record.question->deadline = now + kQueueFullWait;
     SetDue(i, record.question->deadline);
   } else {
@@ -167,7 +185,7 @@ bool Core::AskAgain(PositionerIndex i) {
   ++bus_of(i).view.retries;
   const CanFrame frame = Encode(question.message, {layout.unit(i).node, question.sequence});
   question.deadline = kNever;
-  if (!bus_of(i).schedule.Enqueue({frame, kAnswerBits, i})) {
+  if (!bus_of(i).schedule.Enqueue({frame, question.answer_bits, i})) {
     question.deadline = now + kQueueFullWait;
     SetDue(i, question.deadline);
   }
@@ -213,6 +231,8 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
   out->frames.push_back({buses[bus].id, frame});
   buses[bus].schedule.Charge(now, FrameBits(frame));
   if (!std::holds_alternative<Stop>(message)) return;
+  if (node == kBroadcastNode)
+    buses[bus].schedule.Hold(now + BitTime(kStopAloneBits, config.bit_rate_bps));
   for (const PositionerIndex i : buses[bus].units) {
     if (node != kBroadcastNode && node != layout.unit(i).node) continue;
     unit(i).told_to_stop = now;
@@ -222,8 +242,21 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
 
 bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
   const UnitRecord& record = units[i.value];
-  if (sequence != 0) return sequence == record.stop_sequence;
+  if (sequence != 0) return std::ranges::count(record.stop_sequences, sequence) > 0;
   return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
+}
+
+MoveId Core::TakeMoveId() {
+  const MoveId taken = next_move_;
+  next_move_ = MoveAfter(taken, 1);
+  if (--moves_left_ < limits::kMovesReserved / 2) ReserveMoves();
+  return taken;
+}
+
+void Core::ReserveMoves() {
+  moves_left_ = limits::kMovesReserved;
+  Note(NextMoveRow{MoveAfter(next_move_, moves_left_)});
+  if (reserved_by_ == 0) reserved_by_ = batch_now();
 }
 
 void Core::Raise(Severity severity, std::optional<PositionerIndex> who, std::optional<BusId> bus,
@@ -303,11 +336,14 @@ void Core::BeginStep(const Inputs& inputs, Effects* effects) {
   committed_through = inputs.committed_through;
   store_failing = inputs.store_failing;
   std::fill(is_changed_.begin(), is_changed_.end(), std::uint8_t{0});
+  if (reserved_by_ == 0) ReserveMoves();
 }
 
-void Core::Count(BusRecord* bus, std::uint32_t bits) {
+void Core::Count(BusRecord* bus, const CanFrame& frame) {
+  const std::uint32_t bits = FrameBits(frame);
   bus->view.bits += bits;
   bus->window_bits += bits;
+  if (IsOfUpload(frame)) bus->view.upload.bits += bits;
 }
 
 void Core::CloseLoadWindow(BusRecord* bus) const {
@@ -351,7 +387,8 @@ void Core::EndStep() {
   for (const OutFrame& sent : out->frames) {
     BusRecord* bus = FindBus(sent.bus);
     ++bus->view.frames_sent;
-    Count(bus, FrameBits(sent.frame));
+    Count(bus, sent.frame);
+    if (IsOfUpload(sent.frame)) bus->upload_began = std::min(bus->upload_began, now);
   }
   if (!timers_.empty()) out->wake_at = std::min(out->wake_at, timers_.top().at);
   if (!out->rows.empty()) out->batch = next_batch++;

@@ -8,6 +8,7 @@
 // due.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -18,6 +19,7 @@
 #include <vector>
 
 #include "fleet/coordinate/bus_schedule.h"
+#include "fleet/coordinate/clock_map.h"
 #include "fleet/coordinate/unit_phase.h"
 #include "fleet/coordinator.h"
 #include "protocol/wire/codec.h"
@@ -31,6 +33,7 @@ struct Question {
   Function answer_function{};
   std::uint8_t sequence = 0;
   std::uint8_t tries = 0;
+  std::uint32_t answer_bits = 0;  // that its answer will take
   HostInstant deadline = kNever;  // set when the frame leaves
   HostInstant asked = kNever;     // when it first left
   /// Where others depend on an answer by then: said once, before the retries are over.
@@ -43,6 +46,7 @@ struct Reading {
   StatusReply status;
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
+  std::array<std::int32_t, kAxisCount> counter1{};
 };
 
 struct UnitRecord {
@@ -52,7 +56,11 @@ struct UnitRecord {
   std::optional<Question> question;
   std::uint64_t write_request = 0;  // the command that waits for the answer to a written parameter
   Reading reading;
-  HostInstant due = kNever;  // when Service has something to do
+  /// What it holds otherwise than plans are made with, for people; empty: nothing. Such a unit is
+  /// kFault, and read again with every poll.
+  std::string unfit;
+  std::optional<std::uint8_t> other_version;  // of the protocol, that it said last
+  HostInstant due = kNever;                   // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
   // In motion: when others depend on where it is, and when the last question was asked to which it
@@ -63,8 +71,13 @@ struct UnitRecord {
   /// Whoever was asked later than this and has not begun never will: the start may have been late.
   HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
+  ClockMap clock;
+  bool clock_told = false;   // that its clock is off by more than plans allow for
+  bool wants_start = false;  // began with the others; when, is not known yet
+  ClockMap::Instant began;   // told last
   // Stops of ours, so that one of somebody else's is told from them.
-  std::uint8_t stop_sequence = 0;       // of the last one that it was asked for
+  /// Of the last ones that it was asked for, newest first: answers may come late, and repeated.
+  std::array<std::uint8_t, 4> stop_sequences{};
   HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
   bool runs_freely = false;             // set in motion, and not stopped by us since
 };
@@ -76,8 +89,18 @@ struct BusRecord {
   HostInstant clock_due{INT64_MIN};
   HostInstant window_began = kNever;  // of the second over which the load is taken
   std::uint64_t window_bits = 0;
+  // Of the upload under way: its first frame let go, its last unit armed.
+  HostInstant upload_began = kNever;
+  HostInstant upload_ended{INT64_MIN};
   std::vector<PositionerIndex> units;
 };
+
+/// Frames that an upload consists of, both directions.
+constexpr bool IsOfUpload(const CanFrame& frame) {
+  const auto function = static_cast<Function>(frame.id >> 20 & 63);
+  return function == Function::kStageBegin || function == Function::kStageSegment ||
+         function == Function::kConfirm || function == Function::kArm;
+}
 
 enum class UnitEventKind : std::uint8_t {
   kReady,        // read anew, or its motion ended where it should: its knowledge is settled
@@ -87,6 +110,7 @@ enum class UnitEventKind : std::uint8_t {
   kEnded,        // in motion, says that it stands, not yet where
   kLost,         // silent, restarted, foreign or faulty: not to be counted on
   kForeignStop,  // it obeyed a stop that is not ours
+  kStartTold,    // when it began is known
 };
 struct UnitEvent {
   PositionerIndex unit;
@@ -115,8 +139,10 @@ class Core {
   void Changed(PositionerIndex i);
   void SetDue(PositionerIndex i, HostInstant at);
   /// Replaces any open question. Where the bus's queue is full the question is asked when it has
-  /// room.
-  void Ask(PositionerIndex i, const HostMessage& message);
+  /// room. `answer_bits`: what the answer will take, where that is known; else a fair guess.
+  void Ask(PositionerIndex i, const HostMessage& message, std::uint32_t answer_bits = 0);
+  /// The sequence number of the question after `questions` more ones.
+  [[nodiscard]] std::uint8_t SequenceAfter(PositionerIndex i, int questions) const;
   void Forget(PositionerIndex i);  // its open question, and what waits for it on the bus
   /// True where a retry went out; false where the last one is over: nobody answers.
   [[nodiscard]] bool AskAgain(PositionerIndex i);
@@ -151,12 +177,18 @@ class Core {
   /// The batch number that this step's rows will carry.
   [[nodiscard]] std::uint64_t batch_now() const { return next_batch; }
 
+  /// A number that no unit holds a move under. Numbers are taken from a stock that the store knows
+  /// as used: a run that is killed may have armed units that nobody hears any more, and the next
+  /// one's start signals reach them. Pre: MovesAreReserved().
+  MoveId TakeMoveId();
+  [[nodiscard]] bool MovesAreReserved() const { return committed_through >= reserved_by_; }
+
   // ---- being driven
 
   void BeginStep(const Inputs& inputs, Effects* effects);
   /// Matches an answer to the open question; false: late, doubled, or never asked.
   [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
-  void Count(BusRecord* bus, std::uint32_t bits);
+  void Count(BusRecord* bus, const CanFrame& frame);
   void EndStep();
   /// Units that are due at `now`, in the order of their times.
   [[nodiscard]] std::optional<PositionerIndex> NextDue();
@@ -171,7 +203,6 @@ class Core {
   std::unordered_map<SerialNumber, PositionerIndex> place_of;
   std::vector<ConfigurationRow> earlier_configurations;  // as stored
   std::vector<UnitEvent> events;
-  MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
   std::uint64_t next_exposure = 1;
@@ -196,6 +227,12 @@ class Core {
     PositionerIndex unit;
     bool operator>(const Timer& o) const { return at != o.at ? at > o.at : unit > o.unit; }
   };
+
+  void ReserveMoves();
+
+  MoveId next_move_;
+  std::uint32_t moves_left_ = 0;
+  std::uint64_t reserved_by_ = 0;  // the batch of the first stock
 
   void CloseLoadWindow(BusRecord* bus) const;
   void DropQuestion(PositionerIndex i);

@@ -1,6 +1,7 @@
 #include "fleet/coordinate/pursuit.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "fleet/coordinate/noticing.h"
@@ -20,6 +21,12 @@ std::uint64_t FramesOf(const Core& core) {
   std::uint64_t frames = 0;
   for (const BusRecord& bus : core.buses) frames += bus.view.frames_sent + bus.view.frames_received;
   return frames;
+}
+
+std::uint64_t UploadBitsOf(const Core& core) {
+  std::uint64_t bits = 0;
+  for (const BusRecord& bus : core.buses) bits += bus.view.upload.bits;
+  return bits;
 }
 
 std::string DaemonEnded(std::uint64_t configuration) {
@@ -155,7 +162,10 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   std::fill(excluded_.begin(), excluded_.end(), std::uint8_t{0});
   std::fill(strikes_.begin(), strikes_.end(), std::uint8_t{0});
   frames_before_ = FramesOf(core_);
-  for (BusRecord& bus : core_.buses) bus.view.load_max = 0;
+  for (BusRecord& bus : core_.buses) {
+    bus.view.load_max = 0;
+    bus.view.upload = {};
+  }
   Gather();
   core_.out->replies.push_back({request_, false, {}, "configuration " + std::to_string(view_.id)});
 }
@@ -172,7 +182,7 @@ void Pursuit::GatherIfDue() {
         return unit.view.phase == kIdentifying ||
                (unit.view.phase == kAbsent && !unit.asked_once) || unit.view.phase == kSettling;
       });
-  if (waiting && core_.now < gather_until_) {
+  if ((waiting && core_.now < gather_until_) || !core_.MovesAreReserved()) {
     due_ = core_.now + kGatherStep;
     return;
   }
@@ -192,6 +202,7 @@ void Pursuit::BeginRound() {
       .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
   job.options.fixed = fixed_;
   job.options.lead_apart = true;
+  job.options.start_skew_s = round_skew_s_ = planned_skew_s_;
   job.options.notice_s = NoticingOf(core_.config).notice.seconds();
   job.unproven = unproven_;
   bool any = !to_home_.empty();
@@ -275,8 +286,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
   prediction_ = done.predicted;
-  move_ = core_.next_move;
-  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  move_ = core_.TakeMoveId();
   if (plan_.moves.empty()) {
     RoundOver();
     return;
@@ -291,6 +301,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
     core_.SetPhase(i, kStaging);
     waiting_[core_.unit(i).bus].push_back(i);
   }
+  PredictUpload();
   PumpUploads();
 }
 
@@ -308,7 +319,10 @@ void Pursuit::Advance() {
   for (std::size_t n = 0; n < core_.events.size(); ++n) Take(core_.events[n]);
   core_.events.clear();
   ReportArrivals();
-  if (busy()) view_.frames = FramesOf(core_) - frames_before_;
+  if (busy()) {
+    view_.frames = FramesOf(core_) - frames_before_;
+    view_.upload.bits = UploadBitsOf(core_);
+  }
   if (core_.now >= due_) {
     due_ = kNever;
     if (state_ == State::kGathering) GatherIfDue();
@@ -358,7 +372,8 @@ void Pursuit::Advance() {
 }
 
 void Pursuit::SayWhatIsWaitedFor() {
-  const bool needs_the_store = state_ == State::kCommitting || state_ == State::kHomeCommitting ||
+  const bool needs_the_store = (state_ == State::kGathering && !core_.MovesAreReserved()) ||
+                               state_ == State::kCommitting || state_ == State::kHomeCommitting ||
                                (state_ == State::kReporting && !arrivals_.empty());
   view_.waiting_for = needs_the_store && core_.store_failing ? "the store, which cannot be written"
                       : state_ == State::kMeasuring && exposure_ != 0 ? "the camera"
@@ -369,6 +384,10 @@ void Pursuit::Take(const UnitEvent& event) {
   const PositionerIndex i = event.unit;
   if (event.kind == UnitEventKind::kForeignStop) {
     StoppedBySomebodyElse(i);
+    return;
+  }
+  if (event.kind == UnitEventKind::kStartTold) {
+    NoteStart(i);
     return;
   }
   if (part_[i.value] == Part::kNone) return;
@@ -405,6 +424,7 @@ void Pursuit::Take(const UnitEvent& event) {
       SetPart(i, Part::kNone);
       break;
     case UnitEventKind::kForeignStop:
+    case UnitEventKind::kStartTold:
       break;  // above
   }
 }
@@ -432,7 +452,10 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
 
 bool Pursuit::RoundIsOver() const {
   return late_.empty() &&
-         std::all_of(parts_.begin(), parts_.end(), [](std::uint32_t count) { return count == 0; });
+         std::all_of(parts_.begin(), parts_.end(),
+                     [](std::uint32_t count) { return count == 0; }) &&
+         std::none_of(plan_.moves.begin(), plan_.moves.end(),
+                      [this](const UnitPlan& move) { return AwaitsStart(move.unit); });
 }
 
 void Pursuit::ReportArrivals() {
@@ -446,6 +469,7 @@ void Pursuit::RoundOver() {
   if (view_.started != kNever && last_arrival_ > view_.started)
     view_.makespan_s += (last_arrival_ - view_.started).seconds();
   view_.started = kNever;
+  if (state_ == State::kMoving) JudgeStarts();
   for (const UnitPlan& move : plan_.moves) plan_of_[move.unit.value] = kNoPlan;
   const bool was_homing = state_ == State::kHoming;
   plan_.moves.clear();
@@ -552,6 +576,8 @@ void Pursuit::SetPart(PositionerIndex i, Part part) {
 void Pursuit::SetState(State state) { state_ = state; }
 
 void Pursuit::Record() {
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  const bool known = view_.starts.told > 0;
   core_.Note(ConfigurationRow{.id = view_.id,
                               .source = view_.source,
                               .state = view_.state,
@@ -562,7 +588,9 @@ void Pursuit::Record() {
                               .makespan_predicted_s = view_.makespan_predicted_s,
                               .makespan_s = view_.makespan_s,
                               .energy_J = view_.energy_J,
-                              .peak_power_W = view_.peak_power_W});
+                              .peak_power_W = view_.peak_power_W,
+                              .start_skew_s = known ? view_.starts.skew_s : kNotKnown,
+                              .start_skew_bound_s = known ? view_.starts.bound_s : kNotKnown});
 }
 
 }  // namespace focalfleet

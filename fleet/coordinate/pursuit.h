@@ -27,6 +27,7 @@
 
 #include "fleet/coordinate/contact.h"
 #include "fleet/coordinate/core.h"
+#include "fleet/coordinate/start_skew.h"
 
 namespace focalfleet {
 
@@ -118,6 +119,9 @@ class Pursuit {
   void TakePlan(const PlanDone& done);
   void PumpUploads();
   void Upload(PositionerIndex i);
+  [[nodiscard]] std::uint32_t UploadBits(PositionerIndex i) const;
+  void PredictUpload();
+  void MeasureUpload();
   void FallOut(PositionerIndex i, const std::string& reason);
   void UploadsOver();
   void Disarm();
@@ -127,6 +131,10 @@ class Pursuit {
   void TakeBackIntents();
   void Start();
   void RepeatStart();
+  void ExpectStarts();
+  void NoteStart(PositionerIndex i);
+  [[nodiscard]] bool AwaitsStart(PositionerIndex i) const;
+  void JudgeStarts();
   void RoundOver();
   void CommitHoming();
   void StartHoming();
@@ -156,6 +164,7 @@ class Pursuit {
   [[nodiscard]] std::vector<Deviation> Deviations() const;
   [[nodiscard]] std::vector<Deviation> DeviationsNear(PositionerIndex i) const;
   [[nodiscard]] bool IsStale(const Late& late) const;
+  [[nodiscard]] bool StandsAt(PositionerIndex i, const Pose& from) const;
   [[nodiscard]] bool IsUnheard(const LateMove& late) const;
   Status MayRetarget(const RetargetCommand& command);
   void GoOnLate(PositionerIndex i);
@@ -252,6 +261,11 @@ class Pursuit {
   HostInstant late_due_ = kNever;
   double round_end_s_ = 0;  // predicted, after the start signal
   std::uint64_t commit_batch_ = 0;
+  // When the units of this round began; what it was planned for, and what the next one will be:
+  // any unit may start so much early or late.
+  StartSkew skew_;
+  double round_skew_s_ = PlanOptions{}.start_skew_s;
+  double planned_skew_s_ = PlanOptions{}.start_skew_s;
   HostInstant last_arrival_;
   HostInstant start_repeat_ = kNever;
   int start_repeats_ = 0;

@@ -103,6 +103,12 @@ bool Pursuit::IsUnheard(const LateMove& late) const {
   });
 }
 
+/// It may be read anew while its way is planned (a late answer, a restart).
+bool Pursuit::StandsAt(PositionerIndex i, const Pose& from) const {
+  const UnitView& view = core_.unit(i).view;
+  return view.phase == kReady && IsPlace(view.knowledge) && PlaceOf(view.knowledge) == from;
+}
+
 bool Pursuit::IsStale(const Late& late) const {
   const std::vector<Deviation> now = DeviationsNear(late.unit);
   return !std::equal(now.begin(), now.end(), late.near.begin(), late.near.end(), IsSame);
@@ -249,11 +255,13 @@ void Pursuit::PlanLate(Late* late) {
   late->job = late_job_;
   late->near = DeviationsNear(i);
   PlanJob job{.job = job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = {}};
-  const ReplanQuestion question{.unit = i,
-                                .from = PlaceOf(core_.unit(i).view.knowledge),
-                                .to = *targets_[i.value],
-                                .now_s = (core_.now - view_.started).seconds(),
-                                .start_s = (start - view_.started).seconds()};
+  const ReplanQuestion question{
+      .unit = i,
+      .from = PlaceOf(core_.unit(i).view.knowledge),
+      .to = *targets_[i.value],
+      .now_s = (core_.now - view_.started).seconds(),
+      .start_s = (start - view_.started).seconds(),
+      .start_skew_s = std::max(ReplanQuestion{}.start_skew_s, 2 * planned_skew_s_)};
   job.late = std::make_shared<const LateJob>(LateJob{running_, question, Deviations()});
   core_.out->plan_job = std::move(job);
 }
@@ -268,7 +276,7 @@ void Pursuit::OnLatePlan(const PlanDone& done) {
     if (late->request != 0) SetOutcome(late->unit, TargetOutcome::kRefused, error.text);
     EndLate(*late, error);
     late_.erase(late);
-  } else if (IsStale(*late)) {
+  } else if (!StandsAt(late->unit, (*done.late)->move.from) || IsStale(*late)) {
     if (!TryAgain(&*late)) late_.erase(late);
   } else {
     late->predicted = done.predicted;
@@ -288,9 +296,7 @@ bool Pursuit::TryAgain(Late* late) {
 
 void Pursuit::TakeLate(Late* late, const LateMove& move) {
   const PositionerIndex i = late->unit;
-  courses_[i.value] = {move, core_.next_move};
-  core_.next_move = {
-      static_cast<std::uint16_t>(core_.next_move.value == 65'535 ? 1 : core_.next_move.value + 1)};
+  courses_[i.value] = {move, core_.TakeMoveId()};
   plan_of_[i.value] = plan_.moves.size();
   plan_.moves.push_back(move.move);
   stage_tries_[i.value] = 0;
@@ -356,7 +362,6 @@ bool Pursuit::Load(Late* late) {
   if (part_[i.value] != Part::kHolding) return true;
   if (late->stage == Late::Stage::kUploading) {
     Intend(i, IntentOf(i), core_.unit(i).view.offset);
-    core_.Note(NextMoveRow{core_.next_move});
     late->batch = core_.batch_now();
     late->stage = Late::Stage::kCommitting;
   }

@@ -65,7 +65,6 @@ void Pursuit::CommitRound() {
   for (const UnitPlan& move : plan_.moves) {
     Intend(move.unit, IntentOf(move.unit), core_.unit(move.unit).view.offset);
   }
-  core_.Note(NextMoveRow{core_.next_move});
   commit_batch_ = core_.batch_now();
   SetState(State::kCommitting);
 }
@@ -86,12 +85,15 @@ void Pursuit::Start() {
     WatchLeader(move.unit);
     core_.SetDue(move.unit, unit.next_poll);
   }
+  ExpectStarts();
+  if (core_.config.sync_line) core_.out->sync_at = view_.started;
   SetState(State::kMoving);
   RepeatStart();
 }
 
 void Pursuit::RepeatStart() {
-  const DurationNs left = view_.started - core_.now;
+  DurationNs left = view_.started - core_.now;
+  if (core_.config.sync_line) left = left + core_.config.sync_lead;
   const auto ticks = static_cast<std::uint32_t>(std::max<std::int64_t>(left.ns, 0) / kTick.ns);
   std::vector<bool> told(core_.buses.size());
   for (const UnitPlan& move : plan_.moves) {
@@ -152,8 +154,7 @@ std::optional<Pursuit::Course> Pursuit::CourseOf(PositionerIndex i) const {
 bool Pursuit::MayHaveArrived(const Course& course) const {
   const PlanOptions allowed;
   const double end_s = EndOf(*course.plan, core_.drives[course.plan->unit.value]);
-  return core_.now >=
-         course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * allowed.start_skew_s);
+  return core_.now >= course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * round_skew_s_);
 }
 
 Pursuit::Ended Pursuit::SeenUntil(PositionerIndex i, HostInstant until) const {
@@ -249,13 +250,11 @@ void Pursuit::CommitHoming() {
     return;
   }
   // A new id: the moves that made way for these units had their own.
-  move_ = core_.next_move;
-  core_.next_move = {static_cast<std::uint16_t>(move_.value == 65'535 ? 1 : move_.value + 1)};
+  move_ = core_.TakeMoveId();
   for (const PositionerIndex i : homing_) {
     // At its stop it begins to count anew: what the camera found of the old count is over.
     Intend(i, HomingIntentOf(i), {});
   }
-  core_.Note(NextMoveRow{core_.next_move});
   // A few feeds: no work for the planner's thread.
   const PlanEstimate estimate = Estimate(HomingMotion(), core_.layout, core_.drives, MotorModel{});
   prediction_ = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};

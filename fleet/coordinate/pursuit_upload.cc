@@ -1,7 +1,10 @@
 // Pursuit, before the start: each unit of the plan gets its move, reads it back, and arms.
 
+#include <algorithm>
+
 #include "fleet/coordinate/pursuit.h"
 #include "protocol/base/limits.h"
+#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 namespace {
@@ -11,6 +14,31 @@ using enum UnitPhase;
 // Units of one bus that are uploaded at once: enough to keep the bus busy while answers are under
 // way.
 constexpr std::uint32_t kUploadsPerBus = 16;
+
+/// Calls `send` with each frame of a move that has no answer, in their order.
+template <class Send>
+void ForEachStageFrame(const StagedMove& move, NodeId node, const Send& send) {
+  const Address to{node, 0};
+  send(Encode(
+      HostMessage(StageBegin{move.move, {move.path[0].size(), move.path[1].size()}, move.mode}),
+      to));
+  for (const Axis axis : kAxes) {
+    std::uint8_t index = 0;
+    for (const Segment& segment : move.path[Index(axis)].segments())
+      send(Encode(HostMessage(StageSegment{axis, index++, segment}), to));
+  }
+}
+
+/// What a unit answers where all is well.
+std::uint32_t BitsOfConfirmed(const StagedMove& move, const Address& address) {
+  return FrameBits(
+      Encode(UnitMessage(ConfirmReply{
+                 move.move, Digest(move), {move.path[0].size(), move.path[1].size()}, Answer::kOk}),
+             address));
+}
+std::uint32_t BitsOfArmed(MoveId move, const Address& address) {
+  return FrameBits(Encode(UnitMessage(ArmReply{move, Answer::kOk}), address));
+}
 
 }  // namespace
 
@@ -39,18 +67,55 @@ void Pursuit::Upload(PositionerIndex i) {
     ++uploading_[core_.unit(i).bus];
     SetPart(i, Part::kUploading);
   }
+  const NodeId node = core_.layout.unit(i).node;
   // Where the queue has no room the read-back shows it, and the move is sent again.
-  const auto send = [&, to = Address{core_.layout.unit(i).node, 0}](const HostMessage& message) {
-    static_cast<void>(bus.schedule.Enqueue({Encode(message, to), 0, {}}));
-  };
-  send(StageBegin{move.move, {move.path[0].size(), move.path[1].size()}, move.mode});
-  for (const Axis axis : kAxes) {
-    std::uint8_t index = 0;
-    for (const Segment& segment : move.path[Index(axis)].segments())
-      send(StageSegment{axis, index++, segment});
-  }
+  ForEachStageFrame(move, node, [&](const CanFrame& frame) {
+    static_cast<void>(bus.schedule.Enqueue({frame, 0, {}}));
+  });
   core_.SetPhase(i, kConfirming);
-  core_.Ask(i, Confirm{move.move});
+  core_.Ask(i, Confirm{move.move}, BitsOfConfirmed(move, {node, core_.SequenceAfter(i, 1)}));
+}
+
+/// To the bit, where nothing is lost: what stands in a frame decides how long it is, the sequence
+/// numbers of the two questions included.
+std::uint32_t Pursuit::UploadBits(PositionerIndex i) const {
+  const StagedMove move = StagedMoveOf(i);
+  const NodeId node = core_.layout.unit(i).node;
+  const Address confirm{node, core_.SequenceAfter(i, 1)};
+  const Address arm{node, core_.SequenceAfter(i, 2)};
+  std::uint32_t bits = BitsOfConfirmed(move, confirm) + BitsOfArmed(move.move, arm) +
+                       FrameBits(Encode(HostMessage(Confirm{move.move}), confirm)) +
+                       FrameBits(Encode(HostMessage(Arm{move.move, Digest(move)}), arm));
+  ForEachStageFrame(move, node, [&](const CanFrame& frame) { bits += FrameBits(frame); });
+  return bits;
+}
+
+void Pursuit::PredictUpload() {
+  double longest_s = 0;
+  for (std::size_t b = 0; b < waiting_.size(); ++b) {
+    BusRecord& bus = core_.buses[b];
+    bus.upload_began = kNever;
+    bus.upload_ended = HostInstant{INT64_MIN};
+    std::uint64_t bits = 0;
+    for (const PositionerIndex i : waiting_[b]) bits += UploadBits(i);
+    const double bits_s = static_cast<double>(bits) / core_.config.bit_rate_bps;
+    bus.view.upload.bits_predicted += bits;
+    bus.view.upload.predicted_s += bits_s;
+    view_.upload.bits_predicted += bits;
+    longest_s = std::max(longest_s, bits_s);
+  }
+  view_.upload.predicted_s += longest_s;
+}
+
+void Pursuit::MeasureUpload() {
+  double longest_s = 0;
+  for (BusRecord& bus : core_.buses) {
+    if (bus.upload_began > bus.upload_ended) continue;
+    const double took_s = (bus.upload_ended - bus.upload_began).seconds();
+    bus.view.upload.measured_s += took_s;
+    longest_s = std::max(longest_s, took_s);
+  }
+  view_.upload.measured_s += longest_s;
 }
 
 void Pursuit::OnConfirm(PositionerIndex i, const ConfirmReply& reply) {
@@ -59,7 +124,8 @@ void Pursuit::OnConfirm(PositionerIndex i, const ConfirmReply& reply) {
   const std::uint32_t digest = Digest(move);
   if (reply.answer == Answer::kOk && reply.digest == digest) {
     core_.SetPhase(i, kArming);
-    core_.Ask(i, Arm{move.move, digest});
+    core_.Ask(i, Arm{move.move, digest},
+              BitsOfArmed(move.move, {core_.layout.unit(i).node, core_.SequenceAfter(i, 1)}));
   } else if ((reply.answer == Answer::kOk || reply.answer == Answer::kIncomplete ||
               reply.answer == Answer::kWrongMove) &&
              ++stage_tries_[i.value] <= limits::kStageRetries) {
@@ -79,6 +145,7 @@ void Pursuit::OnArm(PositionerIndex i, const ArmReply& reply) {
     return;
   }
   core_.SetPhase(i, kArmed);
+  core_.bus_of(i).upload_ended = core_.now;
   core_.SetDue(i, kNever);
   --uploading_[core_.unit(i).bus];
   SetPart(i, Part::kHolding);
@@ -98,6 +165,7 @@ void Pursuit::UploadsOver() {
   if (parts_[static_cast<std::size_t>(Part::kWaiting)] != 0 ||
       parts_[static_cast<std::size_t>(Part::kUploading)] != 0)
     return;
+  MeasureUpload();
   if (parts_[static_cast<std::size_t>(Part::kHolding)] == plan_.moves.size() && !stopping_) {
     CommitRound();
   } else {

@@ -78,7 +78,7 @@ double PathSearch::ExactClearance(std::int32_t index) {
   const auto clearance = [&](const Blocker& b) {
     return DistanceMm(line, b.capsule.line) - b.capsule.radius_mm - b.need_mm;
   };
-  double least = std::numeric_limits<float>::max();
+  double least = static_cast<double>(std::numeric_limits<float>::max());
   if (last_touched_ < q_.blockers.size()) least = clearance(q_.blockers[last_touched_]);
   for (std::size_t k = 0; k < q_.blockers.size() && least > 0; ++k) {
     const double here = clearance(q_.blockers[k]);

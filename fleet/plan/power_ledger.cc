@@ -11,7 +11,7 @@ namespace focalfleet {
 PowerLedger::PowerLedger(const Layout& layout, std::span<const UnitDrive> drives,
                          const MotorModel& motor, const PowerLimits& limits,
                          const Tolerance& tolerance)
-    : layout_(layout), drives_(drives), powers_(motor), limits_(limits), tolerance_(tolerance) {
+    : drives_(drives), powers_(motor), limits_(limits), tolerance_(tolerance) {
   std::map<std::uint32_t, std::uint32_t> index;
   for (const Unit& unit : layout.units()) {
     const auto [it, fresh] =

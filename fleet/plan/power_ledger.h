@@ -61,7 +61,6 @@ class PowerLedger {
     return static_cast<std::int64_t>(std::llround(power_W * 1e9));
   }
 
-  const Layout& layout_;
   std::span<const UnitDrive> drives_;
   DrivePowers powers_;
   PowerLimits limits_;

@@ -16,13 +16,17 @@ inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each
 inline constexpr std::uint32_t kRequestRetries = 4;  // waits double: 31 times the first in all
 inline constexpr std::uint32_t kStageRetries = 3;
 inline constexpr std::uint32_t kRoundsPerConfiguration = 6;
+inline constexpr std::uint32_t kMovesReserved = 1024;  // numbers that the store knows as taken
 inline constexpr std::uint32_t kFramesPerBusQueued = 4096;
 inline constexpr std::uint32_t kFramesPerStep = 65'536;
+inline constexpr std::uint32_t kSpotsPerExposure = 131'072;  // fibres, fiducials, dust
+inline constexpr std::uint32_t kFiducials = 4096;
 
 // The largest focal plane in view (20,000 units at 100 a bus) fits with room.
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
 static_assert(kNodesPerBus < 255, "255 is the broadcast address");
 static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
+static_assert(kSpotsPerExposure >= 2 * (kUnits + kFiducials), "a plate seen with as much dust");
 // A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8
 // segments.
 static_assert(kFramesPerBusQueued >= kNodesPerBus * (1 + 2 * 8));

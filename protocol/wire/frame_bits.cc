@@ -6,7 +6,23 @@ namespace {
 // CRC delimiter, ACK slot, ACK delimiter, end of frame, intermission.
 constexpr std::uint32_t kUnstuffedTail = 1 + 1 + 1 + 7 + 3;
 
+struct NoRecord {
+  void Note(std::uint32_t, bool) {}
+  void EndArbitration() {}
+};
+
+struct LevelRecord {
+  void Note(std::uint32_t bit, bool stuff) {
+    levels.recessive[levels.bits] = bit != 0;
+    levels.stuff[levels.bits] = stuff;
+    ++levels.bits;
+  }
+  void EndArbitration() { levels.arbitration = levels.bits; }
+  FrameLevels levels;
+};
+
 // Walks the stuffed part of a frame bit by bit: CRC and stuff bits grow as the wire would see them.
+template <class Record>
 class BitWalk {
  public:
   void Bits(std::uint32_t value, int count) {
@@ -20,8 +36,10 @@ class BitWalk {
   void DropLastStuffBit() {
     if (stuffed_last_) --bits_;
   }
+  void EndArbitration() { record_.EndArbitration(); }
   [[nodiscard]] std::uint32_t bits() const { return bits_; }
   [[nodiscard]] std::uint16_t crc() const { return static_cast<std::uint16_t>(crc_); }
+  [[nodiscard]] const Record& record() const { return record_; }
 
  private:
   void Bit(std::uint32_t bit) {
@@ -32,11 +50,13 @@ class BitWalk {
   }
   void Stuff(std::uint32_t bit) {
     ++bits_;
+    record_.Note(bit, false);
     run_ = bit == last_ ? run_ + 1 : 1;
     last_ = bit;
     stuffed_last_ = run_ == 5;
     if (stuffed_last_) {
       ++bits_;
+      record_.Note(bit ^ 1, true);
       last_ = bit ^ 1;
       run_ = 1;
     }
@@ -47,15 +67,19 @@ class BitWalk {
   std::uint32_t last_ = 2;  // neither 0 nor 1: the first bit starts a run
   int run_ = 0;
   bool stuffed_last_ = false;
+  Record record_;
 };
 
-BitWalk Walk(const CanFrame& frame) {
-  BitWalk walk;
+template <class Record = NoRecord>
+BitWalk<Record> Walk(const CanFrame& frame) {
+  BitWalk<Record> walk;
   walk.Bits(0, 1);                    // start of frame
   walk.Bits(frame.id >> 18, 11);      // base identifier
   walk.Bits(0b11, 2);                 // SRR, IDE: recessive
   walk.Bits(frame.id & 0x3ffff, 18);  // identifier extension
-  walk.Bits(0, 3);                    // RTR, r1, r0
+  walk.Bits(0, 1);                    // RTR
+  walk.EndArbitration();
+  walk.Bits(0, 2);  // r1, r0
   walk.Bits(frame.length, 4);
   for (const std::uint8_t byte : frame.payload()) walk.Bits(byte, 8);
   return walk;
@@ -70,7 +94,7 @@ std::uint32_t FrameBits(const CanFrame& frame) {
 }
 
 FdFrameBits FrameBits(const FdFrame& frame) {
-  BitWalk walk;
+  BitWalk<NoRecord> walk;
   walk.Bits(0, 1);                    // start of frame
   walk.Bits(frame.id >> 18, 11);      // base identifier
   walk.Bits(0b11, 2);                 // SRR, IDE
@@ -85,6 +109,12 @@ FdFrameBits FrameBits(const FdFrame& frame) {
   const std::uint32_t fixed_stuff_bits = 1 + (check_bits - 1) / 4;
   return {.nominal = before_switch + kUnstuffedTail - 1,
           .data = walk.bits() - before_switch + check_bits + fixed_stuff_bits + 1};
+}
+
+FrameLevels LevelsOf(const CanFrame& frame) {
+  auto walk = Walk<LevelRecord>(frame);
+  walk.Crc();
+  return walk.record().levels;
 }
 
 std::uint16_t FrameCrc(const CanFrame& frame) { return Walk(frame).crc(); }

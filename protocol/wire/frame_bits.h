@@ -17,6 +17,7 @@
 // The rate changes at the sample points of BRS and of the CRC delimiter: this is exact to a bit.
 #pragma once
 
+#include <bitset>
 #include <cstdint>
 
 #include "protocol/base/instants.h"
@@ -39,7 +40,17 @@ struct FdFrameBits {
 };
 FdFrameBits FrameBits(const FdFrame& frame);
 
+inline constexpr std::uint32_t kFrameBitsMin = 67;   // no data, no stuffing; 8 bits a byte more
 inline constexpr std::uint32_t kFrameBitsMax = 160;  // 8 bytes, worst stuffing
+
+/// What stands on the wire from start of frame to the end of the CRC sequence, bit by bit.
+struct FrameLevels {
+  std::bitset<kFrameBitsMax> recessive;
+  std::bitset<kFrameBitsMax> stuff;  // bits that carry nothing
+  std::uint32_t bits = 0;            // so far; the unstuffed rest follows
+  std::uint32_t arbitration = 0;     // bits until arbitration is over: RTR is the last of them
+};
+FrameLevels LevelsOf(const CanFrame& frame);
 
 constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {
   return {static_cast<std::int64_t>(bits) * 1'000'000'000 / bit_rate_bps};

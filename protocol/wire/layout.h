@@ -256,8 +256,10 @@ template <>
 struct Layout<ClockReply> : ConstantDetail {
   static constexpr const char* kName = "clock_reply";
   static constexpr Function kFunction = Function::kClock;
-  static constexpr std::uint8_t kLength = 4;
-  static constexpr std::tuple kFields{Bind(Unsigned("ticks", 0, 32, "ticks"), &ClockReply::ticks)};
+  static constexpr std::uint8_t kLength = 8;
+  static constexpr std::tuple kFields{
+      Bind(Unsigned("ticks", 0, 32, "ticks"), &ClockReply::ticks),
+      Bind(Unsigned("began_ticks", 32, 32, "ticks"), &ClockReply::began_ticks)};
 };
 template <>
 struct Layout<ArmReply> : ConstantDetail {

@@ -148,8 +148,9 @@ struct Done {  // a motion ended, or the answer to a stop: where the axes stand
   std::array<std::int32_t, kAxisCount> position{};  // vectors, 24 bits each
   MoveId move;                                      // the last one begun
 };
-struct ClockReply {
-  std::uint32_t ticks = 0;  // the unit's clock, low 32 bits
+struct ClockReply {               // the unit's clock since power-on, low 32 bits
+  std::uint32_t ticks = 0;        // when the request had ended
+  std::uint32_t began_ticks = 0;  // when the move begun last began; 0: none since power-on
 };
 struct ArmReply {
   MoveId move;

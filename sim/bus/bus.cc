@@ -1,14 +1,46 @@
 #include "sim/bus/bus.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "protocol/base/check.h"
 #include "protocol/wire/frame_bits.h"
 
 namespace focalfleet::sim {
+namespace {
+
+/// Transmit mailboxes of a unit's controller: what it keeps while it cannot send.
+constexpr std::size_t kKeptMax = 3;
+
+}  // namespace
+
+template <class Order>
+void Bus::Heap<Order>::MoveAllOf(std::uint32_t node, std::vector<Entry>* to) {
+  std::vector<Entry>& all = this->c;
+  const auto theirs = std::stable_partition(
+      all.begin(), all.end(), [node](const Entry& entry) { return entry.node() != node; });
+  to->insert(to->end(), theirs, all.end());
+  all.erase(theirs, all.end());
+  std::make_heap(all.begin(), all.end(), this->comp);
+}
+
+Bus::Bus(const Options& options, Rng chance)
+    : options_(options), chance_(chance), nodes_(1), idle_at_(options.start) {}
+
+std::uint32_t Bus::Attach() {
+  nodes_.emplace_back();
+  ++hearing_;
+  return static_cast<std::uint32_t>(nodes_.size() - 1);
+}
+
+DurationNs Bus::Bits(std::uint32_t bits) const { return BitTime(bits, options_.bit_rate_bps); }
+
+// ---- what waits
 
 bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
-  if (dead_) {
+  Entry entry{.ready = ready, .waiting = waiting};
+  Node& node = nodes_[entry.node()];
+  if (dead_ || (entry.node() == kHost && node.off)) {
     ++counters_.dropped;
     return false;
   }
@@ -16,13 +48,17 @@ bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
     ++counters_.refused;
     return false;
   }
-  Entry entry{ready, order_++, waiting};
+  entry.order = order_++;
+  if (!Hears(entry.node())) {
+    if (node.kept.size() >= kKeptMax) {
+      ++counters_.refused;
+      return false;
+    }
+    node.kept.push_back(entry);
+    return true;
+  }
   if (faults_.late > 0 && chance_.Uniform() < faults_.late) entry.ready = ready + faults_.late_by;
   Admit(entry);
-  if (faults_.duplicate > 0 && chance_.Uniform() < faults_.duplicate) {
-    entry.order = order_++;
-    Admit(entry);
-  }
   return true;
 }
 
@@ -33,51 +69,461 @@ void Bus::Admit(const Entry& entry) {
 }
 
 HostInstant Bus::NextEvent() const {
+  if (dead_) return kNever;
+  if (stuck_at_ != kNever) return stuck_step_at_;
   if (sending_) return idle_at_;
-  if (!ready_.empty()) return std::max(idle_at_, ready_.top().ready);
-  if (!later_.empty()) return std::max(idle_at_, later_.top().ready);
-  return kNever;
+  const HostInstant begin = NextBegin();
+  return off_nodes_.empty() ? begin : std::min(begin, NextRecovery());
+}
+
+HostInstant Bus::NextBegin() const {
+  if (!ready_.empty() && held_until_ <= idle_at_) return std::max(idle_at_, ready_.top().ready);
+  HostInstant at = kNever;
+  if (!ready_.empty()) at = held_until_;
+  if (!later_.empty()) at = std::min(at, std::max(idle_at_, later_.top().ready));
+  for (const Babbler& babbler : babblers_) {
+    if (!Hears(babbler.node)) continue;
+    const HostInstant free =
+        babbler.node == suspended_ ? std::max(idle_at_, suspended_until_) : idle_at_;
+    at = std::min(at, std::max(free, babbler.since));
+  }
+  return at;
 }
 
 bool Bus::Advance(Heard* heard) {
+  if (stuck_at_ != kNever) {
+    StickOn(stuck_step_at_);
+    return false;
+  }
   if (!sending_) {
-    BeginFrame();
-    if (options_.bit_clock) return false;
+    if (!off_nodes_.empty() && NextRecovery() <= NextBegin()) {
+      RecoverThrough(NextRecovery());
+      return false;
+    }
+    BeginFrame(NextBegin());
+    if (options_.bit_clock || !sending_) return false;
   }
   sending_ = false;
-  heard->sent = on_wire_;
+  return EndFrame(heard);
+}
+
+// ---- a frame begins
+
+std::optional<Bus::Entry> Bus::TakeReady(HostInstant now) {
+  while (!later_.empty() && later_.top().ready <= now) {
+    ready_.push(later_.top());
+    later_.pop();
+  }
+  if (ready_.empty()) return std::nullopt;
+  // Suspend transmission: who sent last and is passive leaves the next eight bits to the others.
+  std::vector<Entry> passed_over;
+  std::optional<Entry> best;
+  while (!best && !ready_.empty()) {
+    if (now < suspended_until_ && ready_.top().node() == suspended_) {
+      passed_over.push_back(ready_.top());
+    } else {
+      best = ready_.top();
+    }
+    ready_.pop();
+  }
+  for (const Entry& entry : passed_over) ready_.push(entry);
+  return best;
+}
+
+std::optional<Bus::Entry> Bus::Arbitrate(HostInstant now) {
+  std::optional<Entry> best = TakeReady(now);
+  babbling_ = false;
+  for (const Babbler& babbler : babblers_) {
+    const bool suspended = babbler.node == suspended_ && now < suspended_until_;
+    if (!Hears(babbler.node) || suspended || now < babbler.since) continue;
+    if (best && best->waiting.frame.id <= babbler.frame.id) continue;
+    if (best && !babbling_) ready_.push(*best);
+    best = Entry{.ready = now, .waiting = {babbler.frame, babbler.node != kHost, babbler.node}};
+    babbling_ = true;
+  }
+  return best;
+}
+
+void Bus::BeginFrame(HostInstant now) {
+  const std::optional<Entry> best = Arbitrate(now);
+  if (!best) {
+    FOCALFLEET_CHECK(now < suspended_until_ && !ready_.empty());
+    held_until_ = suspended_until_;
+    return;
+  }
+  if (!off_nodes_.empty()) CountRowsWhileIdle(now);
+  on_wire_ = *best;
+  sending_ = true;
+  abandoned_ = false;
+  refusing_ = kNobody;
+  counters_.idle = counters_.idle + (now - idle_at_);
+  if (on_wire_.repeated) ++counters_.repeats;
+  began_at_ = idle_at_ = now;
+  course_ = DrawCourse();
+  if (options_.bit_clock) idle_at_ = now + Bits(course_.bits);
+}
+
+/// The first disturbed bit is geometric: P(none in b bits) = (1 - rate)^b.
+FrameCourse Bus::DrawCourse() {
+  const CanFrame& frame = on_wire_.waiting.frame;
+  const std::uint32_t sender = on_wire_.node();
+  FrameCourse course;
+  if (options_.bit_clock) course = hearing_ > 1 ? WellSent(frame) : Unacknowledged(frame);
+  if (faults_.bit_error_rate > 0 && options_.bit_clock) {
+    const double first =
+        std::log1p(-chance_.Uniform()) / std::log1p(-std::min(faults_.bit_error_rate, 0.5));
+    const std::uint32_t exposed = ExposedBits(frame);
+    if (first < exposed) {
+      const FrameCourse disturbed =
+          DisturbedAt(frame, static_cast<std::uint32_t>(first),
+                      nodes_[sender].errors.state() == Confinement::kPassive);
+      if (course.accepted || disturbed.bits < course.bits) course = disturbed;
+    }
+  }
+  if (faults_.duplicate > 0 && course.error == FrameError::kNone &&
+      chance_.Uniform() < faults_.duplicate) {
+    course = RefusedByOne(frame);
+    if (!options_.bit_clock) course.bits = 0;
+    if (hearing_ > 2) refusing_ = DrawReceiver(sender);
+  }
+  return course;
+}
+
+std::uint32_t Bus::DrawReceiver(std::uint32_t sender) {
+  std::uint64_t skip = chance_.Below(hearing_ - 1);
+  for (std::uint32_t node = 0;; ++node) {
+    if (node == sender || !Hears(node)) continue;
+    if (skip-- == 0) return node;
+  }
+}
+
+// ---- a frame ends
+
+bool Bus::EndFrame(Heard* heard) {
+  Charge(idle_at_ - began_at_);
+  const std::uint32_t sender = on_wire_.node();
+  if (!off_nodes_.empty()) CountRowOfFrame();
+  if (course_.error == FrameError::kNone) {
+    counters_.bits += course_.bits;
+    if (unclean_ > 0) CountWell(sender);
+  } else {
+    counters_.error_bits += course_.bits;
+    ++counters_.errors[static_cast<std::size_t>(course_.error)];
+    CountError(sender);
+    if (course_.accepted) ++counters_.received_twice;
+    if (!babbling_ && !abandoned_) {
+      on_wire_.repeated = true;
+      if (Hears(sender)) {
+        ready_.push(on_wire_);
+      } else if (sender != kHost) {
+        nodes_[sender].kept.push_back(on_wire_);
+      } else {
+        ++counters_.dropped;
+      }
+    }
+  }
+  if (unclean_ > 0 && nodes_[sender].errors.state() == Confinement::kPassive) {
+    suspended_ = sender;
+    suspended_until_ = idle_at_ + Bits(kSuspendBits);
+  }
+  if (!off_nodes_.empty()) RecoverThrough(idle_at_);
+  if (!course_.accepted) return false;
+  heard->sent = on_wire_.waiting;
   heard->at = idle_at_;
-  ++(on_wire_.from_unit ? counters_.unit_frames : counters_.host_frames);
+  heard->but_not = refusing_;
+  ++(heard->sent.from_unit ? counters_.unit_frames : counters_.host_frames);
+  if (babbling_) ++counters_.babbled;
   heard->lost = faults_.drop > 0 && chance_.Uniform() < faults_.drop;
   if (heard->lost) ++counters_.dropped;
   return true;
 }
 
-void Bus::BeginFrame() {
-  const HostInstant now = NextEvent();
-  while (!later_.empty() && later_.top().ready <= now) {
-    ready_.push(later_.top());
-    later_.pop();
-  }
-  FOCALFLEET_CHECK(!ready_.empty());
-  on_wire_ = ready_.top().waiting;
-  ready_.pop();
-  sending_ = true;
-  idle_at_ = now;
-  if (!options_.bit_clock) return;
-  const std::uint32_t bits = FrameBits(on_wire_.frame);
-  const DurationNs taken = BitTime(bits, options_.bit_rate_bps);
-  counters_.bits += bits;
+void Bus::Charge(DurationNs taken) {
   counters_.busy = counters_.busy + taken;
-  idle_at_ = now + taken;
+  if (course_.error != FrameError::kNone) counters_.destroyed = counters_.destroyed + taken;
 }
 
-void Bus::Kill() {
+// ---- counters (the rules' numbers: error_counters.h)
+
+template <class Change>
+void Bus::Count(std::uint32_t node, HostInstant now, const Change& change) {
+  ErrorCounters& errors = nodes_[node].errors;
+  const bool was_clean = errors.clean();
+  const Confinement before = errors.state();
+  change(&errors);
+  if (was_clean != errors.clean()) unclean_ += was_clean ? 1u : UINT32_MAX;
+  const Confinement after = errors.state();
+  if (before == Confinement::kActive && after == Confinement::kPassive) ++counters_.went_passive;
+  if (after == Confinement::kOff && !nodes_[node].off) GoOff(node, now);
+}
+
+void Bus::CountWell(std::uint32_t sender) {
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node) {
+    if (!Hears(node) || nodes_[node].errors.clean()) continue;
+    Count(node, idle_at_, [&](ErrorCounters* errors) {
+      node == sender ? errors->Transmitted() : errors->Received();
+    });
+  }
+}
+
+void Bus::CountError(std::uint32_t sender) {
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node) {
+    if (!Hears(node)) continue;
+    if (node == sender && !course_.lost_arbitration) {
+      const bool passive = nodes_[node].errors.state() == Confinement::kPassive;
+      if (abandoned_ || course_.excused || (course_.unanswered && passive)) continue;
+      Count(node, idle_at_, [](ErrorCounters* errors) { errors->TransmitError(); });
+    } else if (node == refusing_) {
+      // Its flag begins one bit before the others' and ends one bit before theirs.
+      Count(node, idle_at_, [](ErrorCounters* errors) {
+        errors->ReceiveError();
+        errors->DominantBehindFlag();
+      });
+    } else if (!course_.accepted) {
+      Count(node, idle_at_, [](ErrorCounters* errors) { errors->ReceiveError(); });
+    }
+  }
+}
+
+// ---- off, and back
+
+void Bus::GoOff(std::uint32_t node, HostInstant now) {
+  Node& off = nodes_[node];
+  off.off = true;
+  off.rows_missing = kRecessiveRows;
+  const bool waits = node == kHost && options_.host_restart == DurationNs{kNever.ns};
+  off.counts_from = waits ? kNever : node == kHost ? now + options_.host_restart : now;
+  off_nodes_.push_back(node);
+  ++counters_.went_off;
+  hearing_ -= off.there ? 1u : 0u;
+  ready_.MoveAllOf(node, &off.kept);
+  later_.MoveAllOf(node, &off.kept);
+  if (node != kHost) return;
+  counters_.dropped += off.kept.size();  // as a driver does with what it holds
+  off.kept.clear();
+}
+
+HostInstant Bus::BackAt(const Node& node) const {
+  if (node.counts_from == kNever || !node.there) return kNever;
+  return std::max(idle_at_, node.counts_from) + Bits(node.rows_missing * kRecessiveRowBits);
+}
+
+HostInstant Bus::NextRecovery() const {
+  HostInstant at = kNever;
+  for (const std::uint32_t node : off_nodes_) at = std::min(at, BackAt(nodes_[node]));
+  return at;
+}
+
+void Bus::CountRowsWhileIdle(HostInstant now) {
+  const std::int64_t row_ns = Bits(kRecessiveRowBits).ns;
+  for (const std::uint32_t number : off_nodes_) {
+    Node& node = nodes_[number];
+    const DurationNs seen = now - std::max(idle_at_, node.counts_from);
+    if (node.counts_from == kNever || seen.ns < row_ns) continue;
+    node.rows_missing -= static_cast<std::uint32_t>(
+        std::min<std::int64_t>(seen.ns / row_ns, std::int64_t{node.rows_missing}));
+  }
+}
+
+void Bus::CountRowOfFrame() {
+  const HostInstant row_began = idle_at_ - Bits(kRecessiveRowBits);
+  for (const std::uint32_t number : off_nodes_) {
+    Node& node = nodes_[number];
+    if (node.counts_from <= row_began && node.rows_missing > 0) --node.rows_missing;
+  }
+}
+
+void Bus::RecoverThrough(HostInstant now) {
+  for (std::size_t i = 0; i < off_nodes_.size();) {
+    const std::uint32_t number = off_nodes_[i];
+    if (BackAt(nodes_[number]) > now) {
+      ++i;
+      continue;
+    }
+    off_nodes_.erase(off_nodes_.begin() + static_cast<std::ptrdiff_t>(i));
+    nodes_[number].off = false;
+    Count(number, now, [](ErrorCounters* errors) { errors->Recover(); });
+    ++counters_.recovered;
+    Rejoin(number, now);
+  }
+}
+
+void Bus::RestartHost(HostInstant now) {
+  Node& host = nodes_[kHost];
+  if (host.off) host.counts_from = std::min(host.counts_from, now);
+}
+
+void Bus::ThrowHostOff(HostInstant now) {
+  if (nodes_[kHost].off || dead_) return;
+  if (sending_ && on_wire_.node() == kHost) Leave(kHost, now);
+  while (!nodes_[kHost].off)
+    Count(kHost, now, [](ErrorCounters* errors) { errors->TransmitError(); });
+}
+
+// ---- who is there
+
+/// `now` is within the frame on the wire: bits of it that are over.
+std::uint32_t Bus::BitsOnWire(HostInstant now) const {
+  return static_cast<std::uint32_t>((now - began_at_).ns * options_.bit_rate_bps / 1'000'000'000);
+}
+
+/// Its frame on the wire, if it is its own, ends here and is not sent again.
+void Bus::Leave(std::uint32_t node, HostInstant now) {
+  if (!sending_ || on_wire_.node() != node || abandoned_) return;
+  abandoned_ = true;
+  const std::uint32_t at = BitsOnWire(now);
+  if (course_.error != FrameError::kNone || at >= ExposedBits(on_wire_.waiting.frame)) return;
+  course_ = CutOffAt(on_wire_.waiting.frame, at);
+  idle_at_ = began_at_ + Bits(course_.bits);
+  refusing_ = kNobody;
+}
+
+void Bus::Rejoin(std::uint32_t number, HostInstant now) {
+  Node& node = nodes_[number];
+  if (!Hears(number)) return;
+  ++hearing_;
+  for (Babbler& babbler : babblers_)
+    if (babbler.node == number) babbler.since = std::max(babbler.since, now);
+  for (Entry& entry : node.kept) {
+    entry.ready = std::max(entry.ready, now);
+    Admit(entry);
+  }
+  node.kept.clear();
+}
+
+void Bus::PowerOff(std::uint32_t number, HostInstant now) {
+  Node& node = nodes_[number];
+  Leave(number, now);
+  hearing_ -= Hears(number) ? 1u : 0u;
+  node.there = false;
+  ready_.MoveAllOf(number, &node.kept);
+  later_.MoveAllOf(number, &node.kept);
+  counters_.dropped += node.kept.size();
+  node.kept.clear();
+  std::erase(off_nodes_, number);
+  node.off = false;
+  Count(number, now, [](ErrorCounters* errors) { errors->Recover(); });
+}
+
+void Bus::PowerOn(std::uint32_t number, HostInstant now) {
+  if (nodes_[number].there) return;
+  nodes_[number].there = true;
+  Rejoin(number, now);
+}
+
+void Bus::Unplug(std::uint32_t number, HostInstant now) {
+  Node& node = nodes_[number];
+  if (!node.there) return;
+  if (sending_ && on_wire_.node() == number && !abandoned_) {
+    Leave(number, now);
+    if (!course_.accepted) node.kept.push_back(on_wire_);
+  }
+  hearing_ -= Hears(number) ? 1u : 0u;
+  node.there = false;
+  ready_.MoveAllOf(number, &node.kept);
+  later_.MoveAllOf(number, &node.kept);
+  std::ranges::sort(node.kept, {}, &Entry::order);
+}
+
+void Bus::Plug(std::uint32_t number, HostInstant now) {
+  Node& node = nodes_[number];
+  if (node.there) return;
+  node.there = true;
+  if (node.off) node.counts_from = std::max(node.counts_from, now);
+  // Alone it was not acknowledged: rule 3 up to passive, then exception 1.
+  while (!node.kept.empty() && node.errors.state() == Confinement::kActive)
+    Count(number, now, [](ErrorCounters* errors) { errors->TransmitError(); });
+  Rejoin(number, now);
+}
+
+void Bus::Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now) {
+  std::erase_if(babblers_, [node](const Babbler& babbler) { return babbler.node == node; });
+  if (frame) babblers_.push_back({node, *frame, now});
+}
+
+// ---- a wire that is dead or stuck
+
+void Bus::Kill(HostInstant now) {
+  if (dead_) return;
+  Release(now);
   counters_.dropped += waiting();
+  if (sending_) {
+    course_.error = course_.error == FrameError::kNone ? FrameError::kForm : course_.error;
+    Charge(now - began_at_);
+  } else {
+    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
+  }
+  dead_at_ = sending_ ? now : std::max(now, idle_at_);
   later_ = {};
   ready_ = {};
   sending_ = false;
   dead_ = true;
+}
+
+void Bus::Revive(HostInstant now) {
+  if (!dead_) return;
+  dead_ = false;
+  idle_at_ = std::max(now, dead_at_);
+  counters_.dead = counters_.dead + (idle_at_ - dead_at_);
+}
+
+void Bus::Stick(HostInstant now) {
+  if (dead_ || stuck_at_ != kNever || !options_.bit_clock) return;
+  stuck_sender_ = kNobody;
+  stuck_at_ = now;
+  if (sending_) {
+    // From here on the sender sees what it does not send; its frame comes later.
+    stuck_sender_ = abandoned_ ? kNobody : on_wire_.node();
+    course_.error = FrameError::kBit;
+    ++counters_.errors[static_cast<std::size_t>(FrameError::kBit)];
+    counters_.error_bits += BitsOnWire(now);
+    Charge(now - began_at_);
+    if (!abandoned_ && !babbling_) {
+      on_wire_.repeated = true;
+      ready_.push(on_wire_);
+    }
+    sending_ = false;
+  } else {
+    if (!off_nodes_.empty()) CountRowsWhileIdle(now);
+    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
+    stuck_at_ = std::max(now, idle_at_);
+  }
+  idle_at_ = stuck_at_;
+  stuck_steps_ = 0;
+  stuck_step_at_ = stuck_at_ + Bits(kFlagBits);
+}
+
+/// A dominant wire, as the nodes see it: the sixth equal bit is an error (rules 1 and 3), their
+/// flag takes six, the bit behind it is dominant (rule 2), and so are the eight behind it, and the
+/// eight behind these (rule 6), until nobody has anything left to lose.
+void Bus::StickOn(HostInstant now) {
+  bool all_passive = true;
+  for (std::uint32_t node = 0; node < nodes_.size(); ++node) {
+    if (!Hears(node)) continue;
+    const bool sends = node == stuck_sender_;
+    Count(node, now, [&](ErrorCounters* errors) {
+      if (!sends) {
+        stuck_steps_ == 0 ? errors->ReceiveError() : errors->DominantBehindFlag();
+      } else if (stuck_steps_ != 1) {
+        errors->TransmitError();
+      }
+    });
+    all_passive = all_passive && !sends && state(node) != Confinement::kActive;
+  }
+  stuck_step_at_ = all_passive ? kNever : now + Bits(stuck_steps_ < 2 ? kFlagBits + 1 : 8);
+  ++stuck_steps_;
+}
+
+void Bus::Release(HostInstant now) {
+  if (stuck_at_ == kNever) return;
+  // All wait for the end of the error frame that they see.
+  idle_at_ = std::max(now, stuck_at_) + Bits(kDelimiterBits + kIntermissionBits);
+  counters_.stuck = counters_.stuck + (idle_at_ - stuck_at_);
+  counters_.busy = counters_.busy + (idle_at_ - stuck_at_);
+  stuck_at_ = stuck_step_at_ = kNever;
+  stuck_sender_ = kNobody;
+  for (const std::uint32_t node : off_nodes_)
+    nodes_[node].counts_from = std::max(nodes_[node].counts_from, now);
 }
 
 }  // namespace focalfleet::sim

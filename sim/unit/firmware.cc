@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include "sim/axis/field_path.h"
 
@@ -73,6 +74,7 @@ HostInstant Firmware::deadline() const {
 }
 
 void Firmware::OnFrame(const CanFrame& frame, HostInstant now, Outbox* out) {
+  if (Withheld(frame, now, out)) return;
   Outbox said;
   machine_.OnFrame(frame, now, &said);
   FollowMotion();
@@ -86,6 +88,12 @@ void Firmware::OnTime(HostInstant now, Outbox* out) {
   FollowMotion();
   Pass(said, Cause::kTime, out);
   TripIfDue(now, out);
+}
+
+void Firmware::OnSync(HostInstant now, Outbox* out) {
+  OnTime(now, out);
+  machine_.OnSync(now);
+  FollowMotion();
 }
 
 void Firmware::RaiseFault(const Trip& trip, HostInstant now, Outbox* out) {
@@ -112,6 +120,62 @@ void Firmware::TripIfDue(HostInstant now, Outbox* out) {
   RaiseFault(trip, now, out);
 }
 
+bool Firmware::Withheld(const CanFrame& frame, HostInstant now, Outbox* out) {
+  UnitFaults& faults = *hardware_.faults;
+  const bool planted = faults.ignores || faults.refuses || faults.loses_segments > 0 ||
+                       faults.stale_sequence || faults.claims_arrival;
+  if (!planted || !powered()) return false;
+  const auto request = DecodeHost(frame);
+  if (!request) return false;
+  const NodeId node = request->address.node;
+  if (node != hardware_.node && node != kBroadcastNode) return false;
+  // A repeat has the number of the request that it repeats.
+  if (node == hardware_.node && request->address.sequence != sequence_)
+    sequence_before_ = std::exchange(sequence_, request->address.sequence);
+  const auto function = static_cast<Function>(frame.id >> 20 & 63);
+  if (faults.ignores == function) return true;
+  if (faults.loses_segments > 0 && function == Function::kStageSegment) {
+    --faults.loses_segments;
+    return true;
+  }
+  const auto* start = std::get_if<Start>(&request->message);
+  if (faults.claims_arrival && start != nullptr) {
+    const Flash& flash = *hardware_.flash;
+    if (state() == UnitState::kArmed)
+      out->Add(Encode(UnitMessage{Done{Outcome::kArrived,
+                                       {flash.axis[0].position(), flash.axis[1].position()},
+                                       start->move}},
+                      {hardware_.node, 0}));
+    return true;
+  }
+  if (!faults.refuses || faults.refuses->what != function) return false;
+  if (const auto refusal = Refused(*request, now))
+    out->Add(Encode(*refusal, {hardware_.node, request->address.sequence}));
+  return true;
+}
+
+std::optional<UnitMessage> Firmware::Refused(const Addressed<HostMessage>& request,
+                                             HostInstant now) {
+  const Answer answer = hardware_.faults->refuses->answer;
+  if (const auto* confirm = std::get_if<Confirm>(&request.message))
+    return ConfirmReply{confirm->move, 0, {}, answer};
+  if (const auto* arm = std::get_if<Arm>(&request.message)) return ArmReply{arm->move, answer};
+  if (const auto* home = std::get_if<Home>(&request.message)) return HomeReply{home->move, answer};
+  const auto* write = std::get_if<ParameterWrite>(&request.message);
+  if (write == nullptr) return std::nullopt;
+  Outbox said;  // what it keeps instead
+  machine_.OnFrame(
+      Encode(HostMessage{ParameterRead{write->axis, write->parameter}}, request.address), now,
+      &said);
+  const auto read =
+      said.frames().empty() ? std::nullopt : std::optional(DecodeUnit(said.frames()[0]));
+  if (!read || !*read) return std::nullopt;
+  auto reply = std::get<ParameterReply>((*read)->message);
+  reply.written = true;
+  reply.answer = answer;
+  return reply;
+}
+
 void Firmware::Pass(const Outbox& said, Cause cause, Outbox* out) const {
   for (const CanFrame& frame : said.frames()) {
     // What comes with time is the end of a motion.
@@ -122,15 +186,21 @@ void Firmware::Pass(const Outbox& said, Cause cause, Outbox* out) const {
 
 CanFrame Firmware::Distorted(const CanFrame& frame) const {
   const UnitFaults& faults = *hardware_.faults;
-  if (!faults.wrong_digest && !faults.foreign_serial) return frame;
+  if (!faults.wrong_digest && !faults.foreign_serial && !faults.stale_sequence &&
+      !faults.protocol_version)
+    return frame;
   auto decoded = DecodeUnit(frame);
   if (!decoded) return frame;
   if (auto* confirm = std::get_if<ConfirmReply>(&decoded->message);
       confirm != nullptr && faults.wrong_digest)
     confirm->digest ^= 0x00ff00ffu;
-  if (auto* identify = std::get_if<IdentifyReply>(&decoded->message);
-      identify != nullptr && faults.foreign_serial)
-    identify->serial = *faults.foreign_serial;
+  if (auto* identify = std::get_if<IdentifyReply>(&decoded->message)) {
+    identify->serial = faults.foreign_serial.value_or(identify->serial);
+    identify->protocol_version = faults.protocol_version.value_or(identify->protocol_version);
+  }
+  // Sequence number 0 is of what it says unasked.
+  if (faults.stale_sequence && decoded->address.sequence != 0)
+    decoded->address.sequence = sequence_before_;
   return Encode(decoded->message, decoded->address);
 }
 

@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/codec.h"
 #include "sim/axis/axis.h"
 #include "sim/faults.h"
 #include "sim/unit/unit_machine.h"
@@ -37,6 +39,8 @@ class Firmware {
   void OnFrame(const CanFrame& frame, HostInstant now, Outbox* out);
   /// Does what is due. Pre: now is not before anything told so far.
   void OnTime(HostInstant now, Outbox* out);
+  /// An edge of the SYNC line.
+  void OnSync(HostInstant now, Outbox* out);
   /// When OnTime is due next; kNever without power.
   [[nodiscard]] HostInstant deadline() const;
 
@@ -56,6 +60,10 @@ class Firmware {
   void TripIfDue(HostInstant now, Outbox* out);
   /// Hands on what the machine said, with what is planted done to it.
   enum class Cause { kFrame, kTime };
+  /// True where what is planted keeps the machine from hearing the frame.
+  bool Withheld(const CanFrame& frame, HostInstant now, Outbox* out);
+  [[nodiscard]] std::optional<UnitMessage> Refused(const Addressed<HostMessage>& request,
+                                                   HostInstant now);
   void Pass(const Outbox& said, Cause cause, Outbox* out) const;
   [[nodiscard]] CanFrame Distorted(const CanFrame& frame) const;
 
@@ -64,6 +72,9 @@ class Firmware {
   HostInstant powered_at_;
   std::uint32_t motions_seen_ = 0;  // of Flash::moves_begun
   HostInstant trip_at_ = kNever;    // planted
+  // Of the requests to it alone, for answers under the wrong one.
+  std::uint8_t sequence_ = 0;
+  std::uint8_t sequence_before_ = 0;
 };
 
 }  // namespace focalfleet::sim

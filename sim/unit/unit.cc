@@ -28,6 +28,11 @@ void Unit::OnTime(HostInstant now, Outbox* out) {
   RecordBegun();
 }
 
+void Unit::OnSync(HostInstant now, Outbox* out) {
+  firmware_.OnSync(now, out);
+  RecordBegun();
+}
+
 void Unit::RecordBegun() {
   if (recorded_ == flash_.moves_begun) return;
   recorded_ = flash_.moves_begun;

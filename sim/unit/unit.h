@@ -26,6 +26,7 @@ class Unit {
 
   void OnFrame(const CanFrame& frame, HostInstant now, Outbox* out);
   void OnTime(HostInstant now, Outbox* out);
+  void OnSync(HostInstant now, Outbox* out);
 
   [[nodiscard]] Firmware& firmware() { return firmware_; }
   [[nodiscard]] const Firmware& firmware() const { return firmware_; }

@@ -45,6 +45,11 @@ void UnitMachine::OnTime(BoardInstant now, Outbox* out) {
   if (!host_lost_ && deadline() <= now) LoseHost();
 }
 
+void UnitMachine::OnSync(BoardInstant now) {
+  if (!powered_ || begin_at_ == kNever) return;
+  if (begin_at_ <= board_.after(board_.context, now, kSyncWindow)) Begin(now);
+}
+
 void UnitMachine::LoseHost() {
   host_lost_ = true;
   // A motion that runs, and one whose start signal came, are finished first.
@@ -77,6 +82,7 @@ void UnitMachine::Begin(BoardInstant now) {
   staged_ = {};
   begin_at_ = kNever;
   began_at_ = end_at_ = now;
+  began_ticks_ = board_.ticks(board_.context, now);
   for (const Axis axis : kAxes) {
     const AxisFlash& stored = flash.axis[Index(axis)];
     const auto segments = held.path[Index(axis)].segments();

@@ -35,6 +35,9 @@
 
 namespace focalfleet::sim {
 
+/// An edge of SYNC means a start only so short before its own time; any other is none.
+inline constexpr DurationNs kSyncWindow = Milliseconds(20);
+
 class UnitMachine {
  public:
   /// `board`'s context and `flash` outlive the machine; `flash` is what was read from FLASH.
@@ -47,6 +50,9 @@ class UnitMachine {
   void OnFrame(const CanFrame& frame, BoardInstant now, Outbox* out);
   /// Does what is due. Pre: now is not before anything told so far.
   void OnTime(BoardInstant now, Outbox* out);
+  /// An edge of the SYNC line, on boards that have one: a move whose start is due within
+  /// kSyncWindow of the unit's own time begins now. Pre: as OnTime, and OnTime was called.
+  void OnSync(BoardInstant now);
   /// When OnTime is due next; kNever without power.
   [[nodiscard]] BoardInstant deadline() const;
 
@@ -140,7 +146,8 @@ class UnitMachine {
   BoardInstant heard_at_;
   BoardInstant begin_at_ = kNever;  // armed: the start signal came
   BoardInstant began_at_;
-  BoardInstant end_at_ = kNever;  // moving, homing: of this path
+  std::uint32_t began_ticks_ = 0;  // the same by the unit's own clock
+  BoardInstant end_at_ = kNever;   // moving, homing: of this path
   Axis homing_axis_ = Axis::kPhi;
   std::uint8_t lost_before_homing_ = 0;
   Staged staged_;

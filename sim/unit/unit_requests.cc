@@ -71,7 +71,7 @@ void UnitMachine::On(const Start& m, const Context& c) {
 void UnitMachine::On(const Clock&, const Context&) {}
 
 void UnitMachine::On(const ClockRequest&, const Context& c) {
-  Say(ClockReply{board_.ticks(board_.context, c.now)}, c);
+  Say(ClockReply{board_.ticks(board_.context, c.now), began_ticks_}, c);
 }
 
 void UnitMachine::On(const StageBegin& m, const Context& c) {
@@ -141,6 +141,7 @@ void UnitMachine::On(const Home& m, const Context& c) {
   ++flash.moves_begun;
   board_.keep(board_.context);
   began_at_ = c.now;
+  began_ticks_ = board_.ticks(board_.context, c.now);
   Enter(UnitState::kHoming);
   RunHoming(Axis::kPhi, c.now);
 }

@@ -1,7 +1,8 @@
-// in_process_log UNITS_CSV STATE_CSV TARGETS_CSV REPEAT: what candump would have logged, had the
-// buses of one configuration been real. The coordinator, the planner and the simulated world run in
-// this one process on virtual time; no socket, no daemon, no kernel in between. Interfaces are
-// called vcan0, vcan1 ... by ascending bus_id. Ends with 0 where all units arrived.
+// in_process_log CONFIG STATE_CSV TARGETS_CSV: what candump would have logged, had the buses of one
+// configuration been real. The coordinator, the planner and the simulated world run in this one
+// process on virtual time, with the units, drive and timing of the daemon's CONFIG; no socket, no
+// daemon, no kernel in between. Interfaces are called vcan0, vcan1 ... by ascending bus_id. Ends
+// with 0 where all units arrived.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -13,8 +14,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config.h"
+#include "daemon/fleet_setup.h"
 #include "daemon/ports/simulated_port.h"
-#include "fleet/files/layout_file.h"
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/plan/job.h"
@@ -55,10 +57,12 @@ sim::WorldConfig Describe(const Layout& layout, const std::vector<std::optional<
 
 class Run {
  public:
-  Run(const Layout& layout, const std::vector<std::optional<Pose>>& poses, const UnitDrive& drive)
+  Run(const Layout& layout, const std::vector<std::optional<Pose>>& poses,
+      const DaemonConfig& config)
       : layout_(layout),
         world_(Describe(layout, poses, now_)),
-        coordinator_(&layout, std::vector<UnitDrive>(layout.size(), drive), {}, {}) {
+        coordinator_(&layout, std::vector<UnitDrive>(layout.size(), config.drive), config.timing,
+                     {}) {
     for (std::size_t b = 0; b < layout.buses().size(); ++b) place_[layout.buses()[b]] = b;
   }
 
@@ -143,13 +147,11 @@ class Run {
 };
 
 int Main(char** arguments) {
-  const Layout layout = OrEnd(ReadLayout(ReadText(arguments[1]), arguments[1], {}));
+  const DaemonConfig config = OrEnd(LoadConfig(arguments[1]));
+  const Layout layout = OrEnd(LoadLayout(config.fleet));
   const std::vector<UnitDrive> factory(layout.size());
   const auto poses = OrEnd(ReadState(ReadText(arguments[2]), arguments[2], layout, factory));
-  UnitDrive drive;
-  for (AxisDrive& axis : drive.axis)
-    axis.repeat = static_cast<std::uint8_t>(std::atoi(arguments[4]));
-  Run run(layout, poses, drive);
+  Run run(layout, poses, config);
   while (!run.AllReady()) run.Turn();
   const Targets targets = OrEnd(ReadTargets(ReadText(arguments[3]), arguments[3]));
   run.Apply(OrEnd(ResolveTargets(targets, layout, run.coordinator().drives(), run.Knowledge())));
@@ -166,8 +168,8 @@ int Main(char** arguments) {
 }  // namespace focalfleet::testing
 
 int main(int count, char** arguments) {
-  if (count != 5) {
-    std::fputs("usage: in_process_log UNITS_CSV STATE_CSV TARGETS_CSV REPEAT\n", stderr);
+  if (count != 4) {
+    std::fputs("usage: in_process_log CONFIG STATE_CSV TARGETS_CSV\n", stderr);
     return 2;
   }
   return focalfleet::testing::Main(arguments);

@@ -86,6 +86,7 @@ class Unit:
         self.granted_arm = self.granted_home = None
         self.runs = None
         self.powered_at = self.heard_at = time.monotonic()
+        self.began_ticks = 0
 
     # ---- saying
 
@@ -144,6 +145,7 @@ class Unit:
         self.flash.marked, self.flash.begun = True, self.begin[0]
         self.flash.count = (self.flash.count + 1) & 0xFFFF
         begin = self.begins_at
+        self.began_ticks = self.ticks_at(begin)
         self.runs = [Run(self.flash.position[axis],
                          [self.segments[axis][index] for index in sorted(self.segments[axis])],
                          self.flash.settings[axis][COUNTER1], begin) for axis in AXES]
@@ -220,8 +222,10 @@ class Unit:
 
     def on_clock(self, sequence, detail, _data, _frame):
         if detail == 1:
-            ticks = int((time.monotonic() - self.powered_at) / TICK_S) & 0xFFFFFFFF
-            self.send(CLOCK, sequence, struct.pack("<I", ticks))
+            self.send(CLOCK, sequence, struct.pack("<II", self.ticks_at(time.monotonic()), self.began_ticks))
+
+    def ticks_at(self, now):
+        return int((now - self.powered_at) / TICK_S) & 0xFFFFFFFF
 
     def on_arm(self, sequence, _detail, data, frame):
         move, digest = struct.unpack("<HI", data)

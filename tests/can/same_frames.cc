@@ -98,8 +98,12 @@ void BoundTheRest(const ConfigurationFrames& reference, const ConfigurationFrame
     if (is > at_most) Complain(std::string("too many: ") + what);
   };
   bound("configuration frames again", more, kRepeatsMax * static_cast<double>(frames));
-  bound("clock", static_cast<double>(of(Function::kClock).host),
-        buses * (life_s / kClockPeriod_s + 2));
+  // Each unit's clock is read while it is read, once in its move, and with polls at rest.
+  bound("clock and its readings", static_cast<double>(of(Function::kClock).host),
+        buses * (life_s / kClockPeriod_s + 2) + 2 * units +
+            static_cast<double>(of(Function::kStatus).host));
+  bound("clock answers", static_cast<double>(of(Function::kClock).unit),
+        static_cast<double>(of(Function::kClock).host));
   // Each unit is asked once while it is read, and then at most once a poll period.
   bound("status polls", static_cast<double>(of(Function::kStatus).host),
         units * (life_s / kPollPeriodMin_s + 2));
@@ -141,11 +145,12 @@ void ReportSkew(const CandumpLog& log, double speed) {
       first[start->move.value].Add(at_s * 1e3);
   }
   for (const auto& [move, spread] : first) {
-    const double skew_ms = spread.width();
+    const double skew_ms = spread.width() * speed;
     std::printf(
-        "  move %d begins on %zu buses within %.2f ms of real time (any of its start frames: "
-        "%.2f ms); the planner allows %.0f ms\n",
-        int{move}, begun[move].size(), skew_ms, all[move].width(), kSkewTolerance_ms);
+        "  move %d begins on %zu buses within %.2f ms of real time, %.2f ms of the fleet's (any of "
+        "its start frames: %.2f ms); the planner allows %.0f ms\n",
+        int{move}, begun[move].size(), spread.width(), skew_ms, all[move].width() * speed,
+        kSkewTolerance_ms);
     if (skew_ms > kSkewTolerance_ms) Complain("the buses began too far apart");
   }
 }

@@ -1,18 +1,26 @@
 // Any bytes as what a socket hands over as a frame: taken only where it is a 29-bit data frame,
-// with nothing past its length, and then the same again on its way back.
+// with nothing past its length, and then the same again on its way back. The same bytes as a
+// controller's error frame: a state or none, and causes in words.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 
+#include "daemon/ports/can_errors.h"
 #include "daemon/ports/socket_frames.h"
 #include "protocol/base/check.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
                                // function
+  ErrorTally tally;
   for (; size >= sizeof(can_frame); data += sizeof(can_frame), size -= sizeof(can_frame)) {
     can_frame raw{};
     std::memcpy(&raw, data, sizeof raw);
+    tally.Note(raw);
+    const auto state = LinkStateOf(raw);
+    FOCALFLEET_CHECK(!state || *state <= LinkState::kDown);
+    FOCALFLEET_CHECK(!IsWarning(raw) || state != LinkState::kOff);
+    FOCALFLEET_CHECK(tally.Causes().size() < 100);
     const auto frame = FromSocketFrame(raw);
     const bool ours = (raw.can_id & CAN_EFF_FLAG) != 0 &&
                       (raw.can_id & (CAN_RTR_FLAG | CAN_ERR_FLAG)) == 0 && raw.len <= CAN_MAX_DLEN;

@@ -69,7 +69,10 @@ void Fill(Rng& rng, ParameterWrite* m) {
 void Fill(Rng& rng, Done* m) {
   *m = {Draw<Outcome>(rng, 4), {Position24(rng), Position24(rng)}, AnyMove(rng)};
 }
-void Fill(Rng& rng, ClockReply* m) { m->ticks = Whole<std::uint32_t>(rng); }
+void Fill(Rng& rng, ClockReply* m) {
+  m->ticks = Whole<std::uint32_t>(rng);
+  m->began_ticks = Whole<std::uint32_t>(rng);
+}
 void Fill(Rng& rng, ArmReply* m) { *m = {AnyMove(rng), AnyAnswer(rng)}; }
 void Fill(Rng& rng, ConfirmReply* m) {
   *m = {AnyMove(rng),
@@ -170,7 +173,7 @@ void Put(Text& out, const FaultRequest& m) { out << m.clear; }
 void Put(Text& out, const ParameterRead& m) { out << m.axis << m.parameter; }
 void Put(Text& out, const ParameterWrite& m) { out << m.axis << m.parameter << m.value; }
 void Put(Text& out, const Done& m) { out << m.outcome << m.position << m.move; }
-void Put(Text& out, const ClockReply& m) { out << m.ticks; }
+void Put(Text& out, const ClockReply& m) { out << m.ticks << m.began_ticks; }
 void Put(Text& out, const ArmReply& m) { out << m.move << m.answer; }
 void Put(Text& out, const ConfirmReply& m) { out << m.move << m.digest << m.segments << m.answer; }
 void Put(Text& out, const HomeReply& m) { out << m.move << m.answer; }

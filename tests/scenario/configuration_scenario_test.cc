@@ -8,55 +8,13 @@
 
 #include "protocol/wire/codec.h"
 #include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet::testing {
 namespace {
 
 InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
-
-// Until somebody moves, and then a little longer: in the middle of the motion.
-void RunIntoMotion(InProcessFleet* fleet, DurationNs further) {
-  ASSERT_TRUE(fleet->RunUntil(
-      [&] { return fleet->coordinator().configuration().state == ConfigurationState::kMoving; },
-      Seconds(60)));
-  fleet->Run(further);
-}
-
-// The first unit that moves at `now` and for some time to come.
-PositionerIndex SomebodyMoving(InProcessFleet* fleet) {
-  for (std::uint32_t n = 0; n < fleet->layout().size(); ++n)
-    if (fleet->world().Truth(n).state == UnitState::kMoving) return {n};
-  ADD_FAILURE() << "nobody moves";
-  return {0};
-}
-
-bool HasAlarm(const InProcessFleet& fleet, const std::string& part) {
-  auto& alarms = const_cast<InProcessFleet&>(fleet).store().alarms;
-  return std::any_of(alarms.begin(), alarms.end(), [&](const AlarmRow& alarm) {
-    return alarm.text.find(part) != std::string::npos;
-  });
-}
-
-std::string Unserved(InProcessFleet& fleet) {
-  std::string text;
-  for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
-    const UnitView& view = fleet.coordinator().unit({n});
-    if (view.outcome != TargetOutcome::kArrived)
-      text += "unit " + std::to_string(fleet.id(n).value) + " " + Name(view.phase) + ", " +
-              Name(view.knowledge[0].witness) + ": " + Name(view.outcome) + " " +
-              view.outcome_reason + "\n";
-  }
-  return text;
-}
-
-void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than) {
-  fleet->Run(Milliseconds(100));  // the last batch becomes durable
-  EXPECT_GE(fleet->CountOutcome(TargetOutcome::kArrived), fleet->layout().size() - others_than)
-      << Unserved(*fleet);
-  fleet->ExpectStoreTellsTheTruth("at the end");
-  EXPECT_TRUE(fleet->store().fleet.open_intents.empty());
-}
 
 TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
@@ -322,6 +280,7 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
   fleet.Run(Milliseconds(10));
   EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
   fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
+  fleet.TellLink({sick, LinkState::kDown, "the interface is down"});
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.ExpectStoreTellsTheTruth("while the bus is off");
   const std::string name = "bus " + std::to_string(sick.value);
@@ -330,8 +289,12 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
         name + " is passive: the controller is error-passive (bit error)",
         name + " is off: the controller is bus-off (no acknowledgement); its " +
             std::to_string(of_bus) + " units cannot be",
-        name + ": the controller is bus-off; no privilege to restart it"})
+        name + ": the controller is bus-off; no privilege to restart it",
+        name + " is down: the interface is down"})
     EXPECT_TRUE(HasAlarm(fleet, part)) << part;
+  EXPECT_FALSE(HasAlarm(fleet, "the interface is down; its")) << "they were lost before";
+  EXPECT_NE(Unserved(fleet).find("it cannot be reached: " + name + " is off"), std::string::npos)
+      << Unserved(fleet);
   fleet.world().ReviveBus(sick);
   fleet.TellLink({sick, LinkState::kUp, ""});
   fleet.Run(Seconds(10));
@@ -541,6 +504,21 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
       fleet.Freeze(Milliseconds(ms), heard);
       ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
     }
+  }
+}
+
+// Answers that come late or twice, to stops of ours of which there may be several.
+TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
+  for (std::uint64_t seed = testing::TestSeed(60); seed < testing::TestSeed(60) + 30; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet(Small(seed));
+    fleet.Run(Seconds(2));
+    for (const BusId bus : fleet.layout().buses())
+      *fleet.world().faults(bus) = {.duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(1200)};
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
+    fleet.ExpectStoreTellsTheTruth("with late answers");
   }
 }
 

@@ -87,19 +87,27 @@ const VectorRow* MemoryStore::Vector(SerialNumber serial) const {
 }
 
 InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
-  auto layout = Layout::Create(
-      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus}), {});
+  std::vector<focalfleet::Unit> units =
+      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus});
+  for (focalfleet::Unit& unit : units) unit.id.value += options.first_id - 1;
+  auto layout = Layout::Create(std::move(units), {});
   FOCALFLEET_CHECK(layout.has_value());
   layout_ = std::make_unique<Layout>(std::move(*layout));
   drives_.assign(layout_->size(), UnitDrive{});
   const auto start = DrawConfiguration(*layout_, drives_, {}, Rng::Stream(options.seed, "start"));
   FOCALFLEET_CHECK(start.has_value());
-  sim::WorldConfig config{.units = {}, .seed = options.seed, .spread = options.spread};
+  sim::WorldConfig config{.units = {},
+                          .seed = options.seed,
+                          .spread = options.spread,
+                          .drive = options.factory,
+                          .faults = options.faults};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
   config.start = now_;
+  config.clock_error_max = options.clock_error_max;
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
   world_ = std::make_unique<sim::World>(std::move(config));
+  for (const BusId bus : layout_->buses()) controllers_.emplace_back(bus);
   Restart();
 }
 
@@ -122,7 +130,14 @@ void InProcessFleet::End() {
 }
 
 void InProcessFleet::StepOnce() {
-  world_->AdvanceTo(now_, &heard_);
+  world_->AdvanceTo(now_, &heard_, wire);
+  if (now_ >= sync_at_) {
+    world_->PulseSync();
+    sync_at_ = kNever;
+  }
+  for (std::size_t i = 0; i < controllers_.size(); ++i)
+    if (controllers_[i].Look(*world_))
+      links_.push_back({layout_->buses()[i], controllers_[i].state(), controllers_[i].trouble()});
   std::vector<PlanDone> plans;
   while (!planning_.empty() && planning_.front().at <= now_) {
     plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
@@ -157,8 +172,10 @@ void InProcessFleet::StepOnce() {
 }
 
 void InProcessFleet::Perform(const Effects& effects) {
+  if (sent != nullptr) sent->insert(sent->end(), effects.frames.begin(), effects.frames.end());
   if (!effects.rows.empty())
     commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});
+  if (effects.sync_at) sync_at_ = *effects.sync_at;
   for (const OutFrame& out : effects.frames) {
     world_->Inject(out.bus, out.frame, now_);
     for (const std::uint64_t word : {std::uint64_t{out.bus.value}, std::uint64_t{out.frame.id},
@@ -203,6 +220,7 @@ bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limi
     if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
     if (!exposing_.empty()) next = std::min(next, exposing_.front().at);
     if (!planning_.empty()) next = std::min(next, planning_.front().at);
+    next = std::min(next, sync_at_);
     if (!commands_.empty() || !links_.empty()) next = now_;
     next = std::max(next, now_ + kTurn);
     if (next > end) {
@@ -224,7 +242,7 @@ bool InProcessFleet::RunUntilIdle(DurationNs limit) {
 
 void InProcessFleet::Freeze(DurationNs duration, Heard heard) {
   now_ = now_ + duration;
-  world_->AdvanceTo(now_, &heard_);
+  world_->AdvanceTo(now_, &heard_, wire);
   if (heard == Heard::kLost) heard_.clear();
 }
 

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/ports/simulated_port.h"
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
 #include "protocol/base/rng.h"
@@ -44,6 +45,10 @@ class InProcessFleet {
     sim::Spread spread = sim::Spread::kNominal;
     DurationNs exposure_delay = Milliseconds(500);
     double centroid_sigma_um = 2;
+    double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
+    std::uint32_t first_id = 1;
+    sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
+    std::vector<sim::PlannedFault> faults = {};
   };
 
   explicit InProcessFleet(const Options& options);
@@ -63,9 +68,13 @@ class InProcessFleet {
   /// A stop of all that somebody else puts on every bus, as `stop --direct` does.
   void StopDirectly();
 
-  /// What the port of a bus tells of its link. Frames pass all the same: only what the coordinator
-  /// makes of it is tried; KillBus is the other half.
+  /// What the port of a bus tells of its link, beside what it tells of its controller by itself.
+  /// Frames pass all the same: only what the coordinator makes of it is tried; KillBus is the other
+  /// half.
   void TellLink(LinkEvent event) { links_.push_back(std::move(event)); }
+
+  /// A frame that no unit sent, heard with the next step.
+  void Hear(const ReceivedFrame& frame) { heard_.push_back(frame); }
 
   void Send(Command command);
   /// Applies a random configuration that is clear of what stands; returns its request number.
@@ -92,6 +101,7 @@ class InProcessFleet {
   [[nodiscard]] sim::World& world() { return *world_; }
   [[nodiscard]] const Layout& layout() const { return *layout_; }
   [[nodiscard]] MemoryStore& store() { return store_; }
+  [[nodiscard]] const MemoryStore& store() const { return store_; }
   /// That the coordinator was given last.
   [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
@@ -99,6 +109,8 @@ class InProcessFleet {
   bool store_fails = false;
   /// What the camera makes of an exposure before the coordinator hears of it.
   std::function<void(ExposureDone*)> camera_fault;
+  std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
+  std::vector<OutFrame>* sent = nullptr;        // where it is given: all frames of the coordinator
 
  private:
   void StepOnce();
@@ -119,10 +131,12 @@ class InProcessFleet {
   std::unique_ptr<Layout> layout_;
   std::vector<UnitDrive> drives_;
   std::unique_ptr<sim::World> world_;
+  std::vector<SimulatedLink> controllers_;  // Shape: as the layout's buses
   std::unique_ptr<Coordinator> coordinator_;
   MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
+  HostInstant sync_at_ = kNever;
   std::deque<Commit> commits_;
   std::deque<Planning> planning_;
   struct Exposing {

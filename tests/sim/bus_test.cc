@@ -18,6 +18,13 @@ CanFrame FrameOf(std::uint32_t id, std::uint8_t length = 0, std::uint8_t fill = 
   return frame;
 }
 
+/// A bus with eight units: nodes 1..8.
+Bus BusOfEight(const Bus::Options& options, Rng chance = Rng(1)) {
+  Bus bus(options, chance);
+  for (int i = 0; i < 8; ++i) bus.Attach();
+  return bus;
+}
+
 std::vector<Bus::Heard> Drain(Bus* bus, HostInstant until = {INT64_MAX - 1}) {
   std::vector<Bus::Heard> all;
   while (bus->NextEvent() <= until) {
@@ -62,7 +69,7 @@ TEST(Bus, HoldsTheWireForExactlyTheFramesBits) {
   const std::uint64_t seed = focalfleet::testing::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
-  Bus bus({.bit_rate_bps = 1'000'000}, Rng(1));
+  Bus bus = BusOfEight({.bit_rate_bps = 1'000'000}, Rng(1));
   std::int64_t end_ns = 0;
   std::uint64_t bits = 0;
   for (int i = 0; i < 500; ++i) {
@@ -85,26 +92,26 @@ TEST(Bus, HoldsTheWireForExactlyTheFramesBits) {
 }
 
 TEST(Bus, SlowerBitsTakeLonger) {
-  Bus bus({.bit_rate_bps = 250'000}, Rng(1));
+  Bus bus = BusOfEight({.bit_rate_bps = 250'000}, Rng(1));
   const CanFrame frame = FrameOf(0x123, 8, 0x55);
   bus.Offer({frame, false, 0}, {100});
   EXPECT_EQ(Drain(&bus)[0].at.ns, 100 + BitsByHand(frame) * 4000);
 }
 
 TEST(Bus, LowestIdentifierWinsAmongAllThatWait) {
-  Bus bus({}, Rng(1));
+  Bus bus = BusOfEight({}, Rng(1));
   const std::uint32_t ids[] = {700, 20, 500, 20, 90, 3};
-  std::uint32_t sender = 0;
+  std::uint32_t sender = 1;
   for (const std::uint32_t id : ids) bus.Offer({FrameOf(id), true, sender++}, {0});
   const auto heard = Drain(&bus);
   ASSERT_EQ(heard.size(), 6u);
-  const std::uint32_t senders[] = {5, 1, 3, 4, 2, 0};  // equal ones in order of coming
+  const std::uint32_t senders[] = {6, 2, 4, 5, 3, 1};  // equal ones in order of coming
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(heard[i].sent.sender, senders[i]);
   EXPECT_EQ(bus.counters().waiting_max, 6u);
 }
 
 TEST(Bus, AFrameOnTheWireIsNotInterrupted) {
-  Bus bus({}, Rng(1));
+  Bus bus = BusOfEight({}, Rng(1));
   const CanFrame low = FrameOf(0x1fffffff, 8, 0xff);
   bus.Offer({low, true, 1}, {0});
   bus.Offer({FrameOf(9), true, 2}, {10'000});
@@ -118,7 +125,7 @@ TEST(Bus, AFrameOnTheWireIsNotInterrupted) {
 }
 
 TEST(Bus, RefusesWhatItHasNoMailboxFor) {
-  Bus bus({.mailboxes_max = 3}, Rng(1));
+  Bus bus = BusOfEight({.mailboxes_max = 3}, Rng(1));
   for (std::uint32_t i = 0; i < 3; ++i) EXPECT_TRUE(bus.Offer({FrameOf(i), false, 0}, {0}));
   EXPECT_FALSE(bus.Offer({FrameOf(9), false, 0}, {0}));
   EXPECT_EQ(bus.counters().refused, 1u);
@@ -127,14 +134,14 @@ TEST(Bus, RefusesWhatItHasNoMailboxFor) {
 }
 
 TEST(Bus, ADeadBusLosesWhatWaitsAndCarriesAgainWhenRevived) {
-  Bus bus({}, Rng(1));
+  Bus bus = BusOfEight({}, Rng(1));
   bus.Offer({FrameOf(1), false, 0}, {0});
   bus.Offer({FrameOf(2), false, 0}, {0});
-  bus.Kill();
+  bus.Kill({0});
   EXPECT_EQ(bus.NextEvent(), kNever);
   EXPECT_FALSE(bus.Offer({FrameOf(3), false, 0}, {0}));
   EXPECT_EQ(bus.counters().dropped, 3u);
-  bus.Revive();
+  bus.Revive({0});
   EXPECT_TRUE(bus.Offer({FrameOf(4), false, 0}, {0}));
   EXPECT_EQ(Drain(&bus).size(), 1u);
 }
@@ -142,8 +149,8 @@ TEST(Bus, ADeadBusLosesWhatWaitsAndCarriesAgainWhenRevived) {
 TEST(Bus, PlantedChanceDropsDuplicatesAndDelaysAtItsRate) {
   const std::uint64_t seed = focalfleet::testing::TestSeed(4);
   FOCALFLEET_TRACE_SEED(seed);
-  Bus bus({}, Rng(seed));
-  bus.faults() = {.drop = 0.1, .duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(5)};
+  Bus bus = BusOfEight({}, Rng(seed));
+  bus.faults() = {.drop = 0.1, .duplicate = 0.05, .late = 0.3, .late_by = Milliseconds(5)};
   int heard_count = 0;
   int lost = 0;
   int late = 0;
@@ -157,14 +164,15 @@ TEST(Bus, PlantedChanceDropsDuplicatesAndDelaysAtItsRate) {
       late += (heard.at - at).ns > 5'000'000 ? 1 : 0;
     }
   }
-  // Five standard deviations of a binomial.
-  EXPECT_NEAR(heard_count, kFrames * 1.2, 5 * 40);
-  EXPECT_NEAR(lost, kFrames * 0.12, 5 * 35);
-  EXPECT_NEAR(late, kFrames * 0.36, 5 * 70);
+  // What is sent again may be heard twice again: 1 / (1 - 0.05) times. Five standard deviations.
+  EXPECT_NEAR(heard_count, kFrames * 1.0526, 5 * 24);
+  EXPECT_NEAR(lost, kFrames * 0.10526, 5 * 32);
+  EXPECT_NEAR(late, kFrames * 0.3158, 5 * 50);
+  EXPECT_EQ(bus.counters().received_twice, heard_count - kFrames);
 }
 
 TEST(Bus, WithoutABitClockFramesPassAtOnceInOrder) {
-  Bus bus({.bit_clock = false}, Rng(1));
+  Bus bus = BusOfEight({.bit_clock = false}, Rng(1));
   bus.Offer({FrameOf(7), false, 0}, {5});
   bus.Offer({FrameOf(2), false, 0}, {9});
   const auto heard = Drain(&bus);

@@ -96,6 +96,10 @@ class FirmwareRig {
   void StartAll(MoveId move, std::uint32_t delay_ticks) {
     Give(focalfleet::Start{move, delay_ticks}, 1, kBroadcastNode);
   }
+  void PulseSync() {
+    Outbox out;
+    firmware_.OnSync(now_, &out);
+  }
   void CutPower() { firmware_.PowerOff(now_); }
   void GivePower() { firmware_.PowerOn(now_); }
 

@@ -237,6 +237,50 @@ TEST(Firmware, BeginsOnItsOwnClockAndEndsWhenTheFormulaSays) {
   }
 }
 
+TEST(Firmware, TellsWhenItsMoveBeganByItsOwnClock) {
+  FirmwareRig rig(1.004);
+  EXPECT_EQ(rig.Ask<ClockReply>(ClockRequest{})->began_ticks, 0u);
+  rig.Run(Milliseconds(1000));
+  ASSERT_EQ(rig.StageAndArm(BenchMove(5)), Answer::kOk);
+  rig.StartAll({5}, 2500);
+  EXPECT_EQ(rig.Ask<ClockReply>(ClockRequest{})->began_ticks, 0u);
+  const std::uint32_t heard = rig.Ask<ClockReply>(ClockRequest{})->ticks;
+  EXPECT_EQ(heard, 10'040u);
+  rig.Run(Milliseconds(400));
+  const ClockReply moving = *rig.Ask<ClockReply>(ClockRequest{});
+  EXPECT_EQ(moving.began_ticks, heard + 2500);
+  EXPECT_EQ(moving.ticks, 14'056u);
+  rig.Run(Seconds(60));
+  ASSERT_EQ(rig.state(), UnitState::kHostLost);
+  EXPECT_EQ(rig.Ask<ClockReply>(ClockRequest{})->began_ticks, moving.began_ticks);
+  rig.CutPower();
+  rig.GivePower();
+  EXPECT_EQ(rig.Ask<ClockReply>(ClockRequest{})->began_ticks, 0u);
+}
+
+TEST(Firmware, ASyncEdgeMeansAStartOnlyShortlyBeforeItsTime) {
+  FirmwareRig rig;
+  rig.PulseSync();
+  EXPECT_EQ(rig.state(), UnitState::kRest);
+  ASSERT_EQ(rig.StageAndArm(BenchMove(5)), Answer::kOk);
+  rig.PulseSync();
+  EXPECT_EQ(rig.state(), UnitState::kArmed) << "no start has come";
+  rig.StartAll({5}, 1000);
+  rig.Run(Microseconds(79'900));
+  rig.PulseSync();
+  EXPECT_EQ(rig.state(), UnitState::kArmed) << "20.1 ms before its time";
+  rig.Run(Microseconds(5100));
+  const std::uint32_t edge = rig.Ask<ClockReply>(ClockRequest{})->ticks;
+  rig.PulseSync();
+  EXPECT_EQ(rig.state(), UnitState::kMoving);
+  rig.PulseSync();
+  rig.Run(Milliseconds(50));
+  EXPECT_EQ(rig.Ask<ClockReply>(ClockRequest{})->began_ticks, edge);
+  EXPECT_EQ(rig.flash().moves_begun, 1u);
+  rig.CutPower();
+  rig.PulseSync();
+}
+
 TEST(Firmware, WritesFlashBeforeTheFirstStepAndAfterTheLast) {
   FirmwareRig rig;
   const Flash before = rig.flash();

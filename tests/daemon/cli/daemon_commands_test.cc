@@ -32,6 +32,17 @@ Json Configuration(const std::string& state, std::uint64_t arrived, std::uint64_
          {"energy_J", 3.5},
          {"peak_power_W", 0.5},
          {"frames", 420},
+         {"upload_bits_predicted", 1800},
+         {"upload_bits", 1900},
+         {"upload_predicted_s", 0.0018},
+         {"upload_s", 0.002},
+         {"starts", 2},
+         {"starts_known", 2},
+         {"start_skew_s", 0.0021},
+         {"start_skew_bound_s", 0.0004},
+         {"start_skew_allowed_s", 0.04},
+         {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
+         {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
          {"unserved", Json::array()}};
   if (failed != 0) {
     c["unserved"].push_back(
@@ -116,9 +127,28 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"energy_J", 3.5},
                       {"peak_power_W", 0.5},
                       {"frames", 420},
+                      {"upload_bits_predicted", 1800},
+                      {"upload_bits", 1900},
+                      {"upload_predicted_s", 0.0018},
+                      {"upload_s", 0.002},
+                      {"starts", 2},
+                      {"starts_known", 2},
+                      {"start_skew_s", 0.0021},
+                      {"start_skew_bound_s", 0.0004},
+                      {"start_skew_allowed_s", 0.04},
+                      {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
+                      {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
                       {"bus_load_max", 0.375},
                       {"unserved", Json::array()}};
   EXPECT_EQ(told, expected);
+}
+
+TEST_F(DaemonCommands, ApplyWaitTellsUploadAndStarts) {
+  const auto result = Apply({"--wait"}, {.result = Configuration("done", 2, 0)});
+  EXPECT_THAT(result.out, HasSubstr("upload 0.002 s (its bits take 0.002 s), 1900 bits (1800 "
+                                    "predicted)"));
+  EXPECT_THAT(result.out, HasSubstr("units began within 2.1 ms of each other (+- 0.4; 2 of 2 told; "
+                                    "plans allow for 40 ms)"));
 }
 
 TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
@@ -161,7 +191,8 @@ TEST_F(DaemonCommands, ManyUnservedUnitsAreToldByReason) {
                                   "(now silent)\n"
                                   "  1 more unit: 30: failed: stalled (now silent)\n"
                                   "  --json names them all\n"));
-  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 3 + 20 + 3);
+  // What it is, what it took, its upload and starts; 20 units; the rest by reason.
+  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 5 + 20 + 3);
 }
 
 TEST_F(DaemonCommands, ApplyWaitEndsWithFiveWhereItWasStoppedOrFailed) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "daemon/control/messages.h"
+#include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/files/state_file.h"
@@ -82,6 +83,23 @@ TEST_F(OfflineCommands, LayoutTakesGearsAndArms) {
   EXPECT_EQ(layout->unit({2}).theta().gear, 900);
   EXPECT_EQ(layout->unit({2}).phi().gear, 800);
   EXPECT_EQ(layout->unit({0}).phi().arm_mm, 8);
+}
+
+TEST_F(OfflineCommands, LayoutPutsFiducialsBesideTheUnits) {
+  const std::string units = scratch_ / "u.csv";
+  const std::string lights = scratch_ / "f.csv";
+  const auto result = Focalfleet({"layout", "hex", "--count", "30", "--fiducials", "7",
+                                  "--fiducials-out", lights, "--out", units, "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  EXPECT_EQ(Json::parse(result.out)["fiducials"], 7);
+  const auto layout = ReadLayout(Slurp(units), "u.csv", {});
+  ASSERT_TRUE(layout) << layout.error().text;
+  EXPECT_EQ(layout->size(), 30u);
+  const auto fiducials = ReadFiducials(Slurp(lights), "f.csv");
+  ASSERT_TRUE(fiducials) << fiducials.error().text;
+  EXPECT_EQ(fiducials->size(), 7u);
+  EXPECT_EQ(
+      Focalfleet({"layout", "hex", "--count", "30", "--fiducials", "7", "--out", units}).exit, 2);
 }
 
 TEST_F(OfflineCommands, LayoutOutOfLimitsIsWrongUsage) {

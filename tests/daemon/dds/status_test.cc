@@ -163,6 +163,7 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   bus.view.frames_sent = UINT64_MAX;
   bus.view.load = 0.25;
   bus.view.retries = 3;
+  bus.view.upload.measured_s = 0.091;
   ConfigurationProgressValue configuration;
   configuration.view.id = 3;
   configuration.view.source = "night.csv";
@@ -170,6 +171,10 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   configuration.view.arrived = 4999;
   configuration.view.peak_power_W = 12.5;
   configuration.view.frames = 90'000;
+  configuration.view.starts = {
+      .begun = 5000, .told = 4998, .skew_s = 0.002, .bound_s = 0.0005, .allowed_s = 0.04};
+  configuration.view.upload = {
+      .bits_predicted = 4'500'000, .bits = 4'600'000, .predicted_s = 0.09, .measured_s = 0.092};
   ASSERT_TRUE(publisher->Publish(fleet));
   EXPECT_EQ(publisher->Publish(std::span(&bus, 1)), 1u);
   ASSERT_TRUE(publisher->Publish(configuration));
@@ -191,6 +196,16 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   EXPECT_EQ(seen.configuration->view.state, ConfigurationState::kStopped);
   EXPECT_EQ(seen.configuration->view.arrived, 4999u);
   EXPECT_EQ(seen.configuration->view.frames, 90'000u);
+  EXPECT_EQ(seen.configuration->view.starts.begun, 5000u);
+  EXPECT_EQ(seen.configuration->view.starts.told, 4998u);
+  EXPECT_EQ(seen.configuration->view.starts.skew_s, 0.002);
+  EXPECT_EQ(seen.configuration->view.starts.bound_s, 0.0005);
+  EXPECT_EQ(seen.configuration->view.starts.allowed_s, 0.04);
+  EXPECT_EQ(seen.configuration->view.upload.bits_predicted, 4'500'000u);
+  EXPECT_EQ(seen.configuration->view.upload.bits, 4'600'000u);
+  EXPECT_EQ(seen.configuration->view.upload.predicted_s, 0.09);
+  EXPECT_EQ(seen.configuration->view.upload.measured_s, 0.092);
+  EXPECT_EQ(seen.buses[7].view.upload.measured_s, 0.091);
   EXPECT_TRUE(reader->writer_alive());
 }
 

@@ -111,6 +111,9 @@ TEST(CanNetlink, TheKernelsRefusalIsTold) {
                 .value(),
             0);
   EXPECT_FALSE(ReadAcknowledgement(Controller()));
+  for (const std::int32_t none : {1, -4096, INT32_MIN})
+    EXPECT_FALSE(ReadAcknowledgement(Answer().Put(none).Put(nlmsghdr{}).Message(NLMSG_ERROR)))
+        << none;
 }
 
 // Whatever bytes come: no crash, nothing read past the end (the sanitizers see to it).

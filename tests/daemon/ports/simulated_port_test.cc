@@ -75,5 +75,50 @@ TEST(SimulatedPort, ADeadBusIsDownAndTakesNothing) {
   EXPECT_EQ(port.Send(std::vector<CanFrame>{CanFrame{}}), 0u);
 }
 
+// The words of a SocketCAN port, because the coordinator shows them to people.
+TEST(SimulatedPort, TellsHowItsControllerStandsByTheInterfaceOfARealOne) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  const auto fleet = SimulatedFleet::Create(std::move(config)).value();
+  SimulatedPort port(fleet, BusId{0});
+  SimulatedPort well(fleet, BusId{1});
+  std::vector<ReceivedFrame> received;
+  HostInstant now{};
+  const auto run = [&](DurationNs duration) {
+    now = now + duration;
+    port.Receive(now, &received);
+    well.Receive(now, &received);
+  };
+  run(Milliseconds(1));
+  EXPECT_EQ(port.trouble(), "");
+  // The only other node leaves: nobody acknowledges.
+  fleet->world().PowerCut(UnitId{1});
+  const std::vector<CanFrame> ask{Encode(HostMessage(IdentifyRequest{}), {kBroadcastNode, 9})};
+  EXPECT_EQ(port.Send(ask), 1u);
+  run(Microseconds(1100));
+  EXPECT_EQ(port.state(), LinkState::kUp);
+  EXPECT_EQ(port.trouble(), "the controller warns of errors (no acknowledgement)");
+  run(Milliseconds(100));
+  EXPECT_EQ(port.state(), LinkState::kPassive);
+  EXPECT_EQ(port.trouble(), "the controller is error-passive (no acknowledgement)");
+  EXPECT_GT(port.counters().link_errors, 100u);
+  fleet->world().ThrowHostOff(BusId{0});
+  run(Milliseconds(1));
+  EXPECT_EQ(port.state(), LinkState::kOff);
+  EXPECT_EQ(port.trouble(), "the controller is bus-off (no acknowledgement)");
+  EXPECT_EQ(port.Send(ask), 0u);
+  fleet->world().PowerOn(UnitId{1});
+  run(Milliseconds(1100));
+  EXPECT_EQ(port.state(), LinkState::kUp);
+  EXPECT_EQ(port.trouble(), "");
+  EXPECT_EQ(port.Send(ask), 1u);
+  received.clear();
+  run(Milliseconds(10));
+  EXPECT_EQ(received.size(), 1u);
+  EXPECT_EQ(well.state(), LinkState::kUp);
+  EXPECT_EQ(well.counters().link_errors, 0u);
+}
+
 }  // namespace
 }  // namespace focalfleet

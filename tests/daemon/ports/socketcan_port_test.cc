@@ -82,7 +82,9 @@ TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   const CanFrame frame{.id = 77, .length = 0, .data = {}};
   EXPECT_EQ((*port)->Send({&frame, 1}), 0u);
   EXPECT_EQ((*port)->state(), LinkState::kDown);
-  EXPECT_EQ(receive_at(1600), LinkState::kUp);
+  EXPECT_EQ(receive_at(1600), LinkState::kDown) << "told before it may be up again";
+  EXPECT_EQ((*port)->wake_at(), HostInstant{} + Milliseconds(1800));
+  EXPECT_EQ(receive_at(1800), LinkState::kUp);
   EXPECT_EQ((*port)->counters().reconnects, 1u);
 }
 
@@ -228,6 +230,18 @@ TEST_F(TroubledPort, NamesStateAndCause) {
   EXPECT_EQ(port_->state(), LinkState::kUp);
   EXPECT_EQ(port_->trouble(), "");
   EXPECT_EQ(port_->counters().link_errors, 6u);
+}
+
+TEST_F(TroubledPort, WarnsNoMoreWhenTheControllerIsWellAgain) {
+  for (int time = 0; time < 2; ++time) {  // the second warning is as new as the first
+    Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
+    ReceiveAt(10 * time + 1);
+    EXPECT_EQ(port_->trouble(), "the controller warns of errors");
+    Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_ACTIVE));
+    ReceiveAt(10 * time + 2);
+    EXPECT_EQ(port_->state(), LinkState::kUp);
+    EXPECT_EQ(port_->trouble(), "");
+  }
 }
 
 TEST_F(TroubledPort, IsBroughtBackFromBusOffAgainAndAgain) {

@@ -35,9 +35,10 @@ TEST(TransmitWindow, LearnsWhatTheKernelChargesFromOneFrameAlone) {
   window.Sent(kFrame, kNow);
   window.Sent(kFrame, kNow);
   window.Charged(1536);
-  EXPECT_EQ(window.Room(true, kNow), 0u) << "may be three of 512 bytes";
+  EXPECT_EQ(window.Room(false, kNow), 0u);
+  EXPECT_EQ(window.Room(true, kNow), 1u) << "no more than went down";
   window.Charged(768);
-  EXPECT_EQ(window.Room(true, kNow), 0u) << "still not known";
+  EXPECT_EQ(window.Room(false, kNow), 0u) << "may still be both";
   window.Charged(0);
   EXPECT_EQ(window.Room(false, kNow), 1u) << "one alone, to learn";
   window.Sent(kFrame, kNow);
@@ -53,12 +54,16 @@ TEST(TransmitWindow, LearnsWhatTheKernelChargesFromOneFrameAlone) {
 
 TEST(TransmitWindow, AnInterfaceThatHoldsNothingIsNeverFull) {
   TransmitWindow window;
-  for (int i = 0; i < 100; ++i) {
+  for (const std::size_t room : {2u, 4u, 8u, 16u, 32u, 64u, 64u}) {
     window.Charged(0);
-    EXPECT_EQ(window.Room(false, kNow), 2u);
-    window.Sent(kFrame, kNow);
-    window.Sent(kFrame, kNow);
+    ASSERT_EQ(window.Room(false, kNow), room);
+    for (std::size_t i = 0; i < room; ++i) window.Sent(kFrame, kNow);
   }
+  // Somebody puts a queue in between.
+  window.Charged(768 * 64);
+  EXPECT_EQ(window.Room(true, kNow), 0u);
+  window.Charged(0);
+  EXPECT_EQ(window.Room(false, kNow), 1u) << "as any other from now on";
 }
 
 TEST(TransmitWindow, TheBitClockHoldsAFrameForItsBits) {
@@ -75,6 +80,18 @@ TEST(TransmitWindow, TheBitClockHoldsAFrameForItsBits) {
   window.Sent(kFrame, kNow + took * 10);
   window.Sent(kFrame, kNow + took * 10);
   EXPECT_EQ(window.RoomAt(), kNow + took * 11);
+}
+
+TEST(TransmitWindow, TheBitClockNeedsNotLearnWhatTheKernelCharges) {
+  TransmitWindow window({.bit_rate_bps = 1'000'000});
+  const DurationNs took = Microseconds(FrameBits(kFrame));
+  window.Sent(kFrame, kNow);
+  window.Sent(kFrame, kNow);
+  window.Charged(1536);
+  EXPECT_EQ(window.Room(true, kNow), 1u);
+  EXPECT_EQ(window.Room(false, kNow + took * 2), 0u) << "the driver is slower than the wire";
+  window.Charged(0);
+  EXPECT_EQ(window.Room(false, kNow + took * 2), 2u);
 }
 
 TEST(TransmitWindow, AFrameOfAnotherNodeDelaysOursThatWaited) {

@@ -60,6 +60,10 @@ port = "socketcan"
 bit_rate_bps = 500000
 unix_directory = "d"
 interfaces = ["can0", "can1"]
+[sync]
+chip = "/dev/gpiochip3"
+line = 9
+active_low = true
 [clock]
 speed = 1.0
 [drive]
@@ -74,6 +78,7 @@ identify_period_ms = 2
 poll_period_ms = 3
 clock_period_ms = 4
 start_delay_ms = 5
+sync_lead_ms = 9
 settle_margin_ms = 6
 silence_limit_ms = 7
 [simulated]
@@ -95,6 +100,21 @@ spread = "real"
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
   EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:22");
+  EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
+  EXPECT_EQ(config->sync.line, 9u);
+  EXPECT_TRUE(config->sync.active_low);
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:24");
+  EXPECT_TRUE(config->timing.sync_line);
+  EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
+}
+
+TEST(Config, ASyncLineAsksForRealTimeAndAnEdgeWithinTheUnitsWindow) {
+  const std::string bus = "[bus]\nport = \"simulated\"\n";
+  EXPECT_FALSE(ParseConfig(kMinimal, "f.toml")->timing.sync_line);
+  EXPECT_THAT(ErrorOf(bus + "[sync]\nchip = \"/dev/gpiochip0\"\n[clock]\nspeed = 4.0\n"),
+              HasSubstr(":4: sync.chip asks for clock.speed = 1"));
+  EXPECT_THAT(ErrorOf(bus + "[timing]\nsync_lead_ms = 20\n"),
+              HasSubstr(":4: timing.sync_lead_ms must be below 20"));
 }
 
 TEST(Config, AbsolutePathsStay) {

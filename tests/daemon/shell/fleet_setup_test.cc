@@ -35,6 +35,18 @@ class OpenPortsTest : public ::testing::Test {
   double speed = 1;
 };
 
+TEST(OpenSync, AChipThatIsNotThereIsToldWithItsLine) {
+  const auto config = ParseConfig(
+      "[bus]\nport = \"simulated\"\n[sync]\nchip = \"/dev/gpiochip4711\"\n", "/etc/f.toml");
+  ASSERT_TRUE(config) << config.error().text;
+  const auto sync = OpenSync(config->sync);
+  ASSERT_FALSE(sync);
+  EXPECT_EQ(sync.error().text, "/etc/f.toml:4: /dev/gpiochip4711: No such file or directory");
+  const auto none = OpenSync({});
+  ASSERT_TRUE(none);
+  EXPECT_EQ(*none, nullptr);
+}
+
 TEST_F(OpenPortsTest, OnlyVirtualInterfacesMayRunInAnotherTime) {
   const std::set<std::string> all{"can0", "can1", "can2"};
   speed = 0.5;

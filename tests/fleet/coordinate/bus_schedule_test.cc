@@ -55,6 +55,18 @@ TEST(BusSchedule, ReleasesNoMoreThanTheHorizonTakes) {
   EXPECT_GE(now - kNow + Milliseconds(4), one * 499);
 }
 
+TEST(BusSchedule, HeldItReleasesNothingAndSaysWhenItWill) {
+  BusSchedule schedule(kBitRate);
+  ASSERT_TRUE(schedule.Enqueue({Frame(Stop{}), 0, {}}));
+  schedule.Hold(kNow + Microseconds(640));
+  schedule.Hold(kNow + Microseconds(100));  // no shorter
+  EXPECT_TRUE(Release(&schedule, kNow).frames.empty());
+  EXPECT_TRUE(Release(&schedule, kNow + Microseconds(639)).frames.empty());
+  EXPECT_EQ(schedule.ReadyAt(Milliseconds(4)), kNow + Microseconds(640));
+  EXPECT_EQ(Release(&schedule, kNow + Microseconds(640)).frames.size(), 1u);
+  EXPECT_EQ(schedule.ReadyAt(Milliseconds(4)), kNever);
+}
+
 TEST(BusSchedule, ChargesTheAnswerWithTheQuestion) {
   BusSchedule with(kBitRate);
   BusSchedule without(kBitRate);

@@ -5,9 +5,11 @@
 
 #include <functional>
 
+#include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/plan_file.h"
+#include "fleet/files/spots_file.h"
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/hex_layout.h"
@@ -126,6 +128,31 @@ TEST(CsvMutation, PlanReaderIsTotal) {
         }
         return ErrorText(rows);
       });
+}
+
+TEST(CsvMutation, SpotsReaderIsTotal) {
+  ExpectTotal(
+      "# exposure_id: a 1\n# taken_utc: 2026-11-22T03:04:05.678Z\n"
+      "spot_id,x_px,y_px,flux,fwhm_px\n1,10.5,20,1.5,2.2\n9,1,2,3,\n",
+      testing::TestSeed(7), [](const std::string& text) {
+        const SensorLimits sensor{100, 100};
+        const auto exposure = ReadSpots(text, "file.csv", sensor);
+        if (!exposure) return exposure.error().text;
+        const auto again = ReadSpots(WriteSpots(*exposure), "again", sensor);
+        EXPECT_TRUE(again) << again.error().text << "\n" << text;
+        return std::string();
+      });
+}
+
+TEST(CsvMutation, FiducialsReaderIsTotal) {
+  ExpectTotal("fiducial_id,x_mm,y_mm\n1,0,0\n2,-5.25,0\n3,1e2,7\n", testing::TestSeed(8),
+              [](const std::string& text) {
+                const auto fiducials = ReadFiducials(text, "file.csv");
+                if (!fiducials) return fiducials.error().text;
+                const auto again = ReadFiducials(WriteFiducials(*fiducials), "again");
+                EXPECT_TRUE(again) << again.error().text << "\n" << text;
+                return std::string();
+              });
 }
 
 }  // namespace

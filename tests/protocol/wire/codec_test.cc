@@ -155,7 +155,7 @@ std::vector<Golden> GoldenUnitFrames() {
   const auto unit = [&](const UnitMessage& m) { return Encode(m, from); };
   return {
       {"082952E2#FFFFFF0201003412", unit(Done{Outcome::kFault, {-1, 0x102}, {0x1234}})},
-      {"083952E0#04030201", unit(ClockReply{0x01020304})},
+      {"083952E0#0403020108070605", unit(ClockReply{0x01020304, 0x05060708})},
       {"0C4952E0#341205", unit(ArmReply{{0x1234}, Answer::kBegunBefore})},
       {"107952E0#3412EFBEADDE3F02",
        unit(ConfirmReply{{0x1234}, 0xDEADBEEF, {15, 3}, Answer::kIncomplete})},

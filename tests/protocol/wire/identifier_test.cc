@@ -29,6 +29,15 @@ TEST(Identifier, PrioritiesAreAsDocumented) {
     EXPECT_EQ(kFunctions[i].priority, priorities[i]) << kFunctions[i].name;
 }
 
+// docs/adr/0009: a boot loader may have them one day.
+TEST(Identifier, ThoseForUpdatesOfFirmwareAreFree) {
+  for (const FunctionRow& row : kFunctions) {
+    EXPECT_LT(row.priority, 7) << row.name;
+    EXPECT_LT(static_cast<int>(row.function), 56) << row.name;
+  }
+  EXPECT_NE(kProtocolVersion, 0);
+}
+
 TEST(Identifier, FieldsStandWhereTheHeaderSays) {
   const auto bits = [](std::uint32_t value, int count) {
     std::string text;

@@ -1,0 +1,25 @@
+// faults.csv: which bus or unit of the simulated fleet misbehaves how, from when to when, with what
+// chance. docs/files.md describes it; deploy/faults.csv is an example.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/fault_plan.h"
+#include "sim/unit_description.h"
+
+namespace focalfleet::simulator {
+
+struct FaultsFor {
+  const std::vector<sim::UnitDescription>& units;  // that the file may name, and their buses
+  bool bit_clock = true;  // false: real interfaces carry the frames, and have faults of their own
+};
+
+/// One fault for each bus or unit that a row names, in the order of the file.
+/// Total: any bytes give a plan or an Error. Errors: kInvalid, with file, line, column and reason.
+Result<std::vector<sim::PlannedFault>> ReadFaults(std::string_view text, std::string file,
+                                                  const FaultsFor& fleet);
+
+}  // namespace focalfleet::simulator

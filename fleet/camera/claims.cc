@@ -1,0 +1,175 @@
+#include "fleet/camera/claims.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "fleet/kinematics.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr double kWideShare = 0.05;
+constexpr double kWideVariances = 16;
+constexpr double kFarVariances = 200;
+
+double Density(double squared_sigmas, const CovarianceFp& covariance, double sigma_mm) {
+  const double xx = covariance.xx + sigma_mm * sigma_mm;
+  const double yy = covariance.yy + sigma_mm * sigma_mm;
+  const double root = std::sqrt(xx * yy - covariance.xy * covariance.xy);
+  return ((1 - kWideShare) * std::exp(-squared_sigmas / 2) +
+          kWideShare / kWideVariances * std::exp(-squared_sigmas / 2 / kWideVariances)) /
+         (2 * std::numbers::pi * root);
+}
+
+double PatrolAreaMm2(const Unit& unit) {
+  const PatrolLimits limits = PatrolOf(unit);
+  return std::numbers::pi * (limits.max_mm * limits.max_mm - limits.min_mm * limits.min_mm);
+}
+
+CovarianceFp Round(double sigma_mm) { return {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm}; }
+
+}  // namespace
+
+Odds Odds::Of(const Layout& layout, const IdentifyOptions& options) {
+  // A unit's share of the plate on a hexagonal lattice; within a factor for any other.
+  const double cell_mm2 = layout.pitch_mm() * layout.pitch_mm() * std::numbers::sqrt3 / 2;
+  const double dust = options.dust_share / cell_mm2;
+  return {dust, options.missing_share * dust};
+}
+
+void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const IdentifyOptions& options,
+              std::vector<ExpectedPlace>* places) {
+  places->clear();
+  const CovarianceFp as_before =
+      Round(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
+  const double as_told =
+      1 - options.did_not_move_share - options.strayed_share - options.missing_share;
+  if (!expectation.moved) {
+    if (expectation.before_fp)
+      places->push_back({PlaceKind::kExpected, *expectation.before_fp, as_before, as_told});
+    return;
+  }
+  if (expectation.before_fp)
+    places->push_back(
+        {PlaceKind::kBefore, *expectation.before_fp, as_before, options.did_not_move_share});
+  if (!expectation.expected_fp) return;
+  const auto at = [&](const AxisAngles& angles) {
+    return CovarianceAt(unit, angles, expectation.blind);
+  };
+  const auto& commanded = expectation.commanded;
+  places->push_back({PlaceKind::kExpected, *expectation.expected_fp,
+                     commanded ? at(*commanded) : Round(expectation.blind.place_sigma_mm),
+                     as_told});
+  if (!commanded || !expectation.before) return;
+  const AxisAngles only_phi{expectation.before->theta_deg, commanded->phi_deg};
+  const AxisAngles only_theta{commanded->theta_deg, expectation.before->phi_deg};
+  const double share = options.one_axis_stayed_share / 2;
+  places->push_back({PlaceKind::kThetaStayed, FibreAt(unit, only_phi), at(only_phi), share});
+  places->push_back({PlaceKind::kPhiStayed, FibreAt(unit, only_theta), at(only_theta), share});
+}
+
+namespace {
+
+// A spot where one axis or both may have stayed may also be where the unit strayed to, or a move
+// that ended far from its end by a rare large error: what a stay has to be likelier than.
+void AddOtherReasons(const ClaimSearch& search, std::uint32_t unit, std::size_t begin,
+                     const std::vector<ExpectedPlace>& places, double dark_and_dust,
+                     std::vector<Claim>* all) {
+  const IdentifyOptions& options = *search.options;
+  const std::size_t end = all->size();
+  for (std::size_t k = begin; k < end; ++k) {
+    const std::uint32_t spot = (*all)[k].spot;
+    if ((*all)[k].kind == PlaceKind::kExpected) continue;
+    double density = options.strayed_share / PatrolAreaMm2(search.request->layout->unit({unit}));
+    for (const ExpectedPlace& place : places) {
+      if (place.kind != PlaceKind::kExpected) continue;
+      const CovarianceFp far{place.covariance.xx * kFarVariances,
+                             place.covariance.xy * kFarVariances,
+                             place.covariance.yy * kFarVariances};
+      const double squared = SquaredSigmas(place.at_fp, search.spots->at_fp[spot], far, 0);
+      density += options.strayed_share * Density(squared, far, 0);
+    }
+    all->push_back({unit, spot, PlaceKind::kAnywhere, std::log(density / dark_and_dust)});
+  }
+}
+
+}  // namespace
+
+Claims FindClaims(const ClaimSearch& search) {
+  const Layout& layout = *search.request->layout;
+  const IdentifyOptions& options = *search.options;
+  const Odds odds = Odds::Of(layout, options);
+  Claims claims;
+  std::vector<char> claimed(search.spots->at_fp.size(), 0);
+  std::vector<ExpectedPlace> places;
+  double map_sigma_mm_max = 0;
+  for (const double sigma : search.spots->sigma_mm)
+    map_sigma_mm_max = std::max(map_sigma_mm_max, sigma);
+  const double far_mm2 =
+      map_sigma_mm_max * map_sigma_mm_max + options.centroid_sigma_mm * options.centroid_sigma_mm;
+  for (std::uint32_t i = 0; i < layout.size(); ++i) {
+    PlacesOf(layout.unit({i}), search.request->expectations[i], options, &places);
+    const std::size_t before = claims.all.size();
+    for (const ExpectedPlace& place : places) {
+      const double radius_mm =
+          std::sqrt(options.gate_squared_sigmas * (LargestVariance(place.covariance) + far_mm2));
+      search.grid->ForNear(place.at_fp, radius_mm, [&](std::uint32_t spot, double) {
+        if (search.spots->is_fiducial[spot]) return;
+        const double sigma_mm = std::hypot(options.centroid_sigma_mm, search.spots->sigma_mm[spot]);
+        const double squared =
+            SquaredSigmas(place.at_fp, search.spots->at_fp[spot], place.covariance, sigma_mm);
+        if (squared > options.gate_squared_sigmas) return;
+        claims.all.push_back({i, spot, place.kind,
+                              std::log(place.share * Density(squared, place.covariance, sigma_mm) /
+                                       odds.dark_and_dust)});
+        claimed[spot] = 1;
+      });
+    }
+    if (places.empty()) continue;
+    AddOtherReasons(search, i, before, places, odds.dark_and_dust, &claims.all);
+    ++claims.units;
+    if (claims.all.size() > before) ++claims.recognised;
+  }
+  for (std::size_t spot = 0; spot < claimed.size(); ++spot)
+    if (claimed[spot] == 0 && !search.spots->is_fiducial[spot]) ++claims.stray_spots;
+  return claims;
+}
+
+std::vector<Claim> FindStrays(const ClaimSearch& search, std::span<const std::uint32_t> units,
+                              std::span<const char> is_free) {
+  const Layout& layout = *search.request->layout;
+  const Odds odds = Odds::Of(layout, *search.options);
+  std::vector<Claim> strays;
+  for (const std::uint32_t i : units) {
+    const Unit& unit = layout.unit({i});
+    // Nothing else is known of a unit without a place: it is somewhere.
+    const bool lost =
+        !search.request->expectations[i].expected_fp && !search.request->expectations[i].before_fp;
+    const double share = lost ? 1 : search.options->strayed_share;
+    const double log_odds = std::log(share / PatrolAreaMm2(unit) / odds.dark_and_dust);
+    const double reach_mm = PatrolOf(unit).max_mm + kStraySlackMm;
+    search.grid->ForNear(unit.base_fp, reach_mm, [&](std::uint32_t spot, double) {
+      if (is_free[spot] != 0 && InPatrol(unit, search.spots->at_fp[spot], kStraySlackMm))
+        strays.push_back({i, spot, PlaceKind::kAnywhere, log_odds});
+    });
+  }
+  return strays;
+}
+
+bool InPatrol(const Unit& unit, PointFp at_fp, double slack_mm) {
+  const double distance_mm = DistanceMm(unit.base_fp, at_fp);
+  const PatrolLimits limits = PatrolOf(unit);
+  if (distance_mm < limits.min_mm - slack_mm || distance_mm > limits.max_mm + slack_mm)
+    return false;
+  // A theta that goes all round leaves no direction out.
+  if (unit.theta().max_deg - unit.theta().min_deg >= 360) return true;
+  if (distance_mm <= slack_mm) return true;
+  const double inside_mm = std::clamp(distance_mm, limits.min_mm, limits.max_mm);
+  const double scale = inside_mm / distance_mm;
+  return !AnglesFor(unit, {unit.base_fp.x_mm + (at_fp.x_mm - unit.base_fp.x_mm) * scale,
+                           unit.base_fp.y_mm + (at_fp.y_mm - unit.base_fp.y_mm) * scale})
+              .empty();
+}
+
+}  // namespace focalfleet

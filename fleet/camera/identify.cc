@@ -1,0 +1,371 @@
+#include "fleet/camera/identify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "fleet/camera/claims.h"
+#include "fleet/camera/mapping.h"
+#include "fleet/camera/swaps.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr double kCellMm = 8;
+constexpr std::uint32_t kStrayFibresMin = 9;  // fewer say nothing about a whole field
+
+// Who has which spot, in the order in which certainty falls.
+class Matching {
+ public:
+  Matching(const IdentificationRequest& request, const IdentifyOptions& options,
+           const MappedSpots& spots, const SpotGrid& grid, Claims claims)
+      : request_(request),
+        options_(options),
+        spots_(spots),
+        search_{&request, &options, &spots, &grid},
+        claims_(std::move(claims)),
+        sightings_(request.layout->size()),
+        settled_(request.layout->size(), 0),
+        is_free_(spots.at_fp.size(), 1) {
+    for (std::size_t k = 0; k < is_free_.size(); ++k)
+      if (spots.is_fiducial[k]) is_free_[k] = 0;
+  }
+
+  void Run(Identification* result) {
+    TakeSwaps();
+    TakeExpected();
+    TakeStrays();
+    TakeOutside();
+    NameRivals();
+    MarkBlends();
+    result->units = std::move(sightings_);
+    for (const UnitSighting& sighting : result->units)
+      ++result->count[static_cast<std::size_t>(sighting.status)];
+    for (std::uint32_t k = 0; k < is_free_.size(); ++k)
+      if (is_free_[k] != 0) result->unexplained.push_back(k);
+  }
+
+ private:
+  void Give(std::uint32_t unit, std::uint32_t spot, SightingStatus status, double doubt) {
+    UnitSighting& sighting = sightings_[unit];
+    sighting.status = status;
+    sighting.spot = spot;
+    sighting.at_fp = spots_.at_fp[spot];
+    const double sigma_mm = std::hypot(options_.centroid_sigma_mm, spots_.sigma_mm[spot]);
+    sighting.covariance = {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm};
+    sighting.doubt = doubt;
+    settled_[unit] = 1;
+    is_free_[spot] = 0;
+  }
+
+  void LeaveAmbiguous(std::uint32_t unit, double doubt) {
+    sightings_[unit].status = SightingStatus::kAmbiguous;
+    sightings_[unit].doubt = doubt;
+    settled_[unit] = 1;
+  }
+
+  // Candidates: told to move, and no spot near where the move ends. Their spots: all but those that
+  // are one unit's only one at the end of its move.
+  void TakeSwaps() {
+    std::vector<std::uint32_t> ends(settled_.size(), 0);
+    for (const Claim& claim : claims_.all)
+      if (claim.kind == PlaceKind::kExpected) ++ends[claim.unit];
+    std::vector<char> is_free = is_free_;
+    for (const Claim& claim : claims_.all)
+      if (claim.kind == PlaceKind::kExpected && ends[claim.unit] == 1) is_free[claim.spot] = 0;
+    std::vector<std::uint32_t> units;
+    for (std::uint32_t i = 0; i < ends.size(); ++i)
+      if (ends[i] == 0 && request_.expectations[i].commanded && request_.expectations[i].moved)
+        units.push_back(i);
+    const SwapFindings found =
+        FindSwaps({&request_, &options_, &spots_, search_.grid, units, is_free, claims_.all});
+    traces_ = found.traces;
+    for (const SwapRing& ring : found.rings) {
+      for (const SwapTrace& trace : ring.members) {
+        if (ring.ambiguous) {
+          LeaveAmbiguous(trace.unit, 0.5);
+          held_.push_back(trace.spot);
+        } else {
+          Give(trace.unit, trace.spot, SightingStatus::kSwapped, 0);
+        }
+        sightings_[trace.unit].other = {trace.other};
+      }
+    }
+    for (const std::uint32_t spot : held_) is_free_[spot] = 0;
+  }
+
+  void TakeExpected() {
+    std::vector<Claim> open;
+    for (const Claim& claim : claims_.all)
+      if (settled_[claim.unit] == 0 && is_free_[claim.spot] != 0) open.push_back(claim);
+    const std::vector<Decision> decisions = Assign(open);
+    for (const Decision& decision : decisions) {
+      if (decision.spot != kNoSpot && decision.doubt <= options_.doubt_max) GiveExpected(decision);
+    }
+    // What an undecided unit could have is nobody's else, either.
+    for (const Decision& decision : decisions)
+      if (decision.doubt > options_.doubt_max) LeaveAmbiguous(decision.unit, decision.doubt);
+    for (const Claim& claim : open) {
+      const bool undecided = sightings_[claim.unit].status == SightingStatus::kAmbiguous;
+      if (undecided && is_free_[claim.spot] != 0) {
+        is_free_[claim.spot] = 0;
+        held_.push_back(claim.spot);
+      }
+    }
+  }
+
+  void GiveExpected(const Decision& decision) {
+    const bool stayed =
+        decision.kind != PlaceKind::kExpected && decision.kind != PlaceKind::kAnywhere;
+    const bool known =
+        decision.kind != PlaceKind::kAnywhere && decision.kind_doubt <= options_.motion_doubt_max;
+    Give(decision.unit, decision.spot,
+         stayed && known ? SightingStatus::kDidNotMove : SightingStatus::kMeasured, decision.doubt);
+    UnitSighting& sighting = sightings_[decision.unit];
+    sighting.motion_is_known = known;
+    if (!stayed || !known) return;
+    sighting.stayed[Index(Axis::kTheta)] = decision.kind != PlaceKind::kPhiStayed;
+    sighting.stayed[Index(Axis::kPhi)] = decision.kind != PlaceKind::kThetaStayed;
+  }
+
+  [[nodiscard]] std::vector<std::uint32_t> Open() const {
+    std::vector<std::uint32_t> units;
+    for (std::uint32_t i = 0; i < settled_.size(); ++i)
+      if (settled_[i] == 0) units.push_back(i);
+    return units;
+  }
+
+  void TakeStrays() {
+    const std::vector<std::uint32_t> open = Open();
+    std::vector<char> is_candidate = is_free_;
+    for (const std::uint32_t spot : held_) is_candidate[spot] = 1;
+    std::vector<char> is_held(is_free_.size(), 0);
+    for (const std::uint32_t spot : held_) is_held[spot] = 1;
+    std::vector<Claim> strays = FindStrays(search_, open, is_candidate);
+    // A unit that could have a spot over which others are undecided is undecided, too.
+    for (const Claim& claim : strays)
+      if (is_held[claim.spot] != 0 && settled_[claim.unit] == 0) LeaveAmbiguous(claim.unit, 0.5);
+    std::vector<Claim> left;
+    for (const Claim& claim : strays)
+      if (settled_[claim.unit] == 0 || is_held[claim.spot] == 0) left.push_back(claim);
+    for (const Decision& decision : Assign(left)) {
+      if (settled_[decision.unit] != 0) continue;
+      if (decision.doubt > options_.stray_doubt_max) {
+        LeaveAmbiguous(decision.unit, decision.doubt);
+      } else if (decision.spot != kNoSpot) {
+        Give(decision.unit, decision.spot, SightingStatus::kStrayed, decision.doubt);
+        Suspect(decision.unit, decision.spot);
+      }
+    }
+    for (const Claim& claim : left)
+      if (sightings_[claim.unit].status == SightingStatus::kAmbiguous &&
+          is_free_[claim.spot] != 0) {
+        is_free_[claim.spot] = 0;
+        held_.push_back(claim.spot);
+      }
+  }
+
+  // One other unit, not seen where it should be, was told to go where this one is.
+  void Suspect(std::uint32_t unit, std::uint32_t spot) {
+    int found = 0;
+    for (const SwapTrace& trace : traces_) {
+      if (trace.unit != unit || trace.spot != spot) continue;
+      if (IsCertain(sightings_[trace.other].status)) continue;
+      ++found;
+      sightings_[unit].other = {trace.other};
+    }
+    if (found == 1) sightings_[unit].status = SightingStatus::kSwapSuspected;
+    if (found != 1) sightings_[unit].other = kNobody;
+  }
+
+  void TakeOutside() {
+    for (const std::uint32_t unit : Open()) {
+      const Unit& arms = request_.layout->unit({unit});
+      const double reach_mm = arms.theta().arm_mm + arms.phi().arm_mm + options_.outside_mm;
+      std::uint32_t spot = kNoSpot;
+      int found = 0;
+      search_.grid->ForNear(arms.base_fp, reach_mm, [&](std::uint32_t s, double) {
+        if (is_free_[s] == 0 || !InPatrol(arms, spots_.at_fp[s], options_.outside_mm)) return;
+        ++found;
+        spot = s;
+      });
+      if (found == 1) Give(unit, spot, SightingStatus::kOutsidePatrol, 0.5);
+    }
+  }
+
+  // For whoever looks into an ambiguity: one other unit near it that is undecided as well.
+  void NameRivals() {
+    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
+      UnitSighting& sighting = sightings_[i];
+      if (sighting.status != SightingStatus::kAmbiguous || sighting.other != kNobody) continue;
+      for (const PositionerIndex j : request_.layout->neighbours({i}))
+        if (sightings_[j.value].status == SightingStatus::kAmbiguous) {
+          sighting.other = j;
+          break;
+        }
+    }
+  }
+
+  void MarkBlends() {
+    const double width_px = MedianWidth();
+    std::vector<std::uint32_t> holder(is_free_.size(), UINT32_MAX);
+    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
+      const UnitSighting& sighting = sightings_[i];
+      if (sighting.spot == kNoSpot) continue;
+      holder[sighting.spot] = i;
+      const Spot& spot = request_.exposure->spots[sighting.spot];
+      const double flux = request_.expectations[i].flux;
+      const bool wide = width_px > 0 && spot.fwhm_px > options_.blend_width_ratio * width_px;
+      if (wide || (flux > 0 && spot.flux > options_.blend_flux_ratio * flux)) Blend(i);
+    }
+    // A unit that is not seen, expected where another's spot is: that spot may be both.
+    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
+      if (sightings_[i].status != SightingStatus::kMissing || !request_.expectations[i].expected_fp)
+        continue;
+      std::uint32_t with = kNoSpot;
+      search_.grid->ForNear(*request_.expectations[i].expected_fp, options_.blend_mm,
+                            [&](std::uint32_t spot, double) {
+                              if (holder[spot] != UINT32_MAX) with = spot;
+                            });
+      if (with == kNoSpot) continue;
+      Give(i, with, SightingStatus::kBlended, 0.5);
+      sightings_[i].other = {holder[with]};
+      sightings_[holder[with]].other = {i};
+      Blend(i);
+      Blend(holder[with]);
+    }
+  }
+
+  // The centroid of two lights of any brightness is within their distance of each.
+  void Blend(std::uint32_t unit) {
+    UnitSighting& sighting = sightings_[unit];
+    sighting.status = SightingStatus::kBlended;
+    sighting.covariance.xx += options_.blend_mm * options_.blend_mm / 4;
+    sighting.covariance.yy += options_.blend_mm * options_.blend_mm / 4;
+  }
+
+  [[nodiscard]] double MedianWidth() const {
+    std::vector<double> widths;
+    for (const Spot& spot : request_.exposure->spots)
+      if (spot.fwhm_px > 0) widths.push_back(spot.fwhm_px);
+    if (widths.empty()) return 0;
+    const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+    std::nth_element(widths.begin(), middle, widths.end());
+    return *middle;
+  }
+
+  const IdentificationRequest& request_;
+  const IdentifyOptions& options_;
+  const MappedSpots& spots_;
+  ClaimSearch search_;
+  Claims claims_;
+  std::vector<UnitSighting> sightings_;
+  std::vector<char> settled_;
+  std::vector<char> is_free_;
+  std::vector<std::uint32_t> held_;  // spots over which units are undecided
+  std::vector<SwapTrace> traces_;
+};
+
+bool IsOtherField(const Claims& claims, const IdentifyOptions& options) {
+  return claims.recognised < options.recognised_share_min * claims.units &&
+         claims.stray_spots > std::max(claims.recognised, kStrayFibresMin);
+}
+
+std::optional<Refusal> Implausible(const IdentificationRequest& request,
+                                   const IdentifyOptions& options) {
+  const auto lights = static_cast<double>(request.layout->size() + request.fiducials.size());
+  const auto spots = static_cast<double>(request.exposure->spots.size());
+  char text[120];
+  if (spots < options.spots_share_min * lights || spots > options.spots_share_max * lights + 20) {
+    std::snprintf(text, sizeof text, "%zu spots for %zu units and %zu fiducials",
+                  request.exposure->spots.size(), request.layout->size(), request.fiducials.size());
+    return Refusal{RefusalReason::kCount, text};
+  }
+  if (request.fiducials.size() < 3)
+    return Refusal{RefusalReason::kFewFiducials,
+                   "a camera cannot be solved from fewer than 3 fiducials"};
+  return std::nullopt;
+}
+
+struct Looked {
+  MappedSpots spots;
+  SpotGrid grid;
+  Claims claims;
+};
+
+tl::expected<Looked, Refusal> Look(const IdentificationRequest& request,
+                                   const IdentifyOptions& options, Orientation orientation,
+                                   Identification* result) {
+  auto spots = MapSpots(request, options, orientation, result);
+  if (!spots) return tl::unexpected<Refusal>(std::move(spots.error()));
+  SpotGrid grid(spots->at_fp, kCellMm);
+  Claims claims = FindClaims({&request, &options, &*spots, &grid});
+  return Looked{std::move(*spots), std::move(grid), std::move(claims)};
+}
+
+bool Fits(const IdentificationRequest& request, const IdentifyOptions& options,
+          Orientation orientation) {
+  Identification ignored;
+  const auto looked = Look(request, options, orientation, &ignored);
+  return looked && looked->claims.recognised >= options.recognised_share_min * looked->claims.units;
+}
+
+std::string Said(Orientation orientation, bool model_is_mirrored) {
+  if (orientation.mirrored)
+    return std::string("the picture is mirrored") +
+           (orientation.quarters == 0 ? "" : " and turned");
+  // Undone on the plate; on a mirrored sensor the sense is the other.
+  const int quarters = model_is_mirrored ? orientation.quarters : 4 - orientation.quarters;
+  return "the picture is turned by " + std::to_string(90 * quarters) + " degrees";
+}
+
+// The field that was expected, seen the wrong way round: fiducials and fibres fit when it is
+// turned.
+std::optional<Refusal> Turned(const IdentificationRequest& request,
+                              const IdentifyOptions& options) {
+  for (int k = 1; k < 8; ++k) {
+    const Orientation orientation{k % 4, k >= 4};
+    if (!Fits(request, options, orientation)) continue;
+    return Refusal{orientation.mirrored ? RefusalReason::kMirrored : RefusalReason::kTurned,
+                   Said(orientation, request.camera->mirrored)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+const char* Name(SightingStatus status) {
+  constexpr const char* kNames[] = {"measured",       "did_not_move",   "swapped",
+                                    "strayed",        "swap_suspected", "blended",
+                                    "outside_patrol", "ambiguous",      "missing"};
+  return kNames[static_cast<std::size_t>(status)];
+}
+
+tl::expected<Identification, Refusal> Identify(const IdentificationRequest& request,
+                                               const IdentifyOptions& options) {
+  FOCALFLEET_CHECK(request.layout != nullptr && request.camera != nullptr &&
+                   request.exposure != nullptr &&
+                   request.expectations.size() == request.layout->size());
+  if (auto refusal = Implausible(request, options))
+    return tl::unexpected<Refusal>(std::move(*refusal));
+  Identification result;
+  auto looked = Look(request, options, {}, &result);
+  if (!looked) {
+    if (auto turned = Turned(request, options)) return tl::unexpected<Refusal>(std::move(*turned));
+    return tl::unexpected<Refusal>(std::move(looked.error()));
+  }
+  if (IsOtherField(looked->claims, options)) {
+    if (auto turned = Turned(request, options)) return tl::unexpected<Refusal>(std::move(*turned));
+    return tl::unexpected<Refusal>(
+        {RefusalReason::kOtherField,
+         "fiducials are in place, but only " + std::to_string(looked->claims.recognised) + " of " +
+             std::to_string(looked->claims.units) +
+             " units are where they ended or were before: another field, or another plate"});
+  }
+  Matching(request, options, looked->spots, looked->grid, std::move(looked->claims)).Run(&result);
+  result.spots_fp = std::move(looked->spots.at_fp);
+  return result;
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,27 @@
+// Any bytes as the kernel's answer about a CAN interface: a link, an acknowledgement or the reason
+// why not. Whatever is claimed about lengths, nothing is read past the end (the sanitizers see to
+// it), and what is told stands in bounds.
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "daemon/ports/can_netlink.h"
+#include "protocol/base/check.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
+                               // function
+  std::vector<std::byte> bytes(size);
+  if (size > 0) std::memcpy(bytes.data(), data, size);
+  if (const auto link = ReadLink(bytes)) {
+    FOCALFLEET_CHECK(!link->state || *link->state <= ControllerState::kSleeping);
+    FOCALFLEET_CHECK(link->kind.size() <= size && link->kind.find('\0') == std::string::npos);
+  } else {
+    FOCALFLEET_CHECK(!link.error().text.empty());
+  }
+  const auto acknowledged = ReadAcknowledgement(bytes);
+  FOCALFLEET_CHECK(acknowledged || !acknowledged.error().text.empty());
+  return 0;
+}

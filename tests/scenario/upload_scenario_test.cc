@@ -1,0 +1,87 @@
+// The way onto the wire: how long an upload takes on the simulated bit clock, beside the bits that
+// it needs, and what the coordinator says of it before and after.
+
+#include <gtest/gtest.h>
+
+#include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/upload_on_wire.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet::testing {
+namespace {
+
+/// Of the first upload of a random configuration: what passed the wire until the units move.
+std::vector<sim::WireFrame> UploadOf(InProcessFleet* fleet, std::uint64_t seed) {
+  fleet->Run(Milliseconds(2500));  // everybody has been read
+  std::vector<sim::WireFrame> wire;
+  fleet->wire = &wire;
+  fleet->ApplyRandom(seed);
+  EXPECT_TRUE(fleet->RunUntil(
+      [&] { return fleet->coordinator().configuration().state == ConfigurationState::kMoving; },
+      Seconds(60)));
+  fleet->wire = nullptr;
+  return wire;
+}
+
+TEST(Upload, TakesHardlyLongerThanItsBits) {
+  constexpr int kRuns = 10;
+  double sum = 0;
+  for (std::uint64_t k = 0; k < kRuns; ++k) {
+    const std::uint64_t seed = TestSeed(1) + k;
+    SCOPED_TRACE(seed);
+    InProcessFleet fleet({.count = 100, .units_per_bus = 100, .seed = seed});
+    const auto uploads = MeasureUpload(UploadOf(&fleet, seed));
+    ASSERT_EQ(uploads.size(), 1u);
+    const UploadOnWire& upload = uploads.begin()->second;
+    EXPECT_EQ(upload.units, 100u);
+    EXPECT_LE(upload.ratio(), 1.05);
+    sum += upload.ratio();
+  }
+  // What a guess of the answers' lengths would already cost is 0.018.
+  EXPECT_LE(sum / kRuns, 1.005);
+}
+
+TEST(Upload, IsPredictedToTheBit) {
+  for (std::uint64_t k = 0; k < 5; ++k) {
+    const std::uint64_t seed = TestSeed(1) + k;
+    SCOPED_TRACE(seed);
+    InProcessFleet fleet({.count = 91, .units_per_bus = 25, .seed = seed});
+    const auto uploads = MeasureUpload(UploadOf(&fleet, seed));
+    const ConfigurationView& said = fleet.coordinator().configuration();
+    std::uint64_t bits = 0;
+    double longest_s = 0;
+    for (const auto& [bus, upload] : uploads) {
+      const UploadView& of_bus = fleet.coordinator().bus(bus).upload;
+      EXPECT_EQ(of_bus.bits_predicted, upload.needed_bits) << "bus " << bus.value;
+      EXPECT_EQ(of_bus.bits, upload.needed_bits) << "bus " << bus.value;
+      // The host hears of the last answer a turn of its loop later, and lets the first frame go
+      // when it is decided.
+      const double elapsed_s = static_cast<double>(upload.elapsed_bits) * 1e-6;
+      EXPECT_GE(of_bus.measured_s, elapsed_s);
+      EXPECT_LE(of_bus.measured_s, elapsed_s + 0.001);
+      bits += upload.needed_bits;
+      longest_s = std::max(longest_s, static_cast<double>(upload.needed_bits) * 1e-6);
+    }
+    EXPECT_EQ(said.upload.bits_predicted, bits);
+    EXPECT_EQ(said.upload.bits, bits);
+    EXPECT_NEAR(said.upload.predicted_s, longest_s, 1e-9);
+    EXPECT_GE(said.upload.measured_s, longest_s);
+  }
+}
+
+TEST(Upload, SaysWhatRepeatsCost) {
+  const std::uint64_t seed = TestSeed(1);
+  InProcessFleet fleet({.count = 40, .units_per_bus = 40, .seed = seed});
+  fleet.Run(Milliseconds(2500));
+  fleet.world().faults(fleet.layout().buses()[0])->drop = 0.02;
+  fleet.ApplyRandom(seed);
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] { return fleet.coordinator().configuration().state == ConfigurationState::kMoving; },
+      Seconds(60)));
+  const UploadView& upload = fleet.coordinator().configuration().upload;
+  EXPECT_GT(upload.bits, upload.bits_predicted);
+  EXPECT_GT(upload.measured_s, upload.predicted_s);
+}
+
+}  // namespace
+}  // namespace focalfleet::testing
