@@ -57,6 +57,18 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Path("chip", &c->sync.chip);
   visit->Whole("line", &c->sync.line, {0, 1023});
   visit->Flag("active_low", &c->sync.active_low);
+  visit->Section("camera");
+  visit->Path("directory", &c->camera.directory);
+  visit->Path("fiducials", &c->camera.fiducials);
+  visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6});
+  visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6});
+  visit->Real("pixels_per_mm", &c->camera.model.pixels_per_mm, {1e-3, 1e4});
+  visit->Real("rotation_deg", &c->camera.model.rotation_deg, {-360, 360});
+  visit->Real("centre_x_px", &c->camera.model.centre_x_px, {-1e6, 1e6});
+  visit->Real("centre_y_px", &c->camera.model.centre_y_px, {-1e6, 1e6});
+  visit->Flag("mirrored", &c->camera.model.mirrored);
+  visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000});
+  visit->Wait("patience_ms", &c->camera.patience);
   visit->Section("clock");
   visit->Real("speed", &c->clock.speed, {0.01, 1000});
   visit->Section("drive");
@@ -302,6 +314,8 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   reader->Require(config.timing.sync_lead < Milliseconds(20), "timing", "sync_lead_ms",
                   "timing.sync_lead_ms must be below 20: units take an edge only so short before "
                   "their start");
+  reader->Require(config.camera.directory.empty() || !config.camera.fiducials.empty(), "camera",
+                  "fiducials", "camera.fiducials must name a file where there is a camera");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",
@@ -328,6 +342,7 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
+  config.timing.has_camera = !config.camera.directory.empty();
   config.timing.sync_line = !config.sync.chip.empty();
   config.sync.chip_at = reader.At("sync", "chip");
   config.bus.interfaces_at = reader.At("bus", "interfaces");

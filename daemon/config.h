@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fleet/camera/camera_model.h"
+#include "fleet/camera/spots.h"
 #include "fleet/coordinator.h"
 #include "fleet/drive.h"
 #include "protocol/base/result.h"
@@ -53,6 +55,14 @@ struct DaemonConfig {
     bool active_low = false;
     std::string chip_at;  // file:line, for messages
   } sync;
+  struct Camera {
+    std::string directory;  // where it is asked and answers (camera/camera_folder.h); empty: none
+    std::string fiducials;  // fiducials.csv
+    SensorLimits sensor{11'000, 11'000};
+    CameraModel model{.pixels_per_mm = 5, .centre_x_px = 5500, .centre_y_px = 5500};
+    double centroid_sigma_um = 2;
+    DurationNs patience = Milliseconds(30'000);  // real time; until an exposure has to be there
+  } camera;
   struct Clock {
     double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
   } clock;

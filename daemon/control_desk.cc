@@ -1,6 +1,7 @@
 #include "daemon/control_desk.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -34,6 +35,28 @@ Result<Parameter> ParameterArgument(const Json& args) {
   return Fail(ErrorCode::kInvalid, "there is no parameter '" + name + "'");
 }
 
+constexpr double kCorrectionsMax = 10;
+
+/// {corrections?, tolerance_um?, observe?}: nothing of it, and the camera is left alone.
+Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
+  if (!args.contains("corrections")) return std::optional<ApplyCommand::Measure>();
+  ApplyCommand::Measure measure;
+  FOCALFLEET_TRY_ASSIGN(const double corrections, NumberArgument(args, "corrections"));
+  if (!(corrections >= 0 && corrections <= kCorrectionsMax) ||
+      corrections != std::floor(corrections))
+    return Fail(ErrorCode::kInvalid, "corrections must be a whole number in 0..10");
+  measure.corrections = static_cast<std::uint8_t>(corrections);
+  if (args.contains("tolerance_um")) {
+    FOCALFLEET_TRY_ASSIGN(measure.tolerance_um, NumberArgument(args, "tolerance_um"));
+    if (!(measure.tolerance_um > 0 && measure.tolerance_um <= 1e6))
+      return Fail(ErrorCode::kInvalid, "tolerance_um must be above 0 and at most 1e6");
+  }
+  FOCALFLEET_TRY_ASSIGN(measure.observe, FlagArgumentOr(args, "observe", false));
+  if (measure.observe && measure.corrections > 0)
+    return Fail(ErrorCode::kInvalid, "observe takes no corrections: what is seen is not used");
+  return std::optional(measure);
+}
+
 Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(const std::string csv, TextArgument(args, "targets_csv"));
@@ -48,7 +71,8 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   now.reserve(view.layout->size());
   for (std::uint32_t n = 0; n < view.layout->size(); ++n)
     now.push_back(view.coordinator->unit({n}).knowledge);
-  ApplyCommand command{.source = source, .targets = {}, .fixed = fixed};
+  FOCALFLEET_TRY_ASSIGN(const auto measure, MeasureOf(args));
+  ApplyCommand command{.source = source, .targets = {}, .fixed = fixed, .measure = measure};
   FOCALFLEET_TRY_ASSIGN(command.targets,
                         ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
   return command;

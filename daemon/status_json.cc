@@ -151,6 +151,19 @@ double FractionOf(const FleetView& fleet) {
 
 }  // namespace
 
+Json MeasuredJson(const ConfigurationView& configuration) {
+  Json rounds = Json::array();
+  for (const MeasuredRound& round : configuration.measured)
+    rounds.push_back({{"exposure", round.exposure},
+                      {"measured", round.measured},
+                      {"unknown", round.unknown},
+                      {"within_tolerance", round.within_tolerance},
+                      {"rms_um", Number(round.rms_um)},
+                      {"median_um", Number(round.median_um)},
+                      {"worst_um", Number(round.worst_um)}});
+  return rounds;
+}
+
 Json ConfigurationJson(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   Json json{{"id", c.id},
@@ -170,6 +183,7 @@ Json ConfigurationJson(const FleetView& view) {
             {"unserved", UnservedJson(view)}};
   PutUpload(c.upload, &json);
   PutStarts(view, &json);
+  json["measured"] = MeasuredJson(c);
   return json;
 }
 
@@ -254,6 +268,8 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
           {"x_mm", Number(status.x_fp_mm)},
           {"y_mm", Number(status.y_fp_mm)},
           {"target", std::move(target)},
+          {"sighting", seen.sighting ? Json(Name(*seen.sighting)) : Json()},
+          {"error_um", seen.error_um ? Json(*seen.error_um) : Json()},
           {"mode", Name(drive.mode)},
           {"v_bus_V", drive.v_bus_V},
           {"clock", ClockJson(seen.clock)},

@@ -50,6 +50,9 @@ struct ApplyCommand {
   struct Measure {
     std::uint8_t corrections = 0;
     double tolerance_um = 10;
+    /// What is found is told and stored, and not used: the units go on by what they report, and
+    /// come as the way comes. Campaigns measure the blind moves so.
+    bool observe = false;
   };
   std::optional<Measure> measure = {};
 };
@@ -110,7 +113,7 @@ struct PlanDone {
 /// The answer to an ExposureJob.
 struct ExposureDone {
   std::uint64_t id = 0;
-  Result<Exposure> exposure;
+  Result<ExposureFindings> exposure;
 };
 
 struct Inputs {
@@ -156,6 +159,7 @@ struct ExposureJob {
   HostInstant since;  // the exposure begins no earlier
   std::vector<UnitKnowledge> expected;
   std::vector<std::optional<Pose>> before;  // where it stood before it was sent; none: not known
+  std::vector<std::uint8_t> seen;           // non-zero: a camera has put it somewhere before
 };
 
 struct ReplyEffect {
@@ -274,6 +278,7 @@ struct MeasuredRound {
   std::uint32_t unknown = 0;           // seen nowhere, or not to be told from another
   std::uint32_t within_tolerance = 0;  // of `measured`
   double rms_um = 0;                   // of the distances from the targets, of `measured`
+  double median_um = 0;
   double worst_um = 0;
 };
 
@@ -318,6 +323,7 @@ struct CoordinatorConfig {
   /// A SYNC line tells the common start by an edge. Start frames then say an instant `sync_lead`
   /// after it, for units that have no such line or miss the edge.
   bool sync_line = false;
+  bool has_camera = false;  // else a configuration that asks for one is refused
   DurationNs sync_lead = Milliseconds(5);
   /// A configuration that is measured ends each axis' way with this last piece, in this direction,
   /// so that play and wind-up of a gear are always on one side. 0: as the way comes.

@@ -1,5 +1,5 @@
 // What the camera over the plate found of one unit in one exposure, as the coordinator takes it.
-// Only `kMeasured` and `kDidNotMove` put the unit somewhere; all else says why it is not known, and
+// Only certain statuses (IsCertain) put the unit somewhere; all else says why it is not known, and
 // what is known of the unit stays as it was.
 #pragma once
 
@@ -15,18 +15,23 @@
 namespace focalfleet {
 
 enum class SightingStatus : std::uint8_t {
-  kMissing,     // no spot where it may stand
-  kMeasured,    // one spot, and no other unit's
-  kDidNotMove,  // measured where it stood before it was sent away
-  kAmbiguous,   // more than one spot, or one that may be another unit's
-  kSwapped,     // its spot is where another unit was sent: the two are confused somewhere
-  kOutOfReach,  // its spot is where its arms cannot put it
+  kMeasured,       // seen where its move ends
+  kDidNotMove,     // told to move, and one axis or both are where they were
+  kSwapped,        // it carried out another unit's command, and that one (or a ring) its own
+  kStrayed,        // only spot in its patrol area that nobody else explains; its by elimination
+  kSwapSuspected,  // strayed, to where the command of one other that is not seen would have led
+  kBlended,        // its light is in this spot, but not alone: the place is biased
+  kOutsidePatrol,  // the only spot left is where its arms do not reach
+  kAmbiguous,      // more than one answer; no place is given
+  kMissing,        // no spot that could be its
 };
-inline constexpr std::uint8_t kSightingStatusCount = 6;
-constexpr const char* Name(SightingStatus status) {
-  constexpr const char* kNames[] = {"missing",   "measured", "did_not_move",
-                                    "ambiguous", "swapped",  "out_of_reach"};
-  return kNames[static_cast<std::size_t>(status)];
+const char* Name(SightingStatus status);
+inline constexpr std::size_t kSightingStatusCount = 9;
+
+/// The spot is this unit's, and nothing else is in it: the place may be used.
+constexpr bool IsCertain(SightingStatus status) {
+  return status == SightingStatus::kMeasured || status == SightingStatus::kDidNotMove ||
+         status == SightingStatus::kSwapped;
 }
 
 struct Sighting {
@@ -41,8 +46,8 @@ struct Sighting {
   std::optional<Pose> place;
 };
 
-/// All of one exposure: one sighting a unit that was looked for.
-struct Exposure {
+/// What one exposure found: one sighting a unit that was looked for.
+struct ExposureFindings {
   std::uint64_t id = 0;
   std::vector<Sighting> sightings;
 };

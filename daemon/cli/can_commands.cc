@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "protocol/wire/candump_line.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/message_rows.h"

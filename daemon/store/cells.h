@@ -77,7 +77,7 @@ constexpr const char* Flaw(const AxisKnowledge& knowledge) {
   return nullptr;
 }
 
-inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kOutOfReach;
+inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kMissing;
 inline constexpr Origin kLastOrigin = Origin::kCamera;
 inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
 inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;

@@ -237,8 +237,9 @@ CREATE TABLE measurement(
 
 CREATE VIEW measured AS SELECT
   exposure, unit_id, configuration,
-  CASE status WHEN 0 THEN 'missing' WHEN 1 THEN 'measured' WHEN 2 THEN 'did_not_move'
-    WHEN 3 THEN 'ambiguous' WHEN 4 THEN 'swapped' ELSE 'out_of_reach' END AS status,
+  CASE status WHEN 0 THEN 'measured' WHEN 1 THEN 'did_not_move' WHEN 2 THEN 'swapped'
+    WHEN 3 THEN 'strayed' WHEN 4 THEN 'swap_suspected' WHEN 5 THEN 'blended'
+    WHEN 6 THEN 'outside_patrol' WHEN 7 THEN 'ambiguous' ELSE 'missing' END AS status,
   x_mm, y_mm, sigma_um, error_um,
   datetime(at_ns / 1000000000, 'unixepoch') AS at_utc
   FROM measurement;

@@ -93,6 +93,8 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
     return Fail(ErrorCode::kRefused, "the store cannot be written: nothing moves until it can");
   if (command.targets.size() != core_.units.size())
     return Fail(ErrorCode::kInvalid, "targets for another layout");
+  if (command.measure && !core_.config.has_camera)
+    return Fail(ErrorCode::kRefused, "there is no camera to measure with: [camera] directory");
   targets_ = command.targets;
   fixed_ = command.fixed;
   measure_ = command.measure;
@@ -142,7 +144,7 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   failure_.clear();
   stopping_ = false;
   corrections_left_ = measure_ ? measure_->corrections : std::uint8_t{0};
-  goes_past_ = measure_.has_value();
+  goes_past_ = measure_ && !measure_->observe;
   sets_out_ = true;
   exposures_refused_ = 0;
   view_ = {.id = core_.next_configuration++,

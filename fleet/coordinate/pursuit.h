@@ -191,7 +191,8 @@ class Pursuit {
   bool GoPast(std::vector<std::optional<Pose>>* targets);
   void MeasureOrFinish();
   void AskForExposure();
-  void TakeSighting(const Exposure& exposure, const Sighting& sighting, MeasuredRound* round);
+  void TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
+                    MeasuredRound* round);
   void CorrectOrFinish();
   bool Correct();
   [[nodiscard]] Pose AimOf(PositionerIndex i) const;

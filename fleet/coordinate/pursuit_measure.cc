@@ -25,12 +25,23 @@ constexpr double kAimGuardMm = -1e-3;  // within what a plan takes for clear
 // when it is looked at again.
 constexpr double kWorthwhile = 0.5;
 
+void Summarise(std::vector<double> errors_um, MeasuredRound* round) {
+  if (errors_um.empty()) return;
+  double sum = 0;
+  for (const double um : errors_um) sum += um * um;
+  round->rms_um = std::sqrt(sum / static_cast<double>(errors_um.size()));
+  std::sort(errors_um.begin(), errors_um.end());
+  round->median_um = errors_um[errors_um.size() / 2];
+  round->worst_um = errors_um.back();
+}
+
 std::string Micrometres(double um) {
   char text[32];
   std::snprintf(text, sizeof text, "%.1f um", um);
   return text;
 }
 
+/// A swapped unit's place is certain, too, but not the way by which another's commands led there.
 bool IsPut(SightingStatus status) {
   return status == SightingStatus::kMeasured || status == SightingStatus::kDidNotMove;
 }
@@ -111,8 +122,12 @@ void Pursuit::MeasureOrFinish() {
 
 void Pursuit::AskForExposure() {
   exposure_ = core_.next_exposure++;
-  ExposureJob job{.id = exposure_, .since = core_.now, .expected = {}, .before = stood_};
-  for (const UnitRecord& unit : core_.units) job.expected.push_back(unit.view.knowledge);
+  ExposureJob job{
+      .id = exposure_, .since = core_.now, .expected = {}, .before = stood_, .seen = {}};
+  for (const UnitRecord& unit : core_.units) {
+    job.expected.push_back(unit.view.knowledge);
+    job.seen.push_back(unit.view.offset != Pose{} ? 1 : 0);
+  }
   core_.out->exposure = std::move(job);
 }
 
@@ -132,18 +147,18 @@ void Pursuit::OnExposure(const ExposureDone& done) {
     return;
   }
   MeasuredRound round{.exposure = exposure_};
-  double sum = 0;
+  std::vector<double> errors_um;
   for (const Sighting& sighting : done.exposure->sightings) {
     TakeSighting(*done.exposure, sighting, &round);
     const UnitView& view = core_.unit(sighting.unit).view;
-    if (view.target && view.error_um) sum += *view.error_um * *view.error_um;
+    if (view.target && view.error_um) errors_um.push_back(*view.error_um);
   }
-  if (round.measured > 0) round.rms_um = std::sqrt(sum / round.measured);
+  Summarise(std::move(errors_um), &round);
   view_.measured.push_back(round);
   CorrectOrFinish();
 }
 
-void Pursuit::TakeSighting(const Exposure& exposure, const Sighting& sighting,
+void Pursuit::TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
                            MeasuredRound* round) {
   const PositionerIndex i = sighting.unit;
   UnitView& view = core_.unit(i).view;
@@ -155,7 +170,6 @@ void Pursuit::TakeSighting(const Exposure& exposure, const Sighting& sighting,
     const PointFp wanted = FibreAt(core_.layout.unit(i), core_.drives[i.value], *view.target);
     view.error_um = 1e3 * std::hypot(sighting.x_mm - wanted.x_mm, sighting.y_mm - wanted.y_mm);
     ++round->measured;
-    round->worst_um = std::max(round->worst_um, *view.error_um);
     if (*view.error_um <= measure_->tolerance_um) ++round->within_tolerance;
   } else if (view.target) {
     ++round->unknown;
@@ -175,7 +189,7 @@ void Pursuit::TakeSighting(const Exposure& exposure, const Sighting& sighting,
     if (sighting.other) row.other = core_.layout.unit(*sighting.other).id;
     core_.Note(std::move(row));
   }
-  if (put && view.phase == UnitPhase::kReady && IsPlace(view.knowledge))
+  if (put && !measure_->observe && view.phase == UnitPhase::kReady && IsPlace(view.knowledge))
     core_.See(i, *sighting.place);
   if (sighting.status == SightingStatus::kDidNotMove && stood_[i.value] && view.target &&
       *stood_[i.value] != *view.target)
@@ -191,7 +205,7 @@ void Pursuit::CorrectOrFinish() {
   if (corrections_left_ > 0 && Correct()) return;
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     UnitView& view = core_.unit({n}).view;
-    if (view.outcome != TargetOutcome::kArrived || !view.target) continue;
+    if (view.outcome != TargetOutcome::kArrived || !view.target || measure_->observe) continue;
     if (!view.error_um) {
       view.outcome_reason =
           std::string("not measured: ") + (view.sighting ? Name(*view.sighting) : "not looked for");

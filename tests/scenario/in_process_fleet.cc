@@ -192,7 +192,7 @@ void InProcessFleet::Perform(const Effects& effects) {
 // A camera that sees every fibre and knows whose it is: to see and to tell apart is tried
 // elsewhere.
 ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
-  Exposure exposure{.id = job.id, .sightings = {}};
+  ExposureFindings exposure{.id = job.id, .sightings = {}};
   for (std::uint32_t n = 0; n < layout_->size(); ++n) {
     const sim::UnitTruth truth = world_->Truth(n);
     const double noise_mm = 1e-3 * options_.centroid_sigma_um;
