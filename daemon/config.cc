@@ -51,6 +51,8 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("bus");
   visit->Index("port", &c->bus.port, kPortKindNames);
   visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});
+  visit->Flag("can_fd", &c->bus.can_fd);
+  visit->Whole("data_bit_rate_bps", &c->bus.data_bit_rate_bps, {10'000, 8'000'000});
   visit->Path("unix_directory", &c->bus.unix_directory);
   visit->Texts("interfaces", &c->bus.interfaces);
   visit->Section("sync");
@@ -305,6 +307,12 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   const std::set<std::string> names(config.bus.interfaces.begin(), config.bus.interfaces.end());
   reader->Require(names.size() == config.bus.interfaces.size() && !names.contains(""), "bus",
                   "interfaces", "bus.interfaces must name each interface once");
+  reader->Require(!config.bus.can_fd || socketcan, "bus", "can_fd",
+                  "bus.can_fd needs bus.port = \"socketcan\": simulated buses and UNIX sockets "
+                  "carry classic frames only");
+  reader->Require(!config.bus.can_fd || config.bus.data_bit_rate_bps >= config.bus.bit_rate_bps,
+                  "bus", "data_bit_rate_bps",
+                  "bus.data_bit_rate_bps must not be below bus.bit_rate_bps");
   reader->Require(config.bus.port != PortKind::kUnix || !config.bus.unix_directory.empty(), "bus",
                   "unix_directory",
                   "bus.unix_directory must say where bus<ID>.sock are for bus.port = \"unix\"");
@@ -343,6 +351,7 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
   config.timing.has_camera = !config.camera.directory.empty();
+  config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();
   config.sync.chip_at = reader.At("sync", "chip");
   config.bus.interfaces_at = reader.At("bus", "interfaces");

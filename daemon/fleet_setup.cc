@@ -62,12 +62,14 @@ Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
   Ports ports;
   bool any = false;
   for (std::size_t b = 0; b < config.bus.interfaces.size(); ++b) {
-    auto port = SocketCanPort::Create({.bus = layout.buses()[b],
-                                       .interface = config.bus.interfaces[b],
-                                       .bit_rate_bps = config.bus.bit_rate_bps,
-                                       .clock = clock,
-                                       .retry_period = kRetryPeriod,
-                                       .open = open});
+    auto port = SocketCanPort::Create(
+        {.bus = layout.buses()[b],
+         .interface = config.bus.interfaces[b],
+         .bit_rate_bps = config.bus.bit_rate_bps,
+         .data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0,
+         .clock = clock,
+         .retry_period = kRetryPeriod,
+         .open = open});
     if (!port) return Fail(port.error().code, config.bus.interfaces_at + ": " + port.error().text);
     FOCALFLEET_TRY(CheckSpeed(config, clock, **port));
     any |= (*port)->found();

@@ -52,7 +52,7 @@ class Coordinator::Impl {
     BusRecord* bus = core_.FindBus(received.bus);
     FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
     ++bus->view.frames_received;
-    core_.Count(bus, received.frame);
+    core_.Count(bus, {&received.frame, 1});
     const auto heard = DecodeUnit(received.frame);
     if (!heard) {
       // Another host may share the bus (a direct stop does): its frames are well formed and not for

@@ -253,10 +253,12 @@ struct StartView {
 /// Getting the moves of a configuration onto the wire. Counted are the frames without which a unit
 /// is not armed: stage_begin, stage_segment, confirm and arm with their answers.
 struct UploadView {
-  std::uint64_t bits_predicted = 0;  // exact, each frame once; known before the first is sent
-  std::uint64_t bits = 0;            // as they passed: repeats and late moves included
-  double predicted_s = 0;            // bits_predicted by the bit rate; of all buses the longest
-  double measured_s = 0;  // first frame let go to last unit armed; of all buses the longest
+  // Of the nominal bit rate: CAN FD counts by its time. Known before the first is sent: exact, each
+  // frame once, groups as full as can be.
+  std::uint64_t bits_predicted = 0;
+  std::uint64_t bits = 0;  // as they passed: repeats and late moves included
+  double predicted_s = 0;  // bits_predicted by the bit rate; of all buses the longest
+  double measured_s = 0;   // first frame let go to last unit armed; of all buses the longest
 };
 
 struct BusView {
@@ -306,6 +308,7 @@ struct ConfigurationView {
 
 struct CoordinatorConfig {
   std::uint32_t bit_rate_bps = 1'000'000;
+  std::uint32_t data_bit_rate_bps = 0;  // of groups on buses with CAN FD (docs/adr/0008); 0: none
   DurationNs reply_wait =
       Milliseconds(50);  // one request's answer; repeats wait 2, 4, 8, 16 times that
   DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again

@@ -13,6 +13,7 @@
 #include <deque>
 #include <optional>
 #include <queue>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -188,13 +189,15 @@ class Core {
   void BeginStep(const Inputs& inputs, Effects* effects);
   /// Matches an answer to the open question; false: late, doubled, or never asked.
   [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
-  void Count(BusRecord* bus, const CanFrame& frame);
+  /// Frames that passed the bus together: one, or those of a group.
+  void Count(BusRecord* bus, std::span<const CanFrame> frames);
   void EndStep();
   /// Units that are due at `now`, in the order of their times.
   [[nodiscard]] std::optional<PositionerIndex> NextDue();
 
   const Layout& layout;
   const CoordinatorConfig config;
+  const BusRates rates;
   std::vector<UnitDrive> drives;
   std::vector<UnitRecord> units;
   std::vector<BusRecord> buses;
@@ -235,6 +238,7 @@ class Core {
   std::uint64_t reserved_by_ = 0;  // the batch of the first stock
 
   void CloseLoadWindow(BusRecord* bus) const;
+  void CountSent();
   void DropQuestion(PositionerIndex i);
 
   std::priority_queue<Timer, std::vector<Timer>, std::greater<>> timers_;

@@ -119,7 +119,8 @@ class Pursuit {
   void TakePlan(const PlanDone& done);
   void PumpUploads();
   void Upload(PositionerIndex i);
-  [[nodiscard]] std::uint32_t UploadBits(PositionerIndex i) const;
+  /// Appends what the host stages to `staged`; returns the bits of the rest.
+  std::uint32_t UploadBits(PositionerIndex i, std::vector<CanFrame>* staged) const;
   void PredictUpload();
   void MeasureUpload();
   void FallOut(PositionerIndex i, const std::string& reason);
