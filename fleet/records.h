@@ -89,7 +89,8 @@ struct MeasurementRow {
   double y_mm = 0;
   double sigma_um = 0;             // of one coordinate
   std::optional<Pose> place;       // vectors; none: it was put nowhere
-  std::optional<double> error_um;  // from its target, where it had one
+  std::optional<PointFp> target_fp;  // where it had one
+  std::optional<double> error_um;    // from there
 };
 
 struct BindingRow {  // which hardware sits at a place

@@ -230,7 +230,9 @@ CREATE TABLE measurement(
   sigma_um REAL NOT NULL,
   theta INTEGER,                -- vectors; NULL: the unit was put nowhere
   phi INTEGER,
-  error_um REAL,                -- from its target; NULL: it had none
+  target_x_mm REAL,             -- NULL: it had none
+  target_y_mm REAL,
+  error_um REAL,                -- from its target
   at_ns INTEGER NOT NULL,
   PRIMARY KEY(exposure, unit_id)
 ) STRICT, WITHOUT ROWID;
@@ -240,7 +242,7 @@ CREATE VIEW measured AS SELECT
   CASE status WHEN 0 THEN 'measured' WHEN 1 THEN 'did_not_move' WHEN 2 THEN 'swapped'
     WHEN 3 THEN 'strayed' WHEN 4 THEN 'swap_suspected' WHEN 5 THEN 'blended'
     WHEN 6 THEN 'outside_patrol' WHEN 7 THEN 'ambiguous' ELSE 'missing' END AS status,
-  x_mm, y_mm, sigma_um, error_um,
+  x_mm, y_mm, sigma_um, target_x_mm, target_y_mm, error_um,
   datetime(at_ns / 1000000000, 'unixepoch') AS at_utc
   FROM measurement;
 )sql";

@@ -90,8 +90,8 @@ constexpr const char* kTuning =
     "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* kMeasurement =
     "INSERT OR REPLACE INTO measurement(exposure, unit_id, serial, configuration, status, "
-    "other, x_mm, y_mm, sigma_um, theta, phi, error_um, at_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
+    "other, x_mm, y_mm, sigma_um, theta, phi, error_um, target_x_mm, target_y_mm, at_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)";
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
@@ -196,7 +196,9 @@ class RowWriter {
     row.place ? s.Bind(10, (*row.place)[0]) : s.BindNull(10);
     row.place ? s.Bind(11, (*row.place)[1]) : s.BindNull(11);
     row.error_um ? s.BindReal(12, *row.error_um) : s.BindNull(12);
-    s.Bind(13, now_.ns);
+    row.target_fp ? s.BindReal(13, row.target_fp->x_mm) : s.BindNull(13);
+    row.target_fp ? s.BindReal(14, row.target_fp->y_mm) : s.BindNull(14);
+    s.Bind(15, now_.ns);
     FOCALFLEET_TRY(s.Run());
     return Meta(statements_.raise_meta, "next_exposure", row.exposure + 1);
   }

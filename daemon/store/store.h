@@ -134,6 +134,11 @@ struct UnitHistory {
 /// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
 /// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
 /// read.
+struct MeasurementHistory {
+  MeasurementRow row;
+  WallTime at;  // stored
+};
+
 class StoreReader {
  public:
   /// Errors: kUnavailable: no such file, or not readable; kNewer; kInvalid: not a store.
@@ -150,7 +155,7 @@ class StoreReader {
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
   /// Of one exposure, by unit id.
-  Result<std::vector<MeasurementRow>> Measurements(std::uint64_t exposure);
+  Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);

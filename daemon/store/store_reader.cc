@@ -173,13 +173,14 @@ Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
       });
 }
 
-Result<std::vector<MeasurementRow>> StoreReader::Measurements(std::uint64_t exposure) {
-  return Query<MeasurementRow>(
+Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t exposure) {
+  return Query<MeasurementHistory>(
       *connection_, "measurement",
       "SELECT exposure, unit_id, serial, configuration, status, other, x_mm, y_mm, sigma_um, "
-      "theta, phi, error_um FROM measurement WHERE exposure = ?2 ORDER BY unit_id LIMIT ?1",
+      "theta, phi, error_um, target_x_mm, target_y_mm, at_ns FROM measurement WHERE exposure = ?2 ORDER BY unit_id LIMIT ?1",
       limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
-        MeasurementRow row;
+        MeasurementHistory history;
+        MeasurementRow& row = history.row;
         row.exposure = cells.Whole<std::uint64_t>(0);
         row.unit = {cells.Whole<std::uint32_t>(1)};
         row.serial = cells.Serial(2);
@@ -193,7 +194,10 @@ Result<std::vector<MeasurementRow>> StoreReader::Measurements(std::uint64_t expo
         if (!cells.IsNull(9))
           row.place = Pose{cells.Whole<std::int32_t>(9), cells.Whole<std::int32_t>(10)};
         if (!cells.IsNull(11)) row.error_um = cells.Real(11);
-        return row;
+        cells.Require(cells.IsNull(12) == cells.IsNull(13), "it has a target on one axis alone");
+        if (!cells.IsNull(12)) row.target_fp = PointFp{cells.Real(12), cells.Real(13)};
+        history.at = {cells.Whole<std::int64_t>(14)};
+        return history;
       });
 }
 

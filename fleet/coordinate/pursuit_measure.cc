@@ -185,8 +185,11 @@ void Pursuit::TakeSighting(const ExposureFindings& exposure, const Sighting& sig
                        .y_mm = sighting.y_mm,
                        .sigma_um = sighting.sigma_um,
                        .place = sighting.place,
+                       .target_fp = {},
                        .error_um = view.error_um};
     if (sighting.other) row.other = core_.layout.unit(*sighting.other).id;
+    if (view.target)
+      row.target_fp = FibreAt(core_.layout.unit(i), core_.drives[i.value], *view.target);
     core_.Note(std::move(row));
   }
   if (put && !measure_->observe && view.phase == UnitPhase::kReady && IsPlace(view.knowledge))

@@ -1,0 +1,280 @@
+#include "daemon/campaign/campaign_files.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "fleet/files/csv.h"
+#include "fleet/files/layout_file.h"
+
+namespace focalfleet {
+namespace {
+
+using sim::Campaign;
+using sim::CampaignUnit;
+using sim::kPhi;
+using sim::kTheta;
+
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+constexpr IntegerBounds kIdBounds{0, UINT32_MAX - 1};
+constexpr IntegerBounds kMoveBounds{0, 1'000'000'000};
+constexpr double kAngleMax_deg = 1e6;
+constexpr double kPlaceMax_mm = 1e5;
+constexpr std::array<std::string_view, 8> kFixedColumns = {
+    "unit_id",      "move_id",     "theta_from_deg", "theta_cmd_deg",
+    "phi_from_deg", "phi_cmd_deg", "x_mm",           "y_mm"};
+constexpr std::string_view kWordColumn = "mode";
+constexpr std::array<std::string_view, 3> kModes = {"asymmetric", "five_segment", "seven_segment"};
+
+// Covariates of which some values can be known to be wrong.
+struct CovariateBounds {
+  std::string_view column;
+  double low;
+  double high;
+};
+constexpr double kFar = 1e300;
+constexpr CovariateBounds kCovariateBounds[] = {
+    {"sigma_um", 0, 1e6},        {"rehomed", 0, 1},
+    {"temp_C", -200, 300},       {"v_bus_V", 0, 1000},
+    {"elevation_deg", -90, 180}, {"movers_on_rail", 0, 1e6},
+    {"delay_s", 0, 1e7},         {"drive_amplitude", 0, 1000},
+    {"cycles_theta", 0, kFar},   {"cycles_phi", 0, kFar},
+};
+
+double OrMissing(std::optional<std::uint32_t> value) {
+  return value ? static_cast<double>(*value) : kMissing;
+}
+
+CampaignUnit UnitOf(const Unit& unit, bool has_rail, bool has_bus) {
+  CampaignUnit out;
+  out.id = unit.id.value;
+  out.base_x_mm = unit.base_fp.x_mm;
+  out.base_y_mm = unit.base_fp.y_mm;
+  for (const Axis axis : kAxes) {
+    const AxisGeometry& geometry = unit.axis[Index(axis)];
+    out.arm_mm[Index(axis)] = geometry.arm_mm;
+    out.zero_deg[Index(axis)] = geometry.zero_deg;
+    out.gear[Index(axis)] = geometry.gear;
+    out.min_deg[Index(axis)] = geometry.min_deg;
+    out.max_deg[Index(axis)] = geometry.max_deg;
+  }
+  out.rail = has_rail ? static_cast<double>(unit.rail.value) : kMissing;
+  out.bus = has_bus && unit.bus != kNoBus ? static_cast<double>(unit.bus.value) : kMissing;
+  out.rail_slot = OrMissing(unit.rail_slot);
+  out.bus_slot = OrMissing(unit.bus_slot);
+  out.enabled = unit.enabled;
+  return out;
+}
+
+// One row of moves.csv as it stands in the file, before the rows are sorted by unit.
+struct MoveRow {
+  std::size_t unit = 0;
+  std::size_t at = 0;  // row of the table
+  std::int64_t move = 0;
+  double from_deg[2] = {0, 0};
+  double cmd_deg[2] = {0, 0};
+  double x_mm = kMissing;
+  double y_mm = kMissing;
+};
+
+void CheckSize(CsvRow* row, std::string_view column, double value, double size_max) {
+  if (std::abs(value) > size_max)
+    row->Reject(column, NumberText(value) + " is not within +-" + NumberText(size_max));
+}
+
+Result<MoveRow> ReadMove(const CsvTable& table, std::size_t at,
+                         const std::unordered_map<std::uint32_t, std::size_t>& unit_of_id,
+                         const std::string& units_file) {
+  CsvRow row(table, at);
+  MoveRow move;
+  move.at = at;
+  const auto id = static_cast<std::uint32_t>(row.Integer("unit_id", kIdBounds));
+  move.move = row.Integer("move_id", kMoveBounds);
+  constexpr std::string_view kFrom[] = {"theta_from_deg", "phi_from_deg"};
+  constexpr std::string_view kCmd[] = {"theta_cmd_deg", "phi_cmd_deg"};
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    move.from_deg[axis] = row.Number(kFrom[axis]);
+    move.cmd_deg[axis] = row.Number(kCmd[axis]);
+    CheckSize(&row, kFrom[axis], move.from_deg[axis], kAngleMax_deg);
+    CheckSize(&row, kCmd[axis], move.cmd_deg[axis], kAngleMax_deg);
+  }
+  move.x_mm = row.NumberIfAny("x_mm").value_or(kMissing);
+  move.y_mm = row.NumberIfAny("y_mm").value_or(kMissing);
+  CheckSize(&row, "x_mm", move.x_mm, kPlaceMax_mm);
+  CheckSize(&row, "y_mm", move.y_mm, kPlaceMax_mm);
+  if (std::isnan(move.x_mm) != std::isnan(move.y_mm))
+    row.Reject(std::isnan(move.x_mm) ? "x_mm" : "y_mm",
+               "the other coordinate is there: both or neither");
+  if (row.error()) return tl::unexpected<Error>(*row.error());
+  const auto unit = unit_of_id.find(id);
+  if (unit == unit_of_id.end())
+    return tl::unexpected<Error>(table.ErrorAt(
+        at, "column unit_id: unit " + std::to_string(id) + " is not in " + units_file));
+  move.unit = unit->second;
+  return move;
+}
+
+std::string TwiceText(std::uint32_t id, std::int64_t move, int line) {
+  return "column move_id: unit " + std::to_string(id) + " has move " + std::to_string(move) +
+         " twice, first in line " + std::to_string(line);
+}
+
+Result<std::vector<MoveRow>> ReadMoveRows(const CsvTable& table, const UnitsFile& units) {
+  std::unordered_map<std::uint32_t, std::size_t> unit_of_id;
+  for (std::size_t u = 0; u < units.units.size(); ++u) unit_of_id[units.units[u].id.value] = u;
+  std::vector<MoveRow> rows;
+  rows.reserve(table.size());
+  std::unordered_map<std::uint64_t, int> line_of;
+  line_of.reserve(table.size());
+  for (std::size_t at = 0; at < table.size(); ++at) {
+    FOCALFLEET_TRY_ASSIGN(const MoveRow row, ReadMove(table, at, unit_of_id, units.source));
+    const std::uint64_t key =
+        (std::uint64_t{row.unit} << 32) | static_cast<std::uint64_t>(row.move);
+    const auto [it, fresh] = line_of.emplace(key, table.line(at));
+    if (!fresh)
+      return tl::unexpected<Error>(
+          table.ErrorAt(at, TwiceText(units.units[row.unit].id.value, row.move, it->second)));
+    rows.push_back(row);
+  }
+  if (rows.empty()) return Fail(ErrorCode::kInvalid, table.file() + ": a header, but no moves");
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const MoveRow& a, const MoveRow& b) { return a.unit < b.unit; });
+  return rows;
+}
+
+Status ReadCovariate(const CsvTable& table, const std::string& name,
+                     const std::vector<MoveRow>& rows, Campaign* campaign) {
+  sim::Covariate covariate{name, {}};
+  covariate.values.reserve(rows.size());
+  const auto bounds =
+      std::find_if(std::begin(kCovariateBounds), std::end(kCovariateBounds),
+                   [&](const CovariateBounds& candidate) { return candidate.column == name; });
+  for (const MoveRow& move : rows) {
+    CsvRow row(table, move.at);
+    const std::optional<double> value = row.NumberIfAny(name);
+    if (value && bounds != std::end(kCovariateBounds) &&
+        (*value < bounds->low || *value > bounds->high))
+      row.Reject(name, NumberText(*value) + " is not between " + NumberText(bounds->low) + " and " +
+                           NumberText(bounds->high));
+    if (row.error()) return tl::unexpected<Error>(*row.error());
+    covariate.values.push_back(value.value_or(kMissing));
+  }
+  campaign->covariates.push_back(std::move(covariate));
+  return {};
+}
+
+Status ReadModes(const CsvTable& table, const std::vector<MoveRow>& rows, Campaign* campaign) {
+  sim::WordColumn column{std::string(kWordColumn), {kModes.begin(), kModes.end()}, {}};
+  for (const MoveRow& move : rows) {
+    CsvRow row(table, move.at);
+    if (!row.Has(kWordColumn)) {
+      column.values.push_back(-1);
+      continue;
+    }
+    const std::string word = row.Text(kWordColumn);
+    const auto it = std::find(kModes.begin(), kModes.end(), word);
+    if (it == kModes.end())
+      return tl::unexpected<Error>(
+          table.ErrorAt(move.at, "column mode: '" + word.substr(0, 40) +
+                                     "' is not asymmetric, five_segment or seven_segment"));
+    column.values.push_back(static_cast<int>(it - kModes.begin()));
+  }
+  campaign->word_columns.push_back(std::move(column));
+  return {};
+}
+
+void TakeRows(const std::vector<MoveRow>& rows, const UnitsFile& units, bool has_rail, bool has_bus,
+              Campaign* campaign) {
+  std::optional<std::size_t> unit;
+  for (const MoveRow& row : rows) {
+    if (unit != row.unit) {
+      campaign->units.push_back(UnitOf(units.units[row.unit], has_rail, has_bus));
+      campaign->first_row.push_back(campaign->move_id.size());
+      unit = row.unit;
+    }
+    campaign->move_id.push_back(row.move);
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      campaign->from_deg[axis].push_back(row.from_deg[axis]);
+      campaign->cmd_deg[axis].push_back(row.cmd_deg[axis]);
+    }
+    campaign->x_mm.push_back(row.x_mm);
+    campaign->y_mm.push_back(row.y_mm);
+  }
+  campaign->first_row.push_back(campaign->move_id.size());
+}
+
+bool HasColumn(std::string_view text, std::string_view column) {
+  // Of the header alone: whether units.csv has it, or its reader put a default there.
+  while (text.starts_with('#')) text.remove_prefix(std::min(text.size(), text.find('\n') + 1));
+  const std::string_view header = text.substr(0, text.find('\n'));
+  return header.find(column) != std::string_view::npos;
+}
+
+}  // namespace
+
+Result<Campaign> ReadCampaign(const CampaignTables& tables) {
+  FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(tables.units, tables.units_file));
+  FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.moves, tables.moves_file));
+  FOCALFLEET_TRY(table.Require({"unit_id", "move_id", "theta_from_deg", "theta_cmd_deg",
+                                "phi_from_deg", "phi_cmd_deg", "x_mm", "y_mm"}));
+  FOCALFLEET_TRY_ASSIGN(const std::vector<MoveRow> rows, ReadMoveRows(table, units));
+  Campaign campaign;
+  campaign.name = tables.name;
+  TakeRows(rows, units, HasColumn(tables.units, "rail_id"), HasColumn(tables.units, "bus_id"),
+           &campaign);
+  for (const std::string& column : table.columns()) {
+    if (std::find(kFixedColumns.begin(), kFixedColumns.end(), column) != kFixedColumns.end())
+      continue;
+    FOCALFLEET_TRY(column == kWordColumn ? ReadModes(table, rows, &campaign)
+                                         : ReadCovariate(table, column, rows, &campaign));
+  }
+  FOCALFLEET_TRY(Validate(campaign));
+  return campaign;
+}
+
+std::string WriteMoves(const Campaign& campaign) {
+  std::vector<std::string_view> columns(kFixedColumns.begin(), kFixedColumns.end());
+  for (const sim::Covariate& covariate : campaign.covariates) columns.push_back(covariate.name);
+  for (const sim::WordColumn& column : campaign.word_columns) columns.push_back(column.name);
+  CsvWriter csv(columns);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      csv.Integer(campaign.units[unit].id).Integer(campaign.move_id[row]);
+      for (const std::size_t axis : {kTheta, kPhi})
+        csv.Number(campaign.from_deg[axis][row]).Number(campaign.cmd_deg[axis][row]);
+      csv.Number(campaign.x_mm[row]).Number(campaign.y_mm[row]);
+      for (const sim::Covariate& covariate : campaign.covariates) csv.Number(covariate.values[row]);
+      for (const sim::WordColumn& column : campaign.word_columns) {
+        const int word = column.values[row];
+        word < 0 ? csv.Missing() : csv.Text(column.words[static_cast<std::size_t>(word)]);
+      }
+      csv.EndRow();
+    }
+  return csv.Take();
+}
+
+std::string WriteCampaignUnits(const Campaign& campaign) {
+  CsvWriter csv({"unit_id", "base_x_mm", "base_y_mm", "arm_theta_mm", "arm_phi_mm",
+                 "theta_zero_deg", "phi_zero_deg", "theta_gear", "phi_gear", "theta_min_deg",
+                 "theta_max_deg", "phi_min_deg", "phi_max_deg", "rail_id", "rail_slot", "bus_id",
+                 "bus_slot", "enabled"});
+  for (const CampaignUnit& unit : campaign.units) {
+    csv.Integer(unit.id).Number(unit.base_x_mm).Number(unit.base_y_mm);
+    csv.Number(unit.arm_mm[kTheta]).Number(unit.arm_mm[kPhi]);
+    csv.Number(unit.zero_deg[kTheta]).Number(unit.zero_deg[kPhi]);
+    csv.Number(unit.gear[kTheta]).Number(unit.gear[kPhi]);
+    for (const std::size_t axis : {kTheta, kPhi})
+      csv.Number(unit.min_deg[axis]).Number(unit.max_deg[axis]);
+    csv.Number(unit.rail).Number(unit.rail_slot).Number(unit.bus).Number(unit.bus_slot);
+    csv.Integer(unit.enabled ? 1 : 0).EndRow();
+  }
+  return csv.Take();
+}
+
+}  // namespace focalfleet
