@@ -308,6 +308,7 @@ std::optional<Result<Json>> ControlDesk::Ask(const FleetView& view, const Contro
   if (request.verb == "unit") return AskUnit(view, request);
   if (request.verb == "params") return AskParameters(view, request);
   if (request.verb == "history") return AskHistory(view, request);
+  if (request.verb == "measurements") return AskMeasurements(view, request);
   return std::nullopt;
 }
 
@@ -351,6 +352,22 @@ Result<Json> ControlDesk::AskHistory(const FleetView& view, const ControlRequest
   FOCALFLEET_TRY_ASSIGN(const auto moves, reader->Moves(id, limit));
   FOCALFLEET_TRY_ASSIGN(const auto places, reader->Units(id, limit));
   return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+}
+
+/// {exposure?}: the newest of the last configuration without it.
+Result<Json> ControlDesk::AskMeasurements(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
+  if (exposure == 0) {
+    FOCALFLEET_TRY_ASSIGN(const auto last,
+                          reader->LastExposure(view.coordinator->configuration().id));
+    if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
+    exposure = *last;
+  }
+  FOCALFLEET_TRY_ASSIGN(const auto rows, reader->Measurements(exposure));
+  if (rows.empty())
+    return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
+  return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
 }
 
 Result<StoreReader*> ControlDesk::Reader() {

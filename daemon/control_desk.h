@@ -65,6 +65,7 @@ class ControlDesk {
   Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
   Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
   Result<Json> AskHistory(const FleetView& view, const ControlRequest& request);
+  Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
 

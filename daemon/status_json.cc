@@ -327,6 +327,24 @@ Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
   return rows;
 }
 
+Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
+  Json rows = Json::array();
+  for (const auto& [row, at] : measurements) {
+    Json json = {{"unit_id", row.unit.value},
+                 {"configuration", row.configuration},
+                 {"status", Name(row.status)},
+                 {"x_mm", row.x_mm},
+                 {"y_mm", row.y_mm},
+                 {"sigma_um", row.sigma_um},
+                 {"target_x_mm", row.target_fp ? Json(row.target_fp->x_mm) : Json()},
+                 {"target_y_mm", row.target_fp ? Json(row.target_fp->y_mm) : Json()},
+                 {"error_um", row.error_um ? Json(*row.error_um) : Json()},
+                 {"other_unit_id", row.other ? Json(row.other->value) : Json()},
+                 {"at", ToIso8601(at)}};
+    rows.push_back(std::move(json));
+  }
+  return rows;
+}
 Json HistoryJson(const std::vector<MoveHistory>& moves) {
   Json rows = Json::array();
   for (const MoveHistory& move : moves) {

@@ -133,6 +133,8 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddSimulateCommand(line.get());
   AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
+  AddMeasurementsCommand(line.get());
+  AddCampaignCommands(line.get());
   AddCanCommands(line.get());
   AddCompletionCommand(line.get());
   return line;

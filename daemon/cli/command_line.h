@@ -62,7 +62,9 @@ void AddUnitCommands(CommandLine* line);  // home, disable, enable, adopt, param
 void AddSimulateCommand(CommandLine* line);
 void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
+void AddCampaignCommands(CommandLine* line);
 void AddCanCommands(CommandLine* line);
+void AddMeasurementsCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

@@ -131,14 +131,14 @@ struct UnitHistory {
   WallTime at;
 };
 
-/// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
-/// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
-/// read.
 struct MeasurementHistory {
   MeasurementRow row;
   WallTime at;  // stored
 };
 
+/// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
+/// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
+/// read.
 class StoreReader {
  public:
   /// Errors: kUnavailable: no such file, or not readable; kNewer; kInvalid: not a store.

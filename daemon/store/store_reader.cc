@@ -177,7 +177,8 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
   return Query<MeasurementHistory>(
       *connection_, "measurement",
       "SELECT exposure, unit_id, serial, configuration, status, other, x_mm, y_mm, sigma_um, "
-      "theta, phi, error_um, target_x_mm, target_y_mm, at_ns FROM measurement WHERE exposure = ?2 ORDER BY unit_id LIMIT ?1",
+      "theta, phi, error_um, target_x_mm, target_y_mm, at_ns FROM measurement WHERE exposure = ?2 "
+      "ORDER BY unit_id LIMIT ?1",
       limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
         MeasurementHistory history;
         MeasurementRow& row = history.row;
