@@ -5,8 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "fleet/kinematics.h"
 #include "fleet/layout.h"
 #include "protocol/base/result.h"
 #include "sim/campaign/campaign.h"

@@ -136,9 +136,9 @@ tl::expected<Json, Failure> MakeMove(const Context& context, const ListedMove& m
   if (!done) return tl::unexpected(done.error());
   if (ListIn(*done, "measured").empty())
     return tl::unexpected(
-        Failure{{ErrorCode::kUnavailable,
-                 fmt::format("{}: the camera saw nothing (focalfleet history says why)", source)},
-                ExitCode::kBroken});
+        Failure{ExitCode::kBroken,
+                {ErrorCode::kUnavailable,
+                 fmt::format("{}: the camera saw nothing (focalfleet history says why)", source)}});
   return Ask(context, {.verb = "measurements"});
 }
 

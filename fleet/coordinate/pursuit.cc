@@ -146,6 +146,7 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   corrections_left_ = measure_ ? measure_->corrections : std::uint8_t{0};
   goes_past_ = measure_ && !measure_->observe;
   sets_out_ = true;
+  measured_batch_ = 0;
   exposures_refused_ = 0;
   view_ = {.id = core_.next_configuration++,
            .source = std::move(source),
@@ -360,7 +361,7 @@ void Pursuit::Advance() {
       if (count(Part::kMoving) == 0) RoundOver();
       break;
     case State::kReporting:
-      if (arrivals_.empty()) Finish();
+      if (arrivals_.empty() && core_.committed_through >= measured_batch_) Finish();
       break;
     case State::kMeasuring:
       if (exposure_ == 0 && arrivals_.empty()) AskForExposure();
@@ -376,7 +377,7 @@ void Pursuit::Advance() {
 void Pursuit::SayWhatIsWaitedFor() {
   const bool needs_the_store = (state_ == State::kGathering && !core_.MovesAreReserved()) ||
                                state_ == State::kCommitting || state_ == State::kHomeCommitting ||
-                               (state_ == State::kReporting && !arrivals_.empty());
+                               state_ == State::kReporting;
   view_.waiting_for = needs_the_store && core_.store_failing ? "the store, which cannot be written"
                       : state_ == State::kMeasuring && exposure_ != 0 ? "the camera"
                                                                       : "";

@@ -224,6 +224,7 @@ class Pursuit {
   std::vector<std::optional<Pose>> targets_;
   // Of a goal that is measured.
   std::optional<ApplyCommand::Measure> measure_;
+  std::uint64_t measured_batch_ = 0;  // with which the last exposure becomes durable; 0: none
   std::uint8_t corrections_left_ = 0;
   bool goes_past_ = false;                  // this leg ends past the targets
   bool sets_out_ = false;                   // the next round is the first since the last exposure

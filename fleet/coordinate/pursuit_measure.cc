@@ -155,6 +155,7 @@ void Pursuit::OnExposure(const ExposureDone& done) {
   }
   Summarise(std::move(errors_um), &round);
   view_.measured.push_back(round);
+  measured_batch_ = core_.batch_now();
   CorrectOrFinish();
 }
 
