@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <utility>
 
 namespace focalfleet {
 namespace {
@@ -61,14 +62,19 @@ Result<FitsColumn> ReadColumn(fitsfile* file, int number, const ColumnForm& form
     std::vector<char> buffer(static_cast<std::size_t>(form.repeat) + 1);
     for (long row = 1; row <= rows && status == 0; ++row) {
       char* into = buffer.data();
-      fits_read_col(file, TSTRING, number, row, 1, 1, nullptr, &into, nullptr, &status);
-      texts[static_cast<std::size_t>(row - 1)] = into;
+      int none = 0;
+      fits_read_col(file, TSTRING, number, row, 1, 1, nullptr, &into, &none, &status);
+      std::string text = into;
+      text.erase(text.find_last_not_of(' ') + 1);  // blanks at the end mean nothing in FITS
+      texts[static_cast<std::size_t>(row - 1)] = std::move(text);
     }
     column.values = std::move(texts);
   } else if (form.type == TFLOAT || form.type == TDOUBLE) {
     std::vector<double> numbers(count);
     double missing = std::nan("");
-    fits_read_col(file, TDOUBLE, number, 1, 1, rows, &missing, numbers.data(), nullptr, &status);
+    int any_missing = 0;
+    fits_read_col(file, TDOUBLE, number, 1, 1, rows, &missing, numbers.data(), &any_missing,
+                  &status);
     column.values = std::move(numbers);
   } else {
     std::vector<std::int64_t> numbers(count);
@@ -84,6 +90,13 @@ Result<FitsColumn> ReadColumn(fitsfile* file, int number, const ColumnForm& form
   return column;
 }
 
+/// Keys that describe the table itself; writing it makes them anew.
+bool IsOfTheFormat(std::string_view key) {
+  for (const char* stem : {"XTENSION", "TTYPE", "TFORM", "TUNIT", "TDISP", "CHECKSUM", "DATASUM"})
+    if (key.starts_with(stem)) return true;
+  return key == "EXTNAME";
+}
+
 void ReadKeys(fitsfile* file, FitsTable* table) {
   int status = 0;
   int count = 0;
@@ -94,6 +107,7 @@ void ReadKeys(fitsfile* file, FitsTable* table) {
     std::array<char, FLEN_COMMENT> comment{};
     fits_read_keyn(file, i, name.data(), value.data(), comment.data(), &status);
     if (status != 0 || value[0] != '\'') continue;
+    if (IsOfTheFormat(name.data())) continue;
     char* text = nullptr;
     if (fits_read_key_longstr(file, name.data(), &text, nullptr, &status) != 0) continue;
     table->keys.push_back({name.data(), std::string(text), comment.data()});
@@ -178,9 +192,11 @@ Result<FitsTable> ReadFitsTable(const std::string& path) {
   if (rows > kFitsRowsMax)
     return Fail(ErrorCode::kInvalid, path + ": " + std::to_string(rows) + " rows are too many");
   FitsTable table;
+  std::array<char, FLEN_VALUE> name{};
+  int unnamed = 0;
+  if (fits_read_key(opened, TSTRING, "EXTNAME", name.data(), nullptr, &unnamed) == 0)
+    table.name = name.data();
   ReadKeys(opened, &table);
-  if (const FitsKey* name = table.FindKey("EXTNAME"))
-    table.name = std::get<std::string>(name->value);
   for (int number = 1; number <= columns; ++number) {
     ColumnForm form;
     fits_get_eqcoltype(opened, number, &form.type, &form.repeat, &form.width, &status);

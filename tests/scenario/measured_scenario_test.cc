@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 
 #include "fleet/kinematics.h"
 #include "tests/scenario/in_process_fleet.h"
@@ -17,21 +16,22 @@ double TrueErrorUm(const InProcessFleet& fleet, const UnitView& view, std::uint3
 }
 
 TEST(Measured, CorrectionsBringUnitsWithRealGearsToTheirTargets) {
-  InProcessFleet fleet({.count = 150, .seed = 3, .spread = sim::Spread::kReal});
+  InProcessFleet fleet(
+      {.count = 150, .seed = 3, .config = {.has_camera = true}, .spread = sim::Spread::kReal});
   fleet.ApplyRandomMeasured(1, {.corrections = 2, .tolerance_um = 10});
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
   ASSERT_EQ(view.measured.size(), 3u);
-  for (const MeasuredRound& round : view.measured)
-    std::printf("exposure %d: %u measured, rms %.1f um, worst %.1f um, %u within\n",
-                static_cast<int>(round.exposure), round.measured, round.rms_um, round.worst_um,
-                round.within_tolerance);
+  // Blind, nobody is there; the rest at the end has gears or motors that no correction mends.
+  EXPECT_EQ(view.measured[0].within_tolerance, 0u);
+  EXPECT_GE(view.measured[2].within_tolerance, 120u);
+  EXPECT_LT(view.measured[2].median_um, 6);
   for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
     const UnitView& unit = fleet.coordinator().unit({n});
     if (unit.outcome == TargetOutcome::kArrived) {
       EXPECT_LT(TrueErrorUm(fleet, unit, n), 10 + 4 * 2 * std::sqrt(2.0)) << n;
     } else {
-      std::printf("%.1f ", *unit.error_um);
+      EXPECT_FALSE(unit.outcome_reason.empty()) << n;
     }
   }
 }

@@ -18,6 +18,7 @@ using ::testing::HasSubstr;
 
 constexpr std::int64_t kNowNs = 1'795'316'645'000'000'000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr double kRimMm = 260;  // beyond the outermost fibre
 
 /// Gives what it was filled with, one after the other.
 class ScriptedPort : public CameraPort {
@@ -37,11 +38,11 @@ class ScriptedPort : public CameraPort {
 
 class CameraWorkTest : public ::testing::Test {
  protected:
-  CameraWorkTest() : field_({.count = 300, .units_per_bus = 100}, 7) {
+  CameraWorkTest() : field_({.count = 300, .units_per_bus = 100, .fiducials = 40}, 7) {
     const testing::FieldTroubles none{
         .tail_share = 0, .dead_share = 0, .slipping_share = 0, .disabled_share = 0, .swaps = 0};
     field_.Move(none);
-    const sim::CameraTraits traits = testing::TestCamera(0.3);
+    const sim::CameraTraits traits = testing::TestCamera(kRimMm);
     CameraWorker::Options options{
         .layout = &field_.layout(),
         .site = {.model = testing::ModelOf(traits),
@@ -74,7 +75,7 @@ class CameraWorkTest : public ::testing::Test {
     return knowledge;
   }
   Exposure Take(const std::string& id) {
-    sim::CameraTraits traits = testing::TestCamera(0.3);
+    sim::CameraTraits traits = testing::TestCamera(kRimMm);
     Exposure exposure =
         testing::ExposureOf(sim::TakeImage(field_.Sources(), traits, &field_.rng()), id);
     exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;
@@ -129,9 +130,10 @@ TEST_F(CameraWorkTest, WhatMayNotAnswerIsRefusedWithItsReason) {
   future.taken_unix_ns = now_ns_ + 10 * kSecondNs;
   ExpectRefused(future, "future");
   Exposure turned = Take("turned");
+  const std::complex<double> far_corner = testing::TestCamera(kRimMm).sensor_px - 1.0;
   for (Spot& spot : turned.spots) {
-    spot.x_px = 10'999 - spot.x_px;
-    spot.y_px = 10'999 - spot.y_px;
+    spot.x_px = far_corner.real() - spot.x_px;
+    spot.y_px = far_corner.imag() - spot.y_px;
   }
   ExpectRefused(turned, "turned");
   Exposure few = Take("few");
@@ -144,10 +146,11 @@ TEST_F(CameraWorkTest, WhatMayNotAnswerIsRefusedWithItsReason) {
 
 TEST_F(CameraWorkTest, AnotherFieldIsRefused) {
   const Exposure other = [&] {
-    CameraField elsewhere({.count = 300, .units_per_bus = 100}, 8);
+    CameraField elsewhere({.count = 300, .units_per_bus = 100, .fiducials = 40}, 8);
     elsewhere.Move({});
     return testing::ExposureOf(
-        sim::TakeImage(elsewhere.Sources(), testing::TestCamera(0.3), &elsewhere.rng()), "other");
+        sim::TakeImage(elsewhere.Sources(), testing::TestCamera(kRimMm), &elsewhere.rng()),
+        "other");
   }();
   Exposure exposure = other;
   exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;

@@ -75,7 +75,7 @@ TEST(CampaignFiles, NamesFileLineAndColumnOfWhatIsWrong) {
   EXPECT_THAT(WhyNot(kHeader + "9,1,0,10,0,20,5,1,1,fast,\n"), HasSubstr("column mode: 'fast'"));
   EXPECT_THAT(WhyNot(kHeader + "9,1,0,1e9,0,20,5,1,1,,\n"), HasSubstr("column theta_cmd_deg"));
   EXPECT_THAT(WhyNot(kHeader), HasSubstr("no moves"));
-  EXPECT_THAT(WhyNot("unit_id,move_id\n1,2\n"), HasSubstr("x_mm is missing"));
+  EXPECT_THAT(WhyNot("unit_id,move_id\n1,2\n"), HasSubstr("y_mm is missing"));
   EXPECT_THAT(WhyNot(kHeader + "9,1,0,10,0,20,5,1"), HasSubstr("cut short"));
 }
 

@@ -20,7 +20,7 @@ FitsTable Small() {
           .keys = {{"EXPID", std::string("night 3, field 4"), "a name"},
                    {"DATE-OBS", std::string("2026-11-22T03:04:05.678Z"), "UTC"}},
           .columns = {{"UNIT_ID", "", std::vector<std::int64_t>{1, 5'000'000'000, -7}},
-                      {"X_MM", "mm", std::vector<double>{0.1, -1e300, 5e-324}},
+                      {"X_MM", "mm", std::vector<double>{0.1, -1e300, 2.3e-308}},
                       {"NOTE", "", std::vector<std::string>{"a", "", "longer"}}}};
 }
 
