@@ -55,7 +55,7 @@ bool Pursuit::NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const 
   const std::int32_t approach =
       NearestVectors(core_.config.approach_deg[Index(axis)], core_.layout.unit(i).axis[Index(axis)],
                      core_.drives[i.value].axis[Index(axis)]);
-  const auto [low, high] = std::minmax(0, approach);
+  const auto [low, high] = std::minmax({0, approach});
   return known.witness != Witness::kMeasured || left < low || left > high;
 }
 
