@@ -147,6 +147,7 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   goes_past_ = measure_ && !measure_->observe;
   sets_out_ = true;
   measured_batch_ = 0;
+  came_.resize(core_.units.size());
   exposures_refused_ = 0;
   view_ = {.id = core_.next_configuration++,
            .source = std::move(source),
@@ -444,6 +445,9 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
       arrivals_.push_back({core_.batch_now(), i});
     // Not the target: whoever only makes way has none, and others may come to theirs by stages.
     const std::size_t plan = plan_of_[i.value];
+    const bool reached = plan != kNoPlan && IsPlace(view.knowledge) &&
+                         PlaceOf(view.knowledge) == plan_.moves[plan].to;
+    NoteDirections(i, reached ? &plan_.moves[plan] : nullptr);
     if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
       StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " did not get out of its way");
   }

@@ -188,7 +188,8 @@ class Pursuit {
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
   void JudgeTargets();
-  [[nodiscard]] std::optional<Pose> PastTarget(PositionerIndex i) const;
+  [[nodiscard]] std::vector<Pose> PastTarget(PositionerIndex i) const;
+  void NoteDirections(PositionerIndex i, const UnitPlan* reached);
   bool GoPast(std::vector<std::optional<Pose>>* targets);
   void MeasureOrFinish();
   void AskForExposure();
@@ -196,7 +197,7 @@ class Pursuit {
                     MeasuredRound* round);
   void CorrectOrFinish();
   bool Correct();
-  [[nodiscard]] Pose AimOf(PositionerIndex i) const;
+  [[nodiscard]] std::vector<Pose> AimsOf(PositionerIndex i) const;
   [[nodiscard]] bool NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const;
   void Reopen(PositionerIndex i);
   void ReportArrivals();
@@ -224,6 +225,8 @@ class Pursuit {
   std::vector<std::optional<Pose>> targets_;
   // Of a goal that is measured.
   std::optional<ApplyCommand::Measure> measure_;
+  /// Direction of each axis' last motion, -1 or 1; 0: not known.
+  std::vector<std::array<std::int8_t, kAxisCount>> came_;
   std::uint64_t measured_batch_ = 0;  // with which the last exposure becomes durable; 0: none
   std::uint8_t corrections_left_ = 0;
   bool goes_past_ = false;                  // this leg ends past the targets

@@ -48,34 +48,63 @@ bool IsPut(SightingStatus status) {
 
 }  // namespace
 
-/// An axis that was measured came the right way, and needs no run-up where it has to go on in the
-/// same direction, at most as far as a run-up is long.
+/// An axis needs no run-up where it was measured and has to go on in the direction in which it
+/// came, at most as far as a run-up is long: its play is on the right side already.
 bool Pursuit::NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const {
   const AxisKnowledge& known = core_.units[i.value].view.knowledge[Index(axis)];
-  const std::int32_t approach =
-      NearestVectors(core_.config.approach_deg[Index(axis)], core_.layout.unit(i).axis[Index(axis)],
-                     core_.drives[i.value].axis[Index(axis)]);
-  const auto [low, high] = std::minmax({0, approach});
-  return known.witness != Witness::kMeasured || left < low || left > high;
+  const std::int32_t run_up = std::abs(NearestVectors(core_.config.approach_deg[Index(axis)],
+                                                      core_.layout.unit(i).axis[Index(axis)],
+                                                      core_.drives[i.value].axis[Index(axis)]));
+  const std::int32_t ahead = left * came_[i.value][Index(axis)];
+  return known.witness != Witness::kMeasured || (left != 0 && (ahead <= 0 || ahead > run_up));
 }
 
-/// None where it has arrived already, or where there is no approach to prepare.
-std::optional<Pose> Pursuit::PastTarget(PositionerIndex i) const {
+/// `reached`: null where it ended elsewhere than its plan did.
+void Pursuit::NoteDirections(PositionerIndex i, const UnitPlan* reached) {
+  for (const Axis axis : kAxes) {
+    std::int8_t& came = came_[i.value][Index(axis)];
+    if (reached == nullptr) {
+      came = 0;
+      continue;
+    }
+    for (const Segment& segment : reached->path[Index(axis)].segments())
+      if (segment.delta != 0) came = segment.delta > 0 ? 1 : -1;
+  }
+}
+
+/// Where it may go first, the best first: past the target by the approach on both axes, then past
+/// its other side where a neighbour is in the way, then on one axis alone. Empty where it has
+/// arrived already, or where there is no approach to prepare.
+std::vector<Pose> Pursuit::PastTarget(PositionerIndex i) const {
   const Pose target = *targets_[i.value];
   const Pose place = PlaceOf(core_.unit(i).view.knowledge);
-  if (place == target) return std::nullopt;
-  Pose past = place;
+  if (place == target) return {};
+  // Of each axis: the usual side, the other side, and where it stays if it needs or gets none.
+  std::array<std::array<std::int32_t, 3>, kAxisCount> choice{};
+  bool any = false;
   for (const Axis axis : kAxes) {
+    choice[Index(axis)].fill(place[Index(axis)]);
     if (!NeedsRunUp(i, axis, target[Index(axis)] - place[Index(axis)])) continue;
     const AxisGeometry& geometry = core_.layout.unit(i).axis[Index(axis)];
     const AxisDrive& drive = core_.drives[i.value].axis[Index(axis)];
     const VectorRange range = RangeOf(geometry, drive);
-    past[Index(axis)] =
-        std::clamp(target[Index(axis)] -
-                       NearestVectors(core_.config.approach_deg[Index(axis)], geometry, drive),
-                   range.low, range.high);
+    const std::int32_t approach =
+        NearestVectors(core_.config.approach_deg[Index(axis)], geometry, drive);
+    if (approach == 0) continue;
+    any = true;
+    std::size_t option = 0;
+    for (const std::int32_t past : {target[Index(axis)] - approach, target[Index(axis)] + approach})
+      if (past >= range.low && past <= range.high) choice[Index(axis)][option++] = past;
   }
-  return past == target || past == place ? std::nullopt : std::optional(past);
+  if (!any) return {};
+  std::vector<Pose> wished;
+  constexpr std::array<std::array<std::size_t, 2>, 8> kOrder{
+      {{0, 0}, {0, 1}, {1, 0}, {1, 1}, {0, 2}, {2, 0}, {1, 2}, {2, 1}}};
+  for (const auto& [theta, phi] : kOrder) {
+    const Pose pose{choice[0][theta], choice[1][phi]};
+    if (pose != place && std::ranges::find(wished, pose) == wished.end()) wished.push_back(pose);
+  }
+  return wished;
 }
 
 /// Puts where they go first in the place of the targets; false: nobody goes anywhere first.
@@ -95,7 +124,7 @@ bool Pursuit::GoPast(std::vector<std::optional<Pose>>* targets) {
   std::uint32_t without = 0;
   for (std::uint32_t n = 0; n < units.size(); ++n) {
     if (!(*targets)[n]) continue;
-    if (units[n].wished && *chosen[n] == *units[n].otherwise) ++without;
+    if (!units[n].wished.empty() && *chosen[n] == *units[n].otherwise) ++without;
     const bool goes = *chosen[n] != PlaceOf(core_.units[n].view.knowledge);
     if (goes) first[n] = chosen[n];
     any |= goes;
@@ -233,13 +262,13 @@ bool Pursuit::Correct() {
     units[n].otherwise = PlaceOf(view.knowledge);
     if (view.outcome == TargetOutcome::kArrived && view.target && view.error_um &&
         *view.error_um > kWorthwhile * measure_->tolerance_um)
-      units[n].wished = AimOf({n});
+      units[n].wished = AimsOf({n});
   }
   // Who stays may stand a little nearer to a neighbour's target than its own target is.
   const auto chosen = ChooseRunUps(core_.layout, core_.drives, units, kAimGuardMm);
   bool again = false;
   for (std::uint32_t n = 0; n < units.size(); ++n) {
-    if (!units[n].wished || *chosen[n] == *units[n].otherwise) continue;
+    if (units[n].wished.empty() || *chosen[n] == *units[n].otherwise) continue;
     Reopen({n});
     targets_[n] = chosen[n];
     again = true;
@@ -254,9 +283,10 @@ bool Pursuit::Correct() {
   return true;
 }
 
-/// Where a correction is to end. A run-up scatters by some micrometres itself: it is taken only for
-/// more than that, and where another correction follows, it ends short of the target.
-Pose Pursuit::AimOf(PositionerIndex i) const {
+/// Where a correction is to end, or one axis of it. A run-up scatters by some micrometres itself:
+/// it is taken only for more than that, and where another correction follows, it ends short of the
+/// target.
+std::vector<Pose> Pursuit::AimsOf(PositionerIndex i) const {
   const UnitView& view = core_.units[i.value].view;
   const Unit& unit = core_.layout.unit(i);
   const Pose place = PlaceOf(view.knowledge);
@@ -279,7 +309,8 @@ Pose Pursuit::AimOf(PositionerIndex i) const {
       aim[Index(axis)] += NearestVectors(creep_deg, geometry, drive);
     }
   }
-  return InRange(unit, core_.drives[i.value], aim) ? aim : *view.target;
+  if (!InRange(unit, core_.drives[i.value], aim)) aim = *view.target;
+  return {aim, {aim[0], place[1]}, {place[0], aim[1]}};
 }
 
 /// Takes its arrival back: the camera knows better.

@@ -24,7 +24,7 @@ class Chooser {
   bool Pass() {
     bool changed = false;
     for (std::uint32_t n = 0; n < units_.size(); ++n)
-      changed |= units_[n].wished && units_[n].otherwise && Improve({n});
+      changed |= units_[n].otherwise && Improve({n});
     return changed;
   }
 
@@ -36,10 +36,7 @@ class Chooser {
   }
 
   bool Improve(PositionerIndex i) {
-    const Pose wished = *units_[i.value].wished;
-    const Pose otherwise = *units_[i.value].otherwise;
-    for (const Pose& pose :
-         {wished, Pose{wished[0], otherwise[1]}, Pose{otherwise[0], wished[1]}}) {
+    for (const Pose& pose : units_[i.value].wished) {
       if (pose == *chosen_[i.value]) return false;  // what comes after is worse
       const SegmentFp arm = ArmOfUnit(i, pose);
       if (!HasRoom(i, arm)) continue;
