@@ -1,7 +1,8 @@
 // How many of our frames are below the socket: in the interface's queue, in the controller, on the
 // wire. Down there a stop can pass nothing, so frames wait above, where it can. At most three are
 // below, and the third place is a stop's alone: ahead of it are at most the frame on the wire and
-// one more, 2 x 160 bits. A group of staging frames (CAN FD) is one frame here, as it is below.
+// one more, 2 x 160 bits; where bus.can_fd is on, 2 groups of staging frames, each one frame here
+// as it is below, of up to 393 us.
 //
 // Two frames keep a bus busy: one is on the wire (131 us and more at 1 Mbit/s for 8 bytes), and
 // that long there is to learn that the one before has left and to hand down the next.
