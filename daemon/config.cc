@@ -51,12 +51,26 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("bus");
   visit->Index("port", &c->bus.port, kPortKindNames);
   visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});
+  visit->Flag("can_fd", &c->bus.can_fd);
+  visit->Whole("data_bit_rate_bps", &c->bus.data_bit_rate_bps, {10'000, 8'000'000});
   visit->Path("unix_directory", &c->bus.unix_directory);
   visit->Texts("interfaces", &c->bus.interfaces);
   visit->Section("sync");
   visit->Path("chip", &c->sync.chip);
   visit->Whole("line", &c->sync.line, {0, 1023});
   visit->Flag("active_low", &c->sync.active_low);
+  visit->Section("camera");
+  visit->Path("directory", &c->camera.directory);
+  visit->Path("fiducials", &c->camera.fiducials);
+  visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6});
+  visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6});
+  visit->Real("pixels_per_mm", &c->camera.model.pixels_per_mm, {1e-3, 1e4});
+  visit->Real("rotation_deg", &c->camera.model.rotation_deg, {-360, 360});
+  visit->Real("centre_x_px", &c->camera.model.centre_x_px, {-1e6, 1e6});
+  visit->Real("centre_y_px", &c->camera.model.centre_y_px, {-1e6, 1e6});
+  visit->Flag("mirrored", &c->camera.model.mirrored);
+  visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000});
+  visit->Wait("patience_ms", &c->camera.patience);
   visit->Section("clock");
   visit->Real("speed", &c->clock.speed, {0.01, 1000});
   visit->Section("drive");
@@ -293,6 +307,12 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   const std::set<std::string> names(config.bus.interfaces.begin(), config.bus.interfaces.end());
   reader->Require(names.size() == config.bus.interfaces.size() && !names.contains(""), "bus",
                   "interfaces", "bus.interfaces must name each interface once");
+  reader->Require(!config.bus.can_fd || socketcan, "bus", "can_fd",
+                  "bus.can_fd needs bus.port = \"socketcan\": simulated buses and UNIX sockets "
+                  "carry classic frames only");
+  reader->Require(!config.bus.can_fd || config.bus.data_bit_rate_bps >= config.bus.bit_rate_bps,
+                  "bus", "data_bit_rate_bps",
+                  "bus.data_bit_rate_bps must not be below bus.bit_rate_bps");
   reader->Require(config.bus.port != PortKind::kUnix || !config.bus.unix_directory.empty(), "bus",
                   "unix_directory",
                   "bus.unix_directory must say where bus<ID>.sock are for bus.port = \"unix\"");
@@ -302,6 +322,8 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   reader->Require(config.timing.sync_lead < Milliseconds(20), "timing", "sync_lead_ms",
                   "timing.sync_lead_ms must be below 20: units take an edge only so short before "
                   "their start");
+  reader->Require(config.camera.directory.empty() || !config.camera.fiducials.empty(), "camera",
+                  "fiducials", "camera.fiducials must name a file where there is a camera");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",
@@ -328,6 +350,8 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
+  config.timing.has_camera = !config.camera.directory.empty();
+  config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();
   config.sync.chip_at = reader.At("sync", "chip");
   config.bus.interfaces_at = reader.At("bus", "interfaces");

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "fleet/camera/camera_model.h"
+#include "fleet/camera/spots.h"
 #include "fleet/coordinator.h"
 #include "fleet/drive.h"
 #include "protocol/base/result.h"
@@ -43,9 +45,11 @@ struct DaemonConfig {
   struct Bus {
     PortKind port = PortKind::kUnix;
     std::uint32_t bit_rate_bps = 1'000'000;
-    std::string unix_directory;           // where bus<ID>.sock are
-    std::vector<std::string> interfaces;  // by ascending bus id
-    std::string interfaces_at;            // file:line, for messages
+    bool can_fd = false;                          // staging frames go in groups (docs/adr/0008)
+    std::uint32_t data_bit_rate_bps = 2'000'000;  // of these; only where can_fd
+    std::string unix_directory;                   // where bus<ID>.sock are
+    std::vector<std::string> interfaces;          // by ascending bus id
+    std::string interfaces_at;                    // file:line, for messages
   } bus;
   struct Sync {
     std::string chip;  // of the GPIO that pulses at the common start; empty: there is no such line
@@ -53,11 +57,19 @@ struct DaemonConfig {
     bool active_low = false;
     std::string chip_at;  // file:line, for messages
   } sync;
+  struct Camera {
+    std::string directory;  // where it is asked and answers (camera/camera_folder.h); empty: none
+    std::string fiducials;  // fiducials.csv
+    SensorLimits sensor{11'000, 11'000};
+    CameraModel model{.pixels_per_mm = 5, .centre_x_px = 5500, .centre_y_px = 5500};
+    double centroid_sigma_um = 2;
+    DurationNs patience = Milliseconds(30'000);  // real time; until an exposure has to be there
+  } camera;
   struct Clock {
     double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
   } clock;
   UnitDrive drive;           // of units whose own parameters are not known
-  CoordinatorConfig timing;  // its bit rate is bus.bit_rate_bps
+  CoordinatorConfig timing;  // its bit rates are those of bus
   struct Simulated {
     std::uint64_t seed = 1;
     std::string spread = "nominal";

@@ -1,6 +1,7 @@
 #include "daemon/control_desk.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -34,6 +35,28 @@ Result<Parameter> ParameterArgument(const Json& args) {
   return Fail(ErrorCode::kInvalid, "there is no parameter '" + name + "'");
 }
 
+constexpr double kCorrectionsMax = 10;
+
+/// {corrections?, tolerance_um?, observe?}: nothing of it, and the camera is left alone.
+Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
+  if (!args.contains("corrections")) return std::optional<ApplyCommand::Measure>();
+  ApplyCommand::Measure measure;
+  FOCALFLEET_TRY_ASSIGN(const double corrections, NumberArgument(args, "corrections"));
+  if (!(corrections >= 0 && corrections <= kCorrectionsMax) ||
+      corrections != std::floor(corrections))
+    return Fail(ErrorCode::kInvalid, "corrections must be a whole number in 0..10");
+  measure.corrections = static_cast<std::uint8_t>(corrections);
+  if (args.contains("tolerance_um")) {
+    FOCALFLEET_TRY_ASSIGN(measure.tolerance_um, NumberArgument(args, "tolerance_um"));
+    if (!(measure.tolerance_um > 0 && measure.tolerance_um <= 1e6))
+      return Fail(ErrorCode::kInvalid, "tolerance_um must be above 0 and at most 1e6");
+  }
+  FOCALFLEET_TRY_ASSIGN(measure.observe, FlagArgumentOr(args, "observe", false));
+  if (measure.observe && measure.corrections > 0)
+    return Fail(ErrorCode::kInvalid, "observe takes no corrections: what is seen is not used");
+  return std::optional(measure);
+}
+
 Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(const std::string csv, TextArgument(args, "targets_csv"));
@@ -48,7 +71,8 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   now.reserve(view.layout->size());
   for (std::uint32_t n = 0; n < view.layout->size(); ++n)
     now.push_back(view.coordinator->unit({n}).knowledge);
-  ApplyCommand command{.source = source, .targets = {}, .fixed = fixed};
+  FOCALFLEET_TRY_ASSIGN(const auto measure, MeasureOf(args));
+  ApplyCommand command{.source = source, .targets = {}, .fixed = fixed, .measure = measure};
   FOCALFLEET_TRY_ASSIGN(command.targets,
                         ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
   return command;
@@ -284,6 +308,7 @@ std::optional<Result<Json>> ControlDesk::Ask(const FleetView& view, const Contro
   if (request.verb == "unit") return AskUnit(view, request);
   if (request.verb == "params") return AskParameters(view, request);
   if (request.verb == "history") return AskHistory(view, request);
+  if (request.verb == "measurements") return AskMeasurements(view, request);
   return std::nullopt;
 }
 
@@ -327,6 +352,22 @@ Result<Json> ControlDesk::AskHistory(const FleetView& view, const ControlRequest
   FOCALFLEET_TRY_ASSIGN(const auto moves, reader->Moves(id, limit));
   FOCALFLEET_TRY_ASSIGN(const auto places, reader->Units(id, limit));
   return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+}
+
+/// {exposure?}: the newest of the last configuration without it.
+Result<Json> ControlDesk::AskMeasurements(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
+  if (exposure == 0) {
+    FOCALFLEET_TRY_ASSIGN(const auto last,
+                          reader->LastExposure(view.coordinator->configuration().id));
+    if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
+    exposure = *last;
+  }
+  FOCALFLEET_TRY_ASSIGN(const auto rows, reader->Measurements(exposure));
+  if (rows.empty())
+    return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
+  return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
 }
 
 Result<StoreReader*> ControlDesk::Reader() {

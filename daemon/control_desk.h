@@ -56,7 +56,7 @@ class ControlDesk {
     bool wait = false;
     bool pursues = false;  // apply or home: its summary is the configuration
     bool retargets = false;
-    bool began = false;    // and the coordinator took it up
+    bool began = false;  // and the coordinator took it up
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
@@ -65,6 +65,7 @@ class ControlDesk {
   Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
   Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
   Result<Json> AskHistory(const FleetView& view, const ControlRequest& request);
+  Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
 

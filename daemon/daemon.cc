@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include "daemon/camera/camera_folder.h"
 #include "daemon/event_loop.h"
 #include "daemon/fleet_setup.h"
 #include "daemon/log.h"
@@ -44,6 +45,7 @@ class Daemon {
   StoreThread::Sinks StoreSinks();
   Status OpenDesk();
   Status OpenStatus();
+  Status OpenCamera();
   ShellFacts Facts() const;
 
   DaemonConfig config_;
@@ -54,11 +56,13 @@ class Daemon {
   std::unique_ptr<Store> store_;
   std::unique_ptr<StatusOutlet> outlet_;  // none: DDS is off
   std::unique_ptr<StatusFeed> feed_;
+  std::unique_ptr<CameraWorker> camera_worker_;  // none: there is no camera
   std::unique_ptr<EventSignal> signal_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<StoreThread> store_thread_;
   std::unique_ptr<PlannerThread> planner_;
+  std::unique_ptr<CameraThread> camera_;  // none: there is no camera
   std::unique_ptr<ControlDesk> desk_;
   std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
@@ -78,6 +82,7 @@ Status Daemon::Start() {
   const auto buses = layout_->buses();
   lines_ =
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
+  FOCALFLEET_TRY(OpenCamera());
   FOCALFLEET_TRY(OpenStatus());
   coordinator_ = std::make_unique<Coordinator>(
       layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
@@ -110,6 +115,20 @@ Status Daemon::OpenStatus() {
   return {};
 }
 
+Status Daemon::OpenCamera() {
+  if (config_.camera.directory.empty()) return {};
+  FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
+  FOCALFLEET_TRY_ASSIGN(auto folder, CameraFolder::Open(config_.camera.directory, site.sensor));
+  camera_worker_ = std::make_unique<CameraWorker>(
+      std::move(folder),
+      CameraWorker::Options{
+          .layout = layout_.get(),
+          .site = std::move(site),
+          .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
+          .log = [](const std::string& text) { spdlog::warn("{}", text); }});
+  return {};
+}
+
 StoreThread::Sinks Daemon::StoreSinks() {
   StoreThread::Sinks sinks;
   sinks.commit = [this](std::span<const Row> rows, WallTime at) {
@@ -133,16 +152,26 @@ Status Daemon::StartThreads() {
   FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
   signal_ = std::make_unique<EventSignal>(std::move(signal));
   FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
-  FOCALFLEET_TRY_ASSIGN(planner_, PlannerThread::Create(
-                                      [layout = layout_.get()](const PlannerWork& work) {
-                                        return RunPlanJob(work.job, *layout, work.drives);
-                                      },
-                                      signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(
+      planner_, PlannerThread::Create(
+                    [layout = layout_.get()](const PlannerWork& work, const std::atomic<bool>&) {
+                      return RunPlanJob(work.job, *layout, work.drives);
+                    },
+                    signal_.get()));
+  if (camera_worker_ != nullptr) {
+    FOCALFLEET_TRY_ASSIGN(camera_,
+                          CameraThread::Create(
+                              [this](const CameraWork& work, const std::atomic<bool>& ending) {
+                                return camera_worker_->Do(work, ending);
+                              },
+                              signal_.get()));
+  }
   FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
                                                   .coordinator = coordinator_.get(),
                                                   .lines = lines_.get(),
                                                   .desk = desk_.get(),
                                                   .planner = planner_.get(),
+                                                  .camera = camera_.get(),
                                                   .store = store_thread_.get(),
                                                   .feed = feed_.get(),
                                                   .sync = sync_.get(),
@@ -205,6 +234,7 @@ Status RunDaemon(const DaemonConfig& config) {
 Result<std::string> CheckDaemon(const DaemonConfig& config) {
   FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
   FOCALFLEET_TRY(CheckInterfaces(config, layout));
+  if (!config.camera.directory.empty()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
   return "# " + std::to_string(layout.size()) + " units on " +
          std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
 }

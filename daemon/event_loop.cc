@@ -191,14 +191,17 @@ void EventLoop::Gather() {
   links_.clear();
   commands_.clear();
   plans_.clear();
+  exposures_.clear();
   parts_.lines->Receive(now_, &frames_, &links_);
   while (auto plan = parts_.planner->Take()) plans_.push_back(std::move(*plan));
+  while (auto done = parts_.camera != nullptr ? parts_.camera->Take() : std::nullopt)
+    exposures_.push_back(std::move(*done));
   if (std::exchange(desk_ready_, false)) parts_.desk->Service(View(), &commands_);
 }
 
 bool EventLoop::StepIsDue() const {
   return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
-         parts_.store->committed_through() != committed_through_ ||
+         !exposures_.empty() || parts_.store->committed_through() != committed_through_ ||
          parts_.store->failing() != store_failing_ || now_ >= effects_.wake_at;
 }
 
@@ -212,6 +215,7 @@ void EventLoop::Step() {
                             .links = links_,
                             .commands = commands_,
                             .plans = plans_,
+                            .exposures = exposures_,
                             .committed_through = committed_through_,
                             .store_failing = store_failing_},
                            &effects_);
@@ -230,6 +234,11 @@ void EventLoop::Perform() {
     const auto drives = parts_.coordinator->drives();
     PlannerWork work{std::move(*effects_.plan_job), {drives.begin(), drives.end()}};
     if (!parts_.planner->Submit(&work)) spdlog::error("plan job {} found no room", work.job.job);
+  }
+  if (effects_.exposure && parts_.camera != nullptr) {
+    const auto drives = parts_.coordinator->drives();
+    CameraWork work{std::move(*effects_.exposure), {drives.begin(), drives.end()}};
+    if (!parts_.camera->Submit(&work)) spdlog::error("exposure {} found no room", work.job.id);
   }
   for (const ReplyEffect& reply : effects_.replies) parts_.desk->Reply(View(), reply);
   if (parts_.feed != nullptr) parts_.feed->Changed(effects_.changed);

@@ -1,7 +1,7 @@
 // The core thread. It waits until something is there (frames, requests, a plan, a commit, a signal)
 // or due, gives it all to the coordinator in one Step, and performs what comes back: rows to the
-// store's thread, frames to the buses, a plan job to the planner's thread, replies to the control
-// desk, status to the feed. It never waits for any of them.
+// store's thread, frames to the buses, a plan job to the planner's thread, an exposure to the
+// camera's, replies to the control desk, status to the feed. It never waits for any of them.
 #pragma once
 
 #include <cstdint>
@@ -9,16 +9,24 @@
 #include <vector>
 
 #include "daemon/bus_lines.h"
+#include "daemon/camera/camera_work.h"
 #include "daemon/clock.h"
 #include "daemon/control_desk.h"
 #include "daemon/event_signal.h"
-#include "daemon/planner_thread.h"
+#include "daemon/job_thread.h"
 #include "daemon/status_feed.h"
 #include "daemon/store_thread.h"
 #include "daemon/sync_pulse.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
+
+struct PlannerWork {
+  PlanJob job;
+  std::vector<UnitDrive> drives;
+};
+using PlannerThread = JobThread<PlannerWork, PlanDone>;
+using CameraThread = JobThread<CameraWork, ExposureDone>;
 
 class EventLoop {
  public:
@@ -29,10 +37,11 @@ class EventLoop {
     BusLines* lines = nullptr;
     ControlDesk* desk = nullptr;
     PlannerThread* planner = nullptr;
+    CameraThread* camera = nullptr;  // none: there is no camera
     StoreThread* store = nullptr;
     StatusFeed* feed = nullptr;            // none: DDS is off
     SyncPulse* sync = nullptr;             // none: no SYNC line
-    const EventSignal* threads = nullptr;  // raised by planner and store
+    const EventSignal* threads = nullptr;  // raised by planner, camera, store
     HostClock clock;
   };
 
@@ -80,6 +89,7 @@ class EventLoop {
   std::vector<LinkEvent> links_;
   std::vector<Command> commands_;
   std::vector<PlanDone> plans_;
+  std::vector<ExposureDone> exposures_;
   std::uint64_t committed_through_ = 0;  // as the coordinator knows it
   bool store_failing_ = false;
   Effects effects_;

@@ -1,5 +1,7 @@
 #include "daemon/fleet_setup.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -9,6 +11,7 @@
 
 #include "daemon/ports/simulated_port.h"
 #include "daemon/ports/unix_port.h"
+#include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 
@@ -59,12 +62,14 @@ Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
   Ports ports;
   bool any = false;
   for (std::size_t b = 0; b < config.bus.interfaces.size(); ++b) {
-    auto port = SocketCanPort::Create({.bus = layout.buses()[b],
-                                       .interface = config.bus.interfaces[b],
-                                       .bit_rate_bps = config.bus.bit_rate_bps,
-                                       .clock = clock,
-                                       .retry_period = kRetryPeriod,
-                                       .open = open});
+    auto port = SocketCanPort::Create(
+        {.bus = layout.buses()[b],
+         .interface = config.bus.interfaces[b],
+         .bit_rate_bps = config.bus.bit_rate_bps,
+         .data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0,
+         .clock = clock,
+         .retry_period = kRetryPeriod,
+         .open = open});
     if (!port) return Fail(port.error().code, config.bus.interfaces_at + ": " + port.error().text);
     FOCALFLEET_TRY(CheckSpeed(config, clock, **port));
     any |= (*port)->found();
@@ -104,6 +109,18 @@ Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
   }
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.units));
   return ReadLayout(text, fleet.units, std::move(options));
+}
+
+Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {
+  CameraSite site{.model = camera.model, .sensor = camera.sensor, .fiducials = {}, .options = {}};
+  site.options.centroid_sigma_mm = 1e-3 * camera.centroid_sigma_um;
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(camera.fiducials));
+  FOCALFLEET_TRY_ASSIGN(site.fiducials, ReadFiducials(text, camera.fiducials));
+  double radius_mm = 0;
+  for (const Fiducial& fiducial : site.fiducials)
+    radius_mm = std::max(radius_mm, std::hypot(fiducial.at_fp.x_mm, fiducial.at_fp.y_mm));
+  site.model.radius_mm = radius_mm;
+  return site;
 }
 
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {

@@ -9,6 +9,7 @@
 #include "daemon/ports/gpio_line.h"
 #include "daemon/ports/pollable_port.h"
 #include "daemon/ports/socketcan_port.h"
+#include "fleet/camera/findings.h"
 #include "fleet/layout.h"
 #include "protocol/base/result.h"
 
@@ -16,6 +17,9 @@ namespace focalfleet {
 
 /// Errors: kUnavailable: a file cannot be read; kInvalid with file:line.
 Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet);
+
+/// The camera as configured, with its fiducials. Pre: there is one. Errors: as LoadLayout.
+Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera);
 
 /// What configuration and layout must agree on. Errors: kInvalid: not one interface a bus.
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout);

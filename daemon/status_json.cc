@@ -151,6 +151,19 @@ double FractionOf(const FleetView& fleet) {
 
 }  // namespace
 
+Json MeasuredJson(const ConfigurationView& configuration) {
+  Json rounds = Json::array();
+  for (const MeasuredRound& round : configuration.measured)
+    rounds.push_back({{"exposure", round.exposure},
+                      {"measured", round.measured},
+                      {"unknown", round.unknown},
+                      {"within_tolerance", round.within_tolerance},
+                      {"rms_um", Number(round.rms_um)},
+                      {"median_um", Number(round.median_um)},
+                      {"worst_um", Number(round.worst_um)}});
+  return rounds;
+}
+
 Json ConfigurationJson(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   Json json{{"id", c.id},
@@ -170,6 +183,7 @@ Json ConfigurationJson(const FleetView& view) {
             {"unserved", UnservedJson(view)}};
   PutUpload(c.upload, &json);
   PutStarts(view, &json);
+  json["measured"] = MeasuredJson(c);
   return json;
 }
 
@@ -254,6 +268,8 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
           {"x_mm", Number(status.x_fp_mm)},
           {"y_mm", Number(status.y_fp_mm)},
           {"target", std::move(target)},
+          {"sighting", seen.sighting ? Json(Name(*seen.sighting)) : Json()},
+          {"error_um", seen.error_um ? Json(*seen.error_um) : Json()},
           {"mode", Name(drive.mode)},
           {"v_bus_V", drive.v_bus_V},
           {"clock", ClockJson(seen.clock)},
@@ -311,6 +327,24 @@ Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
   return rows;
 }
 
+Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
+  Json rows = Json::array();
+  for (const auto& [row, at] : measurements) {
+    Json json = {{"unit_id", row.unit.value},
+                 {"configuration", row.configuration},
+                 {"status", Name(row.status)},
+                 {"x_mm", row.x_mm},
+                 {"y_mm", row.y_mm},
+                 {"sigma_um", row.sigma_um},
+                 {"target_x_mm", row.target_fp ? Json(row.target_fp->x_mm) : Json()},
+                 {"target_y_mm", row.target_fp ? Json(row.target_fp->y_mm) : Json()},
+                 {"error_um", row.error_um ? Json(*row.error_um) : Json()},
+                 {"other_unit_id", row.other ? Json(row.other->value) : Json()},
+                 {"at", ToIso8601(at)}};
+    rows.push_back(std::move(json));
+  }
+  return rows;
+}
 Json HistoryJson(const std::vector<MoveHistory>& moves) {
   Json rows = Json::array();
   for (const MoveHistory& move : moves) {

@@ -50,5 +50,6 @@ Json HistoryJson(const std::vector<ParameterHistory>& parameters);
 Json HistoryJson(const std::vector<TuningHistory>& tunings);
 Json HistoryJson(const std::vector<AlarmHistory>& alarms);
 Json HistoryJson(const std::vector<UnitHistory>& units);
+Json HistoryJson(const std::vector<MeasurementHistory>& measurements);
 
 }  // namespace focalfleet

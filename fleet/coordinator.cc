@@ -23,6 +23,7 @@ class Coordinator::Impl {
     for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
     for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
+    for (const ExposureDone& exposure : inputs.exposures) pursuit_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
     while (const auto due = core_.NextDue()) static_cast<void>(contact_.Service(*due));
     pursuit_.Advance();
@@ -51,7 +52,7 @@ class Coordinator::Impl {
     BusRecord* bus = core_.FindBus(received.bus);
     FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
     ++bus->view.frames_received;
-    core_.Count(bus, received.frame);
+    core_.Count(bus, {&received.frame, 1});
     const auto heard = DecodeUnit(received.frame);
     if (!heard) {
       // Another host may share the bus (a direct stop does): its frames are well formed and not for
@@ -129,6 +130,7 @@ void Effects::Clear() {
   rows.clear();
   frames.clear();
   plan_job.reset();
+  exposure.reset();
   replies.clear();
   sync_at.reset();
   changed.clear();

@@ -13,6 +13,7 @@
 // number of rounds is bounded. docs/way_of_a_move.md follows one move through here.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -44,6 +45,16 @@ struct ApplyCommand {
   std::string source;
   std::vector<std::optional<Pose>> targets;  // Shape: (n)
   bool fixed = false;
+  /// Given: look with the camera when all have arrived, send those again that are farther off than
+  /// the tolerance, and look again, at most so many times.
+  struct Measure {
+    std::uint8_t corrections = 0;
+    double tolerance_um = 10;
+    /// What is found is told and stored, and not used: the units go on by what they report, and
+    /// come as the way comes. Campaigns measure the blind moves so.
+    bool observe = false;
+  };
+  std::optional<Measure> measure = {};
 };
 /// Another target for one unit of the configuration that is under way; it need not have had one.
 /// A unit that moves is stopped first. Answered when it starts, or with why it does not.
@@ -99,12 +110,19 @@ struct PlanDone {
   std::optional<Result<LateMove>> late;  // of a job for a late move; `plan` is empty then
 };
 
+/// The answer to an ExposureJob.
+struct ExposureDone {
+  std::uint64_t id = 0;
+  Result<ExposureFindings> exposure;
+};
+
 struct Inputs {
   HostInstant now;
   std::span<const ReceivedFrame> frames;
   std::span<const LinkEvent> links;
   std::span<const Command> commands;
   std::span<const PlanDone> plans;
+  std::span<const ExposureDone> exposures = {};
   std::uint64_t committed_through = 0;  // highest batch that is durable
   bool store_failing = false;           // the last attempt to commit failed; the shell tries again
 };
@@ -135,6 +153,15 @@ struct PlanJob {
   std::shared_ptr<const LateJob> late;  // then nothing else is looked at
 };
 
+/// Take an exposure now, and say where each unit is found. All units rest.
+struct ExposureJob {
+  std::uint64_t id = 0;
+  HostInstant since;  // the exposure begins no earlier
+  std::vector<UnitKnowledge> expected;
+  std::vector<std::optional<Pose>> before;  // where it stood before it was sent; none: not known
+  std::vector<std::uint8_t> seen;           // non-zero: a camera has put it somewhere before
+};
+
 struct ReplyEffect {
   std::uint64_t request = 0;
   bool last = true;  // false: progress, more will come
@@ -147,6 +174,7 @@ struct Effects {
   std::vector<Row> rows;
   std::vector<OutFrame> frames;
   std::optional<PlanJob> plan_job;
+  std::optional<ExposureJob> exposure;
   std::vector<ReplyEffect> replies;
   std::optional<HostInstant> sync_at;    // an edge on the SYNC line is due then
   std::vector<PositionerIndex> changed;  // units whose status differs from what was last told
@@ -193,9 +221,12 @@ struct ClockView {
 
 struct UnitView {
   UnitPhase phase = UnitPhase::kAbsent;
-  UnitKnowledge knowledge;    // while it moves: the hull
-  SerialNumber serial;        // that answers; 0: none yet
-  SerialNumber bound_serial;  // that belongs here; 0: none yet
+  UnitKnowledge knowledge;  // while it moves: the hull
+  Pose offset{};            // its place less its own count of vectors (VectorRow::offset)
+  std::optional<SightingStatus> sighting;  // of the last exposure; none: it was not looked for
+  std::optional<double> error_um;          // from its target, as last measured
+  SerialNumber serial;                     // that answers; 0: none yet
+  SerialNumber bound_serial;               // that belongs here; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;
@@ -222,10 +253,12 @@ struct StartView {
 /// Getting the moves of a configuration onto the wire. Counted are the frames without which a unit
 /// is not armed: stage_begin, stage_segment, confirm and arm with their answers.
 struct UploadView {
-  std::uint64_t bits_predicted = 0;  // exact, each frame once; known before the first is sent
-  std::uint64_t bits = 0;            // as they passed: repeats and late moves included
-  double predicted_s = 0;            // bits_predicted by the bit rate; of all buses the longest
-  double measured_s = 0;  // first frame let go to last unit armed; of all buses the longest
+  // Of the nominal bit rate: CAN FD counts by its time. Known before the first is sent: exact, each
+  // frame once, groups as full as can be.
+  std::uint64_t bits_predicted = 0;
+  std::uint64_t bits = 0;  // as they passed: repeats and late moves included
+  double predicted_s = 0;  // bits_predicted by the bit rate; of all buses the longest
+  double measured_s = 0;   // first frame let go to last unit armed; of all buses the longest
 };
 
 struct BusView {
@@ -238,6 +271,17 @@ struct BusView {
   double load = 0;      // of the last second
   double load_max = 0;  // highest second since the configuration began
   UploadView upload;    // of the configuration, all rounds
+};
+
+/// What the exposures of a configuration found of the units that have targets.
+struct MeasuredRound {
+  std::uint64_t exposure = 0;
+  std::uint32_t measured = 0;
+  std::uint32_t unknown = 0;           // seen nowhere, or not to be told from another
+  std::uint32_t within_tolerance = 0;  // of `measured`
+  double rms_um = 0;                   // of the distances from the targets, of `measured`
+  double median_um = 0;
+  double worst_um = 0;
 };
 
 struct ConfigurationView {
@@ -257,12 +301,14 @@ struct ConfigurationView {
   UploadView upload;                // bits of all buses, all rounds
   StartView starts;
   HostInstant began;
-  HostInstant started;      // start signal of this round; kNever before it
-  std::string waiting_for;  // what holds it up, for people; usually empty
+  HostInstant started;                  // start signal of this round; kNever before it
+  std::string waiting_for;              // what holds it up, for people; usually empty
+  std::vector<MeasuredRound> measured;  // blind, then after each correction
 };
 
 struct CoordinatorConfig {
   std::uint32_t bit_rate_bps = 1'000'000;
+  std::uint32_t data_bit_rate_bps = 0;  // of groups on buses with CAN FD (docs/adr/0008); 0: none
   DurationNs reply_wait =
       Milliseconds(50);  // one request's answer; repeats wait 2, 4, 8, 16 times that
   DurationNs identify_period = Milliseconds(2000);  // absent and silent units are asked again
@@ -280,7 +326,15 @@ struct CoordinatorConfig {
   /// A SYNC line tells the common start by an edge. Start frames then say an instant `sync_lead`
   /// after it, for units that have no such line or miss the edge.
   bool sync_line = false;
+  bool has_camera = false;  // else a configuration that asks for one is refused
   DurationNs sync_lead = Milliseconds(5);
+  /// A configuration that is measured ends each axis' way with this last piece, in this direction,
+  /// so that play and wind-up of a gear are always on one side. 0: as the way comes.
+  std::array<double, kAxisCount> approach_deg = {-2, -2};
+  /// A correction that is not the last ends so far short of the target where it needed a run-up, so
+  /// that the last one is short and goes on in the same direction: a long way scatters, a short one
+  /// does not.
+  double creep_deg = 0.04;
 };
 
 class Coordinator {

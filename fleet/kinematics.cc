@@ -149,6 +149,65 @@ std::vector<AxisAngles> AnglesFor(const Unit& unit, PointFp fibre_fp, double fre
   return solutions;
 }
 
+namespace {
+
+// Both angles from the point alone: on the elbow side and in the turns nearest to `believed`.
+AxisAngles AnglesSeen(const Unit& unit, PointFp seen_fp, const AxisAngles& believed) {
+  const double a = unit.theta().arm_mm;
+  const double b = unit.phi().arm_mm;
+  const double distance = DistanceMm(unit.base_fp, seen_fp);
+  const double c = (distance * distance - a * a - b * b) / (2 * a * b);
+  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kDegree;
+  const auto nearest = [](double angle_deg, double to_deg) {
+    return to_deg + std::remainder(angle_deg - to_deg, 360);
+  };
+  const double one = nearest(bend_deg - unit.phi().zero_deg, believed.phi_deg);
+  const double other = nearest(-bend_deg - unit.phi().zero_deg, believed.phi_deg);
+  const double phi =
+      std::abs(one - believed.phi_deg) <= std::abs(other - believed.phi_deg) ? one : other;
+  const double direction_deg =
+      std::atan2(seen_fp.y_mm - unit.base_fp.y_mm, seen_fp.x_mm - unit.base_fp.x_mm) / kDegree;
+  return {nearest(ThetaFor(unit, direction_deg, phi), believed.theta_deg), phi};
+}
+
+// One Gauss-Newton step of what PlaceSeen minimises. Units: mm and radians inside.
+AxisAngles Improved(const Unit& unit, PointFp seen_fp, const AxisAngles& at,
+                    const AxisAngles& believed, const SeenWith& with) {
+  const SegmentFp arm = ArmAt(unit, at);
+  // The fibre turns about the base with theta, about the elbow with phi.
+  const double jt_x = -(arm.b.y_mm - unit.base_fp.y_mm), jt_y = arm.b.x_mm - unit.base_fp.x_mm;
+  const double jp_x = -(arm.b.y_mm - arm.a.y_mm), jp_y = arm.b.x_mm - arm.a.x_mm;
+  const double rx = seen_fp.x_mm - arm.b.x_mm, ry = seen_fp.y_mm - arm.b.y_mm;
+  const double prior = with.sigma_mm / (with.believed_deg * kDegree);
+  const double weight = prior * prior;
+  const double tt = jt_x * jt_x + jt_y * jt_y + weight;
+  const double pp = jp_x * jp_x + jp_y * jp_y + weight;
+  const double tp = jt_x * jp_x + jt_y * jp_y;
+  const double bt = jt_x * rx + jt_y * ry + weight * (believed.theta_deg - at.theta_deg) * kDegree;
+  const double bp = jp_x * rx + jp_y * ry + weight * (believed.phi_deg - at.phi_deg) * kDegree;
+  const double determinant = tt * pp - tp * tp;  // positive: the prior sees to it
+  return {at.theta_deg + (pp * bt - tp * bp) / determinant / kDegree,
+          at.phi_deg + (tt * bp - tp * bt) / determinant / kDegree};
+}
+
+}  // namespace
+
+std::optional<Pose> PlaceSeen(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
+                              const Pose& believed, const SeenWith& with) {
+  const double distance = DistanceMm(unit.base_fp, seen_fp);
+  const double a = unit.theta().arm_mm;
+  const double b = unit.phi().arm_mm;
+  if (!(distance <= a + b + with.out_of_reach_mm) ||
+      distance < std::abs(a - b) - with.out_of_reach_mm)
+    return std::nullopt;
+  const AxisAngles prior = AnglesOf(unit, drive, believed);
+  AxisAngles angles = AnglesSeen(unit, seen_fp, prior);
+  constexpr int kSteps = 4;  // quadratic from so near; at the ends of the reach the prior is all
+  for (int step = 0; step < kSteps; ++step) angles = Improved(unit, seen_fp, angles, prior, with);
+  return Pose{NearestVectors(angles.theta_deg, unit.axis[0], drive.axis[0]),
+              NearestVectors(angles.phi_deg, unit.axis[1], drive.axis[1])};
+}
+
 std::vector<double> TurnsInRange(double angle_deg, const AxisGeometry& axis) {
   return TurnsWithin(angle_deg, axis, kRangeToleranceDeg);
 }

@@ -10,6 +10,7 @@
 // stretches the arm, 180 folds it back.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "fleet/drive.h"
@@ -63,6 +64,20 @@ PatrolLimits PatrolOf(const Unit& unit);
 /// theta serves, and `free_theta_deg`, brought into range, is taken. Empty: out of patrol or out of
 /// range. Errors of the result: at most kReachToleranceMm. Cost: O(solutions).
 std::vector<AxisAngles> AnglesFor(const Unit& unit, PointFp fibre_fp, double free_theta_deg = 0);
+
+/// How well a fibre was seen, and how far from where it was believed it may well be.
+struct SeenWith {
+  double sigma_mm = 0.003;  // of one coordinate
+  double believed_deg = 3;  // standard deviation of what was believed of each axis
+  double out_of_reach_mm = 0.25;
+};
+/// The most likely pose, in whole vectors, of a unit whose fibre was seen at a point:
+///   argmin |FibreAt(q) - seen|^2 / sigma^2 + |q - believed|^2 / believed_deg^2,
+/// elbow side and whole turns as believed. What was believed decides where the point cannot: at the
+/// ends of the reach theta and phi trade against each other. Not held to the ranges, because what
+/// stands there stands there. None: farther out of reach than that.
+std::optional<Pose> PlaceSeen(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
+                              const Pose& believed, const SeenWith& with = {});
 
 /// The angle plus every whole number of turns that lies within the axis' range, ascending.
 std::vector<double> TurnsInRange(double angle_deg, const AxisGeometry& axis);

@@ -12,21 +12,34 @@
 
 #include "fleet/drive.h"
 #include "fleet/knowledge.h"
+#include "fleet/sighting.h"
 #include "protocol/base/ids.h"
 #include "protocol/wire/messages.h"
 
 namespace focalfleet {
 
-enum class Origin : std::uint8_t { kFactory, kTuning, kCampaign, kOperator, kMove, kHoming };
+enum class Origin : std::uint8_t {
+  kFactory,
+  kTuning,
+  kCampaign,
+  kOperator,
+  kMove,
+  kHoming,
+  kCamera
+};
 constexpr const char* Name(Origin origin) {
-  constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator", "move", "homing"};
+  constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator",
+                                    "move",    "homing", "camera"};
   return kNames[static_cast<std::size_t>(origin)];
 }
 
-/// Where a unit stands now: the mirror of its FLASH and what it is worth.
+/// Where a unit stands now: the mirror of its FLASH and what it is worth. FLASH has the count of
+/// the vectors that were shown; `offset` more than that is the place that the axis truly has, as a
+/// camera last found it. 0: never measured since the count began anew.
 struct VectorRow {
   SerialNumber serial;
   UnitKnowledge knowledge;
+  Pose offset{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
   MoveId move;  // the last one begun, as the unit says
   Origin origin = Origin::kFactory;
@@ -62,6 +75,22 @@ struct IntentEndRow {
   SerialNumber serial;
   MoveId move;
   IntentEnd end = IntentEnd::kArrived;
+};
+
+/// What one exposure found of one unit.
+struct MeasurementRow {
+  std::uint64_t exposure = 0;
+  std::uint64_t configuration = 0;
+  SerialNumber serial;
+  UnitId unit;
+  SightingStatus status = SightingStatus::kMissing;
+  std::optional<UnitId> other;  // that it is confused with
+  double x_mm = 0;              // focal-plane frame
+  double y_mm = 0;
+  double sigma_um = 0;             // of one coordinate
+  std::optional<Pose> place;       // vectors; none: it was put nowhere
+  std::optional<PointFp> target_fp;  // where it had one
+  std::optional<double> error_um;    // from there
 };
 
 struct BindingRow {  // which hardware sits at a place
@@ -149,8 +178,8 @@ struct NextMoveRow {
   MoveId next;
 };
 
-using Row = std::variant<VectorRow, IntentRow, IntentEndRow, BindingRow, EnableRow, ParameterRow,
-                         TuningRow, ConfigurationRow, AlarmRow, NextMoveRow>;
+using Row = std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
+                         ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow>;
 
 /// All that the coordinator needs to go on after a restart.
 struct StoredFleet {
@@ -170,6 +199,7 @@ struct StoredFleet {
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
+  std::uint64_t next_exposure = 1;
 };
 
 }  // namespace focalfleet

@@ -1,16 +1,17 @@
-// apply FILE [--wait] [--fixed]: hands a targets file to the daemon.
+// apply FILE [--wait] [--fixed] [--correct N]: hands a targets file to the daemon.
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <csignal>
 #include <cstring>
+#include <optional>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/progress_bar.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "fleet/files/targets_file.h"
 
 namespace focalfleet::cli {
@@ -20,6 +21,8 @@ struct ApplyOptions {
   std::string file;
   bool wait = false;
   bool fixed = false;
+  std::optional<std::uint32_t> corrections;  // none: the camera is left alone
+  double tolerance_um = 10;
 };
 
 // Ctrl-C ends the waiting, not the motion; whoever presses it must know that.
@@ -89,6 +92,10 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
                              {"wait", options.wait}},
                     .long_lasting = options.wait,
                     .on_progress = [&bar](const Json& p) { ShowProgress(&bar, p); }};
+  if (options.corrections) {
+    question.args["corrections"] = *options.corrections;
+    question.args["tolerance_um"] = options.tolerance_um;
+  }
   const auto result = Ask(context, question);
   bar.End();
   if (!result) return Report(context, result.error());
@@ -98,9 +105,11 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
 }  // namespace
 
 void AddApplyCommand(CommandLine* line) {
-  CLI::App* command = AddCommand(&line->app, "apply", "Move the fleet to the targets of a file",
-                                 "  focalfleet apply targets.csv --wait\n"
-                                 "  focalfleet apply targets.csv --wait --json > summary.json");
+  CLI::App* command =
+      AddCommand(&line->app, "apply", "Move the fleet to the targets of a file",
+                 "  focalfleet apply targets.csv --wait\n"
+                 "  focalfleet apply targets.csv --wait --json > summary.json\n"
+                 "  focalfleet apply targets.csv --wait --correct 2 --tolerance-um 10");
   auto options = std::make_shared<ApplyOptions>();
   AddFile(command, "FILE", &options->file,
           "targets.csv: unit_id and x_mm, y_mm or theta_deg, phi_deg")
@@ -109,6 +118,13 @@ void AddApplyCommand(CommandLine* line) {
                     "Wait until the configuration is over, with its progress");
   command->add_flag("--fixed", options->fixed,
                     "Units that the file does not name may not step aside");
+  command
+      ->add_option("--correct", options->corrections,
+                   "Measure with the camera when all have arrived, and correct at most so often")
+      ->check(CLI::Range(0, 10));
+  command->add_option("--tolerance-um", options->tolerance_um, "Who is farther off is corrected")
+      ->check(NumberBetween(0.1, 1e6))
+      ->capture_default_str();
   OnChosen(line, command, options, RunApply);
 }
 

@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "protocol/wire/candump_line.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/message_rows.h"
@@ -21,7 +21,8 @@ struct CanDecodeOptions {
   std::string file = "-";
 };
 
-std::string HexData(const CanFrame& frame) {
+template <class Frame>
+std::string HexData(const Frame& frame) {
   std::string text;
   for (const std::uint8_t byte : frame.payload()) text += fmt::format("{:02X}", byte);
   return text;
@@ -101,6 +102,35 @@ std::string TextOf(const CandumpLine& line) {
   return text + "\n";
 }
 
+/// One line for each frame of a group, as if it had come alone; one for a group that is none.
+void PrintGroup(const Context& context, const CandumpLine& line) {
+  const auto entries = UnpackGroup(*line.group);
+  if (!entries) {
+    const std::string data = HexData(*line.group);
+    if (context.json)
+      PrintJson({{"time", std::string(line.time)},
+                 {"interface", std::string(line.interface)},
+                 {"id", fmt::format("{:08X}", line.group->id)},
+                 {"data", data},
+                 {"malformed", Name(entries.error())}});
+    else
+      PrintText(fmt::format("{}{}  malformed ({}): {:08X}##{}\n",
+                            line.time.empty() ? "" : fmt::format("{}  ", line.time), line.interface,
+                            Name(entries.error()), line.group->id, data));
+    return;
+  }
+  CandumpLine one = line;
+  for (std::size_t i = 0; i < entries->count; ++i) {
+    one.frame = entries->frame[i];
+    Json object = JsonOf(one);
+    object["group"] = i + 1;
+    if (context.json)
+      PrintJson(object);
+    else
+      PrintText(TextOf(one));
+  }
+}
+
 struct Tally {
   std::uint64_t lines = 0;
   std::uint64_t bad = 0;
@@ -120,7 +150,9 @@ Tally DecodeAll(const Context& context, const std::string& name, std::istream& i
           fmt::format("{}:{}: not a line of candump: {}\n", name, tally.lines, parsed.error()));
       continue;
     }
-    if (context.json)
+    if (parsed->group)
+      PrintGroup(context, *parsed);
+    else if (context.json)
       PrintJson(JsonOf(*parsed));
     else
       PrintText(TextOf(*parsed));

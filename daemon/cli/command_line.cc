@@ -134,6 +134,8 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddDiagnoseCommand(line.get());
   AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
+  AddMeasurementsCommand(line.get());
+  AddCampaignCommands(line.get());
   AddCanCommands(line.get());
   AddCompletionCommand(line.get());
   return line;

@@ -64,7 +64,9 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line);
 void AddDiagnoseCommand(CommandLine* line);
 void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
+void AddCampaignCommands(CommandLine* line);
 void AddCanCommands(CommandLine* line);
+void AddMeasurementsCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

@@ -67,6 +67,23 @@ std::string DescribeUploadAndStarts(const Json& c) {
   return text;
 }
 
+/// A line an exposure: blind, then after each correction.
+std::string DescribeMeasured(const Json& c) {
+  std::string text;
+  std::size_t correction = 0;
+  for (const Json& round : ListIn(c, "measured")) {
+    text += fmt::format(
+        "\n  {}: rms {:.1f} um, median {:.1f} um, worst {:.1f} um; {} of {} within the tolerance",
+        correction == 0 ? "measured as they came" : fmt::format("after correction {}", correction),
+        NumberIn(round, "rms_um"), NumberIn(round, "median_um"), NumberIn(round, "worst_um"),
+        CountIn(round, "within_tolerance"), CountIn(round, "measured"));
+    if (const std::uint64_t unknown = CountIn(round, "unknown"); unknown > 0)
+      text += fmt::format(", {} not to be told", unknown);
+    ++correction;
+  }
+  return text;
+}
+
 Colour ColourOf(ExitCode exit) {
   return exit == ExitCode::kOk             ? Colour::kGreen
          : exit == ExitCode::kSomeUnserved ? Colour::kYellow
@@ -104,6 +121,7 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
                       span("makespan_predicted_s"), Shown(c, "energy_J", "J", 1),
                       Shown(c, "peak_power_W", "W", 1), CountIn(c, "frames"));
   text += DescribeUploadAndStarts(c);
+  text += DescribeMeasured(c);
   if (const std::string error = TextIn(c, "error"); !error.empty()) {
     text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
   }
@@ -146,6 +164,7 @@ Json ApplySummary(const Json& configuration, const Json& status) {
                           "start_skew_allowed_s", "start_first", "start_last"}) {
     summary[key] = configuration.value(key, Json(nullptr));
   }
+  summary["measured"] = ListIn(configuration, "measured");
   summary["bus_load_max"] =
       NumberIn(configuration, "bus_load_max", NumberIn(status, "bus_load_max"));
   // Only where it failed on the way: the reason.

@@ -17,7 +17,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "sim/diagnosis/next_moves.h"
 #include "sim/diagnosis/planted.h"
 #include "sim/effects/registry.h"

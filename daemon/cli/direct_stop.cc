@@ -13,7 +13,7 @@
 #define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "daemon/ports/socketcan_port.h"
 #include "daemon/ports/unix_port.h"
 #include "fleet/files/layout_file.h"

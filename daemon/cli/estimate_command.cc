@@ -10,7 +10,7 @@
 #include "daemon/cli/offline_fleet.h"
 #include "daemon/cli/start_check.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "fleet/estimate.h"
 #include "fleet/files/csv.h"
 #include "fleet/targets.h"

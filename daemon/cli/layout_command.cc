@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/hex_layout.h"

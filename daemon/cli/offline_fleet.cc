@@ -5,7 +5,7 @@
 #include <map>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "daemon/store/store.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"

@@ -10,7 +10,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/offline_fleet.h"
 #include "daemon/cli/start_check.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "daemon/report/plan_page.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"

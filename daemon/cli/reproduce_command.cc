@@ -9,7 +9,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "daemon/report/page.h"
 #include "sim/reproduction/reproduce.h"
 

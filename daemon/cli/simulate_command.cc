@@ -11,7 +11,7 @@
 #include "daemon/cli/drive_options.h"
 #include "daemon/cli/drive_report.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "fleet/files/csv.h"
 #include "sim/drive/start_study.h"
 #include "sim/scope/recording.h"

@@ -6,7 +6,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
 namespace {

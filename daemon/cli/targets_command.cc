@@ -5,7 +5,7 @@
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/offline_fleet.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/kinematics.h"

@@ -14,7 +14,7 @@
 #include "daemon/cli/drive_options.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "daemon/store/store.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"

@@ -98,6 +98,9 @@ std::string TextOf(std::span<const std::byte> bytes) {
 void ReadCanAttribute(std::uint16_t type, std::span<const std::byte> payload, CanLink* link) {
   if (type == IFLA_CAN_BITTIMING) {
     if (const auto timing = Value<can_bittiming>(payload)) link->bit_rate_bps = timing->bitrate;
+  } else if (type == IFLA_CAN_DATA_BITTIMING) {
+    if (const auto timing = Value<can_bittiming>(payload))
+      link->data_bit_rate_bps = timing->bitrate;
   } else if (type == IFLA_CAN_STATE) {
     const auto state = Value<std::uint32_t>(payload);
     if (state && *state < CAN_STATE_MAX) link->state = static_cast<ControllerState>(*state);
@@ -233,6 +236,8 @@ Result<CanLink> ReadLink(std::span<const std::byte> answer) {
   well &= ForEachAttribute(head.body.subspan(sizeof(ifinfomsg)),
                            [&](std::uint16_t type, std::span<const std::byte> payload) {
                              if (type == IFLA_LINKINFO) well &= ReadLinkInfo(payload, &link);
+                             if (type == IFLA_MTU)
+                               link.mtu = Value<std::uint32_t>(payload).value_or(0);
                            });
   if (!well) return NoAnswer();
   return link;

@@ -34,7 +34,9 @@ struct CanLink {
   bool up = false;
   bool echoes = false;  // own frames are given back when they have left (IFF_ECHO)
   std::string kind;     // "can": a controller; "vcan", "vxcan"; empty: its driver does not say
-  std::uint32_t bit_rate_bps = 0;  // 0: it has no bit timing
+  std::uint32_t bit_rate_bps = 0;       // 0: it has no bit timing
+  std::uint32_t data_bit_rate_bps = 0;  // of CAN FD frames' inner part; 0: as above, or none set
+  std::uint32_t mtu = 0;                // bytes: 72 where it carries CAN FD frames, else 16
   std::optional<ControllerState> state;
   std::uint32_t restart_ms = 0;  // the kernel restarts it so long after bus-off; 0: it does not
   std::uint16_t tx_errors = 0;   // the controller's counters, where it shows them

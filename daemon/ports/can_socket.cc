@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "daemon/ports/can_errors.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
 namespace {
@@ -21,24 +22,31 @@ constexpr int kReceiveBufferBytes = 1 << 20;
 
 // protocol/wire/identifier.h: bit 19 says who sends; functions above 15 do not exist.
 constexpr canid_t kFromUnit = 1u << 19;
-constexpr canid_t kNoFunction = 0x30u << 20;
+constexpr canid_t kNoFunction = 0x30u << 20;  // but for the one of groups
 
 bool Set(int fd, int level, int option, const void* value, socklen_t size) {
   return ::setsockopt(fd, level, option, value, size) == 0;
 }
 
 /// A driver that echoes gives our own frames back as confirmations; the filter must let them in.
-Status Configure(int fd, Hears hears, bool confirms) {
+Status Configure(int fd, const Listening& listening, bool confirms) {
   const int on = 1;
   const int own = confirms ? 1 : 0;
   const can_err_mask_t errors = ErrorsOfInterest();
-  const canid_t theirs = hears == Hears::kUnits ? kFromUnit : 0;
+  const int fd_frames = listening.groups ? 1 : 0;
+  const bool hears_hosts = listening.hears == Hears::kHosts;
+  const canid_t theirs = hears_hosts ? 0 : kFromUnit;
   const canid_t exact = CAN_EFF_FLAG | CAN_RTR_FLAG | kNoFunction;
-  const can_filter filter{CAN_EFF_FLAG | (confirms ? 0 : theirs),
-                          exact | (confirms ? 0 : kFromUnit)};
+  const std::array<can_filter, 2> filters{
+      can_filter{CAN_EFF_FLAG | (confirms ? 0 : theirs), exact | (confirms ? 0 : kFromUnit)},
+      can_filter{CAN_EFF_FLAG | kGroupId, CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_EFF_MASK}};
+  // Groups come from hosts: from others for units, as confirmations for the one that sent them.
+  const bool groups_come = listening.groups && (hears_hosts || confirms);
+  const auto filter_bytes = static_cast<socklen_t>(sizeof(can_filter) * (groups_come ? 2 : 1));
   if (!Set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &own, sizeof own) ||
       !Set(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) ||
-      !Set(fd, SOL_CAN_RAW, CAN_RAW_FILTER, &filter, sizeof filter))
+      !Set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &fd_frames, sizeof fd_frames) ||
+      !Set(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), filter_bytes))
     return Fail(ErrorCode::kUnavailable,
                 std::string("cannot set up CAN_RAW: ") + std::strerror(errno));
   // All of these are help, not need: refused by a hardened kernel, the port works as well.
@@ -51,7 +59,7 @@ Status Configure(int fd, Hears hears, bool confirms) {
 
 }  // namespace
 
-Result<OpenedInterface> OpenInterface(const std::string& name, Hears hears) {
+Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& listening) {
   FOCALFLEET_TRY(QuestionAboutLink(name));
   const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd < 0)
@@ -67,7 +75,7 @@ Result<OpenedInterface> OpenInterface(const std::string& name, Hears hears) {
     ::close(fd);
     return OpenedInterface{-1, *link};
   }
-  if (const auto done = Configure(fd, hears, link->echoes); !done) return give_up(done.error());
+  if (const auto done = Configure(fd, listening, link->echoes); !done) return give_up(done.error());
   sockaddr_can address{};
   address.can_family = AF_CAN;
   address.can_ifindex = link->index;

@@ -16,6 +16,11 @@ namespace focalfleet {
 /// of the other direction, of 11 bits, or remote, do not even wake it.
 enum class Hears : std::uint8_t { kUnits, kHosts };
 
+struct Listening {
+  Hears hears = Hears::kUnits;
+  bool groups = false;  // CAN FD frames pass, both ways
+};
+
 struct OpenedInterface {
   int socket = -1;  // -1: the interface is there, and down
   CanLink link;
@@ -23,10 +28,10 @@ struct OpenedInterface {
 
 /// Errors: kUnavailable: the kernel has no CAN, or no such interface (named); kInvalid: none can
 /// have this name.
-Result<OpenedInterface> OpenInterface(const std::string& name, Hears hears);
+Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& listening);
 /// As OpenInterface; another one in tests on a kernel without CAN.
 using InterfaceOpener =
-    std::function<Result<OpenedInterface>(const std::string& name, Hears hears)>;
+    std::function<Result<OpenedInterface>(const std::string& name, const Listening& listening)>;
 
 /// What the kernel charges to the socket for frames that it holds below. Units: bytes. 0 where it
 /// does not tell.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <cstring>
 #include <ctime>
 #include <optional>
@@ -16,7 +17,7 @@ constexpr std::size_t kBatch = 64;
 
 /// The room that one batch needs, wired up once a call.
 struct Batch {
-  std::array<can_frame, kBatch> frames;
+  std::array<canfd_frame, kBatch> frames;  // a can_frame is its front
   std::array<iovec, kBatch> vectors;
   std::array<mmsghdr, kBatch> messages;
   struct Control {
@@ -31,7 +32,7 @@ struct Batch {
   Batch(std::size_t count, bool with_control) {
     for (std::size_t i = 0; i < count; ++i) {
       messages[i] = {};
-      vectors[i] = {&frames[i], sizeof(can_frame)};
+      vectors[i] = {&frames[i], with_control ? sizeof(canfd_frame) : sizeof(can_frame)};
       messages[i].msg_hdr.msg_iov = &vectors[i];
       messages[i].msg_hdr.msg_iovlen = 1;
       if (!with_control) continue;
@@ -66,11 +67,39 @@ bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
 
 /// One packet that was read.
 struct Packet {
-  const can_frame* raw = nullptr;
-  bool whole = false;  // as long as a frame
-  bool own = false;    // our own, come back
+  const canfd_frame* raw = nullptr;
+  std::size_t size = 0;  // bytes; 0: more than any frame has
+  bool own = false;      // our own, come back
   Told told;
 };
+
+can_frame Classic(const canfd_frame& frame) {
+  can_frame classic;
+  static_assert(offsetof(canfd_frame, data) == offsetof(can_frame, data));
+  std::memcpy(&classic, &frame, sizeof classic);
+  return classic;
+}
+
+HostInstant StampOf(const Packet& packet, HostInstant otherwise, const Aside* aside) {
+  if (aside == nullptr || !aside->stamps || !packet.told.wall_ns) return otherwise;
+  return aside->stamps->At(*packet.told.wall_ns);
+}
+
+/// Hands on what a group is made of.
+void TakeApart(const Packet& packet, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+               PortCounters* counters, const Aside& aside) {
+  const auto group = FromSocketFrame(*packet.raw);
+  const auto entries =
+      group ? UnpackGroup(*group) : tl::unexpected<Malformed>(Malformed::kIdentifier);
+  if (!entries) {
+    ++counters->rejected;
+    return;
+  }
+  if (aside.only_units) return;  // another host's
+  const HostInstant at = StampOf(packet, stamp.at, &aside);
+  for (std::size_t i = 0; i < entries->count; ++i)
+    out->push_back({stamp.bus, at, entries->frame[i]});
+}
 
 void Sort(const Packet& packet, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
           PortCounters* counters, Aside* aside) {
@@ -79,20 +108,19 @@ void Sort(const Packet& packet, const ReceivedFrame& stamp, std::vector<Received
     ++aside->confirmed;
     return;
   }
-  const auto frame = packet.whole ? FromSocketFrame(*packet.raw) : std::nullopt;
+  if (packet.size == sizeof(canfd_frame) && aside != nullptr && aside->groups)
+    return TakeApart(packet, stamp, out, counters, *aside);
+  const bool whole = packet.size == sizeof(can_frame);
+  const auto frame = whole ? FromSocketFrame(Classic(*packet.raw)) : std::nullopt;
   if (!frame) {
-    if (packet.whole && aside != nullptr && (packet.raw->can_id & CAN_ERR_FLAG) != 0)
-      aside->errors.push_back(*packet.raw);
+    if (whole && aside != nullptr && (packet.raw->can_id & CAN_ERR_FLAG) != 0)
+      aside->errors.push_back(Classic(*packet.raw));
     else
       ++counters->rejected;
     return;
   }
-  HostInstant at = stamp.at;
-  if (aside != nullptr) {
-    if (aside->only_units && !IsFromUnit(*frame)) return;  // another host's
-    if (aside->stamps && packet.told.wall_ns) at = aside->stamps->At(*packet.told.wall_ns);
-  }
-  out->push_back({stamp.bus, at, *frame});
+  if (aside != nullptr && aside->only_units && !IsFromUnit(*frame)) return;  // another host's
+  out->push_back({stamp.bus, StampOf(packet, stamp.at, aside), *frame});
 }
 
 }  // namespace
@@ -122,7 +150,10 @@ BatchSent SendFrames(int fd, std::span<const CanFrame> frames) {
   Batch batch(std::min(kBatch, frames.size()), /*with_control=*/false);
   while (sent.taken < frames.size()) {
     const auto chunk = frames.subspan(sent.taken, std::min(kBatch, frames.size() - sent.taken));
-    std::ranges::transform(chunk, batch.frames.begin(), ToSocketFrame);
+    for (std::size_t i = 0; i < chunk.size(); ++i) {
+      const can_frame raw = ToSocketFrame(chunk[i]);
+      std::memcpy(&batch.frames[i], &raw, sizeof raw);
+    }
     const int done = ::sendmmsg(fd, batch.messages.data(), static_cast<unsigned>(chunk.size()),
                                 MSG_DONTWAIT | MSG_NOSIGNAL);
     if (done < 0) {
@@ -133,6 +164,33 @@ BatchSent SendFrames(int fd, std::span<const CanFrame> frames) {
     sent.taken += static_cast<std::size_t>(done);
   }
   return sent;
+}
+
+canfd_frame ToSocketFrame(const FdFrame& frame) {
+  canfd_frame out{};
+  out.can_id = frame.id | CAN_EFF_FLAG;
+  out.len = frame.length;
+  out.flags = CANFD_BRS;
+  std::ranges::copy(frame.data, out.data);
+  return out;
+}
+
+std::optional<FdFrame> FromSocketFrame(const canfd_frame& frame) {
+  if ((frame.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) != CAN_EFF_FLAG)
+    return std::nullopt;
+  if (frame.len > CANFD_MAX_DLEN || FdLength(frame.len) != frame.len) return std::nullopt;
+  FdFrame out;
+  out.id = frame.can_id & CAN_EFF_MASK;
+  out.length = frame.len;
+  std::copy_n(frame.data, frame.len, out.data.begin());
+  return out;
+}
+
+int SendGroup(int fd, const FdFrame& group) {
+  const canfd_frame raw = ToSocketFrame(group);
+  while (::send(fd, &raw, sizeof raw, MSG_DONTWAIT | MSG_NOSIGNAL) < 0)
+    if (errno != EINTR) return errno;
+  return 0;
 }
 
 HostInstant FrameStamps::At(std::int64_t wall_ns) const {
@@ -155,7 +213,7 @@ BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<Rece
       if (message.msg_len == 0) return {.closed = true, .error = 0};
       const auto flags = static_cast<unsigned>(message.msg_hdr.msg_flags);
       Sort({.raw = &batch.frames[i],
-            .whole = message.msg_len == sizeof(can_frame) && (flags & MSG_TRUNC) == 0,
+            .size = (flags & MSG_TRUNC) == 0 ? message.msg_len : 0,
             .own = (flags & MSG_CONFIRM) != 0,
             .told = ReadControl(&message.msg_hdr)},
            stamp, out, counters, aside);

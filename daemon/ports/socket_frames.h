@@ -1,6 +1,8 @@
 // Frames in batches through a socket that carries `struct can_frame`, one a packet: CAN_RAW and
-// SOCK_SEQPACKET look the same here. A batch of 64 costs one system call; on a bus at its limit
-// (7.6k frames/s) that is 120 calls a second instead of 7600.
+// SOCK_SEQPACKET look the same here. CAN_RAW may carry groups of staging frames beside them, as
+// `struct canfd_frame`; whoever hears a group gets the frames that it is made of. A batch of 64
+// costs one system call; on a bus at its limit (7.6k frames/s) that is 120 calls a second instead
+// of 7600.
 #pragma once
 
 #include <linux/can.h>
@@ -12,6 +14,7 @@
 #include "daemon/clock.h"
 #include "daemon/ports/pollable_port.h"
 #include "protocol/link/frame_port.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
 
@@ -25,6 +28,12 @@ struct BatchSent {
   int error = 0;  // errno of the first frame that was refused
 };
 BatchSent SendFrames(int fd, std::span<const CanFrame> frames);
+
+canfd_frame ToSocketFrame(const FdFrame& frame);
+/// None where it is no extended data frame, or has a length that CAN FD does not have.
+std::optional<FdFrame> FromSocketFrame(const canfd_frame& frame);
+/// 0, or the errno with which it was refused.
+int SendGroup(int fd, const FdFrame& group);
 
 struct BatchReceived {
   bool closed = false;  // the other end is gone (of a connected socket)
@@ -48,6 +57,7 @@ struct Aside {
   std::size_t confirmed = 0;          // our own frames that came back
   std::optional<FrameStamps> stamps;  // given: frames are stamped by the kernel
   bool only_units = false;            // of others' frames, drop those of hosts
+  bool groups = false;                // CAN FD frames may come
 };
 
 /// Reads until nothing is left, at most kFramesPerReceive. What is no data frame is counted as

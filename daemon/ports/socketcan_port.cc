@@ -34,6 +34,32 @@ Status CheckBitRate(const CanLink& link, const SocketCanPort* port, std::uint32_
                                        std::to_string(wanted_bps));
 }
 
+Status CheckFd(const CanLink& link, const SocketCanPort* port, std::uint32_t wanted_bps) {
+  if (wanted_bps == 0) return {};
+  const std::string interface = "CAN interface '" + port->name() + "' ";
+  if (link.mtu != CANFD_MTU)
+    return Fail(ErrorCode::kRefused,
+                interface + "carries no CAN FD: its MTU is " + std::to_string(link.mtu) + ", not " +
+                    std::to_string(CANFD_MTU) + " (`ip link set " + port->name() +
+                    (link.kind == "can"
+                         ? " type can ... dbitrate " + std::to_string(wanted_bps) + " fd on`)"
+                         : " mtu " + std::to_string(CANFD_MTU) + "`)"));
+  if (link.data_bit_rate_bps == 0 || link.data_bit_rate_bps == wanted_bps) return {};
+  return Fail(ErrorCode::kRefused, interface + "has " + std::to_string(link.data_bit_rate_bps) +
+                                       " bit/s for the data of CAN FD frames, not " +
+                                       std::to_string(wanted_bps));
+}
+
+/// How many of `frames`, from the front, stand before the next group; at most `most`, at least one.
+std::size_t BeforeGroup(std::span<const CanFrame> frames, std::size_t most) {
+  const auto begins = [frames](std::size_t at) {
+    return at + 1 < frames.size() && CanBeGrouped(frames[at]) && CanBeGrouped(frames[at + 1]);
+  };
+  std::size_t alone = 1;
+  while (alone < std::min(most, frames.size()) && !begins(alone)) ++alone;
+  return alone;
+}
+
 LinkState LinkStateOf(const CanLink& link) {
   if (link.state == ControllerState::kBusOff) return LinkState::kOff;
   return link.state == ControllerState::kPassive ? LinkState::kPassive : LinkState::kUp;
@@ -56,6 +82,8 @@ SocketCanPort::SocketCanPort(Options options, WatchedSocket socket)
            .poll_period = options_.clock.Real(Milliseconds(10))}) {
   if (!options_.wire_clock) options_.wire_clock = Monotonic;
   aside_.only_units = options_.hears == Hears::kUnits;
+  // A unit on such a bus takes staging frames either way.
+  aside_.groups = !aside_.only_units || options_.data_bit_rate_bps > 0;
 }
 
 Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
@@ -68,7 +96,7 @@ Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
 }
 
 Status SocketCanPort::Open() {
-  auto opened = options_.open(options_.interface, options_.hears);
+  auto opened = options_.open(options_.interface, {options_.hears, aside_.groups});
   found_ = opened.has_value();
   if (!opened) {
     trouble_ = opened.error().text;
@@ -80,13 +108,17 @@ Status SocketCanPort::Open() {
     return {};
   }
   socket_.Open(opened->socket);
-  if (auto right = CheckBitRate(link_, this, options_.bit_rate_bps); !right) {
+  auto right = CheckBitRate(link_, this, options_.bit_rate_bps);
+  if (right) right = CheckFd(link_, this, options_.data_bit_rate_bps);
+  if (!right) {
     socket_.Close();
     trouble_ = right.error().text;
     return right;
   }
   window_ = TransmitWindow(
-      {.confirms = link_.echoes, .bit_rate_bps = link_.echoes ? 0 : link_.bit_rate_bps});
+      {.confirms = link_.echoes,
+       .bit_rate_bps = link_.echoes ? 0 : link_.bit_rate_bps,
+       .data_bit_rate_bps = std::max(link_.bit_rate_bps, options_.data_bit_rate_bps)});
   waits_since_ = kNever;
   trouble_.clear();
   counters_.reconnects += std::exchange(was_up_, true) ? 1u : 0u;
@@ -136,18 +168,12 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
   while (taken < frames.size()) {
     const bool urgent = IsUrgent(frames[taken]);
     const HostInstant monotonic = window_.needs_time() ? options_.wire_clock() : HostInstant{0};
-    const std::size_t room = std::min(Room(urgent, monotonic), frames.size() - taken);
+    const std::size_t room = Room(urgent, monotonic);
     if (room == 0) return taken;
-    // The last place is not for those behind a stop.
-    const auto batch = frames.subspan(taken, urgent ? 1 : room);
     if (urgent) SetUrgent(socket_.socket(), true);
-    const BatchSent sent = SendFrames(socket_.socket(), batch);
+    // The last place is not for those behind a stop.
+    const BatchSent sent = HandDown(frames.subspan(taken), urgent ? 1 : room, monotonic);
     if (urgent) SetUrgent(socket_.socket(), false);
-    if (sent.taken > 0 && window_.unconfirmed() == 0) waits_since_ = monotonic;
-    // Their bits begin no sooner than now.
-    const HostInstant below =
-        window_.options().bit_rate_bps > 0 ? options_.wire_clock() : monotonic;
-    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, below);
     taken += sent.taken;
     // ENOBUFS: others have filled the interface's queue, which no poll tells.
     socket_.WatchSending(sent.error == EAGAIN);
@@ -159,6 +185,34 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
     }
   }
   return taken;
+}
+
+BatchSent SocketCanPort::HandDown(std::span<const CanFrame> frames, std::size_t room,
+                                  HostInstant monotonic) {
+  const int socket = socket_.socket();
+  const bool groups = options_.data_bit_rate_bps > 0;
+  FdFrame group;
+  const std::size_t grouped = groups ? PackGroup(frames, &group) : 0;
+  const bool together = grouped >= kGroupEntriesMin;
+  const auto batch =
+      frames.first(groups ? BeforeGroup(frames, room) : std::min(room, frames.size()));
+  BatchSent sent;
+  if (together) {
+    sent.error = SendGroup(socket, group);
+    sent.taken = sent.error == 0 ? grouped : 0;
+  } else {
+    sent = SendFrames(socket, batch);
+  }
+  if (sent.taken == 0) return sent;
+  if (window_.unconfirmed() == 0) waits_since_ = monotonic;
+  // Their bits begin no sooner than now.
+  const HostInstant below = window_.options().bit_rate_bps > 0 ? options_.wire_clock() : monotonic;
+  if (together) {
+    window_.Sent(group, below);
+  } else {
+    for (const CanFrame& frame : batch.first(sent.taken)) window_.Sent(frame, below);
+  }
+  return sent;
 }
 
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {

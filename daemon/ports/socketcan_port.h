@@ -4,8 +4,9 @@
 //
 // An interface that is down or not there takes the link down, no more: it is looked for again and
 // opened when it is up, be it the same or another of the same name. One whose bit rate is wrong is
-// not used. A controller that goes bus-off is brought back where that is possible
-// (link_recovery.h), otherwise `trouble` says what a person has to do.
+// not used, nor is one without CAN FD where that is asked for. A controller that goes bus-off is
+// brought back where that is possible (link_recovery.h), otherwise `trouble` says what a person has
+// to do.
 #pragma once
 
 #include <functional>
@@ -30,6 +31,9 @@ class SocketCanPort : public PollablePort {
     std::string interface;
     Hears hears = Hears::kUnits;
     std::uint32_t bit_rate_bps = 0;  // that the interface must have, if it has any; 0: whatever
+    /// Of a bus with CAN FD, for a host: staging frames that are handed over one behind the other
+    /// go down in groups. 0: every frame goes alone.
+    std::uint32_t data_bit_rate_bps = 0;
     HostClock clock = HostClock();
     DurationNs retry_period = Milliseconds(200);  // real time
     // What the frames below go by: bits do not hurry when the host's clock does. None: the
@@ -39,8 +43,8 @@ class SocketCanPort : public PollablePort {
     LinkRecovery::Reviver revive = {};  // none: ReviveLink
   };
   /// Tries to open it once; an interface that is down or not there is down, no error.
-  /// Errors: kInvalid: none can have this name; kRefused: it has another bit rate; kUnavailable: no
-  /// descriptors left.
+  /// Errors: kInvalid: none can have this name; kRefused: it has another bit rate, or no CAN FD;
+  /// kUnavailable: no descriptors left.
   static Result<std::unique_ptr<SocketCanPort>> Create(Options options);
 
   std::size_t Send(std::span<const CanFrame> frames) override;
@@ -66,6 +70,8 @@ class SocketCanPort : public PollablePort {
   void SetState(LinkState state, HostInstant now);
   void LookAgain(HostInstant now);
   void Recover(HostInstant now);
+  /// Hands down what fits into `room` frames, or one group. Pre: room is not 0.
+  BatchSent HandDown(std::span<const CanFrame> frames, std::size_t room, HostInstant monotonic);
   [[nodiscard]] std::size_t Room(bool urgent, HostInstant monotonic);
   [[nodiscard]] FrameStamps Stamps(HostInstant now);
   [[nodiscard]] std::string WithCauses(const std::string& what) const;

@@ -5,6 +5,16 @@
 #include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
+namespace {
+
+DurationNs TimeOf(const CanFrame& frame, const TransmitWindow::Options& options) {
+  return BitTime(FrameBits(frame), options.bit_rate_bps);
+}
+DurationNs TimeOf(const FdFrame& group, const TransmitWindow::Options& options) {
+  return BitTime(FrameBits(group), {options.bit_rate_bps, options.data_bit_rate_bps});
+}
+
+}  // namespace
 
 std::size_t TransmitWindow::ByMemory() const {
   if (charged_bytes_ == 0) return 0;
@@ -32,14 +42,18 @@ HostInstant TransmitWindow::RoomAt() const {
   return ends_.size() < kOrdinary ? kNever : ends_[ends_.size() - kOrdinary];
 }
 
-void TransmitWindow::Sent(const CanFrame& frame, HostInstant now) {
+template <class Frame>
+void TransmitWindow::Count(const Frame& frame, HostInstant now) {
   if (options_.confirms) ++unconfirmed_;
   ++sent_when_empty_;
   if (options_.bit_rate_bps == 0) return;
   const HostInstant idle = ends_.empty() ? now : std::max(now, ends_.back());
-  ends_.push_back(idle + BitTime(FrameBits(frame), options_.bit_rate_bps));
+  ends_.push_back(idle + TimeOf(frame, options_));
   if (ends_.size() > kAll) ends_.pop_front();
 }
+
+void TransmitWindow::Sent(const CanFrame& frame, HostInstant now) { Count(frame, now); }
+void TransmitWindow::Sent(const FdFrame& group, HostInstant now) { Count(group, now); }
 
 void TransmitWindow::Confirmed(std::size_t frames) {
   unconfirmed_ -= std::min(unconfirmed_, frames);
@@ -47,7 +61,7 @@ void TransmitWindow::Confirmed(std::size_t frames) {
 
 void TransmitWindow::Heard(const CanFrame& frame, HostInstant at) {
   if (options_.bit_rate_bps == 0) return;
-  const DurationNs took = BitTime(FrameBits(frame), options_.bit_rate_bps);
+  const DurationNs took = TimeOf(frame, options_);
   for (HostInstant& end : ends_)
     if (end > at - took) end = end + took;
 }

@@ -1,7 +1,8 @@
 // How many of our frames are below the socket: in the interface's queue, in the controller, on the
 // wire. Down there a stop can pass nothing, so frames wait above, where it can. At most three are
 // below, and the third place is a stop's alone: ahead of it are at most the frame on the wire and
-// one more, 2 x 160 bits.
+// one more, 2 x 160 bits; where bus.can_fd is on, 2 groups of staging frames, each one frame here
+// as it is below, of up to 393 us.
 //
 // Two frames keep a bus busy: one is on the wire (131 us and more at 1 Mbit/s for 8 bytes), and
 // that long there is to learn that the one before has left and to hand down the next.
@@ -22,6 +23,7 @@
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
 
@@ -32,8 +34,9 @@ class TransmitWindow {
   static constexpr std::size_t kUnheldMax = 64;  // at once, where nothing is ever held
 
   struct Options {
-    bool confirms = false;           // the driver echoes: confirmations come
-    std::uint32_t bit_rate_bps = 0;  // 0: frames take no time that is known
+    bool confirms = false;                // the driver echoes: confirmations come
+    std::uint32_t bit_rate_bps = 0;       // 0: frames take no time that is known
+    std::uint32_t data_bit_rate_bps = 0;  // of the inner part of groups
   };
   TransmitWindow() = default;
   explicit TransmitWindow(const Options& options) : options_(options) {}
@@ -46,6 +49,7 @@ class TransmitWindow {
   [[nodiscard]] HostInstant RoomAt() const;
 
   void Sent(const CanFrame& frame, HostInstant now);
+  void Sent(const FdFrame& group, HostInstant now);
   /// So many of ours have come back.
   void Confirmed(std::size_t frames);
   /// Another node's frame ended at `at`: what we had waiting then waited so much longer.
@@ -61,6 +65,8 @@ class TransmitWindow {
   [[nodiscard]] bool charged() const { return charged_bytes_ > 0; }
 
  private:
+  template <class Frame>
+  void Count(const Frame& frame, HostInstant now);
   [[nodiscard]] std::size_t ByMemory() const;
   [[nodiscard]] std::size_t ByBitClock(HostInstant now) const;
 

@@ -1,5 +1,6 @@
 // One SocketCAN interface a bus. The interface arbitrates and takes its own time, so the world
 // passes frames at once; what the interface cannot take now (ENOBUFS) is kept and tried again.
+// A CAN FD group is taken apart at the door: each unit gets its frames as if they had come alone.
 #pragma once
 
 #include <deque>

@@ -12,8 +12,8 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
-#include "daemon/cli/text_file.h"
 #include "daemon/control/line_client.h"
+#include "daemon/files/text_file.h"
 #include "daemon/simulator/simulator.h"
 
 namespace focalfleet::simulator {
@@ -63,6 +63,7 @@ struct Given {
   std::string targets;
   std::string code;
   std::string axis = "theta";
+  std::uint32_t exposures = 1;
   double seconds = -1;
   double after_s = -1;
   std::optional<double> late_s;
@@ -124,13 +125,13 @@ int SetBuses(const Given& given, const char* verb) {
 int TellTruth(const Given& given) {
   Json args = Json::object();
   if (!given.targets.empty()) {
-    const auto text = cli::ReadTextFile(given.targets);
+    const auto text = ReadTextFile(given.targets);
     if (!text) return Complain(text.error(), ExitCode::kRefused);
     args = {{"targets_csv", *text}, {"targets_name", given.targets}};
   }
   return Ask(given, {0, "truth", args}, [&](const Json& result) {
     if (!given.out.empty()) {
-      const auto written = cli::WriteFileAtomically(given.out, result.value("csv", ""));
+      const auto written = WriteFileAtomically(given.out, result.value("csv", ""));
       if (!written) return Complain(written.error(), ExitCode::kRefused);
     }
     if (given.json) {
@@ -165,6 +166,10 @@ int Run(Given* given, const CLI::App& app) {
     if (!interfaces) return Complain(interfaces.error(), ExitCode::kUsage);
     given->run.interfaces = std::move(*interfaces);
   }
+  if (given->run.camera_directory.empty() != given->run.fiducials_path.empty()) {
+    std::fputs("focalfleet-sim: --camera and --fiducials go together\n", stderr);
+    return static_cast<int>(ExitCode::kUsage);
+  }
   given->run.control_path = given->control;
   given->run.spread = given->spread == "real" ? sim::Spread::kReal : sim::Spread::kNominal;
   const auto ran = RunSimulator(given->run);
@@ -186,6 +191,16 @@ void AddRunOptions(CLI::App* app, Given* given) {
   app->add_option(
       "--faults", run.faults_path,
       "faults.csv: which bus or unit misbehaves how, from when to when; chance by --seed");
+  app->add_option("--camera", run.camera_directory,
+                  "folder where focalfleetd asks a camera for exposures; it is answered there");
+  app->add_option("--fiducials", run.fiducials_path, "fiducials.csv: what the camera sees beside");
+  app->add_option("--camera-noise-um", run.camera_noise_um, "of one coordinate of a usual spot")
+      ->check(cli::NumberBetween(0, 1000))
+      ->capture_default_str();
+  app->add_option("--camera-air-um", run.camera_air_um,
+                  "turbulence, of one coordinate; nearly the same for neighbours")
+      ->check(cli::NumberBetween(0, 1000))
+      ->capture_default_str();
   app->add_option("--speed", run.speed, "times faster than life")
       ->check(cli::NumberBetween(0.01, 1000))
       ->capture_default_str();
@@ -261,6 +276,10 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
   kill->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
   CLI::App* revive = AddSubcommand(app, given, "revive-bus", "these buses work again");
   revive->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
+  CLI::App* camera = AddSubcommand(app, given, "camera", "let the next exposures go wrong");
+  camera->add_option("--fault", given->code, "dead, late, doubled, turned, other_field, or none")
+      ->required();
+  camera->add_option("--exposures", given->exposures, "so many")->capture_default_str();
   CLI::App* status = AddSubcommand(app, given, "status", "counters of all buses, as JSON");
   CLI::App* quit =
       AddSubcommand(app, given, "quit", "end the simulation; it writes its FLASH file");
@@ -286,6 +305,11 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
           {misbehave, [given] { return Misbehave(*given); }},
           {kill, [given] { return SetBuses(*given, "kill_bus"); }},
           {revive, [given] { return SetBuses(*given, "revive_bus"); }},
+          {camera,
+           [given] {
+             return AskSimply(
+                 *given, {0, "camera", {{"fault", given->code}, {"exposures", given->exposures}}});
+           }},
           {status,
            [given] {
              given->json = true;

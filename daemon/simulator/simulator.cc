@@ -17,10 +17,11 @@
 #include <span>
 #include <utility>
 
-#include "daemon/cli/text_file.h"
 #include "daemon/clock.h"
 #include "daemon/control/line_server.h"
+#include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
+#include "daemon/simulator/camera_door.h"
 #include "daemon/simulator/can_doors.h"
 #include "daemon/simulator/faults_file.h"
 #include "daemon/simulator/memory_file.h"
@@ -38,7 +39,7 @@ constexpr std::int64_t kGrainNs = 100'000;
 
 Status PlaceUnits(const std::string& path, const Layout& layout, sim::WorldConfig* config) {
   if (path.empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
   const std::vector<UnitDrive> drives(layout.size());
   FOCALFLEET_TRY_ASSIGN(const auto poses, ReadState(text, path, layout, drives));
   for (std::size_t i = 0; i < layout.size(); ++i) {
@@ -53,7 +54,7 @@ Status PlaceUnits(const std::string& path, const Layout& layout, sim::WorldConfi
 
 Status Remember(const SimulatorOptions& options, sim::WorldConfig* config) {
   if (options.flash_path.empty() || !std::filesystem::exists(options.flash_path)) return {};
-  FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(options.flash_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.flash_path));
   FOCALFLEET_TRY_ASSIGN(MemoryFile memory, ReadMemory(text, options.flash_path));
   if (memory.seed != options.seed || memory.spread != options.spread)
     return Fail(ErrorCode::kRefused,
@@ -66,14 +67,14 @@ Status Remember(const SimulatorOptions& options, sim::WorldConfig* config) {
 
 Status PlanFaults(const SimulatorOptions& options, sim::WorldConfig* config) {
   if (options.faults_path.empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(options.faults_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.faults_path));
   FOCALFLEET_TRY_ASSIGN(config->faults,
                         ReadFaults(text, options.faults_path, {config->units, config->bit_clock}));
   return {};
 }
 
 Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostClock& clock) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, cli::ReadTextFile(options.units_path));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.units_path));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, options.units_path, {}));
   sim::WorldConfig config;
   config.units = DescribeUnits(layout);
@@ -99,6 +100,16 @@ Result<std::unique_ptr<BusDoors>> OpenDoors(const SimulatorOptions& options,
   }
   FOCALFLEET_TRY_ASSIGN(auto doors, CanDoors::Create({options.interfaces, all, clock}));
   return doors;
+}
+
+Result<CameraDoor> OpenCamera(const SimulatorOptions& options) {
+  sim::CameraTraits traits;
+  traits.centroid_sigma_px = 1e-3 * options.camera_noise_um * traits.optics.pixels_per_mm;
+  traits.air.sigma_mm = 1e-3 * options.camera_air_um;
+  return CameraDoor::Open({.directory = options.camera_directory,
+                           .fiducials_path = options.fiducials_path,
+                           .seed = options.seed,
+                           .traits = traits});
 }
 
 /// The descriptors of the loop itself.
@@ -173,17 +184,19 @@ class Loop {
     sim::World* world;
     BusDoors* doors;
     LineServer* control;  // none: null
+    CameraDoor* camera;   // none: null
     const Wakers* wakers;
   };
-  explicit Loop(const Parts& parts) : parts_(parts), verbs_(parts.world) {}
+  explicit Loop(const Parts& parts) : parts_(parts), verbs_(parts.world, parts.camera) {}
 
   void Run() {
     for (;;) {
       Turn();
       if (verbs_.quit()) return;
       const HostInstant now = parts_.clock->Now();
-      const HostInstant due =
+      HostInstant due =
           std::min({parts_.world->NextEvent(), parts_.doors->wake_at(), verbs_.wake_at()});
+      if (parts_.camera != nullptr) due = std::min(due, parts_.camera->wake_at());
       std::int64_t at_ns = parts_.clock->ToMonotonic(due);
       if (due != kNever) at_ns = std::max(at_ns, parts_.clock->ToMonotonic(now) + kGrainNs);
       if (parts_.wakers->Sleep(at_ns)) return;
@@ -198,6 +211,7 @@ class Loop {
     parts_.doors->Exchange(now, parts_.world);
     // What came in may end at once (a real bus has taken its time already).
     Advance(now);
+    if (parts_.camera != nullptr) LetLook(now);
     if (parts_.control != nullptr) Answer();
   }
 
@@ -206,6 +220,11 @@ class Loop {
     carried_.clear();
     parts_.world->AdvanceTo(now, &delivered_, &carried_);
     if (!carried_.empty()) parts_.doors->Carry(carried_);
+  }
+
+  void LetLook(HostInstant now) {
+    if (const Status looked = parts_.camera->Serve(now, *parts_.world); !looked)
+      std::fprintf(stderr, "focalfleet-sim: %s\n", looked.error().text.c_str());
   }
 
   void Answer() {
@@ -245,12 +264,18 @@ Status RunSimulator(const SimulatorOptions& options) {
   }
   if (!wakers.Watch(doors->fd()) || (control && !wakers.Watch(control->fd())))
     return Fail(ErrorCode::kUnavailable, std::string("cannot watch: ") + std::strerror(errno));
+  std::optional<CameraDoor> camera;
+  if (!options.camera_directory.empty()) {
+    FOCALFLEET_TRY_ASSIGN(camera, OpenCamera(options));
+  }
   std::puts("ready");
   std::fflush(stdout);
-  Loop({&clock, &world, doors.get(), control ? &*control : nullptr, &wakers}).Run();
+  Loop({&clock, &world, doors.get(), control ? &*control : nullptr, camera ? &*camera : nullptr,
+        &wakers})
+      .Run();
   if (options.flash_path.empty()) return {};
-  return cli::WriteFileAtomically(options.flash_path,
-                                  WriteMemory({options.seed, options.spread, world.Memory()}));
+  return WriteFileAtomically(options.flash_path,
+                             WriteMemory({options.seed, options.spread, world.Memory()}));
 }
 
 }  // namespace focalfleet::simulator

@@ -19,6 +19,10 @@ struct SimulatorOptions {
   std::string control_path;             // empty: none
   std::string flash_path;               // empty: forgotten at the end
   std::string faults_path;              // empty: none by the clock
+  std::string camera_directory;         // where the daemon asks for exposures; empty: no camera
+  std::string fiducials_path;           // that the camera sees beside the fibres
+  double camera_noise_um = 2;           // of one coordinate of a usual spot
+  double camera_air_um = 0;             // likewise, the same for neighbours
   double speed = 1;
   std::uint64_t seed = 1;
   sim::Spread spread = sim::Spread::kNominal;

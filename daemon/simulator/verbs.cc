@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <string>
 
@@ -37,6 +38,7 @@ Result<Json> Verbs::Do(const ControlRequest& request) {
   if (request.verb == "fault") return RaiseFault(request.args);
   if (request.verb == "silence") return Silence(request.args);
   if (request.verb == "misbehave") return Misbehave(request.args);
+  if (request.verb == "camera") return FailCamera(request.args);
   if (request.verb == "kill_bus") return SetBuses(request.args, false);
   if (request.verb == "revive_bus") return SetBuses(request.args, true);
   if (request.verb == "status") return StatusOfAll();
@@ -129,6 +131,18 @@ Result<Json> Verbs::Silence(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const bool off, FlagArgumentOr(args, "off", false));
   for (const UnitId unit : units) world_->faults(unit)->silent = !off;
   return Json{{"units", units.size()}};
+}
+
+Result<Json> Verbs::FailCamera(const Json& args) {
+  if (camera_ == nullptr) return Fail(ErrorCode::kRefused, "this simulation has no camera");
+  FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgument(args, "fault"));
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t exposures, UnsignedArgumentOr(args, "exposures", 1));
+  const auto found = std::ranges::find(kCameraFaultNames, name);
+  if (found == std::end(kCameraFaultNames))
+    return Fail(ErrorCode::kInvalid, "no fault of a camera is called '" + name + "'");
+  camera_->Fail(static_cast<CameraFault>(found - std::begin(kCameraFaultNames)),
+                static_cast<std::uint32_t>(std::min<std::uint64_t>(exposures, UINT32_MAX)));
+  return Json{{"fault", name}, {"exposures", exposures}};
 }
 
 Result<Json> Verbs::Misbehave(const Json& args) {

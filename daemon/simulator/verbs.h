@@ -3,6 +3,7 @@
 //   truth {targets_csv?, targets_name?}   status {}   quit {}
 //   power_cut {units, seconds?}   power_on {units}   fault {units, code, axis?, after_s?}
 //   silence {units, off?}   kill_bus {buses}   revive_bus {buses}
+//   camera {fault, exposures?}: how the next exposures go wrong; `none` ends it
 //   misbehave {units, off?, late_s?, copies?, deaf?, wrong_digest?, mute_done?, foreign_serial?}:
 //     adds to how the units already misbehave; `off` ends all that this verb began before
 #pragma once
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "daemon/control/messages.h"
+#include "daemon/simulator/camera_door.h"
 #include "protocol/base/instants.h"
 #include "sim/world.h"
 
@@ -17,7 +19,9 @@ namespace focalfleet::simulator {
 
 class Verbs {
  public:
-  explicit Verbs(sim::World* world) : world_(world) {}
+  /// `camera`: null where there is none.
+  explicit Verbs(sim::World* world, CameraDoor* camera = nullptr)
+      : world_(world), camera_(camera) {}
 
   /// Pre: the world has been brought to the present.
   Result<Json> Do(const ControlRequest& request);
@@ -34,6 +38,7 @@ class Verbs {
   Result<Json> Silence(const Json& args);
   Result<Json> Misbehave(const Json& args);
   Result<Json> SetBuses(const Json& args, bool alive);
+  Result<Json> FailCamera(const Json& args);
   [[nodiscard]] Json StatusOfAll() const;
   /// All of them exist, or none is touched.
   [[nodiscard]] Result<std::vector<UnitId>> Units(const Json& args) const;
@@ -43,6 +48,7 @@ class Verbs {
     UnitId unit;
   };
   sim::World* world_;
+  CameraDoor* camera_;
   std::vector<PowerReturn> power_returns_;
   bool quit_ = false;
 };

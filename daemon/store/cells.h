@@ -77,7 +77,8 @@ constexpr const char* Flaw(const AxisKnowledge& knowledge) {
   return nullptr;
 }
 
-inline constexpr Origin kLastOrigin = Origin::kHoming;
+inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kMissing;
+inline constexpr Origin kLastOrigin = Origin::kCamera;
 inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
 inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
 inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;

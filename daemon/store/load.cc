@@ -33,16 +33,17 @@ Status LoadUnits(Connection& connection, StoredFleet* fleet) {
                  });
 }
 
-// vector and turns say the same as low, once more: a row that disagrees with itself is not
-// believed.
-void CheckVector(Cells& cells, const AxisKnowledge& knowledge, std::uint16_t subdivision) {
+// vector and turns say the same as low, less the offset, once more: a row that disagrees with
+// itself is not believed.
+void CheckVector(Cells& cells, const AxisKnowledge& knowledge, std::uint16_t subdivision,
+                 std::int32_t offset) {
   const bool place = knowledge.witness >= Witness::kPredicted && subdivision != 0;
   cells.Require(cells.IsNull(7) != place && cells.IsNull(8) != place,
                 "vector and turns do not belong to its witness");
   if (!place || cells.error()) return;
   const std::int64_t vector = cells.Integer(7, 0, subdivision - 1);
   const std::int64_t turns = cells.Whole<std::int32_t>(8);
-  cells.Require(turns * subdivision + vector == knowledge.low,
+  cells.Require(turns * subdivision + vector == std::int64_t{knowledge.low} - offset,
                 "vector and turns disagree with low");
 }
 
@@ -50,7 +51,7 @@ Status LoadVectors(Connection& connection, StoredFleet* fleet) {
   bool half = false;  // theta of the last serial was read, phi not yet
   FOCALFLEET_TRY(ForEach(connection, "axis_state", 2,
                          "SELECT serial, axis, witness, low, high, move, subdivision, vector, "
-                         "turns, origin FROM axis_state "
+                         "turns, origin, offset FROM axis_state "
                          "ORDER BY serial, axis",
                          [fleet, &half](Cells& cells) {
                            const SerialNumber serial = cells.Serial(0);
@@ -59,11 +60,12 @@ Status LoadVectors(Connection& connection, StoredFleet* fleet) {
                            const MoveId move{cells.Whole<std::uint16_t>(5)};
                            const auto subdivision = cells.Whole<std::uint16_t>(6);
                            const Origin origin = cells.Code(9, kLastOrigin);
+                           const auto offset = cells.Whole<std::int32_t>(10);
                            if (cells.error()) return;
-                           CheckVector(cells, knowledge, subdivision);
+                           CheckVector(cells, knowledge, subdivision, offset);
                            if (axis == Axis::kTheta) {
                              cells.Require(!half, "the serial number before it has no phi");
-                             fleet->vectors.push_back({serial, {}, {}, move, origin});
+                             fleet->vectors.push_back({serial, {}, {}, {}, move, origin});
                            }
                            cells.Require(
                                !fleet->vectors.empty() && fleet->vectors.back().serial == serial,
@@ -74,6 +76,7 @@ Status LoadVectors(Connection& connection, StoredFleet* fleet) {
                                          "theta and phi are of different moves");
                            row.knowledge[Index(axis)] = knowledge;
                            row.subdivision[Index(axis)] = subdivision;
+                           row.offset[Index(axis)] = offset;
                            half = axis == Axis::kTheta;
                          }));
   if (!half) return {};
@@ -147,6 +150,8 @@ Status LoadNextIds(Connection& connection, StoredFleet* fleet) {
           fleet->next_move = {cells.Whole<std::uint16_t>(1)};
         } else if (key == "next_configuration") {
           fleet->next_configuration = cells.Whole<std::uint64_t>(1);
+        } else if (key == "next_exposure") {
+          fleet->next_exposure = cells.Whole<std::uint64_t>(1);
         } else if (key == "next_alarm") {
           fleet->next_alarm = cells.Whole<std::uint64_t>(1);
         } else {

@@ -12,7 +12,8 @@ namespace focalfleet::store_internal {
 namespace {
 
 // Codes are the enumerators of fleet/records.h and fleet/knowledge.h; the views spell them out for
-// people. Positions are vectors from the axis' zero; position = turns * subdivision + vector.
+// people. Positions are vectors from the axis' zero; turns * subdivision + vector is the unit's
+// count, which is the position less the axis' offset.
 constexpr const char* kVersion1 = R"sql(
 CREATE TABLE meta(
   key TEXT PRIMARY KEY,
@@ -213,7 +214,40 @@ ALTER TABLE configuration ADD COLUMN start_skew_s REAL;        -- NULL: not know
 ALTER TABLE configuration ADD COLUMN start_skew_bound_s REAL;  -- the true skew is within +- of it
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3};
+// What a camera found, and by how much the place of an axis differs from its count of vectors.
+constexpr const char* kVersion4 = R"sql(
+ALTER TABLE axis_state ADD COLUMN offset INTEGER NOT NULL DEFAULT 0;
+
+CREATE TABLE measurement(
+  exposure INTEGER NOT NULL,
+  unit_id INTEGER NOT NULL,
+  serial INTEGER NOT NULL,
+  configuration INTEGER NOT NULL,
+  status INTEGER NOT NULL,
+  other INTEGER,                -- unit_id of the one that it is confused with
+  x_mm REAL NOT NULL,
+  y_mm REAL NOT NULL,
+  sigma_um REAL NOT NULL,
+  theta INTEGER,                -- vectors; NULL: the unit was put nowhere
+  phi INTEGER,
+  target_x_mm REAL,             -- NULL: it had none
+  target_y_mm REAL,
+  error_um REAL,                -- from its target
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(exposure, unit_id)
+) STRICT, WITHOUT ROWID;
+
+CREATE VIEW measured AS SELECT
+  exposure, unit_id, configuration,
+  CASE status WHEN 0 THEN 'measured' WHEN 1 THEN 'did_not_move' WHEN 2 THEN 'swapped'
+    WHEN 3 THEN 'strayed' WHEN 4 THEN 'swap_suspected' WHEN 5 THEN 'blended'
+    WHEN 6 THEN 'outside_patrol' WHEN 7 THEN 'ambiguous' ELSE 'missing' END AS status,
+  x_mm, y_mm, sigma_um, target_x_mm, target_y_mm, error_um,
+  datetime(at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM measurement;
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -1,5 +1,6 @@
 #include "daemon/store/store.h"
 
+#include <cmath>
 #include <cstdlib>
 
 #include "daemon/store/cells.h"
@@ -18,6 +19,7 @@ struct Statements {
   Statement unbound_elsewhere, unbind_elsewhere, bind, enable, unit_changed;
   Statement parameter_changed, parameter;
   Statement tuning_kept, tuning;
+  Statement measurement;
   Statement configuration, alarm;
   Statement raise_meta, set_meta;
 };
@@ -27,7 +29,9 @@ namespace {
 // Replaces the row as a whole: ON CONFLICT DO UPDATE reads it first, and costs a fifth more.
 constexpr const char* kAxis =
     "INSERT OR REPLACE INTO axis_state(serial, axis, witness, low, high, vector, turns, "
-    "subdivision, move, origin, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)";
+    "subdivision, move, origin, at_ns, offset) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
+    "?11, "
+    "?12)";
 constexpr const char* kAxisChanged =
     "INSERT INTO axis_history(serial, axis, witness, low, high, subdivision, origin, at_ns) "
     "SELECT ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8 WHERE NOT EXISTS(SELECT 1 FROM axis_state WHERE serial "
@@ -84,6 +88,10 @@ constexpr const char* kTuning =
     "INSERT OR REPLACE INTO tuning(serial, axis, critical, repeat, margin, load_uNm, v_bus_V, "
     "counter1, subdivision, mode, origin, at_ns) "
     "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
+constexpr const char* kMeasurement =
+    "INSERT OR REPLACE INTO measurement(exposure, unit_id, serial, configuration, status, "
+    "other, x_mm, y_mm, sigma_um, theta, phi, error_um, target_x_mm, target_y_mm, at_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)";
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
@@ -126,6 +134,7 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {&Statements::parameter, kParameter},
       {&Statements::tuning_kept, kTuningKept},
       {&Statements::tuning, kTuning},
+      {&Statements::measurement, kMeasurement},
       {&Statements::configuration, kConfiguration},
       {&Statements::alarm, kAlarm},
       {&Statements::raise_meta, kRaiseMeta},
@@ -157,13 +166,41 @@ class RowWriter {
       if (const char* flaw = Flaw(row.knowledge[Index(axis)])) {
         return Wrong("vector row", row.serial, flaw);
       }
-      // Motions are kept in intent; what sets a vector otherwise would leave no trace.
-      if (row.origin != Origin::kMove && row.origin != Origin::kHoming) {
+      // Motions are kept in intent, exposures in measurement; what sets a vector otherwise would
+      // leave no trace.
+      if (row.origin != Origin::kMove && row.origin != Origin::kHoming &&
+          row.origin != Origin::kCamera) {
         FOCALFLEET_TRY(KeepVector(row, axis));
       }
       FOCALFLEET_TRY(WriteAxis(row, axis));
     }
     return {};
+  }
+
+  Status operator()(const MeasurementRow& row) {
+    if (row.serial.value == 0) return Wrong("measurement without a serial number");
+    if (row.exposure > INT64_MAX || row.configuration > INT64_MAX)
+      return Wrong("measurement", row.serial, "its number is too large");
+    for (const double value : {row.x_mm, row.y_mm, row.sigma_um})
+      if (!std::isfinite(value)) return Wrong("measurement", row.serial, "it is not finite");
+    Statement& s = statements_.measurement;
+    s.Bind(1, static_cast<std::int64_t>(row.exposure));
+    s.Bind(2, row.unit.value);
+    s.Bind(3, row.serial.value);
+    s.Bind(4, static_cast<std::int64_t>(row.configuration));
+    s.Bind(5, Code(row.status));
+    row.other ? s.Bind(6, row.other->value) : s.BindNull(6);
+    s.BindReal(7, row.x_mm);
+    s.BindReal(8, row.y_mm);
+    s.BindReal(9, row.sigma_um);
+    row.place ? s.Bind(10, (*row.place)[0]) : s.BindNull(10);
+    row.place ? s.Bind(11, (*row.place)[1]) : s.BindNull(11);
+    row.error_um ? s.BindReal(12, *row.error_um) : s.BindNull(12);
+    row.target_fp ? s.BindReal(13, row.target_fp->x_mm) : s.BindNull(13);
+    row.target_fp ? s.BindReal(14, row.target_fp->y_mm) : s.BindNull(14);
+    s.Bind(15, now_.ns);
+    FOCALFLEET_TRY(s.Run());
+    return Meta(statements_.raise_meta, "next_exposure", row.exposure + 1);
   }
 
   Status operator()(const IntentRow& row) {
@@ -325,11 +362,13 @@ class RowWriter {
     s.Bind(3, Code(knowledge.witness));
     s.Bind(4, knowledge.low);
     s.Bind(5, knowledge.high);
+    const std::int32_t offset = row.offset[Index(axis)];
     if (knowledge.witness >= Witness::kPredicted && subdivision != 0) {
-      const std::int32_t remainder = knowledge.low % subdivision;
+      const std::int64_t count = std::int64_t{knowledge.low} - offset;
+      const auto remainder = static_cast<std::int32_t>(count % subdivision);
       const std::int32_t vector = remainder < 0 ? remainder + subdivision : remainder;
       s.Bind(6, vector);
-      s.Bind(7, (std::int64_t{knowledge.low} - vector) / subdivision);
+      s.Bind(7, (count - vector) / subdivision);
     } else {
       s.BindNull(6);
       s.BindNull(7);
@@ -337,6 +376,7 @@ class RowWriter {
     s.Bind(8, subdivision);
     s.Bind(9, row.move.value);
     s.Bind(10, Code(row.origin));
+    s.Bind(12, offset);
     return s.Run();
   }
 
@@ -457,6 +497,8 @@ Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
       "DELETE FROM configuration WHERE id IN (SELECT id FROM configuration WHERE changed_ns < ?1 "
       "AND state >= 3 "
       "ORDER BY id LIMIT ?2)",
+      "DELETE FROM measurement WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
+      "measurement WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
       "DELETE FROM alarm WHERE id IN (SELECT id FROM alarm WHERE at_ns < ?1 ORDER BY id LIMIT ?2)",
   };
   static_assert(ConfigurationState::kDone == ConfigurationState{3});

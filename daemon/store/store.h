@@ -131,6 +131,11 @@ struct UnitHistory {
   WallTime at;
 };
 
+struct MeasurementHistory {
+  MeasurementRow row;
+  WallTime at;  // stored
+};
+
 /// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
 /// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
 /// read.
@@ -149,6 +154,10 @@ class StoreReader {
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
+  /// Of one exposure, by unit id.
+  Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
+  /// The newest exposure of a configuration; none: it was never measured.
+  Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
 
  private:

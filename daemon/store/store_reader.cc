@@ -8,6 +8,7 @@
 #include "daemon/store/schema.h"
 #include "daemon/store/sqlite.h"
 #include "daemon/store/store.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
@@ -170,6 +171,47 @@ Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
         entry.at = cells.Time(5);
         return entry;
       });
+}
+
+Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t exposure) {
+  return Query<MeasurementHistory>(
+      *connection_, "measurement",
+      "SELECT exposure, unit_id, serial, configuration, status, other, x_mm, y_mm, sigma_um, "
+      "theta, phi, error_um, target_x_mm, target_y_mm, at_ns FROM measurement WHERE exposure = ?2 "
+      "ORDER BY unit_id LIMIT ?1",
+      limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
+        MeasurementHistory history;
+        MeasurementRow& row = history.row;
+        row.exposure = cells.Whole<std::uint64_t>(0);
+        row.unit = {cells.Whole<std::uint32_t>(1)};
+        row.serial = cells.Serial(2);
+        row.configuration = cells.Whole<std::uint64_t>(3);
+        row.status = cells.Code(4, kLastSightingStatus);
+        if (!cells.IsNull(5)) row.other = UnitId{cells.Whole<std::uint32_t>(5)};
+        row.x_mm = cells.Real(6);
+        row.y_mm = cells.Real(7);
+        row.sigma_um = cells.Real(8);
+        cells.Require(cells.IsNull(9) == cells.IsNull(10), "it has a place on one axis alone");
+        if (!cells.IsNull(9))
+          row.place = Pose{cells.Whole<std::int32_t>(9), cells.Whole<std::int32_t>(10)};
+        if (!cells.IsNull(11)) row.error_um = cells.Real(11);
+        cells.Require(cells.IsNull(12) == cells.IsNull(13), "it has a target on one axis alone");
+        if (!cells.IsNull(12)) row.target_fp = PointFp{cells.Real(12), cells.Real(13)};
+        history.at = {cells.Whole<std::int64_t>(14)};
+        return history;
+      });
+}
+
+Result<std::optional<std::uint64_t>> StoreReader::LastExposure(std::uint64_t configuration) {
+  FOCALFLEET_TRY_ASSIGN(
+      const auto found,
+      Query<std::uint64_t>(*connection_, "measurement",
+                           "SELECT exposure FROM measurement WHERE configuration = ?2 "
+                           "ORDER BY exposure DESC LIMIT ?1",
+                           1, static_cast<std::int64_t>(configuration),
+                           [](Cells& cells) { return cells.Whole<std::uint64_t>(0); }));
+  if (found.empty()) return std::optional<std::uint64_t>();
+  return std::optional<std::uint64_t>(found.front());
 }
 
 Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit,

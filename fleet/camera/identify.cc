@@ -176,7 +176,7 @@ class Matching {
       sightings_[unit].other = {trace.other};
     }
     if (found == 1) sightings_[unit].status = SightingStatus::kSwapSuspected;
-    if (found != 1) sightings_[unit].other = kNobody;
+    if (found != 1) sightings_[unit].other = kNoUnit;
   }
 
   void TakeOutside() {
@@ -198,7 +198,7 @@ class Matching {
   void NameRivals() {
     for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
       UnitSighting& sighting = sightings_[i];
-      if (sighting.status != SightingStatus::kAmbiguous || sighting.other != kNobody) continue;
+      if (sighting.status != SightingStatus::kAmbiguous || sighting.other != kNoUnit) continue;
       for (const PositionerIndex j : request_.layout->neighbours({i}))
         if (sightings_[j.value].status == SightingStatus::kAmbiguous) {
           sighting.other = j;

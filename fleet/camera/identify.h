@@ -25,30 +25,11 @@
 #include "fleet/camera/fiducials.h"
 #include "fleet/camera/plate_map.h"
 #include "fleet/camera/spots.h"
+#include "fleet/sighting.h"
 
 namespace focalfleet {
 
-enum class SightingStatus : std::uint8_t {
-  kMeasured,       // seen where its move ends
-  kDidNotMove,     // told to move, and one axis or both are where they were
-  kSwapped,        // it carried out another unit's command, and that one (or a ring) its own
-  kStrayed,        // only spot in its patrol area that nobody else explains; its by elimination
-  kSwapSuspected,  // strayed, to where the command of one other that is not seen would have led
-  kBlended,        // its light is in this spot, but not alone: the place is biased
-  kOutsidePatrol,  // the only spot left is where its arms do not reach
-  kAmbiguous,      // more than one answer; no place is given
-  kMissing,        // no spot that could be its
-};
-const char* Name(SightingStatus status);
-inline constexpr std::size_t kSightingStatusCount = 9;
-
-/// The spot is this unit's, and nothing else is in it: the place may be used.
-constexpr bool IsCertain(SightingStatus status) {
-  return status == SightingStatus::kMeasured || status == SightingStatus::kDidNotMove ||
-         status == SightingStatus::kSwapped;
-}
-
-inline constexpr PositionerIndex kNobody{UINT32_MAX};
+inline constexpr PositionerIndex kNoUnit{UINT32_MAX};
 
 struct UnitSighting {
   SightingStatus status = SightingStatus::kMissing;
@@ -57,7 +38,7 @@ struct UnitSighting {
   CovarianceFp covariance;       // centroid, map and air; of a blend also what it may be off
   std::array<bool, kAxisCount> stayed{};  // did not move: these axes
   /// Swapped, or suspected: whose command it carried out. Ambiguous: a rival, where there is one.
-  PositionerIndex other = kNobody;
+  PositionerIndex other = kNoUnit;
   /// False: its spot, for more than one reason: start and end of its move are near each other, or
   /// one axis may have stayed, or slipped. The place is good, the status is kMeasured.
   bool motion_is_known = true;

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "protocol/base/limits.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 
@@ -20,18 +19,30 @@ void BusSchedule::Release(HostInstant now, DurationNs horizon, BusId bus,
   if (now < held_until_) return;
   for (auto& queue : queue_) {
     while (!queue.empty() && busy_until_ < now + horizon) {
-      const Entry& entry = queue.front();
-      frames->push_back({bus, entry.frame});
-      if (entry.asks) asked->push_back(*entry.asks);
-      busy_until_ = busy_until_ + BitTime(FrameBits(entry.frame) + entry.reply_bits, bit_rate_bps_);
-      queue.pop_front();
-      --waiting_;
+      const OnWire next = Next(queue);
+      std::uint32_t bits = next.bits;
+      for (std::size_t i = 0; i < next.frames; ++i) {
+        const Entry& entry = queue.front();
+        frames->push_back({bus, entry.frame});
+        if (entry.asks) asked->push_back(*entry.asks);
+        bits += entry.reply_bits;
+        queue.pop_front();
+      }
+      busy_until_ = busy_until_ + BitTime(bits, rates_.nominal_bps);
+      waiting_ -= next.frames;
     }
   }
 }
 
+OnWire BusSchedule::Next(const std::deque<Entry>& queue) const {
+  std::array<CanFrame, kGroupEntriesMax> front;
+  const std::size_t count = rates_.data_bps == 0 ? 1 : std::min(queue.size(), front.size());
+  for (std::size_t i = 0; i < count; ++i) front[i] = queue[i].frame;
+  return NextOnWire({front.data(), count}, rates_);
+}
+
 void BusSchedule::Charge(HostInstant now, std::uint32_t bits) {
-  busy_until_ = std::max(busy_until_, now) + BitTime(bits, bit_rate_bps_);
+  busy_until_ = std::max(busy_until_, now) + BitTime(bits, rates_.nominal_bps);
 }
 
 HostInstant BusSchedule::ReadyAt(DurationNs horizon) const {

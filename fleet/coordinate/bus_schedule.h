@@ -1,7 +1,9 @@
 // What may go onto one bus next. Frames wait here, not in the kernel, so that a stop or a start
 // passes all of them: at most `horizon` of bus time is handed to the port ahead of the bit clock. A
 // request is charged with the bits of its answer too, so an upload fills the bus without drowning
-// the replies. Frames of one priority leave in the order in which they came.
+// the replies. Frames of one priority leave in the order in which they came. On a bus with CAN FD
+// staging frames that wait one behind the other leave together, charged as the group that the port
+// makes of them.
 #pragma once
 
 #include <algorithm>
@@ -14,6 +16,7 @@
 #include "fleet/coordinator.h"
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet {
 
@@ -25,7 +28,7 @@ class BusSchedule {
     std::optional<PositionerIndex> asks;  // told when its request leaves
   };
 
-  explicit BusSchedule(std::uint32_t bit_rate_bps) : bit_rate_bps_(bit_rate_bps) {}
+  explicit BusSchedule(const BusRates& rates) : rates_(rates) {}
 
   /// False where the queue is full (limits::kFramesPerBusQueued): the caller asks again later.
   [[nodiscard]] bool Enqueue(const Entry& entry);
@@ -54,11 +57,14 @@ class BusSchedule {
  private:
   static constexpr std::size_t kPriorities = 8;
 
+  /// What the front of `queue` becomes on the wire. Pre: it is not empty.
+  [[nodiscard]] OnWire Next(const std::deque<Entry>& queue) const;
+
   std::array<std::deque<Entry>, kPriorities> queue_;
   std::size_t waiting_ = 0;
   HostInstant busy_until_{INT64_MIN};
   HostInstant held_until_{INT64_MIN};
-  std::uint32_t bit_rate_bps_;
+  BusRates rates_;
 };
 
 }  // namespace focalfleet

@@ -329,9 +329,10 @@ void Contact::OnMotionStatus(PositionerIndex i, const StatusReply& status) {
   }
 }
 
-void Contact::OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence) {
+void Contact::OnDone(PositionerIndex i, Done done, std::uint8_t sequence) {
   UnitRecord& record = core_.unit(i);
   UnitView& view = record.view;
+  done.position = core_.PlaceAt(i, done.position);
   view.move = done.move;
   const bool answer = sequence != 0 && core_.Answers(i, Function::kDone, sequence);
   // A unit says `stopped` only to a stop.
@@ -440,6 +441,7 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
   if (reply.parameter == Parameter::kPosition) {
     UnitKnowledge knowledge = record.view.knowledge;
     knowledge[Index(reply.axis)] = Exactly(Witness::kReported, reply.value);
+    record.view.offset[Index(reply.axis)] = 0;  // the operator says where it stands
     core_.Know(i, knowledge, Origin::kOperator);
   }
 }
@@ -479,8 +481,11 @@ void Contact::Concluded(PositionerIndex i) {
   core_.SetDue(i, record.next_poll);
   if (!Belongs(i)) return;
   StoreSays store;
-  if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end())
+  view.offset = {};
+  if (const auto it = core_.stored_vectors.find(view.serial); it != core_.stored_vectors.end()) {
     store.vector = it->second;
+    view.offset = it->second.offset;
+  }
   if (const auto it = core_.intents.find(view.serial); it != core_.intents.end()) {
     store.intent = it->second;
     if (reading.status.state == UnitState::kMoving || reading.status.state == UnitState::kHoming) {
@@ -506,7 +511,7 @@ void Contact::Concluded(PositionerIndex i) {
     return;
   }
   const Reconciled result =
-      Reconcile({reading.status, reading.position, reading.subdivision}, store);
+      Reconcile({reading.status, core_.PlaceAt(i, reading.position), reading.subdivision}, store);
   if (result.intent_end) core_.EndIntent(i, *result.intent_end);
   // Its `done` was lost, but it stands short of its end, and nothing but a stop leaves it there.
   if (result.intent_end == IntentEnd::kStopped && record.runs_freely)

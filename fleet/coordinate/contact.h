@@ -48,7 +48,7 @@ class Contact {
   void OnOtherVersion(PositionerIndex i, const IdentifyReply& identity);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
-  void OnDone(PositionerIndex i, const Done& done, std::uint8_t sequence);
+  void OnDone(PositionerIndex i, Done done, std::uint8_t sequence);
   void OnParameter(PositionerIndex i, const ParameterReply& reply);
   void OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at);
   void OnWritten(PositionerIndex i, const ParameterReply& reply);

@@ -16,7 +16,7 @@ constexpr DurationNs kQueueFullWait = Milliseconds(20);
 constexpr std::uint8_t kLastSequence = 254;
 /// Bus time that a stop of all has to itself: the frame on the wire, one that must be sent again,
 /// and the stop.
-constexpr std::uint32_t kStopAloneBits = 4 * kFrameBitsMax;
+constexpr std::uint32_t kStopAloneFrames = 4;
 
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
@@ -34,17 +34,18 @@ Core::Core(const Layout* layout_in, std::vector<UnitDrive> drives_in,
            const CoordinatorConfig& config_in, StoredFleet stored)
     : layout(*layout_in),
       config(config_in),
+      rates{config_in.bit_rate_bps, config_in.data_bit_rate_bps},
       drives(std::move(drives_in)),
       units(layout_in->size()),
       earlier_configurations(std::move(stored.configurations)),
       next_configuration(stored.next_configuration),
       next_alarm(stored.next_alarm),
+      next_exposure(stored.next_exposure),
       next_move_(stored.next_move),
       is_changed_(layout_in->size(), 0) {
   FOCALFLEET_CHECK(drives.size() == units.size());
   for (const BusId id : layout.buses())
-    buses.push_back(
-        {.id = id, .schedule = BusSchedule(config.bit_rate_bps), .view = {}, .units = {}});
+    buses.push_back({.id = id, .schedule = BusSchedule(rates), .view = {}, .units = {}});
   for (std::uint32_t n = 0; n < units.size(); ++n) {
     const Unit& unit = layout.units()[n];
     units[n].view.enabled = unit.enabled;
@@ -231,7 +232,8 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
   buses[bus].schedule.Charge(now, FrameBits(frame));
   if (!std::holds_alternative<Stop>(message)) return;
   if (node == kBroadcastNode)
-    buses[bus].schedule.Hold(now + BitTime(kStopAloneBits, config.bit_rate_bps));
+    buses[bus].schedule.Hold(
+        now + BitTime(kStopAloneFrames * LongestFrameBits(rates), config.bit_rate_bps));
   for (const PositionerIndex i : buses[bus].units) {
     if (node != kBroadcastNode && node != layout.unit(i).node) continue;
     unit(i).told_to_stop = now;
@@ -294,6 +296,19 @@ void Core::SayWhatIsDurable() {
   }
 }
 
+Pose Core::PlaceAt(PositionerIndex i, const Pose& count) const {
+  const Pose& offset = units[i.value].view.offset;
+  return {count[0] + offset[0], count[1] + offset[1]};
+}
+
+void Core::See(PositionerIndex i, const Pose& place) {
+  UnitView& view = unit(i).view;
+  const Pose believed = PlaceOf(view.knowledge);
+  for (const Axis axis : kAxes)
+    view.offset[Index(axis)] += place[Index(axis)] - believed[Index(axis)];
+  Know(i, Exactly(Witness::kMeasured, place), Origin::kCamera);
+}
+
 void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin) {
   UnitRecord& record = unit(i);
   record.view.knowledge = knowledge;
@@ -301,6 +316,7 @@ void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin
   VectorRow row{
       .serial = record.view.serial,
       .knowledge = knowledge,
+      .offset = record.view.offset,
       .subdivision = {drives[i.value].axis[0].subdivision, drives[i.value].axis[1].subdivision},
       .move = record.view.move,
       .origin = origin};
@@ -324,11 +340,31 @@ void Core::BeginStep(const Inputs& inputs, Effects* effects) {
   if (reserved_by_ == 0) ReserveMoves();
 }
 
-void Core::Count(BusRecord* bus, const CanFrame& frame) {
-  const std::uint32_t bits = FrameBits(frame);
-  bus->view.bits += bits;
-  bus->window_bits += bits;
-  if (IsOfUpload(frame)) bus->view.upload.bits += bits;
+void Core::Count(BusRecord* bus, std::span<const CanFrame> frames) {
+  const OnWire passed = NextOnWire(frames, rates);
+  bus->view.bits += passed.bits;
+  bus->window_bits += passed.bits;
+  if (IsOfUpload(frames.front())) bus->view.upload.bits += passed.bits;
+}
+
+void Core::CountSent() {
+  std::array<CanFrame, kGroupEntriesMax> together;
+  const std::vector<OutFrame>& sent = out->frames;
+  for (std::size_t i = 0; i < sent.size();) {
+    BusRecord* bus = FindBus(sent[i].bus);
+    std::size_t count = 0;
+    do {
+      together[count] = sent[i + count].frame;
+      ++count;
+    } while (rates.data_bps > 0 && count < together.size() && i + count < sent.size() &&
+             sent[i + count].bus == bus->id);
+    const std::span<const CanFrame> front(together.data(), count);
+    const std::size_t passed = NextOnWire(front, rates).frames;
+    Count(bus, front.first(passed));
+    bus->view.frames_sent += passed;
+    if (IsOfUpload(front[0])) bus->upload_began = std::min(bus->upload_began, now);
+    i += passed;
+  }
 }
 
 void Core::CloseLoadWindow(BusRecord* bus) const {
@@ -369,12 +405,7 @@ void Core::EndStep() {
         std::min({out->wake_at, bus.clock_due, bus.schedule.ReadyAt(config.transmit_horizon)});
     CloseLoadWindow(&bus);
   }
-  for (const OutFrame& sent : out->frames) {
-    BusRecord* bus = FindBus(sent.bus);
-    ++bus->view.frames_sent;
-    Count(bus, sent.frame);
-    if (IsOfUpload(sent.frame)) bus->upload_began = std::min(bus->upload_began, now);
-  }
+  CountSent();
   if (!timers_.empty()) out->wake_at = std::min(out->wake_at, timers_.top().at);
   if (!out->rows.empty()) out->batch = next_batch++;
 }

@@ -13,6 +13,7 @@
 #include <deque>
 #include <optional>
 #include <queue>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -164,6 +165,11 @@ class Core {
   /// written.
   void ReplyWhenDurable(std::uint64_t request, std::string text);
 
+  /// Where it stands when its own count of vectors says `count`.
+  [[nodiscard]] Pose PlaceAt(PositionerIndex i, const Pose& count) const;
+  /// The camera found it at `place`, where its count had it elsewhere: the count is right from here
+  /// on, but for the offset. Pre: it stands at one known place.
+  void See(PositionerIndex i, const Pose& place);
   /// Knowledge of a unit that is settled now: kept here and in the store.
   void Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin);
   /// Closes the unit's open intent, if there is one.
@@ -183,13 +189,15 @@ class Core {
   void BeginStep(const Inputs& inputs, Effects* effects);
   /// Matches an answer to the open question; false: late, doubled, or never asked.
   [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
-  void Count(BusRecord* bus, const CanFrame& frame);
+  /// Frames that passed the bus together: one, or those of a group.
+  void Count(BusRecord* bus, std::span<const CanFrame> frames);
   void EndStep();
   /// Units that are due at `now`, in the order of their times.
   [[nodiscard]] std::optional<PositionerIndex> NextDue();
 
   const Layout& layout;
   const CoordinatorConfig config;
+  const BusRates rates;
   std::vector<UnitDrive> drives;
   std::vector<UnitRecord> units;
   std::vector<BusRecord> buses;
@@ -200,6 +208,7 @@ class Core {
   std::vector<UnitEvent> events;
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;
+  std::uint64_t next_exposure = 1;
   std::uint64_t next_batch = 1;
   std::uint64_t committed_through = 0;
   bool store_failing = false;
@@ -229,6 +238,7 @@ class Core {
   std::uint64_t reserved_by_ = 0;  // the batch of the first stock
 
   void CloseLoadWindow(BusRecord* bus) const;
+  void CountSent();
   void DropQuestion(PositionerIndex i);
 
   std::priority_queue<Timer, std::vector<Timer>, std::greater<>> timers_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 #include "fleet/coordinate/noticing.h"
 #include "protocol/base/check.h"
@@ -92,8 +93,11 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
     return Fail(ErrorCode::kRefused, "the store cannot be written: nothing moves until it can");
   if (command.targets.size() != core_.units.size())
     return Fail(ErrorCode::kInvalid, "targets for another layout");
+  if (command.measure && !core_.config.has_camera)
+    return Fail(ErrorCode::kRefused, "there is no camera to measure with: [camera] directory");
   targets_ = command.targets;
   fixed_ = command.fixed;
+  measure_ = command.measure;
   Begin(request, command.source);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
@@ -122,6 +126,7 @@ Status Pursuit::Home(std::uint64_t request, const HomeCommand& command) {
   std::sort(to_home_.begin(), to_home_.end());
   to_home_.erase(std::unique(to_home_.begin(), to_home_.end()), to_home_.end());
   fixed_ = false;
+  measure_.reset();
   unproven_ = command.unproven;
   Begin(request, "home");
   if (unproven_)
@@ -138,6 +143,12 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   request_ = request;
   failure_.clear();
   stopping_ = false;
+  corrections_left_ = measure_ ? measure_->corrections : std::uint8_t{0};
+  goes_past_ = measure_ && !measure_->observe;
+  sets_out_ = true;
+  measured_batch_ = 0;
+  came_.resize(core_.units.size());
+  exposures_refused_ = 0;
   view_ = {.id = core_.next_configuration++,
            .source = std::move(source),
            .state = ConfigurationState::kPlanning,
@@ -148,6 +159,8 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
     view.target = targets_[n];
     view.outcome = TargetOutcome::kNone;
     view.outcome_reason.clear();
+    view.sighting.reset();
+    view.error_um.reset();
     core_.Changed({n});
   }
   std::fill(excluded_.begin(), excluded_.end(), std::uint8_t{0});
@@ -197,9 +210,11 @@ void Pursuit::BeginRound() {
   job.options.notice_s = NoticingOf(core_.config).notice.seconds();
   job.unproven = unproven_;
   bool any = !to_home_.empty();
+  if (sets_out_) stood_.assign(core_.units.size(), std::nullopt);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
     const bool usable = view.phase == kReady && view.enabled && excluded_[n] == 0;
+    if (sets_out_ && IsPlace(view.knowledge)) stood_[n] = PlaceOf(view.knowledge);
     job.start.push_back(view.knowledge);
     job.frozen.push_back(usable ? 0 : 1);
     std::optional<Pose> target;
@@ -218,8 +233,10 @@ void Pursuit::BeginRound() {
     }
     job.targets.push_back(target);
   }
+  sets_out_ = false;
+  if (goes_past_ && !GoPast(&job.targets)) goes_past_ = false;
   if (!any) {
-    FinishWhenDurable(ConfigurationState::kDone);
+    MeasureOrFinish();
     return;
   }
   core_.out->plan_job = std::move(job);
@@ -230,6 +247,14 @@ void Pursuit::BeginRound() {
 void Pursuit::OnPlan(const PlanDone& done) {
   if (done.late) return OnLatePlan(done);
   if (state_ != State::kPlanning || done.job != job_) return;  // of a goal that was stopped
+  if (!done.plan && goes_past_) {  // then they come to their targets as they can
+    core_.Raise(Severity::kWarning, {}, {},
+                "no run-up: from which side the targets are approached is left open (" +
+                    done.plan.error().text + ")");
+    goes_past_ = false;
+    Gather();
+    return;
+  }
   if (!done.plan) {
     failure_ = done.plan.error().text;
     if (view_.round == 1) {
@@ -260,7 +285,7 @@ void Pursuit::TakePlan(const PlanDone& done) {
     return;
   }
   for (const Unserved& unserved : plan_.unserved)
-    if (core_.unit(unserved.unit).view.outcome == TargetOutcome::kPending)
+    if (!goes_past_ && core_.unit(unserved.unit).view.outcome == TargetOutcome::kPending)
       SetOutcome(unserved.unit, TargetOutcome::kRefused,
                  std::string(Name(unserved.why)) +
                      (unserved.by ? " by " + core_.NameOf(*unserved.by) : ""));
@@ -337,7 +362,10 @@ void Pursuit::Advance() {
       if (count(Part::kMoving) == 0) RoundOver();
       break;
     case State::kReporting:
-      if (arrivals_.empty()) Finish();
+      if (arrivals_.empty() && core_.committed_through >= measured_batch_) Finish();
+      break;
+    case State::kMeasuring:
+      if (exposure_ == 0 && arrivals_.empty()) AskForExposure();
       break;
     case State::kIdle:
     case State::kGathering:
@@ -350,9 +378,10 @@ void Pursuit::Advance() {
 void Pursuit::SayWhatIsWaitedFor() {
   const bool needs_the_store = (state_ == State::kGathering && !core_.MovesAreReserved()) ||
                                state_ == State::kCommitting || state_ == State::kHomeCommitting ||
-                               (state_ == State::kReporting && !arrivals_.empty());
-  view_.waiting_for =
-      needs_the_store && core_.store_failing ? "the store, which cannot be written" : "";
+                               state_ == State::kReporting;
+  view_.waiting_for = needs_the_store && core_.store_failing ? "the store, which cannot be written"
+                      : state_ == State::kMeasuring && exposure_ != 0 ? "the camera"
+                                                                      : "";
 }
 
 void Pursuit::Take(const UnitEvent& event) {
@@ -412,10 +441,13 @@ void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
         state_ == State::kHoming && how == UnitEventKind::kReady && IsPlace(view.knowledge);
     if (homed) std::erase(to_home_, i);
     if (view.outcome == TargetOutcome::kPending && IsPlace(view.knowledge) &&
-        (homed || (view.target && PlaceOf(view.knowledge) == *view.target)))
+        (homed || (targets_[i.value] && PlaceOf(view.knowledge) == *targets_[i.value])))
       arrivals_.push_back({core_.batch_now(), i});
     // Not the target: whoever only makes way has none, and others may come to theirs by stages.
     const std::size_t plan = plan_of_[i.value];
+    const bool reached = plan != kNoPlan && IsPlace(view.knowledge) &&
+                         PlaceOf(view.knowledge) == plan_.moves[plan].to;
+    NoteDirections(i, reached ? &plan_.moves[plan] : nullptr);
     if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
       StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " did not get out of its way");
   }
@@ -471,11 +503,15 @@ void Pursuit::RoundOver() {
 }
 
 void Pursuit::JudgeTargets() {
+  if (std::exchange(goes_past_, false)) {
+    Gather();
+    return;
+  }
   bool again = false;
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
     if (view.outcome != TargetOutcome::kPending) continue;
-    if (IsPlace(view.knowledge) && view.target && PlaceOf(view.knowledge) == *view.target) {
+    if (IsPlace(view.knowledge) && targets_[n] && PlaceOf(view.knowledge) == *targets_[n]) {
       const bool noted = std::any_of(arrivals_.begin(), arrivals_.end(),
                                      [&](const Arrival& a) { return a.unit.value == n; });
       if (!noted) arrivals_.push_back({0, {n}});  // stood there from the start
@@ -483,7 +519,7 @@ void Pursuit::JudgeTargets() {
       again = true;
     }
   }
-  again ? Gather() : FinishWhenDurable(ConfigurationState::kDone);
+  again ? Gather() : MeasureOrFinish();
 }
 
 void Pursuit::FinishWhenDurable(ConfigurationState end) {

@@ -4,6 +4,10 @@
 //                   ^             |                        |
 //                   +-------------+------------------------+   somebody fell out: plan around it
 //
+// A goal that is measured goes past each target first and comes to it by a last short way of one
+// direction, then looks with the camera and does the same again for those that are too far off
+// (pursuit_measure.cc).
+//
 // Nothing starts before every unit of the plan holds its move, and before the store holds the
 // intent of each. A unit that falls out before the start costs a new plan; one that falls out in
 // motion stops those whose way leads through where it may stand (UnitPlan::followers), and the next
@@ -45,6 +49,7 @@ class Pursuit {
   void EndThoseOfAnEarlierRun();
 
   void OnPlan(const PlanDone& done);
+  void OnExposure(const ExposureDone& done);
   void OnConfirm(PositionerIndex i, const ConfirmReply& reply);
   void OnArm(PositionerIndex i, const ArmReply& reply);
   void OnHomeReply(PositionerIndex i, const HomeReply& reply);
@@ -74,6 +79,7 @@ class Pursuit {
     kMoving,
     kHomeCommitting,
     kHoming,
+    kMeasuring,  // all rest, the camera looks
     kReporting,  // all motion is over; the last rows are being written
   };
   /// Where a unit is in this round.
@@ -113,14 +119,15 @@ class Pursuit {
   void TakePlan(const PlanDone& done);
   void PumpUploads();
   void Upload(PositionerIndex i);
-  [[nodiscard]] std::uint32_t UploadBits(PositionerIndex i) const;
+  /// Appends what the host stages to `staged`; returns the bits of the rest.
+  std::uint32_t UploadBits(PositionerIndex i, std::vector<CanFrame>* staged) const;
   void PredictUpload();
   void MeasureUpload();
   void FallOut(PositionerIndex i, const std::string& reason);
   void UploadsOver();
   void Disarm();
   void CommitRound();
-  void Intend(PositionerIndex i, const IntentRow& intent);
+  void Intend(PositionerIndex i, const IntentRow& intent, const Pose& offset);
   void TakeBackIntent(PositionerIndex i);
   void TakeBackIntents();
   void Start();
@@ -181,6 +188,18 @@ class Pursuit {
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
   void JudgeTargets();
+  [[nodiscard]] std::vector<Pose> PastTarget(PositionerIndex i) const;
+  void NoteDirections(PositionerIndex i, const UnitPlan* reached);
+  bool GoPast(std::vector<std::optional<Pose>>* targets);
+  void MeasureOrFinish();
+  void AskForExposure();
+  void TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
+                    MeasuredRound* round);
+  void CorrectOrFinish();
+  bool Correct();
+  [[nodiscard]] std::vector<Pose> AimsOf(PositionerIndex i) const;
+  [[nodiscard]] bool NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const;
+  void Reopen(PositionerIndex i);
   void ReportArrivals();
   void Record();
   void CountPrediction();
@@ -202,13 +221,29 @@ class Pursuit {
   bool unproven_ = false;
   bool stopping_ = false;
   ConfigurationState end_ = ConfigurationState::kDone;
-  std::vector<std::optional<Pose>> targets_;  // of the goal
+  /// Where they are to end: the targets, or short of them where a correction follows.
+  std::vector<std::optional<Pose>> targets_;
+  // Of a goal that is measured.
+  std::optional<ApplyCommand::Measure> measure_;
+  /// Direction of each axis' last motion, -1 or 1; 0: not known.
+  std::vector<std::array<std::int8_t, kAxisCount>> came_;
+  std::uint64_t measured_batch_ = 0;  // with which the last exposure becomes durable; 0: none
+  std::uint8_t corrections_left_ = 0;
+  bool goes_past_ = false;                  // this leg ends past the targets
+  bool sets_out_ = false;                   // the next round is the first since the last exposure
+  std::vector<std::optional<Pose>> stood_;  // before they were sent off
+  std::uint64_t exposure_ = 0;
+  int exposures_refused_ = 0;
+
   std::vector<PositionerIndex> to_home_;
   std::vector<std::uint8_t> excluded_;  // failed in this goal: stands still from then on
   std::vector<std::uint8_t> strikes_;
   std::string failure_;
-  std::vector<std::optional<UnitKnowledge>>
-      before_;  // what was known before an intent not yet begun
+  struct Before {
+    UnitKnowledge knowledge;
+    Pose offset{};
+  };
+  std::vector<std::optional<Before>> before_;  // what was known before an intent not yet begun
 
   // this round
   std::uint64_t job_ = 0;

@@ -174,9 +174,10 @@ Status Pursuit::Retarget(std::uint64_t request, const RetargetCommand& command) 
   return {};
 }
 
-/// Stopped on its way, and still wanted there.
+/// Stopped on its way, and still wanted there; who runs up is not there yet, and stays.
 void Pursuit::GoOnLate(PositionerIndex i) {
   const UnitView& view = core_.unit(i).view;
+  if (goes_past_) return;
   if (state_ != State::kMoving || stopping_ || running_ == nullptr || !targets_[i.value]) return;
   if (view.outcome != TargetOutcome::kPending || excluded_[i.value] != 0) return;
   if (!IsPlace(view.knowledge) || PlaceOf(view.knowledge) == *targets_[i.value]) return;
@@ -360,7 +361,7 @@ bool Pursuit::Load(Late* late) {
   late_due_ = std::min(late_due_, last + DurationNs{1});
   if (part_[i.value] != Part::kHolding) return true;
   if (late->stage == Late::Stage::kUploading) {
-    Intend(i, IntentOf(i));
+    Intend(i, IntentOf(i), core_.unit(i).view.offset);
     late->batch = core_.batch_now();
     late->stage = Late::Stage::kCommitting;
   }

@@ -34,8 +34,11 @@ IntentRow Pursuit::IntentOf(PositionerIndex i) const {
   return row;
 }
 
-void Pursuit::Intend(PositionerIndex i, const IntentRow& intent) {
-  before_[i.value] = core_.unit(i).view.knowledge;
+// `offset` is that of the unit's count from here on.
+void Pursuit::Intend(PositionerIndex i, const IntentRow& intent, const Pose& offset) {
+  UnitView& view = core_.unit(i).view;
+  before_[i.value] = {view.knowledge, view.offset};
+  view.offset = offset;
   core_.intents[intent.serial] = intent;
   core_.Note(intent);
   // From here on the store must not claim the old place: the unit may be anywhere on its way.
@@ -43,12 +46,13 @@ void Pursuit::Intend(PositionerIndex i, const IntentRow& intent) {
 }
 
 void Pursuit::TakeBackIntent(PositionerIndex i) {
-  std::optional<UnitKnowledge>& before = before_[i.value];
+  std::optional<Before>& before = before_[i.value];
   if (!before) return;
   // Who was lost meanwhile keeps its intent: its return decides.
   if (core_.unit(i).view.phase == kArmed || core_.unit(i).view.phase == kReady) {
     core_.EndIntent(i, IntentEnd::kNeverBegan);
-    core_.Know(i, *before, Origin::kMove);
+    core_.unit(i).view.offset = before->offset;
+    core_.Know(i, before->knowledge, Origin::kMove);
   }
   before.reset();
 }
@@ -59,7 +63,7 @@ void Pursuit::TakeBackIntents() {
 
 void Pursuit::CommitRound() {
   for (const UnitPlan& move : plan_.moves) {
-    Intend(move.unit, IntentOf(move.unit));
+    Intend(move.unit, IntentOf(move.unit), core_.unit(move.unit).view.offset);
   }
   commit_batch_ = core_.batch_now();
   SetState(State::kCommitting);
@@ -199,7 +203,7 @@ IntentRow Pursuit::HomingIntentOf(PositionerIndex i) const {
     const AxisKnowledge& known = view.knowledge[Index(axis)];
     const bool unknown = known.witness == Witness::kUnknown;
     const std::int32_t to = axis == Axis::kTheta ? low : high;
-    row.from[Index(axis)] = unknown ? low : known.low;
+    row.from[Index(axis)] = unknown ? low : known.low - view.offset[Index(axis)];
     row.to[Index(axis)] = to;
     row.hull[Index(axis)] = {Witness::kInterval, std::min(unknown ? low : known.low, to),
                              std::max(unknown ? high : known.high, to)};
@@ -248,7 +252,8 @@ void Pursuit::CommitHoming() {
   // A new id: the moves that made way for these units had their own.
   move_ = core_.TakeMoveId();
   for (const PositionerIndex i : homing_) {
-    Intend(i, HomingIntentOf(i));
+    // At its stop it begins to count anew: what the camera found of the old count is over.
+    Intend(i, HomingIntentOf(i), {});
   }
   // A few feeds: no work for the planner's thread.
   const PlanEstimate estimate = Estimate(HomingMotion(), core_.layout, core_.drives, MotorModel{});
@@ -315,6 +320,7 @@ void Pursuit::StopAll(const std::string& reason) {
   switch (state_) {
     case State::kGathering:
     case State::kPlanning:
+    case State::kMeasuring:
       FinishWhenDurable(ConfigurationState::kStopped);
       break;
     case State::kUploading:

@@ -78,16 +78,15 @@ void Pursuit::Upload(PositionerIndex i) {
 
 /// To the bit, where nothing is lost: what stands in a frame decides how long it is, the sequence
 /// numbers of the two questions included.
-std::uint32_t Pursuit::UploadBits(PositionerIndex i) const {
+std::uint32_t Pursuit::UploadBits(PositionerIndex i, std::vector<CanFrame>* staged) const {
   const StagedMove move = StagedMoveOf(i);
   const NodeId node = core_.layout.unit(i).node;
   const Address confirm{node, core_.SequenceAfter(i, 1)};
   const Address arm{node, core_.SequenceAfter(i, 2)};
-  std::uint32_t bits = BitsOfConfirmed(move, confirm) + BitsOfArmed(move.move, arm) +
-                       FrameBits(Encode(HostMessage(Confirm{move.move}), confirm)) +
-                       FrameBits(Encode(HostMessage(Arm{move.move, Digest(move)}), arm));
-  ForEachStageFrame(move, node, [&](const CanFrame& frame) { bits += FrameBits(frame); });
-  return bits;
+  ForEachStageFrame(move, node, [&](const CanFrame& frame) { staged->push_back(frame); });
+  staged->push_back(Encode(HostMessage(Confirm{move.move}), confirm));
+  return BitsOfConfirmed(move, confirm) + BitsOfArmed(move.move, arm) +
+         FrameBits(Encode(HostMessage(Arm{move.move, Digest(move)}), arm));
 }
 
 void Pursuit::PredictUpload() {
@@ -97,7 +96,9 @@ void Pursuit::PredictUpload() {
     bus.upload_began = kNever;
     bus.upload_ended = HostInstant{INT64_MIN};
     std::uint64_t bits = 0;
-    for (const PositionerIndex i : waiting_[b]) bits += UploadBits(i);
+    std::vector<CanFrame> staged;
+    for (const PositionerIndex i : waiting_[b]) bits += UploadBits(i, &staged);
+    bits += BitsOnWire(staged, core_.rates);
     const double bits_s = static_cast<double>(bits) / core_.config.bit_rate_bps;
     bus.view.upload.bits_predicted += bits;
     bus.view.upload.predicted_s += bits_s;

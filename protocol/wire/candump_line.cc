@@ -10,14 +10,13 @@ using Broken = tl::unexpected<const char*>;
 constexpr std::size_t kShortDigits = 3;     // candump writes 11-bit identifiers with 3 digits,
 constexpr std::size_t kExtendedDigits = 8;  // and all others with 8
 constexpr std::uint32_t kErrorFlag = 0x20000000;
-constexpr unsigned kBytesMax = 8;
 constexpr unsigned kFdBytesMax = 64;
 
 constexpr const char* kNoFrame = "it ends before the frame";
 constexpr const char* kNoIdentifier = "the identifier is neither 3 nor 8 hexadecimal digits";
 constexpr const char* kNoData = "the data are not pairs of hexadecimal digits";
 constexpr const char* kNoLength = "the length is no number of bytes";
-constexpr const char* kTooMuch = "more than 8 bytes";
+constexpr const char* kTooMuch = "more bytes than a frame has";
 
 /// Cuts the next word off; empty at the end.
 std::string_view NextWord(std::string_view* rest) {
@@ -58,26 +57,42 @@ bool TakeIdentifier(std::string_view digits, CandumpLine* line) {
   return line->frame.id <= kCanIdMax;
 }
 
-bool AddByte(std::string_view digits, CanFrame* frame) {
+template <class Frame>
+bool AddByte(std::string_view digits, Frame* frame) {
   std::uint8_t byte = 0;
   if (digits.size() != 2 || !Parse(digits, 16, &byte)) return false;
   frame->data[frame->length++] = byte;
   return true;
 }
 
+bool MayBeGroup(const CandumpLine& line) {
+  return line.foreign == nullptr && line.frame.id == kGroupId;
+}
+
+/// Data without blanks.
+template <class Frame>
+tl::expected<void, const char*> ReadPairs(std::string_view data, Frame* frame) {
+  for (; !data.empty(); data = data.substr(data.size() < 2 ? data.size() : 2)) {
+    if (frame->length == frame->data.size()) return Broken(kTooMuch);
+    if (!AddByte(data.substr(0, 2), frame)) return Broken(kNoData);
+  }
+  return {};
+}
+
 tl::expected<CandumpLine, const char*> ParseLogged(std::string_view word, CandumpLine line) {
   const std::size_t hash = word.find('#');
   if (!TakeIdentifier(word.substr(0, hash), &line)) return Broken(kNoIdentifier);
   std::string_view data = word.substr(hash + 1);
+  if (MayBeGroup(line) && data.size() >= 2 && data[0] == '#') {
+    line.group = FdFrame{.id = line.frame.id};
+    line.frame = {};
+    return ReadPairs(data.substr(2), &*line.group).map([&] { return line; });
+  }
   if (!data.empty() && (data[0] == '#' || data[0] == 'R')) {
     if (line.foreign == nullptr) line.foreign = data[0] == '#' ? "CAN FD" : "a remote frame";
     return line;
   }
-  for (; !data.empty(); data = data.substr(data.size() < 2 ? data.size() : 2)) {
-    if (line.frame.length == kBytesMax) return Broken(kTooMuch);
-    if (!AddByte(data.substr(0, 2), &line.frame)) return Broken(kNoData);
-  }
-  return line;
+  return ReadPairs(data, &line.frame).map([&] { return line; });
 }
 
 tl::expected<CandumpLine, const char*> ParsePlain(std::string_view word, std::string_view rest,
@@ -97,6 +112,13 @@ tl::expected<CandumpLine, const char*> ParsePlain(std::string_view word, std::st
   if (length.empty() || length.back() != ']' ||
       !Parse(length.substr(0, length.size() - 1), 10, &bytes) || bytes > (fd ? kFdBytesMax : 8u))
     return Broken(kNoLength);
+  if (fd && MayBeGroup(line)) {
+    line.group = FdFrame{.id = line.frame.id};
+    line.frame = {};
+    for (unsigned i = 0; i < bytes; ++i)
+      if (!AddByte(NextWord(&rest), &*line.group)) return Broken(kNoData);
+    return line;
+  }
   if (fd) {
     if (line.foreign == nullptr) line.foreign = "CAN FD";
     return line;

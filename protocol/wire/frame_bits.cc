@@ -111,6 +111,25 @@ FdFrameBits FrameBits(const FdFrame& frame) {
           .data = walk.bits() - before_switch + check_bits + fixed_stuff_bits + 1};
 }
 
+OnWire NextOnWire(std::span<const CanFrame> frames, const BusRates& rates) {
+  if (rates.data_bps > 0) {
+    FdFrame group;
+    const std::size_t grouped = PackGroup(frames, &group);
+    if (grouped >= kGroupEntriesMin) return {grouped, NominalBits(FrameBits(group), rates)};
+  }
+  return {1, FrameBits(frames.front())};
+}
+
+std::uint64_t BitsOnWire(std::span<const CanFrame> frames, const BusRates& rates) {
+  std::uint64_t bits = 0;
+  while (!frames.empty()) {
+    const OnWire next = NextOnWire(frames, rates);
+    bits += next.bits;
+    frames = frames.subspan(next.frames);
+  }
+  return bits;
+}
+
 FrameLevels LevelsOf(const CanFrame& frame) {
   auto walk = Walk<LevelRecord>(frame);
   walk.Crc();

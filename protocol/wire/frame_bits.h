@@ -18,7 +18,9 @@
 #pragma once
 
 #include <bitset>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
@@ -56,9 +58,41 @@ constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {
   return {static_cast<std::int64_t>(bits) * 1'000'000'000 / bit_rate_bps};
 }
 
-constexpr DurationNs BitTime(const FdFrameBits& bits, std::uint32_t bit_rate_bps,
-                             std::uint32_t data_bit_rate_bps) {
-  return BitTime(bits.nominal, bit_rate_bps) + BitTime(bits.data, data_bit_rate_bps);
+/// Of one bus.
+struct BusRates {
+  std::uint32_t nominal_bps = 1'000'000;
+  std::uint32_t data_bps = 0;  // of the inner part of CAN FD frames; 0: the bus carries none
+};
+
+constexpr DurationNs BitTime(const FdFrameBits& bits, const BusRates& rates) {
+  return BitTime(bits.nominal, rates.nominal_bps) + BitTime(bits.data, rates.data_bps);
 }
+
+/// In bits of the nominal rate, rounded up: what goes faster counts for the time that it takes.
+constexpr std::uint32_t NominalBits(const FdFrameBits& bits, const BusRates& rates) {
+  const std::uint64_t scaled = std::uint64_t{bits.data} * rates.nominal_bps;
+  return bits.nominal + static_cast<std::uint32_t>((scaled + rates.data_bps - 1) / rates.data_bps);
+}
+
+/// Bits of the longest group: 64 bytes, worst stuffing.
+constexpr FdFrameBits kGroupBitsMax{.nominal = 53, .data = 679};
+
+/// The longest frame that the bus carries. Units: bits of the nominal rate.
+constexpr std::uint32_t LongestFrameBits(const BusRates& rates) {
+  const std::uint32_t group = rates.data_bps == 0 ? 0 : NominalBits(kGroupBitsMax, rates);
+  return group > kFrameBitsMax ? group : kFrameBitsMax;
+}
+
+/// What goes over the bus as one frame: a group, or one frame alone.
+struct OnWire {
+  std::size_t frames = 0;
+  std::uint32_t bits = 0;  // of the nominal rate
+};
+/// Of frames that are handed down one behind the other: what the front of them becomes.
+/// Pre: `frames` is not empty. Cost: no more than the first kGroupEntriesMax are looked at.
+OnWire NextOnWire(std::span<const CanFrame> frames, const BusRates& rates);
+
+/// Of all of them. Units: bits of the nominal rate.
+std::uint64_t BitsOnWire(std::span<const CanFrame> frames, const BusRates& rates);
 
 }  // namespace focalfleet

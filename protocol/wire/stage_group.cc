@@ -77,6 +77,7 @@ tl::expected<GroupEntries, Malformed> UnpackGroup(const FdFrame& group) {
                      .detail = static_cast<std::uint8_t>(rest[2] & 7)});
     frame.length = *length;
     std::copy_n(rest.begin() + kHeader, *length, frame.data.begin());
+    if (const auto message = DecodeHost(frame); !message) return tl::unexpected(message.error());
     rest = rest.subspan(kHeader + *length);
   }
   const bool filled =

@@ -45,6 +45,7 @@ constexpr std::uint8_t FdLength(std::size_t bytes) { return kFdLengths[FdLengthC
 inline constexpr std::uint32_t kGroupFunction = 16;
 inline constexpr std::uint32_t kGroupId = 4u << 26 | kGroupFunction << 20 | 255u << 11;
 inline constexpr std::size_t kGroupEntriesMax = 12;  // read-backs: 5 bytes each
+inline constexpr std::size_t kGroupEntriesMin = 2;   // that are sent: one alone goes classic
 
 /// Whether a group can carry it: a host's stage_begin, stage_segment or confirm to one unit, of the
 /// length that it must have.
@@ -61,8 +62,7 @@ struct GroupEntries {
   std::array<CanFrame, kGroupEntriesMax> frame;
   std::size_t count = 0;
 };
-/// Total over all frames. What comes out can be grouped, but is otherwise unchecked: DecodeHost
-/// has the last word on it.
+/// Total over all frames. What comes out are frames that DecodeHost takes and CanBeGrouped allows.
 tl::expected<GroupEntries, Malformed> UnpackGroup(const FdFrame& group);
 
 }  // namespace focalfleet

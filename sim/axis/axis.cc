@@ -52,7 +52,9 @@ void AxisModel::Run(const FieldPath& path) {
   path_ = path;
   if (path.pieces().empty() || traits_.scatter_deg <= 0 || traits_.grip <= 0) return;
   Rng rng = Rng::Stream(traits_.scatter_seed, "scatter", ++memory_.moves);
-  next_scatter_deg_ = traits_.scatter_deg * rng.Normal();
+  const double kept = std::exp(-WayDeg() / kScatterTravelDeg);
+  next_scatter_deg_ =
+      kept * memory_.scatter_deg + traits_.scatter_deg * std::sqrt(1 - kept * kept) * rng.Normal();
 }
 
 void AxisModel::Halt(HostInstant at) { Fold(at, true); }
@@ -171,6 +173,12 @@ void AxisModel::Turn(double rotor_turns, Moment* moment) const {
 double AxisModel::LoadShare(double rotor_turns) const {
   return 1 + motor_->parameters().load_variation *
                  SinDeg(DrivenDeg(rotor_turns) + traits_.load_phase_deg);
+}
+
+double AxisModel::WayDeg() const {
+  double vectors = 0;
+  for (const FieldPath::Piece& piece : path_.pieces()) vectors += std::abs(piece.delta);
+  return vectors * 360 / (subdivision_ * traits_.gear);
 }
 
 double AxisModel::ScatterDeg(HostInstant at) const {

@@ -7,10 +7,11 @@
 
 #include "protocol/base/check.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet::sim {
 
-/// Never more than two frames: an answer, and the end of a motion.
+/// Never more than an answer to each entry of a group, and the end of a motion.
 class Outbox {
  public:
   void Add(const CanFrame& frame) {
@@ -20,7 +21,7 @@ class Outbox {
   [[nodiscard]] std::span<const CanFrame> frames() const { return {frames_.data(), count_}; }
 
  private:
-  std::array<CanFrame, 4> frames_{};
+  std::array<CanFrame, kGroupEntriesMax + 1> frames_{};
   std::size_t count_ = 0;
 };
 

@@ -27,6 +27,7 @@
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
 #include "protocol/wire/codec.h"
+#include "protocol/wire/stage_group.h"
 #include "protocol/wire/staged_move.h"
 #include "sim/unit/board.h"
 #include "sim/unit/flash.h"
@@ -48,6 +49,8 @@ class UnitMachine {
   void PowerOff() { powered_ = false; }
 
   void OnFrame(const CanFrame& frame, BoardInstant now, Outbox* out);
+  /// A CAN FD frame: of a group the unit's own entries, as if each had come alone.
+  void OnGroup(const FdFrame& group, BoardInstant now, Outbox* out);
   /// Does what is due. Pre: now is not before anything told so far.
   void OnTime(BoardInstant now, Outbox* out);
   /// An edge of the SYNC line, on boards that have one: a move whose start is due within

@@ -30,6 +30,17 @@ void UnitMachine::OnFrame(const CanFrame& frame, BoardInstant now, Outbox* out) 
   std::visit([&](const auto& message) { On(message, context); }, decoded->message);
 }
 
+void UnitMachine::OnGroup(const FdFrame& group, BoardInstant now, Outbox* out) {
+  if (!powered_) return;
+  const auto entries = UnpackGroup(group);
+  if (!entries) {
+    ++malformed_;
+    return;
+  }
+  for (std::size_t i = 0; i < entries->count; ++i)
+    if ((entries->frame[i].id >> 11 & 255) == node_.value) OnFrame(entries->frame[i], now, out);
+}
+
 void UnitMachine::Say(const UnitMessage& message, const Context& c) {
   c.out->Add(Encode(message, {node_, c.address.sequence}));
 }

@@ -45,11 +45,11 @@ struct Times {
 // Writing the rows is the core's work and measured by nobody here.
 void SetRows(std::int32_t k, std::vector<Row>* rows) {
   for (std::size_t i = 0; i < rows->size(); ++i) {
-    (*rows)[i] = VectorRow{{static_cast<std::uint32_t>(i + 1)},
-                           Exactly(Witness::kReported, Pose{k, k}),
-                           {96, 96},
-                           {static_cast<std::uint16_t>(k)},
-                           Origin::kMove};
+    (*rows)[i] = VectorRow{.serial = {static_cast<std::uint32_t>(i + 1)},
+                           .knowledge = Exactly(Witness::kReported, Pose{k, k}),
+                           .subdivision = {96, 96},
+                           .move = {static_cast<std::uint16_t>(k)},
+                           .origin = Origin::kMove};
   }
 }
 

@@ -13,8 +13,11 @@
 // move, the jog against backlash, the final creep). Each frame is taken to be as short as such a
 // frame can be.
 
+#include <array>
 #include <cinttypes>
 #include <cstdio>
+#include <iterator>
+#include <span>
 
 #include "protocol/base/rng.h"
 #include "tests/bench/options.h"
@@ -85,6 +88,20 @@ double JaegerBitsPerRobot(std::uint64_t seed) {
   return (begin + kJaegerPoints * point + end) / kDraws;
 }
 
+constexpr std::uint32_t kDataRates_bps[] = {2'000'000, 5'000'000};
+
+/// The same uploads with their staging frames in CAN FD groups, as full as can be.
+struct InGroups {
+  std::uint64_t bits = 0;  // of the nominal rate
+  std::uint64_t frames = 0;
+  void Add(const UploadOnWire& upload, const BusRates& rates) {
+    bits += upload.needed_bits_with(rates);
+    frames += upload.frames - upload.staged.size();
+    for (std::span<const CanFrame> rest = upload.staged; !rest.empty(); ++frames)
+      rest = rest.subspan(NextOnWire(rest, rates).frames);
+  }
+};
+
 constexpr std::uint32_t kDesiBitsLeast = 3 * (kFrameBitsMin + 8 * 8) + 4 * kFrameBitsMin;
 
 int Run(int argc, char** argv) {
@@ -98,6 +115,7 @@ int Run(int argc, char** argv) {
   std::uint64_t segment_bits = 0;
   std::uint64_t moved = 0;
   double longest_ms = 0;
+  std::array<InGroups, std::size(kDataRates_bps)> in_groups{};
   for (int k = 0; k < configurations; ++k) {
     for (const UploadOnWire& upload : UploadOnce(units, seed + static_cast<std::uint64_t>(k))) {
       ratios.push_back(upload.ratio());
@@ -106,6 +124,8 @@ int Run(int argc, char** argv) {
       segments += upload.segments;
       segment_bits += upload.segment_bits;
       moved += upload.units;
+      for (std::size_t r = 0; r < in_groups.size(); ++r)
+        in_groups[r].Add(upload, {1'000'000, kDataRates_bps[r]});
       longest_ms = std::max(longest_ms, static_cast<double>(upload.elapsed_bits) * 1e-3);
     }
   }
@@ -128,6 +148,10 @@ int Run(int argc, char** argv) {
   std::printf("bits a configured unit, both directions:\n");
   std::printf("  focalfleet  %7.0f  %.1f frames, %.2f segments\n", per_unit,
               static_cast<double>(frames) / n, segments_per_unit);
+  for (std::size_t r = 0; r < in_groups.size(); ++r)
+    std::printf("  focalfleet  %7.0f  %.1f frames; staged in CAN FD groups at %.0f Mbit/s\n",
+                static_cast<double>(in_groups[r].bits) / n,
+                static_cast<double>(in_groups[r].frames) / n, kDataRates_bps[r] * 1e-6);
   std::printf("  focalfleet  %7.0f  had it as many segments as jaeger has points\n",
               with_their_points);
   std::printf("  jaeger      %7.0f  %.1f frames with as many empty answers, %.1f points\n", jaeger,

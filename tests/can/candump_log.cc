@@ -42,8 +42,18 @@ Result<CandumpLog> ParseCandump(const std::string& text) {
       continue;
     }
     logged.interface = parsed->interface;
-    logged.frame = parsed->frame;
-    log.frames.push_back(std::move(logged));
+    if (!parsed->group) {
+      logged.frame = parsed->frame;
+      log.frames.push_back(std::move(logged));
+      continue;
+    }
+    const auto entries = UnpackGroup(*parsed->group);
+    if (!entries)
+      return Fail(ErrorCode::kInvalid, "line " + std::to_string(number) + ": no group: " + line);
+    for (std::size_t i = 0; i < entries->count; ++i) {
+      logged.frame = entries->frame[i];
+      log.frames.push_back(logged);
+    }
   }
   return log;
 }

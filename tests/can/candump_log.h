@@ -20,7 +20,7 @@ struct LoggedFrame {
 
 struct CandumpLog {
   std::vector<LoggedFrame> frames;
-  int foreign = 0;  // 11-bit, remote, CAN FD and error frames
+  int foreign = 0;  // 11-bit, remote and error frames, CAN FD that is no group
 };
 
 /// Errors: kInvalid, names the line.

@@ -102,6 +102,36 @@ TEST(SlowBus, AtMostThreeOfOursAreBelowAndAStopWaitsForTwo) {
       sent, below_max, stops_by_wait[0], stops_by_wait[1], stops_by_wait[2]);
 }
 
+// A group is one frame below, and one confirmation: were it more, or none, this would come to a
+// halt or drop frames in a queue that holds three.
+TEST(SlowBus, AtMostTwoGroupsAreBelowAndEachIsConfirmed) {
+  auto created =
+      SocketCanPort::Create({.bus = {3}, .interface = "vcan0", .data_bit_rate_bps = 2'000'000});
+  ASSERT_TRUE(created) << created.error().text;
+  SocketCanPort& port = **created;
+  ASSERT_TRUE(port.link().echoes) << "vcan must be loaded with echo=1";
+  std::vector<CanFrame> frames;
+  for (std::uint8_t n = 0; n < 200; ++n)
+    frames.push_back(Encode(HostMessage(StageSegment{Axis::kTheta, 1, {5, 6, 7}}), {{n}, 0}));
+  for (std::uint8_t n = 0; n < 100; ++n)  // these go alone
+    frames.push_back(Encode(HostMessage(Arm{MoveId{1}, 7}), {{n}, 1}));
+  std::vector<ReceivedFrame> in;
+  for (int round = 0; round < 5; ++round) {
+    std::size_t sent = 0;
+    while (sent < frames.size()) {
+      const std::size_t now = port.Send(std::span(frames).subspan(sent));
+      EXPECT_LE(now, TransmitWindow::kOrdinary * 5);
+      sent += now;
+      pollfd wait{port.fd(), POLLIN, 0};
+      ASSERT_GT(poll(&wait, 1, kPatienceMs), 0) << "no confirmation comes";
+      port.Receive(HostInstant{1}, &in);
+    }
+  }
+  EXPECT_TRUE(in.empty());
+  EXPECT_EQ(port.counters().rejected, 0u);
+  EXPECT_EQ(port.counters().link_errors, 0u) << "a confirmation was given up";
+}
+
 // Somebody else on this host floods the interface: ENOBUFS, no loss, no link down.
 TEST(SlowBus, AQueueThatOthersFillIsWaitedFor) {
   const auto port = OpenPort();

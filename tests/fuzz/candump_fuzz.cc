@@ -28,7 +28,11 @@ void Try(std::string_view line) {
   }
   FOCALFLEET_CHECK(parsed->frame.length <= 8 && parsed->frame.id <= kCanIdMax);
   FOCALFLEET_CHECK(!parsed->interface.empty());
-  if (parsed->foreign == nullptr) TryAgain(parsed->frame);
+  if (parsed->group) {
+    FOCALFLEET_CHECK(parsed->foreign == nullptr && parsed->group->length <= 64);
+  } else if (parsed->foreign == nullptr) {
+    TryAgain(parsed->frame);
+  }
 }
 
 }  // namespace

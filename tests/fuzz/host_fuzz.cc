@@ -30,6 +30,7 @@ constexpr std::size_t kRecord = 12;
 constexpr std::size_t kRecordsMax = 60;
 constexpr std::uint32_t kUnits = 3;
 constexpr int kStepsPerRecord = 400;
+constexpr std::uint64_t kCommitSteps = 5;  // a start that does not wait for its intent is seen
 
 Layout ThreeInARow() {
   std::vector<Unit> units(kUnits);
@@ -289,9 +290,10 @@ class Theatre {
     plans.swap(plans_);
     std::vector<ReceivedFrame> heard;
     heard.swap(heard_);
-    while (!store_fails_ && !commits_.empty()) {
-      store_.Commit(commits_.front().second);
-      committed_ = commits_.front().first;
+    ++step_;
+    while (!store_fails_ && !commits_.empty() && commits_.front().due <= step_) {
+      store_.Commit(commits_.front().rows);
+      committed_ = commits_.front().batch;
       commits_.erase(commits_.begin());
     }
     Effects effects;
@@ -305,7 +307,8 @@ class Theatre {
                        &effects);
     links_.clear();
     commands_.clear();
-    if (!effects.rows.empty()) commits_.emplace_back(effects.batch, effects.rows);
+    if (!effects.rows.empty())
+      commits_.push_back({effects.batch, effects.rows, step_ + kCommitSteps});
     if (effects.plan_job)
       plans_.push_back(RunPlanJob(*effects.plan_job, layout_, coordinator_->drives()));
     for (const OutFrame& out : effects.frames) Deliver(out);
@@ -353,7 +356,13 @@ class Theatre {
   testing::MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
-  std::vector<std::pair<std::uint64_t, std::vector<Row>>> commits_;
+  struct Commit {
+    std::uint64_t batch;
+    std::vector<Row> rows;
+    std::uint64_t due;  // in steps
+  };
+  std::vector<Commit> commits_;
+  std::uint64_t step_ = 0;
   std::uint64_t committed_ = 0;
   bool store_fails_ = false;
   std::vector<Command> commands_;

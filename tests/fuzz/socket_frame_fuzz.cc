@@ -1,6 +1,7 @@
 // Any bytes as what a socket hands over as a frame: taken only where it is a 29-bit data frame,
 // with nothing past its length, and then the same again on its way back. The same bytes as a
-// controller's error frame: a state or none, and causes in words.
+// controller's error frame: a state or none, and causes in words. The first of them as a CAN FD
+// frame.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -12,6 +13,13 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
                                // function
+  if (canfd_frame fd{}; size >= sizeof fd) {
+    std::memcpy(&fd, data, sizeof fd);
+    if (const auto frame = FromSocketFrame(fd)) {
+      FOCALFLEET_CHECK(frame->id <= kCanIdMax && FdLength(frame->length) == frame->length);
+      FOCALFLEET_CHECK(FromSocketFrame(ToSocketFrame(*frame)) == frame);
+    }
+  }
   ErrorTally tally;
   for (; size >= sizeof(can_frame); data += sizeof(can_frame), size -= sizeof(can_frame)) {
     can_frame raw{};

@@ -1,7 +1,7 @@
 // The unit's side of the protocol alone, as a board would run it, under a host that may say
 // anything at any time and a power supply that may go at any time. Records of 12 bytes: what
 // happens (1), how long after (1), function and address (1), length and sequence (1), data (8).
-// Whatever comes:
+// Staging frames may come in CAN FD groups. Whatever comes:
 //
 //   it answers in well-formed frames of its own node, an addressed request at most once, with that
 //   request's sequence number;
@@ -11,10 +11,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
+#include <vector>
 
 #include "protocol/base/check.h"
 #include "protocol/base/limits.h"
 #include "protocol/wire/codec.h"
+#include "protocol/wire/stage_group.h"
 #include "sim/unit/unit_machine.h"
 
 namespace focalfleet::sim {
@@ -57,6 +60,33 @@ class Bench {
     for (const CanFrame& answer : out.frames()) {
       const auto message = DecodeUnit(answer);
       FOCALFLEET_CHECK(message && message->address == Address({kNode, request->address.sequence}));
+    }
+    CheckAll();
+  }
+  /// Frames for a group; one that no group carries comes alone, as a port would send it.
+  void Collect(const CanFrame& frame) {
+    if (!CanBeGrouped(frame)) return Give(frame);
+    if (collected_.size() < kGroupEntriesMax) collected_.push_back(frame);
+  }
+  /// What was collected; any bytes where nothing was.
+  void GiveGroup(std::span<const std::uint8_t> bytes) {
+    FdFrame group{.id = kGroupId};
+    if (collected_.empty()) {
+      group.length = FdLength(std::min(bytes.size(), group.data.size()));
+      std::copy_n(bytes.begin(), std::min<std::size_t>(bytes.size(), group.length),
+                  group.data.begin());
+    } else {
+      PackGroup(collected_, &group);
+      collected_.clear();
+    }
+    const auto entries = UnpackGroup(group);
+    const bool powered = machine_.powered();
+    Outbox out;
+    machine_.OnGroup(group, now_, &out);
+    FOCALFLEET_CHECK(out.frames().size() <= (powered && entries ? entries->count : 0u));
+    for (const CanFrame& answer : out.frames()) {
+      const auto message = DecodeUnit(answer);
+      FOCALFLEET_CHECK(message && message->address.node == kNode);
     }
     CheckAll();
   }
@@ -174,6 +204,7 @@ class Bench {
   Flash kept_;
   Motor motor_[kAxisCount];
   UnitMachine machine_;
+  std::vector<CanFrame> collected_;
   BoardInstant now_{0};
   std::uint32_t begun_ = 0;
   MoveId last_;
@@ -218,6 +249,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         break;
       case 3:
         bench.ArmWhatIsHeld({static_cast<std::uint16_t>(data[4] | data[5] << 8)});
+        break;
+      case 4:
+        bench.Collect(sim::FrameOf(data));
+        break;
+      case 5:
+        bench.GiveGroup({data + 4, size - 4});
         break;
       default:
         bench.Give(sim::FrameOf(data));

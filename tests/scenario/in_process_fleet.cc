@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fleet/hex_layout.h"
+#include "fleet/kinematics.h"
 #include "fleet/plan/job.h"
 #include "fleet/targets.h"
 #include "protocol/base/check.h"
@@ -113,6 +114,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
 void InProcessFleet::Restart() {
   commits_.clear();  // what was not durable is gone
   planning_.clear();
+  exposing_.clear();
   commands_.clear();
   committed_through_ = 0;
   coordinator_ =
@@ -142,6 +144,12 @@ void InProcessFleet::StepOnce() {
     planning_.pop_front();
     if (plans.back().plan) last_plan_ = *plans.back().plan;
   }
+  std::vector<ExposureDone> exposures;
+  while (!exposing_.empty() && exposing_.front().at <= now_) {
+    exposures.push_back(Expose(exposing_.front().job));
+    if (camera_fault) camera_fault(&exposures.back());
+    exposing_.pop_front();
+  }
   while (!store_fails && !commits_.empty() && commits_.front().at <= now_) {
     store_.Commit(commits_.front().rows);
     committed_through_ = commits_.front().batch;
@@ -153,6 +161,7 @@ void InProcessFleet::StepOnce() {
                       .links = links_,
                       .commands = commands_,
                       .plans = plans,
+                      .exposures = exposures,
                       .committed_through = committed_through_,
                       .store_failing = store_fails},
                      &effects_);
@@ -175,8 +184,31 @@ void InProcessFleet::Perform(const Effects& effects) {
     for (const std::uint8_t byte : out.frame.payload()) digest_ = (digest_ ^ byte) * 0x100000001b3u;
   }
   if (effects.plan_job) planning_.push_back({now_ + options_.plan_delay, *effects.plan_job});
+  if (effects.exposure) exposing_.push_back({now_ + options_.exposure_delay, *effects.exposure});
   replies_.insert(replies_.end(), effects.replies.begin(), effects.replies.end());
   wake_at_ = effects.wake_at;
+}
+
+// A camera that sees every fibre and knows whose it is: to see and to tell apart is tried
+// elsewhere.
+ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
+  ExposureFindings exposure{.id = job.id, .sightings = {}};
+  for (std::uint32_t n = 0; n < layout_->size(); ++n) {
+    const sim::UnitTruth truth = world_->Truth(n);
+    const double noise_mm = 1e-3 * options_.centroid_sigma_um;
+    Sighting sighting{.unit = {n},
+                      .status = SightingStatus::kMeasured,
+                      .other = {},
+                      .x_mm = truth.x_mm + noise_mm * camera_noise_.Normal(),
+                      .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
+                      .sigma_um = options_.centroid_sigma_um,
+                      .place = {}};
+    if (job.expected[n][0].witness >= Witness::kReported)
+      sighting.place = PlaceSeen(layout_->units()[n], drives_[n], {sighting.x_mm, sighting.y_mm},
+                                 PlaceOf(job.expected[n]));
+    exposure.sightings.push_back(sighting);
+  }
+  return {job.id, std::move(exposure)};
 }
 
 bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limit) {
@@ -186,6 +218,7 @@ bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limi
     if (done()) return true;
     HostInstant next = std::min(wake_at_, world_->NextEvent());
     if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
+    if (!exposing_.empty()) next = std::min(next, exposing_.front().at);
     if (!planning_.empty()) next = std::min(next, planning_.front().at);
     next = std::min(next, sync_at_);
     if (!commands_.empty() || !links_.empty()) next = now_;
@@ -233,6 +266,19 @@ std::uint64_t InProcessFleet::ApplyRandom(std::uint64_t seed) {
   const auto poses = DrawConfiguration(*layout_, drives_, standing, Rng::Stream(seed, "targets"));
   FOCALFLEET_CHECK(poses.has_value());
   return Apply({poses->begin(), poses->end()});
+}
+
+std::uint64_t InProcessFleet::ApplyRandomMeasured(std::uint64_t seed,
+                                                  const ApplyCommand::Measure& measure) {
+  std::vector<std::optional<Pose>> standing(layout_->size());
+  const auto poses = DrawConfiguration(*layout_, drives_, standing, Rng::Stream(seed, "targets"));
+  FOCALFLEET_CHECK(poses.has_value());
+  const std::uint64_t request = next_request_++;
+  Send({request, ApplyCommand{.source = "measured",
+                              .targets = {poses->begin(), poses->end()},
+                              .fixed = false,
+                              .measure = measure}});
+  return request;
 }
 
 std::optional<ReplyEffect> InProcessFleet::LastReply(std::uint64_t request) const {

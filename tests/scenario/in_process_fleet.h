@@ -16,6 +16,7 @@
 #include "daemon/ports/simulated_port.h"
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
+#include "protocol/base/rng.h"
 #include "sim/world.h"
 
 namespace focalfleet::testing {
@@ -42,6 +43,8 @@ class InProcessFleet {
     DurationNs plan_delay = Milliseconds(20);
     CoordinatorConfig config;
     sim::Spread spread = sim::Spread::kNominal;
+    DurationNs exposure_delay = Milliseconds(500);
+    double centroid_sigma_um = 2;
     double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
     std::uint32_t first_id = 1;
     sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
@@ -77,6 +80,8 @@ class InProcessFleet {
   /// Applies a random configuration that is clear of what stands; returns its request number.
   std::uint64_t ApplyRandom(std::uint64_t seed);
   std::uint64_t Apply(std::vector<std::optional<Pose>> targets);
+  /// The same configuration as ApplyRandom's, measured and corrected.
+  std::uint64_t ApplyRandomMeasured(std::uint64_t seed, const ApplyCommand::Measure& measure);
 
   /// kill -9 and a new start: nothing of the coordinator survives but the store; the world goes on.
   void Restart();
@@ -102,12 +107,15 @@ class InProcessFleet {
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
+  /// What the camera makes of an exposure before the coordinator hears of it.
+  std::function<void(ExposureDone*)> camera_fault;
   std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
   std::vector<OutFrame>* sent = nullptr;        // where it is given: all frames of the coordinator
 
  private:
   void StepOnce();
   void Perform(const Effects& effects);
+  [[nodiscard]] ExposureDone Expose(const ExposureJob& job);
 
   struct Commit {
     HostInstant at;
@@ -131,6 +139,12 @@ class InProcessFleet {
   HostInstant sync_at_ = kNever;
   std::deque<Commit> commits_;
   std::deque<Planning> planning_;
+  struct Exposing {
+    HostInstant at;
+    ExposureJob job;
+  };
+  std::deque<Exposing> exposing_;
+  Rng camera_noise_{1};
   std::uint64_t committed_through_ = 0;
   std::vector<Command> commands_;
   std::vector<LinkEvent> links_;

@@ -9,6 +9,7 @@
 
 #include "protocol/wire/codec.h"
 #include "protocol/wire/frame_bits.h"
+#include "protocol/wire/stage_group.h"
 #include "sim/world.h"
 
 namespace focalfleet::testing {
@@ -24,12 +25,17 @@ struct UploadOnWire {
   std::uint32_t units = 0;
   std::uint32_t segments = 0;
   std::uint64_t segment_bits = 0;
+  std::vector<CanFrame> staged;  // stage_begin, stage_segment, confirm; unit by unit
 
   [[nodiscard]] double ratio() const {
     return static_cast<double>(elapsed_bits) / static_cast<double>(needed_bits);
   }
   [[nodiscard]] double bits_per_unit() const {
     return static_cast<double>(needed_bits) / static_cast<double>(units);
+  }
+  /// Of the needed ones, were the staging frames in groups, as full as can be.
+  [[nodiscard]] std::uint64_t needed_bits_with(const BusRates& rates) const {
+    return needed_bits - BitsOnWire(staged, {rates.nominal_bps}) + BitsOnWire(staged, rates);
   }
 };
 
@@ -77,12 +83,17 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
     upload.needed_bits += bits;
     ++upload.frames;
     const auto function = static_cast<Function>(w.frame.id >> 20 & 63);
+    if (CanBeGrouped(w.frame)) upload.staged.push_back(w.frame);
     if (function == Function::kStageBegin) ++upload.units;
     if (function == Function::kStageSegment) {
       ++upload.segments;
       upload.segment_bits += bits;
     }
   }
+  // The host hands them over so; between the units' mailboxes lower identifiers pass.
+  for (auto& [bus, upload] : out)
+    std::ranges::stable_sort(upload.staged, {},
+                             [](const CanFrame& frame) { return frame.id >> 11 & 255; });
   return out;
 }
 

@@ -41,6 +41,29 @@ TEST(Upload, TakesHardlyLongerThanItsBits) {
   EXPECT_LE(sum / kRuns, 1.005);
 }
 
+// The simulated bus carries classic frames; what is charged and told is what groups would take.
+TEST(Upload, WithCanFdIsChargedAsGroups) {
+  for (const std::uint32_t data_bps : {2'000'000u, 5'000'000u}) {
+    const std::uint64_t seed = TestSeed(3);
+    SCOPED_TRACE(seed);
+    const BusRates rates{1'000'000, data_bps};
+    InProcessFleet fleet({.count = 40,
+                          .units_per_bus = 40,
+                          .seed = seed,
+                          .config = {.data_bit_rate_bps = data_bps}});
+    const auto uploads = MeasureUpload(UploadOf(&fleet, seed));
+    ASSERT_EQ(uploads.size(), 1u);
+    const auto& [bus, upload] = *uploads.begin();
+    const auto needed = static_cast<double>(upload.needed_bits_with(rates));
+    EXPECT_LT(needed, 0.85 * static_cast<double>(upload.needed_bits));
+    const UploadView& said = fleet.coordinator().bus(bus).upload;
+    // Which frames share a group depends on the order of the units, which is the plan's.
+    EXPECT_NEAR(static_cast<double>(said.bits_predicted), needed, 0.01 * needed);
+    // Where the queue runs empty a group is not full: 5 % with so few units.
+    EXPECT_NEAR(static_cast<double>(said.bits), needed, 0.10 * needed);
+  }
+}
+
 TEST(Upload, IsPredictedToTheBit) {
   for (std::uint64_t k = 0; k < 5; ++k) {
     const std::uint64_t seed = TestSeed(1) + k;

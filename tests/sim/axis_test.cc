@@ -250,25 +250,40 @@ TEST(Axis, SlippingAndDeadAxesArriveShort) {
   EXPECT_EQ(none.Deg(), 0);
 }
 
-TEST(Axis, StepScatterIsDrawnOnceAMotionAndRemembered) {
+// Of `moves` there and back over `way_deg`: the spread of the place, and of its change in a move.
+struct Scattered {
+  double place_deg = 0;
+  double change_deg = 0;
+};
+Scattered ScatterOver(double way_deg, int moves) {
   AxisTraits traits;
   traits.scatter_deg = 0.1;
   traits.scatter_seed = 5;
   AxisRig rig(traits);
   AxisRig clean({});
-  double sum = 0;
-  double squares = 0;
-  constexpr int kMoves = 2000;
-  for (int i = 0; i < kMoves; ++i) {
-    const std::int32_t way = i % 2 == 0 ? 500 : -500;
+  Scattered sums;
+  double before = 0;
+  for (int i = 0; i < moves; ++i) {
+    const auto way = static_cast<std::int32_t>((i % 2 == 0 ? way_deg : -way_deg) / 0.0375);
     rig.Move(way);
     clean.Move(way);
     const double off = rig.Deg() - clean.Deg();
-    sum += off;
-    squares += off * off;
+    sums.place_deg += off * off;
+    sums.change_deg += (off - before) * (off - before);
+    before = off;
   }
-  EXPECT_NEAR(sum / kMoves, 0, 5 * 0.1 / std::sqrt(kMoves));
-  EXPECT_NEAR(std::sqrt(squares / kMoves), 0.1, 5 * 0.1 / std::sqrt(2 * kMoves));
+  return {std::sqrt(sums.place_deg / moves), std::sqrt(sums.change_deg / moves)};
+}
+
+TEST(Axis, ScatterGrowsWithTheWayAndForgetsItselfOverAFullTurn) {
+  constexpr int kMoves = 4000;
+  const double tolerance = 5 / std::sqrt(2.0 * kMoves);
+  for (const double way_deg : {15.0, 60.0, 360.0}) {
+    const double kept = std::exp(-way_deg / kScatterTravelDeg);
+    const double expected = 0.1 * std::sqrt(2 * (1 - kept));
+    EXPECT_NEAR(ScatterOver(way_deg, kMoves).change_deg, expected, tolerance * expected) << way_deg;
+  }
+  EXPECT_NEAR(ScatterOver(1440, kMoves).place_deg, 0.1, tolerance * 0.1);
 }
 
 TEST(Axis, FoundAgainFromMemoryItStandsWhereItStood) {

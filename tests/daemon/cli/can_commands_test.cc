@@ -69,6 +69,27 @@ TEST(CanDecodeCommand, GivesAnObjectALine) {
   EXPECT_EQ(objects[4]["malformed"], "length");
 }
 
+// The example of docs/protocol.md, and one with a wrong byte.
+TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
+  const ScratchDirectory scratch;
+  const std::string log =
+      scratch.Put("bus.log",
+                  "(1.000000) vcan0 1107F800##107002801020102010709380102FFFFFF\n"
+                  "(2.000000) vcan0 1107F800##107002801020102010709F80102FFFFFF\n");
+  const auto text = Focalfleet({"can", "decode", log});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("1.000000  vcan0    7 <- host  #0    stage_begin"));
+  EXPECT_THAT(text.out, HasSubstr("1.000000  vcan0    7 <- host  #9    confirm"));
+  EXPECT_THAT(text.out, HasSubstr("2.000000  vcan0  malformed (function): 1107F800##0700"));
+  const std::vector<Json> objects = Objects(Focalfleet({"can", "decode", log, "--json"}).out);
+  ASSERT_EQ(objects.size(), 3u);
+  EXPECT_EQ(objects[0]["message"], "stage_begin");
+  EXPECT_EQ(objects[0]["group"], 1);
+  EXPECT_EQ(objects[1]["message"], "confirm");
+  EXPECT_EQ(objects[1]["group"], 2);
+  EXPECT_EQ(objects[2]["malformed"], "function");
+}
+
 TEST(CanDecodeCommand, NamesBadLinesAndDecodesTheOthers) {
   const ScratchDirectory scratch;
   const std::string log = scratch.Put("bus.log", std::string(kLog) + "hello\n" + kLog + "x y z\n");

@@ -124,6 +124,7 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"failed", 0},
                       {"makespan_predicted_s", 12.5},
                       {"makespan_s", 12.75},
+                      {"measured", Json::array()},
                       {"energy_J", 3.5},
                       {"peak_power_W", 0.5},
                       {"frames", 420},

@@ -6,7 +6,7 @@
 
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 #include "tests/daemon/cli/program.h"
 
 namespace focalfleet {
@@ -34,10 +34,10 @@ TEST(Table, FlattensObjectsAndAlignsRows) {
 TEST(TextFile, AcceptsUtf8AndNamesTheFirstByteThatIsNot) {
   const test::ScratchDirectory scratch;
   const std::string good = "# \xc2\xb5m \xe2\x82\xac \xf0\x9f\x94\xad\n1,2\n";
-  ASSERT_TRUE(cli::ReadTextFile(scratch.Put("good", good)));
+  ASSERT_TRUE(ReadTextFile(scratch.Put("good", good)));
   for (const std::string bad : {"\xc0\x80", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82", "\x80",
                                 "\xf0\x80\x80\x80", "\xe0\x80\x80"}) {
-    const auto text = cli::ReadTextFile(scratch.Put("bad", "a\nb\n" + bad));
+    const auto text = ReadTextFile(scratch.Put("bad", "a\nb\n" + bad));
     ASSERT_FALSE(text);
     EXPECT_THAT(text.error().text, HasSubstr("bad:3: not a text file"));
   }
@@ -48,7 +48,7 @@ TEST(TextFile, WritesThroughALinkAndKeepsItsMode) {
   const std::string file = scratch.Put("real", "old");
   const std::string link = scratch / "link";
   ASSERT_EQ(symlink(file.c_str(), link.c_str()), 0);
-  ASSERT_TRUE(cli::WriteFileAtomically(link, "new"));
+  ASSERT_TRUE(WriteFileAtomically(link, "new"));
   EXPECT_EQ(test::Slurp(file), "new");
   EXPECT_EQ(scratch.List(), (std::vector<std::string>{"link", "real"}));
 }

@@ -88,6 +88,30 @@ TEST(CanNetlink, ReadsAController) {
   EXPECT_EQ(link->rx_errors, 7);
 }
 
+TEST(CanNetlink, ReadsWhatCanFdNeeds) {
+  can_bittiming timing{};
+  timing.bitrate = 500'000;
+  can_bittiming data{};
+  data.bitrate = 4'000'000;
+  Answer can;
+  can.Attribute(IFLA_CAN_BITTIMING, Answer().Put(timing));
+  can.Attribute(IFLA_CAN_DATA_BITTIMING, Answer().Put(data));
+  Answer info;
+  info.Attribute(IFLA_INFO_KIND, Answer().Text("can"));
+  info.Attribute(IFLA_INFO_DATA, can);
+  const auto link = ReadLink(Head(IFF_UP)
+                                 .Attribute(IFLA_MTU, Answer().Put(std::uint32_t{72}))
+                                 .Attribute(IFLA_LINKINFO, info)
+                                 .Message(RTM_NEWLINK));
+  ASSERT_TRUE(link) << link.error().text;
+  EXPECT_EQ(link->bit_rate_bps, 500'000u);
+  EXPECT_EQ(link->data_bit_rate_bps, 4'000'000u);
+  EXPECT_EQ(link->mtu, 72u);
+  const auto without = ReadLink(Controller());
+  ASSERT_TRUE(without);
+  EXPECT_EQ(without->data_bit_rate_bps, 0u);
+}
+
 TEST(CanNetlink, AVirtualInterfaceHasNoBitTiming) {
   Answer info;
   info.Attribute(IFLA_INFO_KIND, Answer().Text("vcan"));

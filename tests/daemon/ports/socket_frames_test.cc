@@ -47,7 +47,7 @@ TEST(SocketFrames, FrameSurvivesTheWay) {
 }
 
 TEST(SocketFrames, OnlyExtendedDataFramesAreFrames) {
-  can_frame raw = ToSocketFrame({.id = 5, .length = 2, .data = {9, 9}});
+  can_frame raw = ToSocketFrame(CanFrame{.id = 5, .length = 2, .data = {9, 9}});
   raw.can_id = 5;  // 11 bits
   EXPECT_FALSE(FromSocketFrame(raw));
   raw.can_id = 5 | CAN_EFF_FLAG | CAN_RTR_FLAG;
@@ -60,7 +60,7 @@ TEST(SocketFrames, OnlyExtendedDataFramesAreFrames) {
 }
 
 TEST(SocketFrames, BytesPastTheLengthAreNobodys) {
-  can_frame raw = ToSocketFrame({.id = 5, .length = 2, .data = {1, 2}});
+  can_frame raw = ToSocketFrame(CanFrame{.id = 5, .length = 2, .data = {1, 2}});
   raw.data[5] = 0xee;
   EXPECT_EQ(FromSocketFrame(raw), (CanFrame{.id = 5, .length = 2, .data = {1, 2}}));
 }
@@ -94,7 +94,7 @@ TEST(SocketFrames, WhatIsNoFrameIsCounted) {
   pair.Write(std::array<char, 3>{});
   pair.Write(std::array<char, 72>{});
   pair.Write(can_frame{});  // 11 bits
-  pair.Write(ToSocketFrame({.id = 1, .length = 0, .data = {}}));
+  pair.Write(ToSocketFrame(CanFrame{.id = 1, .length = 0, .data = {}}));
   std::vector<ReceivedFrame> received;
   PortCounters counters;
   ReceiveFrames(pair.b(), kStamp, &received, &counters);

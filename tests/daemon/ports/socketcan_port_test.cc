@@ -8,8 +8,12 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cstring>
 #include <thread>
 #include <utility>
+
+#include "protocol/wire/codec.h"
+#include "protocol/wire/stage_group.h"
 
 namespace focalfleet {
 namespace {
@@ -54,9 +58,9 @@ struct Interface {
 TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   Interface interface;
   const auto port = SocketCanPort::Create(
-      {.bus = BusId{1}, .interface = "can7", .open = [&](const std::string& name, Hears) {
-         return interface.Open(name);
-       }});
+      {.bus = BusId{1},
+       .interface = "can7",
+       .open = [&](const std::string& name, const Listening&) { return interface.Open(name); }});
   ASSERT_TRUE(port) << port.error().text;
   EXPECT_EQ((*port)->trouble(), "no CAN interface 'can7'");
   std::vector<ReceivedFrame> in;
@@ -92,7 +96,7 @@ TEST(SocketCanPort, RefusesANameThatNoInterfaceCanHave) {
   const auto port = SocketCanPort::Create(
       {.bus = BusId{1},
        .interface = "can7",
-       .open = [](const std::string&, Hears) -> Result<OpenedInterface> {
+       .open = [](const std::string&, const Listening&) -> Result<OpenedInterface> {
          return Fail(ErrorCode::kInvalid, "no CAN interface can be called so");
        }});
   ASSERT_FALSE(port);
@@ -111,9 +115,9 @@ TEST(SocketCanPort, HandsDownNoMoreThanTheKernelHasLet) {
   Interface interface;
   interface.there = true;
   const auto port = SocketCanPort::Create(
-      {.bus = BusId{1}, .interface = "can7", .open = [&](const std::string& name, Hears) {
-         return interface.Open(name);
-       }});
+      {.bus = BusId{1},
+       .interface = "can7",
+       .open = [&](const std::string& name, const Listening&) { return interface.Open(name); }});
   ASSERT_TRUE(port) << port.error().text;
   constexpr std::uint32_t kOrdinaryId = 5u << 26;
   const auto frames = Frames(40, kOrdinaryId);
@@ -141,7 +145,7 @@ TEST(SocketCanPort, RefusesAnotherBitRate) {
   Interface interface;
   interface.there = true;
   interface.link.bit_rate_bps = 500'000;
-  const auto open = [&](const std::string& name, Hears) { return interface.Open(name); };
+  const auto open = [&](const std::string& name, const Listening&) { return interface.Open(name); };
   const auto port = SocketCanPort::Create(
       {.bus = BusId{1}, .interface = "can7", .bit_rate_bps = 1'000'000, .open = open});
   ASSERT_FALSE(port);
@@ -158,7 +162,7 @@ TEST(SocketCanPort, DoesNotUseOneThatComesBackWithAnotherBitRate) {
       {.bus = BusId{1},
        .interface = "can7",
        .bit_rate_bps = 1'000'000,
-       .open = [&](const std::string& name, Hears) { return interface.Open(name); }});
+       .open = [&](const std::string& name, const Listening&) { return interface.Open(name); }});
   ASSERT_TRUE(port) << port.error().text;
   interface.there = true;
   interface.link.bit_rate_bps = 250'000;
@@ -171,21 +175,212 @@ TEST(SocketCanPort, DoesNotUseOneThatComesBackWithAnotherBitRate) {
   EXPECT_EQ((*port)->state(), LinkState::kUp);
 }
 
+// ---- CAN FD
+
+class FdPort : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    interface_.there = true;
+    interface_.link.mtu = CANFD_MTU;
+  }
+  Result<std::unique_ptr<SocketCanPort>> Create(const Listening& expected,
+                                                std::uint32_t data_bit_rate_bps) {
+    return SocketCanPort::Create(
+        {.bus = BusId{1},
+         .interface = "can7",
+         .hears = expected.hears,
+         .data_bit_rate_bps = data_bit_rate_bps,
+         .open = [this, expected](const std::string& name, const Listening& listening) {
+           EXPECT_EQ(listening.hears, expected.hears);
+           EXPECT_EQ(listening.groups, expected.groups);
+           return interface_.Open(name);
+         }});
+  }
+  void Open(Hears hears = Hears::kUnits) {
+    auto port = Create({hears, true}, hears == Hears::kUnits ? 2'000'000 : 0);
+    ASSERT_TRUE(port) << port.error().text;
+    port_ = std::move(*port);
+  }
+  /// What the other end finds: frames alone, and groups as what they are made of.
+  struct Taken {
+    std::vector<CanFrame> frames;
+    std::vector<std::size_t> sizes;  // how many each packet had; 0: it was a classic frame
+  };
+  void TakeOne(Taken* taken) const {
+    canfd_frame raw{};
+    const ssize_t size = ::recv(interface_.ends[1], &raw, sizeof raw, MSG_DONTWAIT);
+    if (size == sizeof(canfd_frame)) {
+      EXPECT_EQ(raw.flags & CANFD_BRS, CANFD_BRS);
+      const auto group = FromSocketFrame(raw);
+      ASSERT_TRUE(group);
+      const auto entries = UnpackGroup(*group);
+      ASSERT_TRUE(entries) << Name(entries.error());
+      taken->sizes.push_back(entries->count);
+      taken->frames.insert(taken->frames.end(), entries->frame.begin(),
+                           entries->frame.begin() + static_cast<std::ptrdiff_t>(entries->count));
+    } else if (size == sizeof(can_frame)) {
+      can_frame classic{};
+      std::memcpy(&classic, &raw, sizeof classic);
+      taken->sizes.push_back(0);
+      taken->frames.push_back(FromSocketFrame(classic).value());
+    }
+  }
+  Taken SendAll(std::span<const CanFrame> frames) {
+    Taken taken;
+    std::size_t sent = 0;
+    for (int turn = 0; turn < 1000 && taken.frames.size() < frames.size(); ++turn) {
+      sent += port_->Send(frames.subspan(sent));
+      EXPECT_LE(sent - taken.frames.size(), TransmitWindow::kOrdinary * kGroupEntriesMax);
+      TakeOne(&taken);
+    }
+    EXPECT_EQ(sent, frames.size());
+    return taken;
+  }
+  void Write(const FdFrame& group) const {
+    const canfd_frame raw = ToSocketFrame(group);
+    ASSERT_EQ(::send(interface_.ends[1], &raw, sizeof raw, 0), static_cast<ssize_t>(sizeof raw));
+  }
+
+  Interface interface_;
+  std::unique_ptr<SocketCanPort> port_;
+};
+
+CanFrame ConfirmTo(std::uint8_t node) {
+  return Encode(HostMessage(Confirm{MoveId{1}}), {NodeId{node}, 1});
+}
+CanFrame SegmentTo(std::uint8_t node) {
+  return Encode(HostMessage(StageSegment{Axis::kPhi, 0, {0, 100, 37}}), {NodeId{node}, 0});
+}
+CanFrame ArmTo(std::uint8_t node) {
+  return Encode(HostMessage(Arm{MoveId{1}, 7}), {NodeId{node}, 2});
+}
+
+TEST_F(FdPort, PutsWhatIsStagedIntoGroupsInOrderAndNothingElse) {
+  Open();
+  std::vector<CanFrame> frames;
+  for (std::uint8_t node = 0; node < 7; ++node) frames.push_back(SegmentTo(node));
+  frames.push_back(ArmTo(9));
+  frames.push_back(ConfirmTo(10));
+  frames.push_back(ArmTo(11));
+  for (std::uint8_t node = 20; node < 33; ++node) frames.push_back(ConfirmTo(node));
+  const Taken taken = SendAll(frames);
+  EXPECT_EQ(taken.frames, frames);
+  // Five segments fill a group; one that is alone goes as a classic frame, as does what no group
+  // carries.
+  EXPECT_EQ(taken.sizes, (std::vector<std::size_t>{5, 2, 0, 0, 0, 12, 0}));
+}
+
+TEST_F(FdPort, WithoutCanFdEverythingGoesAlone) {
+  interface_.link.mtu = CAN_MTU;
+  auto port = Create({Hears::kUnits, false}, 0);
+  ASSERT_TRUE(port) << port.error().text;
+  port_ = std::move(*port);
+  const std::vector<CanFrame> frames(6, ConfirmTo(1));
+  EXPECT_EQ(SendAll(frames).sizes, std::vector<std::size_t>(6, 0));
+}
+
+TEST_F(FdPort, AGroupTakesOnePlaceBelowAndAStopStillFindsItsOwn) {
+  Open();
+  // One classic frame alone shows what a frame is charged.
+  Taken taken;
+  const CanFrame arm = ArmTo(1);
+  ASSERT_EQ(port_->Send({&arm, 1}), 1u);
+  TakeOne(&taken);
+  const std::vector<CanFrame> frames(60, SegmentTo(3));
+  std::size_t sent = 0;
+  for (int turn = 0; turn < 20 && sent < 20; ++turn) {
+    sent += port_->Send(std::span(frames).subspan(sent));
+    if (sent < 20) TakeOne(&taken);
+  }
+  // Full now: two groups at most are below.
+  while (port_->Send(std::span(frames).subspan(sent, 5)) > 0) sent += 5;
+  EXPECT_LE(sent - (taken.frames.size() - 1), 10u);
+  const CanFrame stop = Encode(HostMessage(Stop{}), {NodeId{3}, 1});
+  EXPECT_EQ(port_->Send({&stop, 1}), 1u);
+  EXPECT_EQ(port_->Send({&stop, 1}), 0u);
+}
+
+TEST_F(FdPort, RefusesAnInterfaceWithoutCanFd) {
+  interface_.link.mtu = CAN_MTU;
+  interface_.link.kind = "vcan";
+  auto port = Create({Hears::kUnits, true}, 2'000'000);
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(port.error().text,
+            "CAN interface 'can7' carries no CAN FD: its MTU is 16, not 72 (`ip link set can7 mtu "
+            "72`)");
+  interface_.link.kind = "can";
+  port = Create({Hears::kUnits, true}, 2'000'000);
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().text,
+            "CAN interface 'can7' carries no CAN FD: its MTU is 16, not 72 (`ip link set can7 type "
+            "can ... dbitrate 2000000 fd on`)");
+}
+
+TEST_F(FdPort, RefusesAnotherDataBitRate) {
+  interface_.link.data_bit_rate_bps = 5'000'000;
+  const auto port = Create({Hears::kUnits, true}, 2'000'000);
+  ASSERT_FALSE(port);
+  EXPECT_EQ(port.error().code, ErrorCode::kRefused);
+  EXPECT_EQ(port.error().text,
+            "CAN interface 'can7' has 5000000 bit/s for the data of CAN FD frames, not 2000000");
+  interface_.link.data_bit_rate_bps = 2'000'000;
+  EXPECT_TRUE(Create({Hears::kUnits, true}, 2'000'000));
+}
+
+TEST_F(FdPort, UnitsHearAGroupAsItsFramesAndAHostHearsNone) {
+  const std::vector<CanFrame> frames{SegmentTo(1), ConfirmTo(1), ConfirmTo(2)};
+  FdFrame group;
+  ASSERT_EQ(PackGroup(frames, &group), 3u);
+  FdFrame broken = group;
+  broken.data[2] = 0xff;
+  std::vector<ReceivedFrame> in;
+  Open(Hears::kHosts);
+  Write(group);
+  Write(broken);
+  port_->Receive(HostInstant{1}, &in);
+  std::vector<CanFrame> heard;
+  for (const ReceivedFrame& one : in) heard.push_back(one.frame);
+  EXPECT_EQ(heard, frames);
+  EXPECT_EQ(port_->counters().rejected, 1u);
+
+  in.clear();
+  Open(Hears::kUnits);
+  Write(group);
+  port_->Receive(HostInstant{1}, &in);
+  EXPECT_TRUE(in.empty()) << "another host's";
+  EXPECT_EQ(port_->counters().rejected, 0u);
+}
+
+TEST_F(FdPort, AHostThatIsNotSetUpForGroupsRejectsThem) {
+  auto port = Create({Hears::kUnits, false}, 0);
+  ASSERT_TRUE(port) << port.error().text;
+  FdFrame group;
+  const std::vector<CanFrame> frames(2, ConfirmTo(2));
+  ASSERT_EQ(PackGroup(frames, &group), 2u);
+  Write(group);
+  std::vector<ReceivedFrame> in;
+  (*port)->Receive(HostInstant{1}, &in);
+  EXPECT_TRUE(in.empty());
+  EXPECT_EQ((*port)->counters().rejected, 1u);
+}
+
 // Error frames that the controller's driver would write.
 class TroubledPort : public ::testing::Test {
  protected:
   void SetUp() override { Open(); }
   void Open() {
     interface_.there = true;
-    auto port = SocketCanPort::Create(
-        {.bus = BusId{1},
-         .interface = "can7",
-         .open = [this](const std::string& name, Hears) { return interface_.Open(name); },
-         .revive = [this]() -> Status {
-           ++attempts_;
-           if (works_) return {};
-           return Fail(ErrorCode::kRefused, "no privilege to restart it");
-         }});
+    auto port =
+        SocketCanPort::Create({.bus = BusId{1},
+                               .interface = "can7",
+                               .open = [this](const std::string& name,
+                                              const Listening&) { return interface_.Open(name); },
+                               .revive = [this]() -> Status {
+                                 ++attempts_;
+                                 if (works_) return {};
+                                 return Fail(ErrorCode::kRefused, "no privilege to restart it");
+                               }});
     ASSERT_TRUE(port) << port.error().text;
     port_ = std::move(*port);
   }

@@ -106,5 +106,20 @@ TEST(TransmitWindow, AFrameOfAnotherNodeDelaysOursThatWaited) {
   EXPECT_EQ(window.Room(false, kNow + took * 3), 2u);
 }
 
+TEST(TransmitWindow, AGroupIsOneFrameThatTakesItsTimeAtBothRates) {
+  constexpr BusRates kRates{1'000'000, 4'000'000};
+  TransmitWindow window({.bit_rate_bps = kRates.nominal_bps, .data_bit_rate_bps = kRates.data_bps});
+  FdFrame group{.id = kGroupId, .length = 64, .data = {}};
+  window.Sent(group, kNow);
+  EXPECT_EQ(window.Room(false, kNow), 1u);
+  const HostInstant first = kNow + BitTime(FrameBits(group), kRates);
+  window.Sent(kFrame, kNow);
+  EXPECT_EQ(window.RoomAt(), first);
+  EXPECT_EQ(window.Room(false, first - DurationNs{1}), 0u);
+  EXPECT_EQ(window.Room(false, first), 1u);
+  window.Sent(group, first);
+  EXPECT_EQ(window.RoomAt(), first + BitTime(FrameBits(kFrame), kRates.nominal_bps));
+}
+
 }  // namespace
 }  // namespace focalfleet

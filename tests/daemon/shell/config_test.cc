@@ -32,6 +32,8 @@ TEST(Config, DefaultsAreTheDocumentedOnes) {
   EXPECT_TRUE(config->dds.enabled);
   EXPECT_EQ(config->dds.rate_hz, 10);
   EXPECT_EQ(config->bus.bit_rate_bps, 1'000'000u);
+  EXPECT_FALSE(config->bus.can_fd);
+  EXPECT_EQ(config->timing.data_bit_rate_bps, 0u) << "no groups, whatever data_bit_rate_bps is";
   EXPECT_EQ(config->clock.speed, 1);
   EXPECT_EQ(config->drive.axis[1].repeat, 108);
   EXPECT_EQ(config->timing.reply_wait, CoordinatorConfig{}.reply_wait);
@@ -58,6 +60,8 @@ file = "l.log"
 [bus]
 port = "socketcan"
 bit_rate_bps = 500000
+can_fd = true
+data_bit_rate_bps = 4000000
 unix_directory = "d"
 interfaces = ["can0", "can1"]
 [sync]
@@ -93,17 +97,18 @@ spread = "real"
   EXPECT_EQ(config->bus.port, PortKind::kSocketCan);
   EXPECT_EQ(config->bus.interfaces, (std::vector<std::string>{"can0", "can1"}));
   EXPECT_EQ(config->timing.bit_rate_bps, 500'000u);
+  EXPECT_EQ(config->timing.data_bit_rate_bps, 4'000'000u);
   EXPECT_EQ(config->drive.mode, WaveMode::kSevenSegment);
   EXPECT_EQ(config->drive.axis[0], config->drive.axis[1]);
   EXPECT_EQ(config->drive.axis[0].counter1, 400);
   EXPECT_EQ(config->timing.silence_limit, Milliseconds(7));
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:22");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:24");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:24");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:26");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
 }
@@ -150,6 +155,8 @@ TEST(Config, ValueOutOfRangeIsAnErrorWithItsLine) {
   const std::string bus = "[bus]\nport = \"simulated\"\n";
   EXPECT_THAT(ErrorOf(bus + "bit_rate_bps = 2000000"),
               HasSubstr(":3: bus.bit_rate_bps must be in"));
+  EXPECT_THAT(ErrorOf(bus + "data_bit_rate_bps = 9000000"),
+              HasSubstr(":3: bus.data_bit_rate_bps must be in 10000..8000000"));
   EXPECT_THAT(ErrorOf(bus + "[clock]\nspeed = 0"), HasSubstr(":4: clock.speed must be in"));
   EXPECT_THAT(ErrorOf(bus + "[clock]\nspeed = nan"), HasSubstr(":4: clock.speed must be in"));
   EXPECT_THAT(ErrorOf(bus + "[dds]\ndomain = -1"), HasSubstr(":4: dds.domain must be in 0..230"));
@@ -164,6 +171,13 @@ TEST(Config, WhatDoesNotGoTogetherIsSaid) {
   EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\"\ninterfaces = [\"a\", \"a\"]"),
               HasSubstr(":3: bus.interfaces must name each interface once"));
   EXPECT_THAT(ErrorOf("[bus]\nport = \"unix\""), HasSubstr("bus.unix_directory"));
+  for (const char* port : {"\"simulated\"", "\"unix\"\nunix_directory = \"d\""})
+    EXPECT_THAT(ErrorOf("[bus]\ncan_fd = true\nport = " + std::string(port)),
+                HasSubstr(":2: bus.can_fd needs bus.port = \"socketcan\": simulated buses and UNIX "
+                          "sockets carry classic frames only"));
+  EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\"\ninterfaces = [\"a\"]\ncan_fd = true\n"
+                      "data_bit_rate_bps = 500000"),
+              HasSubstr(":5: bus.data_bit_rate_bps must not be below bus.bit_rate_bps"));
   EXPECT_THAT(ErrorOf(std::string(kMinimal) + "[store]\npath = \"\""), HasSubstr(":4: store.path"));
 }
 

@@ -23,7 +23,8 @@ class OpenPortsTest : public ::testing::Test {
     EXPECT_TRUE(config) << config.error().text;
     const auto layout = Layout::Create(MakeHexLayout({.count = 3, .units_per_bus = 1}), {});
     EXPECT_TRUE(layout) << layout.error().text;
-    const InterfaceOpener open = [&](const std::string& name, Hears) -> Result<OpenedInterface> {
+    const InterfaceOpener open = [&](const std::string& name,
+                                     const Listening&) -> Result<OpenedInterface> {
       if (name.size() > 15) return Fail(ErrorCode::kInvalid, "none can be called " + name);
       if (!there.contains(name)) return Fail(ErrorCode::kUnavailable, "no interface " + name);
       return OpenedInterface{-1, {.kind = kind}};  // there, and down

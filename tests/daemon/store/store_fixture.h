@@ -13,27 +13,9 @@
 #include <vector>
 
 #include "daemon/store/store.h"
+#include "tests/support/temporary_folder.h"
 
 namespace focalfleet::testing {
-
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name =
-        (std::filesystem::temp_directory_path() / "focalfleet_store_XXXXXX").string();
-    path_ = mkdtemp(name.data());
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  [[nodiscard]] std::string File(const std::string& name) const { return path_ + "/" + name; }
-
- private:
-  std::string path_;
-};
 
 class StoreTest : public ::testing::Test {
  protected:
@@ -66,7 +48,7 @@ inline void ExpectDone(const Status& status) { EXPECT_TRUE(status) << status.err
 
 inline VectorRow Vector(std::uint32_t serial, Witness witness, std::int32_t theta, std::int32_t phi,
                         std::uint16_t move = 1, Origin origin = Origin::kMove) {
-  return {{serial}, Exactly(witness, Pose{theta, phi}), {96, 96}, {move}, origin};
+  return {{serial}, Exactly(witness, Pose{theta, phi}), {}, {96, 96}, {move}, origin};
 }
 
 inline IntentRow Intent(std::uint32_t unit, std::uint32_t serial, std::uint16_t move, Pose from,

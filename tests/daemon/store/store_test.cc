@@ -54,7 +54,7 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
   VectorRow half_known = Vector(7001, Witness::kMeasured, -1, 96, 12, Origin::kCampaign);
   half_known.knowledge[1] = {Witness::kInterval, -500, 700};
   half_known.subdivision = {96, 64};
-  const VectorRow unknown{{7002}, {}, {}, {}, Origin::kFactory};
+  const VectorRow unknown{{7002}, {}, {}, {}, {}, Origin::kFactory};
   const IntentRow intent = Intent(12, 7001, 13, {5, -6}, {-7, 8});
   const std::vector<Row> rows = {
       BindingRow{{12}, {7001}},
@@ -280,7 +280,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
       no_witness,
       turned_hull,
       Vector(0, Witness::kReported, 5, 5),
-      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(6)),
+      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(7)),
       IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
       ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
       Tuned(0, 0.5),   // no n at all
@@ -339,7 +339,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE axis_state SET vector = NULL", "vector and turns do not belong"},
         Garbage{"UPDATE axis_state SET vector = 96", "vector is 96"},
         Garbage{"UPDATE axis_state SET subdivision = 70000", "subdivision is 70000"},
-        Garbage{"UPDATE axis_state SET origin = 6", "origin is 6"},
+        Garbage{"UPDATE axis_state SET origin = 7", "origin is 7"},
         Garbage{"UPDATE axis_state SET move = 65536", "move is 65536"},
         Garbage{"UPDATE axis_state SET axis = 2 WHERE axis = 1", "axis is 2"},
         Garbage{"UPDATE axis_state SET move = 7 WHERE axis = 1", "of different moves"},
@@ -356,7 +356,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE tuning SET critical = 55", "tuning, row serial 7, axis 1: its n are not"},
         Garbage{"UPDATE tuning SET load_uNm = 0", "load"},
         Garbage{"UPDATE tuning SET mode = 3", "mode is 3"},
-        Garbage{"UPDATE tuning SET origin = 6", "origin is 6"},
+        Garbage{"UPDATE tuning SET origin = 7", "origin is 7"},
         Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
         Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 

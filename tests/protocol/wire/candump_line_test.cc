@@ -43,6 +43,25 @@ TEST(CandumpLine, ReadsBothFormsOfCandump) {
   }
 }
 
+TEST(CandumpLine, ReadsAGroupWithAsManyBytesAsItHas) {
+  for (const char* text : {"(1.000000) vcan0 1107F800##1070028010201020107093801",
+                           "  vcan0  1107F800  [12]  07 00 28 01 02 01 02 01 07 09 38 01"}) {
+    const auto line = ParseCandumpLine(text);
+    ASSERT_TRUE(line) << text << ": " << line.error();
+    EXPECT_EQ(line->foreign, nullptr);
+    EXPECT_EQ(line->frame, CanFrame{});
+    const FdFrame expected{
+        .id = kGroupId, .length = 12, .data = {7, 0, 0x28, 1, 2, 1, 2, 1, 7, 9, 0x38, 1}};
+    EXPECT_EQ(line->group, expected);
+  }
+  EXPECT_FALSE(ParseCandumpLine("(1.0) vcan0 1107F800##10G"));
+  EXPECT_FALSE(ParseCandumpLine("(1.0) vcan0 1107F800##1" + std::string(130, '0')));
+  EXPECT_FALSE(ParseCandumpLine("vcan0 1107F800 [12] 07 00"));
+  const auto classic = ParseCandumpLine("(1.0) vcan0 1107F800#00");
+  ASSERT_TRUE(classic);
+  EXPECT_FALSE(classic->group) << "a classic frame is none, whatever its identifier";
+}
+
 TEST(CandumpLine, TellsForeignFramesApart) {
   for (const char* text :
        {"(1.000000) vcan0 123#11", "(1.000000) vcan0 14A952E0#R", "(1.000000) vcan0 14A952E0##1AB",

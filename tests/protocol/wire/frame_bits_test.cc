@@ -146,6 +146,58 @@ TEST(FrameBits, OfCanFdEqualTheFrameWrittenOut) {
   }
 }
 
+TEST(FrameBits, NoGroupIsLongerThanTheLongest) {
+  const auto seed = testing::TestSeed(15);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  for (int i = 0; i < 20'000; ++i) {
+    FdFrame group{.id = kGroupId, .length = 64, .data = {}};
+    constexpr std::uint8_t kRuns[] = {0x00, 0xFF, 0x0F, 0xF0, 0x87, 0x78, 0xC3, 0x1F};
+    for (auto& byte : group.data) byte = kRuns[rng.Below(8)];
+    const FdFrameBits bits = FrameBits(group);
+    ASSERT_EQ(bits.nominal, kGroupBitsMax.nominal);
+    ASSERT_LE(bits.data, kGroupBitsMax.data);
+  }
+  // ESI, DLC, data; a stuff bit before each fifth; stuff count, CRC, fixed stuff bits, delimiter.
+  static_assert(kGroupBitsMax.data == 1 + 4 + 512 + 516 / 4 + 4 + 21 + 7 + 1);
+  // The pattern that is stuffed most: four equal bits again and again.
+  FdFrame worst{.id = kGroupId, .length = 64, .data = {}};
+  worst.data.fill(0x87);
+  EXPECT_GE(FrameBits(worst).data, kGroupBitsMax.data - 1);
+  EXPECT_LE(FrameBits(worst).data, kGroupBitsMax.data);
+}
+
+TEST(FrameBits, AGroupCountsForItsTime) {
+  constexpr FdFrameBits kBits{.nominal = 50, .data = 401};
+  constexpr BusRates kRates{1'000'000, 4'000'000};
+  EXPECT_EQ(NominalBits(kBits, kRates), 50u + 101u) << "rounded up";
+  EXPECT_EQ(BitTime(kBits, kRates), (DurationNs{50'000 + 100'250}));
+  EXPECT_EQ(LongestFrameBits({1'000'000, 0}), kFrameBitsMax);
+  EXPECT_EQ(LongestFrameBits({1'000'000, 8'000'000}), kFrameBitsMax);
+  EXPECT_EQ(LongestFrameBits({1'000'000, 2'000'000}), 53u + 340u);
+}
+
+TEST(FrameBits, OnTheWireTwoOrMoreGoTogetherAndOneAlone) {
+  constexpr BusRates kClassic{1'000'000};
+  constexpr BusRates kFd{1'000'000, 2'000'000};
+  const CanFrame confirm = Encode(HostMessage(Confirm{MoveId{3}}), {NodeId{4}, 5});
+  const CanFrame stop = Encode(HostMessage(Stop{}), {NodeId{4}, 5});
+  const std::vector<CanFrame> frames{confirm, stop, confirm, confirm, confirm, stop};
+  EXPECT_EQ(NextOnWire(frames, kFd).frames, 1u) << "one alone is no group";
+  EXPECT_EQ(NextOnWire(frames, kFd).bits, FrameBits(confirm));
+  const std::span<const CanFrame> from_third = std::span(frames).subspan(2);
+  EXPECT_EQ(NextOnWire(from_third, kClassic).frames, 1u);
+  const OnWire together = NextOnWire(from_third, kFd);
+  EXPECT_EQ(together.frames, 3u);
+  FdFrame group;
+  ASSERT_EQ(PackGroup(from_third, &group), 3u);
+  EXPECT_EQ(together.bits, NominalBits(FrameBits(group), kFd));
+  const std::uint32_t alone = FrameBits(confirm) + 2 * FrameBits(stop);
+  EXPECT_EQ(BitsOnWire(frames, kFd), alone + together.bits);
+  EXPECT_EQ(BitsOnWire(frames, kClassic), alone + 3 * FrameBits(confirm));
+  EXPECT_EQ(BitsOnWire({}, kFd), 0u);
+}
+
 TEST(FrameBits, IgnoresBytesBeyondTheLength) {
   CanFrame frame{0x123456, 2, {1, 2, 3, 4, 5, 6, 7, 8}};
   const std::uint32_t bits = FrameBits(frame);

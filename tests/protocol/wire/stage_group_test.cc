@@ -121,5 +121,20 @@ TEST(StageGroup, DropsTheWholeGroupForOneWrongByte) {
                Name(Malformed::kLength));
 }
 
+// Well formed as a group, but one entry is no message: nobody gets any of it.
+TEST(StageGroup, AnEntryThatNoUnitWouldTakeDropsItAll) {
+  const std::vector<CanFrame> frames{Encode(StageBegin{MoveId{1}, {1, 1}, {}}, {NodeId{1}, 0}),
+                                     Encode(Confirm{MoveId{1}}, {NodeId{2}, 5})};
+  FdFrame group;
+  ASSERT_EQ(PackGroup(frames, &group), 2u);
+  ASSERT_TRUE(UnpackGroup(group));
+  group.data[2] |= 5;  // stage_begin has no detail
+  const auto wrong = DecodeHost({.id = frames[0].id | 5, .length = 5, .data = frames[0].data});
+  ASSERT_FALSE(wrong);
+  const auto entries = UnpackGroup(group);
+  ASSERT_FALSE(entries);
+  EXPECT_EQ(entries.error(), wrong.error());
+}
+
 }  // namespace
 }  // namespace focalfleet

@@ -7,8 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "protocol/base/rng.h"
 #include "protocol/wire/codec.h"
+#include "protocol/wire/stage_group.h"
+#include "tests/protocol/random_messages.h"
 #include "tests/support/alloc_guard.h"
+#include "tests/support/seed.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -112,6 +116,94 @@ TEST_F(UnitMachineTest, KeepsTheMarkBeforeTheFirstStepAndThePlaceAfterTheLast) {
   EXPECT_EQ(Asked(), (std::vector<std::string>{"halt", "halt", "keep"}));
   EXPECT_FALSE(board_.kept.moving);
   EXPECT_EQ(board_.kept.axis[0].position(), 100);
+}
+
+FdFrame GroupOf(const std::vector<CanFrame>& frames) {
+  FdFrame group;
+  EXPECT_EQ(PackGroup(frames, &group), frames.size());
+  return group;
+}
+
+TEST_F(UnitMachineTest, TakesItsOwnEntriesOfAGroupAndNobodyElses) {
+  StagedMove move{{5}, WaveMode::kAsymmetric, {}};
+  move.path[0].Append({0, 100, 37});
+  const auto stage = [](NodeId node, std::int32_t delta) {
+    return std::vector<CanFrame>{
+        Encode(HostMessage(StageBegin{{5}, {1, 0}, WaveMode::kAsymmetric}), {node, 0}),
+        Encode(HostMessage(StageSegment{Axis::kTheta, 0, {0, delta, 37}}), {node, 0}),
+        Encode(HostMessage(Confirm{{5}}), {node, 3})};
+  };
+  std::vector<CanFrame> frames = stage({8}, 777);
+  for (const CanFrame& frame : stage(kNode, 100)) frames.push_back(frame);
+  Outbox out;
+  machine_.OnGroup(GroupOf(frames), now_, &out);
+  ASSERT_EQ(out.frames().size(), 1u);
+  EXPECT_EQ(out.frames()[0],
+            Encode(UnitMessage(ConfirmReply{{5}, Digest(move), {1, 0}, {}}), {kNode, 3}));
+  EXPECT_EQ(machine_.malformed(), 0u);
+  // A group of others says nothing to it, not even that the host is there.
+  const BoardInstant deadline = machine_.deadline();
+  Outbox nothing;
+  machine_.OnGroup(GroupOf(stage({8}, 100)), now_ + Milliseconds(100), &nothing);
+  EXPECT_TRUE(nothing.frames().empty());
+  EXPECT_EQ(machine_.deadline(), deadline);
+  // One wrong byte, in another's entry: all of it goes, and counts once.
+  FdFrame broken = GroupOf(frames);
+  broken.data[2] |= 7;
+  machine_.OnGroup(broken, now_, &nothing);
+  EXPECT_TRUE(nothing.frames().empty());
+  EXPECT_EQ(machine_.malformed(), 1u);
+}
+
+TEST_F(UnitMachineTest, HasRoomForTheAnswersToTheFullestGroup) {
+  const std::vector<CanFrame> frames(kGroupEntriesMax,
+                                     Encode(HostMessage(Confirm{{5}}), {kNode, 3}));
+  Outbox out;
+  machine_.OnGroup(GroupOf(frames), now_, &out);
+  EXPECT_EQ(out.frames().size(), kGroupEntriesMax);
+}
+
+// Whatever staging comes, in whatever portions: what is answered and held is the same.
+TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
+  const auto seed = focalfleet::testing::TestSeed(41);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  PaperBoard other_board;
+  other_board.flash = board_.flash;
+  UnitMachine alone(kNode, other_board.MakeBoard(), &other_board.flash);
+  alone.PowerOn(now_);
+  std::size_t answers = 0;
+  for (int round = 0; round < 3000; ++round) {
+    std::vector<CanFrame> frames;
+    while (frames.size() < 1 + rng.Below(12)) {
+      HostMessage message = focalfleet::testing::RandomHost(rng);
+      // Few moves, so that some of them are complete.
+      const MoveId move{static_cast<std::uint16_t>(1 + rng.Below(2))};
+      if (auto* begin = std::get_if<StageBegin>(&message)) *begin = {move, {1, 0}, begin->mode};
+      if (auto* segment = std::get_if<StageSegment>(&message)) segment->index = 0;
+      if (auto* confirm = std::get_if<Confirm>(&message)) confirm->move = move;
+      const auto node = static_cast<std::uint8_t>(kNode.value + rng.Below(2));
+      const CanFrame frame = Encode(message, {{node}, static_cast<std::uint8_t>(rng.Below(256))});
+      if (CanBeGrouped(frame)) frames.push_back(frame);
+    }
+    now_ = now_ + Milliseconds(1);
+    Outbox together;
+    FdFrame group;
+    const std::size_t taken = PackGroup(frames, &group);
+    machine_.OnGroup(group, now_, &together);
+    std::vector<CanFrame> one_by_one;
+    for (std::size_t i = 0; i < taken; ++i) {
+      Outbox out;
+      alone.OnFrame(frames[i], now_, &out);
+      one_by_one.insert(one_by_one.end(), out.frames().begin(), out.frames().end());
+    }
+    ASSERT_EQ(std::vector<CanFrame>(together.frames().begin(), together.frames().end()),
+              one_by_one);
+    ASSERT_EQ(machine_.deadline(), alone.deadline());
+    ASSERT_EQ(machine_.state(), alone.state());
+    answers += one_by_one.size();
+  }
+  EXPECT_GT(answers, 1000u);
 }
 
 TEST_F(UnitMachineTest, KeepsTheMarkBeforeHoming) {

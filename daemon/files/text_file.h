@@ -6,7 +6,7 @@
 
 #include "protocol/base/result.h"
 
-namespace focalfleet::cli {
+namespace focalfleet {
 
 inline constexpr std::size_t kFileBytesMax = 256u << 20;
 
@@ -23,4 +23,4 @@ Result<std::string> ReadTextFile(const std::string& path);
 /// directly; `-` is stdout. Errors: kUnavailable, kFull; names the file.
 Status WriteFileAtomically(const std::string& path, const std::string& text);
 
-}  // namespace focalfleet::cli
+}  // namespace focalfleet

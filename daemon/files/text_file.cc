@@ -1,4 +1,4 @@
-#include "daemon/cli/text_file.h"
+#include "daemon/files/text_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -14,7 +14,7 @@
 #include <optional>
 #include <string_view>
 
-namespace focalfleet::cli {
+namespace focalfleet {
 namespace {
 
 class Descriptor {
@@ -172,4 +172,4 @@ Status WriteFileAtomically(const std::string& path, const std::string& text) {
   return {};
 }
 
-}  // namespace focalfleet::cli
+}  // namespace focalfleet

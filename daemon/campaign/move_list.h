@@ -1,0 +1,47 @@
+// CAMPAIGN.csv: the moves that a campaign is to make, `move_id, unit_id, theta_deg, phi_deg`, one
+// row a unit that is sent. Moves are made in the order of their numbers; who is not named in one
+// stays where it is.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fleet/layout.h"
+#include "fleet/targets.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+struct ListedMove {
+  std::int64_t id = 0;
+  std::vector<TargetRow> rows;
+};
+
+/// Ascending by id. Errors: kInvalid with file:line: a column or value missing, a unit twice in one
+/// move, or one that the layout has not; nothing to do.
+Result<std::vector<ListedMove>> ReadMoveList(std::string_view text, std::string file,
+                                             const Layout& layout);
+std::string WriteMoveList(const std::vector<ListedMove>& moves);
+
+enum class CampaignKind : std::uint8_t {
+  kSurvey,      // configurations at random, as a night has them
+  kArcs,        // one axis after the other over its range and back, all units in parallel
+  kDiagnostic,  // arcs, a ladder of reversals on each axis, shares of units, repeats
+};
+inline constexpr const char* kCampaignKindNames[] = {"survey", "arcs", "diagnostic"};
+
+struct MakeMovesOptions {
+  CampaignKind kind = CampaignKind::kDiagnostic;
+  std::size_t moves = 24;
+  std::uint64_t seed = 1;
+};
+/// A list of moves. In arcs and ladders all units stand alike, as translated copies of each other,
+/// so that nobody comes near anybody; each is kept within the ranges of its own axes. Errors: as
+/// DrawConfiguration's.
+Result<std::vector<ListedMove>> MakeMoves(const Layout& layout,
+                                          const std::vector<UnitDrive>& drives,
+                                          const MakeMovesOptions& options);
+
+}  // namespace focalfleet

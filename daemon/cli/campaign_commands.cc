@@ -1,0 +1,233 @@
+// campaign make, campaign run: moves that are made to be measured, for diagnosis.
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "daemon/campaign/campaign_files.h"
+#include "daemon/campaign/campaign_log.h"
+#include "daemon/campaign/move_list.h"
+#include "daemon/cli/client.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/offline_fleet.h"
+#include "daemon/cli/progress_bar.h"
+#include "daemon/files/text_file.h"
+#include "fleet/files/targets_file.h"
+
+namespace focalfleet::cli {
+namespace {
+
+// ---- make
+
+struct MakeOptions {
+  FleetFiles files;
+  std::string kind = kCampaignKindNames[2];
+  std::size_t moves = 24;
+  std::uint64_t seed = 1;
+  std::string out;
+};
+
+ExitCode RunMake(const Context& context, const MakeOptions& options) {
+  const auto fleet = LoadFleet(context, options.files);
+  if (!fleet) return Report(context, fleet.error());
+  const auto kind = std::ranges::find(kCampaignKindNames, options.kind);
+  const auto moves =
+      MakeMoves(fleet->layout, fleet->drives,
+                {.kind = static_cast<CampaignKind>(kind - std::begin(kCampaignKindNames)),
+                 .moves = options.moves,
+                 .seed = options.seed});
+  if (!moves) return Report(context, moves.error());
+  if (const auto written = WriteFileAtomically(options.out, WriteMoveList(*moves)); !written)
+    return Report(context, written.error());
+  std::size_t rows = 0;
+  for (const ListedMove& move : *moves) rows += move.rows.size();
+  if (context.json)
+    PrintJson(
+        {{"moves", moves->size()}, {"rows", rows}, {"kind", options.kind}, {"out", options.out}});
+  Say(context, fmt::format("{}: {} ({}), {}", options.out, Count(moves->size(), "move", "moves"),
+                           options.kind, Count(rows, "row", "rows")));
+  return ExitCode::kOk;
+}
+
+// ---- run
+
+struct RunOptions {
+  FleetFiles files;
+  std::string list;
+  std::string out;
+};
+
+using Angles = std::map<std::uint32_t, AxisAngles>;  // by unit id
+
+/// Where the daemon believes each unit that is at a place.
+tl::expected<Angles, Failure> BelievedAngles(const Context& context) {
+  const auto state = Ask(context, {.verb = "state"});
+  if (!state) return tl::unexpected(state.error());
+  Angles angles;
+  for (const Json& row : ListIn(*state, "rows")) {
+    const double theta = NumberIn(row, "theta_low_deg", std::nan(""));
+    const double phi = NumberIn(row, "phi_low_deg", std::nan(""));
+    if (std::isfinite(theta) && std::isfinite(phi) && theta == NumberIn(row, "theta_high_deg") &&
+        phi == NumberIn(row, "phi_high_deg"))
+      angles[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = {theta, phi};
+  }
+  return angles;
+}
+
+bool IsCertainStatus(const std::string& status) {
+  for (std::size_t s = 0; s < kSightingStatusCount; ++s)
+    if (status == Name(static_cast<SightingStatus>(s)))
+      return IsCertain(static_cast<SightingStatus>(s));
+  return false;
+}
+
+std::vector<LoggedMove> RowsOf(const ListedMove& move, const Angles& before, const Angles& after,
+                               const Json& measured, double t_s) {
+  std::map<std::uint32_t, const Json*> seen;
+  for (const Json& row : ListIn(measured, "measurements"))
+    seen[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = &row;
+  std::vector<LoggedMove> rows;
+  for (const auto& [id, to] : after) {
+    const auto from = before.find(id);
+    if (from == before.end()) continue;  // it was not at a place: no row says anything of it
+    LoggedMove row{.unit = {id},
+                   .move = move.id,
+                   .from = from->second,
+                   .to = to,
+                   .x_mm = std::nan(""),
+                   .y_mm = std::nan(""),
+                   .sigma_um = std::nan(""),
+                   .t_s = t_s};
+    if (const auto found = seen.find(id);
+        found != seen.end() && IsCertainStatus(TextIn(*found->second, "status"))) {
+      row.x_mm = NumberIn(*found->second, "x_mm");
+      row.y_mm = NumberIn(*found->second, "y_mm");
+      row.sigma_um = NumberIn(*found->second, "sigma_um");
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+Status WriteFolder(const std::string& folder, const sim::Campaign& campaign) {
+  FOCALFLEET_TRY(WriteFileAtomically(folder + "/units.csv", WriteCampaignUnits(campaign)));
+  return WriteFileAtomically(folder + "/moves.csv", WriteMoves(campaign));
+}
+
+/// One move, with its exposure. The answer of the daemon to `measurements`.
+tl::expected<Json, Failure> MakeMove(const Context& context, const ListedMove& move,
+                                     const std::string& source, ProgressBar* bar,
+                                     const std::string& stage) {
+  Question question{.verb = "apply",
+                    .args = {{"source", source},
+                             {"targets_csv", WriteTargets({.source = source, .rows = move.rows})},
+                             {"wait", true},
+                             {"corrections", 0},
+                             {"observe", true}},
+                    .long_lasting = true,
+                    .on_progress = [&](const Json& p) {
+                      bar->Show(NumberIn(p, "fraction"), stage, DescribeStage(p));
+                    }};
+  const auto done = Ask(context, question);
+  if (!done) return tl::unexpected(done.error());
+  if (ListIn(*done, "measured").empty())
+    return tl::unexpected(
+        Failure{ExitCode::kBroken,
+                {ErrorCode::kUnavailable,
+                 fmt::format("{}: the camera saw nothing (focalfleet history says why)", source)}});
+  return Ask(context, {.verb = "measurements"});
+}
+
+CampaignConditions ConditionsOf(const UnitDrive& drive) {
+  return {.v_bus_V = drive.v_bus_V,
+          .counter1 = {static_cast<double>(drive.axis[0].counter1),
+                       static_cast<double>(drive.axis[1].counter1)},
+          .repeat = static_cast<double>(drive.axis[0].repeat),
+          .mode = Name(drive.mode)};
+}
+
+ExitCode RunCampaign(const Context& context, const RunOptions& options) {
+  const auto fleet = LoadFleet(context, options.files);
+  if (!fleet) return Report(context, fleet.error());
+  const auto text = ReadTextFile(options.list);
+  if (!text) return Report(context, text.error());
+  const auto moves = ReadMoveList(*text, options.list, fleet->layout);
+  if (!moves) return Report(context, moves.error());
+  std::error_code failed;
+  std::filesystem::create_directories(options.out, failed);
+  if (failed)
+    return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});
+  CampaignLog log(&fleet->layout, ConditionsOf(fleet->drives.front()));
+  ProgressBar bar(context);
+  const auto began = std::chrono::steady_clock::now();
+  auto before = BelievedAngles(context);
+  if (!before) return Report(context, before.error());
+  for (std::size_t m = 0; m < moves->size(); ++m) {
+    const ListedMove& move = (*moves)[m];
+    const std::string source = fmt::format("{} move {}", options.list, move.id);
+    const auto measured =
+        MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves->size()));
+    if (!measured) return Report(context, measured.error());
+    const double t_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    const auto after = BelievedAngles(context);
+    if (!after) return Report(context, after.error());
+    log.Add(RowsOf(move, *before, *after, *measured, t_s));
+    before = after;
+    // After each move, so that what was measured is kept whatever comes.
+    const auto written = WriteFolder(options.out, log.Campaign(options.list));
+    if (!written) return Report(context, written.error());
+  }
+  bar.End();
+  const sim::Campaign campaign = log.Campaign(options.list);
+  if (context.json)
+    PrintJson({{"moves", moves->size()},
+               {"units", campaign.units.size()},
+               {"rows", campaign.rows()},
+               {"out", options.out}});
+  Say(context, fmt::format("{}: {} of {}, {}", options.out, Count(moves->size(), "move", "moves"),
+                           Count(campaign.units.size(), "unit", "units"),
+                           Count(campaign.rows(), "row", "rows")));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddCampaignCommands(CommandLine* line) {
+  CLI::App* campaign =
+      AddCommand(&line->app, "campaign", "Moves that are made to be measured",
+                 "  focalfleet campaign make --units units.csv --out moves.csv\n"
+                 "  focalfleet campaign run moves.csv --units units.csv --out night1");
+  campaign->require_subcommand(1);
+  CLI::App* make =
+      AddCommand(campaign, "make", "Write a list of moves that tell effects apart",
+                 "  focalfleet campaign make --kind diagnostic --moves 60 --units units.csv "
+                 "--out moves.csv");
+  auto make_options = std::make_shared<MakeOptions>();
+  AddFleetFiles(make, &make_options->files);
+  OneOf(make->add_option("--kind", make_options->kind, "What the moves are good for"),
+        {std::begin(kCampaignKindNames), std::end(kCampaignKindNames)})
+      ->capture_default_str();
+  make->add_option("--moves", make_options->moves, "How many")
+      ->check(CLI::Range(std::size_t{1}, std::size_t{10'000}))
+      ->capture_default_str();
+  make->add_option("--seed", make_options->seed, "Same seed, same moves")->capture_default_str();
+  AddFile(make, "--out", &make_options->out, "File to write")->required();
+  OnChosen(line, make, make_options, RunMake);
+
+  CLI::App* run =
+      AddCommand(campaign, "run", "Make the moves, measure after each, write the folder",
+                 "  focalfleet campaign run moves.csv --units units.csv --out night1");
+  auto run_options = std::make_shared<RunOptions>();
+  AddFleetFiles(run, &run_options->files);
+  AddFile(run, "CAMPAIGN.csv", &run_options->list, "move_id, unit_id, theta_deg, phi_deg")
+      ->required();
+  AddFile(run, "--out", &run_options->out, "Folder to write: moves.csv, units.csv")->required();
+  OnChosen(line, run, run_options, RunCampaign);
+}
+
+}  // namespace focalfleet::cli

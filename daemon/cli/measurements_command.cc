@@ -1,0 +1,131 @@
+// measurements: what the camera found in one exposure, as a table; as FITS for the spectrograph's
+// pipeline.
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "daemon/cli/client.h"
+#include "daemon/cli/command_line.h"
+#include "daemon/files/fits_table.h"
+#include "daemon/files/text_file.h"
+#include "fleet/files/csv.h"
+#include "fleet/sighting.h"
+
+namespace focalfleet::cli {
+namespace {
+
+struct MeasurementsOptions {
+  std::uint64_t exposure = 0;  // 0: the newest of the last configuration
+  std::string out = "-";
+};
+
+double NumberOrNan(const Json& row, const char* key) {
+  const auto found = row.find(key);
+  return found != row.end() && found->is_number() ? found->get<double>() : std::nan("");
+}
+
+/// One bit a status, in the order of SightingStatus; docs/files.md.
+std::int64_t StatusBits(const std::string& status) {
+  for (std::size_t bit = 0; bit < kSightingStatusCount; ++bit)
+    if (status == Name(static_cast<SightingStatus>(bit))) return std::int64_t{1} << bit;
+  return 0;
+}
+
+FitsTable TableOf(const Json& answer) {
+  std::vector<std::int64_t> units, bits;
+  std::vector<double> target_x, target_y, x, y, sigma, error;
+  std::vector<std::string> status, at;
+  std::int64_t configuration = 0;
+  for (const Json& row : ListIn(answer, "measurements")) {
+    units.push_back(static_cast<std::int64_t>(CountIn(row, "unit_id")));
+    configuration = static_cast<std::int64_t>(CountIn(row, "configuration"));
+    status.push_back(TextIn(row, "status"));
+    bits.push_back(StatusBits(status.back()));
+    // Without a spot there is no place; 0, 0 would look like one.
+    const bool seen = NumberIn(row, "sigma_um") > 0;
+    x.push_back(seen ? NumberIn(row, "x_mm") : std::nan(""));
+    y.push_back(seen ? NumberIn(row, "y_mm") : std::nan(""));
+    sigma.push_back(seen ? NumberIn(row, "sigma_um") : std::nan(""));
+    target_x.push_back(NumberOrNan(row, "target_x_mm"));
+    target_y.push_back(NumberOrNan(row, "target_y_mm"));
+    error.push_back(NumberOrNan(row, "error_um"));
+    at.push_back(TextIn(row, "at"));
+  }
+  return {.name = "FIBRES",
+          .keys = {{"EXPOSURE", static_cast<std::int64_t>(CountIn(answer, "exposure")), ""},
+                   {"CONFIG", configuration, "number of the configuration"},
+                   {"ORIGIN", std::string("focalfleet"), ""}},
+          .columns = {{"UNIT_ID", "", std::move(units)},
+                      {"TARGET_X_MM", "mm", std::move(target_x)},
+                      {"TARGET_Y_MM", "mm", std::move(target_y)},
+                      {"X_MM", "mm", std::move(x)},
+                      {"Y_MM", "mm", std::move(y)},
+                      {"SIGMA_UM", "um", std::move(sigma)},
+                      {"ERROR_UM", "um", std::move(error)},
+                      {"STATUS_BITS", "", std::move(bits)},
+                      {"STATUS", "", std::move(status)},
+                      {"MEASURED_UTC", "", std::move(at)}}};
+}
+
+std::string CsvOf(const FitsTable& table) {
+  std::vector<std::string> names;
+  for (const FitsColumn& column : table.columns) {
+    names.push_back(column.name);
+    for (char& letter : names.back())
+      if (letter >= 'A' && letter <= 'Z') letter = static_cast<char>(letter - 'A' + 'a');
+  }
+  const std::vector<std::string_view> views(names.begin(), names.end());
+  CsvWriter csv(views);
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    for (const FitsColumn& column : table.columns) {
+      if (const auto* numbers = std::get_if<std::vector<double>>(&column.values))
+        csv.Number((*numbers)[row]);
+      else if (const auto* whole = std::get_if<std::vector<std::int64_t>>(&column.values))
+        csv.Integer((*whole)[row]);
+      else
+        csv.Text(std::get<std::vector<std::string>>(column.values)[row]);
+    }
+    csv.EndRow();
+  }
+  return csv.Take();
+}
+
+ExitCode RunMeasurements(const Context& context, const MeasurementsOptions& options) {
+  Json args = Json::object();
+  if (options.exposure != 0) args["exposure"] = options.exposure;
+  const auto answer = Ask(context, {.verb = "measurements", .args = args});
+  if (!answer) return Report(context, answer.error());
+  if (context.json) {
+    PrintJson(*answer);
+    if (options.out == "-") return ExitCode::kOk;
+  }
+  const FitsTable table = TableOf(*answer);
+  const Status written = options.out.ends_with(".fits")
+                             ? WriteFitsTable(options.out, table)
+                             : WriteFileAtomically(options.out, CsvOf(table));
+  if (!written) return Report(context, written.error());
+  if (options.out != "-")
+    Say(context, fmt::format("{}: {} of exposure {}", options.out,
+                             Count(table.rows(), "unit", "units"), CountIn(*answer, "exposure")));
+  return ExitCode::kOk;
+}
+
+}  // namespace
+
+void AddMeasurementsCommand(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "measurements", "What the camera found of each unit in one exposure",
+                 "  focalfleet measurements --out fibres.fits\n"
+                 "  focalfleet measurements --exposure 12 --json");
+  auto options = std::make_shared<MeasurementsOptions>();
+  command
+      ->add_option("--exposure", options->exposure,
+                   "Its number; without it the newest of the last configuration")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{INT64_MAX}));
+  AddFile(command, "--out", &options->out, "File to write: .fits, or else CSV; - is stdout")
+      ->capture_default_str();
+  OnChosen(line, command, options, RunMeasurements);
+}
+
+}  // namespace focalfleet::cli

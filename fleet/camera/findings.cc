@@ -1,0 +1,91 @@
+#include "fleet/camera/findings.h"
+
+#include <cmath>
+#include <string>
+
+#include "fleet/kinematics.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet {
+namespace {
+
+// Of units in service (sim/spread.h): the zero angles are off by 0.5 degrees, arms by 57 um; once a
+// camera has put a unit, what is left is scale (0.3 % of a move), periodic error and the arms.
+constexpr BlindError kNeverSeen{
+    .theta_sigma_deg = 0.7, .phi_sigma_deg = 0.7, .place_sigma_mm = 0.06};
+constexpr BlindError kSeen{.theta_sigma_deg = 0.35, .phi_sigma_deg = 0.35, .place_sigma_mm = 0.04};
+constexpr double kMeasuredSigmaMm = 0.005;  // of a unit that rests where a camera saw it
+
+bool IsMeasured(const UnitKnowledge& knowledge) {
+  return knowledge[0].witness == Witness::kMeasured && knowledge[1].witness == Witness::kMeasured;
+}
+
+/// An axis that stayed is believed where it was.
+Pose BelievedPose(const UnitSighting& seen, const Pose& now, const std::optional<Pose>& before) {
+  Pose pose = now;
+  if (seen.status == SightingStatus::kDidNotMove && before)
+    for (const Axis axis : kAxes)
+      if (seen.stayed[Index(axis)]) pose[Index(axis)] = (*before)[Index(axis)];
+  return pose;
+}
+
+}  // namespace
+
+std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believed) {
+  FOCALFLEET_CHECK(
+      believed.now.size() == layout.size() && believed.before.size() == layout.size() &&
+      believed.seen.size() == layout.size() && believed.drives.size() == layout.size());
+  std::vector<UnitExpectation> all(layout.size());
+  for (std::size_t n = 0; n < layout.size(); ++n) {
+    if (!IsPlace(believed.now[n])) continue;
+    const Unit& unit = layout.units()[n];
+    const Pose place = PlaceOf(believed.now[n]);
+    if (IsMeasured(believed.now[n])) {
+      all[n] = ExpectStill(FibreAt(unit, believed.drives[n], place), kMeasuredSigmaMm);
+      continue;
+    }
+    const AxisAngles commanded = AnglesOf(unit, believed.drives[n], place);
+    all[n] = ExpectMove(
+        unit,
+        believed.before[n] ? AnglesOf(unit, believed.drives[n], *believed.before[n]) : commanded,
+        commanded, believed.seen[n] != 0 ? kSeen : kNeverSeen);
+    // Its place is only what it reports: it does not tell the camera anything.
+    all[n].moved = true;
+  }
+  return all;
+}
+
+Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const Believed& believed,
+                                   const CameraSite& site, const Exposure& exposure) {
+  const std::vector<UnitExpectation> expectations = Expect(layout, believed);
+  const auto identified = Identify({.layout = &layout,
+                                    .expectations = expectations,
+                                    .fiducials = site.fiducials,
+                                    .camera = &site.model,
+                                    .exposure = &exposure},
+                                   site.options);
+  if (!identified)
+    return Fail(ErrorCode::kRefused,
+                std::string(Name(identified.error().reason)) + ": " + identified.error().text);
+  ExposureFindings findings{.id = id, .sightings = {}};
+  findings.sightings.reserve(layout.size());
+  for (std::uint32_t n = 0; n < layout.size(); ++n) {
+    const UnitSighting& seen = identified->units[n];
+    Sighting sighting{.unit = {n}, .status = seen.status, .other = {}, .place = {}};
+    if (seen.other != kNoUnit) sighting.other = seen.other;
+    if (seen.spot != kNoSpot) {
+      sighting.x_mm = seen.at_fp.x_mm;
+      sighting.y_mm = seen.at_fp.y_mm;
+      const double sigma_mm = std::sqrt((seen.covariance.xx + seen.covariance.yy) / 2);
+      sighting.sigma_um = 1e3 * sigma_mm;
+      if (IsCertain(seen.status) && IsPlace(believed.now[n]))
+        sighting.place = PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
+                                   BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
+                                   {.sigma_mm = sigma_mm});
+    }
+    findings.sightings.push_back(std::move(sighting));
+  }
+  return findings;
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,79 @@
+"""What camera-loop's files say, held against the store and the truth, by readers that are not ours."""
+import csv
+import json
+import math
+import sqlite3
+import sys
+
+
+def fibres(fits, truth_file, store, summary_file):
+    from astropy.table import Table
+
+    table = Table.read(fits)
+    rows = sqlite3.connect(f"file:{store}?mode=ro", uri=True).execute(
+        "SELECT unit_id, x_mm, y_mm, target_x_mm, target_y_mm, error_um, status FROM measurement WHERE exposure = ? ORDER BY unit_id",
+        (int(table.meta["EXPOSURE"]),),
+    ).fetchall()
+    assert len(rows) == len(table) == 100, (len(rows), len(table))
+    assert str(table["X_MM"].unit) == "mm" and str(table["ERROR_UM"].unit) == "um"
+    for row, (unit, x, y, target_x, target_y, error, status) in zip(table, rows):
+        assert row["UNIT_ID"] == unit
+        assert row["STATUS_BITS"] == 1 << status, (unit, row["STATUS"], status)
+        if row["STATUS"].strip() in ("measured", "did_not_move"):
+            # To the bit: what the store has is what the pipeline gets.
+            assert (row["X_MM"], row["Y_MM"]) == (x, y), unit
+            assert (row["TARGET_X_MM"], row["TARGET_Y_MM"]) == (target_x, target_y), unit
+            assert row["ERROR_UM"] == error, unit
+    with open(truth_file, newline="") as text:
+        truth = {int(row["unit_id"]): row for row in csv.DictReader(text)}
+    with open(summary_file) as text:
+        unserved = {unit["unit_id"] for unit in json.load(text)["unserved"]}
+    worst = 0
+    for row in table:
+        unit = int(row["UNIT_ID"])
+        if row["STATUS"].strip() != "measured":
+            continue
+        off_um = 1e3 * math.hypot(float(truth[unit]["x_mm"]) - row["X_MM"], float(truth[unit]["y_mm"]) - row["Y_MM"])
+        worst = max(worst, off_um)
+        if unit not in unserved:
+            missed_um = 1e3 * math.hypot(
+                float(truth[unit]["x_mm"]) - row["TARGET_X_MM"], float(truth[unit]["y_mm"]) - row["TARGET_Y_MM"]
+            )
+            assert missed_um < 15 + 4 * 3 * math.sqrt(2), (unit, missed_um)
+    assert worst < 20, worst
+    print(f"astropy reads 100 rows as they are stored; measured places are within {worst:.1f} um of the truth")
+
+
+def campaign(folder, store):
+    database = sqlite3.connect(f"file:{store}?mode=ro", uri=True)
+    exposures = [row[0] for row in database.execute("SELECT DISTINCT exposure FROM measurement ORDER BY exposure DESC LIMIT 3")][::-1]
+    measured = {
+        (move, unit): (x, y, status)
+        for move, exposure in enumerate(exposures, start=1)
+        for unit, x, y, status in database.execute(
+            "SELECT unit_id, x_mm, y_mm, status FROM measurement WHERE exposure = ?", (exposure,)
+        )
+    }
+    believed = {}
+    with open(f"{folder}/moves.csv", newline="") as text:
+        rows = list(csv.DictReader(text))
+    for row in rows:
+        key = int(row["move_id"]), int(row["unit_id"])
+        x, y, status = measured[key]
+        if status <= 2:
+            assert (float(row["x_mm"]), float(row["y_mm"])) == (x, y), key
+        else:
+            assert row["x_mm"] == "" and row["y_mm"] == "", key
+        before = believed.get(key[1])
+        if before is not None:
+            assert (row["theta_from_deg"], row["phi_from_deg"]) == before, key
+        believed[key[1]] = row["theta_cmd_deg"], row["phi_cmd_deg"]
+    with open(f"{folder}/units.csv", newline="") as text:
+        assert {int(row["unit_id"]) for row in csv.DictReader(text)} >= {int(row["unit_id"]) for row in rows}
+    print(f"{len(rows)} rows of 3 moves are what the store has, each move begins where the one before ended")
+
+
+if len(sys.argv) == 5:
+    fibres(*sys.argv[1:])
+else:
+    campaign(*sys.argv[1:])
