@@ -172,15 +172,4 @@ Status Save(const std::string& path, const std::string& text) {
   return {};
 }
 
-Result<std::string> Load(const std::string& path) {
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) return Fail(ErrorCode::kUnavailable, path + ": cannot be read");
-  std::string text;
-  std::array<char, 65536> piece{};
-  for (std::size_t n = 0; (n = std::fread(piece.data(), 1, piece.size(), file)) > 0;)
-    text.append(piece.data(), n);
-  std::fclose(file);
-  return text;
-}
-
 }  // namespace focalfleet::hidden

@@ -22,6 +22,5 @@ std::vector<std::string> OptionalColumns(const Spec& spec);
 
 /// Errors: kUnavailable with the path.
 Status Save(const std::string& path, const std::string& text);
-Result<std::string> Load(const std::string& path);
 
 }  // namespace focalfleet::hidden
