@@ -87,7 +87,7 @@ TEST(HiddenPlant, EveryEffectVanishesWithItsSize) {
     const auto largest = [&](double size) {
       effect.size = size;
       double most = 0;
-      for (const auto& unit : Contribution(scene, effect))
+      for (const auto& unit : Contribution(scene, Believed(campaign), effect))
         for (const Place& um : unit) most = std::max(most, std::abs(um));
       return most;
     };
@@ -108,7 +108,7 @@ TEST(HiddenPlant, BacklashIsAPlayOperator) {
   const Scene scene = MakeScene(campaign);
   Effect effect = OfAll("backlash", campaign, kPhi, 1);
   const double gap_deg = effect.kind->typical;
-  const auto um = Contribution(scene, effect);
+  const auto um = Contribution(scene, Believed(campaign), effect);
   std::size_t engaged = 0;
   for (std::size_t u = 0; u < 4; ++u)
     for (std::size_t m = 0; m < campaign.move_count(); ++m) {
@@ -133,7 +133,7 @@ TEST(HiddenPlant, SlipsComeInWholeRevolutionsOfTheMotor) {
   Effect effect = OfAll("step_loss", campaign, kTheta, 10);
   effect.seed = 7;
   std::size_t slipped = 0;
-  const auto um = Contribution(scene, effect);
+  const auto um = Contribution(scene, Believed(campaign), effect);
   const Truth believed = Believed(campaign);
   const auto without = RunPlant(scene, believed, {}, AllUnits(campaign));
   for (std::size_t u = 0; u < um.size(); ++u)
@@ -218,7 +218,7 @@ TEST(HiddenEvidence, LambdaIsWhatALeastSquaresFitFinds) {
   const NoiseModel noise = NoiseOf(campaign);
   for (const char* cause :
        {"backlash", "gear_scale", "eccentricity", "relaxation", "gravity_sag"}) {
-    const auto um = Contribution(scene, OfAll(cause, campaign, kPhi, 2));
+    const auto um = Contribution(scene, Believed(campaign), OfAll(cause, campaign, kPhi, 2));
     const Visibility seen = Assess(scene, noise, AllSeen(campaign), um);
     double dense = 0;
     for (std::size_t u = 0; u < 6; ++u) dense += DenseLambda(campaign, noise, u, um[u]);
@@ -248,8 +248,9 @@ TEST(HiddenEvidence, AnEffectIsMadeAsVisibleAsItIsWanted) {
     if (kind.is_event) continue;
     Effect effect = DrawEffect(kind, campaign, &rng);
     effect.read_through = 23e-6;
-    Tune(scene, noise, seen, 300, &effect);
-    const double lambda = Assess(scene, noise, seen, Contribution(scene, effect)).lambda;
+    Tune(scene, Believed(campaign), noise, seen, 300, &effect);
+    const double lambda =
+        Assess(scene, noise, seen, Contribution(scene, Believed(campaign), effect)).lambda;
     const bool at_the_end = std::abs(effect.size) >= 0.999 * kind.size_max;
     // Steps of a command's last bit are round numbers: not every size exists.
     const double tolerance = kind.cause == "command_quantisation" ? 0.7 : 0.1;

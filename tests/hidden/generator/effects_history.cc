@@ -31,7 +31,7 @@ void FollowWay(const Scene& scene, const Effect& effect, std::size_t unit, Mecha
       const double ramp_deg = 0.8;
       for (int i = 1; i <= steps; ++i) {
         const double gone = std::abs(way_deg) * i / steps;
-        const double left = std::abs(way_deg) - gone;
+        const double left = std::max(0.0, std::abs(way_deg) - gone);
         const double speed = std::sqrt(std::min({1.0, gone / ramp_deg, left / ramp_deg}));
         out_deg = mechanism.Follow(rotor_deg + way_deg * i / steps, way_deg / steps, speed);
       }

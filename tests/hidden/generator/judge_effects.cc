@@ -23,11 +23,11 @@ std::vector<char> SeenOf(const Campaign& campaign, const std::vector<char>& seen
 
 }  // namespace
 
-std::vector<std::vector<Place>> Contribution(const Scene& scene, const Effect& effect) {
-  const Truth believed = Believed(*scene.campaign);
+std::vector<std::vector<Place>> Contribution(const Scene& scene, const Truth& truth,
+                                             const Effect& effect) {
   const auto units = Concerned(effect);
-  const auto with = RunPlant(scene, believed, {&effect, 1}, units);
-  const auto without = RunPlant(scene, believed, {}, units);
+  const auto with = RunPlant(scene, truth, {&effect, 1}, units);
+  const auto without = RunPlant(scene, truth, {}, units);
   std::vector<std::vector<Place>> out(scene.campaign->unit_count());
   for (std::size_t i = 0; i < units.size(); ++i) {
     auto& um = out[units[i]];
@@ -82,26 +82,34 @@ double LambdaScale(const Effect& effect) {
   return (25 + 5 * std::sqrt(2 * 2 * concerned)) / 25;
 }
 
-void Tune(const Scene& scene, const NoiseModel& noise, const std::vector<char>& seen,
-          double lambda_wanted, Effect* effect) {
+void Tune(const Scene& scene, const Truth& truth, const NoiseModel& noise,
+          const std::vector<char>& seen, double lambda_wanted, Effect* effect) {
   if (effect->kind->cause == "identity_swap") return;  // is, or is not
   const double sign = effect->size < 0 ? -1 : 1;
-  const double most = effect->kind->size_max;
   double size = 1;
   double best_size = size;
   double best_miss = 1e300;
-  for (int i = 0; i < 14; ++i) {
+  double too_small = 1e-6;  // a bracket in sizes
+  double too_large = 1e6;
+  double power = 2;  // of the size, in lambda; some effects go by the square of their size
+  double last_size = 0;
+  double last_lambda = 0;
+  for (int i = 0; i < 24; ++i) {
     effect->size = sign * size;
-    const double lambda = Assess(scene, noise, seen, Contribution(scene, *effect)).lambda;
-    const double miss = std::abs(std::log(std::max(lambda, 1e-9) / lambda_wanted));
+    const double lambda =
+        std::max(1e-9, Assess(scene, noise, seen, Contribution(scene, truth, *effect)).lambda);
+    const double miss = std::abs(std::log(lambda / lambda_wanted));
     if (miss < best_miss) best_miss = miss, best_size = size;
     if (miss < 0.02) break;
-    // Chance makes steps; where nothing happened yet, or at the end of the scale, there is no root.
-    const double exponent = effect->kind->is_event && i > 3 ? 0.25 : 0.5;
-    const double factor =
-        std::clamp(std::pow(lambda_wanted / std::max(lambda, 1e-9), exponent), 0.1, 6.0);
-    const double next = std::clamp(size * factor, 1e-5, most);
-    if (next == size) break;
+    (lambda < lambda_wanted ? too_small : too_large) = size;
+    if (last_size > 0 && last_size != size && last_lambda > 1e-8 && lambda > 1e-8)
+      power = std::clamp(std::log(lambda / last_lambda) / std::log(size / last_size), 1.0, 6.0);
+    last_size = size;
+    last_lambda = lambda;
+    double next = size * std::clamp(std::pow(lambda_wanted / lambda, 1 / power), 0.1, 6.0);
+    if (next <= too_small || next >= too_large) next = std::sqrt(too_small * too_large);
+    next = std::min(next, effect->kind->size_max);
+    if (next == size || too_large < 1.0005 * too_small) break;
     size = next;
   }
   effect->size = sign * best_size;

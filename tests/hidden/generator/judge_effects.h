@@ -18,9 +18,10 @@ struct Visibility {
   std::vector<double> lambda_by_unit;  // zero where not concerned
 };
 
-/// What an effect adds to the places that the believed geometry would give. Shape: by unit
-/// concerned (weight not 0) the moves, in um; empty for the others.
-std::vector<std::vector<Place>> Contribution(const Scene& scene, const Effect& effect);
+/// What an effect adds to the places that there would be without it. Shape: by unit concerned
+/// (weight not 0) the moves, in um; empty for the others.
+std::vector<std::vector<Place>> Contribution(const Scene& scene, const Truth& truth,
+                                             const Effect& effect);
 
 Visibility Assess(const Scene& scene, const NoiseModel& noise, const std::vector<char>& seen,
                   const std::vector<std::vector<Place>>& contribution_um);
@@ -30,8 +31,8 @@ Visibility Assess(const Scene& scene, const NoiseModel& noise, const std::vector
 double LambdaScale(const Effect& effect);
 
 /// Scales the effect until it explains `lambda_wanted` (or as much as physics allows).
-void Tune(const Scene& scene, const NoiseModel& noise, const std::vector<char>& seen,
-          double lambda_wanted, Effect* effect);
+void Tune(const Scene& scene, const Truth& truth, const NoiseModel& noise,
+          const std::vector<char>& seen, double lambda_wanted, Effect* effect);
 
 struct Rival {
   std::string cause;

@@ -61,8 +61,9 @@ void Group(const std::vector<Unit>& units, std::size_t groups, const Key& key, c
 Place FibreAt(const Geometry& geometry, const ByAxis& angle_deg) {
   const double first = (angle_deg[kTheta] + geometry.zero_deg[kTheta]) * kDegree;
   const double second = first + (angle_deg[kPhi] + geometry.zero_deg[kPhi]) * kDegree;
-  return geometry.base_mm + std::polar(geometry.arm_mm[kTheta], first) +
-         std::polar(geometry.arm_mm[kPhi], second);
+  // A fit that goes astray may try an arm of negative length, which std::polar does not take.
+  return geometry.base_mm + geometry.arm_mm[kTheta] * std::polar(1.0, first) +
+         geometry.arm_mm[kPhi] * std::polar(1.0, second);
 }
 
 std::vector<Unit> MakePlate(PositionerType type, std::size_t count, Rng* rng, double* pitch_mm) {

@@ -57,7 +57,8 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
                 double lambda_wanted) {
   const Campaign& campaign = planted.campaign;
   const NoiseModel noise = ExpectedNoise(planted.spec, campaign, planted.truth);
-  const Visibility v = Assess(scene, noise, planted.measured.seen, Contribution(scene, effect));
+  const Visibility v =
+      Assess(scene, noise, planted.measured.seen, Contribution(scene, planted.truth, effect));
   const double scale = LambdaScale(effect);
   Json out;
   out["cause"] = effect.kind->cause;
@@ -131,9 +132,8 @@ std::vector<std::vector<Place>> Together(const Planted& planted, const Scene& sc
   for (const Effect& effect : planted.effects)
     if (effect.kind->cause != "sensor_bias") moving.push_back(effect);
   const auto units = AllUnits(planted.campaign);
-  const Truth believed = Believed(planted.campaign);
-  auto um = RunPlant(scene, believed, moving, units);
-  const auto without = RunPlant(scene, believed, {}, units);
+  auto um = RunPlant(scene, planted.truth, moving, units);
+  const auto without = RunPlant(scene, planted.truth, {}, units);
   for (std::size_t u = 0; u < um.size(); ++u)
     for (std::size_t m = 0; m < um[u].size(); ++m) um[u][m] = 1000.0 * (um[u][m] - without[u][m]);
   return um;
@@ -169,7 +169,7 @@ Planted Plant(const Spec& spec) {
     Effect& effect = planted.effects[i];
     // A sensor's error is seen through the growth that it is read for: that one first.
     if (effect.kind->cause == "sensor_bias") continue;
-    Tune(scene, noise, seen, spec.lambda_wanted[i] * LambdaScale(effect), &effect);
+    Tune(scene, planted.truth, noise, seen, spec.lambda_wanted[i] * LambdaScale(effect), &effect);
   }
   for (std::size_t i = 0; i < spec.causes.size(); ++i) {
     Effect& bias = planted.effects[i];
@@ -177,7 +177,7 @@ Planted Plant(const Spec& spec) {
     for (const Effect& effect : planted.effects)
       if (effect.kind->cause == "thermal_arm_growth")
         bias.read_through = effect.kind->typical * effect.size;
-    Tune(scene, noise, seen, spec.lambda_wanted[i] * LambdaScale(bias), &bias);
+    Tune(scene, planted.truth, noise, seen, spec.lambda_wanted[i] * LambdaScale(bias), &bias);
   }
   planted.measured = Measure(spec, scene, planted.truth, planted.effects);
   return planted;
@@ -201,7 +201,7 @@ Key MakeKey(const Planted& planted) {
   for (std::size_t i = 0; i < planted.effects.size(); ++i) {
     const Effect& effect = planted.effects[i];
     out["effects"].push_back(EffectJson(planted, scene, effect, spec.lambda_wanted[i]));
-    AppendContribution(planted.campaign, effect, Contribution(scene, effect),
+    AppendContribution(planted.campaign, effect, Contribution(scene, planted.truth, effect),
                        &key.contribution_csv);
   }
   out["also_true"] = planted.measured.also_true;

@@ -109,6 +109,7 @@ std::vector<Rival> FindRivals(const Scene& scene, const NoiseModel& noise,
   const bool by_unit = effect.owner == Owner::kUnit;
   for (const EffectKind& kind : Catalogue()) {
     if (kind.is_event || IsForeign(kind) || kind.cause == effect.kind->cause) continue;
+    if (kind.cause == "sensor_bias") continue;  // moves nothing by itself
     double best = 0;
     const std::size_t axes = kind.axis == AxisUse::kEither ? 2 : 1;
     for (std::size_t axis = 0; axis < axes; ++axis)

@@ -53,8 +53,9 @@ std::string ByTurns(std::uint64_t suite_seed, bool foreign, std::uint64_t which)
 // What cannot show in a design is not drawn for it.
 bool Shows(const std::string& cause, const std::string& design) {
   static const std::vector<std::string> levers = {
-      "load_angle_lag", "relaxation", "supply_droop",   "gravity_torque", "gravity_sag",
-      "start_skew",     "stiction",   "mode_threshold", "cogging",        "friction_windup"};
+      "load_angle_lag", "relaxation",      "supply_droop", "gravity_torque",
+      "gravity_sag",    "start_skew",      "stiction",     "mode_threshold",
+      "cogging",        "friction_windup", "hard_stop"};
   static const std::vector<std::string> arcs_only_not = {
       "collision_contact", "neighbour_coupling", "camera_similarity",  "plate_gradient",
       "plate_expansion",   "sensor_bias",        "thermal_arm_growth", "air_turbulence",
@@ -67,13 +68,22 @@ bool Shows(const std::string& cause, const std::string& design) {
   return true;
 }
 
+double DrawLambda(const std::string& kind, Rng* rng) {
+  if (kind == "composite") return LogUniform(rng, 110, 8000);
+  if (kind == "unknown") return LogUniform(rng, 100, 8000);
+  const double lot = rng->Uniform();
+  if (lot < 0.35) return LogUniform(rng, 15, 100);
+  return lot < 0.8 ? LogUniform(rng, 100, 2000) : LogUniform(rng, 2000, 30000);
+}
+
 void DrawDesign(const std::string& wished, Rng* rng, Spec* spec) {
   const double lot = rng->Uniform();
   std::string design = lot < 0.65 ? "diagnostic" : lot < 0.9 ? "survey" : "arcs";
   if (!wished.empty()) design = wished;
   const bool shows = std::all_of(spec->causes.begin(), spec->causes.end(),
                                  [&](const std::string& cause) { return Shows(cause, design); });
-  if (!shows && wished.empty()) design = "diagnostic";
+  // Now and then all the same: that these moves cannot show it is for the diagnosis to say.
+  if (!shows && wished.empty() && rng->Uniform() < 0.85) design = "diagnostic";
   spec->design.design = design;
   const bool diagnostic = design == "diagnostic";
   spec->design.moves =
@@ -189,6 +199,8 @@ Result<Spec> DrawSpec(std::uint64_t suite_seed, std::uint64_t index, const Wishe
                                  : spec.kind == "unknown" ? LogUniform(&rng, 100, 3000)
                                  : rng.Uniform() < 0.35   ? LogUniform(&rng, 15, 100)
                                                           : LogUniform(&rng, 100, 4000));
+  for (std::size_t i = 0; i < spec.causes.size(); ++i)
+    spec.lambda_wanted.push_back(DrawLambda(spec.kind, &rng));
   if (wishes.lambda > 0)
     for (double& lambda : spec.lambda_wanted) lambda = wishes.lambda;
   DrawDesign(wishes.design, &rng, &spec);
