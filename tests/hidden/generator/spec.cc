@@ -195,11 +195,6 @@ Result<Spec> DrawSpec(std::uint64_t suite_seed, std::uint64_t index, const Wishe
       return Fail(ErrorCode::kInvalid, "'" + wish + "' is none of" + allowed);
   FOCALFLEET_TRY(DrawCauses(suite_seed, slot, wishes, &rng, &spec));
   for (std::size_t i = 0; i < spec.causes.size(); ++i)
-    spec.lambda_wanted.push_back(spec.kind == "composite" ? LogUniform(&rng, 110, 1500)
-                                 : spec.kind == "unknown" ? LogUniform(&rng, 100, 3000)
-                                 : rng.Uniform() < 0.35   ? LogUniform(&rng, 15, 100)
-                                                          : LogUniform(&rng, 100, 4000));
-  for (std::size_t i = 0; i < spec.causes.size(); ++i)
     spec.lambda_wanted.push_back(DrawLambda(spec.kind, &rng));
   if (wishes.lambda > 0)
     for (double& lambda : spec.lambda_wanted) lambda = wishes.lambda;
