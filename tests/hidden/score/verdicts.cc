@@ -103,8 +103,9 @@ Result<Case> ReadCase(const std::string& name, const std::string& key, const std
   for (const Json& effect : List(json, "effects")) out.effects.push_back(ReadEffect(effect));
   out.also_true = Words(json, "also_true");
   const Json geometry = Part(json, "static");
-  out.static_planted = geometry.value("planted", false);
-  for (const auto& [cause, lambda] : Part(geometry, "lambda").items())
+  out.static_planted = geometry.find("planted") != geometry.end() && geometry["planted"] == true;
+  const Json lambdas = Part(geometry, "lambda");  // items() of what does not last would dangle
+  for (const auto& [cause, lambda] : lambdas.items())
     if (lambda.is_number()) out.static_lambda.emplace_back(cause, lambda.get<double>());
   const Json oracle = Part(json, "oracle");
   out.oracle_before_um = Number(oracle, "rms_before_um");
