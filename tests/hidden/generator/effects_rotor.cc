@@ -217,7 +217,7 @@ std::vector<EffectKind> RotorEffects() {
        "share of the pull-out torque",
        2.3,
        false,
-       {Owner::kPlate, Owner::kUnit},
+       {Owner::kPlate},
        {"v_bus_V"},
        1,
        false,
