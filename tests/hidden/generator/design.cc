@@ -258,8 +258,8 @@ void FillRows(const std::vector<Step>& steps, Rng* rng, Campaign* campaign) {
 void FillSupply(const std::vector<Step>& steps, Rng* rng, Campaign* campaign) {
   const std::size_t units = campaign->unit_count();
   campaign->v_nominal_V = 1.8;
-  const double fall = rng->Uniform(0.01, 0.08);
-  const double wave = rng->Uniform(0.005, 0.03);
+  const double fall = rng->Uniform(0.03, 0.12);
+  const double wave = rng->Uniform(0.01, 0.04);
   const double end_s = campaign->exposures.back().t_s;
   std::vector<int> rank(units);
   for (std::size_t m = 0; m < campaign->move_count(); ++m) {
