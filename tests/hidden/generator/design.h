@@ -1,0 +1,23 @@
+// What is commanded in a campaign and under which conditions: an ordinary survey, a campaign made
+// to tell causes apart, or arcs from the hard stop as one measures a single unit on a bench.
+#pragma once
+
+#include <string>
+
+#include "protocol/base/rng.h"
+#include "tests/hidden/generator/campaign.h"
+#include "tests/hidden/generator/layout.h"
+
+namespace focalfleet::hidden {
+
+struct DesignOptions {
+  std::string design = "diagnostic";  // survey, diagnostic, arcs
+  PositionerType type = PositionerType::kEqualLong;
+  std::size_t units = 40;
+  std::size_t moves = 120;
+};
+
+/// The same seed gives the same campaign. Shape: units * moves rows, move by move.
+Campaign MakeCampaign(const DesignOptions& options, std::uint64_t seed);
+
+}  // namespace focalfleet::hidden

@@ -1,0 +1,62 @@
+// How visible something is in a campaign: the chi-square that it explains once the noise is made
+// white and every unit's static geometry is taken out.
+//
+// A measured place is the true one plus the camera's scatter, new in every picture, plus the
+// scatter of the axes' rest, which stays until the axis moves again. That is a state with two
+// coordinates seen through the arm's Jacobian, so a Kalman filter whitens exactly in O(moves); a
+// covariance matrix over all moves would cost their cube.
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "tests/hidden/generator/campaign.h"
+
+namespace focalfleet::hidden {
+
+struct NoiseModel {
+  std::vector<double> centroid_um;  // of one coordinate, by unit
+  ByAxis actuation_deg{};
+};
+
+using Matrix2 = std::array<double, 4>;  // row by row
+using Column = std::vector<double>;
+
+/// What a move of base, arms and zeros does to a unit's places, one column each: base x and y, arms
+/// (um per um), zeros (um per mdeg). Shape: (6, moves).
+std::array<std::vector<Place>, 6> StaticColumns(const Campaign& campaign, std::size_t unit);
+
+/// One unit's data space. Rows that are not `used` do not exist in it.
+class UnitSpace {
+ public:
+  UnitSpace(const Campaign& campaign, const NoiseModel& noise, std::size_t unit,
+            std::span<const char> used);
+
+  /// Noise made white. Shape: (moves) in um, to (2 * used moves).
+  [[nodiscard]] Column Whiten(std::span<const Place> um) const;
+  /// Whitened, and without what the static geometry can take up.
+  [[nodiscard]] Column Project(std::span<const Place> um) const;
+  /// The static columns, whitened: which = 0..5.
+  [[nodiscard]] Column Static(std::size_t which) const;
+
+ private:
+  struct Step {
+    bool used = false;
+    std::array<bool, kAxes> renewed{};
+    Matrix2 jacobian{};  // um per deg
+    Matrix2 gain{};
+    Matrix2 whitener{};
+  };
+  std::vector<Step> steps_;
+  std::array<std::vector<Place>, 6> static_um_;
+  std::vector<Column> basis_;
+};
+
+double Dot(const Column& a, const Column& b);
+/// Takes the span of an orthonormal basis out of a column.
+void TakeOut(const std::vector<Column>& basis, Column* column);
+/// Makes a column orthogonal to the basis and adds it, unless nothing is left of it.
+void Extend(std::vector<Column>* basis, Column column);
+
+}  // namespace focalfleet::hidden

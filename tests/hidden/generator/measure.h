@@ -1,0 +1,34 @@
+// What the camera and the log make of a campaign: noise, outliers, holes, swaps, wraps. The clean
+// class has Gaussian noise of one size and nothing else.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/hidden/generator/evidence.h"
+#include "tests/hidden/generator/plant.h"
+#include "tests/hidden/generator/spec.h"
+
+namespace focalfleet::hidden {
+
+/// By row of the campaign, where not said otherwise.
+struct Measurement {
+  std::vector<Place> place_mm;
+  std::vector<char> seen;
+  std::vector<char> bad;  // an outlier, a stuck or swapped unit: nothing that an oracle should fit
+  std::vector<ByAxis> told_from_deg;
+  std::vector<ByAxis> told_cmd_deg;
+  std::vector<double> told_temp_C;
+  std::vector<std::uint32_t> blank;  // bit c: covariate cell c is empty
+  std::vector<int> troubled_unit_ids;
+  std::vector<std::string> also_true;  // causes that a nuisance makes true
+  NoiseModel noise;                    // as drawn
+};
+
+/// The true geometry and the scatter of the axes.
+Truth DrawTruth(const Spec& spec, const Campaign& campaign);
+
+Measurement Measure(const Spec& spec, const Scene& scene, const Truth& truth,
+                    const std::vector<Effect>& effects);
+
+}  // namespace focalfleet::hidden

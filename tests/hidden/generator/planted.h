@@ -1,0 +1,30 @@
+// From a spec to a finished campaign and to its key. Both are functions of the spec alone: the key
+// can be written long after the campaign was handed out, by whoever knows the seed, and is then the
+// key of exactly that campaign.
+#pragma once
+
+#include <string>
+
+#include "tests/hidden/generator/files.h"
+#include "tests/hidden/generator/judge_effects.h"
+
+namespace focalfleet::hidden {
+
+struct Planted {
+  Spec spec;
+  Campaign campaign;
+  Truth truth;
+  std::vector<Effect> effects;
+  Measurement measured;
+};
+
+Planted Plant(const Spec& spec);
+
+struct Key {
+  std::string json;
+  std::string contribution_csv;  // unit_id, move_id, cause, dx_um, dy_um: what each effect does
+};
+
+Key MakeKey(const Planted& planted);
+
+}  // namespace focalfleet::hidden
