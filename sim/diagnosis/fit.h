@@ -3,24 +3,16 @@
 // unit by unit (Schur complement), so that a step costs O(rows) and one small dense system of the
 // amplitudes that units share.
 //
-// Noise of one measured place: isotropic, plus what an error of either axis' angle does there,
-//   cov = s0^2 I + s_theta^2 t_theta t_theta' + s_phi^2 t_phi t_phi',  t = dplace / dangle,
-// times a factor of the unit. Weights are Huber's in the whitened length of the residual.
+// Noise is whiten.h's.
 #pragma once
 
 #include <Eigen/Dense>
 #include <cstddef>
 #include <vector>
 
-#include "sim/diagnosis/model.h"
+#include "sim/diagnosis/whiten.h"
 
 namespace focalfleet::sim {
-
-struct Noise {
-  double place_um = 1;
-  double angle_deg[2] = {0, 0};
-  std::vector<double> unit_factor;  // Shape: (units)
-};
 
 /// A fit in progress. Rows without a measured place, or set aside, have weight 0.
 struct Fit {
@@ -31,7 +23,7 @@ struct Fit {
   std::vector<char> aside;         // Shape: (rows): never used in a fit
   Noise noise;
   ParallelFor parallel;
-  bool with_angle_noise = true;
+  bool with_axis_noise = true;
 
   [[nodiscard]] bool Used(std::size_t row) const { return weight[row] > 0; }
 };
@@ -64,21 +56,5 @@ double Merit(const Fit& fit);
 
 /// Static geometry's covariance in mm and degrees, with the unit's own terms beside it.
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit);
-
-// ---- for those who look at a fit's columns
-
-/// One unit's used rows as whitened, weighted vectors: two numbers a row.
-struct WhiteUnit {
-  UnitTrack track;
-  std::vector<std::size_t> moves;  // indices of the used moves in the track
-  Eigen::VectorXd y;               // residuals; Shape: (2 moves)
-  Eigen::MatrixXd geometry;        // d place / d (base, arms, zeros), per mm and degree
-  std::vector<double> whiten;      // Shape: (moves, 3): xx, xy, yy of the symmetric root
-  std::vector<double> turn_um;     // Shape: (moves, 4): d place / d theta, d phi; um per degree
-};
-WhiteUnit Whiten(const Fit& fit, std::size_t unit);
-
-/// The displacement that pose errors make, whitened. Shape: (2 moves).
-void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out);
 
 }  // namespace focalfleet::sim

@@ -93,6 +93,14 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_te
   return fit;
 }
 
+// Of an angle at one exposure; what adds up from move to move, as after ten of them at most.
+double AngleSpread(const Noise& noise, std::size_t axis) {
+  const double c2 = noise.carry[axis] * noise.carry[axis];
+  const double summed = 1 / std::max(1 - c2, 0.1);
+  return std::sqrt(noise.angle_deg[axis] * noise.angle_deg[axis] +
+                   noise.rest_deg[axis] * noise.rest_deg[axis] * summed);
+}
+
 }  // namespace
 
 double NoiseFloor(const Fit& fit) {
@@ -103,10 +111,10 @@ double NoiseFloor(const Fit& fit) {
     const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];
     for (std::size_t i = 0; i < track.moves; ++i) {
       if (!fit.Used(track.first_row + i)) continue;
-      const double theta_um = 1e3 * kRadians * fit.noise.angle_deg[0] *
+      const double theta_um = 1e3 * kRadians * AngleSpread(fit.noise, 0) *
                               std::hypot(track.elbow_x_mm[i] + track.reach_x_mm[i],
                                          track.elbow_y_mm[i] + track.reach_y_mm[i]);
-      const double phi_um = 1e3 * kRadians * fit.noise.angle_deg[1] *
+      const double phi_um = 1e3 * kRadians * AngleSpread(fit.noise, 1) *
                             std::hypot(track.reach_x_mm[i], track.reach_y_mm[i]);
       sum += f2 *
              (2 * fit.noise.place_um * fit.noise.place_um + theta_um * theta_um + phi_um * phi_um);

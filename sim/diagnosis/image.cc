@@ -32,7 +32,7 @@ std::vector<Image> Normals(const Fit& fit) {
       // Per um of shift, and per um at the plate's edge of turn and scale.
       const double x = (white.track.fibre_x_mm[i] - fit.facts->centre_x_mm) / fit.facts->radius_mm;
       const double y = (white.track.fibre_y_mm[i] - fit.facts->centre_y_mm) / fit.facts->radius_mm;
-      const double* w = &white.whiten[3 * k];
+      const double* w = white.filter[k].w;
       Eigen::Matrix<double, 2, 4> plain, j;
       plain << 1, 0, -y, x, 0, 1, x, y;
       Eigen::Matrix2d root;

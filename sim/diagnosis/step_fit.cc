@@ -277,7 +277,7 @@ double Merit(const Fit& fit) {
     const WhiteUnit white = Whiten(fit, unit);
     for (std::size_t k = 0; k < white.moves.size(); ++k) {
       const auto at = static_cast<Index>(2 * k);
-      const double* w = &white.whiten[3 * k];
+      const double* w = white.filter[k].w;
       const double weight = fit.weight[white.track.first_row + white.moves[k]];
       const double square = white.y.segment(at, 2).squaredNorm() / weight;
       // Huber's density: beyond the knee the logarithm falls linearly.
