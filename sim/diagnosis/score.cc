@@ -10,7 +10,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kDependent = 1e-7;  // of a column's length: the rest is rounding
+constexpr double kLeverageMax = 0.6;  // of a signature in one row: an outlier looks the same
+constexpr double kDependent = 1e-7;   // of a column's length: the rest is rounding
 
 // Orthonormal columns, by modified Gram-Schmidt done twice; dependent ones are left out.
 class Basis {
@@ -212,6 +213,14 @@ void AddSpread(const MatrixXd& m, const VectorXd& y, Index spent, FleetPart* par
   part->spread_count += static_cast<double>(c);
 }
 
+// Share of a signature that one row has.
+double Leverage(const MatrixXd& m, double kept) {
+  double most = 0;
+  for (Index at = 0; at + 1 < m.rows(); at += 2)
+    most = std::max(most, m.row(at).squaredNorm() + m.row(at + 1).squaredNorm());
+  return most / kept;
+}
+
 void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std::size_t without,
                ScorePass* pass, ChunkPart* part) {
   UnitScorer scorer(fit, unit, without);
@@ -231,6 +240,7 @@ void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std
     const double kept = m.squaredNorm();
     // Less than this is rounding of what was projected out.
     if (!(kept > 1e-10 * raw)) continue;
+    if (templates[k].columns == 1 && Leverage(m, kept) > kLeverageMax) continue;
     fleet.kept += kept;
     const auto c = static_cast<Index>(templates[k].columns);
     const MatrixXd g = m.transpose() * m;

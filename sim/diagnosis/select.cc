@@ -84,6 +84,35 @@ std::size_t IndexOf(const Templates& templates, const Template& form) {
 // Amplitudes of a template move linearly: two rounds of noise, weights and step suffice.
 void Refit(Fit* fit) { SettleFit(fit, 2); }
 
+// The template at the shape between the listed ones that the data like best.
+Template Refined(const Fit& fit, const Templates& templates, const FleetGroups& groups,
+                 std::size_t at, std::size_t without) {
+  constexpr int kHalvings = 4;
+  Template form = templates[at];
+  if (!form.effect->continuous_shape) return form;
+  double gap = std::numeric_limits<double>::infinity();
+  for (const Template& other : templates)
+    if (other.effect == form.effect && other.axis == form.axis && other.memory == form.memory &&
+        other.form == form.form && other.shape != form.shape)
+      gap = std::min(gap, std::abs(other.shape - form.shape));
+  if (!std::isfinite(gap)) return form;
+  for (int halving = 0; halving < kHalvings; ++halving) {
+    gap /= 2;
+    const Templates three = {form, WithShape(form, form.shape - gap),
+                             WithShape(form, form.shape + gap)};
+    const ScorePass pass = ScoreTemplates(fit, three, without);
+    std::size_t best = 0;
+    double most = -std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < three.size(); ++k) {
+      if (three[k].shape <= 0 && form.shape > 0) continue;
+      const double evidence = Assess(pass.scores[k], three[k], groups, 1).evidence;
+      if (evidence > most) most = evidence, best = k;
+    }
+    form = three[best];
+  }
+  return form;
+}
+
 struct Look {
   ScorePass pass;
   std::vector<Standing> standings;
@@ -221,7 +250,8 @@ Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGrou
   return BestOf(pass, templates, standings, tests, family_wise);
 }
 
-Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+Selection Select(const Templates& listed, const SelectionRule& rule, Fit* fit) {
+  Templates templates = listed;  // and refined ones
   const FleetGroups groups = GroupsOf(*fit->facts);
   Selection selection;
   for (std::size_t round = 0; round <= rule.terms_max; ++round) {
@@ -236,7 +266,9 @@ Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit
         BestOf(look.pass, templates, look.standings, selection.tests, rule.family_wise);
     if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) break;
     const CampaignModel before = fit->model;
-    fit->model.terms.push_back(MakeTerm(templates[best.at], best.standing, groups));
+    const Template refined = Refined(*fit, templates, groups, best.at, kNoTerm);
+    if (IndexOf(templates, refined) == kNoTerm) templates.push_back(refined);
+    fit->model.terms.push_back(MakeTerm(refined, best.standing, groups));
     StepFit(fit);
     Refit(fit);
     if (SizeOf(*fit, fit->model.terms.back()) < rule.size_min_um) {

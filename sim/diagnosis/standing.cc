@@ -17,8 +17,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30};  // of the prior size
-constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
+constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10};   // of the prior size
+constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};  // of units that have it
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 
 // One group's score along its principal directions.

@@ -43,7 +43,8 @@ Effect MakeBacklash() {
               "Approach always from one side, or command the gap in addition after a "
               "reversal.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

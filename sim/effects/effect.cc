@@ -79,4 +79,13 @@ void ListGrid(const Grid& grid, Templates* out) {
       }
 }
 
+Template WithShape(const Template& form, double shape) {
+  Template other = form;
+  other.shape = shape;
+  char text[32];
+  std::snprintf(text, sizeof text, " %.4g", shape);
+  other.label = form.label.substr(0, form.label.rfind(' ')) + text;
+  return other;
+}
+
 }  // namespace focalfleet::sim

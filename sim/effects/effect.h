@@ -67,6 +67,8 @@ struct Effect {
   std::string_view paragraph;           // for the operator
   void (*list)(const CampaignFacts&, Templates*);
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
+  // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
+  bool continuous_shape = false;
 };
 
 std::string_view Name(EffectAxis axis);
@@ -87,6 +89,8 @@ struct Grid {
   std::size_t columns = 1;
 };
 void ListGrid(const Grid& grid, Templates* out);
+/// The same template at another shape; its label says so. Pre: the label ends in the shape.
+Template WithShape(const Template& form, double shape);
 
 /// Adds to angle_deg[axis] what `made(i)` makes at each move of the axis, remembered as `memory`
 /// says.

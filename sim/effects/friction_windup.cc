@@ -39,7 +39,8 @@ Effect MakeFrictionWindup() {
               "unwinds and winds up the other way over some degrees of travel, so that short "
               "moves after a reversal err less than long ones.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -39,7 +39,8 @@ Effect MakeHardStop() {
               "Near an end of its range the axis is held back: the stop, or the clearance "
               "before it, begins earlier than the table says. Narrow the range of this unit.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

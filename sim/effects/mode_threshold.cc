@@ -44,7 +44,8 @@ Effect MakeModeThreshold() {
               "Moves below a length run in another mode of the firmware (creep instead of "
               "cruise), which ends a little elsewhere: the error steps at that length.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -13,6 +13,7 @@ Effect MakeAxisCrosstalk();
 Effect MakeAxisTilt();
 Effect MakeBacklash();
 Effect MakeCameraDistortion();
+Effect MakeCameraSimilarity();
 Effect MakeCentroidBias();
 Effect MakeCogging();
 Effect MakeCommandQuantisation();

@@ -38,7 +38,8 @@ Effect MakeRelaxation() {
               "direction of the move. Wait longer before the exposure, or expose always at "
               "the same delay.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

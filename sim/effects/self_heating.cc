@@ -53,7 +53,8 @@ Effect MakeSelfHeating() {
               "Recent motion warms the motor, and the error follows that warmth with a time "
               "constant of minutes. Pause, or spread the moves.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

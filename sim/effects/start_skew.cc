@@ -40,7 +40,8 @@ Effect MakeStartSkew() {
               "their move is cut: the error is against the motion and grows with the place in "
               "the start order. Wait for the last one.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -49,7 +49,8 @@ Effect MakeStiction() {
               "Moves shorter than a threshold are swallowed by static friction: the arm stays "
               "where it was. Avoid short corrections, or overshoot and come back.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -42,7 +42,8 @@ Effect MakeToothDamage() {
               "One tooth is worn or chipped: the angle errs by a bump whenever the gear "
               "passes that tooth, at the same place each turn of it and in both directions.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim
