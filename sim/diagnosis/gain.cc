@@ -87,7 +87,11 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_te
     fit.model.exposures.clear();
   }
   UpdateResiduals(&fit);
-  SettleFit(&fit, 2);
+  UpdateWeights(&fit);
+  for (int round = 0; round < 2; ++round) {
+    StepFit(&fit);
+    UpdateWeights(&fit);
+  }
   StepFit(&fit);
   FitHeldOutHomings(hold, &fit);
   return fit;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
 constexpr double kPlaceNoiseMin_um = 0.02;
-constexpr std::size_t kRowsMax = 8000;  // of those that the variances come from
+constexpr std::size_t kRowsMax = 4000;  // of those that the variances come from
 constexpr std::size_t kRowsMin = 200;   // fewer: one variance only
 
 struct NoiseMove {
@@ -27,7 +27,41 @@ struct NoiseMove {
 struct NoiseUnit {
   double factor = 1;
   std::vector<NoiseMove> moves;
+  std::vector<double> turn_um;  // of the seen moves. Shape: (seen, 4)
+  // What the unit's own unknowns (geometry, own amplitudes) do. Shape: (2 seen, unknowns)
+  Eigen::MatrixXd own;
 };
+
+Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUnit& white) {
+  Eigen::MatrixXd own = GeometryDisplacements(white);
+  PoseErrors errors;
+  for (const ModelTerm& term : fit.model.terms) {
+    if (term.sharing != Sharing::kUnit || term.group_of_unit[unit] == kNoGroup) continue;
+    for (std::size_t c = 0; c < term.form.columns; ++c) {
+      double one[kColumnsMax] = {};
+      one[c] = 1;
+      errors.Reset(white.track.moves);
+      term.form.effect->apply(white.track, term.form, std::span(one).first(term.form.columns),
+                              &errors);
+      own.conservativeResize(Eigen::NoChange, own.cols() + 1);
+      Displacement(white, errors, own.col(own.cols() - 1).data());
+    }
+  }
+  if (!fit.model.homing_zero_deg[kTheta].empty())
+    for (const std::size_t axis : {kTheta, kPhi})
+      for (std::size_t i = 0; i < white.track.moves;) {
+        errors.Reset(white.track.moves);
+        do {
+          errors.angle_deg[axis][i++] = 1;
+        } while (i < white.track.moves && white.track.restarts[i] == 0);
+        own.conservativeResize(Eigen::NoChange, own.cols() + 1);
+        Displacement(white, errors, own.col(own.cols() - 1).data());
+      }
+  // To a common size: what matters is the plane that they span.
+  for (Eigen::Index c = 0; c < own.cols(); ++c)
+    if (const double length = own.col(c).norm(); length > 0) own.col(c) /= length;
+  return own;
+}
 
 // Whole units, evenly from the fleet.
 std::vector<NoiseUnit> Sample(const Fit& fit) {
@@ -36,7 +70,7 @@ std::vector<NoiseUnit> Sample(const Fit& fit) {
   const std::size_t stride = std::max<std::size_t>(1, (campaign.rows() + kRowsMax - 1) / kRowsMax);
   std::vector<NoiseUnit> sample;
   for (std::size_t unit = 0; unit < units; unit += stride) {
-    NoiseUnit one{fit.noise.unit_factor[unit], {}};
+    NoiseUnit one{fit.noise.unit_factor[unit], {}, {}, {}};
     std::vector<double> weights;
     const WhiteUnit white = WhitenAnew(fit, unit, &weights);
     const UnitTrack& track = white.track;
@@ -54,60 +88,49 @@ std::vector<NoiseUnit> Sample(const Fit& fit) {
       if (!fit.noise.exposure_factor.empty())
         move.exposure_factor = fit.noise.exposure_factor[fit.facts->exposures.of_row[row]];
     }
+    one.turn_um = white.turn_um;
+    one.own = OwnDisplacements(fit, unit, white);
     sample.push_back(std::move(one));
   }
   return sample;
 }
 
-// Student's t of 5 degrees of freedom in two dimensions, for each place given those before it.
-double Cost(const std::vector<NoiseUnit>& sample, const Noise& noise) {
+// Of one unit: Student's t of 5 degrees of freedom in two dimensions for each place given those
+// before it, and what the unit's own unknowns have absorbed (restricted likelihood; the unknowns to
+// second order about the residuals). Source: Patterson and Thompson, Biometrika 58 (1971) 545.
+double CostOf(const NoiseUnit& unit, const Noise& noise) {
   constexpr double kFreedom = 5;
+  constexpr double kLoose = 1e-12;  // of an unknown that the rows do not show
   double cost = 0;
-  double white[2];
-  for (const NoiseUnit& unit : sample) {
-    RestFilter filter(noise, unit.factor);
-    for (const NoiseMove& move : unit.moves) {
-      filter.Move(move.restarts, move.theta_moves, move.phi_moves);
-      if (!move.seen) continue;
-      filter.See(move.turn_um, move.exposure_factor);
-      const double square = filter.SquareLength(move.x_um, move.y_um);
-      cost +=
-          std::log(filter.determinant()) / 2 + (kFreedom + 2) / 2 * std::log1p(square / kFreedom);
-      const RowFilter row = filter.Take(std::min(1.0, (kFreedom + 2) / (kFreedom + square)));
-      filter.Whiten(row, move.turn_um, move.x_um, move.y_um, white);
-    }
+  RestFilter filter(noise, unit.factor);
+  std::vector<RowFilter> rows;
+  Eigen::VectorXd y(unit.own.rows());
+  for (const NoiseMove& move : unit.moves) {
+    filter.Move(move.restarts, move.theta_moves, move.phi_moves);
+    if (!move.seen) continue;
+    filter.See(move.turn_um, move.exposure_factor);
+    const double square = filter.SquareLength(move.x_um, move.y_um);
+    cost += std::log(filter.determinant()) / 2 + (kFreedom + 2) / 2 * std::log1p(square / kFreedom);
+    rows.push_back(filter.Take(std::min(1.0, (kFreedom + 2) / (kFreedom + square))));
+    filter.Whiten(rows.back(), move.turn_um, move.x_um, move.y_um,
+                  &y[static_cast<Eigen::Index>(2 * rows.size() - 2)]);
   }
+  Eigen::MatrixXd own = unit.own;
+  for (Eigen::Index c = 0; c < own.cols(); ++c) ApplyFilter(rows, unit.turn_um, own.col(c).data());
+  Eigen::MatrixXd normal = own.transpose() * own;
+  normal.diagonal().array() += kLoose;
+  const Eigen::VectorXd right = own.transpose() * y;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
+  cost -= right.dot(solver.solve(right)) / 2;
+  for (Eigen::Index c = 0; c < own.cols(); ++c)
+    cost += std::log(std::max(solver.vectorD()[c], kLoose)) / 2;
   return cost;
 }
 
-// Coordinate search in the logarithms of the spreads, and in the shares carried.
-void Search(const std::vector<NoiseUnit>& sample, bool with_axes, double widest, Noise* noise) {
-  double cost = Cost(sample, *noise);
-  const auto attempt = [&](double Noise::*field, double value) {
-    Noise next = *noise;
-    next.*field = value;
-    const double next_cost = Cost(sample, next);
-    if (next_cost < cost) cost = next_cost, *noise = next;
-  };
-  const auto attempt_axis = [&](double(Noise::*field)[2], int axis, double value) {
-    Noise next = *noise;
-    (next.*field)[axis] = value;
-    const double next_cost = Cost(sample, next);
-    if (next_cost < cost) cost = next_cost, *noise = next;
-  };
-  for (double factor = widest; factor > 1.015; factor = std::sqrt(factor)) {
-    for (const double f : {factor, 1 / factor}) attempt(&Noise::place_um, noise->place_um * f);
-    if (!with_axes) continue;
-    for (int axis = 0; axis < 2; ++axis) {
-      for (const double f : {factor, 1 / factor}) {
-        attempt_axis(&Noise::rest_deg, axis, noise->rest_deg[axis] * f);
-        attempt_axis(&Noise::angle_deg, axis, noise->angle_deg[axis] * f);
-      }
-      const double wide = 0.5 * (factor - 1);
-      for (const double d : {wide, -wide})
-        attempt_axis(&Noise::carry, axis, std::clamp(noise->carry[axis] + d, 0.0, 1.0));
-    }
-  }
+double Cost(const std::vector<NoiseUnit>& sample, const Noise& noise) {
+  double cost = 0;
+  for (const NoiseUnit& unit : sample) cost += CostOf(unit, noise);
+  return cost;
 }
 
 double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
@@ -116,6 +139,94 @@ double Lever_um(const std::vector<NoiseUnit>& sample, int axis) {
     for (const NoiseMove& move : unit.moves)
       most = std::max(most, std::hypot(move.turn_um[2 * axis], move.turn_um[2 * axis + 1]));
   return most;
+}
+
+// Coordinate search in the logarithms of the spreads, and in the shares carried.
+class NoiseSearch {
+ public:
+  NoiseSearch(const std::vector<NoiseUnit>& sample, const Noise& begin)
+      : sample_(sample), best_(begin), cost_(Cost(sample, begin)) {}
+
+  void Place(double widest) {
+    for (double factor = widest; factor > kFine; factor = std::sqrt(factor)) Scale(factor);
+  }
+  void Axes(double widest, bool with_carry) {
+    for (double factor = widest; factor > kFine; factor = std::sqrt(factor)) {
+      Scale(factor);
+      for (int axis = 0; axis < 2; ++axis) {
+        for (const double f : {factor, 1 / factor}) {
+          Attempt([&](Noise* n) { n->rest_deg[axis] *= f; });
+          Attempt([&](Noise* n) { n->angle_deg[axis] *= f; });
+        }
+        const double wide = with_carry ? 0.5 * (factor - 1) : 0;
+        for (const double d : {wide, -wide})
+          if (d != 0)
+            Attempt([&](Noise* n) { n->carry[axis] = std::clamp(n->carry[axis] + d, 0.0, 1.0); });
+      }
+    }
+  }
+  // Steps that factors do not find.
+  void Leaps() {
+    for (int axis = 0; axis < 2; ++axis) {
+      const double lever = std::max(Lever_um(sample_, axis), 1e-6);
+      const auto same = [&](double value) { return value * best_.place_um / lever; };
+      Attempt([&](Noise* n) { std::swap(n->rest_deg[axis], n->angle_deg[axis]); });
+      Attempt([&](Noise* n) { n->carry[axis] = 0; });
+      if (best_.rest_deg[axis] < same(0.2))
+        for (const double share : {0.3, 1.0})
+          Attempt([&](Noise* n) { n->rest_deg[axis] = same(share); });
+    }
+  }
+  [[nodiscard]] const Noise& best() const { return best_; }
+  [[nodiscard]] double cost() const { return cost_; }
+
+ private:
+  static constexpr double kFine = 1.015;
+  template <class Change>
+  void Attempt(const Change& change) {
+    Noise next = best_;
+    change(&next);
+    const double cost = Cost(sample_, next);
+    if (cost < cost_) cost_ = cost, best_ = next;
+  }
+  void Scale(double factor) {
+    for (const double f : {factor, 1 / factor}) Attempt([&](Noise* n) { n->place_um *= f; });
+  }
+
+  const std::vector<NoiseUnit>& sample_;
+  Noise best_;
+  double cost_;
+};
+
+// From nothing: errors that are held and errors that are not look alike from far off, so that the
+// search begins at either.
+Noise SearchAnew(const std::vector<NoiseUnit>& sample, bool with_axes, double typical_um,
+                 Noise noise) {
+  noise.place_um = typical_um;
+  for (int axis = 0; axis < 2; ++axis)
+    noise.rest_deg[axis] = noise.angle_deg[axis] = noise.carry[axis] = 0;
+  if (!with_axes) {
+    NoiseSearch search(sample, noise);
+    search.Place(8);
+    return search.best();
+  }
+  double least = 0;
+  Noise best = noise;
+  for (const bool held : {true, false}) {
+    Noise begin = noise;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double angle_deg = typical_um / std::max(Lever_um(sample, axis), 1e-6);
+      begin.rest_deg[axis] = (held ? 0.5 : 0.01) * angle_deg;
+      begin.angle_deg[axis] = (held ? 0.01 : 0.5) * angle_deg;
+    }
+    NoiseSearch search(sample, begin);
+    search.Axes(4, false);
+    if (held || search.cost() < least) least = search.cost(), best = search.best();
+  }
+  NoiseSearch search(sample, best);
+  search.Leaps();
+  search.Axes(2, true);
+  return search.best();
 }
 
 void FitVariances(const std::vector<NoiseUnit>& sample, bool with_axes, Noise* noise) {
@@ -131,16 +242,18 @@ void FitVariances(const std::vector<NoiseUnit>& sample, bool with_axes, Noise* n
   // Near where it was: a short search. Anew where it was never made, or is far away.
   const bool near =
       noise->fitted && typical < 2 * noise->typical_um && typical > 0.5 * noise->typical_um;
-  if (!near) {
-    noise->place_um = typical;
-    for (int axis = 0; axis < 2; ++axis) {
-      const double lever = std::max(Lever_um(sample, axis), 1e-6);
-      noise->rest_deg[axis] = with_axes ? 0.3 * typical / lever : 0;
-      noise->angle_deg[axis] = with_axes ? 0.1 * typical / lever : 0;
-      noise->carry[axis] = 0;
+  if (near) {
+    NoiseSearch search(sample, *noise);
+    if (with_axes) {
+      search.Leaps();
+      search.Axes(1.2, true);
+    } else {
+      search.Place(1.2);
     }
+    *noise = search.best();
+  } else {
+    *noise = SearchAnew(sample, with_axes, typical, *noise);
   }
-  Search(sample, with_axes, near ? 1.5 : 8, noise);
   noise->fitted = true;
   noise->typical_um = typical;
   noise->place_um = std::max(noise->place_um, kPlaceNoiseMin_um);
@@ -164,6 +277,20 @@ struct UnitLengths {
   std::vector<double> square;  // of the used rows
   std::vector<std::size_t> exposure;
 };
+
+// Factors are about 1; what they have in common is the fleet's noise.
+void Normalise(Noise* noise) {
+  if (!noise->exposure_factor.empty()) {
+    const double usual = Median(noise->exposure_factor);
+    for (double& factor : noise->exposure_factor) factor /= usual;
+    noise->place_um *= usual;
+  }
+  const double usual = Median(noise->unit_factor);
+  for (double& factor : noise->unit_factor) factor /= usual;
+  noise->place_um *= usual;
+  for (int axis = 0; axis < 2; ++axis)
+    noise->rest_deg[axis] *= usual, noise->angle_deg[axis] *= usual;
+}
 
 void FitFactors(Fit* fit) {
   const std::size_t units = fit->model.units.size();
@@ -196,7 +323,7 @@ void FitFactors(Fit* fit) {
   }
   // Exposures: what is left once the units have theirs.
   constexpr std::size_t kUnitsMin = 6;
-  if (units < kUnitsMin) return;
+  if (units < kUnitsMin) return Normalise(&fit->noise);
   std::vector<std::vector<double>> of(fit->facts->exposures.size());
   for (std::size_t unit = 0; unit < units; ++unit)
     for (std::size_t k = 0; k < lengths[unit].square.size(); ++k)
@@ -206,6 +333,7 @@ void FitFactors(Fit* fit) {
   for (std::size_t e = 0; e < of.size(); ++e)
     if (!of[e].empty())
       factor[e] *= Shrunk(Median(of[e]) / kMedianSquare, static_cast<double>(of[e].size()), 1);
+  Normalise(&fit->noise);
 }
 
 }  // namespace

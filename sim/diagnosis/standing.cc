@@ -102,7 +102,10 @@ double LevelLogP(const Level& level) {
         std::min(best, LogChiSquareTail(group.chi_square, static_cast<double>(group.along.size())));
   }
   if (tests == 0) return 0;
-  const double all = LogChiSquareTail(sum, dof);
+  // A sum over many units also counts what is wrong with the noise of all of them.
+  constexpr double kNoiseOfNoise = 0.2, kMany = 20;
+  const double all =
+      LogChiSquareTail(sum / (1 + kNoiseOfNoise * std::min(1.0, (dof - 1) / kMany)), dof);
   return tests == 1 ? all : std::min(all, LogLeastOf(best, tests)) + std::log(2.0);
 }
 
@@ -278,7 +281,10 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   Standing best;
   best.dispersion = std::max(1.0, UnitDispersion(score));
   std::vector<Level> levels;
-  levels.push_back(SumLevel(score, c, Sharing::kUnit, Each(units), units, best.dispersion));
+  const bool of_the_whole =
+      form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
+  if (units == 1 || !of_the_whole)
+    levels.push_back(SumLevel(score, c, Sharing::kUnit, Each(units), units, best.dispersion));
   if (units > 1) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.
@@ -292,10 +298,10 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     Level all{Sharing::kFleet,
               {Decompose(score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
-    if (groups.rails > 0)
+    if (groups.rails > 0 && !of_the_whole)
       levels.push_back(
           SumLevel(score, c, Sharing::kRail, groups.rail, groups.rails, best.dispersion));
-    if (groups.buses > 0)
+    if (groups.buses > 0 && !of_the_whole)
       levels.push_back(
           SumLevel(score, c, Sharing::kBus, groups.bus, groups.buses, best.dispersion));
     levels.push_back(std::move(all));
@@ -315,7 +321,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     const MixtureFit fit = Mix(level, prior);
     if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
   }
-  if (units > 2 && c == 1) {
+  if (units > 2 && c == 1 && !of_the_whole) {
     const ScatterFit scatter = Scatter(score, prior, best.dispersion);
     // Only as a refinement of what is shared by all: a scatter that pays for itself.
     if (scatter.evidence > best.evidence + 3) {

@@ -63,32 +63,10 @@ void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, Whit
   }
 }
 
-void WhitenGeometry(WhiteUnit* white) {
-  const UnitTrack& track = white->track;
-  white->geometry.resize(static_cast<Eigen::Index>(2 * white->moves.size()), kStaticColumns);
-  const double arm[2] = {track.unit->arm_mm[0], track.unit->arm_mm[1]};
-  for (std::size_t k = 0; k < white->moves.size(); ++k) {
-    const std::size_t i = white->moves[k];
-    const double* t = &white->turn_um[4 * k];
-    const double columns[6][2] = {
-        {kMicrons, 0},
-        {0, kMicrons},
-        {kMicrons * track.elbow_x_mm[i] / arm[0], kMicrons * track.elbow_y_mm[i] / arm[0]},
-        {kMicrons * track.reach_x_mm[i] / arm[1], kMicrons * track.reach_y_mm[i] / arm[1]},
-        {t[0], t[1]},
-        {t[2], t[3]}};
-    const auto at = static_cast<Eigen::Index>(2 * k);
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      white->geometry(at, c) = columns[c][0];
-      white->geometry(at + 1, c) = columns[c][1];
-    }
-  }
-  for (Eigen::Index c = 0; c < 6; ++c) white->Apply(white->geometry.col(c).data());
-}
-
 }  // namespace
 
-void WhiteUnit::Apply(double* xy_um) const {
+void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+                 double* xy_um) {
   double theta = 0, phi = 0;  // what the rows so far told of the rest errors
   for (std::size_t k = 0; k < filter.size(); ++k) {
     const RowFilter& f = filter[k];
@@ -104,10 +82,34 @@ void WhiteUnit::Apply(double* xy_um) const {
   }
 }
 
+void WhiteUnit::Apply(double* xy_um) const { ApplyFilter(filter, turn_um, xy_um); }
+
+Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
+  const UnitTrack& track = white.track;
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(2 * white.moves.size()), kStaticColumns);
+  const double arm[2] = {track.unit->arm_mm[0], track.unit->arm_mm[1]};
+  for (std::size_t k = 0; k < white.moves.size(); ++k) {
+    const std::size_t i = white.moves[k];
+    const double* t = &white.turn_um[4 * k];
+    const double columns[6][2] = {
+        {kMicrons, 0},
+        {0, kMicrons},
+        {kMicrons * track.elbow_x_mm[i] / arm[0], kMicrons * track.elbow_y_mm[i] / arm[0]},
+        {kMicrons * track.reach_x_mm[i] / arm[1], kMicrons * track.reach_y_mm[i] / arm[1]},
+        {t[0], t[1]},
+        {t[2], t[3]}};
+    const auto at = static_cast<Eigen::Index>(2 * k);
+    for (Eigen::Index c = 0; c < 6; ++c) out(at, c) = columns[c][0], out(at + 1, c) = columns[c][1];
+  }
+  return out;
+}
+
 WhiteUnit Whiten(const Fit& fit, std::size_t unit) {
   WhiteUnit white = Begin(fit, unit, false);
   RunFilter(fit, unit, nullptr, &white);
-  WhitenGeometry(&white);
+  white.geometry = GeometryDisplacements(white);
+  for (Eigen::Index c = 0; c < white.geometry.cols(); ++c)
+    white.Apply(white.geometry.col(c).data());
   return white;
 }
 
@@ -118,7 +120,7 @@ WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weig
   return white;
 }
 
-void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
+void Displacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
   const UnitTrack& track = white.track;
   const double per_arm[2] = {kMicrons / track.unit->arm_mm[0], kMicrons / track.unit->arm_mm[1]};
   for (std::size_t k = 0; k < white.moves.size(); ++k) {
@@ -131,6 +133,10 @@ void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double*
     out[2 * k + 1] = kMicrons * errors.y_mm[i] + t[1] * a + t[3] * b + m * track.elbow_y_mm[i] +
                      n * track.reach_y_mm[i];
   }
+}
+
+void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
+  Displacement(white, errors, out);
   white.Apply(out);
 }
 

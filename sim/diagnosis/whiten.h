@@ -51,11 +51,20 @@ struct WhiteUnit {
   void Apply(double* xy_um) const;
 };
 
+/// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
+void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+                 double* xy_um);
+
 /// Rows with the weights that the fit has.
 WhiteUnit Whiten(const Fit& fit, std::size_t unit);
 /// The same with all weights 1, and only y: what the rows' weights are made from.
 /// `weights` gets the Huber weight of each used row; the filter uses them as it goes.
 WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weights);
+
+/// The displacements that static geometry makes, in um per mm and degree, and that pose errors
+/// make, in um. Shapes: (2 moves, 6), (2 moves).
+Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white);
+void Displacement(const WhiteUnit& white, const PoseErrors& errors, double* out);
 
 /// The displacement that pose errors make, whitened. Shape: (2 moves).
 void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out);
