@@ -10,7 +10,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kLeverageMax = 0.6;  // of a signature in one row: an outlier looks the same
+constexpr double kLeverageMax = 0.5;  // of a signature in one row: an outlier looks the same
+constexpr double kKeptMin = 3e-3;     // of a unit's signature beside its geometry
 constexpr double kDependent = 1e-7;   // of a column's length: the rest is rounding
 
 // Orthonormal columns, by modified Gram-Schmidt done twice; dependent ones are left out.
@@ -238,8 +239,8 @@ void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std
     FleetPart& fleet = part->of_template[k];
     fleet.raw += raw;
     const double kept = m.squaredNorm();
-    // Less than this is rounding of what was projected out.
-    if (!(kept > 1e-10 * raw)) continue;
+    // Less than this is what the unit's geometry explains as well, and large amplitudes of it.
+    if (!(kept > kKeptMin * raw)) continue;
     if (templates[k].columns == 1 && Leverage(m, kept) > kLeverageMax) continue;
     fleet.kept += kept;
     const auto c = static_cast<Index>(templates[k].columns);

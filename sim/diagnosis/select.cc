@@ -17,24 +17,15 @@ constexpr double kKeptMin = 0.01;  // of a signature: less is what geometry expl
 constexpr int kSwapSweepsMax = 3;
 constexpr double kBetterBy = 0.5;  // logarithm of evidence
 
-double UsualDispersion(const ScorePass& pass, const Templates& templates) {
-  std::vector<double> all;
-  for (std::size_t k = 0; k < templates.size(); ++k)
-    if (pass.scores[k].kept > 0)
-      all.push_back(FleetDispersion(pass.scores[k], templates[k].columns));
-  return all.empty() ? 1 : std::max(1.0, Median(std::move(all)));
-}
-
 std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& templates,
                                 const FleetGroups& groups, const Fit& fit) {
-  const double usual = UsualDispersion(pass, templates);
   std::vector<Standing> standings(templates.size());
   constexpr std::size_t kBlock = 16;
   const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
   fit.parallel(blocks, [&](std::size_t block) {
     const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
     for (std::size_t k = block * kBlock; k < end; ++k)
-      standings[k] = Assess(pass.scores[k], templates[k], groups, usual);
+      standings[k] = Assess(pass.scores[k], templates[k], groups);
   });
   return standings;
 }
@@ -105,7 +96,7 @@ Template Refined(const Fit& fit, const Templates& templates, const FleetGroups& 
     double most = -std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < three.size(); ++k) {
       if (three[k].shape <= 0 && form.shape > 0) continue;
-      const double evidence = Assess(pass.scores[k], three[k], groups, 1).evidence;
+      const double evidence = Assess(pass.scores[k], three[k], groups).evidence;
       if (evidence > most) most = evidence, best = k;
     }
     form = three[best];
@@ -193,6 +184,24 @@ void TakeRivals(const Templates& templates, const FleetGroups& groups, const Sel
   }
 }
 
+// Terms that the others have made needless go, the weakest first.
+void DropTheNeedless(const Templates& templates, const FleetGroups& groups,
+                     const SelectionRule& rule, double tests, Fit* fit,
+                     std::vector<Accepted>* accepted) {
+  for (;;) {
+    std::size_t weakest = kNoTerm;
+    for (std::size_t t = 0; t < accepted->size(); ++t) {
+      const double log_p = LogLeastOf((*accepted)[t].standing.log_p, tests);
+      if (log_p <= std::log(rule.family_wise)) continue;
+      if (weakest == kNoTerm || log_p > LogLeastOf((*accepted)[weakest].standing.log_p, tests))
+        weakest = t;
+    }
+    if (weakest == kNoTerm) return;
+    DropTerm(weakest, fit);
+    TakeRivals(templates, groups, rule, *fit, accepted);
+  }
+}
+
 }  // namespace
 
 ModelTerm MakeTerm(const Template& form, const Standing& standing, const FleetGroups& groups) {
@@ -243,10 +252,9 @@ double SizeOf(const Fit& fit, const ModelTerm& term) {
 
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
               double tests, double family_wise) {
-  const double usual = UsualDispersion(pass, templates);
   std::vector<Standing> standings;
   for (std::size_t k = 0; k < templates.size(); ++k)
-    standings.push_back(Assess(pass.scores[k], templates[k], groups, usual));
+    standings.push_back(Assess(pass.scores[k], templates[k], groups));
   return BestOf(pass, templates, standings, tests, family_wise);
 }
 
@@ -287,6 +295,7 @@ Selection Select(const Templates& listed, const SelectionRule& rule, Fit* fit) {
   for (int sweep = 0; !rests && sweep < kSwapSweepsMax; ++sweep)
     rests = !SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted);
   if (!rests) TakeRivals(templates, groups, rule, *fit, &selection.accepted);
+  DropTheNeedless(templates, groups, rule, selection.tests, fit, &selection.accepted);
   return selection;
 }
 

@@ -273,8 +273,7 @@ double FleetDispersion(const Score& score, std::size_t columns) {
   return (effective * raw + kPrior) / (effective + kPrior);
 }
 
-Standing Assess(const Score& score, const Template& form, const FleetGroups& groups,
-                double usual_dispersion) {
+Standing Assess(const Score& score, const Template& form, const FleetGroups& groups) {
   const std::size_t c = form.columns;
   const std::size_t units = score.b.size() / c;
   const double prior = form.effect->prior_size;
@@ -288,27 +287,26 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   if (units > 1) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.
-    constexpr double kPrior = 8;
-    const double fleet = std::max(
-        1.0, (FleetDispersion(score, c) * kPrior + usual_dispersion * kPrior) / (2 * kPrior));
+    const double fleet = std::max(best.dispersion, FleetDispersion(score, c));
     const Level cautious{Sharing::kFleet,
                          {Decompose(score.fleet_b, score.fleet_g, fleet)},
                          std::vector<std::uint32_t>(units, 0)};
     best.log_p = LevelLogP(cautious);
+    const auto look = [&](Sharing sharing, const std::vector<std::uint32_t>& of,
+                          std::size_t count) {
+      best.log_p = std::min(best.log_p, LevelLogP(SumLevel(score, c, sharing, of, count, fleet)));
+      levels.push_back(SumLevel(score, c, sharing, of, count, best.dispersion));
+    };
     Level all{Sharing::kFleet,
               {Decompose(score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
-    if (groups.rails > 0 && !of_the_whole)
-      levels.push_back(
-          SumLevel(score, c, Sharing::kRail, groups.rail, groups.rails, best.dispersion));
-    if (groups.buses > 0 && !of_the_whole)
-      levels.push_back(
-          SumLevel(score, c, Sharing::kBus, groups.bus, groups.buses, best.dispersion));
+    if (groups.rails > 0 && !of_the_whole) look(Sharing::kRail, groups.rail, groups.rails);
+    if (groups.buses > 0 && !of_the_whole) look(Sharing::kBus, groups.bus, groups.buses);
     levels.push_back(std::move(all));
   }
   best.evidence = -std::numeric_limits<double>::infinity();
   for (const Level& level : levels)
-    if (level.sharing != Sharing::kFleet) best.log_p = std::min(best.log_p, LevelLogP(level));
+    if (level.sharing == Sharing::kUnit) best.log_p = std::min(best.log_p, LevelLogP(level));
   best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
   // Chance explains it: no need to know who has it.
   constexpr double kWorthALook = -3;

@@ -34,9 +34,8 @@ struct FleetGroups {
 };
 FleetGroups GroupsOf(const CampaignFacts& facts);
 
-/// Pre: score belongs to form. `usual_dispersion`: median over templates of the fleet's.
-Standing Assess(const Score& score, const Template& form, const FleetGroups& groups,
-                double usual_dispersion);
+/// Pre: score belongs to form.
+Standing Assess(const Score& score, const Template& form, const FleetGroups& groups);
 
 /// Dispersion of the fleet's score about its fit, from exposure to exposure.
 double FleetDispersion(const Score& score, std::size_t columns);

@@ -39,7 +39,39 @@ void Rank(FilledColumn* column) {
   }
 }
 
-FilledColumn Fill(std::span<const double> raw) {
+// What the exposure has, where all units that know it agree; NaN elsewhere. Shape: (exposures).
+std::vector<double> CommonValues(std::span<const double> raw, const Exposures& exposures) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> low(exposures.size(), kNone), high(exposures.size(), kNone);
+  for (std::size_t row = 0; row < raw.size(); ++row) {
+    if (!std::isfinite(raw[row])) continue;
+    const std::size_t e = exposures.of_row[row];
+    low[e] = std::isfinite(low[e]) ? std::min(low[e], raw[row]) : raw[row];
+    high[e] = std::isfinite(high[e]) ? std::max(high[e], raw[row]) : raw[row];
+  }
+  for (std::size_t e = 0; e < low.size(); ++e)
+    if (low[e] != high[e]) low[e] = kNone;
+  return low;
+}
+
+// Along one unit's rows: a straight line from the value before to the value behind.
+void Interpolate(std::span<double> values) {
+  std::size_t before = values.size();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!std::isfinite(values[i])) continue;
+    const std::size_t begin = before == values.size() ? 0 : before + 1;
+    const double left = before == values.size() ? values[i] : values[before];
+    const auto gap = static_cast<double>(i - begin + 1);
+    for (std::size_t k = begin; k < i; ++k)
+      values[k] = left + (values[i] - left) * static_cast<double>(k - begin + 1) / gap;
+    before = i;
+  }
+  if (before == values.size()) return;
+  for (std::size_t k = before + 1; k < values.size(); ++k) values[k] = values[before];
+}
+
+FilledColumn Fill(std::span<const double> raw, const Campaign& campaign,
+                  const Exposures& exposures) {
   FilledColumn column;
   std::vector<double> known;
   for (const double value : raw)
@@ -52,9 +84,19 @@ FilledColumn Fill(std::span<const double> raw) {
   column.first = known.front();
   column.mean =
       std::accumulate(known.begin(), known.end(), 0.0) / static_cast<double>(known.size());
-  const double median = MedianOf(known);
-  column.values.reserve(raw.size());
-  for (const double value : raw) column.values.push_back(std::isfinite(value) ? value : median);
+  column.values.assign(raw.begin(), raw.end());
+  if (column.missing_share > 0) {
+    const std::vector<double> common = CommonValues(raw, exposures);
+    for (std::size_t row = 0; row < raw.size(); ++row)
+      if (!std::isfinite(raw[row])) column.values[row] = common[exposures.of_row[row]];
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+      Interpolate(std::span(column.values)
+                      .subspan(campaign.first_row[unit],
+                               campaign.first_row[unit + 1] - campaign.first_row[unit]));
+    const double median = MedianOf(known);
+    for (double& value : column.values)
+      if (!std::isfinite(value)) value = median;
+  }
   Rank(&column);
   return column;
 }
@@ -154,8 +196,8 @@ void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
     any = any || slope[0] != 0 || slope[1] != 0;
   }
   if (!any) return;
-  facts->columns[std::string(kGradientX)] = Fill(gradient[0]);
-  facts->columns[std::string(kGradientY)] = Fill(gradient[1]);
+  facts->columns[std::string(kGradientX)] = Fill(gradient[0], campaign, facts->exposures);
+  facts->columns[std::string(kGradientY)] = Fill(gradient[1], campaign, facts->exposures);
 }
 
 std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, double reach_mm) {
@@ -195,8 +237,8 @@ void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
                                                   b.gear[axis] * campaign.cmd_deg[axis][other]));
       }
     }
-  facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta]);
-  facts->columns[std::string(kNeighbourPhi)] = Fill(pull[kPhi]);
+  facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta], campaign, facts->exposures);
+  facts->columns[std::string(kNeighbourPhi)] = Fill(pull[kPhi], campaign, facts->exposures);
 }
 
 // Columns that the units' table has and the moves' table lacks.
@@ -215,7 +257,7 @@ void AddUnitColumns(const Campaign& campaign, CampaignFacts* facts) {
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
       for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
         values[row] = campaign.units[unit].*column.value;
-    FilledColumn filled = Fill(values);
+    FilledColumn filled = Fill(values, campaign, facts->exposures);
     if (filled.missing_share <= kMissingShareMax) facts->columns[column.name] = std::move(filled);
   }
 }
@@ -232,7 +274,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   facts.campaign = &campaign;
   facts.exposures = FindExposures(campaign);
   for (const Covariate& covariate : campaign.covariates) {
-    FilledColumn column = Fill(covariate.values);
+    FilledColumn column = Fill(covariate.values, campaign, facts.exposures);
     if (column.missing_share <= kMissingShareMax) facts.columns[covariate.name] = std::move(column);
   }
   AddUnitColumns(campaign, &facts);
@@ -241,10 +283,11 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   std::vector<double> order(campaign.rows());
   for (std::size_t row = 0; row < order.size(); ++row)
     order[row] = static_cast<double>(facts.exposures.of_row[row]);
-  facts.columns[std::string(kOrder)] = Fill(order);
+  facts.columns[std::string(kOrder)] = Fill(order, campaign, facts.exposures);
   for (const std::size_t axis : {kTheta, kPhi}) {
-    facts.columns[std::string(kCommand[axis])] = Fill(campaign.cmd_deg[axis]);
-    facts.columns[std::string(kStep[axis])] = Fill(facts.step_deg[axis]);
+    facts.columns[std::string(kCommand[axis])] =
+        Fill(campaign.cmd_deg[axis], campaign, facts.exposures);
+    facts.columns[std::string(kStep[axis])] = Fill(facts.step_deg[axis], campaign, facts.exposures);
   }
   FindGradients(campaign, &facts);
   FindNeighbourPull(campaign, &facts);

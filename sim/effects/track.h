@@ -16,7 +16,8 @@
 
 namespace focalfleet::sim {
 
-/// One covariate without gaps: missing values are the column's median.
+/// One covariate without gaps. A missing value is what the exposure's other units say where they
+/// agree, else between the unit's own values before and behind; where it has none, the median.
 struct FilledColumn {
   std::vector<double> values;  // Shape: (rows)
   std::vector<float> rank;     // Shape: (rows): share of the rows below, 0..1
