@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::size_t kMovesMin = 8;  // of a unit, seen
 constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
-constexpr double kKeptMin = 0.01;
+constexpr double kKeptMin = 0.03;
+constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
 // Causes that come from other looks than a template's.
 constexpr std::string_view kEventCauses[] = {"collision_contact", "sensor_bias"};
 
@@ -146,7 +147,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   std::vector<CauseFound> merged;
   for (CauseFound& cause : *causes) {
     const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
-      return other.cause == cause.cause && other.scope == cause.scope;
+      return other.cause == cause.cause;
     });
     if (same == merged.end()) {
       merged.push_back(std::move(cause));
@@ -157,6 +158,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
       same->amplitude = cause.amplitude;
       same->ci95[0] = cause.ci95[0], same->ci95[1] = cause.ci95[1];
       same->shape = cause.shape;
+      same->scope = cause.scope;
     }
     std::set<std::uint32_t> units(same->units.begin(), same->units.end());
     units.insert(cause.units.begin(), cause.units.end());
@@ -193,7 +195,7 @@ std::vector<UnknownFound> Screen(const Fit& fit, const DiagnoseOptions& options)
   const ScorePass pass = ScoreTemplates(fit, looks);
   const double tests = EffectiveTests(pass.scores, looks, options.seed);
   std::vector<UnknownFound> found;
-  const Best best = FindBest(pass, looks, groups, tests, options.family_wise);
+  const Best best = FindBest(pass, looks, groups, tests, kUnknownShare * options.family_wise);
   if (best.at == kNoTerm) return found;
   UnknownFound unknown{looks[best.at].covariate, ChannelOf(looks[best.at]),
                        std::exp(best.log_p_family), 0};

@@ -8,7 +8,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kUnitsMin = 12;
+constexpr std::size_t kUnitsMin = 6;
 constexpr double kNeighbourReach = 1.3;  // of the pitch
 constexpr double kNeighboursAgree = 6;   // standard deviations
 constexpr double kSizeMin_um = 0.2;

@@ -11,7 +11,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kLeverageMax = 0.5;  // of a signature in one row: an outlier looks the same
-constexpr double kKeptMin = 3e-3;     // of a unit's signature beside its geometry
+constexpr double kKeptMin = 0.01;     // of a unit's signature beside its geometry
 constexpr double kDependent = 1e-7;   // of a column's length: the rest is rounding
 
 // Orthonormal columns, by modified Gram-Schmidt done twice; dependent ones are left out.
@@ -69,7 +69,7 @@ class UnitScorer {
   MatrixXd Signature(const Template& form, double* raw) {
     MatrixXd m(y_.size(), static_cast<Index>(form.columns));
     for (std::size_t c = 0; c < form.columns; ++c) {
-      double one[kColumnsMax] = {0, 0, 0, 0};
+      double one[kColumnsMax] = {};
       one[c] = 1;
       errors_.Reset(white_.track.moves);
       form.effect->apply(white_.track, form, std::span(one).first(form.columns), &errors_);
@@ -97,7 +97,7 @@ class UnitScorer {
       VectorXd column = VectorXd::Zero(y_.size());
       for (std::size_t c = 0; c < term.form.columns; ++c) {
         if (!amplitude.empty()) {
-          double one[kColumnsMax] = {0, 0, 0, 0};
+          double one[kColumnsMax] = {};
           one[c] =
               term.sharing == Sharing::kFleet || term.sharing == Sharing::kUnit ? 1 : amplitude[c];
           errors_.Reset(white_.track.moves);

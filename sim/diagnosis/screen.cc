@@ -73,7 +73,9 @@ std::string ChannelOf(const Template& look) {
 Templates ScreenTemplates(const CampaignFacts& facts) {
   Templates looks;
   for (const auto& [name, column] : facts.columns) {
-    if (!column.varies() || name == "sigma_um" || name == "rehomed") continue;
+    if (!column.varies() || name == "sigma_um" || name == "rehomed" || name == "pixel_x" ||
+        name == "pixel_y")
+      continue;
     for (int channel = 0; channel < kChannels; ++channel)
       for (int curve = 1; curve <= kCurves; ++curve)
         looks.push_back({.effect = &Curve(),

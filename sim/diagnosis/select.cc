@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kKeptMin = 0.01;  // of a signature: less is what geometry explains as well
+constexpr double kKeptMin = 0.03;  // of a signature: less is what geometry explains as well
 constexpr int kSwapSweepsMax = 3;
 constexpr double kBetterBy = 0.5;  // logarithm of evidence
 

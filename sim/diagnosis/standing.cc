@@ -300,8 +300,11 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     Level all{Sharing::kFleet,
               {Decompose(score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
-    if (groups.rails > 0 && !of_the_whole) look(Sharing::kRail, groups.rail, groups.rails);
-    if (groups.buses > 0 && !of_the_whole) look(Sharing::kBus, groups.bus, groups.buses);
+    const Owner owner = form.effect->owner;
+    if (groups.rails > 0 && !of_the_whole && owner != Owner::kBus)
+      look(Sharing::kRail, groups.rail, groups.rails);
+    if (groups.buses > 0 && !of_the_whole && owner != Owner::kRail)
+      look(Sharing::kBus, groups.bus, groups.buses);
     levels.push_back(std::move(all));
   }
   best.evidence = -std::numeric_limits<double>::infinity();

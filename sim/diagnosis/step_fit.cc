@@ -98,7 +98,7 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
     const std::uint32_t group = term.group_of_unit[unit];
     if (group == kNoGroup) continue;
     for (std::size_t c = 0; c < term.form.columns; ++c) {
-      double one[kColumnsMax] = {0, 0, 0, 0};
+      double one[kColumnsMax] = {};
       one[c] = 1;
       errors.Reset(white.track.moves);
       term.form.effect->apply(white.track, term.form, std::span(one).first(term.form.columns),

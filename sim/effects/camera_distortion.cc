@@ -8,6 +8,10 @@ void List(const CampaignFacts& facts, Templates* out) {
   if (facts.campaign->units.size() < 4) return;
   out->push_back({.axis = EffectAxis::kNone, .label = "radial, third order"});
   out->push_back({.axis = EffectAxis::kNone, .columns = 2, .form = 1, .label = "decentred"});
+  out->push_back({.axis = EffectAxis::kNone,
+                  .columns = 6,
+                  .form = 2,
+                  .label = "radial of third and fifth order, decentred, trefoil"});
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -17,7 +21,14 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     const double x = (track.fibre_x_mm[i] - facts.centre_x_mm) / facts.radius_mm;
     const double y = (track.fibre_y_mm[i] - facts.centre_y_mm) / facts.radius_mm;
     const double r2 = x * x + y * y;
-    if (form.form == 0) {
+    if (form.form == 2) {
+      const double* a = amplitude.data();
+      const double radial = a[0] * r2 + a[1] * r2 * r2;
+      errors->x_mm[i] += 1e-3 * (radial * x + a[2] * (r2 + 2 * x * x) + a[3] * 2 * x * y +
+                                 a[4] * (x * x - y * y) - a[5] * 2 * x * y);
+      errors->y_mm[i] += 1e-3 * (radial * y + a[3] * (r2 + 2 * y * y) + a[2] * 2 * x * y -
+                                 a[4] * 2 * x * y - a[5] * (x * x - y * y));
+    } else if (form.form == 0) {
       errors->x_mm[i] += amplitude[0] * 1e-3 * r2 * x;
       errors->y_mm[i] += amplitude[0] * 1e-3 * r2 * y;
     } else {

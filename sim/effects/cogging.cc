@@ -10,7 +10,7 @@ namespace {
 
 void List(const CampaignFacts&, Templates* out) {
   for (const int power : {1, 2})
-    ListGrid({.shapes = {1, 2},
+    ListGrid({.shapes = {1, 2, 6},
               .shape_name = power == 1 ? "falls with the drive; motor harmonic"
                                        : "falls with its square; motor harmonic",
               .form = power,

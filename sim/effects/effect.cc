@@ -59,6 +59,12 @@ std::size_t AxisIndex(const Template& form) {
   return form.axis == EffectAxis::kPhi ? kPhi : kTheta;
 }
 
+std::span<const std::size_t> AxesOf(const Template& form) {
+  static constexpr std::size_t kAxes[] = {kTheta, kPhi};
+  if (form.axis == EffectAxis::kBoth) return kAxes;
+  return std::span(kAxes).subspan(AxisIndex(form), 1);
+}
+
 void ListGrid(const Grid& grid, Templates* out) {
   for (const EffectAxis axis : grid.axes)
     for (const Memory memory : grid.memories)

@@ -41,7 +41,7 @@ enum class Memory {
   kChain,  // it adds up, open loop, until the unit is homed
 };
 
-inline constexpr std::size_t kColumnsMax = 4;
+inline constexpr std::size_t kColumnsMax = 6;
 
 struct Effect;
 
@@ -76,6 +76,8 @@ std::string_view Name(Owner owner);
 std::string_view Name(Memory memory);
 /// Index of the axis whose angle the template changes. Pre: kTheta or kPhi.
 std::size_t AxisIndex(const Template& form);
+/// The axes that it changes. Pre: not kNone.
+std::span<const std::size_t> AxesOf(const Template& form);
 
 // ---- for the files of effects
 

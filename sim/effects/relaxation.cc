@@ -7,8 +7,31 @@
 namespace focalfleet::sim {
 namespace {
 
+// Seconds since the axis came to rest, at each exposure.
+std::vector<double> RestTimes(const UnitTrack& track, std::size_t axis) {
+  const std::span<const double> delay = track.Column("delay_s");
+  std::span<const double> time;
+  if (track.facts->Has("t_s")) time = track.Column("t_s");
+  std::vector<double> rest(track.moves);
+  double ended = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double own = std::max(delay[i], 0.0);
+    rest[i] = own;
+    if (time.empty()) continue;
+    if (i == 0 || track.step_deg[axis][i] != 0) ended = time[i] - own;
+    rest[i] = std::max(time[i] - ended, own);
+  }
+  return rest;
+}
+
 void List(const CampaignFacts&, Templates* out) {
-  ListGrid({.shapes = {0.3, 1, 3, 10, 30, 100}, .shape_name = "time constant, s,"}, out);
+  // Form 0: seen once, and then held; 1: by the exposure's delay; 2: since the axis came to rest.
+  const std::vector<double> times_s = {0.3, 1, 3, 10, 30, 100};
+  ListGrid({.shapes = times_s, .shape_name = "time constant, s,"}, out);
+  ListGrid(
+      {.shapes = times_s, .shape_name = "by the exposure's delay; time constant, s,", .form = 1},
+      out);
+  ListGrid({.shapes = times_s, .shape_name = "as time passes; time constant, s,", .form = 2}, out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -16,13 +39,24 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> delay = track.Column("delay_s");
-  AddRemembered(
-      track, axis, form.memory,
-      [&](std::size_t i) {
-        return -amplitude[0] * Direction(step[i]) *
-               (1 - std::exp(-std::max(delay[i], 0.0) / form.shape));
-      },
-      &errors->angle_deg[axis]);
+  const auto crept = [&](double seconds) {
+    return -amplitude[0] * (1 - std::exp(-std::max(seconds, 0.0) / form.shape));
+  };
+  if (form.form == 0) {
+    AddRemembered(
+        track, axis, form.memory,
+        [&](std::size_t i) { return Direction(step[i]) * crept(delay[i]); },
+        &errors->angle_deg[axis]);
+    return;
+  }
+  std::vector<double> rest;
+  if (form.form == 2) rest = RestTimes(track, axis);
+  double direction = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i]) direction = 0;
+    if (step[i] != 0) direction = Direction(step[i]);
+    errors->angle_deg[axis][i] += direction * crept(form.form == 2 ? rest[i] : delay[i]);
+  }
 }
 
 }  // namespace

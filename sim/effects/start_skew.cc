@@ -6,25 +6,41 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
-  ListGrid({.memories = {Memory::kHold, Memory::kNow},
-            .shapes = {0, 0.25, 0.5, 0.75},
+void List(const CampaignFacts& facts, Templates* out) {
+  const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
+  const std::vector<double> shapes = {0, 0.25, 0.5, 0.75};
+  ListGrid({.axes = axes,
+            .memories = {Memory::kHold, Memory::kNow},
+            .shapes = shapes,
             .shape_name = "from this share of the slots:"},
            out);
+  // Whoever waits longer than that sees the end of every move.
+  if (facts.Has("delay_s") && facts.Find("delay_s")->varies())
+    ListGrid({.axes = axes,
+              .memories = {Memory::kNow},
+              .shapes = shapes,
+              .shape_name = "in exposures within a second; from this share of the slots:",
+              .form = 1},
+             out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  const std::size_t axis = AxisIndex(form);
-  const std::span<const double> step = track.step_deg[axis];
+  constexpr double kEarly_s = 1;
   const std::span<const double> slot = track.Column("bus_slot");
   const double last = std::max(track.facts->Find("bus_slot")->high, 1.0);
-  AddRemembered(
-      track, axis, form.memory,
-      [&](std::size_t i) {
-        return -amplitude[0] * Direction(step[i]) * std::max(slot[i] / last - form.shape, 0.0);
-      },
-      &errors->angle_deg[axis]);
+  std::span<const double> delay;
+  if (form.form == 1) delay = track.Column("delay_s");
+  for (const std::size_t axis : AxesOf(form)) {
+    const std::span<const double> step = track.step_deg[axis];
+    AddRemembered(
+        track, axis, form.memory,
+        [&](std::size_t i) {
+          if (form.form == 1 && delay[i] > kEarly_s) return 0.0;
+          return -amplitude[0] * Direction(step[i]) * std::max(slot[i] / last - form.shape, 0.0);
+        },
+        &errors->angle_deg[axis]);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include "sim/effects/track.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -269,6 +270,39 @@ const FilledColumn* CampaignFacts::Find(std::string_view name) const {
   return it == columns.end() ? nullptr : &it->second;
 }
 
+namespace {
+
+// Tables call the camera's pixels by many names: x_px, pixel_x, xpix ... The canonical columns are
+// pixel_x and pixel_y.
+bool IsPixelOf(std::string_view name, char letter) {
+  std::string plain;
+  for (const char c : name)
+    if (c != '_' && c != '-' && c != ' ') plain += static_cast<char>(std::tolower(c));
+  for (const std::string_view word : {"pixels", "pixel", "pix", "px"}) {
+    const std::size_t at = plain.find(word);
+    if (at == std::string::npos) continue;
+    plain.erase(at, word.size());
+    if (plain.starts_with("ccd") || plain.starts_with("cam")) plain.erase(0, 3);
+    return plain == std::string(1, letter);
+  }
+  return false;
+}
+
+void AddPixelColumns(CampaignFacts* facts) {
+  for (const char letter : {'x', 'y'}) {
+    const std::string canonical = std::string("pixel_") + letter;
+    if (facts->Has(canonical)) continue;
+    for (const auto& [name, column] : facts->columns)
+      if (IsPixelOf(name, letter)) {
+        FilledColumn copy = column;
+        facts->columns[canonical] = std::move(copy);
+        break;
+      }
+  }
+}
+
+}  // namespace
+
 CampaignFacts MakeFacts(const Campaign& campaign) {
   CampaignFacts facts;
   facts.campaign = &campaign;
@@ -278,6 +312,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
     if (column.missing_share <= kMissingShareMax) facts.columns[covariate.name] = std::move(column);
   }
   AddUnitColumns(campaign, &facts);
+  AddPixelColumns(&facts);
   FindPlate(campaign, &facts);
   FindHistory(campaign, &facts);
   std::vector<double> order(campaign.rows());
@@ -287,6 +322,8 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   for (const std::size_t axis : {kTheta, kPhi}) {
     facts.columns[std::string(kCommand[axis])] =
         Fill(campaign.cmd_deg[axis], campaign, facts.exposures);
+    facts.columns[std::string(kFrom[axis])] =
+        Fill(campaign.from_deg[axis], campaign, facts.exposures);
     facts.columns[std::string(kStep[axis])] = Fill(facts.step_deg[axis], campaign, facts.exposures);
   }
   FindGradients(campaign, &facts);

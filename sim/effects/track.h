@@ -31,6 +31,7 @@ struct FilledColumn {
 
 /// Columns that are computed, with names that no table has.
 inline constexpr std::string_view kCommand[] = {"theta_cmd_deg", "phi_cmd_deg"};
+inline constexpr std::string_view kFrom[] = {"theta_from_deg", "phi_from_deg"};
 inline constexpr std::string_view kStep[] = {"theta step", "phi step"};
 inline constexpr std::string_view kOrder = "move order";
 inline constexpr std::string_view kGradientX = "temperature gradient x";
