@@ -1,68 +1,249 @@
 #include "sim/diagnosis/events.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <set>
 
+#include "sim/diagnosis/chances.h"
+
 namespace focalfleet::sim {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-constexpr double kChiSquareMin = 50;  // best of some hundred places and axes, in thousands of units
-constexpr std::size_t kEventsMax = 6;  // of a unit
-constexpr std::size_t kLastsMin = 3;   // exposures: fewer may be outliers
-constexpr double kNear = 3.5;          // sigmas from a size that physics has
-constexpr double kStepMin_deg = 2;     // a lost command below it cannot be told from other steps
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr std::size_t kEventsMax = 40;  // of a unit
+constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
 constexpr int kTurnsMax = 20;
+constexpr double kEventEvidence = 25;  // at least, of an event that was taken
 
-struct StepFound {
-  std::size_t move = 0, axis = kTheta;
-  double size_deg = 0, sigma_deg = 0, chi_square = 0;
+// ---- lost and doubled commands: so large that only the exact place tells
+
+constexpr double kCap_mm = 0.5;  // what an outlier costs at most
+
+// One unit's rows, and what has been added to each angle so far.
+struct UnitRows {
+  CampaignUnit geometry;
+  UnitTrack track;
+  std::span<const double> x_mm, y_mm;
+  std::vector<double> added_deg[2];
 };
 
-// The step with the largest chi-square beside the unit's geometry.
-StepFound BestStep(const WhiteUnit& white, const VectorXd& y) {
-  const Eigen::HouseholderQR<MatrixXd> qr(white.geometry);
-  const MatrixXd q =
-      qr.householderQ() * MatrixXd::Identity(white.geometry.rows(), white.geometry.cols());
-  const VectorXd left = y - q * (q.transpose() * y);
-  StepFound best;
-  PoseErrors errors;
-  VectorXd m(y.size());
-  for (const std::size_t axis : {kTheta, kPhi})
-    for (std::size_t move = 1; move < white.track.moves; ++move) {
-      if (white.track.step_deg[axis][move] == 0) continue;
-      errors.Reset(white.track.moves);
-      std::size_t i = move;
-      for (; i < white.track.moves && (i == move || white.track.restarts[i] == 0); ++i)
-        errors.angle_deg[axis][i] = 1;
-      if (i - move < kLastsMin) continue;
-      WhiteDisplacement(white, errors, m.data());
-      m -= q * (q.transpose() * m);
-      const double g = m.squaredNorm(), b = m.dot(left);
-      if (g <= 0 || b * b / g <= best.chi_square) continue;
-      best = {move, axis, b / g, 1 / std::sqrt(g), b * b / g};
+double RowCost(const UnitRows& rows, std::size_t i, double theta_deg, double phi_deg) {
+  if (!std::isfinite(rows.x_mm[i])) return 0;
+  const PlacePoint at = PlaceOf(rows.geometry, rows.track.cmd_deg[kTheta][i] + theta_deg,
+                                rows.track.cmd_deg[kPhi][i] + phi_deg);
+  const double x = rows.x_mm[i] - at.x_mm, y = rows.y_mm[i] - at.y_mm;
+  return std::min(x * x + y * y, kCap_mm * kCap_mm);
+}
+
+std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
+  std::size_t end = move + 1;
+  while (end < track.moves && track.restarts[end] == 0) ++end;
+  return end;
+}
+
+double TotalCost(const UnitRows& rows) {
+  double sum = 0;
+  for (std::size_t i = 0; i < rows.track.moves; ++i)
+    sum += RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]);
+  return sum;
+}
+
+struct WholeMove {
+  std::size_t move = 0;
+  double sign = 0;  // -1: not made; +1: made twice
+  double gained = 0;
+};
+
+WholeMove BestWholeMove(const UnitRows& rows) {
+  const UnitTrack& track = rows.track;
+  WholeMove best;
+  for (std::size_t move = 0; move < track.moves; ++move) {
+    const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
+    if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) continue;
+    const std::size_t end = EndOfHistory(track, move);
+    for (const double sign : {-1.0, 1.0}) {
+      double gained = 0;
+      for (std::size_t i = move; i < end; ++i) {
+        const double theta = rows.added_deg[kTheta][i], phi = rows.added_deg[kPhi][i];
+        gained += RowCost(rows, i, theta, phi) -
+                  RowCost(rows, i, theta + sign * steps[0], phi + sign * steps[1]);
+      }
+      if (gained > best.gained) best = {move, sign, gained};
     }
+  }
   return best;
 }
 
-// The size that physics has near the found one; 0: none.
-double SizeOfPhysics(const UnitTrack& track, const StepFound& found) {
-  const double step = track.step_deg[found.axis][found.move];
-  const double tolerance = std::max(kNear * found.sigma_deg, 1e-3);
-  if (std::abs(step) > kStepMin_deg)
-    for (const double size : {-step, step})
-      if (std::abs(found.size_deg - size) < std::max(tolerance, 0.005 * std::abs(step)))
-        return size;
-  const double turn = 360 / track.unit->gear[found.axis];
-  const double turns = std::round(found.size_deg / turn);
-  const bool against = turns * step < 0;
-  if (turns == 0 || std::abs(turns) > kTurnsMax || !against || tolerance > 0.25 * turn) return 0;
-  return std::abs(found.size_deg - turns * turn) < tolerance ? turns * turn : 0;
+// Whole moves that explain the rows, from one geometry to begin at.
+std::vector<WholeMove> FindWholeMoves(double far_mm, UnitRows* rows) {
+  const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
+  std::vector<WholeMove> found;
+  while (found.size() < kEventsMax) {
+    const WholeMove best = BestWholeMove(*rows);
+    if (best.gained < gain_min) break;
+    for (std::size_t i = best.move; i < EndOfHistory(rows->track, best.move); ++i)
+      for (const std::size_t axis : {kTheta, kPhi})
+        rows->added_deg[axis][i] += best.sign * rows->track.step_deg[axis][best.move];
+    found.push_back(best);
+  }
+  return found;
+}
+
+UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) {
+  const Campaign& campaign = *fit.facts->campaign;
+  UnitRows rows;
+  rows.geometry = geometry;
+  rows.track = MakeTrack(*fit.facts, unit, geometry);
+  rows.x_mm = std::span(campaign.x_mm).subspan(rows.track.first_row, rows.track.moves);
+  rows.y_mm = std::span(campaign.y_mm).subspan(rows.track.first_row, rows.track.moves);
+  for (const std::size_t axis : {kTheta, kPhi}) rows.added_deg[axis].assign(rows.track.moves, 0);
+  return rows;
+}
+
+// The unit's lost and doubled commands; its geometry is set to the one that they belong to, as a
+// fit that did not know of them may have been dragged along.
+std::vector<EventTerm> LostCommands(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
+  std::vector<EventTerm> events;
+  UnitRows rows = RowsOf(fit, unit, fit.model.units[unit]);
+  // A row is worth a look that noise does not put there.
+  const double far_mm =
+      std::clamp(15e-3 * fit.noise.place_um * fit.noise.unit_factor[unit], 0.04, 0.4);
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < rows.track.moves; ++i)
+    if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
+  if (far < 3) return events;
+  const double before = TotalCost(rows);
+  std::vector<WholeMove> found = FindWholeMoves(far_mm, &rows);
+  double after = TotalCost(rows);
+  UnitRows table = RowsOf(fit, unit, fit.facts->campaign->units[unit]);
+  const std::vector<WholeMove> by_table = FindWholeMoves(far_mm, &table);
+  const CampaignUnit* chosen = &fit.model.units[unit];
+  if (const double cost = TotalCost(table); cost < after)
+    after = cost, found = by_table, chosen = &fit.facts->campaign->units[unit];
+  // The rest must lie near: what whole moves do not explain is something else.
+  if (found.empty() || after > 0.5 * before) return events;
+  *geometry = *chosen;
+  for (const WholeMove& whole : found)
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      const double step = rows.track.step_deg[axis][whole.move];
+      if (step != 0)
+        events.push_back({unit, rows.track.first_row + whole.move, axis, true, whole.sign * step});
+    }
+  return events;
+}
+
+// ---- slips: whole turns of the rotor, against the motion
+
+struct AngleRow {
+  std::size_t move = 0;
+  double error_deg = 0;
+};
+
+// What each seen place says about the axis' angle, where the arms' pose tells the axes apart.
+std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::size_t axis) {
+  constexpr double kApart = 0.25;  // sine of the angle between the two tangents
+  std::vector<AngleRow> rows;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const std::size_t row = track.first_row + i;
+    if (fit.aside[row] != 0 || !std::isfinite(fit.x_um[row])) continue;
+    const double ax = -(track.elbow_y_mm[i] + track.reach_y_mm[i]);
+    const double ay = track.elbow_x_mm[i] + track.reach_x_mm[i];
+    const double bx = -track.reach_y_mm[i], by = track.reach_x_mm[i];
+    const double det = ax * by - ay * bx;
+    if (std::abs(det) < kApart * std::hypot(ax, ay) * std::hypot(bx, by)) continue;
+    const double x = 1e-3 * fit.x_um[row], y = 1e-3 * fit.y_um[row];
+    const double error = axis == kTheta ? (by * x - bx * y) / det : (ax * y - ay * x) / det;
+    rows.push_back({i, error / kRadians});
+  }
+  return rows;
+}
+
+// Mean of up to three rows from `at`, that belong to one history.
+double Level(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t at, int step,
+             std::size_t* count) {
+  double sum = 0;
+  *count = 0;
+  for (std::size_t k = at; k < rows.size() && *count < 3; k += static_cast<std::size_t>(step)) {
+    sum += rows[k].error_deg;
+    ++*count;
+    if (step < 0 && (k == 0 || track.restarts[rows[k].move] != 0)) break;
+    if (step > 0 && k + 1 < rows.size() && EndOfHistory(track, rows[k].move) <= rows[k + 1].move)
+      break;
+  }
+  return sum / static_cast<double>(*count);
+}
+
+struct Jump {
+  std::size_t move = 0;  // that it happened in
+  double turns = 0;
+  bool whole = false;  // a whole number of turns, against the motion
+  bool holds = false;  // the next rows are at the new level
+};
+
+// The move between two rows that went the other way, the longest; 0: none.
+std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t from, std::size_t to,
+                        double turns) {
+  std::size_t best = 0;
+  double most = 0;
+  for (std::size_t move = from + 1; move <= to; ++move) {
+    const double step = track.step_deg[axis][move];
+    if (step * turns < 0 && std::abs(step) > most) most = std::abs(step), best = move;
+  }
+  return best;
+}
+
+std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& track,
+                          std::size_t axis, double turn) {
+  std::vector<Jump> jumps;
+  for (std::size_t k = 1; k < rows.size(); ++k) {
+    const std::size_t from = rows[k - 1].move, to = rows[k].move;
+    const double size = rows[k].error_deg - rows[k - 1].error_deg;
+    if (EndOfHistory(track, from) <= to || std::abs(size) < 0.6 * turn) continue;
+    Jump jump;
+    jump.turns = std::round(size / turn);
+    jump.move = MoveAgainst(track, axis, from, to, jump.turns);
+    jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&
+                 std::abs(size - jump.turns * turn) < 0.25 * turn;
+    std::size_t behind = 0, ahead = 0;
+    const double levels = Level(rows, track, k, 1, &ahead) - Level(rows, track, k - 1, -1, &behind);
+    // A place that comes back at once was an outlier.
+    jump.holds = ahead >= 2 && std::abs(size - levels) < 0.3 * turn &&
+                 std::abs(levels - jump.turns * turn) < 0.25 * turn;
+    jumps.push_back(jump);
+  }
+  return jumps;
+}
+
+// Of the difference of two rows, as most of the unit's rows have it; negative: too few rows.
+double UsualJump_deg(const Fit& fit, std::size_t unit, std::size_t axis) {
+  constexpr std::size_t kJumpsMin = 8;
+  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
+  std::vector<double> jumps;
+  for (std::size_t k = 1; k < rows.size(); ++k)
+    jumps.push_back(std::abs(rows[k].error_deg - rows[k - 1].error_deg));
+  return jumps.size() < kJumpsMin ? -1 : Median(std::move(jumps)) / 0.6745;
+}
+
+// `jump_deg`: standard deviation of a difference without slips.
+std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis, double jump_deg) {
+  constexpr double kNoiseMax = 1.0 / 6;  // of a turn: else turns cannot be counted
+  std::vector<EventTerm> events;
+  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  const double turn = 360 / track.unit->gear[axis];
+  if (jump_deg < 0 || jump_deg > kNoiseMax * turn) return events;
+  const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
+  std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn);
+  const auto whole = static_cast<std::size_t>(
+      std::count_if(jumped.begin(), jumped.end(), [](const Jump& jump) { return jump.whole; }));
+  // Many jumps that are whole turns against the motion: slips, however close they follow.
+  const bool many = whole >= 4 && 5 * whole >= 4 * jumped.size();
+  for (const Jump& jump : jumped)
+    if (jump.whole && (many || jump.holds) && events.size() < kEventsMax)
+      events.push_back({unit, track.first_row + jump.move, axis, true, jump.turns * turn});
+  return events;
 }
 
 bool IsLostCommand(const Fit& fit, const EventTerm& event) {
@@ -70,41 +251,51 @@ bool IsLostCommand(const Fit& fit, const EventTerm& event) {
   return std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9;
 }
 
+double FleetJump_deg(const Fit& fit, std::size_t axis) {
+  constexpr std::size_t kUnits = 64;  // are enough for a median
+  const std::size_t units = fit.model.units.size();
+  std::vector<double> usual;
+  for (std::size_t unit = 0; unit < units; unit += std::max<std::size_t>(1, units / kUnits))
+    if (const double jump = UsualJump_deg(fit, unit, axis); jump >= 0) usual.push_back(jump);
+  return usual.empty() ? -1 : Median(std::move(usual));
+}
+
 }  // namespace
 
 std::size_t AddEvents(Fit* fit) {
   const std::size_t units = fit->model.units.size();
   std::vector<std::vector<EventTerm>> of_unit(units);
+  std::vector<CampaignUnit> geometry = fit->model.units;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
-  fit->parallel(chunks.size(), [&](std::size_t chunk) {
-    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
-      const WhiteUnit white = Whiten(*fit, unit);
-      if (white.moves.size() < 8) continue;
-      VectorXd y = white.y;
-      PoseErrors errors;
-      VectorXd m(y.size());
-      while (of_unit[unit].size() < kEventsMax) {
-        const StepFound found = BestStep(white, y);
-        if (found.chi_square < kChiSquareMin) break;
-        const double size = SizeOfPhysics(white.track, found);
-        if (size == 0) break;
-        of_unit[unit].push_back({unit, white.track.first_row + found.move, found.axis, true, size});
-        errors.Reset(white.track.moves);
-        for (std::size_t i = found.move; i < white.track.moves; ++i) {
-          if (i > found.move && white.track.restarts[i] != 0) break;
-          errors.angle_deg[found.axis][i] = size;
-        }
-        WhiteDisplacement(white, errors, m.data());
-        y -= m;
-      }
+  const auto take = [&] {
+    std::size_t added = 0;
+    for (auto& events : of_unit) {
+      for (const EventTerm& event : events) fit->model.events.push_back(event), ++added;
+      events.clear();
     }
-  });
-  std::size_t added = 0;
-  for (const auto& events : of_unit)
-    for (const EventTerm& event : events) fit->model.events.push_back(event), ++added;
-  if (added > 0) {
+    if (added == 0) return added;
+    fit->model.units = geometry;
     UpdateResiduals(fit);
     SettleFit(fit, 3);
+    return added;
+  };
+  fit->parallel(chunks.size(), [&](std::size_t chunk) {
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
+      of_unit[unit] = LostCommands(*fit, unit, &geometry[unit]);
+  });
+  std::size_t added = take();
+  for (int round = 0; round < 2; ++round) {
+    geometry = fit->model.units;
+    const std::array<double, 2> usual = {FleetJump_deg(*fit, kTheta), FleetJump_deg(*fit, kPhi)};
+    fit->parallel(chunks.size(), [&](std::size_t chunk) {
+      for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
+        for (const std::size_t axis : {kTheta, kPhi})
+          for (const EventTerm& slip : Slips(*fit, unit, axis, usual[axis]))
+            of_unit[unit].push_back(slip);
+    });
+    const std::size_t slips = take();
+    added += slips;
+    if (slips == 0) break;
   }
   return added;
 }
@@ -136,7 +327,7 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
     cause.all_units = units.size() == fit.model.units.size();
     cause.ci95[0] = cause.ci95[1] = cause.amplitude;
     cause.size_um = std::sqrt(square / cause.amplitude);
-    cause.delta_log_likelihood = kChiSquareMin / 2 * cause.amplitude;
+    cause.delta_log_likelihood = kEventEvidence * cause.amplitude;
     cause.paragraph = lost_command
                           ? "A whole move was not made, or made twice: look at the bus and its "
                             "error counters."
