@@ -9,6 +9,7 @@
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/events.h"
+#include "sim/diagnosis/families.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
 #include "sim/diagnosis/image.h"
@@ -404,7 +405,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   Selection selection = SelectWithEvents(templates, rule, &fit);
   if (facts.homings > 0 && TryHomings(templates, rule, &selection, &fit))
     diagnosis.causes.push_back(HomingCause(fit));
-  if (std::optional<CauseFound> image = AddImageTerms(&fit, options.family_wise)) {
+  if (std::optional<CauseFound> image =
+          AddImageTerms(&fit, options.family_wise, &diagnosis.unknown)) {
     if (!IsLeftOut(options, image->cause)) diagnosis.causes.push_back(std::move(*image));
     // What the image's motion hid, or what stood in for it.
     std::vector<double> kept = std::move(selection.kept_share);
@@ -422,8 +424,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     if (!IsLeftOut(options, cause.cause)) diagnosis.causes.push_back(std::move(cause));
   }
   MergeCauses(&diagnosis.causes);
+  JudgeRemainders(&diagnosis.causes);
   options.progress(0.85, "what is left");
-  diagnosis.unknown = Screen(fit, options);
+  for (UnknownFound& left : Screen(fit, options)) diagnosis.unknown.push_back(std::move(left));
   FindAfterFit(fit, &diagnosis.outliers);
   for (const std::string_view cause : kEventCauses)
     diagnosis.not_testable.push_back({std::string(cause), "this version has no test for it"});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "sim/diagnosis/chances.h"
 
@@ -102,9 +103,87 @@ CauseFound ImageCause(const Fit& fit, double chi_square, double size_um) {
   return cause;
 }
 
+// ---- does the image move with something that the table knows?
+
+// Mean of a column at each exposure; empty where units differ, or where it does not vary.
+std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& column) {
+  constexpr double kOwnShareMax = 0.1;  // of the variance: what units have of their own
+  const std::size_t exposures = facts.exposures.size();
+  std::vector<double> mean(exposures, 0), count(exposures, 0);
+  double square = 0;
+  for (std::size_t row = 0; row < column.values.size(); ++row) {
+    const std::size_t e = facts.exposures.of_row[row];
+    mean[e] += column.values[row], count[e] += 1;
+    square += (column.values[row] - column.mean) * (column.values[row] - column.mean);
+  }
+  double between = 0;
+  for (std::size_t e = 0; e < exposures; ++e) {
+    mean[e] /= std::max(count[e], 1.0);
+    between += count[e] * (mean[e] - column.mean) * (mean[e] - column.mean);
+  }
+  if (!(square > 0) || between < (1 - kOwnShareMax) * square) mean.clear();
+  return mean;
+}
+
+// Share of the shifts' variance that curves over the ranks of `values` take.
+double ShareTaken(const std::vector<Vector4>& shifts, const std::vector<double>& values,
+                  int curves) {
+  const auto n = static_cast<Eigen::Index>(shifts.size());
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  Eigen::MatrixXd basis(n, curves + 1), two(n, 2);
+  for (Eigen::Index e = 0; e < n; ++e) {
+    const double value = values[static_cast<std::size_t>(e)];
+    const auto range = std::equal_range(sorted.begin(), sorted.end(), value);
+    const double rank =
+        static_cast<double>((range.first - sorted.begin()) + (range.second - sorted.begin())) /
+        (2 * static_cast<double>(n));
+    basis(e, 0) = 1;
+    for (int k = 1; k <= curves; ++k) basis(e, k) = std::cos(std::numbers::pi * k * rank);
+    two.row(e) = shifts[static_cast<std::size_t>(e)].head<2>().transpose();
+  }
+  two.rowwise() -= two.colwise().mean().eval();
+  const Eigen::MatrixXd left = two - basis * basis.colPivHouseholderQr().solve(two);
+  const double all = two.squaredNorm();
+  return all > 0 ? 1 - left.squaredNorm() / all : 0;
+}
+
+// The column that the image's shifts follow best, if it is no chance and more than time does.
+std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
+                                           const std::vector<Vector4>& shifts, double size_um) {
+  constexpr int kCurves = 3, kTimeCurves = 6;
+  constexpr double kShareMin = 0.25, kBeyondTime = 0.1;
+  const std::size_t exposures = facts.exposures.size();
+  if (exposures < 20) return std::nullopt;
+  std::vector<double> order(exposures), parity(exposures);
+  for (std::size_t e = 0; e < exposures; ++e)
+    order[e] = static_cast<double>(e), parity[e] = static_cast<double>(e % 2);
+  const double by_time = ShareTaken(shifts, order, kTimeCurves);
+  std::optional<UnknownFound> best;
+  double most = std::max(kShareMin, by_time + kBeyondTime), columns = 1;
+  const auto look = [&](const std::string& name, const std::vector<double>& values, int curves) {
+    columns += 1;
+    const double share = ShareTaken(shifts, values, curves);
+    if (share < most) return;
+    most = share;
+    best = UnknownFound{name, "the image's shift", 0, size_um * std::sqrt(share)};
+    best->p_value = std::exp(LogChiSquareTail(
+        -2 * static_cast<double>(exposures) * std::log1p(-std::min(share, 0.999)), 2.0 * curves));
+  };
+  look("move parity", parity, 1);
+  for (const auto& [name, column] : facts.columns) {
+    if (!column.varies() || name == kOrder || name == "t_s" || name.starts_with("pixel_")) continue;
+    const std::vector<double> values = OfExposures(facts, column);
+    if (!values.empty()) look(name, values, kCurves);
+  }
+  if (best && best->p_value * columns > 1e-4) best.reset();
+  return best;
+}
+
 }  // namespace
 
-std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise) {
+std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise,
+                                        std::vector<UnknownFound>* unknown) {
   if (fit->model.units.size() < kUnitsMin) return std::nullopt;
   const std::vector<Image> images = Normals(*fit);
   double chi_square = 0, dof = 0;
@@ -133,6 +212,8 @@ std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise) {
     square += v[0] * v[0] + v[1] * v[1] + 0.5 * (v[2] * v[2] + v[3] * v[3]);
   }
   const double size_um = std::sqrt(square / static_cast<double>(images.size()));
+  const auto followed = FollowedColumn(*fit->facts, found, size_um);
+  if (followed) unknown->push_back(*followed);
   UpdateResiduals(fit);
   SettleFit(fit, 2);
   const double after = NeighboursAgree(*fit, &turbulence_um);
@@ -147,7 +228,8 @@ std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise) {
         "Air bends the light on its way to the camera: neighbours move alike, anew at each "
         "exposure. Stack exposures, or calm the air.";
   }
-  if (cause.size_um < kSizeMin_um) return std::nullopt;
+  // What follows a column is not the image's own unrest.
+  if (followed || cause.size_um < kSizeMin_um) return std::nullopt;
   return cause;
 }
 

@@ -13,6 +13,8 @@ namespace focalfleet::sim {
 /// Fits shift, turn and scale of each exposure to the residuals where chance does not explain
 /// them, adds them to the model and returns the cause: camera_similarity, or air_turbulence where
 /// neighbours still agree after it.
-std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise);
+/// A column that the image's shifts follow is added to `unknown`, and nothing is named.
+std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise,
+                                        std::vector<UnknownFound>* unknown);
 
 }  // namespace focalfleet::sim

@@ -13,6 +13,13 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kMicrons = 1e3;  // a millimetre
 constexpr double kHuber = 3;      // whitened length from which a row counts less
+constexpr double kFar = 5;        // and from which it counts for ever less
+
+// Huber's, and from kFar on less and less: a row far away says nothing of the rest.
+double WeightOf(double square) {
+  if (square <= kHuber * kHuber) return 1;
+  return square <= kFar * kFar ? kHuber / std::sqrt(square) : kHuber * kFar / square;
+}
 
 // The used rows and what an axis' turn does at each.
 WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
@@ -53,7 +60,7 @@ void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, Whit
     double square = filter.SquareLength(fit.x_um[row], fit.y_um[row]);
     double weight = fit.weight[row];
     if (made != nullptr) {
-      weight = square > kHuber * kHuber ? kHuber / std::sqrt(square) : 1;
+      weight = WeightOf(square);
       made->push_back(weight);
     }
     white->filter.push_back(filter.Take(weight));

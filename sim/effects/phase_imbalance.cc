@@ -1,18 +1,37 @@
 // Phase imbalance: unequal phases or dead time of the bridge.
+#include <algorithm>
+#include <cmath>
+
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
-  ListGrid({.shapes = {1, 2, 6}, .shape_name = "motor harmonic", .columns = 2}, out);
+void List(const CampaignFacts& facts, Templates* out) {
+  // Unequal gains grow with the drive, so that the angle does not know it; an offset (order 1) and
+  // the bridge's dead time (order 6) are volts of their own.
+  ListGrid({.shapes = {2}, .shape_name = "unequal gains; motor harmonic", .columns = 2}, out);
+  const bool levels = facts.Has("drive_amplitude");
+  ListGrid({.shapes = {1, 6},
+            .shape_name = levels ? "falls with the drive; motor harmonic" : "motor harmonic",
+            .form = levels ? 1 : 0,
+            .columns = 2},
+           out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  AddHarmonic(track, axis, form.shape * track.unit->gear[axis], amplitude, errors);
+  const double order = form.shape * track.unit->gear[axis];
+  if (form.form == 0) return AddHarmonic(track, axis, order, amplitude, errors);
+  const std::span<const double> drive = track.Column("drive_amplitude");
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double phase = HarmonicPhase(track, axis, i, order);
+    errors->angle_deg[axis][i] +=
+        (amplitude[0] * std::sin(phase) + amplitude[1] * std::cos(phase)) /
+        std::max(drive[i], 0.05);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,20 @@
+// Causes whose signatures are near each other, so that the true shape of one, where the library has
+// it only roughly, leaves a remainder that looks like another.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "sim/diagnosis/diagnosis.h"
+
+namespace focalfleet::sim {
+
+/// Have the two causes a family in common?
+bool AreRelated(std::string_view a, std::string_view b);
+
+/// A weak cause beside a strong relative on the same axis is no cause of its own for sure: below a
+/// small share of the relative's evidence it is told as the relative's shape, below a larger share
+/// the relative becomes one of its candidates. Pre: strongest first.
+void JudgeRemainders(std::vector<CauseFound>* causes);
+
+}  // namespace focalfleet::sim
