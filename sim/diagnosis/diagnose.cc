@@ -267,7 +267,10 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   Selection selection = Select(templates, rule, fit);
   if (events == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
-  if (Merit(stepped) <= Merit(*fit)) return selection;
+  // A step is a large claim about one move: it has to be worth more than its price.
+  constexpr double kClearly = 20, kEach = 10;
+  if (Merit(stepped) <= Merit(*fit) + kClearly + kEach * static_cast<double>(events))
+    return selection;
   *fit = std::move(stepped);
   return again;
 }
@@ -425,6 +428,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   }
   MergeCauses(&diagnosis.causes);
   JudgeRemainders(&diagnosis.causes);
+  JudgeSeries(&diagnosis.causes, &diagnosis.unknown);
   options.progress(0.85, "what is left");
   for (UnknownFound& left : Screen(fit, options)) diagnosis.unknown.push_back(std::move(left));
   FindAfterFit(fit, &diagnosis.outliers);

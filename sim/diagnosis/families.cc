@@ -1,6 +1,7 @@
 #include "sim/diagnosis/families.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <span>
 
@@ -74,6 +75,27 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       candidates.push_back(name);
   }
   *causes = std::move(kept);
+}
+
+void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
+  constexpr std::size_t kSeries = 3;
+  for (const char* axis : {"theta", "phi"}) {
+    std::vector<CauseFound*> members;
+    double square = 0;
+    for (CauseFound& cause : *causes)
+      if (cause.axis == axis && Has(kAngles, cause.cause)) {
+        members.push_back(&cause);
+        square += cause.size_um * cause.size_um;
+      }
+    if (members.size() < kSeries) continue;
+    for (CauseFound* one : members)
+      for (const CauseFound* other : members)
+        if (std::find(one->candidates.begin(), one->candidates.end(), other->cause) ==
+            one->candidates.end())
+          one->candidates.push_back(other->cause);
+    unknown->push_back(
+        {std::string(axis) + "_cmd_deg", std::string(axis) + " angle", 0, std::sqrt(square)});
+  }
 }
 
 }  // namespace focalfleet::sim

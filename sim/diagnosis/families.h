@@ -17,4 +17,8 @@ bool AreRelated(std::string_view a, std::string_view b);
 /// the relative becomes one of its candidates. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
+/// Three causes or more that depend on where one axis stands are a series of shapes rather than
+/// causes: each gets the others as candidates, and the axis is told as not understood.
+void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
+
 }  // namespace focalfleet::sim

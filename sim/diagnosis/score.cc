@@ -222,6 +222,22 @@ double Leverage(const MatrixXd& m, double kept) {
   return most / kept;
 }
 
+// An amplitude beyond what physics allows, for sure.
+bool IsImpossible(const Effect& effect, const VectorXd& b, const MatrixXd& g) {
+  constexpr double kSigmas = 3, kUsual = 20;
+  const bool bounded = effect.amplitude_low < effect.amplitude_high;
+  const double high = bounded ? effect.amplitude_high : kUsual * effect.prior_size;
+  const double low = bounded ? effect.amplitude_low : -high;
+  if (!(g.trace() > 0)) return false;
+  if (b.size() == 1) {
+    const double a = b[0] / g(0, 0), sigma = 1 / std::sqrt(g(0, 0));
+    return a < low - kSigmas * sigma || a > high + kSigmas * sigma;
+  }
+  const double size = std::sqrt(std::max(b.dot(g.ldlt().solve(b)) / g.trace(), 0.0) *
+                                static_cast<double>(b.size()));
+  return size > high + kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
+}
+
 void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std::size_t without,
                ScorePass* pass, ChunkPart* part) {
   UnitScorer scorer(fit, unit, without);
@@ -245,7 +261,9 @@ void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std
     fleet.kept += kept;
     const auto c = static_cast<Index>(templates[k].columns);
     const MatrixXd g = m.transpose() * m;
-    const VectorXd b = m.transpose() * scorer.y();
+    VectorXd b = m.transpose() * scorer.y();
+    // An amplitude that cannot be says nothing for the effect.
+    if (IsImpossible(*templates[k].effect, b, g)) b.setZero();
     const VectorXd target_b = m.transpose() * scorer.target();
     Score& score = pass->scores[k];
     const auto at = static_cast<Index>(unit) * c;

@@ -14,6 +14,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kKeptMin = 0.03;  // of a signature: less is what geometry explains as well
+constexpr double kHopeless = 0.3;  // of what the term explains
 constexpr int kSwapSweepsMax = 3;
 constexpr double kBetterBy = 0.5;  // logarithm of evidence
 
@@ -134,7 +135,8 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const double behind = 2 * (best.evidence - look.standings[k].evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
-    if (behind >= rule.rival_behind && share < rule.rival_share) continue;
+    const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
+    if (behind >= rule.rival_behind && (share < rule.rival_share || hopeless)) continue;
     const auto [it, fresh] = by_cause.emplace(cause, Rival{cause, behind, share});
     if (!fresh && behind < it->second.behind) it->second = {cause, behind, share};
   }

@@ -50,7 +50,9 @@ Effect MakeCommandQuantisation() {
               "The command is rounded (or cut) to a step of the controller, so that the error "
               "is a saw-tooth of the command. It adds up if each move is rounded by itself.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .amplitude_low = 0,
+          .amplitude_high = 1.5};
 }
 
 }  // namespace focalfleet::sim

@@ -69,6 +69,9 @@ struct Effect {
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
+  // Amplitudes that physics allows; 0 and 0: twenty times the usual size either way.
+  double amplitude_low = 0;
+  double amplitude_high = 0;
 };
 
 std::string_view Name(EffectAxis axis);

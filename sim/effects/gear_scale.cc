@@ -31,7 +31,9 @@ Effect MakeGearScale() {
               "error grows with the distance from where the unit was homed. Calibrate the "
               "ratio, and look at the gear if one unit stands out.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .amplitude_low = -0.5,
+          .amplitude_high = 0.5};
 }
 
 }  // namespace focalfleet::sim

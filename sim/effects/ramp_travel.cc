@@ -43,7 +43,9 @@ Effect MakeRampTravel() {
               "motion in the ramps at its ends that the command does not count. As long as "
               "all moves have one length it looks like a scale error.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .amplitude_low = -10,
+          .amplitude_high = 10};
 }
 
 }  // namespace focalfleet::sim

@@ -50,7 +50,9 @@ Effect MakeStiction() {
               "where it was. Avoid short corrections, or overshoot and come back.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .amplitude_low = 0,
+          .amplitude_high = 1.2};
 }
 
 }  // namespace focalfleet::sim
