@@ -8,7 +8,7 @@
 
 namespace focalfleet {
 
-inline constexpr std::size_t kFileBytesMax = 256u << 20;
+inline constexpr std::size_t kFileBytesMax = std::size_t{1} << 30;  // a campaign of 5000 units
 
 /// The file's bytes; of a pipe without a name, all until its end.
 /// Errors: kUnavailable (missing, unreadable, a directory), kInvalid (larger than kFileBytesMax, a
