@@ -1,5 +1,9 @@
 #include "daemon/hall/field_model_file.h"
 
+#define TOML_EXCEPTIONS 0
+#define TOML_HEADER_ONLY 1
+#include <toml++/toml.h>
+
 #include <fmt/format.h>
 #include <toml++/toml.h>
 
@@ -264,14 +268,13 @@ std::string WriteHallModel(const HallModelFile& model) {
 }
 
 Result<HallModelFile> ReadHallModel(std::string_view text, const std::string& file) {
-  toml::table root;
-  // The library speaks in exceptions; none gets out of here.
-  try {
-    root = toml::parse(text, file);
-  } catch (const toml::parse_error& error) {
+  const toml::parse_result parsed = toml::parse(text, file);
+  if (!parsed) {
+    const toml::parse_error& error = parsed.error();
     return Fail(ErrorCode::kInvalid,
                 fmt::format("{}:{}: {}", file, error.source().begin.line, error.description()));
   }
+  const toml::table& root = parsed.table();
   Reader reader(file);
   HallModelFile model;
   model.name = reader.Text(root, "name");

@@ -65,8 +65,10 @@ class SurfaceField final : public FieldModel {
   Complex turn_;
 };
 
-// B = sum over orders m of Re[conj(C_m(z)) (x + i y)^m], C_m a polynomial: the sum over degrees by
-// the three-term recurrence, value and derivative together.
+// B = sum over orders m of Re[conj(C_m(z)) (x + i y)^m], C_m a polynomial in z: the sum over
+// degrees. It is tabulated once, with slopes, and read by cubic Hermite pieces: 1024 of them leave
+// 1e-10 of a polynomial of degree 20, and value and slope belong together, so that an inversion of
+// the table's own values is exact.
 class SphericalField final : public FieldModel {
  public:
   explicit SphericalField(const std::vector<SphericalTerm>& terms) {
@@ -75,32 +77,14 @@ class SphericalField final : public FieldModel {
       FOCALFLEET_CHECK(term.order >= 0 && term.degree >= term.order && term.degree <= kDegreeMax);
       by_order[term.order].push_back(term);
     }
-    for (const auto& [order, list] : by_order) {
-      int degree_max = order;
-      for (const SphericalTerm& term : list) degree_max = std::max(degree_max, term.degree);
-      Ladder ladder;
-      ladder.order = order;
-      ladder.rungs.resize(static_cast<std::size_t>(degree_max - order + 1));
-      for (const SphericalTerm& term : list) {
-        Rung& rung = ladder.rungs[static_cast<std::size_t>(term.degree - order)];
-        rung.cosine_T = term.cosine_T;
-        rung.sine_T = term.sine_T;
-      }
-      ladder.first = FirstOfOrder(order);
-      for (std::size_t k = 1; k < ladder.rungs.size(); ++k) {
-        const LegendreStep step = StepToDegree(order + static_cast<int>(k), order);
-        ladder.rungs[k].up = step.up;
-        ladder.rungs[k].back = step.back;
-      }
-      ladders_.push_back(std::move(ladder));
-    }
+    for (const auto& [order, list] : by_order) orders_.push_back(Tabulate(order, list));
   }
 
   [[nodiscard]] std::string_view kind() const override { return "spherical"; }
 
   [[nodiscard]] double period_rad() const override {
-    const bool four_fold = std::all_of(ladders_.begin(), ladders_.end(),
-                                       [](const Ladder& ladder) { return ladder.order % 4 == 0; });
+    const bool four_fold = std::all_of(orders_.begin(), orders_.end(),
+                                       [](const Order& order) { return order.order % 4 == 0; });
     return (four_fold ? 90 : 360) * kRadPerDeg;
   }
 
@@ -109,60 +93,111 @@ class SphericalField final : public FieldModel {
   }
 
  private:
-  // p_l = up z p_(l-1) - back p_(l-2), times its coefficients.
-  struct Rung {
-    double up = 0;
-    double back = 0;
-    double cosine_T = 0;
-    double sine_T = 0;
+  static constexpr int kPieces = 1024;
+  static constexpr double kStep = 2.0 / kPieces;
+
+  struct Knot {
+    double value = 0;
+    double slope = 0;  // times the step
   };
-  struct Ladder {
+  struct Order {
     int order = 0;
-    double first = 1;  // p of degree = order
-    std::vector<Rung> rungs;
+    std::vector<Knot> cosine;  // empty where it is zero
+    std::vector<Knot> sine;
+  };
+  struct Read {
+    double value = 0;
+    double slope = 0;
   };
 
-  [[nodiscard]] FieldSample At(const Vector3& u) const {
-    FieldSample sample;
-    const Complex w(u.x, u.y);
-    Complex power = 1;  // w^(m - 1) of the ladder at hand
-    int reached = 0;
-    for (const Ladder& ladder : ladders_) {
-      double p = ladder.first, p_before = 0, d = 0, d_before = 0;
-      double cosine = 0, sine = 0, cosine_slope = 0, sine_slope = 0;
-      for (const Rung& rung : ladder.rungs) {
-        if (&rung != ladder.rungs.data()) {
-          const double p_next = rung.up * u.z * p - rung.back * p_before;
-          const double d_next = rung.up * (p + u.z * d) - rung.back * d_before;
+  static Order Tabulate(int order, const std::vector<SphericalTerm>& terms) {
+    Order table{.order = order};
+    int degree_max = order;
+    for (const SphericalTerm& term : terms) degree_max = std::max(degree_max, term.degree);
+    std::vector<double> cosine(static_cast<std::size_t>(degree_max + 1));
+    std::vector<double> sine = cosine;
+    for (const SphericalTerm& term : terms) {
+      cosine[static_cast<std::size_t>(term.degree)] = term.cosine_T;
+      sine[static_cast<std::size_t>(term.degree)] = term.sine_T;
+    }
+    const auto any = [](const std::vector<double>& list) {
+      return std::any_of(list.begin(), list.end(), [](double value) { return value != 0; });
+    };
+    if (any(cosine)) table.cosine = KnotsOf(order, cosine);
+    if (any(sine)) table.sine = KnotsOf(order, sine);
+    return table;
+  }
+
+  // Value and derivative by the three-term recurrence.
+  static std::vector<Knot> KnotsOf(int order, const std::vector<double>& coefficients) {
+    std::vector<Knot> knots;
+    for (int k = 0; k <= kPieces; ++k) {
+      const double z = -1 + k * kStep;
+      double p = FirstOfOrder(order), p_before = 0, d = 0, d_before = 0;
+      Knot knot;
+      for (std::size_t degree = static_cast<std::size_t>(order); degree < coefficients.size();
+           ++degree) {
+        if (degree > static_cast<std::size_t>(order)) {
+          const LegendreStep step = StepToDegree(static_cast<int>(degree), order);
+          const double p_next = step.up * z * p - step.back * p_before;
+          const double d_next = step.up * (p + z * d) - step.back * d_before;
           p_before = p;
           p = p_next;
           d_before = d;
           d = d_next;
         }
-        cosine += rung.cosine_T * p;
-        sine += rung.sine_T * p;
-        cosine_slope += rung.cosine_T * d;
-        sine_slope += rung.sine_T * d;
+        knot.value += coefficients[degree] * p;
+        knot.slope += coefficients[degree] * d * kStep;
       }
-      const int m = ladder.order;
-      const Complex coefficient(cosine, -sine), slope(cosine_slope, -sine_slope);
+      knots.push_back(knot);
+    }
+    return knots;
+  }
+
+  static Read ReadAt(const std::vector<Knot>& knots, std::size_t piece, double t) {
+    if (knots.empty()) return {};
+    const Knot& low = knots[piece];
+    const Knot& high = knots[piece + 1];
+    const double rise = high.value - low.value;
+    const double a = low.slope - rise, b = rise - high.slope;
+    // low + t rise + t (1 - t) ((1 - t) a + t b)
+    const double bow = (1 - t) * a + t * b, hump = t * (1 - t);
+    return {low.value + t * rise + hump * bow,
+            (rise + (1 - 2 * t) * bow + hump * (b - a)) * (1 / kStep)};
+  }
+
+  [[nodiscard]] FieldSample At(const Vector3& u) const {
+    const double place = std::clamp((u.z + 1) * (1 / kStep), 0.0, kPieces - 1e-9);
+    const auto piece = static_cast<std::size_t>(place);
+    const double t = place - static_cast<double>(piece);
+    FieldSample sample;
+    double power_x = 1, power_y = 0;  // (x + i y)^(m - 1) of the order at hand
+    int reached = 0;
+    for (const Order& order : orders_) {
+      const Read cosine = ReadAt(order.cosine, piece, t);
+      const int m = order.order;
       if (m == 0) {
-        sample.b_T += cosine;
-        sample.slope_T.z += cosine_slope;
+        sample.b_T += cosine.value;
+        sample.slope_T.z += cosine.slope;
         continue;
       }
-      for (; reached < m - 1; ++reached) power *= w;
-      const Complex whole = power * w;
-      const Complex by_w = static_cast<double>(m) * coefficient * power;
-      sample.b_T += (coefficient * whole).real();
-      sample.slope_T.x += by_w.real();
-      sample.slope_T.y -= by_w.imag();
-      sample.slope_T.z += (slope * whole).real();
+      const Read sine = ReadAt(order.sine, piece, t);
+      for (; reached < m - 1; ++reached) {
+        const double next = power_x * u.x - power_y * u.y;
+        power_y = power_x * u.y + power_y * u.x;
+        power_x = next;
+      }
+      const double whole_x = power_x * u.x - power_y * u.y;
+      const double whole_y = power_x * u.y + power_y * u.x;
+      sample.b_T += cosine.value * whole_x + sine.value * whole_y;
+      sample.slope_T.z += cosine.slope * whole_x + sine.slope * whole_y;
+      sample.slope_T.x += m * (cosine.value * power_x + sine.value * power_y);
+      sample.slope_T.y += m * (sine.value * power_x - cosine.value * power_y);
     }
     return sample;
   }
 
-  std::vector<Ladder> ladders_;  // orders ascend
+  std::vector<Order> orders_;  // ascending
 };
 
 }  // namespace

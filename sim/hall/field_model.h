@@ -43,7 +43,7 @@ class FieldModel {
   /// After which turn about z the field is the same again: 90 deg for eight equal poles.
   [[nodiscard]] virtual double period_rad() const { return 90 * kRadPerDeg; }
   /// Pre: directions are unit vectors, as many as samples.
-  /// Cost: no allocation; harmonic 10 ns, surface 50 ns, spherical some 10 ns a degree and order.
+  /// Cost: no allocation; harmonic 10 ns, surface 50 ns, spherical some 10 ns an order.
   virtual void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const = 0;
 
   [[nodiscard]] double Radial_T(const Vector3& local) const {

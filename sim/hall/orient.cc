@@ -11,12 +11,12 @@ namespace {
 constexpr std::size_t kTilts = 13;
 constexpr std::size_t kSpins = 16;
 constexpr std::size_t kNodes = kTilts * kTilts * kSpins;
-constexpr std::size_t kStartsMax = 12;
+constexpr std::size_t kStartsMax = 8;
 constexpr double kSame_rad = 1e-4;
 constexpr double kGammaRange_rad = 90 * kRadPerDeg;
 // Beyond the range where the field does not repeat itself: noise may lead a little out of it.
 constexpr double kGammaMargin_rad = 2 * kRadPerDeg;
-constexpr int kStepsMax = 40;
+constexpr int kStepsMax = 25;
 
 // Symmetric 3 x 3, row by row.
 using Matrix = std::array<std::array<double, 3>, 3>;

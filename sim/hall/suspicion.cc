@@ -6,7 +6,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kRowsTried = 24;
+constexpr std::size_t kRowsTried = 12;
 constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
 constexpr double kNear = 2;        // of the variance that the best leaves: cannot be told apart
