@@ -309,6 +309,8 @@ void AddHallCommands(CommandLine* line) {
   hall->require_subcommand(1);
   AddHallFit(line, hall);
   AddHallOrient(line, hall);
+  AddHallDiagnose(line, hall);
+  AddHallReproduce(line, hall);
 }
 
 }  // namespace focalfleet::cli

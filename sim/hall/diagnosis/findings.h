@@ -15,4 +15,8 @@ std::vector<HallUnknown> RemainingStructure(const HallForward& forward,
                                             const HallCampaign& campaign, const HallSearch& search,
                                             const Selected& selected);
 
+/// 24 poses within 12 deg of tilt. Cost: some ten ms.
+std::vector<Orientation> ProposePoses(const HallForward& forward, const Eigen::VectorXd& parameters,
+                                      const std::vector<Reading>& readings, double noise_V);
+
 }  // namespace focalfleet::sim

@@ -199,7 +199,10 @@ HallDiagnosis DiagnoseHall(const HallCampaign& given, const HallRig& rig, const 
                                   "the column temp_C is missing");
   std::vector<Reading> readings = Usable(campaign, rig, &out);
   out.missing = Insufficient(campaign, readings, out.layout.size());
-  if (!out.missing.empty()) return out;
+  if (!out.missing.empty()) {
+    out.next_poses = ProposePoses(forward, out.parameters, readings, 25 * 5e-4);
+    return out;
+  }
 
   HallSearch search(forward, campaign, std::move(readings));
   FindSwaps(forward, rig, &campaign, &search, &out);
@@ -217,6 +220,8 @@ HallDiagnosis DiagnoseHall(const HallCampaign& given, const HallRig& rig, const 
   for (const HallCauseFound& cause : out.causes)
     if (cause.candidates.size() > 1) out.verdict = HallVerdict::kAmbiguous;
   if (!out.unknown.empty()) out.verdict = HallVerdict::kUnknown;
+  if (out.verdict == HallVerdict::kAmbiguous || out.verdict == HallVerdict::kUnknown)
+    out.next_poses = ProposePoses(forward, out.parameters, out.readings, out.noise_V);
   return out;
 }
 
