@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kUsualNoise_T = 5e-4;
 constexpr double kLeastNoise_T = 1e-6;
+constexpr double kLeastContradiction_T = 1e-4;  // a model of good data may err by less
 constexpr std::size_t kRowsForNoise = 20;
 constexpr double kBranchChi2 = 9;      // as good within 3 standard deviations
 constexpr double kContradiction = 30;  // of chi^2 a degree of freedom
@@ -104,6 +105,24 @@ class RowJudge {
   double noise_T_;
 };
 
+RowEstimate RowOf(const std::vector<OrientationFit>& found, double noise_T, std::string status) {
+  RowEstimate row;
+  row.status = std::move(status);
+  if (found.empty()) return row;
+  const OrientationFit& best = found.front();
+  row.solved = true;
+  row.orientation = best.orientation;
+  for (std::size_t k = 0; k < 3; ++k)
+    row.sd_rad[k] = noise_T * std::sqrt(best.unit_covariance[k][k]);
+  const double close_T2 = best.squares_T2 + kBranchChi2 * noise_T * noise_T;
+  row.branches = static_cast<std::size_t>(
+      std::count_if(found.begin(), found.end(),
+                    [&](const OrientationFit& other) { return other.squares_T2 <= close_T2; }));
+  if (row.branches > 1) Append(&row.status, "ambiguous");
+  if (row.status.empty()) row.status = "ok";
+  return row;
+}
+
 }  // namespace
 
 std::string_view Name(SensorFault fault) {
@@ -158,30 +177,15 @@ Estimates EstimateOrientations(HallRig rig, const std::shared_ptr<const FieldMod
     for (const std::size_t sensor : verdict.or_else) word += " or " + SensorName(sensor);
     Append(&of_all, word);
   }
-  const RowJudge judge(solver, out.noise_T);
+  const RowJudge judge(solver, std::max(out.noise_T, kLeastContradiction_T));
   for (std::size_t r = 0; r < rows.size(); ++r) {
-    RowEstimate row;
-    row.status = OfSensors(rig, rows[r], options.magnitudes);
-    if (!of_all.empty()) Append(&row.status, of_all);
-    const auto found = judge.Judge(readings[r], std::move(fits[r]), &row.status);
-    if (found.empty()) {
-      Append(&row.status,
+    std::string status = OfSensors(rig, rows[r], options.magnitudes);
+    if (!of_all.empty()) Append(&status, of_all);
+    const auto found = judge.Judge(readings[r], std::move(fits[r]), &status);
+    if (found.empty())
+      Append(&status,
              __builtin_popcount(readings[r].used) < 3 ? "too few sensors" : "no orientation found");
-      out.rows.push_back(row);
-      continue;
-    }
-    const OrientationFit& best = found.front();
-    row.solved = true;
-    row.orientation = best.orientation;
-    for (std::size_t k = 0; k < 3; ++k)
-      row.sd_rad[k] = out.noise_T * std::sqrt(best.unit_covariance[k][k]);
-    const double close_T2 = best.squares_T2 + kBranchChi2 * out.noise_T * out.noise_T;
-    row.branches = static_cast<std::size_t>(
-        std::count_if(found.begin(), found.end(),
-                      [&](const OrientationFit& other) { return other.squares_T2 <= close_T2; }));
-    if (row.branches > 1) Append(&row.status, "ambiguous");
-    if (row.status.empty()) row.status = "ok";
-    out.rows.push_back(row);
+    out.rows.push_back(RowOf(found, out.noise_T, std::move(status)));
   }
   return out;
 }

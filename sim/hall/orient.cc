@@ -37,12 +37,6 @@ bool Invert(const Matrix& a, Matrix* out) {
   return true;
 }
 
-struct Linear {
-  Matrix normal{};
-  Triple right{};
-  double squares = 0;
-};
-
 Orientation Moved(const Orientation& from, const Triple& by) {
   return {from.alpha_rad + by[0], from.beta_rad + by[1], from.gamma_rad + by[2]};
 }
@@ -96,43 +90,50 @@ void OrientationSolver::Predict(const Orientation& orientation, std::span<double
   }
 }
 
-OrientationFit OrientationSolver::Refine(const HallReading& reading,
-                                         const Orientation& start) const {
+struct OrientationSolver::Linear {
+  Matrix normal{};
+  Triple right{};
+  double squares = 0;
+};
+
+OrientationSolver::Linear OrientationSolver::Linearise(const HallReading& reading,
+                                                       const Orientation& at) const {
   const std::size_t count = direction_.size();
   std::array<Turned, kSensorsMax> turned;
   std::array<Vector3, kSensorsMax> local;
   std::array<FieldSample, kSensorsMax> samples;
-  const auto linearise = [&](const Orientation& at) {
-    const Rotation rotation(at);
-    for (std::size_t k = 0; k < count; ++k) {
-      turned[k] = rotation.ToRotorWithSlopes(direction_[k]);
-      local[k] = turned[k].local;
+  const Rotation rotation(at);
+  for (std::size_t k = 0; k < count; ++k) {
+    turned[k] = rotation.ToRotorWithSlopes(direction_[k]);
+    local[k] = turned[k].local;
+  }
+  field_->Evaluate({local.data(), count}, {samples.data(), count});
+  Linear linear;
+  for (std::size_t k = 0; k < count; ++k) {
+    if ((reading.used >> k & 1u) == 0) continue;
+    double value = factor_[k] * samples[k].b_T, sign = factor_[k];
+    if (options_.magnitudes && value < 0) {
+      value = -value;
+      sign = -sign;
     }
-    field_->Evaluate({local.data(), count}, {samples.data(), count});
-    Linear linear;
-    for (std::size_t k = 0; k < count; ++k) {
-      if ((reading.used >> k & 1u) == 0) continue;
-      double value = factor_[k] * samples[k].b_T, sign = factor_[k];
-      if (options_.magnitudes && value < 0) {
-        value = -value;
-        sign = -sign;
-      }
-      const double miss = reading.b_T[k] - value;
-      const Triple row = {sign * Dot(samples[k].slope_T, turned[k].by_alpha),
-                          sign * Dot(samples[k].slope_T, turned[k].by_beta),
-                          sign * Dot(samples[k].slope_T, turned[k].by_gamma)};
-      linear.squares += miss * miss;
-      for (std::size_t i = 0; i < 3; ++i) {
-        linear.right[i] += row[i] * miss;
-        for (std::size_t j = i; j < 3; ++j) linear.normal[i][j] += row[i] * row[j];
-      }
+    const double miss = reading.b_T[k] - value;
+    const Triple row = {sign * Dot(samples[k].slope_T, turned[k].by_alpha),
+                        sign * Dot(samples[k].slope_T, turned[k].by_beta),
+                        sign * Dot(samples[k].slope_T, turned[k].by_gamma)};
+    linear.squares += miss * miss;
+    for (std::size_t i = 0; i < 3; ++i) {
+      linear.right[i] += row[i] * miss;
+      for (std::size_t j = i; j < 3; ++j) linear.normal[i][j] += row[i] * row[j];
     }
-    return linear;
-  };
+  }
+  return linear;
+}
 
+OrientationFit OrientationSolver::Refine(const HallReading& reading,
+                                         const Orientation& start) const {
   OrientationFit fit{.orientation = start};
   fit.sensors = __builtin_popcount(reading.used);
-  Linear here = linearise(start);
+  Linear here = Linearise(reading, start);
   double damping = 0;
   for (fit.steps = 1; fit.steps <= kStepsMax; ++fit.steps) {
     Matrix damped = here.normal;
@@ -153,7 +154,7 @@ OrientationFit OrientationSolver::Refine(const HallReading& reading,
     if (size > 0.35)  // 20 deg: beyond any linear reach
       for (double& part : step) part *= 0.35 / size;
     const Orientation next = Moved(fit.orientation, step);
-    const Linear there = linearise(next);
+    const Linear there = Linearise(reading, next);
     if (there.squares <= here.squares) {
       const bool done =
           size < 1e-7 || (damping == 0 && there.squares > 0.999999 * here.squares && size < 1e-5);

@@ -69,6 +69,8 @@ class OrientationSolver {
   [[nodiscard]] Orientation Wrapped(Orientation orientation) const;
 
  private:
+  struct Linear;
+  [[nodiscard]] Linear Linearise(const HallReading& reading, const Orientation& at) const;
   void MakeAtlas();
   [[nodiscard]] std::vector<Orientation> Starts(const HallReading& reading) const;
   [[nodiscard]] Orientation Node(std::size_t index) const;

@@ -12,6 +12,7 @@ constexpr double kVarianceLeft = 0.25;
 constexpr double kNear = 2;        // of the variance that the best leaves: cannot be told apart
 constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;
+constexpr double kHarmless = 0.1;  // of the same: no orientation suffers from it
 constexpr double kSuspicious = 9;  // of the usual noise's variance, where rows are few
 
 struct Hypothesis {
@@ -168,7 +169,7 @@ std::vector<SensorVerdict> SuspectSensors(const OrientationSolver& solver,
         VarianceLeft(solver, *readings, tried, [](const HallReading& reading) { return reading; });
     const double usual_T2 = usual_noise_T * usual_noise_T;
     const bool few = tried.size() < kRowsForVerdict;
-    if (before_T2 < (few ? kSuspicious * usual_T2 : 1e-4 * usual_T2)) break;
+    if (before_T2 < (few ? kSuspicious : kHarmless) * usual_T2) break;
     const std::vector<Hypothesis> hypotheses = Compare(solver, *readings, tried);
     if (hypotheses.empty()) break;
     const Hypothesis& best = hypotheses.front();

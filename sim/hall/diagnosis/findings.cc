@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace focalfleet::sim {
 namespace {
@@ -71,87 +72,84 @@ struct Size {
   std::string text;
 };
 
-// The largest of the parameters that matters, or the length of a vector.
-Size SizeOf(const HallHypothesis& one, const HallDiagnosis& found) {
-  const ParameterLayout& layout = found.layout;
-  const auto value = [&](std::size_t k) { return found.parameters[At(k)]; };
-  const auto sd = [&](std::size_t k) { return found.sd[At(k)]; };
-  const auto length = [&](std::span<const std::size_t> parts, double scale) {
-    double squares = 0, variance = 0;
-    for (const std::size_t part : parts) squares += value(part) * value(part);
-    const double whole = std::sqrt(squares);
-    for (const std::size_t part : parts)
-      variance += whole > 0 ? std::pow(value(part) / whole * sd(part), 2) : 0;
-    return Size{scale * whole, scale * std::sqrt(variance), "", ""};
-  };
+// A vector's length, and its uncertainty along itself.
+Size LengthOf(std::span<const std::size_t> parts, const HallDiagnosis& found) {
+  double squares = 0, variance = 0;
+  for (const std::size_t part : parts) squares += std::pow(found.parameters[At(part)], 2);
+  const double whole = std::sqrt(squares);
+  for (const std::size_t part : parts)
+    if (whole > 0) variance += std::pow(found.parameters[At(part)] / whole * found.sd[At(part)], 2);
+  return {whole, std::sqrt(variance), "", ""};
+}
+
+std::size_t LargestOf(const HallHypothesis& one, const HallDiagnosis& found, std::size_t from) {
   std::size_t largest = one.parameters.front();
+  double most = -1;
   for (const std::size_t parameter : one.parameters)
-    if (std::abs(value(parameter)) > std::abs(value(largest))) largest = parameter;
-  const auto of_sensor = [&] {
-    std::string text;
-    for (const std::size_t sensor : one.sensors)
-      text += (text.empty() ? "v" : ", v") + std::to_string(sensor + 1);
-    return text;
-  };
-  Size size{value(largest), sd(largest), "", ""};
+    if (const double size = std::abs(found.parameters[At(parameter)]);
+        parameter >= from && size > most) {
+      most = size;
+      largest = parameter;
+    }
+  return largest;
+}
+
+Size OfTerms(const HallHypothesis& one, const HallDiagnosis& found) {
+  const std::size_t first = found.layout.term(0);
+  const std::size_t largest = LargestOf(one, found, first);
+  if (largest < first) return {0, 0, "of the peak", "the pole's shape along theta"};
+  Size size{found.parameters[At(largest)], found.sd[At(largest)], "of the peak",
+            TermText(found.layout.terms[largest - first])};
+  for (const std::size_t parameter : one.parameters)
+    if (parameter != largest && parameter >= first &&
+        std::abs(found.parameters[At(parameter)]) > 3 * found.sd[At(parameter)])
+      size.text += "; " + TermText(found.layout.terms[parameter - first]);
+  return size;
+}
+
+std::string SensorsText(const HallHypothesis& one) {
+  std::string text;
+  for (const std::size_t sensor : one.sensors)
+    text += (text.empty() ? "v" : ", v") + std::to_string(sensor + 1);
+  return text;
+}
+
+Size OfShifts(const HallHypothesis& one, const HallDiagnosis& found) {
+  Size largest;
+  for (std::size_t k = 0; k + 1 < one.parameters.size(); k += 2)
+    if (const Size own = LengthOf({&one.parameters[k], 2}, found);
+        own.amplitude >= largest.amplitude)
+      largest = own;
+  return {largest.amplitude / kRadPerDeg, largest.sd / kRadPerDeg, "deg along the sphere",
+          SensorsText(one)};
+}
+
+// The largest of its parameters, or the length of a vector.
+Size SizeOf(const HallHypothesis& one, const HallDiagnosis& found) {
+  const std::size_t largest = LargestOf(one, found, 0);
+  const double value = found.parameters[At(largest)], sd = found.sd[At(largest)];
   switch (one.cause) {
-    case HallCause::kFieldHarmonics: {
-      size.unit = "of the peak";
-      std::size_t term = layout.term(0);
-      double most = -1;
-      for (const std::size_t parameter : one.parameters)
-        if (parameter >= layout.term(0) && std::abs(value(parameter)) > most) {
-          most = std::abs(value(parameter));
-          term = parameter;
-        }
-      size.amplitude = value(term);
-      size.sd = sd(term);
-      size.text = TermText(layout.terms[term - layout.term(0)]);
-      for (const std::size_t parameter : one.parameters)
-        if (parameter != term && parameter >= layout.term(0) &&
-            std::abs(value(parameter)) > 3 * sd(parameter))
-          size.text += "; " + TermText(layout.terms[parameter - layout.term(0)]);
-      break;
-    }
+    case HallCause::kFieldHarmonics:
+      return OfTerms(one, found);
     case HallCause::kFieldWidth:
-      size.unit = "of the width";
-      size.sd *= std::exp(size.amplitude);
-      size.amplitude = std::exp(size.amplitude) - 1;
-      size.text = "the field falls off with latitude as if its width were this much greater";
-      break;
+      return {std::exp(value) - 1, sd * std::exp(value), "of the width",
+              "the field falls off with latitude as if its width were this much greater"};
     case HallCause::kSensorGain:
-      size.unit = "of the gain";
-      size.text = of_sensor();
-      break;
+      return {value, sd, "of the gain", SensorsText(one)};
     case HallCause::kSensorOffset:
-      size.unit = "V";
-      size.text = of_sensor();
-      break;
-    case HallCause::kSensorPosition: {
-      Size best;
-      for (std::size_t k = 0; k + 1 < one.parameters.size(); k += 2) {
-        const Size own = length({&one.parameters[k], 2}, 1 / kRadPerDeg);
-        if (own.amplitude >= best.amplitude) best = own;
-      }
-      size = best;
-      size.unit = "deg along the sphere";
-      size.text = of_sensor();
-      break;
-    }
+      return {value, sd, "V", SensorsText(one)};
+    case HallCause::kSensorPosition:
+      return OfShifts(one, found);
     case HallCause::kCentreOffset: {
       const std::size_t parts[] = {ParameterLayout::kCentre, ParameterLayout::kCentre + 1,
                                    ParameterLayout::kCentre + 2};
-      size = length(parts, 1);
-      size.unit = "mm";
-      size.text = "the rotor's centre is off the sensors'";
-      break;
+      const Size size = LengthOf(parts, found);
+      return {size.amplitude, size.sd, "mm", "the rotor's centre is off the sensors'"};
     }
     case HallCause::kTemperatureCoefficient:
-      size.unit = "1/K";
-      size.text = "the field changes with temp_C";
-      break;
+      return {value, sd, "1/K", "the field changes with temp_C"};
   }
-  return size;
+  return {};
 }
 
 double Rms(const VectorXd& values) {
@@ -223,6 +221,27 @@ double Sensitivity(const HallForward& forward, const HallCampaign& campaign,
   return std::sqrt(squares / (2 * static_cast<double>(std::max<Index>(1, here.size()))));
 }
 
+// What its absence would cost, all else fitted anew.
+void AddWorth(const HallSearch& search, const Selected& selected, HallCauseFound* cause) {
+  std::vector<HallHypothesis> rest;
+  VectorXd start = selected.fit.parameters;
+  for (const HallHypothesis& one : selected.on) {
+    const bool own =
+        std::all_of(one.parameters.begin(), one.parameters.end(), [&](std::size_t parameter) {
+          return std::find(cause->parameters.begin(), cause->parameters.end(), parameter) !=
+                 cause->parameters.end();
+        });
+    if (!own) rest.push_back(one);
+  }
+  for (const std::size_t parameter : cause->parameters) start[At(parameter)] = 0;
+  const HallFit without = search.Fit(rest, start);
+  const auto n = static_cast<double>(search.readings().size());
+  const double explained = without.squares - selected.fit.squares;
+  cause->chi2 = explained / selected.variance;
+  cause->size_V = std::sqrt(std::max(0.0, explained) / n);
+  cause->predicted_gain_V = std::sqrt(without.squares / n) - std::sqrt(selected.fit.squares / n);
+}
+
 }  // namespace
 
 void AddFindings(const HallForward& forward, const HallCampaign& campaign, const HallSearch& search,
@@ -248,23 +267,7 @@ void AddFindings(const HallForward& forward, const HallCampaign& campaign, const
     cause.amplitude_unit = size.unit;
     cause.ci95 = {size.amplitude - 1.96 * size.sd, size.amplitude + 1.96 * size.sd};
     cause.text = size.text;
-    // What its absence would cost, all else fitted anew.
-    std::vector<HallHypothesis> rest;
-    VectorXd start = selected.fit.parameters;
-    for (const HallHypothesis& one : selected.on) {
-      const bool own =
-          std::all_of(one.parameters.begin(), one.parameters.end(), [&](std::size_t parameter) {
-            return std::find(cause.parameters.begin(), cause.parameters.end(), parameter) !=
-                   cause.parameters.end();
-          });
-      if (!own) rest.push_back(one);
-    }
-    for (const std::size_t parameter : cause.parameters) start[At(parameter)] = 0;
-    const HallFit without = search.Fit(rest, start);
-    cause.chi2 = (without.squares - selected.fit.squares) / selected.variance;
-    const auto n = static_cast<double>(search.readings().size());
-    cause.size_V = std::sqrt(std::max(0.0, without.squares - selected.fit.squares) / n);
-    cause.predicted_gain_V = std::sqrt(without.squares / n) - std::sqrt(selected.fit.squares / n);
+    AddWorth(search, selected, &cause);
     out->causes.push_back(std::move(cause));
   }
   std::sort(out->causes.begin(), out->causes.end(),
