@@ -154,6 +154,11 @@ OrientationFit OrientationSolver::Refine(const HallReading& reading,
     if (size > 0.35)  // 20 deg: beyond any linear reach
       for (double& part : step) part *= 0.35 / size;
     const Orientation next = Moved(fit.orientation, step);
+    if (damping == 0 && size < options_.last_step_rad) {
+      fit.orientation = next;
+      for (std::size_t i = 0; i < 3; ++i) here.squares -= step[i] * here.right[i];
+      break;
+    }
     const Linear there = Linearise(reading, next);
     if (there.squares <= here.squares) {
       const bool done =

@@ -91,6 +91,22 @@ TEST(Orient, InvertsItsOwnVoltagesToABillionthOfADegree) {
   }
 }
 
+TEST(Orient, ALastStepLeavesLessThanAnyNoise) {
+  const OrientationSolver solver(Rig(), Surface()),
+      quick(Rig(), Surface(), {.last_step_rad = 1e-3});
+  Rng rng(3);
+  for (int k = 0; k < 200; ++k) {
+    const Orientation truth = Drawn(&rng, 12);
+    HallReading reading = ReadingAt(solver, truth);
+    for (std::size_t s = 0; s < 8; ++s) reading.b_T[s] += 5e-4 * rng.Normal();
+    const Orientation start{truth.alpha_rad + 0.01, truth.beta_rad - 0.01, truth.gamma_rad + 0.01};
+    const OrientationFit full = solver.Refine(reading, start), early = quick.Refine(reading, start);
+    EXPECT_TRUE(early.converged);
+    EXPECT_LE(early.steps, full.steps);
+    EXPECT_LT(Worst_deg(early.orientation, full.orientation), 1e-3);
+  }
+}
+
 TEST(Orient, ReachesTheCramerRaoBound) {
   const std::uint64_t seed = testing::TestSeed(13);
   FOCALFLEET_TRACE_SEED(seed);
