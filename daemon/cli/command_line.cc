@@ -28,8 +28,9 @@ void AddGlobalOptions(CommandLine* line) {
 }
 
 // What never asks a daemon ends with kRefused where its answer cannot be told.
-constexpr std::array<std::string_view, 10> kOffline = {
-    "can", "completion", "diagnose", "estimate", "layout", "plan", "reproduce", "simulate", "targets", "tune"};
+constexpr std::array<std::string_view, 11> kOffline = {
+    "can",  "completion", "diagnose", "estimate", "hall", "layout",
+    "plan", "reproduce",  "simulate", "targets",  "tune"};
 
 /// The deepest command of the tree that the line named.
 const CLI::App& Chosen(const CLI::App& app) {
@@ -134,6 +135,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddDiagnoseCommand(line.get());
   AddTuneCommand(line.get());
   AddReproduceCommand(line.get());
+  AddHallCommands(line.get());
   AddMeasurementsCommand(line.get());
   AddCampaignCommands(line.get());
   AddCanCommands(line.get());

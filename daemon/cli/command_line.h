@@ -66,6 +66,7 @@ void AddTuneCommand(CommandLine* line);
 void AddReproduceCommand(CommandLine* line);
 void AddCampaignCommands(CommandLine* line);
 void AddCanCommands(CommandLine* line);
+void AddHallCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 

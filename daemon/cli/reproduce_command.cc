@@ -3,27 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <map>
 
+#include "daemon/cli/claims_report.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
-#include "daemon/cli/table.h"
-#include "daemon/files/text_file.h"
 #include "daemon/report/page.h"
 #include "sim/reproduction/reproduce.h"
 
 namespace focalfleet::cli {
 namespace {
 
-using sim::Claim;
 using sim::ClaimCurve;
-using sim::ClaimStatus;
 using sim::Reproduction;
-
-constexpr ClaimStatus kStatuses[] = {ClaimStatus::kReproduced, ClaimStatus::kOrdering,
-                                     ClaimStatus::kFitted, ClaimStatus::kDisagrees,
-                                     ClaimStatus::kNotTestable};
 
 struct ReproduceCommandOptions {
   std::string out;
@@ -33,39 +24,6 @@ struct ReproduceCommandOptions {
   bool full = false;
   std::uint64_t seed = 1;
 };
-
-// One number stands alone, more are a list; what is not finite is null, as JSON has no other word.
-Json Numbers(const std::vector<double>& numbers) {
-  const auto one = [](double number) {
-    return std::isfinite(number) ? Json(number) : Json(nullptr);
-  };
-  if (numbers.empty()) return nullptr;
-  if (numbers.size() == 1) return one(numbers.front());
-  Json list = Json::array();
-  for (const double number : numbers) list.push_back(one(number));
-  return list;
-}
-
-std::string Text(const std::vector<double>& numbers) {
-  std::string text;
-  for (const double number : numbers)
-    text += fmt::format("{}{:.5g}", text.empty() ? "" : ", ", number);
-  return text;
-}
-
-Json ClaimsJson(const Reproduction& reproduction) {
-  Json list = Json::array();
-  for (const Claim& claim : reproduction.claims)
-    list.push_back({{"id", claim.id},
-                    {"text", claim.text},
-                    {"paper", Numbers(claim.paper)},
-                    {"simulated", Numbers(claim.simulated)},
-                    {"unit", claim.unit},
-                    {"conditions", claim.conditions},
-                    {"status", Name(claim.status)},
-                    {"reason", claim.reason}});
-  return list;
-}
 
 report::Axis AxisX(std::string_view figure) {
   if (figure == "SNR over carrier") return {.label = "carrier", .unit = "kHz", .log = true};
@@ -95,13 +53,7 @@ std::string PageOf(const Reproduction& reproduction, const ReproduceCommandOptio
       "order comes out; fitted: the named parameter was set so that it comes out; disagrees: both "
       "numbers and the likely reason; not testable.",
       options.wave_set, options.resistance_factor));
-  std::vector<std::vector<std::string>> counts;
-  for (const ClaimStatus status : kStatuses)
-    counts.push_back(
-        {Name(status), std::to_string(std::count_if(
-                           reproduction.claims.begin(), reproduction.claims.end(),
-                           [&](const Claim& claim) { return claim.status == status; }))});
-  page.Table({"status", "claims"}, counts, {report::Align::kLeft, report::Align::kRight});
+  AddStatusTable(reproduction.claims, &page);
 
   page.Heading("Curves");
   std::vector<std::string> figures;
@@ -116,22 +68,12 @@ std::string PageOf(const Reproduction& reproduction, const ReproduceCommandOptio
     page.Plot(report::DrawLines(plot));
   }
 
-  page.Heading("Claims");
-  std::vector<std::vector<std::string>> rows;
-  for (const Claim& claim : reproduction.claims)
-    rows.push_back(
-        {claim.text, Text(claim.paper), Text(claim.simulated), claim.unit, Name(claim.status),
-         claim.reason.empty() ? claim.conditions : claim.conditions + ". " + claim.reason});
-  page.Table({"claim", "paper", "simulated", "unit", "status", "conditions and reason"}, rows);
+  AddClaimTable(reproduction.claims, &page);
   return page.Html();
 }
 
 ExitCode RunReproduce(const Context& context, const ReproduceCommandOptions& options) {
-  std::error_code failed;
-  std::filesystem::create_directories(options.out, failed);
-  if (failed)
-    return Report(context, Error{ErrorCode::kUnavailable,
-                                 fmt::format("{}: {}", options.out, failed.message())});
+  if (const auto made = MakeClaimsFolder(options.out); !made) return Report(context, made.error());
   sim::ReproduceOptions wanted{.wave_set = options.wave_set,
                                .resistance_factor = options.resistance_factor,
                                .full = options.full,
@@ -145,32 +87,7 @@ ExitCode RunReproduce(const Context& context, const ReproduceCommandOptions& opt
       bar.Show(share, "reproducing", std::string(next));
     });
   }
-  const Json claims = ClaimsJson(reproduction);
-  const std::filesystem::path folder(options.out);
-  const std::string claims_path = folder / "claims.json";
-  const std::string page_path = folder / "report.html";
-  for (const auto& [path, text] : {std::pair(claims_path, claims.dump(2) + "\n"),
-                                   std::pair(page_path, PageOf(reproduction, options))})
-    if (const auto written = WriteFileAtomically(path, text); !written)
-      return Report(context, written.error());
-
-  std::map<std::string, int> counts;
-  for (const Claim& claim : reproduction.claims) ++counts[Name(claim.status)];
-  if (context.json) {
-    Json object{{"claims", claims}, {"statuses", counts}, {"out", options.out}};
-    PrintJson(object);
-  }
-  std::vector<std::vector<std::string>> rows = {{"claim", "status", "paper", "simulated", "unit"}};
-  for (const Claim& claim : reproduction.claims)
-    rows.push_back(
-        {claim.id, Name(claim.status), Text(claim.paper), Text(claim.simulated), claim.unit});
-  Say(context, AlignColumns(rows));
-  std::string summary;
-  for (const ClaimStatus status : kStatuses)
-    summary +=
-        fmt::format("{}{} {}", summary.empty() ? "" : ", ", counts[Name(status)], Name(status));
-  Say(context, fmt::format("{}: {}", page_path, summary));
-  return ExitCode::kOk;
+  return DeliverClaims(context, reproduction.claims, PageOf(reproduction, options), options.out);
 }
 
 }  // namespace

@@ -28,6 +28,11 @@ std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& template
     for (std::size_t k = block * kBlock; k < end; ++k)
       standings[k] = Assess(pass.scores[k], templates[k], groups);
   });
+  // Who comes in many shapes fits by chance more often: each shape has its share of the cause.
+  std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
+  for (const Template& form : templates) shapes[{form.effect->cause, form.axis}] += 1;
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    standings[k].evidence -= std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
   return standings;
 }
 

@@ -1,0 +1,31 @@
+// What the hall commands share: which sensors there are, and reading what they read.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/cli/command_line.h"
+#include "daemon/hall/field_model_file.h"
+
+namespace focalfleet::cli {
+
+struct HallSensorOptions {
+  std::string sensors;             // file; empty: the eight by angles
+  std::vector<double> angles_deg;  // empty: the paper's
+};
+
+void AddHallSensorOptions(CLI::App* command, HallSensorOptions* options);
+
+/// Errors: kInvalid, kUnavailable: of the file; both options given.
+Result<std::vector<sim::HallSensor>> SensorsOf(const HallSensorOptions& options);
+
+/// Errors: as ReadHallModel and ReadTextFile.
+Result<HallModelFile> LoadHallModel(const std::string& path);
+
+void AddHallFit(CommandLine* line, CLI::App* hall);
+void AddHallOrient(CommandLine* line, CLI::App* hall);
+void AddHallDiagnose(CommandLine* line, CLI::App* hall);
+void AddHallReproduce(CommandLine* line, CLI::App* hall);
+
+}  // namespace focalfleet::cli

@@ -1,0 +1,53 @@
+// model.toml of a Hall rig: the field as fitted, and what is known of the rig around it (gains,
+// offsets, places of sensors, the rotor's centre, temperature), each with its uncertainty where it
+// has one. `hall fit` writes the field, `hall diagnose` both; `hall orient` and `hall diagnose
+// --model` read them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/hall/field_fit.h"
+#include "sim/hall/rig.h"
+
+namespace focalfleet {
+
+/// What a campaign found about one sensor, from its nominal direction.
+struct SensorCalibration {
+  std::size_t sensor = 0;  // from 0
+  double gain = 1;
+  double offset_V = 0;
+  double shift_east_rad = 0;   // along growing longitude
+  double shift_north_rad = 0;  // towards +Z
+};
+
+struct HallModelFile {
+  std::string name;
+  std::string origin;  // the file that it was made from
+  std::string sha256;
+  sim::FieldParameters field;
+  double radius_mm = sim::kSensorRadius_mm;
+  double peak_T = 0;
+  double rms_T = 0;
+  double noise_T = 0;
+  double decay = 0;
+  bool decay_known = false;
+  std::vector<SensorCalibration> sensors;
+  sim::Vector3 centre_mm;
+  double temperature_per_K = 0;
+  double temperature_reference_C = 20;
+  std::vector<std::string> notes;  // comments at its head
+};
+
+std::string WriteHallModel(const HallModelFile& model);
+
+/// Errors: kInvalid with file and line: not TOML, a key missing, unknown or out of its range.
+Result<HallModelFile> ReadHallModel(std::string_view text, const std::string& file);
+
+/// The model's calibration on sensors in their nominal directions.
+/// Errors: kInvalid: the model knows a sensor that is not there.
+Result<sim::HallRig> RigOf(const HallModelFile& model, std::vector<sim::HallSensor> sensors);
+
+}  // namespace focalfleet

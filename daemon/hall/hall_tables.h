@@ -1,0 +1,45 @@
+// The tables of a Hall rig as CSV: field maps, sensors, voltages, poses in; orientations out.
+// docs/hall.md has the columns. Angles stand in degrees in files, in radians here.
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/hall/estimate.h"
+#include "sim/hall/field_fit.h"
+
+namespace focalfleet {
+
+/// theta_deg, phi_deg, b_T, and where it differs from 59 r_mm.
+/// Errors: kInvalid with file:line and column: missing, not finite, theta outside 0..180, more than
+/// 10 T.
+Result<sim::FieldMap> ReadFieldMap(std::string_view text, std::string file);
+
+/// sensor, x, y, z: unit directions from the centre, stator frame, sensors 1..n in any order.
+/// Errors: kInvalid with file:line and column: a number twice or left out, no unit vector, more
+/// than kSensorsMax.
+Result<std::vector<sim::HallSensor>> ReadSensors(std::string_view text, std::string file);
+
+/// v1_V ... vn_V, and temp_C where it is there; an empty voltage is a missing one.
+/// Errors: kInvalid with file:line and column: a column missing, no number, beyond +-1000 V.
+Result<std::vector<sim::VoltageRow>> ReadVoltages(std::string_view text, std::string file,
+                                                  std::size_t sensors);
+
+struct PoseTable {
+  std::vector<sim::Orientation> poses;
+  std::vector<sim::VoltageRow> rows;
+  bool has_temperature = false;
+  std::vector<std::string> passed_over;  // columns that nobody reads
+};
+/// alpha_deg, beta_deg, gamma_deg, v1_V ... vn_V, and temp_C where it is there.
+/// Errors: as ReadVoltages; a pose must be there.
+Result<PoseTable> ReadPoses(std::string_view text, std::string file, std::size_t sensors);
+
+/// alpha_deg, beta_deg, gamma_deg, sd_alpha_deg, sd_beta_deg, sd_gamma_deg, status: a row for each
+/// of the voltages; no numbers where no orientation was found.
+std::string WriteEstimates(const sim::Estimates& estimates);
+
+}  // namespace focalfleet

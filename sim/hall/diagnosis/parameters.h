@@ -1,0 +1,121 @@
+// Everything that a Hall rig can differ by from its model, as one list of numbers, and the forward
+// model that takes them: what the diagnosis switches on and fits. Zero is "as the model says" for
+// all of them.
+//
+// Field shape: the latitude is stretched (width), and to the field are added terms
+// peak * He_k(latitude / c) exp(-(latitude / c)^2) cos or sin(m phi), which together can make any
+// field; the amplitude and the phase of the model are free, the paper gives neither.
+//
+// Units: gains and terms relative, offsets V, shifts and phases rad, centre mm, temperature 1/K.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "sim/hall/estimate.h"
+#include "sim/hall/field_model.h"
+
+namespace focalfleet::sim {
+
+enum class HallCause {
+  kFieldHarmonics,
+  kFieldWidth,
+  kSensorGain,
+  kSensorOffset,
+  kSensorPosition,
+  kCentreOffset,
+  kTemperatureCoefficient,
+};
+inline constexpr HallCause kHallCauses[] = {
+    HallCause::kFieldHarmonics,        HallCause::kFieldWidth,     HallCause::kSensorGain,
+    HallCause::kSensorOffset,          HallCause::kSensorPosition, HallCause::kCentreOffset,
+    HallCause::kTemperatureCoefficient};
+/// The id in reports.
+const char* Name(HallCause cause);
+
+struct FieldTerm {
+  int order = 4;   // m
+  int degree = 0;  // k of He_k
+  bool sine = false;
+};
+
+/// Where each kind of parameter begins in the list.
+struct ParameterLayout {
+  std::size_t sensors = 8;
+  std::vector<FieldTerm> terms;
+
+  static constexpr std::size_t kAmplitude = 0;
+  static constexpr std::size_t kPhase = 1;
+  static constexpr std::size_t kWidth = 2;  // of the logarithm
+  static constexpr std::size_t kTemperature = 3;
+  static constexpr std::size_t kCentre = 4;  // three
+  static constexpr std::size_t kDecay = 7;   // times the offset: only seen where that is not 0
+  static constexpr std::size_t kFirstSensor = 8;
+
+  [[nodiscard]] std::size_t gain(std::size_t sensor) const { return kFirstSensor + sensor; }
+  [[nodiscard]] std::size_t offset(std::size_t sensor) const {
+    return kFirstSensor + sensors + sensor;
+  }
+  [[nodiscard]] std::size_t shift(std::size_t sensor) const {  // east, north
+    return kFirstSensor + 2 * sensors + 2 * sensor;
+  }
+  [[nodiscard]] std::size_t term(std::size_t k) const { return kFirstSensor + 4 * sensors + k; }
+  [[nodiscard]] std::size_t size() const { return term(terms.size()); }
+};
+
+ParameterLayout LayoutOf(std::size_t sensors);
+
+struct HallCampaign {
+  std::vector<Orientation> poses;
+  std::vector<VoltageRow> rows;  // as many
+  bool has_temperature = false;
+  double temperature_mean_C = 20;
+};
+
+/// One reading that is judged: row and sensor.
+struct Reading {
+  std::size_t row = 0;
+  std::size_t sensor = 0;
+};
+
+class HallForward {
+ public:
+  /// Lifetime: keeps all three.
+  HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field);
+
+  /// The same rig in other poses. Lifetime: keeps `campaign`.
+  [[nodiscard]] HallForward At(const HallCampaign& campaign) const {
+    return HallForward(campaign, rig_, field_);
+  }
+
+  [[nodiscard]] double zero_V() const { return rig_.electronics.zero_V(); }
+  [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
+  [[nodiscard]] double peak_T() const { return peak_T_; }
+  [[nodiscard]] double width_rad() const { return width_rad_; }
+
+  /// Voltages of the readings. Shape: as many as readings.
+  void Predict(const Eigen::VectorXd& parameters, const std::vector<Reading>& readings,
+               Eigen::VectorXd* voltages_V) const;
+  /// Derivatives by central differences of the same. Shape: (readings, chosen).
+  /// Cost: two predictions a parameter; of a sensor's own parameters only of its readings.
+  [[nodiscard]] Eigen::MatrixXd Slopes(const Eigen::VectorXd& parameters,
+                                       const std::vector<Reading>& readings,
+                                       const std::vector<std::size_t>& chosen) const;
+
+ private:
+  [[nodiscard]] double One(const Eigen::VectorXd& parameters, const Reading& reading) const;
+  [[nodiscard]] double Step(std::size_t parameter) const;
+  [[nodiscard]] int SensorOf(std::size_t parameter) const;  // -1: of all
+
+  const HallCampaign& campaign_;
+  const HallRig& rig_;
+  const FieldModel& field_;
+  ParameterLayout layout_;
+  std::vector<Rotation> rotations_;
+  double peak_T_ = 0;
+  double width_rad_ = 0;
+};
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,60 @@
+// The field of magnetised pieces against dipoles summed by other code, by the midpoint rule,
+// extrapolated from two step sizes.
+#include "sim/hall/magnet_array.h"
+
+#include <gtest/gtest.h>
+
+#include "protocol/base/rng.h"
+#include "sim/hall/sensors.h"
+#include "tests/sim/hall/planted_rig.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void ExpectSameField(const std::vector<MagnetShell>& shells,
+                     const std::vector<testing::Shell>& planted) {
+  const std::uint64_t seed = testing::TestSeed(1);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  const MagnetArray array(shells);
+  const testing::DipoleRotor coarse(planted, 12), fine(planted, 24);
+  const double peak_T = std::abs(array.Radial_T({1, 0, 0}, 59));
+  for (int k = 0; k < 12; ++k) {
+    // Within 40 deg of the equator, where sensors stand, and anywhere.
+    const double z = rng.Uniform(-1, 1) * (k % 2 == 0 ? 0.64 : 1);
+    const double phi = rng.Uniform(0, 6.28), flat = std::sqrt(1 - z * z);
+    const Vector3 u{flat * std::cos(phi), flat * std::sin(phi), z};
+    const Vector3 ours = array.Field_T(59 * u);
+    const testing::Vec place = {59 * u.x, 59 * u.y, 59 * u.z};
+    const testing::Vec one = coarse.Field(place), two = fine.Field(place);
+    const double parts[] = {ours.x, ours.y, ours.z};
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_NEAR(parts[i], (4 * two[i] - one[i]) / 3, 1e-4 * peak_T) << k << " part " << i;
+  }
+}
+
+TEST(MagnetArray, OneShellAgreesWithAnIndependentSumOfDipoles) {
+  ExpectSameField(OneShellArray(), testing::PlantedOneShell());
+}
+TEST(MagnetArray, TwoShellsAgreeWithAnIndependentSumOfDipoles) {
+  ExpectSameField(TwoShellArray(), testing::PlantedTwoShells());
+}
+TEST(MagnetArray, UnlikeMagnetsAgreeToo) {
+  auto ours = OneShellArray();
+  auto planted = testing::PlantedOneShell();
+  ours[0].strength = {1.02, 0.97, 1, 1.01, 0.99, 1, 1.03, 0.98};
+  planted[0].strength = ours[0].strength;
+  ExpectSameField(ours, planted);
+}
+
+TEST(MagnetArray, ThreeDimensionalArrayIsBeyondTheSensorsRange) {
+  const SensorElectronics electronics;
+  EXPECT_DOUBLE_EQ(electronics.range_T(), 0.1);
+  EXPECT_LT(MagnetArray(OneShellArray()).Radial_T({1, 0, 0}, 59), electronics.range_T());
+  EXPECT_GT(MagnetArray(TwoShellArray()).Radial_T({1, 0, 0}, 59), electronics.range_T());
+  EXPECT_FALSE(Field_T({}, electronics, Voltage_V({}, electronics, 0.13)));
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
