@@ -258,7 +258,7 @@ void AddDrive(CLI::App* parent, CommandLine* line) {
 
 void AddSimulateCommand(CommandLine* line) {
   CLI::App* simulate =
-      line->app.add_subcommand("simulate", "Simulate a motor, or a measured campaign, without a fleet");
+      line->app.add_subcommand("simulate", "Simulate a motor or a measured campaign, no fleet");
   simulate->require_subcommand(1);
   AddDrive(simulate, line);
   AddSimulateCampaign(simulate, line);

@@ -10,6 +10,7 @@ constexpr std::size_t kRowsTried = 12;
 constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
 constexpr double kNear = 2;        // of the variance that the best leaves: cannot be told apart
+constexpr double kNearSwap = 3;    // an exchange moves all orientations, so that fits differ more
 constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;
 constexpr double kHarmless = 0.1;  // of the same: no orientation suffers from it
@@ -178,6 +179,12 @@ std::vector<SensorVerdict> SuspectSensors(const OrientationSolver& solver,
     SensorVerdict verdict{best.fault, {best.one}, {}, left};
     if (best.fault == SensorFault::kSwapped) {
       verdict.sensors.push_back(best.two);
+      // Another exchange at other orientations may fit nearly as well.
+      for (std::size_t k = 1; k < hypotheses.size(); ++k)
+        if (hypotheses[k].fault == SensorFault::kSwapped &&
+            hypotheses[k].variance_T2 < kNearSwap * best.variance_T2 + 1e-3 * usual_T2)
+          for (const std::size_t sensor : {hypotheses[k].one, hypotheses[k].two})
+            verdict.or_else.push_back(sensor);
     } else {
       if (!few) verdict.fault = KindOf(AgainstTheOthers(solver, *readings, tried, best.one));
       for (std::size_t k = 1; k < hypotheses.size(); ++k)
