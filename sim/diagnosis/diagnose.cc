@@ -145,6 +145,11 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
 
 // One entry a cause: both axes, or several shapes, of one name belong together.
 void MergeCauses(std::vector<CauseFound>* causes) {
+  // Strongest first: what cannot be told of the strongest part cannot be told of the whole, and
+  // rivals of a weak part only do not explain it.
+  std::stable_sort(causes->begin(), causes->end(), [](const CauseFound& a, const CauseFound& b) {
+    return a.delta_log_likelihood > b.delta_log_likelihood;
+  });
   std::vector<CauseFound> merged;
   for (CauseFound& cause : *causes) {
     const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
@@ -168,11 +173,6 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
     same->predicted_gain_um += cause.predicted_gain_um;
-    // Rivals of one part only do not explain the whole.
-    std::erase_if(same->candidates, [&](const std::string& candidate) {
-      return candidate != cause.cause && std::find(cause.candidates.begin(), cause.candidates.end(),
-                                                   candidate) == cause.candidates.end();
-    });
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
     return a.delta_log_likelihood > b.delta_log_likelihood;
