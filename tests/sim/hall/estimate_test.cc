@@ -82,7 +82,7 @@ TEST(Estimate, AStuckSensorWithNoiseIsNamedToo) {
 }
 
 TEST(Estimate, SwappedSensorsAreNamedAndExchanged) {
-  for (const auto& [one, two] : {std::pair(0, 5), std::pair(2, 3), std::pair(4, 6)}) {
+  for (const auto& [one, two] : {std::pair(0, 5), std::pair(1, 2), std::pair(4, 6)}) {
     Table table = Drawn(40);
     const double good_deg = Rms_deg(Of(table.rows), table);
     for (VoltageRow& row : table.rows)
@@ -96,6 +96,19 @@ TEST(Estimate, SwappedSensorsAreNamedAndExchanged) {
         ::testing::ElementsAre(static_cast<std::size_t>(one), static_cast<std::size_t>(two)));
     EXPECT_NEAR(Rms_deg(estimates, table), good_deg, 1e-6);
   }
+}
+
+// The mirror image of 3 and 4 exchanged is 5 and 6 exchanged.
+TEST(Estimate, SwapsThatAMirrorCannotTellAreSaidToBeSo) {
+  Table table = Drawn(40);
+  for (VoltageRow& row : table.rows) std::swap(row.voltages_V[2], row.voltages_V[3]);
+  const Estimates estimates = Of(table.rows);
+  ASSERT_EQ(estimates.verdicts.size(), 1u);
+  EXPECT_EQ(estimates.verdicts[0].fault, SensorFault::kSwapped);
+  std::vector<std::size_t> all = estimates.verdicts[0].sensors;
+  all.insert(all.end(), estimates.verdicts[0].or_else.begin(), estimates.verdicts[0].or_else.end());
+  EXPECT_THAT(all, ::testing::UnorderedElementsAre(2u, 3u, 4u, 5u));
+  EXPECT_THAT(estimates.rows[0].status, HasSubstr(" or v"));
 }
 
 TEST(Estimate, MissingAndSaturatedVoltagesAreSaidRowByRow) {
