@@ -136,6 +136,11 @@ std::string NamesOf(const std::vector<std::size_t>& sensors, std::string_view be
 }
 
 std::string Sentence(const sim::SensorVerdict& verdict) {
+  if (!verdict.or_else.empty() && verdict.fault == sim::SensorFault::kSwapped)
+    return fmt::format(
+        "two sensors are swapped, cannot tell which: {}, or one of the pairs of {}; "
+        "the orientations are those of the first",
+        NamesOf(verdict.sensors, " and "), NamesOf(verdict.or_else, " "));
   if (!verdict.or_else.empty())
     return fmt::format("one sensor contradicts the others, cannot tell which: {} or {}",
                        NamesOf(verdict.sensors, " and "), NamesOf(verdict.or_else, " or "));

@@ -174,7 +174,9 @@ Estimates EstimateOrientations(HallRig rig, const std::shared_ptr<const FieldMod
     if (verdict.fault == SensorFault::kMissing) continue;  // said in each row
     std::string word(Name(verdict.fault));
     for (const std::size_t sensor : verdict.sensors) word += " " + SensorName(sensor);
-    for (const std::size_t sensor : verdict.or_else) word += " or " + SensorName(sensor);
+    const bool pairs = verdict.fault == SensorFault::kSwapped;
+    for (std::size_t k = 0; k < verdict.or_else.size(); ++k)
+      word += (pairs && k % 2 == 1 ? " " : " or ") + SensorName(verdict.or_else[k]);
     Append(&of_all, word);
   }
   const RowJudge judge(solver, std::max(out.noise_T, kLeastContradiction_T));

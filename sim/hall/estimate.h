@@ -6,7 +6,9 @@
 // Hypotheses about all rows are compared by what they leave: nothing wrong; one sensor not to be
 // trusted (is it stuck, off in gain or offset?); two sensors swapped. One is named where it leaves
 // a quarter or less of the variance and no other comes near; where several do, it is said that they
-// cannot be told apart. A row by itself is judged against the noise of the others.
+// cannot be told apart. (A field that is the same above and below the equator does not tell sensors
+// 3 and 4 exchanged from 5 and 6 exchanged: the one is the other's mirror image.) A row by itself
+// is judged against the noise of the others.
 //
 // Statuses: `ok`; `saturated v3`, `missing v3`, `stuck v3`, `bad v3`, `swapped v3 v4` (the
 // orientation comes from the others, or with the two exchanged); `ambiguous` (another orientation
@@ -32,8 +34,9 @@ std::string_view Name(SensorFault fault);
 struct SensorVerdict {
   SensorFault fault = SensorFault::kBad;
   std::vector<std::size_t> sensors;  // from 0; several of kSwapped are the two
-  std::vector<std::size_t> or_else;  // sensors that cannot be told from it
-  double variance_left = 0;          // over that without the hypothesis
+  /// Sensors that cannot be told from it; of kSwapped pairs, one after the other.
+  std::vector<std::size_t> or_else;
+  double variance_left = 0;  // over that without the hypothesis
 };
 
 struct RowEstimate {

@@ -110,6 +110,15 @@ class SphericalField final : public FieldModel {
     double slope = 0;
   };
 
+  struct Flat {
+    double x = 0;
+    double y = 0;
+  };
+  // As complex numbers; std::complex asks for infinities behind each product.
+  static Flat Times(const Flat& a, const Flat& b) {
+    return {a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x};
+  }
+
   static Order Tabulate(int order, const std::vector<SphericalTerm>& terms) {
     Order table{.order = order};
     int degree_max = order;
@@ -171,7 +180,9 @@ class SphericalField final : public FieldModel {
     const auto piece = static_cast<std::size_t>(place);
     const double t = place - static_cast<double>(piece);
     FieldSample sample;
-    double power_x = 1, power_y = 0;  // (x + i y)^(m - 1) of the order at hand
+    // w = x + i y, and w^(m - 1) of the order at hand; orders of equal poles are 8 apart.
+    const Flat w{u.x, u.y}, w2 = Times(w, w), w4 = Times(w2, w2), w8 = Times(w4, w4);
+    Flat power{1, 0};
     int reached = 0;
     for (const Order& order : orders_) {
       const Read cosine = ReadAt(order.cosine, piece, t);
@@ -182,17 +193,17 @@ class SphericalField final : public FieldModel {
         continue;
       }
       const Read sine = ReadAt(order.sine, piece, t);
-      for (; reached < m - 1; ++reached) {
-        const double next = power_x * u.x - power_y * u.y;
-        power_y = power_x * u.y + power_y * u.x;
-        power_x = next;
-      }
-      const double whole_x = power_x * u.x - power_y * u.y;
-      const double whole_y = power_x * u.y + power_y * u.x;
-      sample.b_T += cosine.value * whole_x + sine.value * whole_y;
-      sample.slope_T.z += cosine.slope * whole_x + sine.slope * whole_y;
-      sample.slope_T.x += m * (cosine.value * power_x + sine.value * power_y);
-      sample.slope_T.y += m * (sine.value * power_x - cosine.value * power_y);
+      int gap = m - 1 - reached;
+      for (; gap >= 8; gap -= 8) power = Times(power, w8);
+      if ((gap & 4) != 0) power = Times(power, w4);
+      if ((gap & 2) != 0) power = Times(power, w2);
+      if ((gap & 1) != 0) power = Times(power, w);
+      reached = m - 1;
+      const Flat whole = Times(power, w);
+      sample.b_T += cosine.value * whole.x + sine.value * whole.y;
+      sample.slope_T.z += cosine.slope * whole.x + sine.slope * whole.y;
+      sample.slope_T.x += m * (cosine.value * power.x + sine.value * power.y);
+      sample.slope_T.y += m * (sine.value * power.x - cosine.value * power.y);
     }
     return sample;
   }

@@ -47,9 +47,9 @@ class OrientationSolver {
   struct Options {
     bool magnitudes = false;  // readings are |B|
     double tilt_max_rad = 45 * kRadPerDeg;
-    /// A step shorter than this is the last and is not looked at again. 1e-3 leaves less than
-    /// 0.01 deg at 0.5 mT of noise, which itself turns by some tenths, and saves a third of the
-    /// field's evaluations; 0 goes on to the end of the digits.
+    /// A step shorter than this is the last and is not looked at again. 1e-3 leaves some
+    /// thousandths of a degree of readings with 0.5 mT of noise, which itself is tenths, and saves
+    /// a third of the field's evaluations; 0 goes on to the end of the digits.
     double last_step_rad = 0;
   };
   /// Lifetime: keeps `field`. Cost: the atlas, about 3 ms.

@@ -10,7 +10,6 @@ constexpr std::size_t kRowsTried = 12;
 constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
 constexpr double kNear = 2;        // of the variance that the best leaves: cannot be told apart
-constexpr double kNearSwap = 3;    // an exchange moves all orientations, so that fits differ more
 constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;
 constexpr double kHarmless = 0.1;  // of the same: no orientation suffers from it
@@ -177,23 +176,23 @@ std::vector<SensorVerdict> SuspectSensors(const OrientationSolver& solver,
     const double left = best.variance_T2 / before_T2;
     if (left > kVarianceLeft || (few && best.variance_T2 > kSuspicious * usual_T2)) break;
     SensorVerdict verdict{best.fault, {best.one}, {}, left};
+    const auto near = [&](const Hypothesis& other) {
+      return other.fault == best.fault &&
+             other.variance_T2 < kNear * best.variance_T2 + 1e-3 * usual_T2;
+    };
     if (best.fault == SensorFault::kSwapped) {
       verdict.sensors.push_back(best.two);
-      // Another exchange at other orientations may fit nearly as well.
       for (std::size_t k = 1; k < hypotheses.size(); ++k)
-        if (hypotheses[k].fault == SensorFault::kSwapped &&
-            hypotheses[k].variance_T2 < kNearSwap * best.variance_T2 + 1e-3 * usual_T2)
-          for (const std::size_t sensor : {hypotheses[k].one, hypotheses[k].two})
-            verdict.or_else.push_back(sensor);
+        if (near(hypotheses[k]))
+          verdict.or_else.insert(verdict.or_else.end(), {hypotheses[k].one, hypotheses[k].two});
     } else {
       if (!few) verdict.fault = KindOf(AgainstTheOthers(solver, *readings, tried, best.one));
       for (std::size_t k = 1; k < hypotheses.size(); ++k)
-        if (hypotheses[k].fault == SensorFault::kBad &&
-            hypotheses[k].variance_T2 < kNear * best.variance_T2 + 1e-3 * usual_T2)
-          verdict.or_else.push_back(hypotheses[k].one);
+        if (near(hypotheses[k])) verdict.or_else.push_back(hypotheses[k].one);
     }
-    // Which of several it is cannot be told: nobody is left out.
-    if (verdict.or_else.empty())
+    // Which of several it is cannot be told: nobody is left out. Of swaps one is as good as the
+    // other, and the orientation is one of two.
+    if (verdict.or_else.empty() || best.fault == SensorFault::kSwapped)
       for (HallReading& reading : *readings) reading = Under(reading, best);
     verdicts.push_back(verdict);
     if (!verdict.or_else.empty()) break;

@@ -18,7 +18,8 @@ constexpr std::size_t kSpareReadings = 60;  // beyond the parameters
 constexpr double kAlike_V = 2e-3;
 constexpr double kMove_V = 0.1;
 constexpr double kSwapLeaves = 0.3;  // of the squares
-constexpr double kFarOff = 6;        // robust standard deviations
+constexpr int kPassesMax = 8;
+constexpr double kFarOff = 6;  // robust standard deviations
 constexpr double kPosesSpread_rad = 0.5 * kRadPerDeg;
 
 struct Column {
@@ -153,20 +154,30 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Single readings that nothing in the library comes near to.
-bool DropFarOff(const Eigen::VectorXd& residuals, HallSearch* search, HallDiagnosis* out) {
-  std::vector<double> sizes;
-  for (Index k = 0; k < residuals.size(); ++k) sizes.push_back(std::abs(residuals[k]));
-  const double limit_V = kFarOff * 1.4826 * Median(sizes) + 1e-6;
-  std::vector<Reading> kept;
-  for (std::size_t k = 0; k < sizes.size(); ++k)
-    if (sizes[k] <= limit_V) kept.push_back(search->readings()[k]);
-  const std::size_t dropped = sizes.size() - kept.size();
-  if (dropped == 0 || dropped * 5 > sizes.size()) return false;
-  out->outliers["far off"] += dropped;
-  search->set_readings(std::move(kept));
-  search->TakeMeasured();
-  return true;
+// Single readings that nothing in the library comes near to. One far enough off pulls the fit, and
+// its neighbours seem far off: only those of the size of the worst go at a time.
+bool DropFarOff(const Selected& selected, HallSearch* search, HallDiagnosis* out) {
+  HallFit fit = selected.fit;
+  std::size_t dropped = 0;
+  for (int pass = 0; pass < kPassesMax; ++pass) {
+    const Eigen::VectorXd residuals = search->AllFree(fit).residuals;
+    std::vector<double> sizes;
+    for (Index k = 0; k < residuals.size(); ++k) sizes.push_back(std::abs(residuals[k]));
+    const double worst_V = *std::max_element(sizes.begin(), sizes.end());
+    const double limit_V = std::max(kFarOff * 1.4826 * Median(sizes) + 1e-6, worst_V / 2);
+    std::vector<Reading> kept;
+    for (std::size_t k = 0; k < sizes.size(); ++k)
+      if (sizes[k] <= limit_V) kept.push_back(search->readings()[k]);
+    const std::size_t now = sizes.size() - kept.size();
+    // Many that are far off are no accidents but structure.
+    if (now == 0 || (dropped + now) * 20 > sizes.size()) break;
+    dropped += now;
+    search->set_readings(std::move(kept));
+    search->TakeMeasured();
+    fit = search->Fit(selected.on, fit.parameters);
+  }
+  if (dropped > 0) out->outliers["far off"] += dropped;
+  return dropped > 0;
 }
 
 }  // namespace
@@ -209,7 +220,7 @@ HallDiagnosis DiagnoseHall(const HallCampaign& given, const HallRig& rig, const 
   Selected selected = SelectHall(search);
   // Twice at most: without the far ones the noise is smaller.
   for (int round = 0; round < 2; ++round) {
-    if (!DropFarOff(search.AllFree(selected.fit).residuals, &search, &out)) break;
+    if (!DropFarOff(selected, &search, &out)) break;
     selected = SelectHall(search);
   }
   out.readings = search.readings();

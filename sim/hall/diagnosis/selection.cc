@@ -214,7 +214,8 @@ double Score(double squares, double variance, std::size_t freedom, std::size_t r
          static_cast<double>(freedom) * std::log(static_cast<double>(readings));
 }
 
-constexpr double kLeast_V = 5e-5;  // below a converter's step nothing means anything
+// 0.01 % of the range: a field model itself is no better, and nobody would act on less.
+constexpr double kLeast_V = 2.5e-4;
 double Variance(const HallSearch::Rich& rich) {
   return std::max(rich.variance, kLeast_V * kLeast_V);
 }

@@ -116,9 +116,7 @@ TEST(HallDiagnosis, FindsSwappedStuckAndFarOffVoltages) {
   EXPECT_THAT(diagnosis.troubles[0].sensors, ::testing::ElementsAre(7u));
   EXPECT_EQ(diagnosis.troubles[1].what, "swapped");
   EXPECT_THAT(diagnosis.troubles[1].sensors, ::testing::ElementsAre(1u, 5u));
-  // The planted one, and at most a stray or two of the noise's own.
-  EXPECT_GE(diagnosis.outliers.at("far off"), 1u);
-  EXPECT_LE(diagnosis.outliers.at("far off"), 3u);
+  EXPECT_EQ(diagnosis.outliers.at("far off"), 1u);
   EXPECT_TRUE(diagnosis.causes.empty());
 }
 
