@@ -61,6 +61,7 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Flag("active_low", &c->sync.active_low);
   visit->Section("camera");
   visit->Path("directory", &c->camera.directory);
+  visit->Flag("dds", &c->camera.dds);
   visit->Path("fiducials", &c->camera.fiducials);
   visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6});
   visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6});
@@ -71,6 +72,10 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Flag("mirrored", &c->camera.model.mirrored);
   visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000});
   visit->Wait("patience_ms", &c->camera.patience);
+  visit->Section("hall");
+  visit->Path("model", &c->hall.model);
+  visit->Real("noise_mT", &c->hall.noise_mT, {1e-5, 10});
+  visit->Real("tilt_max_deg", &c->hall.tilt_max_deg, {1, 60});
   visit->Section("clock");
   visit->Real("speed", &c->clock.speed, {0.01, 1000});
   visit->Section("drive");
@@ -322,8 +327,10 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
   reader->Require(config.timing.sync_lead < Milliseconds(20), "timing", "sync_lead_ms",
                   "timing.sync_lead_ms must be below 20: units take an edge only so short before "
                   "their start");
-  reader->Require(config.camera.directory.empty() || !config.camera.fiducials.empty(), "camera",
+  reader->Require(!config.camera.present() || !config.camera.fiducials.empty(), "camera",
                   "fiducials", "camera.fiducials must name a file where there is a camera");
+  reader->Require(!config.camera.dds || config.camera.directory.empty(), "camera", "dds",
+                  "a camera answers through camera.directory or through camera.dds, not both");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",
@@ -350,7 +357,8 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];
   config.timing.bit_rate_bps = config.bus.bit_rate_bps;
-  config.timing.has_camera = !config.camera.directory.empty();
+  config.timing.has_camera = config.camera.present();
+  config.timing.reads_sensors = !config.hall.model.empty();
   config.timing.data_bit_rate_bps = config.bus.can_fd ? config.bus.data_bit_rate_bps : 0;
   config.timing.sync_line = !config.sync.chip.empty();
   config.sync.chip_at = reader.At("sync", "chip");

@@ -58,13 +58,22 @@ struct DaemonConfig {
     std::string chip_at;  // file:line, for messages
   } sync;
   struct Camera {
-    std::string directory;  // where it is asked and answers (camera/camera_folder.h); empty: none
+    // Where it is asked and answers: a folder (camera/camera_folder.h), or topics of [dds]
+    // (camera/camera_dds.h). Neither: there is no camera.
+    std::string directory;
+    bool dds = false;
+    [[nodiscard]] bool present() const { return dds || !directory.empty(); }
     std::string fiducials;  // fiducials.csv
     SensorLimits sensor{11'000, 11'000};
     CameraModel model{.pixels_per_mm = 5, .centre_x_px = 5500, .centre_y_px = 5500};
     double centroid_sigma_um = 2;
     DurationNs patience = Milliseconds(30'000);  // real time; until an exposure has to be there
   } camera;
+  struct Hall {
+    std::string model;  // of the joints' field, as `focalfleet hall fit` writes it; empty: not used
+    double noise_mT = 0.03;  // of a sensor's reading, with what model and calibration leave
+    double tilt_max_deg = 45;
+  } hall;
   struct Clock {
     double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
   } clock;

@@ -57,6 +57,39 @@ Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
   return std::optional(measure);
 }
 
+AxisAngles CountOf(const FleetView& view, PositionerIndex i, const Pose& place) {
+  const Pose& offset = view.coordinator->unit(i).offset;
+  return AnglesOf(view.layout->unit(i), view.coordinator->drives()[i.value],
+                  {place[0] - offset[0], place[1] - offset[1]});
+}
+
+/// How much more than its count a unit's place will be at its target, by the model in force.
+/// A measured configuration ends each way with the piece `last_deg`.
+std::vector<std::optional<Pose>> OffsetsOf(const FleetView& view,
+                                           const std::vector<std::optional<Pose>>& targets,
+                                           const std::array<double, kAxisCount>& last_deg) {
+  std::vector<std::optional<Pose>> offsets(targets.size());
+  for (std::uint32_t n = 0; n < targets.size(); ++n) {
+    const UnitView& unit = view.coordinator->unit({n});
+    if (!targets[n] || unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) continue;
+    const Unit& described = view.layout->unit({n});
+    const UnitDrive& drive = view.coordinator->drives()[n];
+    const auto count =
+        view.compensation->CountFor({n}, {.fibre_fp = FibreAt(described, drive, *targets[n]),
+                                          .now = CountOf(view, {n}, PlaceOf(unit.knowledge)),
+                                          .guess = CountOf(view, {n}, *targets[n]),
+                                          .last_deg = last_deg});
+    if (!count) continue;
+    const double angle_deg[kAxisCount] = {count->theta_deg, count->phi_deg};
+    Pose offset = *targets[n];
+    for (const Axis axis : kAxes)
+      offset[Index(axis)] -= NearestVectors(angle_deg[Index(axis)], described.axis[Index(axis)],
+                                            drive.axis[Index(axis)]);
+    offsets[n] = offset;
+  }
+  return offsets;
+}
+
 Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(const std::string csv, TextArgument(args, "targets_csv"));
@@ -75,6 +108,14 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   ApplyCommand command{.source = source, .targets = {}, .fixed = fixed, .measure = measure};
   FOCALFLEET_TRY_ASSIGN(command.targets,
                         ResolveTargets(targets, *view.layout, view.coordinator->drives(), now));
+  command.target_ids.resize(view.layout->size());
+  for (const TargetRow& row : targets.rows)
+    if (const auto i = view.layout->Find(row.unit)) command.target_ids[i->value] = row.target_id;
+  const bool observe = measure && measure->observe;
+  if (view.compensation != nullptr && !observe)
+    command.offsets = OffsetsOf(
+        view, command.targets,
+        measure ? view.coordinator->config().approach_deg : std::array<double, kAxisCount>{});
   return command;
 }
 
@@ -234,7 +275,19 @@ bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
 
+/// What all units count that rest.
+void NoteRests(const FleetView& view, Compensation* compensation) {
+  if (compensation == nullptr) return;
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) NoteRest(view, {n}, compensation);
+}
+
 }  // namespace
+
+void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation) {
+  const UnitView& unit = view.coordinator->unit(i);
+  if (unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) return;
+  compensation->Rests(i, CountOf(view, i, PlaceOf(unit.knowledge)));
+}
 
 Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
                                                const std::vector<std::uint32_t>& ids) {
@@ -291,7 +344,8 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.pursues;
-  auto command = CommandOf(*request, view);
+  auto change = ChangeModel(view, *request);
+  auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + command.error().text);
     return Answer(pending, tl::unexpected<Error>(command.error()));
@@ -309,6 +363,7 @@ std::optional<Result<Json>> ControlDesk::Ask(const FleetView& view, const Contro
   if (request.verb == "params") return AskParameters(view, request);
   if (request.verb == "history") return AskHistory(view, request);
   if (request.verb == "measurements") return AskMeasurements(view, request);
+  if (request.verb == "model") return Result<Json>(models_.Show(kHistoryRowsMax));
   return std::nullopt;
 }
 
@@ -368,6 +423,52 @@ Result<Json> ControlDesk::AskMeasurements(const FleetView& view, const ControlRe
   if (rows.empty())
     return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
   return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
+}
+
+std::optional<Result<Command>> ControlDesk::ChangeModel(const FleetView& view,
+                                                        const ControlRequest& request) {
+  const auto change = [&]() -> Result<ModelRow> {
+    if (request.verb == "model_unload") return models_.Unload();
+    if (request.verb == "model_rollback")
+      return models_.Rollback([this](const std::string& sha256) -> Result<std::string> {
+        FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+        return reader->ModelText(sha256);
+      });
+    FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgument(request.args, "model_toml"));
+    FOCALFLEET_TRY_ASSIGN(const std::string source,
+                          TextArgumentOr(request.args, "source", "model.toml"));
+    return models_.Load(text, source);
+  };
+  if (request.verb != "model_load" && request.verb != "model_unload" &&
+      request.verb != "model_rollback")
+    return std::nullopt;
+  auto row = change();
+  if (!row) return Result<Command>(tl::unexpected<Error>(std::move(row).error()));
+  if (auto known = ForgetHomed(); !known) options_.log("model: " + known.error().text);
+  NoteRests(view, models_.compensation());
+  return Wrapped(Result<KeepModelCommand>(KeepModelCommand{std::move(*row)}));
+}
+
+Status ControlDesk::RestoreModel() {
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(auto changes, reader->Models(kHistoryRowsMax));
+  if (changes.empty()) return {};
+  std::string text;
+  if (!changes.front().row.sha256.empty()) {
+    FOCALFLEET_TRY_ASSIGN(text, reader->ModelText(changes.front().row.sha256));
+  }
+  FOCALFLEET_TRY(models_.Restore(std::move(changes), text));
+  return ForgetHomed();
+}
+
+/// Units that were homed since the model came count anew.
+Status ControlDesk::ForgetHomed() {
+  if (models_.compensation() == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const auto homed, reader->HomedSince(models_.since()));
+  for (const UnitId id : homed)
+    if (const auto i = options_.layout->Find(id)) models_.compensation()->Forget(*i);
+  return {};
 }
 
 Result<StoreReader*> ControlDesk::Reader() {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/control/line_server.h"
+#include "daemon/model_shelf.h"
 #include "daemon/status_json.h"
 #include "daemon/store/store.h"
 #include "fleet/coordinator.h"
@@ -26,6 +27,9 @@ Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
 /// then.
 Result<Command> CommandOf(const ControlRequest& request, const FleetView& view);
 
+/// Tells the model what the unit counts, if it rests.
+void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation);
+
 class ControlDesk {
  public:
   struct Options {
@@ -33,9 +37,10 @@ class ControlDesk {
     std::function<ShellFacts()> facts;
     std::function<void(const std::string&)> log;  // one sentence for each command
     std::string store_path;
+    const Layout* layout = nullptr;
   };
   ControlDesk(LineServer server, Options options)
-      : server_(std::move(server)), options_(std::move(options)) {}
+      : server_(std::move(server)), options_(std::move(options)), models_(options_.layout) {}
 
   [[nodiscard]] int fd() const { return server_.fd(); }
 
@@ -46,6 +51,12 @@ class ControlDesk {
   void ShowProgress(const FleetView& view);
   /// When ShowProgress wants to be called; kNever while nobody waits.
   [[nodiscard]] HostInstant wake_at() const { return waiting_ > 0 ? progress_at_ : kNever; }
+  /// The model that was in force when the last daemon ended. Errors: those of the store; kInvalid:
+  /// it is none of this fleet any more. Then none is in force.
+  Status RestoreModel();
+  [[nodiscard]] ModelShelf& models() { return models_; }
+  [[nodiscard]] const ModelShelf& models() const { return models_; }
+
   /// Tells all who wait that the daemon ends.
   void Close();
 
@@ -66,11 +77,15 @@ class ControlDesk {
   Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
   Result<Json> AskHistory(const FleetView& view, const ControlRequest& request);
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
+  /// None: the verb changes no model.
+  std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
+  Status ForgetHomed();
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
 
   LineServer server_;
   Options options_;
+  ModelShelf models_;
   std::unique_ptr<StoreReader> reader_;                 // opened with the first question for it
   std::unordered_map<std::uint64_t, Pending> pending_;  // by the coordinator's request number
   std::uint64_t next_request_ = 1;

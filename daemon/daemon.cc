@@ -7,9 +7,11 @@
 #include <memory>
 #include <utility>
 
+#include "daemon/camera/camera_dds.h"
 #include "daemon/camera/camera_folder.h"
 #include "daemon/event_loop.h"
 #include "daemon/fleet_setup.h"
+#include "daemon/hall/measure.h"
 #include "daemon/log.h"
 #include "daemon/status_outlet.h"
 #include "daemon/store/store.h"
@@ -32,6 +34,10 @@ struct SharedCounters {
   std::atomic<std::uint64_t> transactions{0};
   std::atomic<std::uint64_t> rows{0};
 };
+
+DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
+  return {.domain = dds.domain, .config_xml = dds.config.empty() ? "" : "file://" + dds.config};
+}
 
 class Daemon {
  public:
@@ -57,12 +63,13 @@ class Daemon {
   std::unique_ptr<StatusOutlet> outlet_;  // none: DDS is off
   std::unique_ptr<StatusFeed> feed_;
   std::unique_ptr<CameraWorker> camera_worker_;  // none: there is no camera
+  std::unique_ptr<SpineWorker> spine_worker_;    // none: no unit measures itself
   std::unique_ptr<EventSignal> signal_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<StoreThread> store_thread_;
   std::unique_ptr<PlannerThread> planner_;
-  std::unique_ptr<CameraThread> camera_;  // none: there is no camera
+  std::unique_ptr<CameraThread> camera_;  // none: nobody can measure
   std::unique_ptr<ControlDesk> desk_;
   std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
@@ -83,6 +90,7 @@ Status Daemon::Start() {
   lines_ =
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
   FOCALFLEET_TRY(OpenCamera());
+  FOCALFLEET_TRY_ASSIGN(spine_worker_, OpenSpines(config_.hall, *layout_));
   FOCALFLEET_TRY(OpenStatus());
   coordinator_ = std::make_unique<Coordinator>(
       layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
@@ -97,15 +105,16 @@ Status Daemon::OpenDesk() {
       ControlDesk::Options{.progress_period = clock_.Real(Milliseconds(200)),
                            .facts = [this] { return Facts(); },
                            .log = [](const std::string& text) { spdlog::info("{}", text); },
-                           .store_path = config_.store.path});
+                           .store_path = config_.store.path,
+                           .layout = layout_.get()});
+  if (const Status restored = desk_->RestoreModel(); !restored)
+    spdlog::error("no model is in force: {}", restored.error().text);
   return {};
 }
 
 Status Daemon::OpenStatus() {
   if (!config_.dds.enabled) return {};
-  const std::string xml = config_.dds.config.empty() ? "" : "file://" + config_.dds.config;
-  FOCALFLEET_TRY_ASSIGN(auto publisher,
-                        StatusPublisher::Create({.domain = config_.dds.domain, .config_xml = xml}));
+  FOCALFLEET_TRY_ASSIGN(auto publisher, StatusPublisher::Create(DdsOptionsOf(config_.dds)));
   outlet_ = std::make_unique<StatusOutlet>(std::move(publisher));
   feed_ = std::make_unique<StatusFeed>(
       layout_->size(),
@@ -116,15 +125,21 @@ Status Daemon::OpenStatus() {
 }
 
 Status Daemon::OpenCamera() {
-  if (config_.camera.directory.empty()) return {};
+  if (!config_.camera.present()) return {};
   FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
-  FOCALFLEET_TRY_ASSIGN(auto folder, CameraFolder::Open(config_.camera.directory, site.sensor));
+  std::unique_ptr<CameraPort> port;
+  if (config_.camera.dds) {
+    FOCALFLEET_TRY_ASSIGN(port, CameraDds::Open(DdsOptionsOf(config_.dds), site.sensor));
+  } else {
+    FOCALFLEET_TRY_ASSIGN(port, CameraFolder::Open(config_.camera.directory, site.sensor));
+  }
   camera_worker_ = std::make_unique<CameraWorker>(
-      std::move(folder),
+      std::move(port),
       CameraWorker::Options{
           .layout = layout_.get(),
           .site = std::move(site),
           .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
+          .speed = config_.clock.speed,
           .log = [](const std::string& text) { spdlog::warn("{}", text); }});
   return {};
 }
@@ -158,13 +173,13 @@ Status Daemon::StartThreads() {
                       return RunPlanJob(work.job, *layout, work.drives);
                     },
                     signal_.get()));
-  if (camera_worker_ != nullptr) {
-    FOCALFLEET_TRY_ASSIGN(camera_,
-                          CameraThread::Create(
-                              [this](const CameraWork& work, const std::atomic<bool>& ending) {
-                                return camera_worker_->Do(work, ending);
-                              },
-                              signal_.get()));
+  if (camera_worker_ != nullptr || spine_worker_ != nullptr) {
+    FOCALFLEET_TRY_ASSIGN(
+        camera_, CameraThread::Create(
+                     [this](const CameraWork& work, const std::atomic<bool>& ending) {
+                       return MeasureUnits(work, spine_worker_.get(), camera_worker_.get(), ending);
+                     },
+                     signal_.get()));
   }
   FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
                                                   .coordinator = coordinator_.get(),
@@ -234,7 +249,8 @@ Status RunDaemon(const DaemonConfig& config) {
 Result<std::string> CheckDaemon(const DaemonConfig& config) {
   FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
   FOCALFLEET_TRY(CheckInterfaces(config, layout));
-  if (!config.camera.directory.empty()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
+  if (config.camera.present()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
+  FOCALFLEET_TRY(OpenSpines(config.hall, layout));
   return "# " + std::to_string(layout.size()) + " units on " +
          std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
 }

@@ -14,6 +14,7 @@
 #include <cstring>
 #include <string>
 #include <utility>
+#include <variant>
 
 namespace focalfleet {
 namespace {
@@ -224,6 +225,7 @@ void EventLoop::Step() {
 
 void EventLoop::Perform() {
   LogChanges();
+  TellModel();
   if (!effects_.rows.empty()) {
     last_batch_ = effects_.batch;
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
@@ -242,6 +244,19 @@ void EventLoop::Perform() {
   }
   for (const ReplyEffect& reply : effects_.replies) parts_.desk->Reply(View(), reply);
   if (parts_.feed != nullptr) parts_.feed->Changed(effects_.changed);
+}
+
+// A model predicts from how a unit came to where it rests.
+void EventLoop::TellModel() {
+  Compensation* compensation = parts_.desk->models().compensation();
+  if (compensation == nullptr) return;
+  for (const Row& row : effects_.rows) {
+    const auto* end = std::get_if<IntentEndRow>(&row);
+    if (end == nullptr || end->end != IntentEnd::kHomed) continue;
+    for (const PositionerIndex i : effects_.changed)
+      if (parts_.coordinator->unit(i).serial == end->serial) compensation->Forget(i);
+  }
+  for (const PositionerIndex i : effects_.changed) NoteRest(View(), i, compensation);
 }
 
 void EventLoop::Tell() {
@@ -266,7 +281,8 @@ FleetView EventLoop::View() const {
   return {.layout = parts_.layout,
           .coordinator = parts_.coordinator,
           .now = now_,
-          .at = WallTime::Now()};
+          .at = WallTime::Now(),
+          .compensation = std::as_const(*parts_.desk).models().compensation()};
 }
 
 }  // namespace focalfleet

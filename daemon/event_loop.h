@@ -37,7 +37,7 @@ class EventLoop {
     BusLines* lines = nullptr;
     ControlDesk* desk = nullptr;
     PlannerThread* planner = nullptr;
-    CameraThread* camera = nullptr;  // none: there is no camera
+    CameraThread* camera = nullptr;  // measures; none: neither camera nor sensors
     StoreThread* store = nullptr;
     StatusFeed* feed = nullptr;            // none: DDS is off
     SyncPulse* sync = nullptr;             // none: no SYNC line
@@ -73,6 +73,7 @@ class EventLoop {
   void ServeSync();
   void Perform();
   void Tell();
+  void TellModel();
   void LogChanges();
   [[nodiscard]] FleetView View() const;
 

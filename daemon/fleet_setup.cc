@@ -92,6 +92,7 @@ Result<Ports> OpenSimulated(const DaemonConfig& config, const Layout& layout,
   world.spread = config.simulated.spread == "real" ? sim::Spread::kReal : sim::Spread::kNominal;
   world.bit_rate_bps = config.bus.bit_rate_bps;
   world.start = clock.Now();
+  world.joint_sensors = MakeJoints(layout, world.seed, world.spread);
   FOCALFLEET_TRY_ASSIGN(const auto fleet, SimulatedFleet::Create(std::move(world)));
   Ports ports;
   for (const BusId bus : layout.buses())
@@ -121,6 +122,15 @@ Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {
     radius_mm = std::max(radius_mm, std::hypot(fiducial.at_fp.x_mm, fiducial.at_fp.y_mm));
   site.model.radius_mm = radius_mm;
   return site;
+}
+
+Result<std::unique_ptr<SpineWorker>> OpenSpines(const DaemonConfig::Hall& hall,
+                                                const Layout& layout) {
+  if (hall.model.empty()) return std::unique_ptr<SpineWorker>();
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(hall.model));
+  FOCALFLEET_TRY_ASSIGN(const HallModelFile model, ReadHallModel(text, hall.model));
+  return SpineWorker::Create(layout, model,
+                             {.noise_T = 1e-3 * hall.noise_mT, .tilt_max_deg = hall.tilt_max_deg});
 }
 
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout) {

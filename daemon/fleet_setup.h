@@ -6,6 +6,7 @@
 
 #include "daemon/clock.h"
 #include "daemon/config.h"
+#include "daemon/hall/spine_work.h"
 #include "daemon/ports/gpio_line.h"
 #include "daemon/ports/pollable_port.h"
 #include "daemon/ports/socketcan_port.h"
@@ -20,6 +21,11 @@ Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet);
 
 /// The camera as configured, with its fiducials. Pre: there is one. Errors: as LoadLayout.
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera);
+
+/// Who makes places of what units' own sensors show; none where [hall] has no model.
+/// Errors: as LoadLayout; kInvalid: a set of sensors that the model does not fit.
+Result<std::unique_ptr<SpineWorker>> OpenSpines(const DaemonConfig::Hall& hall,
+                                                const Layout& layout);
 
 /// What configuration and layout must agree on. Errors: kInvalid: not one interface a bus.
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout);

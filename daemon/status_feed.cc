@@ -22,7 +22,7 @@ HostInstant StatusFeed::wake_at() const {
 StatusBatch StatusFeed::Take(const FleetView& view, std::uint64_t after_batch, bool store_failing) {
   StatusBatch batch;
   batch.after_batch = after_batch;
-  TakeUnits(view, &batch.units);
+  TakeUnits(view, &batch);
   for (const BusId bus : view.layout->buses()) batch.buses.push_back(SnapshotBus(view, bus));
   const FleetCounts counts = CountFleet(view);
   batch.fleet = FleetStatusValue{
@@ -44,13 +44,16 @@ StatusBatch StatusFeed::Take(const FleetView& view, std::uint64_t after_batch, b
   return batch;
 }
 
-void StatusFeed::TakeUnits(const FleetView& view, std::vector<UnitStatusValue>* out) {
+void StatusFeed::TakeUnits(const FleetView& view, StatusBatch* batch) {
   moving_ = false;
   for (std::uint32_t n = 0; n < changed_.size(); ++n) {
     const UnitPhase phase = view.coordinator->unit({n}).phase;
     const bool moves = phase == UnitPhase::kMoving || phase == UnitPhase::kHoming;
     moving_ = moving_ || moves;
-    if (moves || changed_[n] != 0) out->push_back(SnapshotUnit(view, {n}));
+    if (moves || changed_[n] != 0) batch->units.push_back(SnapshotUnit(view, {n}));
+    if (changed_[n] != 0)
+      if (auto orientation = SnapshotOrientation(view, {n}))
+        batch->orientations.push_back(std::move(*orientation));
     changed_[n] = 0;
   }
   any_changed_ = false;

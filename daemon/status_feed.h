@@ -33,7 +33,7 @@ class StatusFeed {
   void GiveBack(const StatusBatch& batch, const Layout& layout);
 
  private:
-  void TakeUnits(const FleetView& view, std::vector<UnitStatusValue>* out);
+  void TakeUnits(const FleetView& view, StatusBatch* batch);
 
   Options options_;
   DurationNs period_;

@@ -133,6 +133,20 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"subdivision", drive.subdivision}};
 }
 
+Json SpineJson(const SpineReading& spine) {
+  Json json = {
+      {"verdict", spine.verdict}, {"trusted", spine.trusted}, {"sensors_used", spine.used}};
+  const auto put = [&](const char* name, double value) {
+    json[name] = spine.solved ? Json(value) : Json();
+  };
+  const char* const angles[] = {"alpha_deg", "beta_deg", "gamma_deg"};
+  const char* const covariances[] = {"cov_aa_deg2", "cov_ab_deg2", "cov_ag_deg2",
+                                     "cov_bb_deg2", "cov_bg_deg2", "cov_gg_deg2"};
+  for (std::size_t k = 0; k < 3; ++k) put(angles[k], spine.angles_deg[k]);
+  for (std::size_t k = 0; k < 6; ++k) put(covariances[k], spine.covariance_deg2[k]);
+  return json;
+}
+
 /// The rounds that ended, and so much of the one under way.
 double MakespanSoFar(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
@@ -158,6 +172,8 @@ Json MeasuredJson(const ConfigurationView& configuration) {
                       {"measured", round.measured},
                       {"unknown", round.unknown},
                       {"within_tolerance", round.within_tolerance},
+                      {"by_sensors", round.by_sensors},
+                      {"camera", round.camera},
                       {"rms_um", Number(round.rms_um)},
                       {"median_um", Number(round.median_um)},
                       {"worst_um", Number(round.worst_um)}});
@@ -270,6 +286,8 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
           {"target", std::move(target)},
           {"sighting", seen.sighting ? Json(Name(*seen.sighting)) : Json()},
           {"error_um", seen.error_um ? Json(*seen.error_um) : Json()},
+          {"measured_by", seen.sighting ? Json(Name(seen.source)) : Json()},
+          {"orientation", seen.spine ? SpineJson(*seen.spine) : Json()},
           {"mode", Name(drive.mode)},
           {"v_bus_V", drive.v_bus_V},
           {"clock", ClockJson(seen.clock)},
@@ -297,9 +315,16 @@ std::string StateText(const FleetView& view) {
       fmt::format_to(out, ",\"{}_witness\":\"{}\"", name, Name(unit.witness[a]));
       number(fmt::format("{}_low_deg", name).c_str(), unit.low_deg[a]);
       number(fmt::format("{}_high_deg", name).c_str(), unit.high_deg[a]);
+      number(fmt::format("{}_offset_deg", name).c_str(),
+             AngleDeg(view.coordinator->unit({n}).offset[a], view.layout->unit({n}).axis[a],
+                      view.coordinator->drives()[n].axis[a]));
     }
     number("x_mm", unit.x_fp_mm);
     number("y_mm", unit.y_fp_mm);
+    const UnitDrive& drive = view.coordinator->drives()[n];
+    fmt::format_to(out, ",\"counter1\":{},\"repeat\":{},\"mode\":\"{}\"", drive.axis[0].counter1,
+                   drive.axis[0].repeat, Name(drive.mode));
+    number("v_bus_V", drive.v_bus_V);
     fmt::format_to(out, "}}");
   }
   fmt::format_to(out, "]}}");
@@ -333,13 +358,20 @@ Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
     Json json = {{"unit_id", row.unit.value},
                  {"configuration", row.configuration},
                  {"status", Name(row.status)},
+                 {"source", Name(row.source)},
                  {"x_mm", row.x_mm},
                  {"y_mm", row.y_mm},
-                 {"sigma_um", row.sigma_um},
+                 {"sigma_um", SigmaUm(row.covariance)},
+                 {"var_x_mm2", row.covariance.xx},
+                 {"cov_xy_mm2", row.covariance.xy},
+                 {"var_y_mm2", row.covariance.yy},
+                 {"target_id", row.target_id},
+                 {"delay_s", row.delay_s ? Json(*row.delay_s) : Json()},
                  {"target_x_mm", row.target_fp ? Json(row.target_fp->x_mm) : Json()},
                  {"target_y_mm", row.target_fp ? Json(row.target_fp->y_mm) : Json()},
                  {"error_um", row.error_um ? Json(*row.error_um) : Json()},
                  {"other_unit_id", row.other ? Json(row.other->value) : Json()},
+                 {"orientation", row.spine ? SpineJson(*row.spine) : Json()},
                  {"at", ToIso8601(at)}};
     rows.push_back(std::move(json));
   }

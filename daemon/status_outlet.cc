@@ -13,6 +13,11 @@ bool StatusOutlet::Publish(const StatusBatch& status) {
   units_.erase(units_.begin(), units_.begin() + static_cast<std::ptrdiff_t>(gone));
   place_of_.clear();
   for (std::size_t i = 0; i < units_.size(); ++i) place_of_[units_[i].unit] = i;
+  if (!status.orientations.empty()) {
+    const auto told =
+        publisher_->Publish(std::span<const UnitOrientationValue>(status.orientations));
+    if (!told) Note(tl::unexpected<Error>(told.error()));
+  }
   if (!status.buses.empty()) {
     const auto buses = publisher_->Publish(std::span<const BusStatusValue>(status.buses));
     if (!buses) Note(tl::unexpected<Error>(buses.error()));

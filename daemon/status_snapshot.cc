@@ -43,6 +43,21 @@ UnitStatusValue SnapshotUnit(const FleetView& view, PositionerIndex i) {
   return value;
 }
 
+std::optional<UnitOrientationValue> SnapshotOrientation(const FleetView& view, PositionerIndex i) {
+  const UnitView& seen = view.coordinator->unit(i);
+  if (!seen.spine) return std::nullopt;
+  UnitOrientationValue value{
+      .unit = view.layout->unit(i).id, .at = view.at, .spine = *seen.spine, .source = seen.source};
+  if (WitnessOf(seen.knowledge) == Witness::kMeasured) {
+    const PointFp fibre =
+        FibreAt(view.layout->unit(i), view.coordinator->drives()[i.value], PlaceOf(seen.knowledge));
+    value.x_fp_mm = fibre.x_mm;
+    value.y_fp_mm = fibre.y_mm;
+    value.covariance = seen.covariance;
+  }
+  return value;
+}
+
 BusStatusValue SnapshotBus(const FleetView& view, BusId bus) {
   return {.bus = bus, .at = view.at, .view = view.coordinator->bus(bus)};
 }

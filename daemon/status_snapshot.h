@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "daemon/dds/status_values.h"
 #include "daemon/wall_time.h"
@@ -10,12 +11,15 @@
 
 namespace focalfleet {
 
+class Compensation;
+
 /// What a snapshot is taken of.
 struct FleetView {
   const Layout* layout = nullptr;
   const Coordinator* coordinator = nullptr;
   HostInstant now;
   WallTime at;
+  const Compensation* compensation = nullptr;  // none: commands go as they are
 };
 
 /// The lesser of both axes: a unit is known no better than its worse axis.
@@ -23,6 +27,8 @@ Witness WitnessOf(const UnitKnowledge& knowledge);
 
 /// Moving units are shown where the plan has them now.
 UnitStatusValue SnapshotUnit(const FleetView& view, PositionerIndex i);
+/// Nothing where its sensors were never read.
+std::optional<UnitOrientationValue> SnapshotOrientation(const FleetView& view, PositionerIndex i);
 BusStatusValue SnapshotBus(const FleetView& view, BusId bus);
 
 struct FleetCounts {

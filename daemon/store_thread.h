@@ -30,6 +30,7 @@ namespace focalfleet {
 struct StatusBatch {
   std::uint64_t after_batch = 0;  // not to be told before this batch is durable
   std::vector<UnitStatusValue> units;
+  std::vector<UnitOrientationValue> orientations;  // of some of these units
   std::vector<BusStatusValue> buses;
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;

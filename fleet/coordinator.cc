@@ -120,6 +120,12 @@ class Coordinator::Impl {
     return contact_.WriteParameter(request, c);
   }
 
+  Status Do(std::uint64_t request, const KeepModelCommand& c) {
+    core_.Note(c.row);
+    core_.ReplyWhenDurable(request, "done");
+    return {};
+  }
+
   Core core_;
   Contact contact_;
   Pursuit pursuit_;
@@ -170,6 +176,7 @@ const BusView& Coordinator::bus(BusId bus) const {
 
 const ConfigurationView& Coordinator::configuration() const { return impl_->pursuit().view(); }
 std::span<const UnitDrive> Coordinator::drives() const { return impl_->core().drives; }
+const CoordinatorConfig& Coordinator::config() const { return impl_->core().config; }
 bool Coordinator::busy() const { return impl_->pursuit().busy(); }
 
 }  // namespace focalfleet

@@ -45,6 +45,8 @@ struct ApplyCommand {
   std::string source;
   std::vector<std::optional<Pose>> targets;  // Shape: (n)
   bool fixed = false;
+  /// What targets are called, carried through to every report. Shape: (n), or empty: nothing.
+  std::vector<std::string> target_ids = {};
   /// Given: look with the camera when all have arrived, send those again that are farther off than
   /// the tolerance, and look again, at most so many times.
   struct Measure {
@@ -55,6 +57,9 @@ struct ApplyCommand {
     bool observe = false;
   };
   std::optional<Measure> measure = {};
+  /// By a model of the fleet: how much more than its own count each unit's place will be at its
+  /// target. Shape: (n), or empty: no model. A unit without one keeps its offset.
+  std::vector<std::optional<Pose>> offsets = {};
 };
 /// Another target for one unit of the configuration that is under way; it need not have had one.
 /// A unit that moves is stopped first. Answered when it starts, or with why it does not.
@@ -84,10 +89,14 @@ struct WriteParameterCommand {
   Parameter parameter = Parameter::kRepeat;
   std::int32_t value = 0;
 };
+/// A change that the shell has made already, to be kept.
+struct KeepModelCommand {
+  ModelRow row;
+};
 struct Command {
   std::uint64_t request = 0;
   std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, EnableCommand, AdoptCommand,
-               WriteParameterCommand>
+               WriteParameterCommand, KeepModelCommand>
       what;
 };
 
@@ -146,6 +155,7 @@ struct PlanJob {
   std::vector<UnitKnowledge> start;
   std::vector<std::optional<Pose>> targets;
   std::vector<std::uint8_t> frozen;
+  std::vector<Pose> offsets;  // PlanRequest::offsets
   PlanOptions options;
   std::vector<PositionerIndex>
       to_home;            // not empty: plan the next wave of homing, `targets` is empty
@@ -160,6 +170,11 @@ struct ExposureJob {
   std::vector<UnitKnowledge> expected;
   std::vector<std::optional<Pose>> before;  // where it stood before it was sent; none: not known
   std::vector<std::uint8_t> seen;           // non-zero: a camera has put it somewhere before
+  // Shapes: (n). What units with sensors showed; who has a target and is to be found, so that no
+  // exposure is needed where their own sensors say it exactly enough.
+  std::vector<SensorReading> readings = {};
+  std::vector<std::uint8_t> wanted = {};
+  double tolerance_um = 0;
 };
 
 struct ReplyEffect {
@@ -225,8 +240,11 @@ struct UnitView {
   Pose offset{};            // its place less its own count of vectors (VectorRow::offset)
   std::optional<SightingStatus> sighting;  // of the last exposure; none: it was not looked for
   std::optional<double> error_um;          // from its target, as last measured
-  SerialNumber serial;                     // that answers; 0: none yet
-  SerialNumber bound_serial;               // that belongs here; 0: none yet
+  SightingSource source = SightingSource::kCamera;  // of that
+  CovarianceFp covariance;                          // of that; of its place, where it was put
+  std::optional<SpineReading> spine;                // of its sensors' last reading
+  SerialNumber serial;                              // that answers; 0: none yet
+  SerialNumber bound_serial;                        // that belongs here; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;
@@ -279,6 +297,8 @@ struct MeasuredRound {
   std::uint32_t measured = 0;
   std::uint32_t unknown = 0;           // seen nowhere, or not to be told from another
   std::uint32_t within_tolerance = 0;  // of `measured`
+  std::uint32_t by_sensors = 0;        // of `measured`: by the unit's own
+  bool camera = true;                  // looked, too
   double rms_um = 0;                   // of the distances from the targets, of `measured`
   double median_um = 0;
   double worst_um = 0;
@@ -326,15 +346,19 @@ struct CoordinatorConfig {
   /// A SYNC line tells the common start by an edge. Start frames then say an instant `sync_lead`
   /// after it, for units that have no such line or miss the edge.
   bool sync_line = false;
-  bool has_camera = false;  // else a configuration that asks for one is refused
+  bool reads_sensors = false;  // of units that have some (units.csv, [hall] model)
+  bool has_camera = false;     // else a configuration that asks for one is refused
   DurationNs sync_lead = Milliseconds(5);
   /// A configuration that is measured ends each axis' way with this last piece, in this direction,
   /// so that play and wind-up of a gear are always on one side. 0: as the way comes.
   std::array<double, kAxisCount> approach_deg = {-2, -2};
   /// A correction that is not the last ends so far short of the target where it needed a run-up, so
   /// that the last one is short and goes on in the same direction: a long way scatters, a short one
-  /// does not.
-  double creep_deg = 0.04;
+  /// does not. Three times what a run-up there and back scatters by.
+  double creep_deg = 0.06;
+  /// Standard deviation of where an axis ends, after a way that is long: after a way d it is that
+  /// times sqrt(2 (1 - exp(-d / 360 deg))), as robots in service have it.
+  double scatter_deg = 0.12;
 };
 
 class Coordinator {
@@ -354,6 +378,7 @@ class Coordinator {
   [[nodiscard]] const BusView& bus(BusId bus) const;
   [[nodiscard]] const ConfigurationView& configuration() const;
   [[nodiscard]] std::span<const UnitDrive> drives() const;
+  [[nodiscard]] const CoordinatorConfig& config() const;
   [[nodiscard]] bool busy() const;  // a configuration or homing is under way
 
  private:

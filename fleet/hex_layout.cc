@@ -140,6 +140,9 @@ HexPlate MakeHexPlate(const HexLayoutOptions& options) {
     units[i].base_fp = points[i];
     units[i].axis[Index(Axis::kTheta)] = {theta_arm_mm, 0, kGear, -kThetaEndDeg, kThetaEndDeg};
     units[i].axis[Index(Axis::kPhi)] = {phi_arm_mm, 0, kGear, 0, kPhiMaxDeg};
+    units[i].sensors = options.sensors;
+    if (options.sensors > 0)
+      units[i].spine_mm = options.spine_mm > 0 ? options.spine_mm : 2 * (theta_arm_mm + phi_arm_mm);
   }
   std::uint32_t rail = 0;
   std::uint32_t bus = 0;

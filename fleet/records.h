@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -25,11 +26,12 @@ enum class Origin : std::uint8_t {
   kOperator,
   kMove,
   kHoming,
-  kCamera
+  kCamera,
+  kSensors
 };
 constexpr const char* Name(Origin origin) {
   constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator",
-                                    "move",    "homing", "camera"};
+                                    "move",    "homing", "camera",   "sensors"};
   return kNames[static_cast<std::size_t>(origin)];
 }
 
@@ -87,10 +89,14 @@ struct MeasurementRow {
   std::optional<UnitId> other;  // that it is confused with
   double x_mm = 0;              // focal-plane frame
   double y_mm = 0;
-  double sigma_um = 0;             // of one coordinate
-  std::optional<Pose> place;       // vectors; none: it was put nowhere
+  CovarianceFp covariance;
+  std::optional<Pose> place;         // vectors; none: it was put nowhere
   std::optional<PointFp> target_fp;  // where it had one
   std::optional<double> error_um;    // from there
+  std::string target_id;             // as the configuration named it; empty: it did not
+  std::optional<double> delay_s;     // end of its motion to the exposure; none: not known
+  SightingSource source = SightingSource::kCamera;
+  std::optional<SpineReading> spine = {};  // what its own sensors say, whoever is the source
 };
 
 struct BindingRow {  // which hardware sits at a place
@@ -178,8 +184,22 @@ struct NextMoveRow {
   MoveId next;
 };
 
-using Row = std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
-                         ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow>;
+/// Which extended model blind commands go through from here on, or that none does.
+struct ModelRow {
+  std::uint64_t entry = 0;     // of this change, ascending
+  std::string sha256;          // of the model's text, in hex; empty: none is in force
+  std::uint64_t restores = 0;  // the change that it goes back to; 0: none
+  std::string name;
+  std::string campaign;  // that it was found in
+  std::string campaign_sha256;
+  double rms_before_um = 0;  // on moves that no fit has seen; not a number: not known
+  double rms_after_um = 0;
+  std::shared_ptr<const std::string> text;  // none: the store has it under its sha256
+};
+
+using Row =
+    std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
+                 ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow, ModelRow>;
 
 /// All that the coordinator needs to go on after a restart.
 struct StoredFleet {

@@ -70,6 +70,10 @@ local messages = {
      names = {[0] = "counter1", [1] = "repeat", [2] = "subdivision", [3] = "mode", [4] = "position", [5] = "min_position", [6] = "max_position", [7] = "home_position", [8] = "host_timeout_ms"}},
     {name = "value", first = 8, bits = 32, signed = true, min = -2147483648, max = 2147483647},
   }},
+  {name = "sensors", head = 337, from_unit = 0, length = 0, reserved = {}, fields = {
+    {name = "part", first = 0, bits = 3, detail = true, min = 0, max = 3,
+     names = {[0] = "1_to_4", [1] = "5_to_8", [2] = "9_to_12", [3] = "13_to_16"}},
+  }},
   {name = "done", head = 130, from_unit = 1, length = 8, reserved = {}, fields = {
     {name = "outcome", first = 0, bits = 3, detail = true, min = 0, max = 3,
      names = {[0] = "arrived", [1] = "stopped", [2] = "fault", [3] = "homed"}},
@@ -160,6 +164,14 @@ local messages = {
     {name = "answer", first = 8, bits = 8, min = 0, max = 7,
      names = {[0] = "ok", [1] = "wrong_move", [2] = "incomplete", [3] = "out_of_range", [4] = "wrong_state", [5] = "begun_before", [6] = "bad_value", [7] = "interrupted"}},
     {name = "value", first = 16, bits = 32, signed = true, min = -2147483648, max = 2147483647},
+  }},
+  {name = "sensors_reply", head = 337, from_unit = 1, length = 8, reserved = {}, fields = {
+    {name = "part", first = 0, bits = 3, detail = true, min = 0, max = 3,
+     names = {[0] = "1_to_4", [1] = "5_to_8", [2] = "9_to_12", [3] = "13_to_16"}},
+    {name = "first", first = 0, bits = 16, min = 0, max = 65535},
+    {name = "second", first = 16, bits = 16, min = 0, max = 65535},
+    {name = "third", first = 32, bits = 16, min = 0, max = 65535},
+    {name = "fourth", first = 48, bits = 16, min = 0, max = 65535},
   }},
 }
 

@@ -40,6 +40,14 @@ struct UnitFaults {
   std::uint32_t loses_segments = 0;  // so many more stage_segment frames do not reach it
   std::optional<std::uint8_t> protocol_version;  // that it says it speaks
   bool stale_sequence = false;  // answers under the sequence number of the request before
+  /// One sensor of its joint lies.
+  struct Sensor {
+    enum class Kind : std::uint8_t { kStuck, kSaturated, kMissing, kSwapped, kGain };
+    Kind kind = Kind::kStuck;
+    std::uint8_t sensor = 0;  // from 0
+    std::uint8_t other = 0;   // of kSwapped
+  };
+  std::optional<Sensor> sensor;
   bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
 };
 

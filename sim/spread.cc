@@ -44,6 +44,35 @@ void DrawReal(const UnitDescription& description, std::uint64_t seed, UnitTraits
   DrawBadAxes(description, seed, traits);
 }
 
+void Plant(const PlantedTrait& planted, const UnitDescription& description, std::uint64_t seed,
+           UnitTraits* traits) {
+  for (const Axis which : kAxes) {
+    if (!planted.on_axis[Index(which)]) continue;
+    const std::uint64_t stream = description.id.value * kAxisCount + Index(which);
+    Rng rng =
+        Rng::Stream(seed, kPlantedCauseNames[static_cast<std::size_t>(planted.cause)], stream);
+    AxisTraits& axis = traits->axis[Index(which)];
+    switch (planted.cause) {
+      case PlantedCause::kZeroOffset:
+        traits->mechanism.zero_deg[Index(which)] += planted.size * rng.Normal();
+        break;
+      case PlantedCause::kArmLength:
+        traits->mechanism.arm_mm[Index(which)] += planted.size * rng.Normal();
+        break;
+      case PlantedCause::kGearScale:
+        axis.gear *= 1 + planted.size * rng.Normal();
+        break;
+      case PlantedCause::kBacklash:
+        axis.backlash_deg += planted.size;
+        break;
+      case PlantedCause::kEccentricity:
+        axis.periodic_deg += planted.size;
+        axis.periodic_phase_deg = rng.Uniform(0, 360);
+        break;
+    }
+  }
+}
+
 }  // namespace
 
 FactoryRange FactoryRangeOf(const AxisDescription& axis, Axis which, std::int32_t subdivision) {
@@ -76,6 +105,8 @@ UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& o
     axis.stop_high_deg = (range.max_position + beyond) * deg_per_vector;
   }
   if (options.spread == Spread::kReal) DrawReal(description, options.seed, &traits);
+  for (const PlantedTrait& planted : options.planted)
+    Plant(planted, description, options.seed, &traits);
   return traits;
 }
 

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "sim/axis/axis.h"
 #include "sim/mechanism.h"
@@ -25,11 +26,29 @@ struct UnitTraits {
   UnitClock clock;
 };
 
+/// One way in which the units differ from their description, for tests of what finds it: that of a
+/// cause of docs/diagnosis.md, drawn for each unit with a size of its own.
+enum class PlantedCause : std::uint8_t {
+  kZeroOffset,    // zero angle, standard deviation in degrees
+  kArmLength,     // standard deviation in mm
+  kGearScale,     // standard deviation, a share
+  kBacklash,      // full width in degrees, the same for all
+  kEccentricity,  // amplitude in degrees, the same for all; the phase is the unit's own
+};
+inline constexpr std::array<const char*, 5> kPlantedCauseNames{
+    "zero_offset", "arm_length", "gear_scale", "backlash", "eccentricity"};
+struct PlantedTrait {
+  PlantedCause cause = PlantedCause::kZeroOffset;
+  std::array<bool, kAxisCount> on_axis{true, true};
+  double size = 0;
+};
+
 struct TraitsOptions {
   std::uint64_t seed = 1;
   Spread spread = Spread::kNominal;
   double clock_error_max = 0;
   std::int32_t subdivision = 96;
+  std::vector<PlantedTrait> planted = {};  // on top of the spread
 };
 UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& options);
 

@@ -29,7 +29,9 @@ struct UnitDescription {
   double base_x_mm = 0;
   double base_y_mm = 0;
   std::array<AxisDescription, kAxisCount> axis;
-  bool enabled = true;  // false: only its default pose differs; it answers as any other
+  std::uint8_t sensors = 0;  // Hall sensors at its joint (unit/joint_sensors.h)
+  double spine_mm = 0;       // from the joint's centre to the fibre, where it has such sensors
+  bool enabled = true;       // false: only its default pose differs; it answers as any other
 };
 
 /// What FLASH holds when a unit leaves the factory, both axes alike.

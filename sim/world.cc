@@ -44,8 +44,9 @@ Flash FactoryFlash(const UnitDescription& description, const FactoryDrive& drive
 
 Unit::Parts MakeParts(const UnitDescription& description, const WorldConfig& config,
                       const Motor* motor, const UnitMemory* memory) {
-  const UnitTraits traits = DrawTraits(
-      description, {config.seed, config.spread, config.clock_error_max, config.drive.subdivision});
+  const UnitTraits traits =
+      DrawTraits(description, {config.seed, config.spread, config.clock_error_max,
+                               config.drive.subdivision, config.planted});
   const Flash flash =
       memory != nullptr ? memory->flash : FactoryFlash(description, config.drive, config.seed);
   const auto axis = [&](Axis which) {
@@ -55,7 +56,11 @@ Unit::Parts MakeParts(const UnitDescription& description, const WorldConfig& con
                      AxisModel::Start{flash.axis[i].position(), flash.axis[i].subdivision,
                                       description.axis[i].gear});
   };
-  return {description, traits, flash, {axis(Axis::kTheta), axis(Axis::kPhi)}};
+  return {description,
+          traits,
+          flash,
+          {axis(Axis::kTheta), axis(Axis::kPhi)},
+          config.joint_sensors.get()};
 }
 
 struct Wire {  // one bus with its nodes
@@ -75,6 +80,9 @@ Status Complain(const UnitDescription& unit, const std::string& what) {
 }
 
 Status ValidateUnit(const UnitDescription& unit, const FactoryDrive& drive) {
+  if (unit.sensors > limits::kSensorsPerUnit) return Complain(unit, "has too many sensors");
+  if (unit.sensors > 0 && !(unit.spine_mm > 0 && std::isfinite(unit.spine_mm)))
+    return Complain(unit, "has sensors at its joint, and no spine on it");
   if (unit.node == kBroadcastNode) return Complain(unit, "node 255 is the broadcast address");
   for (const Axis which : kAxes) {
     const AxisDescription& axis = unit.axis[Index(which)];
@@ -131,6 +139,8 @@ Status World::Validate(const WorldConfig& config) {
   std::unordered_set<std::uint64_t> addresses;
   for (const UnitDescription& unit : config.units) {
     FOCALFLEET_TRY(ValidateUnit(unit, config.drive));
+    if (unit.sensors > 0 && config.joint_sensors == nullptr)
+      return Complain(unit, "has sensors, and there is no field for them to see");
     if (!ids.insert(unit.id.value).second) return Complain(unit, "stands here twice");
     if (!addresses.insert(std::uint64_t{unit.bus.value} << 8 | unit.node.value).second)
       return Complain(unit, "bus " + std::to_string(unit.bus.value) + " node " +

@@ -34,6 +34,7 @@
 #include "sim/faults.h"
 #include "sim/spread.h"
 #include "sim/unit/flash.h"
+#include "sim/unit/joint_sensors.h"
 #include "sim/unit_description.h"
 
 namespace focalfleet::sim {
@@ -49,6 +50,7 @@ struct WorldConfig {
   std::vector<UnitDescription> units;
   std::uint64_t seed = 1;
   Spread spread = Spread::kNominal;
+  std::vector<PlantedTrait> planted = {};  // on top of it
   std::uint32_t bit_rate_bps = 1'000'000;
   HostInstant start{0};  // power-on of all units
   FactoryDrive drive;
@@ -59,6 +61,8 @@ struct WorldConfig {
   std::vector<UnitMemory> memory;  // of an earlier run, matched by unit id
   /// From the bus-off of a bus' host controller to its restart; kNever: it waits for RestartHost.
   DurationNs host_restart = Milliseconds(1000);
+  /// Of units with sensors at their joint; none: there are no such units.
+  std::shared_ptr<const JointSensors> joint_sensors = {};
   std::vector<PlannedFault> faults;  // by the clock, from `start` on
 };
 

@@ -47,12 +47,16 @@ Result<ExposureFindings> CameraWorker::Judge(const CameraWork& work, const Expos
   if (seen_.size() > kSeenMax) seen_.erase(seen_.begin());
   if (refusal)
     return Fail(ErrorCode::kRefused, std::string(Name(refusal->reason)) + ": " + refusal->text);
-  return FindUnits(work.job.id, *options_.layout,
-                   {.now = work.job.expected,
-                    .before = work.job.before,
-                    .seen = work.job.seen,
-                    .drives = work.drives},
-                   options_.site, exposure);
+  auto findings = FindUnits(work.job.id, *options_.layout,
+                            {.now = work.job.expected,
+                             .before = work.job.before,
+                             .seen = work.job.seen,
+                             .drives = work.drives},
+                            options_.site, exposure);
+  if (findings)
+    findings->after_request_s =
+        1e-9 * static_cast<double>(exposure.taken_unix_ns - since.ns) * options_.speed;
+  return findings;
 }
 
 }  // namespace focalfleet

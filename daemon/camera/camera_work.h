@@ -28,6 +28,7 @@ class CameraWorker {
     CameraSite site;
     std::chrono::milliseconds patience{30'000};  // real time, from the request
     std::chrono::milliseconds pause{20};         // between two looks
+    double speed = 1;                            // of the host's clock, to real time
     std::function<WallTime()> now = &WallTime::Now;
     std::function<void(const std::string&)> log = [](const std::string&) {};
   };

@@ -1,5 +1,6 @@
 #include "daemon/campaign/campaign_log.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -7,13 +8,24 @@ namespace focalfleet {
 namespace {
 
 constexpr double kMovedDeg = 1e-9;
+constexpr double kTunedAmplitude = 1;
+
+/// Added where it is not there yet.
+int IndexOf(const std::string& word, std::vector<std::string>* words) {
+  const auto found = std::find(words->begin(), words->end(), word);
+  const auto index = static_cast<int>(found - words->begin());
+  if (found == words->end()) words->push_back(word);
+  return index;
+}
 
 bool Moved(const LoggedMove& row) {
   return std::abs(row.to.theta_deg - row.from.theta_deg) > kMovedDeg ||
          std::abs(row.to.phi_deg - row.from.phi_deg) > kMovedDeg;
 }
 
-sim::CampaignUnit Describe(const Unit& unit) {
+}  // namespace
+
+sim::CampaignUnit DescribeUnit(const Unit& unit) {
   sim::CampaignUnit described{.id = unit.id.value,
                               .base_x_mm = unit.base_fp.x_mm,
                               .base_y_mm = unit.base_fp.y_mm,
@@ -33,8 +45,6 @@ sim::CampaignUnit Describe(const Unit& unit) {
   return described;
 }
 
-}  // namespace
-
 void CampaignLog::Add(const std::vector<LoggedMove>& units) {
   for (const LoggedMove& row : units) {
     of_unit_[row.unit.value].push_back(row);
@@ -46,21 +56,20 @@ void CampaignLog::Add(const std::vector<LoggedMove>& units) {
 sim::Campaign CampaignLog::Campaign(const std::string& name) const {
   sim::Campaign campaign;
   campaign.name = name;
-  enum { kTime, kSigma, kVolts, kMovers, kCounter1, kRepeat, kCyclesTheta, kCyclesPhi, kCount };
-  std::array<sim::Covariate, kCount> columns{{{"t_s", {}},
-                                              {"sigma_um", {}},
-                                              {"v_bus_V", {}},
-                                              {"movers_on_rail", {}},
-                                              {"counter1", {}},
-                                              {"repeat", {}},
-                                              {"cycles_theta", {}},
-                                              {"cycles_phi", {}}}};
-  sim::WordColumn mode{.name = "mode", .words = {conditions_.mode}, .values = {}};
+  constexpr std::array kNames{"t_s",          "sigma_um",  "delay_s",  "rail_id",
+                              "rail_slot",    "bus_id",    "bus_slot", "movers_on_rail",
+                              "v_bus_V",      "counter1",  "repeat",   "drive_amplitude",
+                              "cycles_theta", "cycles_phi"};
+  std::array<sim::Covariate, kNames.size()> columns;
+  for (std::size_t column = 0; column < kNames.size(); ++column)
+    columns[column].name = kNames[column];
+  sim::WordColumn mode{.name = "mode", .words = {}, .values = {}};
   campaign.first_row.push_back(0);
   for (const Unit& unit : layout_->units()) {
     const auto found = of_unit_.find(unit.id.value);
     if (found == of_unit_.end()) continue;
-    campaign.units.push_back(Describe(unit));
+    campaign.units.push_back(DescribeUnit(unit));
+    const sim::CampaignUnit& described = campaign.units.back();
     double cycles[2] = {0, 0};
     for (const LoggedMove& row : found->second) {
       campaign.move_id.push_back(row.move);
@@ -73,18 +82,24 @@ sim::Campaign CampaignLog::Campaign(const std::string& name) const {
       cycles[0] += std::abs(row.to.theta_deg - row.from.theta_deg) / 360;
       cycles[1] += std::abs(row.to.phi_deg - row.from.phi_deg) / 360;
       const auto movers = movers_.find({row.move, unit.rail.value});
-      const double values[kCount] = {
+      const std::array<double, kNames.size()> values{
           row.t_s,
           row.sigma_um,
-          conditions_.v_bus_V,
+          row.delay_s,
+          described.rail,
+          described.rail_slot,
+          described.bus,
+          described.bus_slot,
           movers == movers_.end() ? 0.0 : static_cast<double>(movers->second),
-          conditions_.counter1[0],
-          conditions_.repeat,
+          row.v_bus_V,
+          row.counter1,
+          row.repeat,
+          kTunedAmplitude,
           cycles[0],
           cycles[1]};
-      for (std::size_t column = 0; column < kCount; ++column)
+      for (std::size_t column = 0; column < values.size(); ++column)
         columns[column].values.push_back(values[column]);
-      mode.values.push_back(0);
+      mode.values.push_back(IndexOf(row.mode, &mode.words));
     }
     campaign.first_row.push_back(campaign.move_id.size());
   }

@@ -26,30 +26,30 @@ struct LoggedMove {
   double y_mm = 0;
   double sigma_um = 0;  // NaN likewise
   double t_s = 0;       // of the exposure, since the first
-};
-
-/// What holds for all moves of the campaign.
-struct CampaignConditions {
+  double delay_s = 0;   // end of its motion to the exposure; NaN: not known
+  // How it is driven.
   double v_bus_V = 0;
-  std::array<double, kAxisCount> counter1{};
+  double counter1 = 0;
   double repeat = 0;
   std::string mode;
 };
 
+/// What the layout says of a unit, as campaigns have it.
+sim::CampaignUnit DescribeUnit(const Unit& unit);
+
 class CampaignLog {
  public:
-  CampaignLog(const Layout* layout, CampaignConditions conditions)
-      : layout_(layout), conditions_(std::move(conditions)) {}
+  explicit CampaignLog(const Layout* layout) : layout_(layout) {}
 
   /// All units of one move, those too that stayed.
   void Add(const std::vector<LoggedMove>& units);
-  /// Covariates that follow from the log: t_s, sigma_um, rail_id, bus_id, slots, movers_on_rail,
-  /// drive_amplitude, counter1, repeat, v_bus_V, mode, revolutions made.
+  /// Covariates: all of docs/files.md but `temp_C` and `elevation_deg`, which nobody tells us, and
+  /// `rehomed`, which no move of a campaign is. Units are driven at the tuned level:
+  /// drive_amplitude is 1.
   [[nodiscard]] sim::Campaign Campaign(const std::string& name) const;
 
  private:
   const Layout* layout_;
-  CampaignConditions conditions_;
   std::map<std::uint32_t, std::vector<LoggedMove>> of_unit_;                // by id
   std::map<std::pair<std::int64_t, std::uint32_t>, std::uint32_t> movers_;  // move, rail
 };

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "fleet/files/csv.h"
+#include "sim/diagnosis/left_by.h"
 
 namespace focalfleet {
 namespace {
@@ -137,7 +138,8 @@ json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
   return report;
 }
 
-std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names) {
+std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names,
+                       const sim::Campaign& campaign) {
   std::string text = "# The extended model of a campaign, made by `focalfleet diagnose`.\n";
   text += "name = " + Quoted(names.model_after) + "\n";
   text += "campaign = " + Quoted(names.campaign) + "\n";
@@ -146,13 +148,20 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
   text += fmt::format("rms_before_um = {:.9g}\nrms_after_um = {:.9g}\n",
                       diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
   for (const sim::ModelTerm& term : diagnosis.model.terms) text += TermText(term, diagnosis);
-  for (const sim::CampaignUnit& unit : diagnosis.model.units) {
+  const std::vector<sim::UnitLeft> left = sim::LeftByCampaign(diagnosis.model, campaign);
+  for (std::size_t u = 0; u < diagnosis.model.units.size(); ++u) {
+    const sim::CampaignUnit& unit = diagnosis.model.units[u];
     text += fmt::format("\n[[unit]]\nunit_id = {}\n", unit.id);
     text += fmt::format("base_x_mm = {:.9g}\nbase_y_mm = {:.9g}\n", unit.base_x_mm, unit.base_y_mm);
     text +=
         fmt::format("arm_theta_mm = {:.9g}\narm_phi_mm = {:.9g}\n", unit.arm_mm[0], unit.arm_mm[1]);
     text += fmt::format("theta_zero_deg = {:.9g}\nphi_zero_deg = {:.9g}\n", unit.zero_deg[0],
                         unit.zero_deg[1]);
+    if (left[u].moved)
+      text += fmt::format(
+          "left_theta_deg = {:.9g}\nleft_phi_deg = {:.9g}\nadded_theta_deg = {:.9g}\n"
+          "added_phi_deg = {:.9g}\n",
+          left[u].pose_deg[0], left[u].pose_deg[1], left[u].added_deg[0], left[u].added_deg[1]);
   }
   return text;
 }

@@ -21,7 +21,8 @@ struct ReportNames {
 
 nlohmann::json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names);
 
-std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names);
+std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names,
+                       const sim::Campaign& campaign);
 
 /// The verdict in one sentence, for people.
 std::string VerdictSentence(const sim::Diagnosis& diagnosis);

@@ -4,6 +4,7 @@
 #include <toml++/toml.h>
 
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <vector>
@@ -15,14 +16,20 @@ namespace {
 
 class ModelReader {
  public:
-  ModelReader(const std::string& file, const sim::Campaign& campaign)
-      : file_(file), campaign_(campaign) {
-    model_.units = campaign.units;
-    for (std::size_t u = 0; u < campaign.units.size(); ++u) index_[campaign.units[u].id] = u;
+  ModelReader(const std::string& file, const std::vector<sim::CampaignUnit>& units) : file_(file) {
+    model_.units = units;
+    read_.left.resize(units.size());
+    for (std::size_t u = 0; u < units.size(); ++u) index_[units[u].id] = u;
   }
 
-  Result<sim::CampaignModel> Read(const toml::table& table) {
+  Result<ModelFile> Read(const toml::table& table) {
+    constexpr double kNotSaid = std::numeric_limits<double>::quiet_NaN();
     model_.name = table["name"].value_or(std::string("unnamed"));
+    read_.campaign = table["campaign"].value_or(std::string());
+    read_.campaign_sha256 = table["campaign_sha256"].value_or(std::string());
+    read_.verdict = table["verdict"].value_or(std::string());
+    read_.rms_before_um = table["rms_before_um"].value_or(kNotSaid);
+    read_.rms_after_um = table["rms_after_um"].value_or(kNotSaid);
     if (const toml::array* units = table["unit"].as_array())
       for (const toml::node& node : *units) {
         const toml::table* unit = node.as_table();
@@ -35,7 +42,8 @@ class ModelReader {
         if (effect == nullptr) return Wrong(node, "[[effect]] is not a table");
         FOCALFLEET_TRY(ReadEffect(*effect));
       }
-    return std::move(model_);
+    read_.model = std::move(model_);
+    return std::move(read_);
   }
 
  private:
@@ -63,11 +71,19 @@ class ModelReader {
     return values;
   }
 
+  static std::vector<std::string> Words(const toml::table& table, std::string_view key) {
+    std::vector<std::string> words;
+    if (const toml::array* array = table[key].as_array())
+      for (const toml::node& node : *array) words.push_back(node.value_or(std::string()));
+    return words;
+  }
+
   Status ReadUnit(const toml::table& table) {
     FOCALFLEET_TRY_ASSIGN(const double id, Number(table, "unit_id"));
     const auto at = index_.find(static_cast<std::uint32_t>(id));
     if (at == index_.end()) return {};
     sim::CampaignUnit& unit = model_.units[at->second];
+    const sim::CampaignUnit described = unit;
     FOCALFLEET_TRY_ASSIGN(unit.base_x_mm, Number(table, "base_x_mm"));
     FOCALFLEET_TRY_ASSIGN(unit.base_y_mm, Number(table, "base_y_mm"));
     FOCALFLEET_TRY_ASSIGN(unit.arm_mm[0], Number(table, "arm_theta_mm"));
@@ -76,7 +92,44 @@ class ModelReader {
     FOCALFLEET_TRY_ASSIGN(unit.zero_deg[1], Number(table, "phi_zero_deg"));
     if (!(unit.arm_mm[0] > 0) || !(unit.arm_mm[1] > 0))
       return Wrong(table, "an arm is not above 0");
+    FOCALFLEET_TRY(CheckGeometry(table, described, unit));
+    return ReadLeft(table, at->second);
+  }
+
+  /// A fit moves a base by its play on the plate and an arm by its making, not to another unit.
+  Status CheckGeometry(const toml::table& table, const sim::CampaignUnit& described,
+                       const sim::CampaignUnit& fitted) const {
+    constexpr double kBaseMm = 10;
+    constexpr double kArmShare = 0.5;
+    const std::string name = "unit " + std::to_string(fitted.id);
+    if (std::hypot(fitted.base_x_mm - described.base_x_mm, fitted.base_y_mm - described.base_y_mm) >
+        kBaseMm)
+      return Wrong(table, name + " has its base more than 10 mm from where it is described");
+    for (const std::size_t axis : {sim::kTheta, sim::kPhi})
+      if (std::abs(fitted.arm_mm[axis] / described.arm_mm[axis] - 1) > kArmShare)
+        return Wrong(table,
+                     name + " has an arm that differs by more than half from its description");
     return {};
+  }
+
+  Status ReadLeft(const toml::table& table, std::size_t unit) {
+    if (!table.contains("left_theta_deg")) return {};
+    sim::UnitLeft left{.moved = true};
+    FOCALFLEET_TRY_ASSIGN(left.pose_deg[0], Number(table, "left_theta_deg"));
+    FOCALFLEET_TRY_ASSIGN(left.pose_deg[1], Number(table, "left_phi_deg"));
+    FOCALFLEET_TRY_ASSIGN(left.added_deg[0], Number(table, "added_theta_deg"));
+    FOCALFLEET_TRY_ASSIGN(left.added_deg[1], Number(table, "added_phi_deg"));
+    read_.left[unit] = left;
+    return {};
+  }
+
+  /// What an amplitude can be, by physics or twenty times what it usually is.
+  static bool IsPossible(const sim::Effect& effect, double amplitude) {
+    constexpr double kTimes = 20 * (1 + 1e-6);
+    if (!std::isfinite(amplitude)) return false;
+    if (effect.amplitude_low == 0 && effect.amplitude_high == 0)
+      return std::abs(amplitude) <= kTimes * effect.prior_size;
+    return amplitude >= effect.amplitude_low && amplitude <= effect.amplitude_high;
   }
 
   Result<sim::Template> ReadForm(const toml::table& table) const {
@@ -113,38 +166,54 @@ class ModelReader {
       return Wrong(table, "amplitude: " + std::to_string(amplitude.size()) + " numbers for " +
                               std::to_string(ids.size()) + " units");
     term.sharing = sim::Sharing::kUnit;
-    term.group_of_unit.assign(campaign_.units.size(), sim::kNoGroup);
-    term.amplitude.assign(campaign_.units.size() * c, 0);
-    term.sigma.assign(campaign_.units.size() * c, 0);
+    std::vector<double> sigma(amplitude.size(), 0);
+    if (table.contains("sigma")) {
+      FOCALFLEET_TRY_ASSIGN(sigma, Numbers(table, "sigma"));
+      if (sigma.size() != amplitude.size()) return Wrong(table, "sigma: not one an amplitude");
+    }
+    term.group_of_unit.assign(model_.units.size(), sim::kNoGroup);
+    term.amplitude.assign(model_.units.size() * c, 0);
+    term.sigma.assign(model_.units.size() * c, 0);
     for (std::size_t k = 0; k < ids.size(); ++k) {
       const auto at = index_.find(static_cast<std::uint32_t>(ids[k]));
       if (at == index_.end()) continue;
       term.group_of_unit[at->second] = static_cast<std::uint32_t>(at->second);
       for (std::size_t j = 0; j < c; ++j) {
-        if (!std::isfinite(amplitude[k * c + j])) return Wrong(table, "an amplitude is not finite");
+        if (!IsPossible(*term.form.effect, amplitude[k * c + j]))
+          return Wrong(table, "unit " + std::to_string(at->first) + ": an amplitude of " +
+                                  std::to_string(amplitude[k * c + j]) + " is none that " +
+                                  std::string(term.form.effect->cause) + " can have");
         term.amplitude[at->second * c + j] = amplitude[k * c + j];
+        term.sigma[at->second * c + j] = sigma[k * c + j];
       }
     }
     model_.terms.push_back(std::move(term));
+    read_.candidates.push_back(Words(table, "candidates"));
     return {};
   }
 
   const std::string& file_;
-  const sim::Campaign& campaign_;
+  ModelFile read_;
   sim::CampaignModel model_;
   std::map<std::uint32_t, std::size_t> index_;
 };
 
 }  // namespace
 
-Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
-                                     const sim::Campaign& campaign) {
+Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
+                                const std::vector<sim::CampaignUnit>& units) {
   const toml::parse_result parsed = toml::parse(text, file);
   if (!parsed)
     return Fail(ErrorCode::kInvalid, file + ":" +
                                          std::to_string(parsed.error().source().begin.line) + ": " +
                                          std::string(parsed.error().description()));
-  return ModelReader(file, campaign).Read(parsed.table());
+  return ModelReader(file, units).Read(parsed.table());
+}
+
+Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
+                                     const sim::Campaign& campaign) {
+  FOCALFLEET_TRY_ASSIGN(ModelFile read, ReadModelFile(text, file, campaign.units));
+  return std::move(read.model);
 }
 
 }  // namespace focalfleet

@@ -2,16 +2,37 @@
 // does not know keep the table's geometry and have no effects.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/base/result.h"
+#include "sim/diagnosis/left_by.h"
 #include "sim/diagnosis/model.h"
 
 namespace focalfleet {
 
+/// A model with what its file says beside it.
+struct ModelFile {
+  sim::CampaignModel model;
+  std::string campaign;  // that it was found in; empty: it does not say
+  std::string campaign_sha256;
+  std::string verdict;
+  double rms_before_um = 0;  // on moves that no fit has seen; NaN: it does not say
+  double rms_after_um = 0;
+  std::vector<std::vector<std::string>> candidates;  // of each term, its rivals; empty: none
+  /// How the campaign left each unit; none: it did not measure it. Shape: (units).
+  std::vector<std::optional<sim::UnitLeft>> left;
+};
+
 /// Errors: kInvalid with file and line where the text is no TOML; a key that is missing or wrong,
-/// an effect that the library does not have, amplitudes that are not as many as its units.
+/// an effect that the library does not have, amplitudes that are not as many as its units or beyond
+/// what their effect can have, arms or bases that are those of another unit.
+Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
+                                const std::vector<sim::CampaignUnit>& units);
+
+/// The model alone, for a campaign's units. Errors: as above.
 Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
                                      const sim::Campaign& campaign);
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/campaign_log.h"
@@ -61,21 +62,35 @@ struct RunOptions {
   std::string out;
 };
 
-using Angles = std::map<std::uint32_t, AxisAngles>;  // by unit id
+/// Where the daemon believes a unit that is at a place, and how it drives it.
+struct Believed {
+  AxisAngles angles;
+  double v_bus_V = 0;
+  double counter1 = 0;
+  double repeat = 0;
+  std::string mode;
+};
+using BelievedFleet = std::map<std::uint32_t, Believed>;  // by unit id
 
-/// Where the daemon believes each unit that is at a place.
-tl::expected<Angles, Failure> BelievedAngles(const Context& context) {
+tl::expected<BelievedFleet, Failure> AskBelieved(const Context& context) {
   const auto state = Ask(context, {.verb = "state"});
   if (!state) return tl::unexpected(state.error());
-  Angles angles;
+  BelievedFleet fleet;
   for (const Json& row : ListIn(*state, "rows")) {
     const double theta = NumberIn(row, "theta_low_deg", std::nan(""));
     const double phi = NumberIn(row, "phi_low_deg", std::nan(""));
     if (std::isfinite(theta) && std::isfinite(phi) && theta == NumberIn(row, "theta_high_deg") &&
         phi == NumberIn(row, "phi_high_deg"))
-      angles[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = {theta, phi};
+      fleet[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = {
+          // As the unit counts: what the camera or a model adds to it changes from time to time.
+          .angles = {theta - NumberIn(row, "theta_offset_deg"),
+                     phi - NumberIn(row, "phi_offset_deg")},
+          .v_bus_V = NumberIn(row, "v_bus_V", std::nan("")),
+          .counter1 = NumberIn(row, "counter1", std::nan("")),
+          .repeat = NumberIn(row, "repeat", std::nan("")),
+          .mode = TextIn(row, "mode")};
   }
-  return angles;
+  return fleet;
 }
 
 bool IsCertainStatus(const std::string& status) {
@@ -85,8 +100,8 @@ bool IsCertainStatus(const std::string& status) {
   return false;
 }
 
-std::vector<LoggedMove> RowsOf(const ListedMove& move, const Angles& before, const Angles& after,
-                               const Json& measured, double t_s) {
+std::vector<LoggedMove> RowsOf(const ListedMove& move, const BelievedFleet& before,
+                               const BelievedFleet& after, const Json& measured, double t_s) {
   std::map<std::uint32_t, const Json*> seen;
   for (const Json& row : ListIn(measured, "measurements"))
     seen[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = &row;
@@ -96,18 +111,24 @@ std::vector<LoggedMove> RowsOf(const ListedMove& move, const Angles& before, con
     if (from == before.end()) continue;  // it was not at a place: no row says anything of it
     LoggedMove row{.unit = {id},
                    .move = move.id,
-                   .from = from->second,
-                   .to = to,
+                   .from = from->second.angles,
+                   .to = to.angles,
                    .x_mm = std::nan(""),
                    .y_mm = std::nan(""),
                    .sigma_um = std::nan(""),
-                   .t_s = t_s};
-    if (const auto found = seen.find(id);
-        found != seen.end() && IsCertainStatus(TextIn(*found->second, "status"))) {
+                   .t_s = t_s,
+                   .delay_s = std::nan(""),
+                   .v_bus_V = to.v_bus_V,
+                   .counter1 = to.counter1,
+                   .repeat = to.repeat,
+                   .mode = to.mode};
+    const auto found = seen.find(id);
+    if (found != seen.end() && IsCertainStatus(TextIn(*found->second, "status"))) {
       row.x_mm = NumberIn(*found->second, "x_mm");
       row.y_mm = NumberIn(*found->second, "y_mm");
       row.sigma_um = NumberIn(*found->second, "sigma_um");
     }
+    if (found != seen.end()) row.delay_s = NumberIn(*found->second, "delay_s", std::nan(""));
     rows.push_back(row);
   }
   return rows;
@@ -118,10 +139,13 @@ Status WriteFolder(const std::string& folder, const sim::Campaign& campaign) {
   return WriteFileAtomically(folder + "/moves.csv", WriteMoves(campaign));
 }
 
-/// One move, with its exposure. The answer of the daemon to `measurements`.
-tl::expected<Json, Failure> MakeMove(const Context& context, const ListedMove& move,
-                                     const std::string& source, ProgressBar* bar,
-                                     const std::string& stage) {
+constexpr int kUnmeasuredInARowMax = 3;
+
+/// One move, with its exposure. The answer of the daemon to `measurements`; none: it was made, as
+/// far as it was, and nothing of it was measured.
+tl::expected<std::optional<Json>, Failure> MakeMove(const Context& context, const ListedMove& move,
+                                                    const std::string& source, ProgressBar* bar,
+                                                    const std::string& stage) {
   Question question{.verb = "apply",
                     .args = {{"source", source},
                              {"targets_csv", WriteTargets({.source = source, .rows = move.rows})},
@@ -134,20 +158,10 @@ tl::expected<Json, Failure> MakeMove(const Context& context, const ListedMove& m
                     }};
   const auto done = Ask(context, question);
   if (!done) return tl::unexpected(done.error());
-  if (ListIn(*done, "measured").empty())
-    return tl::unexpected(
-        Failure{ExitCode::kBroken,
-                {ErrorCode::kUnavailable,
-                 fmt::format("{}: the camera saw nothing (focalfleet history says why)", source)}});
-  return Ask(context, {.verb = "measurements"});
-}
-
-CampaignConditions ConditionsOf(const UnitDrive& drive) {
-  return {.v_bus_V = drive.v_bus_V,
-          .counter1 = {static_cast<double>(drive.axis[0].counter1),
-                       static_cast<double>(drive.axis[1].counter1)},
-          .repeat = static_cast<double>(drive.axis[0].repeat),
-          .mode = Name(drive.mode)};
+  if (ListIn(*done, "measured").empty()) return std::optional<Json>();
+  const auto measured = Ask(context, {.verb = "measurements"});
+  if (!measured) return tl::unexpected(measured.error());
+  return std::optional<Json>(*measured);
 }
 
 ExitCode RunCampaign(const Context& context, const RunOptions& options) {
@@ -161,22 +175,34 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   std::filesystem::create_directories(options.out, failed);
   if (failed)
     return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});
-  CampaignLog log(&fleet->layout, ConditionsOf(fleet->drives.front()));
+  CampaignLog log(&fleet->layout);
   ProgressBar bar(context);
   const auto began = std::chrono::steady_clock::now();
-  auto before = BelievedAngles(context);
+  auto before = AskBelieved(context);
   if (!before) return Report(context, before.error());
+  std::size_t unmeasured = 0;
+  int in_a_row = 0;
   for (std::size_t m = 0; m < moves->size(); ++m) {
     const ListedMove& move = (*moves)[m];
     const std::string source = fmt::format("{} move {}", options.list, move.id);
     const auto measured =
         MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves->size()));
     if (!measured) return Report(context, measured.error());
+    in_a_row = *measured ? 0 : in_a_row + 1;
+    unmeasured += *measured ? 0u : 1u;
+    if (in_a_row == kUnmeasuredInARowMax)
+      return Report(context,
+                    Failure{ExitCode::kBroken,
+                            {ErrorCode::kUnavailable,
+                             fmt::format("{}: the camera saw nothing, as in the {} moves before "
+                                         "(focalfleet history says why)",
+                                         source, kUnmeasuredInARowMax - 1)}});
     const double t_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
-    const auto after = BelievedAngles(context);
+    const auto after = AskBelieved(context);
     if (!after) return Report(context, after.error());
-    log.Add(RowsOf(move, *before, *after, *measured, t_s));
+    // What nobody saw was made all the same: its rows are there, without places.
+    log.Add(RowsOf(move, *before, *after, measured->value_or(Json::object()), t_s));
     before = after;
     // After each move, so that what was measured is kept whatever comes.
     const auto written = WriteFolder(options.out, log.Campaign(options.list));
@@ -188,7 +214,11 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
     PrintJson({{"moves", moves->size()},
                {"units", campaign.units.size()},
                {"rows", campaign.rows()},
+               {"unmeasured_moves", unmeasured},
                {"out", options.out}});
+  if (unmeasured > 0)
+    Say(context, fmt::format("{} could not be measured (focalfleet history says why)",
+                             Count(unmeasured, "move", "moves")));
   Say(context, fmt::format("{}: {} of {}, {}", options.out, Count(moves->size(), "move", "moves"),
                            Count(campaign.units.size(), "unit", "units"),
                            Count(campaign.rows(), "row", "rows")));

@@ -138,6 +138,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddHallCommands(line.get());
   AddMeasurementsCommand(line.get());
   AddCampaignCommands(line.get());
+  AddModelCommands(line.get());
   AddCanCommands(line.get());
   AddCompletionCommand(line.get());
   return line;

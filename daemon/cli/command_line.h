@@ -68,6 +68,7 @@ void AddCampaignCommands(CommandLine* line);
 void AddCanCommands(CommandLine* line);
 void AddHallCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
+void AddModelCommands(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

@@ -79,6 +79,9 @@ std::string DescribeMeasured(const Json& c) {
         CountIn(round, "within_tolerance"), CountIn(round, "measured"));
     if (const std::uint64_t unknown = CountIn(round, "unknown"); unknown > 0)
       text += fmt::format(", {} not to be told", unknown);
+    if (const std::uint64_t sensed = CountIn(round, "by_sensors"); sensed > 0)
+      text += fmt::format(", {} by their own sensors{}", sensed,
+                          round.value("camera", true) ? "" : " without an exposure");
     ++correction;
   }
   return text;

@@ -86,7 +86,8 @@ Status WriteReport(const std::filesystem::path& out, const ReadIn& in,
   std::filesystem::create_directories(out, failed);
   if (failed)
     return Fail(ErrorCode::kUnavailable, fmt::format("{}: {}", out.string(), failed.message()));
-  FOCALFLEET_TRY(WriteFileAtomically(out / "model.toml", WriteModel(diagnosis, in.names)));
+  FOCALFLEET_TRY(
+      WriteFileAtomically(out / "model.toml", WriteModel(diagnosis, in.names, in.campaign)));
   FOCALFLEET_TRY(WriteFileAtomically(out / "next_moves.csv",
                                      WriteNextMoves(sim::ProposeMoves(in.campaign, diagnosis))));
   FOCALFLEET_TRY(

@@ -15,7 +15,7 @@ namespace {
 struct LayoutOptions {
   HexLayoutOptions hex;
   std::vector<double> arms_mm;  // none, one for both arms, or theta and phi
-  std::vector<double> gears;  // none, one for both axes, or theta and phi
+  std::vector<double> gears;    // none, one for both axes, or theta and phi
   std::string out;
   std::string fiducials_out;
 };
@@ -94,11 +94,18 @@ void AddLayoutCommand(CommandLine* line) {
   command->add_option("--units-per-rail", options->hex.units_per_rail, "Units on one supply rail")
       ->check(CLI::Range(1u, limits::kUnits).description(""))
       ->capture_default_str();
-  CLI::Option* fiducials =
-      command
-          ->add_option("--fiducials", options->hex.fiducials,
-                       "Lights for the camera, on places that no arm reaches")
-          ->check(CLI::Range(3u, limits::kFiducials).description(""));
+  command
+      ->add_option("--hall-sensors", options->hex.sensors,
+                   "Hall sensors at each unit's joint: 6 or 8")
+      ->check(CLI::IsMember({6, 8}));
+  command
+      ->add_option("--spine-mm", options->hex.spine_mm,
+                   "From such a joint to the fibre (default: twice both arms)")
+      ->check(length);
+  CLI::Option* fiducials = command
+                               ->add_option("--fiducials", options->hex.fiducials,
+                                            "Lights for the camera, on places that no arm reaches")
+                               ->check(CLI::Range(3u, limits::kFiducials).description(""));
   fiducials->needs(
       AddFile(command, "--fiducials-out", &options->fiducials_out, "fiducials.csv to write")
           ->needs(fiducials));

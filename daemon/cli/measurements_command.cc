@@ -34,19 +34,31 @@ std::int64_t StatusBits(const std::string& status) {
 
 FitsTable TableOf(const Json& answer) {
   std::vector<std::int64_t> units, bits;
-  std::vector<double> target_x, target_y, x, y, sigma, error;
-  std::vector<std::string> status, at;
+  std::vector<double> target_x, target_y, x, y, sigma, var_x, cov_xy, var_y, error;
+  std::vector<std::string> target, status, source, at;
+  std::vector<std::string> sensors;
+  std::vector<double> alpha, beta, gamma;
   std::int64_t configuration = 0;
   for (const Json& row : ListIn(answer, "measurements")) {
     units.push_back(static_cast<std::int64_t>(CountIn(row, "unit_id")));
     configuration = static_cast<std::int64_t>(CountIn(row, "configuration"));
     status.push_back(TextIn(row, "status"));
+    source.push_back(TextIn(row, "source"));
+    const Json& orientation = ObjectIn(row, "orientation");
+    sensors.push_back(TextIn(orientation, "verdict"));
+    alpha.push_back(NumberOrNan(orientation, "alpha_deg"));
+    beta.push_back(NumberOrNan(orientation, "beta_deg"));
+    gamma.push_back(NumberOrNan(orientation, "gamma_deg"));
     bits.push_back(StatusBits(status.back()));
     // Without a spot there is no place; 0, 0 would look like one.
     const bool seen = NumberIn(row, "sigma_um") > 0;
     x.push_back(seen ? NumberIn(row, "x_mm") : std::nan(""));
     y.push_back(seen ? NumberIn(row, "y_mm") : std::nan(""));
     sigma.push_back(seen ? NumberIn(row, "sigma_um") : std::nan(""));
+    var_x.push_back(seen ? NumberIn(row, "var_x_mm2") : std::nan(""));
+    cov_xy.push_back(seen ? NumberIn(row, "cov_xy_mm2") : std::nan(""));
+    var_y.push_back(seen ? NumberIn(row, "var_y_mm2") : std::nan(""));
+    target.push_back(TextIn(row, "target_id"));
     target_x.push_back(NumberOrNan(row, "target_x_mm"));
     target_y.push_back(NumberOrNan(row, "target_y_mm"));
     error.push_back(NumberOrNan(row, "error_um"));
@@ -57,14 +69,23 @@ FitsTable TableOf(const Json& answer) {
                    {"CONFIG", configuration, "number of the configuration"},
                    {"ORIGIN", std::string("focalfleet"), ""}},
           .columns = {{"UNIT_ID", "", std::move(units)},
+                      {"TARGET_ID", "", std::move(target)},
                       {"TARGET_X_MM", "mm", std::move(target_x)},
                       {"TARGET_Y_MM", "mm", std::move(target_y)},
                       {"X_MM", "mm", std::move(x)},
                       {"Y_MM", "mm", std::move(y)},
                       {"SIGMA_UM", "um", std::move(sigma)},
+                      {"VAR_X_MM2", "mm2", std::move(var_x)},
+                      {"COV_XY_MM2", "mm2", std::move(cov_xy)},
+                      {"VAR_Y_MM2", "mm2", std::move(var_y)},
                       {"ERROR_UM", "um", std::move(error)},
                       {"STATUS_BITS", "", std::move(bits)},
                       {"STATUS", "", std::move(status)},
+                      {"SOURCE", "", std::move(source)},
+                      {"SENSORS", "", std::move(sensors)},
+                      {"ALPHA_DEG", "deg", std::move(alpha)},
+                      {"BETA_DEG", "deg", std::move(beta)},
+                      {"GAMMA_DEG", "deg", std::move(gamma)},
                       {"MEASURED_UTC", "", std::move(at)}}};
 }
 
@@ -115,7 +136,7 @@ ExitCode RunMeasurements(const Context& context, const MeasurementsOptions& opti
 
 void AddMeasurementsCommand(CommandLine* line) {
   CLI::App* command =
-      AddCommand(&line->app, "measurements", "What the camera found of each unit in one exposure",
+      AddCommand(&line->app, "measurements", "What was found of each unit in one exposure",
                  "  focalfleet measurements --out fibres.fits\n"
                  "  focalfleet measurements --exposure 12 --json");
   auto options = std::make_shared<MeasurementsOptions>();

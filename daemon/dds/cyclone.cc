@@ -112,4 +112,14 @@ Result<Handle> MakeReader(const Entity& participant, Handle topic) {
   return reader;
 }
 
+Result<Handle> MakeListener(const Entity& participant, Handle topic, std::int32_t depth) {
+  const std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  const dds_entity_t reader = dds_create_reader(participant.get(), topic, qos.get(), nullptr);
+  if (reader < 0) return DdsFailure("make a reader", reader);
+  return reader;
+}
+
 }  // namespace focalfleet::dds_internal

@@ -18,9 +18,12 @@ using Handle = std::int32_t;  // dds_entity_t
 
 inline constexpr const char* kFleetTopic = "focalfleet/fleet_status";
 inline constexpr const char* kUnitTopic = "focalfleet/unit_status";
+inline constexpr const char* kOrientationTopic = "focalfleet/unit_orientation";
 inline constexpr const char* kBusTopic = "focalfleet/bus_status";
 inline constexpr const char* kConfigurationTopic = "focalfleet/configuration_progress";
 inline constexpr const char* kAlarmTopic = "focalfleet/alarm";
+inline constexpr const char* kExposureRequestTopic = "focalfleet/exposure_request";
+inline constexpr const char* kExposureTopic = "focalfleet/exposure";
 
 /// Deletes its entity, and with it all that was made under it.
 class Entity {
@@ -66,5 +69,7 @@ Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& 
                          const char* name);
 Result<Handle> MakeWriter(const Entity& participant, Handle topic);
 Result<Handle> MakeReader(const Entity& participant, Handle topic);
+/// Takes each sample that comes from now on, the last `depth` of them.
+Result<Handle> MakeListener(const Entity& participant, Handle topic, std::int32_t depth);
 
 }  // namespace focalfleet::dds_internal

@@ -1,5 +1,6 @@
 #include "daemon/dds/sample_conversion.h"
 
+#include <cmath>
 #include <cstring>
 #include <string_view>
 
@@ -8,6 +9,7 @@ namespace {
 
 // The codes that the IDL documents are our enumerators.
 static_assert(focalfleet_WITNESS_MEASURED == static_cast<int>(Witness::kMeasured));
+static_assert(focalfleet_SOURCE_SENSORS == static_cast<int>(SightingSource::kSensors));
 static_assert(focalfleet_PHASE_SILENT == static_cast<int>(UnitPhase::kSilent));
 static_assert(focalfleet_PHASE_MOVING == static_cast<int>(UnitPhase::kMoving));
 static_assert(focalfleet_STATE_HOST_LOST == static_cast<int>(UnitState::kHostLost));
@@ -21,6 +23,7 @@ static_assert(sizeof(focalfleet_FleetStatus::units_by_phase) / sizeof(std::uint3
 static_assert(sizeof(focalfleet_FleetStatus::units_by_witness) / sizeof(std::uint32_t) ==
               kWitnessCount);
 
+constexpr SightingSource kLastSource = SightingSource::kSensors;
 constexpr Witness kLastWitness = Witness::kMeasured;
 constexpr UnitPhase kLastPhase = static_cast<UnitPhase>(kUnitPhaseCount - 1);
 constexpr UnitState kLastUnitState = static_cast<UnitState>(kUnitStateCount - 1);
@@ -83,6 +86,9 @@ UploadView UploadOf(const Sample& sample) {
           .measured_s = sample.upload_s};
 }
 
+const char* Flaw(const UnitOrientationValue& value) {
+  return value.source > kLastSource ? "source" : nullptr;
+}
 const char* Flaw(const BusStatusValue& value) {
   return value.view.link > kLastLink ? "link" : nullptr;
 }
@@ -116,6 +122,31 @@ void ToSample(const UnitStatusValue& value, focalfleet_UnitStatus* sample) {
   sample->fault = Code(value.fault);
   sample->outcome = Code(value.outcome);
   sample->enabled = value.enabled;
+}
+
+void ToSample(const UnitOrientationValue& value, focalfleet_UnitOrientation* sample) {
+  const SpineReading& spine = value.spine;
+  const auto number = [&](double known) { return spine.solved ? known : kNoNumber; };
+  sample->time_ns = value.at.ns;
+  sample->alpha_deg = number(spine.angles_deg[0]);
+  sample->beta_deg = number(spine.angles_deg[1]);
+  sample->gamma_deg = number(spine.angles_deg[2]);
+  sample->cov_aa_deg2 = number(spine.covariance_deg2[0]);
+  sample->cov_ab_deg2 = number(spine.covariance_deg2[1]);
+  sample->cov_ag_deg2 = number(spine.covariance_deg2[2]);
+  sample->cov_bb_deg2 = number(spine.covariance_deg2[3]);
+  sample->cov_bg_deg2 = number(spine.covariance_deg2[4]);
+  sample->cov_gg_deg2 = number(spine.covariance_deg2[5]);
+  sample->x_fp_mm = value.x_fp_mm;
+  sample->y_fp_mm = value.y_fp_mm;
+  sample->var_x_mm2 = value.covariance.xx;
+  sample->cov_xy_mm2 = value.covariance.xy;
+  sample->var_y_mm2 = value.covariance.yy;
+  sample->unit_id = value.unit.value;
+  sample->sensors_used = spine.used;
+  sample->witness = Code(spine.trusted ? Witness::kMeasured : Witness::kUnknown);
+  sample->source = Code(value.source);
+  CopyText(spine.verdict, sample->verdict);
 }
 
 void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample) {
@@ -201,6 +232,25 @@ bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value) {
          Take(sample.reported_state, kLastUnitState, &value->reported_state) &&
          Take(sample.fault, kLastFault, &value->fault) &&
          Take(sample.outcome, kLastOutcome, &value->outcome);
+}
+
+bool FromSample(const focalfleet_UnitOrientation& sample, UnitOrientationValue* value) {
+  SpineReading& spine = value->spine;
+  value->at = {sample.time_ns};
+  spine.solved = !std::isnan(sample.alpha_deg);
+  spine.angles_deg = {sample.alpha_deg, sample.beta_deg, sample.gamma_deg};
+  spine.covariance_deg2 = {sample.cov_aa_deg2, sample.cov_ab_deg2, sample.cov_ag_deg2,
+                           sample.cov_bb_deg2, sample.cov_bg_deg2, sample.cov_gg_deg2};
+  spine.used = sample.sensors_used;
+  spine.verdict = TextOf(sample.verdict);
+  value->x_fp_mm = sample.x_fp_mm;
+  value->y_fp_mm = sample.y_fp_mm;
+  value->covariance = {sample.var_x_mm2, sample.cov_xy_mm2, sample.var_y_mm2};
+  value->unit = {sample.unit_id};
+  Witness witness = Witness::kUnknown;
+  if (!Take(sample.witness, kLastWitness, &witness)) return false;
+  spine.trusted = witness == Witness::kMeasured;
+  return Take(sample.source, kLastSource, &value->source);
 }
 
 bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value) {

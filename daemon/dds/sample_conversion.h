@@ -10,11 +10,13 @@ namespace focalfleet::dds_internal {
 
 /// Text that says which code does not exist, or nullptr where all do.
 const char* Flaw(const UnitStatusValue& value);
+const char* Flaw(const UnitOrientationValue& value);
 const char* Flaw(const BusStatusValue& value);
 const char* Flaw(const ConfigurationProgressValue& value);
 const char* Flaw(const AlarmValue& value);
 
 void ToSample(const UnitStatusValue& value, focalfleet_UnitStatus* sample);
+void ToSample(const UnitOrientationValue& value, focalfleet_UnitOrientation* sample);
 void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample);
 void ToSample(const FleetStatusValue& value, focalfleet_FleetStatus* sample);
 void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationProgress* sample);
@@ -22,6 +24,7 @@ void ToSample(const AlarmValue& value, focalfleet_Alarm* sample);
 
 /// False: a code that this version does not know.
 bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value);
+bool FromSample(const focalfleet_UnitOrientation& sample, UnitOrientationValue* value);
 bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value);
 bool FromSample(const focalfleet_FleetStatus& sample, FleetStatusValue* value);
 bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationProgressValue* value);

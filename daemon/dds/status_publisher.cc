@@ -27,6 +27,9 @@ std::uint64_t PayloadBytes(const focalfleet_BusStatus&) {
 std::uint64_t TextBytes(std::uint64_t before, const char* text) {
   return 4 + (before + 3) / 4 * 4 + 4 + std::char_traits<char>::length(text) + 1;
 }
+std::uint64_t PayloadBytes(const focalfleet_UnitOrientation& sample) {
+  return TextBytes(offsetof(focalfleet_UnitOrientation, verdict), sample.verdict);
+}
 std::uint64_t PayloadBytes(const focalfleet_FleetStatus& sample) {
   return TextBytes(offsetof(focalfleet_FleetStatus, version), sample.version);
 }
@@ -59,6 +62,7 @@ class StatusPublisher::Impl {
     } list[] = {
         {&Impl::fleet_writer_, &focalfleet_FleetStatus_desc, kFleetTopic},
         {&Impl::unit_writer_, &focalfleet_UnitStatus_desc, kUnitTopic},
+        {&Impl::orientation_writer_, &focalfleet_UnitOrientation_desc, kOrientationTopic},
         {&Impl::bus_writer_, &focalfleet_BusStatus_desc, kBusTopic},
         {&Impl::configuration_writer_, &focalfleet_ConfigurationProgress_desc, kConfigurationTopic},
         {&Impl::alarm_writer_, &focalfleet_Alarm_desc, kAlarmTopic},
@@ -89,6 +93,9 @@ class StatusPublisher::Impl {
 
   Result<std::size_t> Publish(std::span<const UnitStatusValue> units) {
     return WriteAll<focalfleet_UnitStatus>(unit_writer_, units, "unit");
+  }
+  Result<std::size_t> Publish(std::span<const UnitOrientationValue> orientations) {
+    return WriteAll<focalfleet_UnitOrientation>(orientation_writer_, orientations, "unit");
   }
   Result<std::size_t> Publish(std::span<const BusStatusValue> buses) {
     return WriteAll<focalfleet_BusStatus>(bus_writer_, buses, "bus");
@@ -124,8 +131,8 @@ class StatusPublisher::Impl {
     // A failure was told by the Publish that met it; what waits is offered again here.
     const Status waiting = WriteWaiting();
     static_cast<void>(waiting);
-    for (const Handle writer :
-         {fleet_writer_, unit_writer_, bus_writer_, configuration_writer_, alarm_writer_}) {
+    for (const Handle writer : {fleet_writer_, unit_writer_, orientation_writer_, bus_writer_,
+                                configuration_writer_, alarm_writer_}) {
       dds_write_flush(writer);
     }
   }
@@ -141,6 +148,7 @@ class StatusPublisher::Impl {
 
  private:
   static std::uint64_t IdOf(const UnitStatusValue& value) { return value.unit.value; }
+  static std::uint64_t IdOf(const UnitOrientationValue& value) { return value.unit.value; }
   static std::uint64_t IdOf(const BusStatusValue& value) { return value.bus.value; }
 
   // False: the writer has no room now, because a reader lags.
@@ -187,6 +195,7 @@ class StatusPublisher::Impl {
   Entity participant_;
   Handle fleet_writer_ = 0;
   Handle unit_writer_ = 0;
+  Handle orientation_writer_ = 0;
   Handle bus_writer_ = 0;
   Handle configuration_writer_ = 0;
   Handle alarm_writer_ = 0;
@@ -210,6 +219,9 @@ Result<std::unique_ptr<StatusPublisher>> StatusPublisher::Create(const DdsOption
 
 Result<std::size_t> StatusPublisher::Publish(std::span<const UnitStatusValue> units) {
   return impl_->Publish(units);
+}
+Result<std::size_t> StatusPublisher::Publish(std::span<const UnitOrientationValue> orientations) {
+  return impl_->Publish(orientations);
 }
 Result<std::size_t> StatusPublisher::Publish(std::span<const BusStatusValue> buses) {
   return impl_->Publish(buses);

@@ -1,4 +1,4 @@
-// The daemon's voice on DDS. Five topics, each keeping its last state for those who join late; the
+// The daemon's voice on DDS. Six topics, each keeping its last state for those who join late; the
 // last value wins and nothing waits: a reader that does not read costs the others nothing and the
 // daemon no time.
 //
@@ -48,6 +48,7 @@ class StatusPublisher {
   /// kUnavailable: DDS failed.
   /// Cost: no allocation of ours.
   Result<std::size_t> Publish(std::span<const UnitStatusValue> units);
+  Result<std::size_t> Publish(std::span<const UnitOrientationValue> orientations);
   Result<std::size_t> Publish(std::span<const BusStatusValue> buses);
   Status Publish(const FleetStatusValue& fleet);
   Status Publish(const ConfigurationProgressValue& configuration);

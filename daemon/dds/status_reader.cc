@@ -28,6 +28,8 @@ class StatusReader::Impl {
     FOCALFLEET_TRY_ASSIGN(impl->alarms_, impl->Open(focalfleet_Alarm_desc, kAlarmTopic));
     if (options.units) {
       FOCALFLEET_TRY_ASSIGN(impl->units_, impl->Open(focalfleet_UnitStatus_desc, kUnitTopic));
+      FOCALFLEET_TRY_ASSIGN(impl->orientations_,
+                            impl->Open(focalfleet_UnitOrientation_desc, kOrientationTopic));
     }
     // The fleet topic also tells whether somebody is there.
     const dds_return_t code = dds_set_status_mask(
@@ -55,6 +57,7 @@ class StatusReader::Impl {
     out->fleet.reset();
     out->configuration.reset();
     out->units.clear();
+    out->orientations.clear();
     out->buses.clear();
     out->alarms.clear();
     out->malformed = 0;
@@ -68,6 +71,9 @@ class StatusReader::Impl {
     FOCALFLEET_TRY((Drain<focalfleet_Alarm, AlarmValue>(
         alarms_, out, [out](AlarmValue value) { out->alarms.push_back(std::move(value)); })));
     if (units_ == 0) return {};
+    FOCALFLEET_TRY((Drain<focalfleet_UnitOrientation, UnitOrientationValue>(
+        orientations_, out,
+        [out](UnitOrientationValue value) { out->orientations.push_back(std::move(value)); })));
     return Drain<focalfleet_UnitStatus, UnitStatusValue>(
         units_, out, [out](const UnitStatusValue& value) { out->units.push_back(value); });
   }
@@ -127,6 +133,7 @@ class StatusReader::Impl {
   Handle buses_ = 0;
   Handle alarms_ = 0;
   Handle units_ = 0;  // 0: not wanted
+  Handle orientations_ = 0;
 };
 
 StatusReader::StatusReader(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -21,13 +21,14 @@ struct StatusUpdate {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
   std::vector<UnitStatusValue> units;
+  std::vector<UnitOrientationValue> orientations;
   std::vector<BusStatusValue> buses;
   std::vector<AlarmValue> alarms;
   std::uint32_t malformed = 0;
 
   [[nodiscard]] std::size_t count() const {
-    return (fleet ? 1u : 0u) + (configuration ? 1u : 0u) + units.size() + buses.size() +
-           alarms.size();
+    return (fleet ? 1u : 0u) + (configuration ? 1u : 0u) + units.size() + orientations.size() +
+           buses.size() + alarms.size();
   }
 };
 

@@ -37,6 +37,17 @@ struct UnitStatusValue {
   bool enabled = true;
 };
 
+/// What a unit's own sensors last showed.
+struct UnitOrientationValue {
+  UnitId unit;
+  WallTime at;
+  SpineReading spine;  // verdict: at most 63 bytes are sent
+  SightingSource source = SightingSource::kCamera;
+  double x_fp_mm = kNoNumber;  // the fibre as measured
+  double y_fp_mm = kNoNumber;
+  CovarianceFp covariance{kNoNumber, kNoNumber, kNoNumber};
+};
+
 struct BusStatusValue {
   BusId bus;
   WallTime at;

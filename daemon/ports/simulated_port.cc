@@ -2,7 +2,10 @@
 
 #include <linux/can/error.h>
 
+#include <algorithm>
 #include <utility>
+
+#include "sim/hall/spine.h"
 
 namespace focalfleet {
 namespace {
@@ -69,6 +72,8 @@ std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
     description.base_x_mm = unit.base_fp.x_mm;
     description.base_y_mm = unit.base_fp.y_mm;
     description.enabled = unit.enabled;
+    description.sensors = unit.sensors;
+    description.spine_mm = unit.spine_mm;
     for (const Axis axis : kAxes) {
       const AxisGeometry& from = unit.axis[Index(axis)];
       sim::AxisDescription& to = description.axis[Index(axis)];
@@ -81,6 +86,16 @@ std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
     units.push_back(description);
   }
   return units;
+}
+
+std::shared_ptr<const sim::JointSensors> MakeJoints(const Layout& layout, std::uint64_t seed,
+                                                    sim::Spread spread) {
+  const bool any =
+      std::ranges::any_of(layout.units(), [](const Unit& unit) { return unit.sensors > 0; });
+  if (!any) return nullptr;
+  sim::SpineMake make{.seed = seed};
+  if (spread == sim::Spread::kReal) make.gain_sd = 5e-4, make.offset_sd_V = 2e-4;
+  return std::make_shared<sim::SpineJoints>(make);
 }
 
 bool SimulatedLink::Look(const sim::World& world) {

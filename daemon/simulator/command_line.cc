@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <cstring>
@@ -15,6 +16,7 @@
 #include "daemon/control/line_client.h"
 #include "daemon/files/text_file.h"
 #include "daemon/simulator/simulator.h"
+#include "sim/hall/spine.h"
 
 namespace focalfleet::simulator {
 namespace {
@@ -55,6 +57,7 @@ std::vector<std::string> Split(const std::string& text, char separator) {
 struct Given {
   SimulatorOptions run;
   std::string spread = "nominal";
+  std::vector<std::string> plant;
   std::string buses_text;
   std::string control;
   std::string units_text;
@@ -122,6 +125,18 @@ int SetBuses(const Given& given, const char* verb) {
   return AskSimply(given, {0, verb, {{"buses", *buses}}});
 }
 
+int WriteField(const Given& given) {
+  std::string text = "theta_deg,phi_deg,b_T\n";
+  constexpr int kStepDeg = 4;
+  const sim::SpineJoints joints({});
+  for (int theta = 0; theta <= 180; theta += kStepDeg)
+    for (int phi = 0; phi < 360; phi += kStepDeg)
+      text += fmt::format("{},{},{}\n", theta, phi,
+                          joints.Field_T(theta * sim::kRadPerDeg, phi * sim::kRadPerDeg));
+  const auto written = WriteFileAtomically(given.out, text);
+  return written ? static_cast<int>(ExitCode::kOk) : Complain(written.error(), ExitCode::kRefused);
+}
+
 int TellTruth(const Given& given) {
   Json args = Json::object();
   if (!given.targets.empty()) {
@@ -151,6 +166,29 @@ int TellTruth(const Given& given) {
   });
 }
 
+Result<sim::PlantedTrait> ParsePlant(const std::string& text) {
+  const auto wrong = [&](const std::string& why) {
+    return Fail(ErrorCode::kInvalid, "--plant " + text + ": " + why);
+  };
+  const std::size_t equals = text.find('='), colon = text.find(':');
+  sim::PlantedTrait planted;
+  const std::string cause = text.substr(0, std::min(equals, colon));
+  const auto& names = sim::kPlantedCauseNames;
+  const auto found = std::find(names.begin(), names.end(), cause);
+  if (found == names.end()) return wrong("there is no cause '" + cause + "' to plant");
+  planted.cause = static_cast<sim::PlantedCause>(found - names.begin());
+  if (colon < equals) {
+    const std::string axis = text.substr(colon + 1, equals - colon - 1);
+    if (axis != "theta" && axis != "phi") return wrong("the axis is theta or phi");
+    planted.on_axis = {axis == "theta", axis == "phi"};
+  }
+  constexpr double kSizeMax = 10;
+  if (equals == std::string::npos || !Parse(text.substr(equals + 1), &planted.size) ||
+      !(planted.size >= 0 && planted.size <= kSizeMax))
+    return wrong("CAUSE=SIZE or CAUSE:AXIS=SIZE is expected, with a size of 0 to 10");
+  return planted;
+}
+
 int Run(Given* given, const CLI::App& app) {
   if (given->run.units_path.empty()) {
     std::fprintf(stderr, "focalfleet-sim: --units is required (see %s --help)\n",
@@ -172,6 +210,16 @@ int Run(Given* given, const CLI::App& app) {
   }
   given->run.control_path = given->control;
   given->run.spread = given->spread == "real" ? sim::Spread::kReal : sim::Spread::kNominal;
+  for (const std::string& text : given->plant) {
+    const auto planted = ParsePlant(text);
+    if (!planted) return Complain(planted.error(), ExitCode::kUsage);
+    given->run.planted.push_back(*planted);
+  }
+  if (!given->plant.empty() && !given->run.flash_path.empty()) {
+    std::fputs("focalfleet-sim: --plant and --flash exclude each other: FLASH does not keep it\n",
+               stderr);
+    return static_cast<int>(ExitCode::kUsage);
+  }
   const auto ran = RunSimulator(given->run);
   return ran ? static_cast<int>(ExitCode::kOk) : Complain(ran.error(), ExitCode::kRefused);
 }
@@ -209,6 +257,9 @@ void AddRunOptions(CLI::App* app, Given* given) {
                   "nominal: units as described; real: the spread of service")
       ->check(CLI::IsMember({"nominal", "real"}))
       ->capture_default_str();
+  app->add_option("--plant", given->plant,
+                  "CAUSE=SIZE or CAUSE:AXIS=SIZE, on top of the spread; repeat: zero_offset (deg), "
+                  "arm_length (mm), gear_scale (share), backlash (deg), eccentricity (deg)");
   app->add_option("--bit-rate", run.bit_rate_bps, "bit/s of the simulated buses")
       ->check(CLI::Range(10'000, 1'000'000))
       ->capture_default_str();
@@ -280,6 +331,9 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
   camera->add_option("--fault", given->code, "dead, late, doubled, turned, other_field, or none")
       ->required();
   camera->add_option("--exposures", given->exposures, "so many")->capture_default_str();
+  CLI::App* field = app->add_subcommand(
+      "field", "write the field map of the joints' magnets, for `focalfleet hall fit`");
+  field->add_option("--out", given->out, "FIELD.csv")->required();
   CLI::App* status = AddSubcommand(app, given, "status", "counters of all buses, as JSON");
   CLI::App* quit =
       AddSubcommand(app, given, "quit", "end the simulation; it writes its FLASH file");
@@ -310,6 +364,7 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
              return AskSimply(
                  *given, {0, "camera", {{"fault", given->code}, {"exposures", given->exposures}}});
            }},
+          {field, [given] { return WriteField(*given); }},
           {status,
            [given] {
              given->json = true;

@@ -80,8 +80,10 @@ Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostCl
   config.units = DescribeUnits(layout);
   config.seed = options.seed;
   config.spread = options.spread;
+  config.planted = options.planted;
   config.bit_rate_bps = options.bit_rate_bps;
   config.bit_clock = options.interfaces.empty();
+  config.joint_sensors = MakeJoints(layout, options.seed, options.spread);
   FOCALFLEET_TRY(PlaceUnits(options.state_path, layout, &config));
   FOCALFLEET_TRY(Remember(options, &config));
   FOCALFLEET_TRY(PlanFaults(options, &config));

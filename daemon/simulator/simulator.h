@@ -26,6 +26,7 @@ struct SimulatorOptions {
   double speed = 1;
   std::uint64_t seed = 1;
   sim::Spread spread = sim::Spread::kNominal;
+  std::vector<sim::PlantedTrait> planted = {};  // on top of it
   std::uint32_t bit_rate_bps = 1'000'000;
 };
 

@@ -113,4 +113,34 @@ const char* Flaw(const TuningRow& row) {
   return nullptr;
 }
 
+const char* Flaw(const SpineReading& spine) {
+  if (spine.trusted && !spine.solved) return "it is trusted, and there is none";
+  if (!spine.solved) return nullptr;
+  for (const double angle_deg : spine.angles_deg)
+    if (!(std::abs(angle_deg) <= 360)) return "its angle is no angle";
+  for (const double covariance_deg2 : spine.covariance_deg2)
+    if (!std::isfinite(covariance_deg2)) return "its covariance is not finite";
+  const auto& c = spine.covariance_deg2;
+  return c[0] >= 0 && c[3] >= 0 && c[5] >= 0 ? nullptr : "its variance is negative";
+}
+
+std::optional<SpineReading> ReadSpine(Cells& cells, int first) {
+  if (cells.IsNull(first)) return std::nullopt;
+  SpineReading spine{.trusted = cells.Flag(first), .verdict = cells.Text(first + 1)};
+  spine.used = cells.Whole<std::uint16_t>(first + 2);
+  spine.solved = !cells.IsNull(first + 3);
+  int column = first + 3;
+  for (double& angle_deg : spine.angles_deg) {
+    if (spine.solved) angle_deg = cells.Real(column);
+    ++column;
+  }
+  for (double& covariance_deg2 : spine.covariance_deg2) {
+    if (spine.solved) covariance_deg2 = cells.Real(column);
+    ++column;
+  }
+  const char* flaw = Flaw(spine);
+  cells.Require(flaw == nullptr, flaw == nullptr ? "" : flaw);
+  return spine;
+}
+
 }  // namespace focalfleet::store_internal

@@ -77,8 +77,9 @@ constexpr const char* Flaw(const AxisKnowledge& knowledge) {
   return nullptr;
 }
 
-inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kMissing;
-inline constexpr Origin kLastOrigin = Origin::kCamera;
+inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kTooCoarse;
+inline constexpr SightingSource kLastSightingSource = SightingSource::kSensors;
+inline constexpr Origin kLastOrigin = Origin::kSensors;
 inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
 inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
 inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
@@ -95,6 +96,12 @@ ConfigurationRow ReadConfiguration(Cells& cells);
 TuningRow ReadTuning(Cells& cells, int first);
 /// What such a row must satisfy, when written and when read: nullptr, or what is wrong.
 const char* Flaw(const TuningRow& row);
+
+/// What a stored orientation must satisfy: nullptr, or what is wrong.
+const char* Flaw(const SpineReading& spine);
+/// trusted, verdict, used, three angles and six covariances, in this order from column `first` on;
+/// nothing where the first is NULL.
+std::optional<SpineReading> ReadSpine(Cells& cells, int first);
 
 /// The tables as the coordinator wants them, in one read transaction.
 Result<StoredFleet> LoadFleet(Connection& connection);

@@ -247,7 +247,88 @@ CREATE VIEW measured AS SELECT
   FROM measurement;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4};
+// How well each coordinate was seen, what the target is called, how long after the motion.
+constexpr const char* kVersion5 = R"sql(
+ALTER TABLE measurement ADD COLUMN var_x_mm2 REAL NOT NULL DEFAULT 0;
+ALTER TABLE measurement ADD COLUMN cov_xy_mm2 REAL NOT NULL DEFAULT 0;
+ALTER TABLE measurement ADD COLUMN var_y_mm2 REAL NOT NULL DEFAULT 0;
+ALTER TABLE measurement ADD COLUMN target_id TEXT NOT NULL DEFAULT '';
+ALTER TABLE measurement ADD COLUMN delay_s REAL;  -- end of motion to exposure; NULL: not known
+UPDATE measurement
+  SET var_x_mm2 = sigma_um * sigma_um * 1e-6, var_y_mm2 = sigma_um * sigma_um * 1e-6;
+
+DROP VIEW measured;
+CREATE VIEW measured AS SELECT
+  exposure, unit_id, configuration, target_id,
+  CASE status WHEN 0 THEN 'measured' WHEN 1 THEN 'did_not_move' WHEN 2 THEN 'swapped'
+    WHEN 3 THEN 'strayed' WHEN 4 THEN 'swap_suspected' WHEN 5 THEN 'blended'
+    WHEN 6 THEN 'outside_patrol' WHEN 7 THEN 'ambiguous' ELSE 'missing' END AS status,
+  x_mm, y_mm, sigma_um, var_x_mm2, cov_xy_mm2, var_y_mm2, target_x_mm, target_y_mm, error_um,
+  delay_s, datetime(at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM measurement;
+)sql";
+
+// Models that blind commands went through, and which one did when.
+constexpr const char* kVersion6 = R"sql(
+CREATE TABLE model(
+  sha256 TEXT PRIMARY KEY,      -- of the text, in hex
+  text TEXT NOT NULL,           -- model.toml
+  at_ns INTEGER NOT NULL
+) STRICT;
+
+CREATE TABLE model_change(
+  entry INTEGER PRIMARY KEY,    -- the last is what holds
+  sha256 TEXT,                  -- NULL: from here on none
+  restores INTEGER,             -- entry that it goes back to; NULL: none
+  name TEXT NOT NULL,
+  campaign TEXT NOT NULL,
+  campaign_sha256 TEXT NOT NULL,
+  rms_before_um REAL,           -- NULL: not known
+  rms_after_um REAL,
+  at_ns INTEGER NOT NULL
+) STRICT;
+)sql";
+
+// Units that measure themselves: who saw a fibre, and what the sensors at a joint showed.
+constexpr const char* kVersion7 = R"sql(
+ALTER TABLE measurement ADD COLUMN source INTEGER NOT NULL DEFAULT 0;  -- 0 camera, 1 own sensors
+
+CREATE TABLE orientation(
+  exposure INTEGER NOT NULL,
+  unit_id INTEGER NOT NULL,
+  serial INTEGER NOT NULL,
+  trusted INTEGER NOT NULL,     -- 1: it could be measured by them
+  verdict TEXT NOT NULL,        -- ok, or which sensors lie, or cannot tell
+  used INTEGER NOT NULL,        -- bit k: sensor k took part
+  alpha_deg REAL,               -- NULL: there is no orientation
+  beta_deg REAL,
+  gamma_deg REAL,
+  cov_aa_deg2 REAL,
+  cov_ab_deg2 REAL,
+  cov_ag_deg2 REAL,
+  cov_bb_deg2 REAL,
+  cov_bg_deg2 REAL,
+  cov_gg_deg2 REAL,
+  at_ns INTEGER NOT NULL,
+  PRIMARY KEY(exposure, unit_id)
+) STRICT, WITHOUT ROWID;
+
+DROP VIEW measured;
+CREATE VIEW measured AS SELECT
+  exposure, unit_id, configuration, target_id,
+  CASE status WHEN 0 THEN 'measured' WHEN 1 THEN 'did_not_move' WHEN 2 THEN 'swapped'
+    WHEN 3 THEN 'strayed' WHEN 4 THEN 'swap_suspected' WHEN 5 THEN 'blended'
+    WHEN 6 THEN 'outside_patrol' WHEN 7 THEN 'ambiguous' WHEN 8 THEN 'missing'
+    WHEN 9 THEN 'sensors_doubted' ELSE 'too_coarse' END AS status,
+  CASE source WHEN 0 THEN 'camera' ELSE 'hall_sensors' END AS source,
+  x_mm, y_mm, sigma_um, var_x_mm2, cov_xy_mm2, var_y_mm2, target_x_mm, target_y_mm, error_um,
+  delay_s, orientation.verdict AS sensors, alpha_deg, beta_deg, gamma_deg,
+  datetime(measurement.at_ns / 1000000000, 'unixepoch') AS at_utc
+  FROM measurement LEFT JOIN orientation USING (exposure, unit_id);
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4,
+                                       kVersion5, kVersion6, kVersion7};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

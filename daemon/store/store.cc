@@ -19,8 +19,9 @@ struct Statements {
   Statement unbound_elsewhere, unbind_elsewhere, bind, enable, unit_changed;
   Statement parameter_changed, parameter;
   Statement tuning_kept, tuning;
-  Statement measurement;
+  Statement measurement, orientation;
   Statement configuration, alarm;
+  Statement model, model_change;
   Statement raise_meta, set_meta;
 };
 
@@ -90,8 +91,20 @@ constexpr const char* kTuning =
     "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)";
 constexpr const char* kMeasurement =
     "INSERT OR REPLACE INTO measurement(exposure, unit_id, serial, configuration, status, "
-    "other, x_mm, y_mm, sigma_um, theta, phi, error_um, target_x_mm, target_y_mm, at_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)";
+    "other, x_mm, y_mm, sigma_um, theta, phi, error_um, target_x_mm, target_y_mm, at_ns, "
+    "var_x_mm2, cov_xy_mm2, var_y_mm2, target_id, delay_s, source) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, "
+    "?20, ?21)";
+constexpr const char* kModel =
+    "INSERT INTO model(sha256, text, at_ns) VALUES(?1, ?2, ?3) ON CONFLICT(sha256) DO NOTHING";
+constexpr const char* kModelChange =
+    "INSERT INTO model_change(entry, sha256, restores, name, campaign, campaign_sha256, "
+    "rms_before_um, rms_after_um, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+constexpr const char* kOrientation =
+    "INSERT OR REPLACE INTO orientation(exposure, unit_id, serial, trusted, verdict, used, "
+    "alpha_deg, beta_deg, gamma_deg, cov_aa_deg2, cov_ab_deg2, cov_ag_deg2, cov_bb_deg2, "
+    "cov_bg_deg2, cov_gg_deg2, at_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16)";
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
@@ -135,8 +148,11 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {&Statements::tuning_kept, kTuningKept},
       {&Statements::tuning, kTuning},
       {&Statements::measurement, kMeasurement},
+      {&Statements::orientation, kOrientation},
       {&Statements::configuration, kConfiguration},
       {&Statements::alarm, kAlarm},
+      {&Statements::model, kModel},
+      {&Statements::model_change, kModelChange},
       {&Statements::raise_meta, kRaiseMeta},
       {&Statements::set_meta, kSetMeta},
   };
@@ -169,7 +185,7 @@ class RowWriter {
       // Motions are kept in intent, exposures in measurement; what sets a vector otherwise would
       // leave no trace.
       if (row.origin != Origin::kMove && row.origin != Origin::kHoming &&
-          row.origin != Origin::kCamera) {
+          row.origin != Origin::kCamera && row.origin != Origin::kSensors) {
         FOCALFLEET_TRY(KeepVector(row, axis));
       }
       FOCALFLEET_TRY(WriteAxis(row, axis));
@@ -181,8 +197,13 @@ class RowWriter {
     if (row.serial.value == 0) return Wrong("measurement without a serial number");
     if (row.exposure > INT64_MAX || row.configuration > INT64_MAX)
       return Wrong("measurement", row.serial, "its number is too large");
-    for (const double value : {row.x_mm, row.y_mm, row.sigma_um})
+    const auto& [xx, xy, yy] = row.covariance;
+    for (const double value : {row.x_mm, row.y_mm, xx, xy, yy, row.delay_s.value_or(0)})
       if (!std::isfinite(value)) return Wrong("measurement", row.serial, "it is not finite");
+    if (xx < 0 || yy < 0) return Wrong("measurement", row.serial, "its variance is negative");
+    if (row.source > kLastSightingSource)
+      return Wrong("measurement", row.serial, "its source does not exist");
+    if (row.spine) FOCALFLEET_TRY(WriteOrientation(row, *row.spine));
     Statement& s = statements_.measurement;
     s.Bind(1, static_cast<std::int64_t>(row.exposure));
     s.Bind(2, row.unit.value);
@@ -192,13 +213,19 @@ class RowWriter {
     row.other ? s.Bind(6, row.other->value) : s.BindNull(6);
     s.BindReal(7, row.x_mm);
     s.BindReal(8, row.y_mm);
-    s.BindReal(9, row.sigma_um);
+    s.BindReal(9, SigmaUm(row.covariance));
     row.place ? s.Bind(10, (*row.place)[0]) : s.BindNull(10);
     row.place ? s.Bind(11, (*row.place)[1]) : s.BindNull(11);
     row.error_um ? s.BindReal(12, *row.error_um) : s.BindNull(12);
     row.target_fp ? s.BindReal(13, row.target_fp->x_mm) : s.BindNull(13);
     row.target_fp ? s.BindReal(14, row.target_fp->y_mm) : s.BindNull(14);
     s.Bind(15, now_.ns);
+    s.BindReal(16, xx);
+    s.BindReal(17, xy);
+    s.BindReal(18, yy);
+    s.BindText(19, row.target_id);
+    row.delay_s ? s.BindReal(20, *row.delay_s) : s.BindNull(20);
+    s.Bind(21, Code(row.source));
     FOCALFLEET_TRY(s.Run());
     return Meta(statements_.raise_meta, "next_exposure", row.exposure + 1);
   }
@@ -347,6 +374,37 @@ class RowWriter {
     return Meta(statements_.set_meta, "next_move", row.next.value);
   }
 
+  Status operator()(const ModelRow& row) {
+    if (row.entry == 0 || row.entry >= INT64_MAX || row.restores >= row.entry)
+      return Wrong("model: its entry, or the one that it restores, does not exist");
+    if (row.text != nullptr && !row.sha256.empty()) {
+      Statement& model = statements_.model;
+      model.BindText(1, row.sha256);
+      model.BindText(2, *row.text);
+      model.Bind(3, now_.ns);
+      FOCALFLEET_TRY(model.Run());
+    }
+    Statement& s = statements_.model_change;
+    s.Bind(1, static_cast<std::int64_t>(row.entry));
+    if (row.sha256.empty()) {
+      s.BindNull(2);
+    } else {
+      s.BindText(2, row.sha256);
+    }
+    if (row.restores == 0) {
+      s.BindNull(3);
+    } else {
+      s.Bind(3, static_cast<std::int64_t>(row.restores));
+    }
+    s.BindText(4, row.name);
+    s.BindText(5, row.campaign);
+    s.BindText(6, row.campaign_sha256);
+    s.BindReal(7, row.rms_before_um);
+    s.BindReal(8, row.rms_after_um);
+    s.Bind(9, now_.ns);
+    return s.Run();
+  }
+
  private:
   static Status Wrong(std::string text) { return Fail(ErrorCode::kInvalid, std::move(text)); }
   static Status Wrong(const char* what, SerialNumber serial, const char* why) {
@@ -377,6 +435,29 @@ class RowWriter {
     s.Bind(9, row.move.value);
     s.Bind(10, Code(row.origin));
     s.Bind(12, offset);
+    return s.Run();
+  }
+
+  Status WriteOrientation(const MeasurementRow& row, const SpineReading& spine) {
+    const char* flaw = Flaw(spine);
+    if (flaw != nullptr) return Wrong("orientation", row.serial, flaw);
+    Statement& s = statements_.orientation;
+    s.Bind(1, static_cast<std::int64_t>(row.exposure));
+    s.Bind(2, row.unit.value);
+    s.Bind(3, row.serial.value);
+    s.Bind(4, spine.trusted ? 1 : 0);
+    s.BindText(5, spine.verdict);
+    s.Bind(6, spine.used);
+    int column = 7;
+    for (const double angle_deg : spine.angles_deg) {
+      spine.solved ? s.BindReal(column, angle_deg) : s.BindNull(column);
+      ++column;
+    }
+    for (const double covariance_deg2 : spine.covariance_deg2) {
+      spine.solved ? s.BindReal(column, covariance_deg2) : s.BindNull(column);
+      ++column;
+    }
+    s.Bind(column, now_.ns);
     return s.Run();
   }
 
@@ -499,6 +580,8 @@ Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
       "ORDER BY id LIMIT ?2)",
       "DELETE FROM measurement WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
       "measurement WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
+      "DELETE FROM orientation WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
+      "orientation WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
       "DELETE FROM alarm WHERE id IN (SELECT id FROM alarm WHERE at_ns < ?1 ORDER BY id LIMIT ?2)",
   };
   static_assert(ConfigurationState::kDone == ConfigurationState{3});

@@ -136,6 +136,11 @@ struct MeasurementHistory {
   WallTime at;  // stored
 };
 
+struct ModelHistory {
+  ModelRow row;  // without its text
+  WallTime at;
+};
+
 /// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
 /// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
 /// read.
@@ -158,6 +163,11 @@ class StoreReader {
   Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
+  Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
+  /// Units that were homed later than that.
+  Result<std::vector<UnitId>> HomedSince(WallTime since);
+  /// Errors: kRefused: there is none of that sha256.
+  Result<std::string> ModelText(const std::string& sha256);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
 
  private:

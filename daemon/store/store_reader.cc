@@ -176,8 +176,11 @@ Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
 Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t exposure) {
   return Query<MeasurementHistory>(
       *connection_, "measurement",
-      "SELECT exposure, unit_id, serial, configuration, status, other, x_mm, y_mm, sigma_um, "
-      "theta, phi, error_um, target_x_mm, target_y_mm, at_ns FROM measurement WHERE exposure = ?2 "
+      "SELECT exposure, unit_id, m.serial, configuration, status, other, x_mm, y_mm, sigma_um, "
+      "theta, phi, error_um, target_x_mm, target_y_mm, m.at_ns, var_x_mm2, cov_xy_mm2, var_y_mm2, "
+      "target_id, delay_s, source, trusted, verdict, used, alpha_deg, beta_deg, gamma_deg, "
+      "cov_aa_deg2, cov_ab_deg2, cov_ag_deg2, cov_bb_deg2, cov_bg_deg2, cov_gg_deg2 "
+      "FROM measurement AS m LEFT JOIN orientation USING (exposure, unit_id) WHERE exposure = ?2 "
       "ORDER BY unit_id LIMIT ?1",
       limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
         MeasurementHistory history;
@@ -190,7 +193,6 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
         if (!cells.IsNull(5)) row.other = UnitId{cells.Whole<std::uint32_t>(5)};
         row.x_mm = cells.Real(6);
         row.y_mm = cells.Real(7);
-        row.sigma_um = cells.Real(8);
         cells.Require(cells.IsNull(9) == cells.IsNull(10), "it has a place on one axis alone");
         if (!cells.IsNull(9))
           row.place = Pose{cells.Whole<std::int32_t>(9), cells.Whole<std::int32_t>(10)};
@@ -198,6 +200,12 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
         cells.Require(cells.IsNull(12) == cells.IsNull(13), "it has a target on one axis alone");
         if (!cells.IsNull(12)) row.target_fp = PointFp{cells.Real(12), cells.Real(13)};
         history.at = {cells.Whole<std::int64_t>(14)};
+        row.covariance = {cells.Real(15), cells.Real(16), cells.Real(17)};
+        cells.Require(row.covariance.xx >= 0 && row.covariance.yy >= 0, "its variance is negative");
+        row.target_id = cells.Text(18);
+        if (!cells.IsNull(19)) row.delay_s = cells.Real(19);
+        row.source = cells.Code(20, kLastSightingSource);
+        row.spine = ReadSpine(cells, 21);
         return history;
       });
 }
@@ -212,6 +220,50 @@ Result<std::optional<std::uint64_t>> StoreReader::LastExposure(std::uint64_t con
                            [](Cells& cells) { return cells.Whole<std::uint64_t>(0); }));
   if (found.empty()) return std::optional<std::uint64_t>();
   return std::optional<std::uint64_t>(found.front());
+}
+
+Result<std::vector<ModelHistory>> StoreReader::Models(std::uint32_t limit) {
+  return Query<ModelHistory>(
+      *connection_, "model_change",
+      "SELECT entry, sha256, restores, name, campaign, campaign_sha256, rms_before_um, "
+      "rms_after_um, at_ns FROM model_change ORDER BY entry DESC LIMIT ?1",
+      limit, std::nullopt, [](Cells& cells) {
+        ModelHistory entry;
+        ModelRow& row = entry.row;
+        row.entry = cells.Whole<std::uint64_t>(0);
+        if (!cells.IsNull(1)) row.sha256 = cells.Text(1);
+        if (!cells.IsNull(2)) row.restores = cells.Whole<std::uint64_t>(2);
+        cells.Require(row.restores < row.entry, "it restores what came after it");
+        row.name = cells.Text(3);
+        row.campaign = cells.Text(4);
+        row.campaign_sha256 = cells.Text(5);
+        row.rms_before_um = cells.Real(6);
+        row.rms_after_um = cells.Real(7);
+        entry.at = cells.Time(8);
+        return entry;
+      });
+}
+
+Result<std::vector<UnitId>> StoreReader::HomedSince(WallTime since) {
+  static_assert(IntentEnd::kHomed == IntentEnd{5});
+  return Query<UnitId>(*connection_, "intent",
+                       "SELECT DISTINCT unit_id FROM intent WHERE end = 5 AND ended_ns > ?2 "
+                       "ORDER BY unit_id LIMIT ?1",
+                       limits::kUnits, since.ns,
+                       [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
+}
+
+Result<std::string> StoreReader::ModelText(const std::string& sha256) {
+  FOCALFLEET_TRY_ASSIGN(Statement statement,
+                        connection_->Prepare("SELECT text FROM model WHERE sha256 = ?1"));
+  statement.BindText(1, sha256);
+  const auto row = statement.Next();
+  if (!row) return tl::unexpected<Error>(connection_->Named(row.error()));
+  if (!*row) return Fail(ErrorCode::kRefused, "the store has no model " + sha256);
+  Cells cells(statement, "model", 1);
+  std::string text = cells.Text(0);
+  if (cells.error()) return tl::unexpected<Error>(connection_->Named(*cells.error()));
+  return text;
 }
 
 Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit,

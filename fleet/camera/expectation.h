@@ -9,15 +9,9 @@
 
 #include "fleet/kinematics.h"
 #include "fleet/layout.h"
+#include "fleet/sighting.h"
 
 namespace focalfleet {
-
-/// Symmetric. Units: mm^2. Frame: focal plane.
-struct CovarianceFp {
-  double xx = 0;
-  double xy = 0;
-  double yy = 0;
-};
 
 /// Standard deviations after a move that nobody has measured yet.
 struct BlindError {

@@ -77,7 +77,7 @@ Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const
       sighting.x_mm = seen.at_fp.x_mm;
       sighting.y_mm = seen.at_fp.y_mm;
       const double sigma_mm = std::sqrt((seen.covariance.xx + seen.covariance.yy) / 2);
-      sighting.sigma_um = 1e3 * sigma_mm;
+      sighting.covariance = seen.covariance;
       if (IsCertain(seen.status) && IsPlace(believed.now[n]))
         sighting.place = PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
                                    BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),

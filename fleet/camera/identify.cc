@@ -336,9 +336,9 @@ std::optional<Refusal> Turned(const IdentificationRequest& request,
 }  // namespace
 
 const char* Name(SightingStatus status) {
-  constexpr const char* kNames[] = {"measured",       "did_not_move",   "swapped",
-                                    "strayed",        "swap_suspected", "blended",
-                                    "outside_patrol", "ambiguous",      "missing"};
+  constexpr const char* kNames[] = {
+      "measured",       "did_not_move", "swapped", "strayed",         "swap_suspected", "blended",
+      "outside_patrol", "ambiguous",    "missing", "sensors_doubted", "too_coarse"};
   return kNames[static_cast<std::size_t>(status)];
 }
 

@@ -33,6 +33,9 @@ HostMessage StepQuestion(int step) {
   }
 }
 
+// Eight bytes, as long as they can get.
+constexpr std::uint32_t kSensorsAnswerBits = 160;
+
 // A resting unit is asked for its health ten times less often than a moving one for its progress.
 constexpr std::int64_t kRestPollFactor = 10;
 
@@ -50,6 +53,10 @@ bool Contact::Service(PositionerIndex i) {
     } else if (!core_.AskAgain(i)) {
       NoAnswer(i);
     }
+    return true;
+  }
+  if (record.view.phase == kReady && record.sensing.under_way()) {
+    core_.Ask(i, SensorsRequest{record.sensing.next_part}, kSensorsAnswerBits);
     return true;
   }
   const bool poll = core_.now >= record.next_poll;
@@ -124,6 +131,7 @@ void Contact::Identify(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
   core_.Forget(i);
   record.reading = {};
+  record.sensing = {};
   record.wants_start = false;
   record.clock_told = false;
   core_.SetPhase(i, kIdentifying);
@@ -153,6 +161,13 @@ void Contact::Lose(PositionerIndex i, UnitPhase phase, const std::string& reason
 
 void Contact::NoAnswer(PositionerIndex i) {
   UnitRecord& record = core_.unit(i);
+  if (record.view.phase == kReady && record.sensing.under_way() &&
+      record.question->answer_function == Function::kSensors) {
+    core_.Forget(i);
+    SensorsDoNotAnswer(i, "it does not tell them");
+    core_.SetDue(i, record.next_poll = core_.now);  // whether it is there at all
+    return;
+  }
   core_.Forget(i);
   record.asked_once = true;
   switch (record.view.phase) {
@@ -221,7 +236,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
   } else if (const auto* identity = std::get_if<IdentifyReply>(&heard.message)) {
     if (!answers(Function::kIdentify)) return;
     record.asked_once = true;
-    if (identity->protocol_version != kProtocolVersion) return OnOtherVersion(i, *identity);
+    if (!IsSpoken(identity->protocol_version)) return OnOtherVersion(i, *identity);
+    record.protocol_version = identity->protocol_version;
     record.other_version.reset();
     record.view.serial = identity->serial;
     if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
@@ -237,6 +253,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
       OnParameter(i, *parameter);
   } else if (const auto* clock = std::get_if<ClockReply>(&heard.message)) {
     if (answers(Function::kClock)) OnClock(i, *clock, at);
+  } else if (const auto* sensors = std::get_if<SensorsReply>(&heard.message)) {
+    if (answers(Function::kSensors)) OnSensors(i, *sensors);
   } else if (std::holds_alternative<FaultReply>(heard.message)) {
     if (answers(Function::kFault)) Identify(i);  // asked only to clear it
   }
@@ -250,7 +268,8 @@ void Contact::OnOtherVersion(PositionerIndex i, const IdentifyReply& identity) {
     core_.Raise(Severity::kError, i, {},
                 core_.NameOf(i) + " speaks protocol version " +
                     std::to_string(identity.protocol_version) + ", not " +
-                    std::to_string(kProtocolVersion) + ": it is not moved");
+                    std::to_string(kProtocolVersion) + " or " +
+                    std::to_string(kProtocolVersionWithSensors) + ": it is not moved");
   record.other_version = identity.protocol_version;
   record.view.serial = identity.serial;
   record.view.knowledge = {};

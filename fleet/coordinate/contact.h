@@ -29,6 +29,9 @@ class Contact {
   /// stands for many units.
   void Lose(PositionerIndex i, UnitPhase phase, const std::string& reason, bool alarm = true);
 
+  /// Reads the sensors of a unit that rests and has some: UnitRecord::sensing.
+  void Sense(PositionerIndex i);
+
   Status Adopt(PositionerIndex i);
   void Enable(const EnableCommand& command);
   /// Answered when the unit has, with the value that holds then.
@@ -51,6 +54,8 @@ class Contact {
   void OnDone(PositionerIndex i, Done done, std::uint8_t sequence);
   void OnParameter(PositionerIndex i, const ParameterReply& reply);
   void OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at);
+  void OnSensors(PositionerIndex i, const SensorsReply& reply);
+  void SensorsDoNotAnswer(PositionerIndex i, const std::string& what);
   void OnWritten(PositionerIndex i, const ParameterReply& reply);
   void MotionEnded(PositionerIndex i, const Done& done);
 

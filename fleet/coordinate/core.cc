@@ -96,7 +96,8 @@ std::string Core::TroubleOf(PositionerIndex i) const {
     case UnitPhase::kAbsent:
       if (units[i.value].other_version)
         return "speaks protocol version " + std::to_string(*units[i.value].other_version) +
-               ", not " + std::to_string(kProtocolVersion);
+               ", not " + std::to_string(kProtocolVersion) + " or " +
+               std::to_string(kProtocolVersionWithSensors);
       return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
       return "is still being read";
@@ -301,12 +302,49 @@ Pose Core::PlaceAt(PositionerIndex i, const Pose& count) const {
   return {count[0] + offset[0], count[1] + offset[1]};
 }
 
-void Core::See(PositionerIndex i, const Pose& place) {
+std::array<VectorRange, kAxisCount> Core::RangesOf(PositionerIndex i) const {
+  std::array<VectorRange, kAxisCount> ranges;
+  for (const Axis axis : kAxes) {
+    const VectorRange counts =
+        RangeOf(layout.unit(i).axis[Index(axis)], drives[i.value].axis[Index(axis)]);
+    const std::int32_t offset = units[i.value].view.offset[Index(axis)];
+    ranges[Index(axis)] = {counts.low + offset, counts.high + offset};
+  }
+  return ranges;
+}
+
+Pose Core::NearestInReach(PositionerIndex i, const Pose& pose) const {
+  const std::array<VectorRange, kAxisCount> ranges = RangesOf(i);
+  const std::size_t theta = Index(Axis::kTheta);
+  const std::int32_t turn =
+      NearestVectors(360, layout.unit(i).axis[theta], drives[i.value].axis[theta]);
+  Pose nearest = pose;
+  for (const std::int32_t other : {pose[theta] - turn, pose[theta] + turn})
+    if (!ranges[theta].contains(nearest[theta]) && ranges[theta].contains(other))
+      nearest[theta] = other;
+  for (const Axis axis : kAxes) {
+    const auto& [low, high] = ranges[Index(axis)];
+    nearest[Index(axis)] = std::clamp(nearest[Index(axis)], low, high);
+  }
+  return nearest;
+}
+
+void Core::See(PositionerIndex i, const Pose& place, SightingSource source) {
   UnitView& view = unit(i).view;
   const Pose believed = PlaceOf(view.knowledge);
   for (const Axis axis : kAxes)
     view.offset[Index(axis)] += place[Index(axis)] - believed[Index(axis)];
-  Know(i, Exactly(Witness::kMeasured, place), Origin::kCamera);
+  Know(i, Exactly(Witness::kMeasured, place),
+       source == SightingSource::kCamera ? Origin::kCamera : Origin::kSensors);
+}
+
+void Core::Expect(PositionerIndex i, const Pose& offset) {
+  UnitView& view = unit(i).view;
+  Pose place = PlaceOf(view.knowledge);
+  for (const Axis axis : kAxes)
+    place[Index(axis)] += offset[Index(axis)] - view.offset[Index(axis)];
+  view.offset = offset;
+  Know(i, Exactly(Witness::kReported, place), Origin::kCampaign);
 }
 
 void Core::Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin) {

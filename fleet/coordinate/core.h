@@ -23,6 +23,7 @@
 #include "fleet/coordinate/clock_map.h"
 #include "fleet/coordinate/unit_phase.h"
 #include "fleet/coordinator.h"
+#include "fleet/kinematics.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet {
@@ -73,7 +74,15 @@ struct UnitRecord {
   HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   ClockMap clock;
-  bool clock_told = false;   // that its clock is off by more than plans allow for
+  bool clock_told = false;  // that its clock is off by more than plans allow for
+  std::uint8_t protocol_version = kProtocolVersion;  // that it said last
+  /// Its sensors, being read or as read last.
+  struct Sensing {
+    std::uint8_t next_part = 0;
+    std::uint8_t parts = 0;
+    SensorReading reading;  // none before all parts have come
+    [[nodiscard]] bool under_way() const { return next_part < parts; }
+  } sensing;
   bool wants_start = false;  // began with the others; when, is not known yet
   ClockMap::Instant began;   // told last
   // Stops of ours, so that one of somebody else's is told from them.
@@ -167,9 +176,16 @@ class Core {
 
   /// Where it stands when its own count of vectors says `count`.
   [[nodiscard]] Pose PlaceAt(PositionerIndex i, const Pose& count) const;
-  /// The camera found it at `place`, where its count had it elsewhere: the count is right from here
-  /// on, but for the offset. Pre: it stands at one known place.
-  void See(PositionerIndex i, const Pose& place);
+  /// Places that its own counts can have: the unit holds itself to its range by the count.
+  [[nodiscard]] std::array<VectorRange, kAxisCount> RangesOf(PositionerIndex i) const;
+  /// The pose itself where it is within these; else with theta another whole turn on, where that
+  /// is; else as near as its axes get.
+  [[nodiscard]] Pose NearestInReach(PositionerIndex i, const Pose& pose) const;
+  /// The camera or its own sensors found it at `place`, where its count had it elsewhere: the count
+  /// is right from here on, but for the offset. Pre: it stands at one known place.
+  void See(PositionerIndex i, const Pose& place, SightingSource source);
+  /// A model has it that its place is so much more than its count. Pre: as See.
+  void Expect(PositionerIndex i, const Pose& offset);
   /// Knowledge of a unit that is settled now: kept here and in the store.
   void Know(PositionerIndex i, const UnitKnowledge& knowledge, Origin origin);
   /// Closes the unit's open intent, if there is one.

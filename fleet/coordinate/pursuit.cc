@@ -93,11 +93,18 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
     return Fail(ErrorCode::kRefused, "the store cannot be written: nothing moves until it can");
   if (command.targets.size() != core_.units.size())
     return Fail(ErrorCode::kInvalid, "targets for another layout");
-  if (command.measure && !core_.config.has_camera)
+  if (!command.target_ids.empty() && command.target_ids.size() != core_.units.size())
+    return Fail(ErrorCode::kInvalid, "names of targets for another layout");
+  if (!command.offsets.empty() && command.offsets.size() != core_.units.size())
+    return Fail(ErrorCode::kInvalid, "offsets for another layout");
+  const bool has_sensors =
+      std::ranges::any_of(core_.layout.units(), [](const Unit& unit) { return unit.sensors > 0; });
+  if (command.measure && !core_.config.has_camera && !(core_.config.reads_sensors && has_sensors))
     return Fail(ErrorCode::kRefused, "there is no camera to measure with: [camera] directory");
   targets_ = command.targets;
   fixed_ = command.fixed;
   measure_ = command.measure;
+  target_ids_ = command.target_ids;
   Begin(request, command.source);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
@@ -106,7 +113,17 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
     SetOutcome({n}, TargetOutcome::kPending);
     if (!view.enabled)
       SetOutcome({n}, TargetOutcome::kRefused, "disabled: " + view.disabled_reason);
+    // Observed, a unit comes as its count has it.
+    const bool expects = !command.offsets.empty() && command.offsets[n] && view.enabled &&
+                         view.phase == kReady && IsPlace(view.knowledge) &&
+                         !(measure_ && measure_->observe);
+    if (expects) core_.Expect({n}, *command.offsets[n]);
+    const bool in_reach = core_.NearestInReach({n}, *targets_[n]) == *targets_[n];
+    if (!in_reach && !measure_)
+      SetOutcome({n}, TargetOutcome::kRefused, "its range, as it was measured, ends before it");
+    if (measure_) targets_[n] = GoalFor({n}, *targets_[n]);
   }
+  goals_ = targets_;
   Record();
   return {};
 }
@@ -147,7 +164,10 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   goes_past_ = measure_ && !measure_->observe;
   sets_out_ = true;
   measured_batch_ = 0;
-  came_.resize(core_.units.size());
+  play_.resize(core_.units.size());
+  ended_.resize(core_.units.size(), kNever);
+  approaches_.assign(core_.units.size(), std::nullopt);
+  waves_left_ = 0;
   exposures_refused_ = 0;
   view_ = {.id = core_.next_configuration++,
            .source = std::move(source),
@@ -202,20 +222,28 @@ void Pursuit::BeginRound() {
     return;
   }
   ++view_.round;
-  PlanJob job{
-      .job = ++job_, .start = {}, .targets = {}, .frozen = {}, .options = {}, .to_home = to_home_};
+  PlanJob job{.job = ++job_,
+              .start = {},
+              .targets = {},
+              .frozen = {},
+              .offsets = {},
+              .options = {},
+              .to_home = to_home_};
   job.options.fixed = fixed_;
   job.options.lead_apart = true;
+  job.options.leave_stuck = !view_.measured.empty();
   job.options.start_skew_s = round_skew_s_ = planned_skew_s_;
   job.options.notice_s = NoticingOf(core_.config).notice.seconds();
   job.unproven = unproven_;
   bool any = !to_home_.empty();
+  if (!goes_past_) SetNext();
   if (sets_out_) stood_.assign(core_.units.size(), std::nullopt);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
     const bool usable = view.phase == kReady && view.enabled && excluded_[n] == 0;
     if (sets_out_ && IsPlace(view.knowledge)) stood_[n] = PlaceOf(view.knowledge);
     job.start.push_back(view.knowledge);
+    job.offsets.push_back(view.offset);
     job.frozen.push_back(usable ? 0 : 1);
     std::optional<Pose> target;
     if (view.outcome == TargetOutcome::kPending && to_home_.empty()) {
@@ -234,7 +262,13 @@ void Pursuit::BeginRound() {
     job.targets.push_back(target);
   }
   sets_out_ = false;
-  if (goes_past_ && !GoPast(&job.targets)) goes_past_ = false;
+  if (goes_past_ && !GoPast(&job.targets)) {
+    goes_past_ = false;
+    waves_left_ = 0;
+    SetNext();
+    for (std::uint32_t n = 0; n < core_.units.size(); ++n)
+      if (job.targets[n]) job.targets[n] = targets_[n];
+  }
   if (!any) {
     MeasureOrFinish();
     return;
@@ -252,6 +286,7 @@ void Pursuit::OnPlan(const PlanDone& done) {
                 "no run-up: from which side the targets are approached is left open (" +
                     done.plan.error().text + ")");
     goes_past_ = false;
+    waves_left_ = 0;
     Gather();
     return;
   }
@@ -365,7 +400,7 @@ void Pursuit::Advance() {
       if (arrivals_.empty() && core_.committed_through >= measured_batch_) Finish();
       break;
     case State::kMeasuring:
-      if (exposure_ == 0 && arrivals_.empty()) AskForExposure();
+      if (exposure_ == 0 && arrivals_.empty() && SensorsAreRead()) AskForExposure();
       break;
     case State::kIdle:
     case State::kGathering:
@@ -436,17 +471,19 @@ void Pursuit::Take(const UnitEvent& event) {
 void Pursuit::Settled(PositionerIndex i, UnitEventKind how) {
   if (part_[i.value] == Part::kMoving) {
     last_arrival_ = std::max(last_arrival_, core_.now);
+    settled_batch_ = core_.batch_now();
+    ended_[i.value] = core_.now;
     const UnitView& view = core_.unit(i).view;
     const bool homed =
         state_ == State::kHoming && how == UnitEventKind::kReady && IsPlace(view.knowledge);
     if (homed) std::erase(to_home_, i);
-    if (view.outcome == TargetOutcome::kPending && IsPlace(view.knowledge) &&
+    if (view.outcome == TargetOutcome::kPending && IsPlace(view.knowledge) && !Waits(i) &&
         (homed || (targets_[i.value] && PlaceOf(view.knowledge) == *targets_[i.value])))
       arrivals_.push_back({core_.batch_now(), i});
     // Not the target: whoever only makes way has none, and others may come to theirs by stages.
     const std::size_t plan = plan_of_[i.value];
-    const bool reached = plan != kNoPlan && IsPlace(view.knowledge) &&
-                         PlaceOf(view.knowledge) == plan_.moves[plan].to;
+    const bool reached = plan != kNoPlan && !courses_.contains(i.value) &&
+                         IsPlace(view.knowledge) && PlaceOf(view.knowledge) == plan_.moves[plan].to;
     NoteDirections(i, reached ? &plan_.moves[plan] : nullptr);
     if (plan != kNoPlan && PlaceOf(view.knowledge) != plan_.moves[plan].to && !stopping_)
       StopFollowers(i, SeenUntil(i, core_.now), core_.NameOf(i) + " did not get out of its way");
@@ -514,12 +551,15 @@ void Pursuit::JudgeTargets() {
     if (IsPlace(view.knowledge) && targets_[n] && PlaceOf(view.knowledge) == *targets_[n]) {
       const bool noted = std::any_of(arrivals_.begin(), arrivals_.end(),
                                      [&](const Arrival& a) { return a.unit.value == n; });
-      if (!noted) arrivals_.push_back({0, {n}});  // stood there from the start
+      // It stood there from the start, or waits and will be here until the camera has looked.
+      if (!noted) arrivals_.push_back({Waits({n}) ? settled_batch_ : 0, {n}});
     } else {
       again = true;
     }
   }
-  again ? Gather() : MeasureOrFinish();
+  if (again || AnotherWave()) return Gather();
+  NoteWhoHasNoRoom();
+  MeasureOrFinish();
 }
 
 void Pursuit::FinishWhenDurable(ConfigurationState end) {

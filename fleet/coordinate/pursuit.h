@@ -5,8 +5,8 @@
 //                   +-------------+------------------------+   somebody fell out: plan around it
 //
 // A goal that is measured goes past each target first and comes to it by a last short way of one
-// direction, then looks with the camera and does the same again for those that are too far off
-// (pursuit_measure.cc).
+// direction (pursuit_approach.cc), then looks with the camera and does the same again for those
+// that are too far off (pursuit_measure.cc).
 //
 // Nothing starts before every unit of the plan holds its move, and before the store holds the
 // intent of each. A unit that falls out before the start costs a new plan; one that falls out in
@@ -27,6 +27,7 @@
 
 #include "fleet/coordinate/contact.h"
 #include "fleet/coordinate/core.h"
+#include "fleet/coordinate/play.h"
 #include "fleet/coordinate/start_skew.h"
 
 namespace focalfleet {
@@ -188,17 +189,33 @@ class Pursuit {
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
   void JudgeTargets();
-  [[nodiscard]] std::vector<Pose> PastTarget(PositionerIndex i) const;
+  [[nodiscard]] std::vector<Pose> PastTarget(PositionerIndex i, const Pose& target) const;
   void NoteDirections(PositionerIndex i, const UnitPlan* reached);
   bool GoPast(std::vector<std::optional<Pose>>* targets);
   void MeasureOrFinish();
+  [[nodiscard]] bool SensorsAreRead();
   void AskForExposure();
+  void TakeSpine(PositionerIndex i, const Sighting& sighting);
   void TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
                     MeasuredRound* round);
   void CorrectOrFinish();
   bool Correct();
   [[nodiscard]] std::vector<Pose> AimsOf(PositionerIndex i) const;
   [[nodiscard]] bool NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const;
+  [[nodiscard]] std::int32_t RunUpOf(PositionerIndex i, Axis axis) const;
+  [[nodiscard]] std::int8_t SideAfter(PositionerIndex i, Axis axis, std::int32_t left) const;
+  [[nodiscard]] Pose NextOf(PositionerIndex i) const;
+  void SetNext();
+  [[nodiscard]] bool Waits(PositionerIndex i) const;
+  [[nodiscard]] Pose GoalFor(PositionerIndex i, const Pose& target) const;
+  void NoteWhoHasNoRoom();
+  bool AnotherWave();
+  [[nodiscard]] MeasurementRow RowOf(const ExposureFindings& exposure,
+                                     const Sighting& sighting) const;
+  [[nodiscard]] double ScatterDeg(double way_deg) const;
+  [[nodiscard]] Pose LastAimOf(PositionerIndex i, const Pose& goal,
+                               const std::array<bool, kAxisCount>& runs_up) const;
+  [[nodiscard]] std::string WhyItStays(PositionerIndex i) const;
   void Reopen(PositionerIndex i);
   void ReportArrivals();
   void Record();
@@ -221,18 +238,34 @@ class Pursuit {
   bool unproven_ = false;
   bool stopping_ = false;
   ConfigurationState end_ = ConfigurationState::kDone;
-  /// Where they are to end: the targets, or short of them where a correction follows.
+  /// The targets of the goal, as near as the units get, theta in the whole turn that is taken.
+  std::vector<std::optional<Pose>> goals_;
+  /// Where they are to end: the goals, or short of them where a correction follows.
   std::vector<std::optional<Pose>> targets_;
   // Of a goal that is measured.
   std::optional<ApplyCommand::Measure> measure_;
-  /// Direction of each axis' last motion, -1 or 1; 0: not known.
-  std::vector<std::array<std::int8_t, kAxisCount>> came_;
+  std::vector<std::array<AxisPlay, kAxisCount>> play_;
+  /// Of a correction: where a unit is to end, and on which side of their play its axes were
+  /// measured. None: not measured, or blind.
+  struct Approach {
+    Pose aim{};
+    std::array<std::int8_t, kAxisCount> side{};
+    bool has_no_room = false;  // its neighbours leave none for the correction, or for its run-up
+  };
+  std::vector<std::optional<Approach>> approaches_;
+  int waves_left_ = 0;                // of this correction
+  std::uint64_t settled_batch_ = 0;   // with which the last motion's end becomes durable
   std::uint64_t measured_batch_ = 0;  // with which the last exposure becomes durable; 0: none
   std::uint8_t corrections_left_ = 0;
   bool goes_past_ = false;                  // this leg ends past the targets
   bool sets_out_ = false;                   // the next round is the first since the last exposure
   std::vector<std::optional<Pose>> stood_;  // before they were sent off
+  std::vector<std::string> target_ids_;     // Shape: (n), or empty
+  std::vector<HostInstant> ended_;          // its last motion, as it was heard; kNever: not known
+  HostInstant exposure_asked_;
   std::uint64_t exposure_ = 0;
+  HostInstant sense_at_ = kNever;  // the sensors of units are read from then on
+  bool sensing_ = false;           // and are being read
   int exposures_refused_ = 0;
 
   std::vector<PositionerIndex> to_home_;

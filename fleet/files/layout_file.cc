@@ -48,6 +48,9 @@ Unit ReadUnit(CsvRow* row) {
   unit.rail_slot = IdIfAny(row, "rail_slot");
   unit.bus_slot = IdIfAny(row, "bus_slot");
   unit.group = IdIfAny(row, "group_id");
+  unit.sensors = static_cast<std::uint8_t>(
+      row->IntegerIfAny("hall_sensors", {0, limits::kSensorsPerUnit}).value_or(0));
+  unit.spine_mm = row->NumberIfAny("spine_mm").value_or(0);
   unit.enabled = row->IntegerIfAny("enabled", {0, 1}).value_or(1) == 1;
   return unit;
 }
@@ -76,12 +79,13 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
                                 "theta_min_deg", "theta_max_deg", "phi_min_deg", "phi_max_deg"}));
   UnitsFile units;
   units.source = table.file();
-  units.ignored_columns = table.Others(
-      {"unit_id",          "base_x_mm",    "base_y_mm",   "arm_theta_mm", "arm_phi_mm",
-       "theta_zero_deg",   "phi_zero_deg", "theta_gear",  "phi_gear",     "theta_min_deg",
-       "theta_max_deg",    "phi_min_deg",  "phi_max_deg", "rail_id",      "rail_slot",
-       "bus_id",           "bus_slot",     "node_id",     "group_id",     "enabled",
-       "arm_half_width_mm"});
+  units.ignored_columns =
+      table.Others({"unit_id",           "base_x_mm",      "base_y_mm",     "arm_theta_mm",
+                    "arm_phi_mm",        "theta_zero_deg", "phi_zero_deg",  "theta_gear",
+                    "phi_gear",          "theta_min_deg",  "theta_max_deg", "phi_min_deg",
+                    "phi_max_deg",       "rail_id",        "rail_slot",     "bus_id",
+                    "bus_slot",          "node_id",        "group_id",      "enabled",
+                    "arm_half_width_mm", "hall_sensors",   "spine_mm"});
   std::unordered_map<UnitId, int> line_of;
   for (std::size_t k = 0; k < table.size(); ++k) {
     CsvRow row(table, k);
@@ -114,6 +118,7 @@ std::string WriteUnits(std::span<const Unit> units) {
   const bool rail_slots = any([](const Unit& u) { return u.rail_slot.has_value(); });
   const bool bus_slots = any([](const Unit& u) { return u.bus_slot.has_value(); });
   const bool groups = any([](const Unit& u) { return u.group.has_value(); });
+  const bool sensors = any([](const Unit& u) { return u.sensors > 0; });
   std::vector<std::string_view> columns = {
       "unit_id",        "base_x_mm",    "base_y_mm",        "arm_theta_mm", "arm_phi_mm",
       "theta_zero_deg", "phi_zero_deg", "theta_gear",       "phi_gear",     "theta_min_deg",
@@ -122,6 +127,7 @@ std::string WriteUnits(std::span<const Unit> units) {
   if (rail_slots) columns.emplace_back("rail_slot");
   if (bus_slots) columns.emplace_back("bus_slot");
   if (groups) columns.emplace_back("group_id");
+  if (sensors) columns.insert(columns.end(), {"hall_sensors", "spine_mm"});
   CsvWriter csv(columns);
   const auto integer_if = [&](bool given, std::int64_t value) {
     if (given) {
@@ -148,6 +154,14 @@ std::string WriteUnits(std::span<const Unit> units) {
     if (rail_slots) integer_if(unit.rail_slot.has_value(), unit.rail_slot.value_or(0));
     if (bus_slots) integer_if(unit.bus_slot.has_value(), unit.bus_slot.value_or(0));
     if (groups) integer_if(unit.group.has_value(), unit.group.value_or(0));
+    if (sensors) {
+      csv.Integer(unit.sensors);
+      if (unit.sensors > 0) {
+        csv.Number(unit.spine_mm);
+      } else {
+        csv.Missing();
+      }
+    }
     csv.EndRow();
   }
   return csv.Take();

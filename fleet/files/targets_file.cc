@@ -30,6 +30,8 @@ Status RequireOneKind(const CsvTable& table) {
   return {};
 }
 
+constexpr std::size_t kTargetIdMax = 64;
+
 }  // namespace
 
 Result<Targets> ReadTargets(std::string_view text, std::string file) {
@@ -37,8 +39,8 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
   FOCALFLEET_TRY(RequireOneKind(table));
   Targets targets;
   targets.source = table.file();
-  targets.ignored_columns = table.Others(
-      {"unit_id", "x_mm", "y_mm", "theta_deg", "phi_deg", "priority", "target_id"});
+  targets.ignored_columns =
+      table.Others({"unit_id", "x_mm", "y_mm", "theta_deg", "phi_deg", "priority", "target_id"});
   std::unordered_map<UnitId, int> line_of;
   for (std::size_t k = 0; k < table.size(); ++k) {
     CsvRow row(table, k);
@@ -47,6 +49,8 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
     target.place = ReadPlace(&row);
     target.priority = row.NumberIfAny("priority").value_or(0);
     target.target_id = row.Text("target_id");
+    if (target.target_id.size() > kTargetIdMax)
+      row.Reject("target_id", "is longer than " + std::to_string(kTargetIdMax) + " characters");
     target.line = row.line();
     if (row.error()) return tl::unexpected<Error>(*row.error());
     if (const auto [it, fresh] = line_of.emplace(target.unit, target.line); !fresh)

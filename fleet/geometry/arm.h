@@ -75,6 +75,13 @@ class ArmGeometry {
   [[nodiscard]] double step_rad(Axis axis) const {
     return axis == Axis::kTheta ? theta_step_rad_ : phi_step_rad_;
   }
+  /// From now on its range lies so much further on.
+  void ShiftRange(const Pose& offset) {
+    for (std::size_t k = 0; k < kAxisCount; ++k) {
+      range_.low[k] += offset[k];
+      range_.high[k] += offset[k];
+    }
+  }
   /// Every pose that the axes' ranges allow.
   [[nodiscard]] const PoseBox& range() const { return range_; }
   /// Bound on how far any point of the arm moves for these changes of the angles. Units: vectors,

@@ -91,7 +91,8 @@ PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const Un
                             .drives = drives,
                             .start = job.start,
                             .targets = job.targets,
-                            .frozen = job.frozen};
+                            .frozen = job.frozen,
+                            .offsets = job.offsets};
   PlanDone done = PlanOf(job, request);
   if (done.plan) {
     const PlanEstimate estimate = Estimate(*done.plan, layout, drives, MotorModel{});

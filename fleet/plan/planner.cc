@@ -48,7 +48,7 @@ class Planner {
         options_(options),
         layout_(*request.layout),
         start_(StartsOf(request)),
-        scene_(layout_, request.drives, request.start),
+        scene_(layout_, request.drives, request.start, request.offsets),
         surroundings_(&scene_, start_) {}
 
   Result<Plan> Run();
@@ -83,6 +83,7 @@ class Planner {
   [[nodiscard]] double BoundS() const;
   double PowerBoundS(PowerLedger* ledger) const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
+  bool LeaveStuck();
   void PlanOfChoreography();
   void TracksOfPlan();
   void ServeTheRest();
@@ -521,6 +522,35 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   return false;
 }
 
+/// After all at once has failed: once more, without those that it failed for. False: they are too
+/// many, or do not move; nothing has changed then.
+bool Planner::LeaveStuck() {
+  constexpr int kTimes = 8;
+  const std::vector<Unserved> unserved = unserved_;
+  const std::vector<std::uint8_t> served = served_;
+  const std::vector<std::uint8_t> movable = movable_;
+  const std::vector<Pose> goal = goal_;
+  for (int time = 0; time < kTimes && !stuck_.empty(); ++time) {
+    // One of each cluster at a time: with it at rest the others may find a way.
+    std::vector<std::uint8_t> stays(scene_.size(), 0);
+    for (const std::uint32_t i : stuck_) {
+      const auto near = scene_.neighbours(i);
+      const auto is_at_rest = [&](const NeighbourNeed& n) { return stays[n.unit] != 0; };
+      if (std::any_of(near.begin(), near.end(), is_at_rest)) continue;
+      stays[i] = 1;
+      if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, Blames(i));
+      movable_[i] = 0;
+    }
+    stuck_.clear();
+    if (AllAtOnce(request_.motions)) return true;
+  }
+  unserved_ = unserved;
+  served_ = served;
+  movable_ = movable;
+  goal_ = goal;
+  return false;
+}
+
 void Planner::PlanOfChoreography() {
   plan_ = {};
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
@@ -604,8 +634,14 @@ Result<Plan> Planner::Run() {
   if (!request_.given.empty()) return AmongGiven();
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
   const bool dense = MeanNeighbours() > kDenseNeighbours;
-  const bool at_once = too_near_.empty() && !dense && !options_.stall_tolerant;
+  const bool at_once = !dense && !options_.stall_tolerant;
+  // An order sends everybody through its cell, which costs a fleet that a camera corrects most of
+  // its accuracy: that a few stand too near must not lead to it.
+  const Scene as_ruled = scene_;
+  if (at_once && !too_near_.empty()) scene_.LeadApartThroughout(start_);
   if (at_once && AllAtOnce(request_.motions)) return Finish();
+  if (at_once && options_.leave_stuck && LeaveStuck()) return Finish();
+  scene_ = as_ruled;
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
@@ -629,7 +665,7 @@ Result<Plan> Planner::Run() {
                    Tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s});
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
-  if (at_once && !stuck_for_order_.empty()) ServeTheRest();
+  if (at_once && too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
   if (choreography_.tracks.empty()) TracksOfPlan();
   return Finish();
 }

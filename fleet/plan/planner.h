@@ -34,6 +34,9 @@ struct PlanRequest {
   /// Non-zero: somebody else plans this unit, and its motion stands as it is. All others go around
   /// it at once, never in an order. Shape: (n), or empty: nobody. Pre: it starts at a place.
   std::span<const std::uint8_t> given = {};
+  /// Where a unit stands less its own count of vectors: it holds itself to its range by the count.
+  /// Shape: (n), or empty: nobody differs.
+  std::span<const Pose> offsets = {};
 };
 
 /// What the time that is there is used for, objective.h.
@@ -44,6 +47,10 @@ struct PlanOptions {
   /// Pairs that start nearer than allowed (a unit was cut short while its neighbour went on) are no
   /// error: they are never brought nearer, and named in Plan::too_near.
   bool lead_apart = false;
+  /// Who finds no way when all go at once stays where it stands, and the others go. For
+  /// corrections: an order sends everybody through its cell, which costs all of them more than it
+  /// serves.
+  bool leave_stuck = false;
   double start_skew_s = 0.020;  // any unit may start this early or late
   double clock_error = 0.005;   // and its clock may run this fast or slow
   /// How long it may take until a unit that has ended early is noticed and those that would run

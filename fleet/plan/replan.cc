@@ -501,7 +501,7 @@ RunningPlan::RunningPlan(const PlanRequest& request, std::span<const UnitPlan> m
     : layout_(request.layout),
       drives_(request.drives.begin(), request.drives.end()),
       options_(options),
-      scene_(*request.layout, drives_, request.start),
+      scene_(*request.layout, drives_, request.start, request.offsets),
       paths_(drives_.size()) {
   for (const UnitKnowledge& k : request.start) from_.push_back(IsPlace(k) ? PlaceOf(k) : Pose{});
   to_ = from_;

@@ -90,7 +90,7 @@ std::vector<Capsule> CoverOf(const ArmGeometry& arm, const PoseBox& box, double 
 }
 
 Scene::Scene(const Layout& layout, std::span<const UnitDrive> drives,
-             std::span<const UnitKnowledge> start)
+             std::span<const UnitKnowledge> start, std::span<const Pose> offsets)
     : layout_(&layout) {
   const std::size_t n = layout.size();
   arms_.reserve(n);
@@ -99,6 +99,7 @@ Scene::Scene(const Layout& layout, std::span<const UnitDrive> drives,
   needs_begin_.push_back(0);
   for (std::uint32_t i = 0; i < n; ++i) {
     arms_.emplace_back(layout.unit({i}), drives[i]);
+    if (!offsets.empty()) arms_.back().ShiftRange(offsets[i]);
     is_place_[i] = IsPlace(start[i]) ? 1 : 0;
   }
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -206,6 +207,11 @@ void Scene::LeadApart(std::span<const Pose> poses) {
         near.at_start_mm = std::min(near.at_start_mm, distance - kStartSlackMm);
     }
   }
+}
+
+void Scene::LeadApartThroughout(std::span<const Pose> poses) {
+  LeadApart(poses);
+  for (NeighbourNeed& near : needs_) near.need_mm = std::min(near.need_mm, near.at_start_mm);
 }
 
 }  // namespace focalfleet

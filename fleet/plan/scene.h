@@ -50,7 +50,7 @@ struct PhiSpan {
 class Scene {
  public:
   Scene(const Layout& layout, std::span<const UnitDrive> drives,
-        std::span<const UnitKnowledge> start);
+        std::span<const UnitKnowledge> start, std::span<const Pose> offsets = {});
 
   [[nodiscard]] std::size_t size() const { return arms_.size(); }
   [[nodiscard]] const Layout& layout() const { return *layout_; }
@@ -87,6 +87,8 @@ class Scene {
   /// way of either they are never brought nearer. Pairs that cross are not helped. Shape: (n), the
   /// starts.
   void LeadApart(std::span<const Pose> poses);
+  /// The same for plans that know no first way: such pairs are never nearer than they start.
+  void LeadApartThroughout(std::span<const Pose> poses);
 
  private:
   void FindCells();

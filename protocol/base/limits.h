@@ -11,6 +11,7 @@ inline constexpr std::uint32_t kBuses = 512;
 inline constexpr std::uint32_t kNodesPerBus = 128;     // electrical: a CAN segment carries no more
 inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of a move; two 4-bit counts on the wire
 inline constexpr std::uint32_t kNeighboursPerUnit = 256;  // whose reach overlaps; 6 to 30 are usual
+inline constexpr std::uint32_t kSensorsPerUnit = 16;      // four a frame, parts in three bits
 inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;       // vectors; 24 bits on the wire
 inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each: 28 minutes
 inline constexpr std::uint32_t kRequestRetries = 4;  // waits double: 31 times the first in all
@@ -25,6 +26,7 @@ inline constexpr std::uint32_t kFiducials = 4096;
 // The largest focal plane in view (20,000 units at 100 a bus) fits with room.
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
 static_assert(kNodesPerBus < 255, "255 is the broadcast address");
+static_assert(kSensorsPerUnit <= 4 * 8, "four a frame, the part in three bits");
 static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
 static_assert(kSpotsPerExposure >= 2 * (kUnits + kFiducials), "a plate seen with as much dust");
 // A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8

@@ -32,8 +32,10 @@ enum class Function : std::uint8_t {
   kIdentify = 13,
   kParameterRead = 14,
   kParameterWrite = 15,
+  kStageGroup = 16,  // of CAN FD frames alone (stage_group.h)
+  kSensors = 17,
 };
-inline constexpr std::uint32_t kFunctionCount = 16;
+inline constexpr std::uint32_t kFunctionCount = 18;
 
 struct FunctionRow {
   Function function;
@@ -59,6 +61,8 @@ inline constexpr FunctionRow kFunctions[kFunctionCount] = {
     {Function::kIdentify, "identify", 6},
     {Function::kParameterRead, "parameter_read", 6},
     {Function::kParameterWrite, "parameter_write", 6},
+    {Function::kStageGroup, "stage_group", 4},
+    {Function::kSensors, "sensors", 5},
 };
 
 constexpr const FunctionRow& InfoOf(Function function) {

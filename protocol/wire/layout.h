@@ -70,9 +70,9 @@ struct Whole {
   Member Message::*member;
   constexpr auto& operator()(auto& m) const { return m.*member; }
 };
-template <class Message, class Member>
+template <class Message, class Member, std::size_t kCount>
 struct Element {
-  std::array<Member, kAxisCount> Message::*member;
+  std::array<Member, kCount> Message::*member;
   std::size_t index;
   constexpr auto& operator()(auto& m) const { return (m.*member)[index]; }
 };
@@ -94,7 +94,12 @@ constexpr auto Bind(FieldRow row, Member Message::*member) {
 }
 template <class Message, class Member>
 constexpr auto Bind(FieldRow row, std::array<Member, kAxisCount> Message::*member, Axis axis) {
-  return Field<Element<Message, Member>>{row, {member, Index(axis)}};
+  return Field<Element<Message, Member, kAxisCount>>{row, {member, Index(axis)}};
+}
+template <class Message, class Member, std::size_t kCount>
+constexpr auto BindAt(FieldRow row, std::array<Member, kCount> Message::*member,
+                      std::size_t index) {
+  return Field<Element<Message, Member, kCount>>{row, {member, index}};
 }
 template <class Message, class Part, class Member>
 constexpr auto Bind(FieldRow row, Part Message::*part, Member Part::*member) {
@@ -243,6 +248,15 @@ struct Layout<ParameterWrite> {
 };
 
 template <>
+struct Layout<SensorsRequest> {
+  static constexpr const char* kName = "sensors";
+  static constexpr Function kFunction = Function::kSensors;
+  static constexpr std::uint8_t kLength = 0;
+  static constexpr std::tuple kFields{
+      Bind(InDetail("part", kSensorPartNames), &SensorsRequest::part)};
+};
+
+template <>
 struct Layout<Done> {
   static constexpr const char* kName = "done";
   static constexpr Function kFunction = Function::kDone;
@@ -362,6 +376,18 @@ struct Layout<ParameterReply> {
       Bind(Named("parameter", 0, 8, kParameterNames), &ParameterReply::parameter),
       Bind(Named("answer", 8, 8, kAnswerNames), &ParameterReply::answer),
       Bind(Signed("value", 16, 32, ""), &ParameterReply::value)};
+};
+template <>
+struct Layout<SensorsReply> {
+  static constexpr const char* kName = "sensors_reply";
+  static constexpr Function kFunction = Function::kSensors;
+  static constexpr std::uint8_t kLength = 8;
+  static constexpr std::tuple kFields{
+      Bind(InDetail("part", kSensorPartNames), &SensorsReply::part),
+      BindAt(Unsigned("first", 0, 16, "counts"), &SensorsReply::counts, 0),
+      BindAt(Unsigned("second", 16, 16, "counts"), &SensorsReply::counts, 1),
+      BindAt(Unsigned("third", 32, 16, "counts"), &SensorsReply::counts, 2),
+      BindAt(Unsigned("fourth", 48, 16, "counts"), &SensorsReply::counts, 3)};
 };
 
 // ---- what follows from them

@@ -5,14 +5,21 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <variant>
 
 #include "protocol/base/ids.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 
+/// What units without sensors speak, and those with: version 2 is version 1 and the sensors frames.
 inline constexpr std::uint8_t kProtocolVersion = 1;
+inline constexpr std::uint8_t kProtocolVersionWithSensors = 2;
+constexpr bool IsSpoken(std::uint8_t version) {
+  return version == kProtocolVersion || version == kProtocolVersionWithSensors;
+}
 
 // ---- what both ends speak of
 
@@ -84,6 +91,17 @@ struct Segment {
   constexpr bool operator==(const Segment&) const = default;
 };
 
+/// Sensors are numbered from 0 and told four at a time: part 0 has 0..3, part 1 has 4..7.
+inline constexpr std::size_t kSensorsPerPart = 4;
+inline constexpr std::size_t kSensorParts = limits::kSensorsPerUnit / kSensorsPerPart;
+static_assert(kSensorParts * kSensorsPerPart == limits::kSensorsPerUnit);
+constexpr std::uint8_t SensorPartsOf(std::size_t sensors) {
+  return static_cast<std::uint8_t>((sensors + kSensorsPerPart - 1) / kSensorsPerPart);
+}
+/// A sensor's output as a share of its supply: 0 is ground, kFullCount the supply.
+inline constexpr std::uint16_t kFullCount = 65534;
+inline constexpr std::uint16_t kNoCount = 65535;  // no such sensor, or it gives no reading
+
 // ---- host to unit
 
 struct Stop {};  // one unit or, broadcast, all: end at the next vector
@@ -137,9 +155,15 @@ struct ParameterWrite {
   std::int32_t value = 0;
 };
 
-using HostMessage = std::variant<Stop, Start, Clock, ClockRequest, Arm, Confirm, StageBegin,
-                                 StageSegment, Home, ProgressRequest, StatusRequest, VectorRequest,
-                                 FaultRequest, IdentifyRequest, ParameterRead, ParameterWrite>;
+/// Part 0 takes a reading of all sensors together; the other parts tell the rest of the same one.
+struct SensorsRequest {
+  std::uint8_t part = 0;  // 0..kSensorParts-1
+};
+
+using HostMessage =
+    std::variant<Stop, Start, Clock, ClockRequest, Arm, Confirm, StageBegin, StageSegment, Home,
+                 ProgressRequest, StatusRequest, VectorRequest, FaultRequest, IdentifyRequest,
+                 ParameterRead, ParameterWrite, SensorsRequest>;
 
 // ---- unit to host
 
@@ -208,8 +232,13 @@ struct ParameterReply {  // to a read and to a write: the value that now holds
   std::int32_t value = 0;
 };
 
+struct SensorsReply {
+  std::uint8_t part = 0;
+  std::array<std::uint16_t, kSensorsPerPart> counts{};
+};
+
 using UnitMessage =
     std::variant<Done, ClockReply, ArmReply, ConfirmReply, HomeReply, ProgressReply, StatusReply,
-                 VectorReply, FaultReply, IdentifyReply, ParameterReply>;
+                 VectorReply, FaultReply, IdentifyReply, ParameterReply, SensorsReply>;
 
 }  // namespace focalfleet

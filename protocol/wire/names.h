@@ -7,6 +7,8 @@
 namespace focalfleet {
 
 inline constexpr const char* kNoYesNames[] = {"no", "yes"};
+inline constexpr const char* kSensorPartNames[kSensorParts] = {"1_to_4", "5_to_8", "9_to_12",
+                                                               "13_to_16"};
 inline constexpr const char* kAxisNames[kAxisCount] = {Name(Axis::kTheta), Name(Axis::kPhi)};
 inline constexpr const char* kWaveModeNames[] = {
     Name(WaveMode::kAsymmetric), Name(WaveMode::kFiveSegment), Name(WaveMode::kSevenSegment)};

@@ -42,7 +42,7 @@ constexpr std::uint8_t FdLengthCode(std::size_t bytes) {
 }
 constexpr std::uint8_t FdLength(std::size_t bytes) { return kFdLengths[FdLengthCode(bytes)]; }
 
-inline constexpr std::uint32_t kGroupFunction = 16;
+inline constexpr auto kGroupFunction = static_cast<std::uint32_t>(Function::kStageGroup);
 inline constexpr std::uint32_t kGroupId = 4u << 26 | kGroupFunction << 20 | 255u << 11;
 inline constexpr std::size_t kGroupEntriesMax = 12;  // read-backs: 5 bytes each
 inline constexpr std::size_t kGroupEntriesMin = 2;   // that are sent: one alone goes classic

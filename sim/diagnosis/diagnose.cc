@@ -26,7 +26,7 @@ constexpr double kMissMax_mm = 1;     // median: more, and the geometry is anoth
 constexpr double kKeptMin = 0.03;
 constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
 // Causes that come from other looks than a template's.
-constexpr std::string_view kEventCauses[] = {"collision_contact", "sensor_bias"};
+constexpr std::string_view kEventCauses[] = {"sensor_bias"};
 
 bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
   return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
@@ -119,7 +119,8 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   const Effect& effect = *term.form.effect;
   cause.cause = effect.cause;
   cause.candidates = {cause.cause};
-  for (const Rival& rival : accepted.rivals) cause.candidates.emplace_back(rival.cause);
+  for (const Rival& rival : accepted.rivals)
+    (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
   cause.axis = Name(term.form.axis);
   cause.scope = ScopeOf(term, fit.model.units.size());
   std::size_t have = 0, all = 0;
@@ -196,7 +197,8 @@ std::vector<UnknownFound> Screen(const Fit& fit, const DiagnoseOptions& options)
   const ScorePass pass = ScoreTemplates(fit, looks);
   const double tests = EffectiveTests(pass.scores, looks, options.seed);
   std::vector<UnknownFound> found;
-  const Best best = FindBest(pass, looks, groups, tests, kUnknownShare * options.family_wise);
+  const Best best =
+      FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * options.family_wise);
   if (best.at == kNoTerm) return found;
   UnknownFound unknown{looks[best.at].covariate, ChannelOf(looks[best.at]),
                        std::exp(best.log_p_family), 0};
@@ -340,6 +342,49 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
   }
 }
 
+// The terms, steps, zeros of homings and motion of the image that explain the data.
+Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
+                    const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
+  Selection selection = SelectWithEvents(templates, rule, fit);
+  if (fit->facts->homings > 0 && TryHomings(templates, rule, &selection, fit))
+    diagnosis->causes.push_back(HomingCause(*fit));
+  ImageFound image = AddImageTerms(fit, options.family_wise);
+  if (!image.moves) return selection;
+  if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
+  if (image.cause && !IsLeftOut(options, image.cause->cause))
+    diagnosis->causes.push_back(std::move(*image.cause));
+  // What the image's motion hid, or what stood in for it.
+  std::vector<double> kept = std::move(selection.kept_share);
+  selection = Select(templates, rule, fit);
+  selection.kept_share = std::move(kept);
+  return selection;
+}
+
+// What the model means, by name.
+void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOptions& options,
+                Diagnosis* diagnosis) {
+  std::vector<CauseFound>& causes = diagnosis->causes;
+  for (CauseFound& cause : EventCauses(fit)) causes.push_back(std::move(cause));
+  const double rms_um = RmsOf(fit);
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
+  options.progress(0.8, "geometry against the table");
+  for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
+    cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
+  }
+  MergeCauses(&causes);
+  // Where the image's motion follows a column, steps of it are what is left of that.
+  if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
+                  [](const UnknownFound& told) { return told.channel.starts_with(kImageShift); }))
+    std::erase_if(causes,
+                  [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
+  JudgeRemainders(&causes);
+  JudgeNames(&causes, &diagnosis->unknown);
+  JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
+  JudgeSeries(&causes, &diagnosis->unknown);
+}
+
 void Conclude(Diagnosis* diagnosis) {
   bool ambiguous = false;
   for (const CauseFound& cause : diagnosis->causes)
@@ -405,32 +450,20 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     share += (0.75 - share) * 0.15;
     options.progress(share, stage);
   };
-  Selection selection = SelectWithEvents(templates, rule, &fit);
-  if (facts.homings > 0 && TryHomings(templates, rule, &selection, &fit))
-    diagnosis.causes.push_back(HomingCause(fit));
-  if (std::optional<CauseFound> image =
-          AddImageTerms(&fit, options.family_wise, &diagnosis.unknown)) {
-    if (!IsLeftOut(options, image->cause)) diagnosis.causes.push_back(std::move(*image));
-    // What the image's motion hid, or what stood in for it.
-    std::vector<double> kept = std::move(selection.kept_share);
-    selection = Select(templates, rule, &fit);
-    selection.kept_share = std::move(kept);
-  }
+  const Selection selection = FindModel(templates, options, rule, &fit, &diagnosis);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
-  for (CauseFound& cause : EventCauses(fit)) diagnosis.causes.push_back(std::move(cause));
-  const double rms_um = RmsOf(fit);
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    diagnosis.causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
-  options.progress(0.8, "geometry against the table");
-  for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
-    cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
-    if (!IsLeftOut(options, cause.cause)) diagnosis.causes.push_back(std::move(cause));
-  }
-  MergeCauses(&diagnosis.causes);
-  JudgeRemainders(&diagnosis.causes);
-  JudgeSeries(&diagnosis.causes, &diagnosis.unknown);
+  NameCauses(fit, selection, options, &diagnosis);
   options.progress(0.85, "what is left");
-  for (UnknownFound& left : Screen(fit, options)) diagnosis.unknown.push_back(std::move(left));
+  for (UnknownFound& left : Screen(fit, options))
+    if (std::none_of(diagnosis.unknown.begin(), diagnosis.unknown.end(),
+                     [&](const UnknownFound& told) { return told.covariate == left.covariate; }))
+      diagnosis.unknown.push_back(std::move(left));
+  if (!diagnosis.unknown.empty())
+    for (CauseFound& cause : diagnosis.causes)
+      for (const std::string& name : cause.behind)
+        if (std::find(cause.candidates.begin(), cause.candidates.end(), name) ==
+            cause.candidates.end())
+          cause.candidates.push_back(name);
   FindAfterFit(fit, &diagnosis.outliers);
   for (const std::string_view cause : kEventCauses)
     diagnosis.not_testable.push_back({std::string(cause), "this version has no test for it"});

@@ -18,6 +18,9 @@ namespace focalfleet::sim {
 struct CauseFound {
   std::string cause;
   std::vector<std::string> candidates;  // the cause itself first
+  // Who leaves nearly the same trace, and is behind by the likelihood alone: where the model leaves
+  // something unexplained, that decides nothing.
+  std::vector<std::string> behind;
   std::string axis;
   std::string scope;
   std::vector<std::uint32_t> units;

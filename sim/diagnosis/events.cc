@@ -37,12 +37,6 @@ double RowCost(const UnitRows& rows, std::size_t i, double theta_deg, double phi
   return std::min(x * x + y * y, kCap_mm * kCap_mm);
 }
 
-std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
-  std::size_t end = move + 1;
-  while (end < track.moves && track.restarts[end] == 0) ++end;
-  return end;
-}
-
 double TotalCost(const UnitRows& rows) {
   double sum = 0;
   for (std::size_t i = 0; i < rows.track.moves; ++i)
@@ -83,7 +77,8 @@ std::vector<WholeMove> FindWholeMoves(double far_mm, UnitRows* rows) {
   while (found.size() < kEventsMax) {
     const WholeMove best = BestWholeMove(*rows);
     if (best.gained < gain_min) break;
-    for (std::size_t i = best.move; i < EndOfHistory(rows->track, best.move); ++i)
+    const std::size_t end = EndOfHistory(rows->track, best.move);
+    for (std::size_t i = best.move; i < end; ++i)
       for (const std::size_t axis : {kTheta, kPhi})
         rows->added_deg[axis][i] += best.sign * rows->track.step_deg[axis][best.move];
     found.push_back(best);
@@ -110,9 +105,15 @@ std::vector<EventTerm> LostCommands(const Fit& fit, std::size_t unit, CampaignUn
   // A row is worth a look that noise does not put there.
   const double far_mm =
       std::clamp(15e-3 * fit.noise.place_um * fit.noise.unit_factor[unit], 0.04, 0.4);
-  std::size_t far = 0;
-  for (std::size_t i = 0; i < rows.track.moves; ++i)
-    if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
+  const auto far_rows = [&](const UnitRows& some) {
+    std::size_t far = 0;
+    for (std::size_t i = 0; i < some.track.moves; ++i)
+      if (fit.aside[some.track.first_row + i] == 0 &&
+          RowCost(some, i, some.added_deg[kTheta][i], some.added_deg[kPhi][i]) > far_mm * far_mm)
+        ++far;
+    return far;
+  };
+  const std::size_t far = far_rows(rows);
   if (far < 3) return events;
   const double before = TotalCost(rows);
   std::vector<WholeMove> found = FindWholeMoves(far_mm, &rows);
@@ -120,10 +121,15 @@ std::vector<EventTerm> LostCommands(const Fit& fit, std::size_t unit, CampaignUn
   UnitRows table = RowsOf(fit, unit, fit.facts->campaign->units[unit]);
   const std::vector<WholeMove> by_table = FindWholeMoves(far_mm, &table);
   const CampaignUnit* chosen = &fit.model.units[unit];
+  std::size_t still_far = far_rows(rows);
   if (const double cost = TotalCost(table); cost < after)
-    after = cost, found = by_table, chosen = &fit.facts->campaign->units[unit];
+    after = cost, found = by_table, chosen = &fit.facts->campaign->units[unit],
+    still_far = far_rows(table);
   // The rest must lie near: what whole moves do not explain is something else.
-  if (found.empty() || after > 0.5 * before) return events;
+  constexpr double kStillFarMax = 0.2;
+  if (found.empty() || after > 0.5 * before ||
+      static_cast<double>(still_far) > kStillFarMax * static_cast<double>(far))
+    return events;
   *geometry = *chosen;
   for (const WholeMove& whole : found)
     for (const std::size_t axis : {kTheta, kPhi}) {
@@ -160,26 +166,45 @@ std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::s
   return rows;
 }
 
-// Mean of up to three rows from `at`, that belong to one history.
-double Level(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t at, int step,
-             std::size_t* count) {
-  double sum = 0;
-  *count = 0;
-  for (std::size_t k = at; k < rows.size() && *count < 3; k += static_cast<std::size_t>(step)) {
-    sum += rows[k].error_deg;
-    ++*count;
+// Errors of the rows about a jump that belong to its history, the nearest first.
+std::vector<double> ErrorsFrom(const std::vector<AngleRow>& rows, const UnitTrack& track,
+                               std::size_t at, int step) {
+  constexpr std::size_t kRows = 8;
+  std::vector<double> errors;
+  for (std::size_t k = at; k < rows.size() && errors.size() < kRows;
+       k += static_cast<std::size_t>(step)) {
+    errors.push_back(rows[k].error_deg);
     if (step < 0 && (k == 0 || track.restarts[rows[k].move] != 0)) break;
     if (step > 0 && k + 1 < rows.size() && EndOfHistory(track, rows[k].move) <= rows[k + 1].move)
       break;
   }
-  return sum / static_cast<double>(*count);
+  return errors;
+}
+
+// What a step of `size_deg` before row k explains of the rows on its poorer side, in squares of
+// `sigma_deg`. A row pays for at most kMost: a place that comes back at once was an outlier, and
+// pays nothing, on whichever side it lies.
+double GainOfStep(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t k,
+                  double size_deg, double sigma_deg) {
+  constexpr double kMost = 25;
+  const std::vector<double> before = ErrorsFrom(rows, track, k - 1, -1);
+  const std::vector<double> behind = ErrorsFrom(rows, track, k, 1);
+  const auto cost = [&](double error) {
+    return std::min(error * error / (sigma_deg * sigma_deg), kMost);
+  };
+  const auto gain = [&](const std::vector<double>& side, double level, double step) {
+    double sum = 0;
+    for (const double error : side) sum += cost(error - level) - cost(error - level - step);
+    return sum;
+  };
+  return std::min(gain(behind, Median(before), size_deg), gain(before, Median(behind), -size_deg));
 }
 
 struct Jump {
   std::size_t move = 0;  // that it happened in
-  double turns = 0;
+  double size_deg = 0, turns = 0;
   bool whole = false;  // a whole number of turns, against the motion
-  bool holds = false;  // the next rows are at the new level
+  bool holds = false;  // the next rows stand at the new level
 };
 
 // The move between two rows that went the other way, the longest; 0: none.
@@ -195,22 +220,21 @@ std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t fr
 }
 
 std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& track,
-                          std::size_t axis, double turn) {
+                          std::size_t axis, double turn, double jump_deg) {
+  constexpr double kGainMin = 60;  // three rows at least
   std::vector<Jump> jumps;
   for (std::size_t k = 1; k < rows.size(); ++k) {
     const std::size_t from = rows[k - 1].move, to = rows[k].move;
     const double size = rows[k].error_deg - rows[k - 1].error_deg;
     if (EndOfHistory(track, from) <= to || std::abs(size) < 0.6 * turn) continue;
     Jump jump;
+    jump.size_deg = size;
     jump.turns = std::round(size / turn);
     jump.move = MoveAgainst(track, axis, from, to, jump.turns);
     jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&
                  std::abs(size - jump.turns * turn) < 0.25 * turn;
-    std::size_t behind = 0, ahead = 0;
-    const double levels = Level(rows, track, k, 1, &ahead) - Level(rows, track, k - 1, -1, &behind);
-    // A place that comes back at once was an outlier.
-    jump.holds = ahead >= 2 && std::abs(size - levels) < 0.3 * turn &&
-                 std::abs(levels - jump.turns * turn) < 0.25 * turn;
+    jump.holds =
+        GainOfStep(rows, track, k, jump.turns * turn, jump_deg / std::numbers::sqrt2) > kGainMin;
     jumps.push_back(jump);
   }
   return jumps;
@@ -235,11 +259,20 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   const double turn = 360 / track.unit->gear[axis];
   if (jump_deg < 0 || jump_deg > kNoiseMax * turn) return events;
   const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
-  std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn);
-  const auto whole = static_cast<std::size_t>(
-      std::count_if(jumped.begin(), jumped.end(), [](const Jump& jump) { return jump.whole; }));
-  // Many jumps that are whole turns against the motion: slips, however close they follow.
-  const bool many = whole >= 4 && 5 * whole >= 4 * jumped.size();
+  std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn, jump_deg);
+  // Many jumps that are whole turns against the motion: slips, however close they follow. There and
+  // back again counts once: so does an outlier.
+  double whole = 0, all = 0;
+  for (std::size_t k = 0; k < jumped.size(); ++k) {
+    const auto undoes = [&](std::size_t other) {
+      return std::abs(jumped[k].size_deg + jumped[other].size_deg) < 0.3 * turn;
+    };
+    const bool returns = (k > 0 && undoes(k - 1)) || (k + 1 < jumped.size() && undoes(k + 1));
+    const double weight = returns ? 0.5 : 1;
+    all += weight;
+    if (jumped[k].whole) whole += weight;
+  }
+  const bool many = whole >= 4 && whole >= 0.8 * all;
   for (const Jump& jump : jumped)
     if (jump.whole && (many || jump.holds) && events.size() < kEventsMax)
       events.push_back({unit, track.first_row + jump.move, axis, true, jump.turns * turn});

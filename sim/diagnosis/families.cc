@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <map>
 #include <span>
 
 namespace focalfleet::sim {
@@ -29,8 +31,17 @@ constexpr std::string_view kImage[] = {"camera_similarity", "air_turbulence", "c
 // What turns with the rotor.
 constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_coupling"};
 
+// Found by their exact places, not by signatures.
+constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
+                                           "identity_swap", "lost_command", "step_loss"};
+
 bool Has(std::span<const std::string_view> family, std::string_view cause) {
   return std::find(family.begin(), family.end(), cause) != family.end();
+}
+
+bool IsCandidate(const CauseFound& cause, std::string_view name) {
+  return std::find(cause.candidates.begin(), cause.candidates.end(), name) !=
+         cause.candidates.end();
 }
 
 bool AxesMeet(const std::string& a, const std::string& b) {
@@ -47,21 +58,34 @@ bool AreRelated(std::string_view a, std::string_view b) {
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
-  constexpr double kShape = 0.03, kCandidate = 0.1;  // of the relative's evidence
+  constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3;  // of the relative's evidence
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
-    for (CauseFound& other : kept)
-      if (AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis) &&
-          cause.delta_log_likelihood < kCandidate * other.delta_log_likelihood) {
-        relative = &other;
-        break;
-      }
+    bool related = false, same = false;
+    for (CauseFound& other : kept) {
+      if (cause.delta_log_likelihood >= kCandidate * other.delta_log_likelihood ||
+          Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause))
+        continue;
+      related = AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis);
+      // Of whatever kind: so little of what happens on one axis may be the other's shape.
+      if (!related && (other.axis != cause.axis || cause.axis == "none")) continue;
+      relative = &other;
+      break;
+    }
+    // What could as well be the relative by another name, and is weak beside it, is its remainder.
+    if (relative == nullptr)
+      for (CauseFound& other : kept)
+        if (cause.delta_log_likelihood < kSameName * other.delta_log_likelihood &&
+            AxesMeet(other.axis, cause.axis) && IsCandidate(other, cause.cause)) {
+          relative = &other, same = true;
+          break;
+        }
     if (relative == nullptr) {
       kept.push_back(std::move(cause));
       continue;
     }
-    if (cause.delta_log_likelihood < kShape * relative->delta_log_likelihood) {
+    if (same || (related && cause.delta_log_likelihood < kShape * relative->delta_log_likelihood)) {
       char size[32];
       std::snprintf(size, sizeof size, "%.2g", cause.size_um);
       relative->shape +=
@@ -70,11 +94,51 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
     }
     const std::string name = relative->cause;
     kept.push_back(std::move(cause));
-    auto& candidates = kept.back().candidates;
-    if (std::find(candidates.begin(), candidates.end(), name) == candidates.end())
-      candidates.push_back(name);
+    if (!IsCandidate(kept.back(), name)) kept.back().candidates.push_back(name);
   }
   *causes = std::move(kept);
+}
+
+void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
+  constexpr std::size_t kAnything = 8;  // candidates
+  constexpr double kRemainder = 0.03;   // of the strongest cause's evidence
+  if (causes->empty()) return;
+  const double strongest = causes->front().delta_log_likelihood;
+  std::vector<CauseFound> kept;
+  for (CauseFound& cause : *causes) {
+    if (cause.candidates.size() < kAnything) {
+      kept.push_back(std::move(cause));
+    } else if (cause.delta_log_likelihood >= kRemainder * strongest) {
+      const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
+      unknown->push_back({of_an_axis ? cause.axis + "_cmd_deg" : "t_s",
+                          "what " + std::to_string(cause.candidates.size()) + " causes could be",
+                          std::exp(-cause.delta_log_likelihood), cause.size_um});
+    }
+  }
+  *causes = std::move(kept);
+}
+
+void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
+                std::vector<UnknownFound>* unknown) {
+  constexpr std::size_t kUnitsMin = 4, kNamesMin = 3;
+  if (units < kUnitsMin) return;
+  std::map<std::uint32_t, std::size_t> names;
+  std::map<std::uint32_t, double> square;
+  const auto of_one = [&](const CauseFound& cause) {
+    return !cause.all_units && cause.units.size() == 1 && !Has(kElsewhere, cause.cause);
+  };
+  for (const CauseFound& cause : *causes)
+    if (of_one(cause))
+      ++names[cause.units[0]], square[cause.units[0]] += std::pow(cause.size_um, 2);
+  for (const auto& [unit, count] : names) {
+    if (count < kNamesMin) continue;
+    const std::uint32_t own = unit;
+    std::erase_if(*causes,
+                  [&](const CauseFound& cause) { return of_one(cause) && cause.units[0] == own; });
+    outliers->units.push_back(unit);
+    unknown->push_back({"unit_id", "unit " + std::to_string(unit) + " by many causes at once", 0,
+                        std::sqrt(square[unit])});
+  }
 }
 
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {

@@ -17,6 +17,15 @@ bool AreRelated(std::string_view a, std::string_view b);
 /// the relative becomes one of its candidates. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
+/// A unit that would need three causes of its own or more behaves like none of them: it is named as
+/// a unit, among the outliers, and what it does is unknown.
+void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
+                std::vector<UnknownFound>* unknown);
+
+/// What half of the library could be is no name: a weak remainder of a strong cause goes, anything
+/// else is unknown. Pre: strongest first.
+void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
+
 /// Three causes or more that depend on where one axis stands are a series of shapes rather than
 /// causes: each gets the others as candidates, and the axis is told as not understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);

@@ -12,31 +12,6 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kMicrons = 1e3;  // a millimetre
-// Wide priors keep what the moves do not show where units.csv has it. mm, mm, degrees.
-constexpr double kPriorBase_mm = 2, kPriorArm_mm = 0.5, kPriorZero_deg = 180;
-
-StaticVector PriorWeights() {
-  StaticVector w;
-  w << kPriorBase_mm, kPriorBase_mm, kPriorArm_mm, kPriorArm_mm, kPriorZero_deg, kPriorZero_deg;
-  return w.array().square().inverse();
-}
-
-void AddStatic(const StaticVector& step, CampaignUnit* unit) {
-  unit->base_x_mm += step[0];
-  unit->base_y_mm += step[1];
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    unit->arm_mm[axis] = std::max(unit->arm_mm[axis] + step[2 + static_cast<int>(axis)], 1e-3);
-    unit->zero_deg[axis] += step[4 + static_cast<int>(axis)];
-  }
-}
-
-StaticVector StaticDifference(const CampaignUnit& a, const CampaignUnit& b) {
-  StaticVector d;
-  d << a.base_x_mm - b.base_x_mm, a.base_y_mm - b.base_y_mm, a.arm_mm[0] - b.arm_mm[0],
-      a.arm_mm[1] - b.arm_mm[1], a.zero_deg[0] - b.zero_deg[0], a.zero_deg[1] - b.zero_deg[1];
-  return d;
-}
-
 // ---- the first look at one unit, where zeros may be anywhere
 
 struct PlainRow {
@@ -66,7 +41,7 @@ double MedianMiss(const std::vector<PlainRow>& rows, const CampaignUnit& unit) {
 // Levenberg-Marquardt with L1-like weights about the median miss.
 CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& table,
                       CampaignUnit unit, int rounds) {
-  const StaticVector prior = PriorWeights();
+  const StaticVector prior = StaticPriorWeights();
   double damping = 1e-3;
   double miss_mm = std::max(MedianMiss(rows, unit), 1e-5);
   for (int round = 0; round < rounds; ++round) {
@@ -88,7 +63,7 @@ CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& tab
       right.noalias() += w * j.transpose() * r;
     }
     normal.diagonal() += prior;
-    right -= prior.cwiseProduct(StaticDifference(unit, table));
+    right -= prior.cwiseProduct((ToVector(unit) - ToVector(table)));
     StaticMatrix damped = normal;
     damped.diagonal() *= 1 + damping;
     const StaticVector step = damped.ldlt().solve(right);

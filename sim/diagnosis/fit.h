@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "sim/diagnosis/static_geometry.h"
 #include "sim/diagnosis/whiten.h"
 
 namespace focalfleet::sim {
@@ -23,14 +24,9 @@ struct Fit {
   std::vector<char> aside;         // Shape: (rows): never used in a fit
   Noise noise;
   ParallelFor parallel;
-  bool with_axis_noise = true;
 
   [[nodiscard]] bool Used(std::size_t row) const { return weight[row] > 0; }
 };
-
-inline constexpr std::size_t kStaticColumns = 6;  // base x, y; arms; zeros
-using StaticVector = Eigen::Matrix<double, 6, 1>;
-using StaticMatrix = Eigen::Matrix<double, 6, 6>;
 
 /// Starts from the table's geometry: finds each unit's static geometry robustly, also where zeros
 /// are far off. Errors in the data stay residuals.

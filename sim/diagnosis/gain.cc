@@ -50,8 +50,7 @@ void FitHeldOutHomings(const std::vector<char>& hold, Fit* fit) {
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
       const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
       for (std::size_t begin = 0; begin < track.moves;) {
-        std::size_t end = begin + 1;
-        while (end < track.moves && track.restarts[end] == 0) ++end;
+        const std::size_t end = EndOfHistory(track, begin);
         Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * 1e-9;
         Eigen::Vector2d right = Eigen::Vector2d::Zero();
         for (std::size_t i = begin; i < end; ++i) {

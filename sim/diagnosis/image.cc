@@ -9,6 +9,7 @@
 namespace focalfleet::sim {
 namespace {
 
+constexpr std::string_view kCameraSimilarity = "camera_similarity";
 constexpr std::size_t kUnitsMin = 6;
 constexpr double kNeighbourReach = 1.3;  // of the pitch
 constexpr double kNeighboursAgree = 6;   // standard deviations
@@ -31,8 +32,8 @@ std::vector<Image> Normals(const Fit& fit) {
       const std::size_t i = white.moves[k];
       Image& image = images[fit.facts->exposures.of_row[white.track.first_row + i]];
       // Per um of shift, and per um at the plate's edge of turn and scale.
-      const double x = (white.track.fibre_x_mm[i] - fit.facts->centre_x_mm) / fit.facts->radius_mm;
-      const double y = (white.track.fibre_y_mm[i] - fit.facts->centre_y_mm) / fit.facts->radius_mm;
+      const double x = white.track.fibre_x_mm[i] / fit.facts->radius_mm;
+      const double y = white.track.fibre_y_mm[i] / fit.facts->radius_mm;
       const double* w = white.filter[k].w;
       Eigen::Matrix<double, 2, 4> plain, j;
       plain << 1, 0, -y, x, 0, 1, x, y;
@@ -85,7 +86,7 @@ double NeighboursAgree(const Fit& fit, double* size_um) {
 
 CauseFound ImageCause(const Fit& fit, double chi_square, double size_um) {
   CauseFound cause;
-  cause.cause = "camera_similarity";
+  cause.cause = kCameraSimilarity;
   cause.candidates = {cause.cause};
   cause.axis = "none";
   cause.scope = "camera";
@@ -125,9 +126,10 @@ std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& 
   return mean;
 }
 
-// Share of the shifts' variance that curves over the ranks of `values` take.
-double ShareTaken(const std::vector<Vector4>& shifts, const std::vector<double>& values,
-                  int curves) {
+// Share of the shifts' variance that curves over the ranks of `values` take, or with `by_value` the
+// value, its square and its cube.
+double ShareTaken(const std::vector<Vector4>& shifts, const std::vector<double>& values, int curves,
+                  bool by_value) {
   const auto n = static_cast<Eigen::Index>(shifts.size());
   std::vector<double> sorted = values;
   std::sort(sorted.begin(), sorted.end());
@@ -139,7 +141,10 @@ double ShareTaken(const std::vector<Vector4>& shifts, const std::vector<double>&
         static_cast<double>((range.first - sorted.begin()) + (range.second - sorted.begin())) /
         (2 * static_cast<double>(n));
     basis(e, 0) = 1;
-    for (int k = 1; k <= curves; ++k) basis(e, k) = std::cos(std::numbers::pi * k * rank);
+    const double scaled =
+        (value - sorted.front()) / std::max(sorted.back() - sorted.front(), 1e-300);
+    for (int k = 1; k <= curves; ++k)
+      basis(e, k) = by_value ? std::pow(scaled, k) : std::cos(std::numbers::pi * k * rank);
     two.row(e) = shifts[static_cast<std::size_t>(e)].head<2>().transpose();
   }
   two.rowwise() -= two.colwise().mean().eval();
@@ -148,27 +153,63 @@ double ShareTaken(const std::vector<Vector4>& shifts, const std::vector<double>&
   return all > 0 ? 1 - left.squaredNorm() / all : 0;
 }
 
+// Evidence of curves that take a share of n shifts' variance, by the Bayesian information
+// criterion.
+double EvidenceOf(double share, double coefficients, std::size_t n) {
+  return -2 * static_cast<double>(n) * std::log1p(-std::min(share, 0.9999)) -
+         2 * coefficients * std::log(static_cast<double>(n));
+}
+
+// The largest share of the shifts' variance that one sine over time takes.
+double ShareOfSine(const std::vector<Vector4>& shifts, const std::vector<double>& time) {
+  constexpr double kHalvesMin = 0.5, kHalvesMax = 24, kStep = 0.25;  // half periods
+  const auto n = static_cast<Eigen::Index>(shifts.size());
+  const auto [first, last] = std::minmax_element(time.begin(), time.end());
+  if (!(*last > *first)) return 0;
+  Eigen::MatrixXd two(n, 2), basis(n, 3);
+  for (Eigen::Index e = 0; e < n; ++e)
+    two.row(e) = shifts[static_cast<std::size_t>(e)].head<2>().transpose();
+  two.rowwise() -= two.colwise().mean().eval();
+  const double all = two.squaredNorm();
+  double most = 0;
+  for (double halves = kHalvesMin; halves <= kHalvesMax; halves += kStep) {
+    for (Eigen::Index e = 0; e < n; ++e) {
+      const double share = (time[static_cast<std::size_t>(e)] - *first) / (*last - *first);
+      const double phase = std::numbers::pi * halves * share;
+      basis.row(e) << 1, std::sin(phase), std::cos(phase);
+    }
+    const Eigen::MatrixXd left = two - basis * basis.colPivHouseholderQr().solve(two);
+    most = std::max(most, 1 - left.squaredNorm() / std::max(all, 1e-300));
+  }
+  return most;
+}
+
 // The column that the image's shifts follow best, if it is no chance and more than time does.
+// `signal`: share of the shifts' variance that is no noise.
 std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
-                                           const std::vector<Vector4>& shifts, double size_um) {
+                                           const std::vector<Vector4>& shifts, double signal,
+                                           double size_um) {
   constexpr int kCurves = 3, kTimeCurves = 6;
-  constexpr double kShareMin = 0.25, kBeyondTime = 0.1;
+  constexpr double kShareMin = 0.25;  // of the signal
+  constexpr double kSineMin = 0.85;   // a wandering image has less of one sine
+  constexpr double kClearly = 15;
   const std::size_t exposures = facts.exposures.size();
   if (exposures < 20) return std::nullopt;
   std::vector<double> order(exposures), parity(exposures);
   for (std::size_t e = 0; e < exposures; ++e)
     order[e] = static_cast<double>(e), parity[e] = static_cast<double>(e % 2);
-  const double by_time = ShareTaken(shifts, order, kTimeCurves);
+  const double by_time =
+      EvidenceOf(ShareTaken(shifts, order, kTimeCurves, false), kTimeCurves, exposures);
   std::optional<UnknownFound> best;
-  double most = std::max(kShareMin, by_time + kBeyondTime), columns = 1;
+  double most = std::max(by_time, 0.0) + kClearly;
   const auto look = [&](const std::string& name, const std::vector<double>& values, int curves) {
-    columns += 1;
-    const double share = ShareTaken(shifts, values, curves);
-    if (share < most) return;
-    most = share;
-    best = UnknownFound{name, "the image's shift", 0, size_um * std::sqrt(share)};
-    best->p_value = std::exp(LogChiSquareTail(
-        -2 * static_cast<double>(exposures) * std::log1p(-std::min(share, 0.999)), 2.0 * curves));
+    const double share = std::max(ShareTaken(shifts, values, curves, false),
+                                  ShareTaken(shifts, values, curves, true));
+    const double evidence = EvidenceOf(share, curves, exposures);
+    if (evidence < most || share < kShareMin * signal) return;
+    most = evidence;
+    best = UnknownFound{name, std::string(kImageShift), std::exp(-evidence / 2),
+                        size_um * std::sqrt(share)};
   };
   look("move parity", parity, 1);
   for (const auto& [name, column] : facts.columns) {
@@ -176,48 +217,124 @@ std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
     const std::vector<double> values = OfExposures(facts, column);
     if (!values.empty()) look(name, values, kCurves);
   }
-  if (best && best->p_value * columns > 1e-4) best.reset();
+  if (best) return best;
+  const FilledColumn* clock = facts.Find("t_s");
+  const std::vector<double> time = clock == nullptr ? order : OfExposures(facts, *clock);
+  const double sine = ShareOfSine(shifts, time.empty() ? order : time);
+  if (sine > kSineMin * signal && EvidenceOf(sine, 3, exposures) > kClearly)
+    best = UnknownFound{"t_s", std::string(kImageShift) + ", one slow wave",
+                        std::exp(-EvidenceOf(sine, 3, exposures) / 2), size_um * std::sqrt(sine)};
   return best;
+}
+
+// Correlation of the shifts from one exposure to the next, in standard deviations of chance.
+double Carryover(const std::vector<Vector4>& shifts) {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Vector4& v : shifts) mean += v.head<2>() / static_cast<double>(shifts.size());
+  double next = 0, own = 0;
+  for (std::size_t e = 0; e + 1 < shifts.size(); ++e) {
+    const Eigen::Vector2d a = shifts[e].head<2>() - mean, b = shifts[e + 1].head<2>() - mean;
+    next += a.dot(b), own += a.squaredNorm();
+  }
+  return own > 0 ? next / own * std::sqrt(2 * static_cast<double>(shifts.size())) : 0;
+}
+
+// Shift, turn and scale of each image, um at the plate's edge, and what they explain.
+struct Motion {
+  std::vector<Vector4> found;  // Shape: (exposures)
+  double chi_square = 0, dof = 0;
+  Vector4 square = Vector4::Zero(), noise = Vector4::Zero();  // summed over exposures
+  /// Share of what was found of each that is no noise: shifts may be large and turns nothing.
+  [[nodiscard]] Vector4 Kept() const {
+    return (1 - noise.array() / square.array().max(1e-12)).max(0.0).min(1.0);
+  }
+};
+
+Motion FindMotion(const Fit& fit) {
+  const std::vector<Image> images = Normals(fit);
+  Motion motion;
+  motion.found.assign(images.size(), Vector4::Zero());
+  for (std::size_t e = 0; e < images.size(); ++e) {
+    if (images[e].rows < 6) continue;
+    const Matrix4 covariance = images[e].normal.ldlt().solve(Matrix4::Identity());
+    motion.found[e] = covariance * images[e].right;
+    motion.square += motion.found[e].cwiseAbs2();
+    motion.noise += covariance.diagonal();
+    motion.chi_square += motion.found[e].dot(images[e].right);
+    motion.dof += 4;
+  }
+  return motion;
+}
+
+bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
+
+// Steps of the whole image were a first guess at its motion.
+bool DropImageSteps(Fit* fit) {
+  if (std::erase_if(fit->model.terms, IsImageStep) == 0) return false;
+  UpdateResiduals(fit);
+  SettleFit(fit, 2);
+  return true;
+}
+
+// Takes the motion into the model, round by round: rest errors and geometry have swallowed a part
+// of what moves slowly. The whole motion; `size_um`: its root mean square without noise.
+Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
+  constexpr int kRounds = 5;
+  const std::size_t exposures = motion.found.size();
+  const double per_edge = 1e3 / fit->facts->radius_mm;  // um at the edge to urad and ppm
+  std::vector<Vector4> taken(exposures, Vector4::Zero());
+  Motion whole = motion;
+  fit->model.exposures.assign(exposures, {});
+  for (int round = 0; round < kRounds; ++round) {
+    const Vector4 kept = motion.Kept();
+    if (kept.maxCoeff() < 0.05) break;
+    for (std::size_t e = 0; e < exposures; ++e) {
+      taken[e] += kept.cwiseProduct(motion.found[e]);
+      const Vector4& v = taken[e];
+      fit->model.exposures[e] = {v[0], v[1], v[2] * per_edge, v[3] * per_edge};
+    }
+    UpdateResiduals(fit);
+    SettleFit(fit, 2);
+    motion = FindMotion(*fit);
+    for (std::size_t e = 0; e < exposures; ++e) whole.found[e] = taken[e] + motion.found[e];
+  }
+  double square = 0;
+  whole.square.setZero();
+  for (std::size_t e = 0; e < exposures; ++e) {
+    const Vector4& v = taken[e];
+    square += v[0] * v[0] + v[1] * v[1] + 0.5 * (v[2] * v[2] + v[3] * v[3]);
+    whole.square += whole.found[e].cwiseAbs2();
+  }
+  *size_um = std::sqrt(square / static_cast<double>(exposures));
+  return whole;
 }
 
 }  // namespace
 
-std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise,
-                                        std::vector<UnknownFound>* unknown) {
-  if (fit->model.units.size() < kUnitsMin) return std::nullopt;
-  const std::vector<Image> images = Normals(*fit);
-  double chi_square = 0, dof = 0;
-  std::vector<Vector4> found(images.size(), Vector4::Zero());
-  for (std::size_t e = 0; e < images.size(); ++e) {
-    if (images[e].rows < 6) continue;
-    found[e] = images[e].normal.ldlt().solve(images[e].right);
-    chi_square += found[e].dot(images[e].right);
-    dof += 4;
-  }
+ImageFound AddImageTerms(Fit* fit, double family_wise) {
+  ImageFound image;
+  if (fit->model.units.size() < kUnitsMin) return image;
+  Motion motion = FindMotion(*fit);
   // The noise estimate's own error grows with the number of exposures.
   constexpr double kNoiseOfNoise = 1.15;
   double turbulence_um = 0;
   const double before = NeighboursAgree(*fit, &turbulence_um);
-  const bool moves =
-      dof > 0 && LogChiSquareTail(chi_square / kNoiseOfNoise, dof) < std::log(family_wise / 10);
-  if (!moves && before < kNeighboursAgree) return std::nullopt;
-  // Drawn to zero by as much of it as chance alone would be.
-  const double kept = std::clamp(1 - dof / std::max(chi_square, 1e-9), 0.0, 1.0);
-  fit->model.exposures.assign(images.size(), {});
-  double square = 0;
-  const double per_edge = 1e3 / fit->facts->radius_mm;  // um at the edge to urad and ppm
-  for (std::size_t e = 0; e < images.size(); ++e) {
-    const Vector4 v = kept * found[e];
-    fit->model.exposures[e] = {v[0], v[1], v[2] * per_edge, v[3] * per_edge};
-    square += v[0] * v[0] + v[1] * v[1] + 0.5 * (v[2] * v[2] + v[3] * v[3]);
-  }
-  const double size_um = std::sqrt(square / static_cast<double>(images.size()));
-  const auto followed = FollowedColumn(*fit->facts, found, size_um);
-  if (followed) unknown->push_back(*followed);
-  UpdateResiduals(fit);
-  SettleFit(fit, 2);
+  const bool moves = motion.dof > 0 && LogChiSquareTail(motion.chi_square / kNoiseOfNoise,
+                                                        motion.dof) < std::log(family_wise / 10);
+  // Several steps are no touch of the camera, but a staircase for something else.
+  const auto steps = std::count_if(fit->model.terms.begin(), fit->model.terms.end(), IsImageStep);
+  if (!moves && before < kNeighboursAgree && steps < 2) return image;
+  if (DropImageSteps(fit)) motion = FindMotion(*fit);
+  image.moves = true;
+  double size_um = 0;
+  motion = TakeMotion(std::move(motion), fit, &size_um);
+  const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
+  image.followed = FollowedColumn(*fit->facts, motion.found, signal, size_um);
   const double after = NeighboursAgree(*fit, &turbulence_um);
-  CauseFound cause = ImageCause(*fit, chi_square, std::max(size_um, turbulence_um));
+  CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
+  // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
+  constexpr double kRemembers = 4;
+  if (Carryover(motion.found) < kRemembers) cause.candidates.emplace_back("air_turbulence");
   if (after > kNeighboursAgree) {
     cause.cause = "air_turbulence";
     cause.candidates = {cause.cause};
@@ -229,8 +346,8 @@ std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise,
         "exposure. Stack exposures, or calm the air.";
   }
   // What follows a column is not the image's own unrest.
-  if (followed || cause.size_um < kSizeMin_um) return std::nullopt;
-  return cause;
+  if (!image.followed && cause.size_um >= kSizeMin_um) image.cause = std::move(cause);
+  return image;
 }
 
 }  // namespace focalfleet::sim

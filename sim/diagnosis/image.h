@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
@@ -10,11 +11,20 @@
 
 namespace focalfleet::sim {
 
-/// Fits shift, turn and scale of each exposure to the residuals where chance does not explain
-/// them, adds them to the model and returns the cause: camera_similarity, or air_turbulence where
-/// neighbours still agree after it.
-/// A column that the image's shifts follow is added to `unknown`, and nothing is named.
-std::optional<CauseFound> AddImageTerms(Fit* fit, double family_wise,
-                                        std::vector<UnknownFound>* unknown);
+/// How the channel of what the image's shifts follow begins.
+inline constexpr std::string_view kImageShift = "the image's shift";
+
+struct ImageFound {
+  bool moves = false;  // the model has changed
+  /// camera_similarity, or air_turbulence where neighbours agree beyond the image's motion; the
+  /// latter as a candidate where the image forgets from exposure to exposure.
+  std::optional<CauseFound> cause;
+  std::optional<UnknownFound>
+      followed;  // the column that the shifts follow: then there is no cause
+};
+
+/// Fits shift, turn and scale of each exposure to the residuals where chance does not explain them,
+/// and adds them to the model in place of steps of the whole image.
+ImageFound AddImageTerms(Fit* fit, double family_wise);
 
 }  // namespace focalfleet::sim

@@ -42,6 +42,23 @@ std::vector<UnitChunk> ChunksOf(std::size_t units) {
   return out;
 }
 
+std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& track) {
+  std::vector<Homing> homings;
+  if (model.homing_zero_deg[kTheta].empty()) return homings;
+  for (const std::size_t axis : {kTheta, kPhi})
+    for (std::size_t begin = 0; begin < track.moves;) {
+      const std::size_t end = EndOfHistory(track, begin);
+      homings.push_back({axis, begin, end});
+      begin = end;
+    }
+  return homings;
+}
+
+void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors) {
+  errors->Reset(track.moves);
+  for (std::size_t i = homing.begin; i < homing.end; ++i) errors->angle_deg[homing.axis][i] = 1;
+}
+
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors) {
   for (const ModelTerm& term : model.terms) {
@@ -79,7 +96,7 @@ Places Predict(const CampaignModel& model, const CampaignFacts& facts,
         places.y_mm[row] = place.y_mm + errors.y_mm[i];
         if (model.exposures.empty()) continue;
         const ExposureTerm& image = model.exposures[facts.exposures.of_row[row]];
-        const double x = place.x_mm - facts.centre_x_mm, y = place.y_mm - facts.centre_y_mm;
+        const double x = place.x_mm, y = place.y_mm;
         places.x_mm[row] +=
             image.shift_x_um * 1e-3 + image.scale_ppm * 1e-6 * x - image.turn_urad * 1e-6 * y;
         places.y_mm[row] +=

@@ -67,6 +67,17 @@ struct CampaignModel {
   double homing_spread_deg[2] = {0, 0};  // their standard deviation, a prior
 };
 
+/// One axis from a homing to the next.
+struct Homing {
+  std::size_t axis = kTheta;
+  std::size_t begin = 0, end = 0;  // moves of the track
+};
+/// Those whose zero the model leaves free: theta's, then phi's; none where zeros are the same after
+/// each homing.
+std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& track);
+/// One degree on the axis while the homing lasts. `errors` is reset.
+void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors);
+
 /// The pose errors of one unit by all terms, events and homings of the model.
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors);

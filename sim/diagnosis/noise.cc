@@ -38,25 +38,16 @@ Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUn
   for (const ModelTerm& term : fit.model.terms) {
     if (term.sharing != Sharing::kUnit || term.group_of_unit[unit] == kNoGroup) continue;
     for (std::size_t c = 0; c < term.form.columns; ++c) {
-      double one[kColumnsMax] = {};
-      one[c] = 1;
-      errors.Reset(white.track.moves);
-      term.form.effect->apply(white.track, term.form, std::span(one).first(term.form.columns),
-                              &errors);
+      ApplyColumn(white.track, term.form, c, 1, &errors);
       own.conservativeResize(Eigen::NoChange, own.cols() + 1);
       Displacement(white, errors, own.col(own.cols() - 1).data());
     }
   }
-  if (!fit.model.homing_zero_deg[kTheta].empty())
-    for (const std::size_t axis : {kTheta, kPhi})
-      for (std::size_t i = 0; i < white.track.moves;) {
-        errors.Reset(white.track.moves);
-        do {
-          errors.angle_deg[axis][i++] = 1;
-        } while (i < white.track.moves && white.track.restarts[i] == 0);
-        own.conservativeResize(Eigen::NoChange, own.cols() + 1);
-        Displacement(white, errors, own.col(own.cols() - 1).data());
-      }
+  for (const Homing& homing : FreeHomingsOf(fit.model, white.track)) {
+    ApplyHoming(white.track, homing, &errors);
+    own.conservativeResize(Eigen::NoChange, own.cols() + 1);
+    Displacement(white, errors, own.col(own.cols() - 1).data());
+  }
   // To a common size: what matters is the plane that they span.
   for (Eigen::Index c = 0; c < own.cols(); ++c)
     if (const double length = own.col(c).norm(); length > 0) own.col(c) /= length;
@@ -229,7 +220,7 @@ Noise SearchAnew(const std::vector<NoiseUnit>& sample, bool with_axes, double ty
   return search.best();
 }
 
-void FitVariances(const std::vector<NoiseUnit>& sample, bool with_axes, Noise* noise) {
+void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
   std::vector<double> squares;
   for (const NoiseUnit& unit : sample)
     for (const NoiseMove& move : unit.moves)
@@ -237,7 +228,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, bool with_axes, Noise* n
         squares.push_back((move.x_um * move.x_um + move.y_um * move.y_um) /
                           (unit.factor * unit.factor));
   if (squares.empty()) return;
-  with_axes = with_axes && squares.size() >= kRowsMin;
+  const bool with_axes = squares.size() >= kRowsMin;
   const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), kPlaceNoiseMin_um);
   // Near where it was: a short search. Anew where it was never made, or is far away.
   const bool near =
@@ -342,7 +333,7 @@ void UpdateNoise(Fit* fit) {
   Noise& noise = fit->noise;
   if (noise.unit_factor.empty()) noise.unit_factor.assign(fit->model.units.size(), 1);
   const std::vector<NoiseUnit> sample = Sample(*fit);
-  FitVariances(sample, fit->with_axis_noise, &noise);
+  FitVariances(sample, &noise);
   FitFactors(fit);
 }
 

@@ -201,10 +201,13 @@ void Measure(const PlantedOptions& options, const CampaignFacts& facts, const Pl
   for (std::size_t u = 0; u < campaign->units.size(); ++u) {
     Rng rng = Rng::Stream(options.seed, "noise", u);
     const UnitTrack track = MakeTrack(facts, u, campaign->units[u]);
+    double rest[2] = {0, 0};
     for (std::size_t i = 0; i < track.moves; ++i) {
       const std::size_t row = track.first_row + i;
-      const double a = kRadians * options.angle_noise_deg * rng.Normal();
-      const double b = kRadians * options.angle_noise_deg * rng.Normal();
+      for (const std::size_t axis : {kTheta, kPhi})
+        if (track.restarts[i] != 0 || track.step_deg[axis][i] != 0)
+          rest[axis] = kRadians * options.rest_noise_deg * rng.Normal();
+      const double a = rest[kTheta], b = rest[kPhi];
       const double ex = track.elbow_x_mm[i] + track.reach_x_mm[i];
       const double ey = track.elbow_y_mm[i] + track.reach_y_mm[i];
       double dx = -ey * a - track.reach_y_mm[i] * b + 1e-3 * options.noise_um * rng.Normal();

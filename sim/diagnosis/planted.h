@@ -27,9 +27,9 @@ struct PlantedOptions {
   std::size_t units = 60;
   std::size_t moves = 60;
   std::uint64_t seed = 1;
-  double noise_um = 3;            // one coordinate of a measured place
-  double angle_noise_deg = 0.01;  // each axis, each move
-  double zero_offset_deg = 0;     // of the true geometry against the table, and so below
+  double noise_um = 3;           // one coordinate of a measured place
+  double rest_noise_deg = 0.01;  // of each axis, anew at each of its moves, held until the next
+  double zero_offset_deg = 0;    // of the true geometry against the table, and so below
   double base_offset_mm = 0;
   double arm_offset_mm = 0;
   double outlier_share = 0;  // rows that lie anywhere within 2 mm

@@ -69,10 +69,7 @@ class UnitScorer {
   MatrixXd Signature(const Template& form, double* raw) {
     MatrixXd m(y_.size(), static_cast<Index>(form.columns));
     for (std::size_t c = 0; c < form.columns; ++c) {
-      double one[kColumnsMax] = {};
-      one[c] = 1;
-      errors_.Reset(white_.track.moves);
-      form.effect->apply(white_.track, form, std::span(one).first(form.columns), &errors_);
+      ApplyColumn(white_.track, form, c, 1, &errors_);
       WhiteDisplacement(white_, errors_, m.col(static_cast<Index>(c)).data());
     }
     *raw = m.squaredNorm();
@@ -97,12 +94,8 @@ class UnitScorer {
       VectorXd column = VectorXd::Zero(y_.size());
       for (std::size_t c = 0; c < term.form.columns; ++c) {
         if (!amplitude.empty()) {
-          double one[kColumnsMax] = {};
-          one[c] =
-              term.sharing == Sharing::kFleet || term.sharing == Sharing::kUnit ? 1 : amplitude[c];
-          errors_.Reset(white_.track.moves);
-          term.form.effect->apply(white_.track, term.form, std::span(one).first(term.form.columns),
-                                  &errors_);
+          const bool plain = term.sharing == Sharing::kFleet || term.sharing == Sharing::kUnit;
+          ApplyColumn(white_.track, term.form, c, plain ? 1 : amplitude[c], &errors_);
           WhiteDisplacement(white_, errors_, column.data());
         }
         if (term.sharing == Sharing::kUnit) {
@@ -116,19 +109,12 @@ class UnitScorer {
   }
 
   void AddHomings() {
-    if (fit_.model.homing_zero_deg[kTheta].empty()) return;
     VectorXd column(y_.size());
-    for (const std::size_t axis : {kTheta, kPhi})
-      for (std::size_t begin = 0; begin < white_.track.moves;) {
-        errors_.Reset(white_.track.moves);
-        std::size_t i = begin;
-        do {
-          errors_.angle_deg[axis][i++] = 1;
-        } while (i < white_.track.moves && white_.track.restarts[i] == 0);
-        begin = i;
-        WhiteDisplacement(white_, errors_, column.data());
-        basis_.Add(column);
-      }
+    for (const Homing& homing : FreeHomingsOf(fit_.model, white_.track)) {
+      ApplyHoming(white_.track, homing, &errors_);
+      WhiteDisplacement(white_, errors_, column.data());
+      basis_.Add(column);
+    }
   }
 
   const Fit& fit_;

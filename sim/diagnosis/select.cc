@@ -5,32 +5,38 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string_view>
 #include <tuple>
 
+#include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
 
 namespace focalfleet::sim {
 namespace {
 
 constexpr double kKeptMin = 0.03;  // of a signature: less is what geometry explains as well
+constexpr double kAlike = 4;       // times as far behind may be who leaves the same trace
+constexpr double kShapeDoubt = 0.002;
 constexpr double kHopeless = 0.3;  // of what the term explains
 constexpr int kSwapSweepsMax = 3;
 constexpr double kBetterBy = 0.5;  // logarithm of evidence
 
+// `library`: of which the templates are some or all.
 std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& templates,
-                                const FleetGroups& groups, const Fit& fit) {
+                                const Templates& library, const FleetGroups& groups,
+                                const ParallelFor& parallel) {
   std::vector<Standing> standings(templates.size());
   constexpr std::size_t kBlock = 16;
   const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
-  fit.parallel(blocks, [&](std::size_t block) {
+  parallel(blocks, [&](std::size_t block) {
     const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
     for (std::size_t k = block * kBlock; k < end; ++k)
       standings[k] = Assess(pass.scores[k], templates[k], groups);
   });
   // Who comes in many shapes fits by chance more often: each shape has its share of the cause.
   std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
-  for (const Template& form : templates) shapes[{form.effect->cause, form.axis}] += 1;
+  for (const Template& form : library) shapes[{form.effect->cause, form.axis}] += 1;
   for (std::size_t k = 0; k < templates.size(); ++k)
     standings[k].evidence -= std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
   return standings;
@@ -81,35 +87,6 @@ std::size_t IndexOf(const Templates& templates, const Template& form) {
 // Amplitudes of a template move linearly: two rounds of noise, weights and step suffice.
 void Refit(Fit* fit) { SettleFit(fit, 2); }
 
-// The template at the shape between the listed ones that the data like best.
-Template Refined(const Fit& fit, const Templates& templates, const FleetGroups& groups,
-                 std::size_t at, std::size_t without) {
-  constexpr int kHalvings = 4;
-  Template form = templates[at];
-  if (!form.effect->continuous_shape) return form;
-  double gap = std::numeric_limits<double>::infinity();
-  for (const Template& other : templates)
-    if (other.effect == form.effect && other.axis == form.axis && other.memory == form.memory &&
-        other.form == form.form && other.shape != form.shape)
-      gap = std::min(gap, std::abs(other.shape - form.shape));
-  if (!std::isfinite(gap)) return form;
-  for (int halving = 0; halving < kHalvings; ++halving) {
-    gap /= 2;
-    const Templates three = {form, WithShape(form, form.shape - gap),
-                             WithShape(form, form.shape + gap)};
-    const ScorePass pass = ScoreTemplates(fit, three, without);
-    std::size_t best = 0;
-    double most = -std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < three.size(); ++k) {
-      if (three[k].shape <= 0 && form.shape > 0) continue;
-      const double evidence = Assess(pass.scores[k], three[k], groups).evidence;
-      if (evidence > most) most = evidence, best = k;
-    }
-    form = three[best];
-  }
-  return form;
-}
-
 struct Look {
   ScorePass pass;
   std::vector<Standing> standings;
@@ -119,8 +96,87 @@ Look LookWithout(const Fit& fit, const Templates& templates, const FleetGroups& 
                  std::size_t without) {
   Look look;
   look.pass = ScoreTemplates(fit, templates, without);
-  look.standings = AssessAll(look.pass, templates, groups, fit);
+  look.standings = AssessAll(look.pass, templates, templates, groups, fit.parallel);
   return look;
+}
+
+// A template whose shape is being refined.
+struct Contender {
+  Template form;
+  double gap = 0;  // to the shapes that are tried beside it
+};
+
+// The best templates of the causes that come near the best of all: who is how good is settled once
+// each has the shape that suits it.
+std::vector<Contender> ContendersOf(const Look& look, const Templates& templates,
+                                    const Best& best) {
+  constexpr double kNear = 15, kNearShare = 0.15;  // of the best one's chi-square
+  constexpr std::size_t kMost = 6;
+  const double far = std::max(kNear, kNearShare * best.standing.chi_square);
+  std::map<std::pair<std::string_view, EffectAxis>, std::size_t> at_of;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    if (look.standings[k].evidence < best.standing.evidence - far) continue;
+    if (!(look.pass.scores[k].kept > kKeptMin * look.pass.scores[k].raw)) continue;
+    const auto [it, fresh] =
+        at_of.emplace(std::pair(templates[k].effect->cause, templates[k].axis), k);
+    if (!fresh && look.standings[k].evidence > look.standings[it->second].evidence) it->second = k;
+  }
+  std::vector<std::size_t> order;
+  for (const auto& [key, k] : at_of) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return look.standings[a].evidence > look.standings[b].evidence;
+  });
+  if (order.size() > kMost) order.resize(kMost);
+  std::vector<Contender> contenders;
+  for (const std::size_t k : order) {
+    const Template& form = templates[k];
+    double gap = std::numeric_limits<double>::infinity();
+    for (const Template& other : templates)
+      if (other.effect == form.effect && other.axis == form.axis && other.memory == form.memory &&
+          other.form == form.form && other.shape != form.shape)
+        gap = std::min(gap, std::abs(other.shape - form.shape));
+    if (form.effect->continuous_shape && std::isfinite(gap)) contenders.push_back({form, gap});
+  }
+  return contenders;
+}
+
+// Takes each contender to the shape between the listed ones that the data like best, and adds it to
+// the templates.
+void RefineContenders(const Fit& fit, const FleetGroups& groups, std::vector<Contender> contenders,
+                      Templates* templates) {
+  constexpr int kHalvings = 4;
+  for (int halving = 0; halving < kHalvings && !contenders.empty(); ++halving) {
+    Templates tried;
+    for (Contender& one : contenders) {
+      one.gap /= 2;
+      tried.push_back(one.form);
+      tried.push_back(WithShape(one.form, one.form.shape - one.gap));
+      tried.push_back(WithShape(one.form, one.form.shape + one.gap));
+    }
+    const ScorePass pass = ScoreTemplates(fit, tried);
+    for (std::size_t c = 0; c < contenders.size(); ++c) {
+      double most = -std::numeric_limits<double>::infinity();
+      for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
+        if (tried[k].shape <= 0 && tried[3 * c].shape > 0) continue;
+        const double evidence = Assess(pass.scores[k], tried[k], groups).evidence;
+        if (evidence > most) most = evidence, contenders[c].form = tried[k];
+      }
+    }
+  }
+  for (const Contender& one : contenders)
+    if (IndexOf(*templates, one.form) == kNoTerm) templates->push_back(one.form);
+}
+
+// The best of the templates from `begin` on and of what was best before.
+Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& groups,
+               std::size_t begin, const Best& before, double tests, double family_wise) {
+  const Templates refined(templates.begin() + static_cast<std::ptrdiff_t>(begin), templates.end());
+  const ScorePass pass = ScoreTemplates(fit, refined);
+  const std::vector<Standing> standings = AssessAll(pass, refined, templates, groups, fit.parallel);
+  Best best = BestOf(pass, refined, standings, tests, family_wise);
+  if (best.at == kNoTerm || best.standing.evidence <= before.standing.evidence) return before;
+  best.at += begin;
+  return best;
 }
 
 void DropTerm(std::size_t at, Fit* fit) {
@@ -141,9 +197,13 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
     const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
-    if (behind >= rule.rival_behind && (share < rule.rival_share || hopeless)) continue;
-    const auto [it, fresh] = by_cause.emplace(cause, Rival{cause, behind, share});
-    if (!fresh && behind < it->second.behind) it->second = {cause, behind, share};
+    // Signatures are as good as their shapes: of a large cause a small share decides nothing.
+    const double near = std::max(rule.rival_behind, kShapeDoubt * best.chi_square);
+    const bool alike = share >= rule.rival_share && !hopeless;
+    if (behind >= near && !alike) continue;
+    const Rival rival{cause, behind, share, behind >= kAlike * near};
+    const auto [it, fresh] = by_cause.emplace(cause, rival);
+    if (!fresh && behind < it->second.behind) it->second = rival;
   }
   std::vector<Rival> rivals;
   for (const auto& [cause, rival] : by_cause) rivals.push_back(rival);
@@ -258,40 +318,46 @@ double SizeOf(const Fit& fit, const ModelTerm& term) {
 }
 
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
-              double tests, double family_wise) {
-  std::vector<Standing> standings;
-  for (std::size_t k = 0; k < templates.size(); ++k)
-    standings.push_back(Assess(pass.scores[k], templates[k], groups));
-  return BestOf(pass, templates, standings, tests, family_wise);
+              const ParallelFor& parallel, double tests, double family_wise) {
+  return BestOf(pass, templates, AssessAll(pass, templates, templates, groups, parallel), tests,
+                family_wise);
 }
 
-Selection Select(const Templates& listed, const SelectionRule& rule, Fit* fit) {
-  Templates templates = listed;  // and refined ones
+namespace {
+
+// Adds the best template, with the shape that suits it. False: chance explains what is left.
+bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates, Fit* fit,
+             Selection* selection) {
+  rule.progress("signatures");
+  const Look look = LookWithout(*fit, *templates, groups, kNoTerm);
+  if (selection->kept_share.empty()) {
+    selection->tests = EffectiveTests(look.pass.scores, *templates, rule.seed);
+    for (const Score& score : look.pass.scores)
+      selection->kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
+  }
+  Best best = BestOf(look.pass, *templates, look.standings, selection->tests, rule.family_wise);
+  if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) return false;
+  const std::size_t listed = templates->size();
+  RefineContenders(*fit, groups, ContendersOf(look, *templates, best), templates);
+  if (templates->size() > listed)
+    best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
+  const CampaignModel before = fit->model;
+  fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.standing, groups));
+  StepFit(fit);
+  Refit(fit);
+  if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
+  fit->model = before;
+  UpdateResiduals(fit);
+  Refit(fit);
+  return false;
+}
+
+Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* fit) {
+  Templates templates = library;  // and refined ones
   const FleetGroups groups = GroupsOf(*fit->facts);
   Selection selection;
-  for (std::size_t round = 0; round <= rule.terms_max; ++round) {
-    rule.progress("signatures");
-    const Look look = LookWithout(*fit, templates, groups, kNoTerm);
-    if (round == 0) {
-      selection.tests = EffectiveTests(look.pass.scores, templates, rule.seed);
-      for (const Score& score : look.pass.scores)
-        selection.kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
-    }
-    const Best best =
-        BestOf(look.pass, templates, look.standings, selection.tests, rule.family_wise);
-    if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) break;
-    const CampaignModel before = fit->model;
-    const Template refined = Refined(*fit, templates, groups, best.at, kNoTerm);
-    if (IndexOf(templates, refined) == kNoTerm) templates.push_back(refined);
-    fit->model.terms.push_back(MakeTerm(refined, best.standing, groups));
-    StepFit(fit);
-    Refit(fit);
-    if (SizeOf(*fit, fit->model.terms.back()) < rule.size_min_um) {
-      fit->model = before;
-      UpdateResiduals(fit);
-      Refit(fit);
-      break;
-    }
+  for (std::size_t round = 0;
+       round < rule.terms_max && AddTerm(groups, rule, &templates, fit, &selection); ++round) {
     if (fit->model.terms.size() < 2) continue;
     rule.progress("exchanges");
     for (int sweep = 0; sweep < kSwapSweepsMax; ++sweep)
@@ -303,6 +369,86 @@ Selection Select(const Templates& listed, const SelectionRule& rule, Fit* fit) {
     rests = !SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted);
   if (!rests) TakeRivals(templates, groups, rule, *fit, &selection.accepted);
   DropTheNeedless(templates, groups, rule, selection.tests, fit, &selection.accepted);
+  return selection;
+}
+
+// ---- large fleets: the model is sought on some units, and holds for all
+
+// The fit with all units but `keep` random ones aside.
+Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
+  Fit some = fit;
+  const Campaign& campaign = *fit.facts->campaign;
+  std::vector<std::size_t> order(campaign.units.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  Rng rng = Rng::Stream(seed, "some units");
+  for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[rng.Below(k)]);
+  for (std::size_t k = keep; k < order.size(); ++k)
+    for (std::size_t row = campaign.first_row[order[k]]; row < campaign.first_row[order[k] + 1];
+         ++row)
+      some.aside[row] = 1;
+  UpdateWeights(&some);
+  Refit(&some);
+  return some;
+}
+
+// A term of units' own amplitudes belongs to all units if most of those that were looked at have
+// it.
+void SpreadToAll(const Fit& some, ModelTerm* term) {
+  if (term->sharing != Sharing::kUnit) return;
+  const Campaign& campaign = *some.facts->campaign;
+  std::size_t seen = 0, have = 0;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const std::size_t row = campaign.first_row[unit];
+    if (row == campaign.first_row[unit + 1] || some.aside[row] != 0) continue;
+    ++seen;
+    if (term->group_of_unit[unit] != kNoGroup) ++have;
+  }
+  if (2 * have <= seen) return;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const std::size_t row = campaign.first_row[unit];
+    if (row == campaign.first_row[unit + 1] || some.aside[row] != 0)
+      term->group_of_unit[unit] = static_cast<std::uint32_t>(unit);
+  }
+}
+
+// The model's own templates, and those of their rivals' causes.
+Templates NearTemplates(const Templates& library, const std::vector<Accepted>& accepted,
+                        const Fit& fit) {
+  Templates near;
+  for (const ModelTerm& term : fit.model.terms)
+    if (IndexOf(near, term.form) == kNoTerm) near.push_back(term.form);
+  std::set<std::string_view> causes;
+  for (const Accepted& one : accepted)
+    for (const Rival& rival : one.rivals) causes.insert(rival.cause);
+  for (const Template& form : library)
+    if (causes.count(form.effect->cause) != 0 && IndexOf(near, form) == kNoTerm)
+      near.push_back(form);
+  return near;
+}
+
+}  // namespace
+
+Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) {
+  constexpr std::size_t kManyRows = 100'000, kRowsKept = 60'000;
+  const Campaign& campaign = *fit->facts->campaign;
+  if (campaign.rows() <= kManyRows) return SelectByAll(library, rule, fit);
+  const std::size_t keep = campaign.units.size() * kRowsKept / campaign.rows();
+  Fit some = SomeUnits(*fit, keep, rule.seed);
+  Selection selection = SelectByAll(library, rule, &some);
+  fit->model.terms = some.model.terms;
+  for (ModelTerm& term : fit->model.terms) SpreadToAll(some, &term);
+  StepFit(fit);
+  Refit(fit);
+  // What only units have that were not looked at.
+  const FleetGroups groups = GroupsOf(*fit->facts);
+  rule.progress("all units");
+  Templates templates = library;
+  while (AddTerm(groups, rule, &templates, fit, &selection)) {
+  }
+  rule.progress("rivals of all units");
+  const Templates near = NearTemplates(templates, selection.accepted, *fit);
+  TakeRivals(near, groups, rule, *fit, &selection.accepted);
+  DropTheNeedless(near, groups, rule, selection.tests, fit, &selection.accepted);
   return selection;
 }
 

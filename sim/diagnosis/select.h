@@ -16,8 +16,9 @@ namespace focalfleet::sim {
 
 struct Rival {
   std::string_view cause;
-  double behind = 0;  // twice the difference of the logarithms of evidence
-  double share = 0;   // of the term's own signal that the rival can take over
+  double behind = 0;                  // twice the difference of the logarithms of evidence
+  double share = 0;                   // of the term's own signal that the rival can take over
+  bool behind_by_likelihood = false;  // leaves the same trace, and only its small remainder decides
 };
 
 struct Accepted {
@@ -54,7 +55,7 @@ struct Best {
   double log_p_family = 0;  // chance for the whole family of tests
 };
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
-              double tests, double family_wise);
+              const ParallelFor& parallel, double tests, double family_wise);
 
 /// Root mean square of what the term does to its units' fibres, in um.
 double SizeOf(const Fit& fit, const ModelTerm& term);

@@ -94,13 +94,17 @@ Level SumLevel(const Score& score, std::size_t c, Sharing sharing,
 double LevelLogP(const Level& level) {
   double sum = 0, dof = 0, best = 0;
   double tests = 0;
+  // One unit's noise is known from its own rows only.
+  constexpr double kOwnNoise = 1.15;
+  const double inflation =
+      level.sharing == Sharing::kUnit && level.groups.size() > 1 ? kOwnNoise : 1;
   for (const GroupScore& group : level.groups) {
     if (group.along.empty()) continue;
     sum += group.chi_square;
     dof += static_cast<double>(group.along.size());
     tests += 1;
-    best =
-        std::min(best, LogChiSquareTail(group.chi_square, static_cast<double>(group.along.size())));
+    best = std::min(best, LogChiSquareTail(group.chi_square / inflation,
+                                           static_cast<double>(group.along.size())));
   }
   if (tests == 0) return 0;
   // A sum over many units also counts what is wrong with the noise of all of them.

@@ -11,39 +11,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-StaticVector Table(const CampaignUnit& u) {
-  StaticVector v;
-  v << u.base_x_mm, u.base_y_mm, u.arm_mm[0], u.arm_mm[1], u.zero_deg[0], u.zero_deg[1];
-  return v;
-}
-
-void TakeStatic(const StaticVector& v, CampaignUnit* u) {
-  u->base_x_mm = v[0], u->base_y_mm = v[1];
-  u->arm_mm[0] = std::max(v[2], 1e-3), u->arm_mm[1] = std::max(v[3], 1e-3);
-  u->zero_deg[0] = v[4], u->zero_deg[1] = v[5];
-}
-
-// Wide: what the moves do not show stays where the table has it. mm and degrees.
-StaticVector StaticPrior() {
-  StaticVector w;
-  w << 1 / 4.0, 1 / 4.0, 4.0, 4.0, 1 / 32400.0, 1 / 32400.0;
-  return w;
-}
-
-// Homings of a unit: which one each move belongs to.
-std::vector<Index> HomingOf(const UnitTrack& track, Index* homings) {
-  std::vector<Index> of(track.moves);
-  Index at = -1;
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    if (track.restarts[i] != 0) ++at;
-    of[i] = at;
-  }
-  *homings = at + 1;
-  return of;
-}
-
-bool HasHomings(const CampaignModel& model) { return !model.homing_zero_deg[kTheta].empty(); }
-
 // One unit's equations: its own unknowns (geometry, own amplitudes, homings), and the shared ones
 // that reach it.
 struct UnitEquations {
@@ -52,7 +19,6 @@ struct UnitEquations {
   std::vector<Index> shared_at;  // which shared unknowns
   MatrixXd shared;               // columns
   VectorXd y;
-  Index homings = 0;
 };
 
 void AppendColumn(const VectorXd& column, MatrixXd* columns) {
@@ -60,27 +26,25 @@ void AppendColumn(const VectorXd& column, MatrixXd* columns) {
   columns->col(columns->cols() - 1) = column;
 }
 
+// An unknown of the unit's own: its column, the weight of its prior, how far off it stands.
+void AppendOwn(const VectorXd& column, double prior, double value, UnitEquations* eq) {
+  AppendColumn(column, &eq->own);
+  eq->prior.conservativeResize(eq->own.cols());
+  eq->value.conservativeResize(eq->own.cols());
+  eq->prior[eq->own.cols() - 1] = prior;
+  eq->value[eq->own.cols() - 1] = value;
+}
+
 void AppendHomings(const Fit& fit, const WhiteUnit& white, UnitEquations* eq) {
-  const std::vector<Index> homing_of = HomingOf(white.track, &eq->homings);
   PoseErrors errors;
   VectorXd column(white.y.size());
-  for (const std::size_t axis : {kTheta, kPhi})
-    for (Index h = 0; h < eq->homings; ++h) {
-      errors.Reset(white.track.moves);
-      double now = 0;
-      for (std::size_t i = 0; i < white.track.moves; ++i)
-        if (homing_of[i] == h) {
-          errors.angle_deg[axis][i] = 1;
-          now = fit.model.homing_zero_deg[axis][white.track.first_row + i];
-        }
-      WhiteDisplacement(white, errors, column.data());
-      AppendColumn(column, &eq->own);
-      const double spread = std::max(fit.model.homing_spread_deg[axis], 1e-6);
-      eq->prior.conservativeResize(eq->own.cols());
-      eq->value.conservativeResize(eq->own.cols());
-      eq->prior[eq->own.cols() - 1] = 1 / (spread * spread);
-      eq->value[eq->own.cols() - 1] = now;
-    }
+  for (const Homing& homing : FreeHomingsOf(fit.model, white.track)) {
+    ApplyHoming(white.track, homing, &errors);
+    WhiteDisplacement(white, errors, column.data());
+    const double spread = std::max(fit.model.homing_spread_deg[homing.axis], 1e-6);
+    AppendOwn(column, 1 / (spread * spread),
+              fit.model.homing_zero_deg[homing.axis][white.track.first_row + homing.begin], eq);
+  }
 }
 
 UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& white,
@@ -88,8 +52,8 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
   UnitEquations eq;
   eq.y = white.y;
   eq.own = white.geometry;
-  eq.prior = StaticPrior();
-  eq.value = Table(fit.model.units[unit]) - Table(fit.facts->campaign->units[unit]);
+  eq.prior = StaticPriorWeights();
+  eq.value = ToVector(fit.model.units[unit]) - ToVector(fit.facts->campaign->units[unit]);
   eq.shared.resize(white.y.size(), 0);
   PoseErrors errors;
   VectorXd column(white.y.size());
@@ -98,25 +62,18 @@ UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& w
     const std::uint32_t group = term.group_of_unit[unit];
     if (group == kNoGroup) continue;
     for (std::size_t c = 0; c < term.form.columns; ++c) {
-      double one[kColumnsMax] = {};
-      one[c] = 1;
-      errors.Reset(white.track.moves);
-      term.form.effect->apply(white.track, term.form, std::span(one).first(term.form.columns),
-                              &errors);
+      ApplyColumn(white.track, term.form, c, 1, &errors);
       WhiteDisplacement(white, errors, column.data());
       if (term.sharing == Sharing::kUnit) {
-        AppendColumn(column, &eq.own);
-        eq.prior.conservativeResize(eq.own.cols());
-        eq.value.conservativeResize(eq.own.cols());
-        eq.prior[eq.own.cols() - 1] = term.spread > 0 ? 1 / (term.spread * term.spread) : 0;
-        eq.value[eq.own.cols() - 1] = term.amplitude[group * term.form.columns + c];
+        AppendOwn(column, term.spread > 0 ? 1 / (term.spread * term.spread) : 0,
+                  term.amplitude[group * term.form.columns + c], &eq);
       } else {
         AppendColumn(column, &eq.shared);
         eq.shared_at.push_back(shared_begin[t] + static_cast<Index>(group * term.form.columns + c));
       }
     }
   }
-  if (HasHomings(fit.model)) AppendHomings(fit, white, &eq);
+  AppendHomings(fit, white, &eq);
   return eq;
 }
 
@@ -125,7 +82,6 @@ struct UnitSolution {
   VectorXd right;  // of the own unknowns
   MatrixXd cross;  // own x shared
   std::vector<Index> shared_at;
-  Index homings = 0;
   bool used = false;
 };
 
@@ -144,7 +100,6 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   solution.own.compute(normal);
   solution.cross = eq.own.transpose() * eq.shared;
   solution.shared_at = eq.shared_at;
-  solution.homings = eq.homings;
   solution.used = true;
   if (!eq.shared_at.empty()) {
     const MatrixXd gone = solution.own.solve(solution.cross);
@@ -160,11 +115,8 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   return solution;
 }
 
-void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Index homings,
-             Fit* fit) {
-  StaticVector geometry = Table(fit->model.units[unit]);
-  geometry += step.head<6>();
-  TakeStatic(geometry, &fit->model.units[unit]);
+void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit* fit) {
+  AddStatic(step.head<6>(), &fit->model.units[unit]);
   Index at = kStaticColumns;
   for (ModelTerm& term : fit->model.terms) {
     const std::uint32_t group = term.group_of_unit[unit];
@@ -174,14 +126,12 @@ void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Inde
       term.sigma[group * term.form.columns + c] = sigma[at];
     }
   }
-  if (!HasHomings(fit->model)) return;
   const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
-  Index count = 0;
-  const std::vector<Index> homing_of = HomingOf(track, &count);
-  for (const std::size_t axis : {kTheta, kPhi})
-    for (std::size_t i = 0; i < track.moves; ++i)
-      fit->model.homing_zero_deg[axis][track.first_row + i] +=
-          step[at + static_cast<Index>(axis) * homings + homing_of[i]];
+  for (const Homing& homing : FreeHomingsOf(fit->model, track)) {
+    for (std::size_t i = homing.begin; i < homing.end; ++i)
+      fit->model.homing_zero_deg[homing.axis][track.first_row + i] += step[at];
+    ++at;
+  }
 }
 
 }  // namespace
@@ -237,7 +187,7 @@ void StepFit(Fit* fit) {
       const Index n = step.size();
       const VectorXd sigma =
           solution.own.solve(MatrixXd::Identity(n, n)).diagonal().cwiseMax(0).cwiseSqrt();
-      TakeOwn(step, sigma, unit, solution.homings, fit);
+      TakeOwn(step, sigma, unit, fit);
     }
   });
   UpdateResiduals(fit);
@@ -286,11 +236,9 @@ double Merit(const Fit& fit) {
       log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) - cost / 2;
       values += 2;
     }
-    if (HasHomings(fit.model)) {
-      Index homings = 0;
-      HomingOf(white.track, &homings);
-      parameters += 2 * static_cast<double>(homings - 1);
-    }
+    // One zero of each axis is the geometry's.
+    const auto homings = static_cast<double>(FreeHomingsOf(fit.model, white.track).size());
+    parameters += std::max(homings - 2, 0.0);
   }
   parameters += 2 * static_cast<double>(fit.model.events.size());
   for (const ModelTerm& term : fit.model.terms)

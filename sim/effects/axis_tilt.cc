@@ -43,7 +43,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 Effect MakeAxisTilt() {
   return {.cause = "axis_tilt",
           .amplitude_unit = "mm/mm",
-          .prior_size = 5e-5,
+          .prior_size = 2e-4,
           .owner = Owner::kUnit,
           .needs = {},
           .paragraph =

@@ -18,8 +18,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
            PoseErrors* errors) {
   const CampaignFacts& facts = *track.facts;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const double x = (track.fibre_x_mm[i] - facts.centre_x_mm) / facts.radius_mm;
-    const double y = (track.fibre_y_mm[i] - facts.centre_y_mm) / facts.radius_mm;
+    const double x = track.fibre_x_mm[i] / facts.radius_mm;
+    const double y = track.fibre_y_mm[i] / facts.radius_mm;
     const double r2 = x * x + y * y;
     if (form.form == 2) {
       const double* a = amplitude.data();

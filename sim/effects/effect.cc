@@ -55,6 +55,14 @@ std::string_view Name(Memory memory) {
   return "until the next move";
 }
 
+void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
+                 PoseErrors* errors) {
+  double amplitudes[kColumnsMax] = {};
+  amplitudes[column] = amplitude;
+  errors->Reset(track.moves);
+  form.effect->apply(track, form, std::span(amplitudes).first(form.columns), errors);
+}
+
 std::size_t AxisIndex(const Template& form) {
   return form.axis == EffectAxis::kPhi ? kPhi : kTheta;
 }

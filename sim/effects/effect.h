@@ -74,6 +74,10 @@ struct Effect {
   double amplitude_high = 0;
 };
 
+/// What one column does at the given amplitude, the others at 0. `errors` is reset.
+void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
+                 PoseErrors* errors);
+
 std::string_view Name(EffectAxis axis);
 std::string_view Name(Owner owner);
 std::string_view Name(Memory memory);

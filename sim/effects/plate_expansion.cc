@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "sim/effects/registry.h"
+#include "sim/effects/thermal_mass.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -17,17 +18,6 @@ void List(const CampaignFacts& facts, Templates* out) {
              out);
 }
 
-// The temperature behind a thermal mass, from rest at the first exposure.
-std::vector<double> Late(std::span<const double> temperature, std::span<const double> time,
-                         double tau_s) {
-  std::vector<double> late(temperature.begin(), temperature.end());
-  for (std::size_t i = 1; i < late.size(); ++i) {
-    const double kept = std::exp(-std::max(time[i] - time[i - 1], 0.0) / tau_s);
-    late[i] = kept * late[i - 1] + (1 - kept) * (temperature[i] + temperature[i - 1]) / 2;
-  }
-  return late;
-}
-
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::span<const double> temperature = track.Column("temp_C");
@@ -37,8 +27,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   if (form.form == 1) late = Late(temperature, track.Column("t_s"), form.shape);
   for (std::size_t i = 0; i < track.moves; ++i) {
     const double strain = amplitude[0] * ((form.form == 1 ? late[i] : temperature[i]) - usual_C);
-    errors->x_mm[i] += strain * (track.fibre_x_mm[i] - facts.centre_x_mm);
-    errors->y_mm[i] += strain * (track.fibre_y_mm[i] - facts.centre_y_mm);
+    errors->x_mm[i] += strain * track.fibre_x_mm[i];
+    errors->y_mm[i] += strain * track.fibre_y_mm[i];
   }
 }
 
@@ -47,7 +37,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 Effect MakePlateExpansion() {
   return {.cause = "plate_expansion",
           .amplitude_unit = "1/K",
-          .prior_size = 2e-6,
+          .prior_size = 5e-6,
           .owner = Owner::kPlate,
           .needs = {"temp_C"},
           .paragraph =

@@ -25,8 +25,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   if (form.form == 0) gradient[0] = track.Column(kGradientX);
   if (form.form == 0) gradient[1] = track.Column(kGradientY);
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const double x = track.fibre_x_mm[i] - facts.centre_x_mm;
-    const double y = track.fibre_y_mm[i] - facts.centre_y_mm;
+    const double x = track.fibre_x_mm[i];
+    const double y = track.fibre_y_mm[i];
     const double warm = temperature[i] - usual_C;
     double a = 0, b = 0;
     if (form.form == 0) a = amplitude[0] * gradient[0][i], b = amplitude[0] * gradient[1][i];
@@ -50,7 +50,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 Effect MakePlateGradient() {
   return {.cause = "plate_gradient",
           .amplitude_unit = "1/K",
-          .prior_size = 2e-6,
+          .prior_size = 1e-5,
           .owner = Owner::kPlate,
           .needs = {"temp_C"},
           .paragraph =

@@ -16,6 +16,7 @@ Effect MakeCameraDistortion();
 Effect MakeCameraSimilarity();
 Effect MakeCentroidBias();
 Effect MakeCogging();
+Effect MakeCollisionContact();
 Effect MakeCommandQuantisation();
 Effect MakeEccentricity();
 Effect MakeFibreTorque();

@@ -7,6 +7,8 @@
 namespace focalfleet::sim {
 namespace {
 
+constexpr double kStays = 0.15;  // of the wind-up at which the arm breaks loose
+
 void List(const CampaignFacts&, Templates* out) {
   constexpr double kThresholds_deg[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2};
   ListGrid({.memories = {Memory::kNow, Memory::kHold, Memory::kChain},
@@ -17,6 +19,11 @@ void List(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
             .shape_name = "jumps from, deg,",
             .form = 1},
+           out);
+  // The same, and it stops before it is there: some wind-up stays.
+  ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
+            .shape_name = "jumps, but not home, from, deg,",
+            .form = 2},
            out);
 }
 
@@ -31,7 +38,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         if (form.form == 0) return std::abs(step[i]) < form.shape ? -amplitude[0] * step[i] : 0.0;
         if (track.restarts[i]) behind_deg = 0;
         behind_deg += step[i];
-        if (std::abs(behind_deg) >= form.shape) behind_deg = 0;
+        if (std::abs(behind_deg) >= form.shape)
+          behind_deg = form.form == 2 ? kStays * std::copysign(form.shape, behind_deg) : 0;
         return -amplitude[0] * behind_deg;
       },
       &errors->angle_deg[axis]);

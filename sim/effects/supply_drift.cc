@@ -25,7 +25,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 Effect MakeSupplyDrift() {
   return {.cause = "supply_drift",
           .amplitude_unit = "deg/V",
-          .prior_size = 0.02,
+          .prior_size = 0.05,
           .owner = Owner::kPlate,
           .needs = {"v_bus_V"},
           .paragraph =

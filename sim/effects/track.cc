@@ -7,6 +7,8 @@
 #include <numbers>
 #include <numeric>
 
+#include "sim/effects/arm_gap.h"
+
 namespace focalfleet::sim {
 namespace {
 
@@ -103,16 +105,10 @@ FilledColumn Fill(std::span<const double> raw, const Campaign& campaign,
 }
 
 void FindPlate(const Campaign& campaign, CampaignFacts* facts) {
-  const auto n = static_cast<double>(campaign.units.size());
-  for (const CampaignUnit& unit : campaign.units) {
-    facts->centre_x_mm += unit.base_x_mm / n;
-    facts->centre_y_mm += unit.base_y_mm / n;
-  }
   facts->radius_mm = 1;
   std::vector<double> nearest;
   for (const CampaignUnit& unit : campaign.units) {
-    facts->radius_mm = std::max(facts->radius_mm, std::hypot(unit.base_x_mm - facts->centre_x_mm,
-                                                             unit.base_y_mm - facts->centre_y_mm));
+    facts->radius_mm = std::max(facts->radius_mm, std::hypot(unit.base_x_mm, unit.base_y_mm));
     if (campaign.units.size() < 2 || nearest.size() >= 200) continue;
     double least_mm = std::numeric_limits<double>::infinity();
     for (const CampaignUnit& other : campaign.units)
@@ -177,8 +173,8 @@ void FindGradients(const Campaign& campaign, CampaignFacts* facts) {
   if (temperature == nullptr || campaign.units.size() < 6) return;
   std::vector<PlaneSums> sums(facts->exposures.size());
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    const double x = campaign.units[unit].base_x_mm - facts->centre_x_mm;
-    const double y = campaign.units[unit].base_y_mm - facts->centre_y_mm;
+    const double x = campaign.units[unit].base_x_mm;
+    const double y = campaign.units[unit].base_y_mm;
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
       PlaneSums& s = sums[facts->exposures.of_row[row]];
       const double t = temperature->values[row];
@@ -240,6 +236,16 @@ void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
     }
   facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta], campaign, facts->exposures);
   facts->columns[std::string(kNeighbourPhi)] = Fill(pull[kPhi], campaign, facts->exposures);
+}
+
+void FindContacts(const Campaign& campaign, CampaignFacts* facts) {
+  constexpr double kNear = 0.3;  // of the pitch: no arms are thicker
+  if (campaign.units.size() < 2) return;
+  const ArmGaps gaps = FindArmGaps(campaign, facts->exposures,
+                                   NeighboursOf(campaign, 1.3 * facts->pitch_mm), facts->pitch_mm);
+  if (*std::min_element(gaps.gap_mm.begin(), gaps.gap_mm.end()) > kNear * facts->pitch_mm) return;
+  facts->columns[std::string(kArmGap)] = Fill(gaps.gap_mm, campaign, facts->exposures);
+  facts->columns[std::string(kArmGapSide)] = Fill(gaps.side, campaign, facts->exposures);
 }
 
 // Columns that the units' table has and the moves' table lacks.
@@ -328,11 +334,18 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   }
   FindGradients(campaign, &facts);
   FindNeighbourPull(campaign, &facts);
+  FindContacts(campaign, &facts);
   return facts;
 }
 
 std::span<const double> UnitTrack::Column(std::string_view name) const {
   return std::span<const double>(facts->Find(name)->values).subspan(first_row, moves);
+}
+
+std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
+  std::size_t end = move + 1;
+  while (end < track.moves && track.restarts[end] == 0) ++end;
+  return end;
 }
 
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry) {

@@ -38,6 +38,9 @@ inline constexpr std::string_view kGradientX = "temperature gradient x";
 inline constexpr std::string_view kGradientY = "temperature gradient y";
 inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";
 inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
+// Only where arms come near each other (arm_gap.h).
+inline constexpr std::string_view kArmGap = "gap to the next arm";
+inline constexpr std::string_view kArmGapSide = "side of the next arm";
 
 struct CampaignFacts {
   const Campaign* campaign = nullptr;
@@ -45,9 +48,7 @@ struct CampaignFacts {
   std::map<std::string, FilledColumn, std::less<>> columns;
   std::vector<char> restarts;       // Shape: (rows): the unit's history begins anew here
   std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
-  double centre_x_mm = 0;           // of the plate: mean of the bases
-  double centre_y_mm = 0;
-  double radius_mm = 0;     // of the plate: farthest base; at least 1
+  double radius_mm = 0;     // of the plate: farthest base from the frame's origin; at least 1
   double pitch_mm = 0;      // median distance to the nearest base; 0 with one unit
   std::size_t homings = 0;  // restarts that are not a unit's first row
 
@@ -74,6 +75,9 @@ struct UnitTrack {
   /// Values of a column for this unit's moves. Pre: facts->Has(name).
   [[nodiscard]] std::span<const double> Column(std::string_view name) const;
 };
+
+/// One past the last move of the history (from homing to homing) that `move` belongs to.
+std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
 
 /// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <complex>
+#include <cstdint>
+#include <cstring>
 #include <map>
 
 #include "protocol/base/check.h"
@@ -12,6 +14,131 @@ namespace {
 
 using Complex = std::complex<double>;
 
+constexpr int kPieces = 1024;
+constexpr double kStep = 2.0 / kPieces;
+
+struct Knot {
+  double value = 0;
+  double slope = 0;  // times the step
+};
+/// c[0] + c[1] t + c[2] t^2 + c[3] t^3 of each piece, t from 0 to 1.
+struct Cubic {
+  double c[4];
+};
+
+// ---- eight directions at a time
+
+FOCALFLEET_WIDE void Wave(const DirectionLanes& local, double real, double imaginary,
+                          SampleLanes* __restrict out) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double x = local.x.at[k], y = local.y.at[k];
+    const double x2 = x * x - y * y, y2 = 2 * x * y;
+    const double x3 = x2 * x - y2 * y, y3 = x2 * y + y2 * x;
+    const double cube_x = real * x3 - imaginary * y3, cube_y = real * y3 + imaginary * x3;
+    out->b_T.at[k] = cube_x * x - cube_y * y;
+    out->slope_x.at[k] = 4 * cube_x;
+    out->slope_y.at[k] = -4 * cube_y;
+    out->slope_z.at[k] = 0;
+  }
+}
+
+// As complex numbers, one a lane.
+struct Flat {
+  Lane x, y;
+};
+inline void Multiply(const Flat& by, Flat* __restrict what) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double x = what->x.at[k] * by.x.at[k] - what->y.at[k] * by.y.at[k];
+    what->y.at[k] = what->x.at[k] * by.y.at[k] + what->y.at[k] * by.x.at[k];
+    what->x.at[k] = x;
+  }
+}
+
+struct Order {
+  int order = 0;
+  std::vector<Cubic> cosine = {};  // by piece; empty where it is zero
+  std::vector<Cubic> sine = {};
+};
+
+// Where each direction is in a table over z.
+struct Places {
+  std::int32_t piece[kLanes];
+  Lane t;
+};
+inline void Find(const Lane& z, Places* __restrict out) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double place = (z.at[k] + 1) * (1 / kStep);
+    const double above = place > 0 ? place : 0;
+    const double within = above < kPieces - 1e-9 ? above : kPieces - 1e-9;
+    out->piece[k] = static_cast<std::int32_t>(within);
+    out->t.at[k] = within - out->piece[k];
+  }
+}
+
+// w = x + i y and its powers, and w^(m - 1) of the order m at hand; orders of equal poles are 8
+// apart, so the next is one product away.
+struct Powers {
+  Flat w, w2, w4, w8, now;
+};
+FOCALFLEET_WIDE void Begin(const DirectionLanes& local, Places* __restrict places,
+                           Powers* __restrict out) {
+  Find(local.z, places);
+  out->w = {local.x, local.y};
+  out->w2 = out->w;
+  Multiply(out->w, &out->w2);
+  out->w4 = out->w2;
+  Multiply(out->w2, &out->w4);
+  out->w8 = out->w4;
+  Multiply(out->w4, &out->w8);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    out->now.x.at[k] = 1;
+    out->now.y.at[k] = 0;
+  }
+}
+FOCALFLEET_WIDE void Raise(int by, Powers* __restrict out) {
+  for (; by >= 8; by -= 8) Multiply(out->w8, &out->now);
+  if ((by & 4) != 0) Multiply(out->w4, &out->now);
+  if ((by & 2) != 0) Multiply(out->w2, &out->now);
+  if ((by & 1) != 0) Multiply(out->w, &out->now);
+}
+
+// Adds the cosine's part of Re[conj(C) w^m], one order m, and its slopes: `along` and sign *
+// `across` are the real and the imaginary part of w^(m - 1), conjugate. The sine's is that of
+// i w^(m - 1).
+struct Part {
+  const Cubic* table;
+  double order;
+  double sign;
+};
+FOCALFLEET_WIDE void Add(const Part& part, const Places& places, const Flat& w, const Lane& along,
+                         const Lane& across, SampleLanes* __restrict out) {
+  const double* const c = part.table->c;
+  const double order = part.order, sign = part.sign;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const std::int32_t at = 4 * places.piece[k];
+    const double t = places.t.at[k];
+    const double c0 = c[at], c1 = c[at + 1], c2 = c[at + 2], c3 = c[at + 3];
+    const double value = ((c3 * t + c2) * t + c1) * t + c0;
+    const double slope = ((3 * c3 * t + 2 * c2) * t + c1) * (1 / kStep);
+    const double a = along.at[k], b = sign * across.at[k];
+    const double whole = a * w.x.at[k] + b * w.y.at[k];
+    const double scaled = order * value;
+    out->b_T.at[k] += value * whole;
+    out->slope_z.at[k] += slope * whole;
+    out->slope_x.at[k] += scaled * a;
+    out->slope_y.at[k] += scaled * b;
+  }
+}
+// Order 0: of z alone.
+void AddZonal(const Cubic* table, const Places& places, SampleLanes* out) {
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double t = places.t.at[k];
+    const auto& c = table[places.piece[k]].c;
+    out->b_T.at[k] += ((c[3] * t + c[2]) * t + c[1]) * t + c[0];
+    out->slope_z.at[k] += ((3 * c[3] * t + 2 * c[2]) * t + c[1]) * (1 / kStep);
+  }
+}
+
 class HarmonicField final : public FieldModel {
  public:
   explicit HarmonicField(const HarmonicParameters& parameters)
@@ -19,13 +146,8 @@ class HarmonicField final : public FieldModel {
 
   [[nodiscard]] std::string_view kind() const override { return "harmonic"; }
 
-  void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const override {
-    for (std::size_t k = 0; k < local.size(); ++k) {
-      const Complex w(local[k].x, local[k].y);
-      const Complex cube = factor_ * w * w * w;
-      out[k].b_T = (cube * w).real();
-      out[k].slope_T = {4 * cube.real(), -4 * cube.imag(), 0};
-    }
+  void EvaluateLanes(const DirectionLanes& local, SampleLanes* out) const override {
+    Wave(local, factor_.real(), factor_.imag(), out);
   }
 
  private:
@@ -39,28 +161,40 @@ class SurfaceField final : public FieldModel {
 
   [[nodiscard]] std::string_view kind() const override { return "surface"; }
 
-  void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const override {
-    for (std::size_t k = 0; k < local.size(); ++k) {
-      const Vector3& u = local[k];
-      // Longitude means nothing on the axis, where the field is nearly none.
-      const double square = std::max(u.x * u.x + u.y * u.y, 1e-24);
-      const double radius = std::sqrt(square);
-      const double latitude_rad = std::atan2(u.z, radius);
-      const double scaled = latitude_rad / parameters_.width_rad;
-      const double peak_T = parameters_.amplitude_T * std::exp(-scaled * scaled);
-      Complex wave = Complex(u.x, u.y) / radius;
-      wave *= wave;
-      wave *= wave * turn_;
-      out[k].b_T = peak_T * wave.real();
-      const double by_latitude = -2 * scaled / parameters_.width_rad * out[k].b_T;
-      const double by_longitude = -4 * peak_T * wave.imag();
-      // Along a meridian dz = cos(latitude) d latitude.
-      out[k].slope_T = {-by_longitude * u.y / square, by_longitude * u.x / square,
-                        by_latitude / radius};
+  void EvaluateLanes(const DirectionLanes& local, SampleLanes* out) const override {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const FieldSample sample = At({local.x.at[k], local.y.at[k], local.z.at[k]});
+      out->b_T.at[k] = sample.b_T;
+      out->slope_x.at[k] = sample.slope_T.x;
+      out->slope_y.at[k] = sample.slope_T.y;
+      out->slope_z.at[k] = sample.slope_T.z;
     }
   }
 
  private:
+  [[nodiscard]] FieldSample At(const Vector3& u) const {
+    // Longitude means nothing on the axis, where the field is nearly none.
+    const double square = std::max(u.x * u.x + u.y * u.y, 1e-24);
+    const double radius = std::sqrt(square);
+    const double latitude_rad = std::atan2(u.z, radius);
+    const double scaled = latitude_rad / parameters_.width_rad;
+    const double peak_T = parameters_.amplitude_T * std::exp(-scaled * scaled);
+    // As real numbers: std::complex asks for infinities behind each product.
+    const double cosine = u.x / radius, sine = u.y / radius;
+    const double cosine2 = cosine * cosine - sine * sine, sine2 = 2 * cosine * sine;
+    const double cosine4 = cosine2 * cosine2 - sine2 * sine2, sine4 = 2 * cosine2 * sine2;
+    const double wave = cosine4 * turn_.real() - sine4 * turn_.imag();
+    const double wave_across = cosine4 * turn_.imag() + sine4 * turn_.real();
+    FieldSample sample;
+    sample.b_T = peak_T * wave;
+    const double by_latitude = -2 * scaled / parameters_.width_rad * sample.b_T;
+    const double by_longitude = -4 * peak_T * wave_across;
+    // Along a meridian dz = cos(latitude) d latitude.
+    sample.slope_T = {-by_longitude * u.y / square, by_longitude * u.x / square,
+                      by_latitude / radius};
+    return sample;
+  }
+
   SurfaceParameters parameters_;
   Complex turn_;
 };
@@ -88,37 +222,29 @@ class SphericalField final : public FieldModel {
     return (four_fold ? 90 : 360) * kRadPerDeg;
   }
 
-  void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const override {
-    for (std::size_t k = 0; k < local.size(); ++k) out[k] = At(local[k]);
+  void EvaluateLanes(const DirectionLanes& local, SampleLanes* out) const override {
+    *out = {};
+    Places places;
+    Powers powers;
+    Begin(local, &places, &powers);
+    int reached = 0;
+    for (const Order& order : orders_) {
+      const int m = order.order;
+      if (m == 0) {
+        if (!order.cosine.empty()) AddZonal(order.cosine.data(), places, out);
+        continue;
+      }
+      Raise(m - 1 - reached, &powers);
+      reached = m - 1;
+      const auto& [x, y] = powers.now;
+      if (!order.cosine.empty())
+        Add({order.cosine.data(), static_cast<double>(m), -1}, places, powers.w, x, y, out);
+      if (!order.sine.empty())
+        Add({order.sine.data(), static_cast<double>(m), 1}, places, powers.w, y, x, out);
+    }
   }
 
  private:
-  static constexpr int kPieces = 1024;
-  static constexpr double kStep = 2.0 / kPieces;
-
-  struct Knot {
-    double value = 0;
-    double slope = 0;  // times the step
-  };
-  struct Order {
-    int order = 0;
-    std::vector<Knot> cosine;  // empty where it is zero
-    std::vector<Knot> sine;
-  };
-  struct Read {
-    double value = 0;
-    double slope = 0;
-  };
-
-  struct Flat {
-    double x = 0;
-    double y = 0;
-  };
-  // As complex numbers; std::complex asks for infinities behind each product.
-  static Flat Times(const Flat& a, const Flat& b) {
-    return {a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x};
-  }
-
   static Order Tabulate(int order, const std::vector<SphericalTerm>& terms) {
     Order table{.order = order};
     int degree_max = order;
@@ -132,8 +258,8 @@ class SphericalField final : public FieldModel {
     const auto any = [](const std::vector<double>& list) {
       return std::any_of(list.begin(), list.end(), [](double value) { return value != 0; });
     };
-    if (any(cosine)) table.cosine = KnotsOf(order, cosine);
-    if (any(sine)) table.sine = KnotsOf(order, sine);
+    if (any(cosine)) table.cosine = CubicsOf(order, cosine);
+    if (any(sine)) table.sine = CubicsOf(order, sine);
     return table;
   }
 
@@ -163,55 +289,41 @@ class SphericalField final : public FieldModel {
     return knots;
   }
 
-  static Read ReadAt(const std::vector<Knot>& knots, std::size_t piece, double t) {
-    if (knots.empty()) return {};
-    const Knot& low = knots[piece];
-    const Knot& high = knots[piece + 1];
-    const double rise = high.value - low.value;
-    const double a = low.slope - rise, b = rise - high.slope;
-    // low + t rise + t (1 - t) ((1 - t) a + t b)
-    const double bow = (1 - t) * a + t * b, hump = t * (1 - t);
-    return {low.value + t * rise + hump * bow,
-            (rise + (1 - 2 * t) * bow + hump * (b - a)) * (1 / kStep)};
-  }
-
-  [[nodiscard]] FieldSample At(const Vector3& u) const {
-    const double place = std::clamp((u.z + 1) * (1 / kStep), 0.0, kPieces - 1e-9);
-    const auto piece = static_cast<std::size_t>(place);
-    const double t = place - static_cast<double>(piece);
-    FieldSample sample;
-    // w = x + i y, and w^(m - 1) of the order at hand; orders of equal poles are 8 apart.
-    const Flat w{u.x, u.y}, w2 = Times(w, w), w4 = Times(w2, w2), w8 = Times(w4, w4);
-    Flat power{1, 0};
-    int reached = 0;
-    for (const Order& order : orders_) {
-      const Read cosine = ReadAt(order.cosine, piece, t);
-      const int m = order.order;
-      if (m == 0) {
-        sample.b_T += cosine.value;
-        sample.slope_T.z += cosine.slope;
-        continue;
-      }
-      const Read sine = ReadAt(order.sine, piece, t);
-      int gap = m - 1 - reached;
-      for (; gap >= 8; gap -= 8) power = Times(power, w8);
-      if ((gap & 4) != 0) power = Times(power, w4);
-      if ((gap & 2) != 0) power = Times(power, w2);
-      if ((gap & 1) != 0) power = Times(power, w);
-      reached = m - 1;
-      const Flat whole = Times(power, w);
-      sample.b_T += cosine.value * whole.x + sine.value * whole.y;
-      sample.slope_T.z += cosine.slope * whole.x + sine.slope * whole.y;
-      sample.slope_T.x += m * (cosine.value * power.x + sine.value * power.y);
-      sample.slope_T.y += m * (sine.value * power.x - cosine.value * power.y);
+  // Hermite's, through both knots of a piece with their slopes.
+  static std::vector<Cubic> CubicsOf(int order, const std::vector<double>& coefficients) {
+    const std::vector<Knot> knots = KnotsOf(order, coefficients);
+    std::vector<Cubic> cubics;
+    for (std::size_t k = 0; k < kPieces; ++k) {
+      const Knot &low = knots[k], &high = knots[k + 1];
+      const double rise = high.value - low.value;
+      cubics.push_back({{low.value, low.slope, 3 * rise - 2 * low.slope - high.slope,
+                         low.slope + high.slope - 2 * rise}});
     }
-    return sample;
+    return cubics;
   }
 
   std::vector<Order> orders_;  // ascending
 };
 
 }  // namespace
+
+void FieldModel::Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const {
+  DirectionLanes directions;
+  SampleLanes samples;
+  for (std::size_t begin = 0; begin < local.size(); begin += kLanes) {
+    const std::size_t count = std::min(kLanes, local.size() - begin);
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const Vector3& u = local[begin + std::min(k, count - 1)];
+      directions.x.at[k] = u.x;
+      directions.y.at[k] = u.y;
+      directions.z.at[k] = u.z;
+    }
+    EvaluateLanes(directions, &samples);
+    for (std::size_t k = 0; k < count; ++k)
+      out[begin + k] = {samples.b_T.at[k],
+                        {samples.slope_x.at[k], samples.slope_y.at[k], samples.slope_z.at[k]}};
+  }
+}
 
 std::unique_ptr<FieldModel> MakeField(const FieldParameters& parameters) {
   if (const auto* harmonic = std::get_if<HarmonicParameters>(&parameters))

@@ -22,6 +22,7 @@
 #include <variant>
 #include <vector>
 
+#include "sim/hall/lanes.h"
 #include "sim/hall/rotation.h"
 
 namespace focalfleet::sim {
@@ -42,9 +43,10 @@ class FieldModel {
   [[nodiscard]] virtual std::string_view kind() const = 0;
   /// After which turn about z the field is the same again: 90 deg for eight equal poles.
   [[nodiscard]] virtual double period_rad() const { return 90 * kRadPerDeg; }
-  /// Pre: directions are unit vectors, as many as samples.
-  /// Cost: no allocation; harmonic 10 ns, surface 50 ns, spherical some 10 ns an order.
-  virtual void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const = 0;
+  /// Pre: all are unit vectors. Cost: no allocation.
+  virtual void EvaluateLanes(const DirectionLanes& local, SampleLanes* out) const = 0;
+  /// The same of any number. Pre: as many samples as directions.
+  void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const;
 
   [[nodiscard]] double Radial_T(const Vector3& local) const {
     FieldSample sample;

@@ -37,6 +37,77 @@ bool Invert(const Matrix& a, Matrix* out) {
   return true;
 }
 
+// ---- eight sensors at a time
+
+// Directions in the rotor's frame and their derivatives by alpha and beta; that by gamma is
+// (y, -x, 0) of the direction.
+struct TurnedLanes {
+  DirectionLanes local, by_alpha, by_beta;
+};
+FOCALFLEET_WIDE void Turn(const Rotation& rotation, const DirectionLanes& stator,
+                          TurnedLanes* __restrict out) {
+  const Rotation at = rotation;
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const Turned turned = at.ToRotorWithSlopes({stator.x.at[k], stator.y.at[k], stator.z.at[k]});
+    out->local.x.at[k] = turned.local.x;
+    out->local.y.at[k] = turned.local.y;
+    out->local.z.at[k] = turned.local.z;
+    out->by_alpha.x.at[k] = turned.by_alpha.x;
+    out->by_alpha.y.at[k] = turned.by_alpha.y;
+    out->by_alpha.z.at[k] = turned.by_alpha.z;
+    out->by_beta.x.at[k] = turned.by_beta.x;
+    out->by_beta.y.at[k] = turned.by_beta.y;
+    out->by_beta.z.at[k] = turned.by_beta.z;
+  }
+}
+
+// Sums over the sensors, each in four lanes until the end, so that their order does not depend on
+// the width of the machine: J^T J by rows from the diagonal on, J^T r, r^T r.
+constexpr std::size_t kSums = 10;
+struct Sums {
+  double lane[kSums][4];
+  [[nodiscard]] double Total(std::size_t sum) const {
+    return (lane[sum][0] + lane[sum][1]) + (lane[sum][2] + lane[sum][3]);
+  }
+};
+struct Seen {
+  const Lane& factor;
+  const Lane& weight;  // 0 of sensors that are not to be trusted
+  const Lane& wanted_T;
+};
+FOCALFLEET_WIDE void Accumulate(const TurnedLanes& turned, const SampleLanes& field,
+                                const Seen& seen, bool magnitudes, Sums* __restrict sums) {
+  Lane row[4];
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    const double sx = field.slope_x.at[k], sy = field.slope_y.at[k], sz = field.slope_z.at[k];
+    const double value = seen.factor.at[k] * field.b_T.at[k];
+    const double sign = magnitudes && value < 0 ? -1.0 : 1.0;
+    const double scale = seen.weight.at[k] * sign * seen.factor.at[k];
+    row[0].at[k] = scale * (sx * turned.by_alpha.x.at[k] + sy * turned.by_alpha.y.at[k] +
+                            sz * turned.by_alpha.z.at[k]);
+    row[1].at[k] = scale * (sx * turned.by_beta.x.at[k] + sy * turned.by_beta.y.at[k] +
+                            sz * turned.by_beta.z.at[k]);
+    row[2].at[k] = scale * (sx * turned.local.y.at[k] - sy * turned.local.x.at[k]);
+    row[3].at[k] = seen.weight.at[k] * (seen.wanted_T.at[k] - sign * value);
+  }
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double a = row[0].at[k], a4 = row[0].at[k + 4];
+    const double b = row[1].at[k], b4 = row[1].at[k + 4];
+    const double c = row[2].at[k], c4 = row[2].at[k + 4];
+    const double r = row[3].at[k], r4 = row[3].at[k + 4];
+    sums->lane[0][k] += a * a + a4 * a4;
+    sums->lane[1][k] += a * b + a4 * b4;
+    sums->lane[2][k] += a * c + a4 * c4;
+    sums->lane[3][k] += b * b + b4 * b4;
+    sums->lane[4][k] += b * c + b4 * c4;
+    sums->lane[5][k] += c * c + c4 * c4;
+    sums->lane[6][k] += a * r + a4 * r4;
+    sums->lane[7][k] += b * r + b4 * r4;
+    sums->lane[8][k] += c * r + c4 * r4;
+    sums->lane[9][k] += r * r + r4 * r4;
+  }
+}
+
 Orientation Moved(const Orientation& from, const Triple& by) {
   return {from.alpha_rad + by[0], from.beta_rad + by[1], from.gamma_rad + by[2]};
 }
@@ -67,26 +138,30 @@ OrientationSolver::OrientationSolver(HallRig rig, std::shared_ptr<const FieldMod
       field_(std::move(field)),
       options_(options),
       periodic_(field_->period_rad() < 91 * kRadPerDeg) {
-  FOCALFLEET_CHECK(rig_.sensors.size() <= kSensorsMax);
-  for (const HallSensor& sensor : rig_.sensors) {
-    const HallRig::Seen seen = rig_.SeenFromRotor(sensor);
-    direction_.push_back(seen.direction);
-    factor_.push_back(seen.factor);
+  FOCALFLEET_CHECK(!rig_.sensors.empty() && rig_.sensors.size() <= kSensorsMax);
+  for (std::size_t k = 0; k < kSensorsMax; ++k) {
+    const HallRig::Seen seen = rig_.SeenFromRotor(rig_.sensors[k < count() ? k : 0]);
+    DirectionLanes& block = directions_[k / kLanes];
+    block.x.at[k % kLanes] = seen.direction.x;
+    block.y.at[k % kLanes] = seen.direction.y;
+    block.z.at[k % kLanes] = seen.direction.z;
+    factors_[k / kLanes].at[k % kLanes] = seen.factor;
   }
   MakeAtlas();
 }
 
 void OrientationSolver::Predict(const Orientation& orientation, std::span<double> b_T) const {
-  const std::size_t count = direction_.size();
-  FOCALFLEET_CHECK(b_T.size() == count);
+  FOCALFLEET_CHECK(b_T.size() == count());
   const Rotation rotation(orientation);
-  std::array<Vector3, kSensorsMax> local;
-  std::array<FieldSample, kSensorsMax> samples;
-  for (std::size_t k = 0; k < count; ++k) local[k] = rotation.ToRotor(direction_[k]);
-  field_->Evaluate({local.data(), count}, {samples.data(), count});
-  for (std::size_t k = 0; k < count; ++k) {
-    b_T[k] = factor_[k] * samples[k].b_T;
-    if (options_.magnitudes) b_T[k] = std::abs(b_T[k]);
+  TurnedLanes turned;
+  SampleLanes samples;
+  for (std::size_t begin = 0; begin < count(); begin += kLanes) {
+    Turn(rotation, directions_[begin / kLanes], &turned);
+    field_->EvaluateLanes(turned.local, &samples);
+    for (std::size_t k = begin; k < std::min(begin + kLanes, count()); ++k) {
+      b_T[k] = factors_[begin / kLanes].at[k - begin] * samples.b_T.at[k - begin];
+      if (options_.magnitudes) b_T[k] = std::abs(b_T[k]);
+    }
   }
 }
 
@@ -98,34 +173,27 @@ struct OrientationSolver::Linear {
 
 OrientationSolver::Linear OrientationSolver::Linearise(const HallReading& reading,
                                                        const Orientation& at) const {
-  const std::size_t count = direction_.size();
-  std::array<Turned, kSensorsMax> turned;
-  std::array<Vector3, kSensorsMax> local;
-  std::array<FieldSample, kSensorsMax> samples;
   const Rotation rotation(at);
-  for (std::size_t k = 0; k < count; ++k) {
-    turned[k] = rotation.ToRotorWithSlopes(direction_[k]);
-    local[k] = turned[k].local;
+  TurnedLanes turned;
+  SampleLanes samples;
+  Sums sums{};
+  for (std::size_t begin = 0; begin < count(); begin += kLanes) {
+    Turn(rotation, directions_[begin / kLanes], &turned);
+    field_->EvaluateLanes(turned.local, &samples);
+    Lane weight, wanted;
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      weight.at[k] = (reading.used >> (begin + k) & 1u) != 0 ? 1 : 0;
+      wanted.at[k] = reading.b_T[begin + k];
+    }
+    Accumulate(turned, samples, {factors_[begin / kLanes], weight, wanted}, options_.magnitudes,
+               &sums);
   }
-  field_->Evaluate({local.data(), count}, {samples.data(), count});
   Linear linear;
-  for (std::size_t k = 0; k < count; ++k) {
-    if ((reading.used >> k & 1u) == 0) continue;
-    double value = factor_[k] * samples[k].b_T, sign = factor_[k];
-    if (options_.magnitudes && value < 0) {
-      value = -value;
-      sign = -sign;
-    }
-    const double miss = reading.b_T[k] - value;
-    const Triple row = {sign * Dot(samples[k].slope_T, turned[k].by_alpha),
-                        sign * Dot(samples[k].slope_T, turned[k].by_beta),
-                        sign * Dot(samples[k].slope_T, turned[k].by_gamma)};
-    linear.squares += miss * miss;
-    for (std::size_t i = 0; i < 3; ++i) {
-      linear.right[i] += row[i] * miss;
-      for (std::size_t j = i; j < 3; ++j) linear.normal[i][j] += row[i] * row[j];
-    }
-  }
+  std::size_t entry = 0;
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t j = i; j < 3; ++j) linear.normal[i][j] = sums.Total(entry++);
+  for (double& part : linear.right) part = sums.Total(entry++);
+  linear.squares = sums.Total(entry);
   return linear;
 }
 
@@ -194,18 +262,19 @@ Orientation OrientationSolver::Node(std::size_t index) const {
 }
 
 void OrientationSolver::MakeAtlas() {
-  const std::size_t count = direction_.size();
-  atlas_.resize(count * kNodes);
+  const std::size_t sensors = count();
+  atlas_.resize(sensors * kNodes);
   std::array<double, kSensorsMax> b_T{};
   for (std::size_t node = 0; node < kNodes; ++node) {
-    Predict(Node(node), {b_T.data(), count});
-    for (std::size_t k = 0; k < count; ++k) atlas_[k * kNodes + node] = static_cast<float>(b_T[k]);
+    Predict(Node(node), {b_T.data(), sensors});
+    for (std::size_t k = 0; k < sensors; ++k)
+      atlas_[k * kNodes + node] = static_cast<float>(b_T[k]);
   }
 }
 
 std::vector<Orientation> OrientationSolver::Starts(const HallReading& reading) const {
   std::vector<float> miss(kNodes, 0.0F);
-  for (std::size_t k = 0; k < direction_.size(); ++k) {
+  for (std::size_t k = 0; k < count(); ++k) {
     if ((reading.used >> k & 1u) == 0) continue;
     const float* row = atlas_.data() + k * kNodes;
     const auto b_T = static_cast<float>(reading.b_T[k]);

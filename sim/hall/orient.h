@@ -73,6 +73,8 @@ class OrientationSolver {
   [[nodiscard]] Orientation Wrapped(Orientation orientation) const;
 
  private:
+  static constexpr std::size_t kBlocks = kSensorsMax / kLanes;
+  [[nodiscard]] std::size_t count() const { return rig_.sensors.size(); }
   struct Linear;
   [[nodiscard]] Linear Linearise(const HallReading& reading, const Orientation& at) const;
   void MakeAtlas();
@@ -82,9 +84,10 @@ class OrientationSolver {
   HallRig rig_;
   std::shared_ptr<const FieldModel> field_;
   Options options_;
-  bool periodic_;                   // in -45..45 deg of gamma
-  std::vector<Vector3> direction_;  // of each sensor as the rotor's centre sees it
-  std::vector<double> factor_;
+  bool periodic_;  // in -45..45 deg of gamma
+  // Of each sensor as the rotor's centre sees it; unused lanes repeat the first.
+  std::array<DirectionLanes, kBlocks> directions_;
+  std::array<Lane, kBlocks> factors_;
   std::vector<float> atlas_;  // Shape: (sensors, nodes): one sensor's nodes lie together
 };
 

@@ -58,6 +58,13 @@ struct Board {
   /// 100 us counts of the unit's own clock since power-on, low 32 bits.
   std::uint32_t (*ticks)(void* context, BoardInstant now) = nullptr;
 
+  // ---- sensors; a board without any leaves both as they are, and speaks protocol version 1
+
+  std::uint8_t sensors = 0;  // at most limits::kSensorsPerUnit
+  /// What all of them show at `now`, averaged over the time that the board takes for it: `counts`
+  /// has a place for each, to be filled with 0..kFullCount, or kNoCount.
+  void (*sense)(void* context, BoardInstant now, std::uint16_t* counts) = nullptr;
+
   // ---- FLASH
 
   /// What stands in Flash now outlives a power cut from the return of this call on.

@@ -48,9 +48,46 @@ Board Firmware::MakeBoard() {
             return static_cast<std::uint32_t>(
                 static_cast<std::uint64_t>(unit_ns / static_cast<double>(kTick.ns)));
           },
+      .sensors = hardware_.joint.sensors,
+      .sense =
+          [](void* context, BoardInstant now, std::uint16_t* counts) {
+            auto& firmware = *static_cast<Firmware*>(context);
+            firmware.Sense(now, {counts, firmware.hardware_.joint.sensors});
+          },
       // A simulated FLASH keeps what is written to it at once.
       .keep = [](void*) {},
   };
+}
+
+void Firmware::Sense(HostInstant now, std::span<std::uint16_t> counts) {
+  const Hardware::Joint& joint = hardware_.joint;
+  const std::complex<double> tip = FibreAt(*joint.mechanism, {hardware_.axis[0]->AngleDeg(now),
+                                                              hardware_.axis[1]->AngleDeg(now)}) -
+                                   joint.mechanism->base_mm;
+  joint.magnets->Read(joint.unit, readings_++, {tip.real(), tip.imag(), joint.spine_mm}, counts);
+  if (!hardware_.faults->sensor) return;
+  using Kind = UnitFaults::Sensor::Kind;
+  const UnitFaults::Sensor& lies = *hardware_.faults->sensor;
+  if (lies.sensor >= counts.size() || lies.other >= counts.size()) return;
+  std::uint16_t& count = counts[lies.sensor];
+  constexpr int kMiddle = kFullCount / 2;
+  switch (lies.kind) {
+    case Kind::kStuck:
+      count = 20'000;
+      break;
+    case Kind::kSaturated:
+      count = kFullCount;
+      break;
+    case Kind::kMissing:
+      count = kNoCount;
+      break;
+    case Kind::kSwapped:
+      std::swap(count, counts[lies.other]);
+      break;
+    case Kind::kGain:
+      count = static_cast<std::uint16_t>(kMiddle + (count - kMiddle) * 7 / 10);
+      break;
+  }
 }
 
 // ---- power, frames and time

@@ -6,12 +6,15 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "protocol/base/instants.h"
 #include "protocol/wire/can_frame.h"
 #include "protocol/wire/codec.h"
 #include "sim/axis/axis.h"
 #include "sim/faults.h"
+#include "sim/mechanism.h"
+#include "sim/unit/joint_sensors.h"
 #include "sim/unit/unit_machine.h"
 
 namespace focalfleet::sim {
@@ -25,6 +28,14 @@ class Firmware {
     Flash* flash = nullptr;
     std::array<AxisModel*, kAxisCount> axis{};
     UnitFaults* faults = nullptr;
+    struct Joint {
+      UnitId unit;
+      std::uint8_t sensors = 0;
+      double spine_mm = 0;
+      const Mechanism* mechanism = nullptr;
+      const JointSensors* magnets = nullptr;
+    };
+    Joint joint = {};  // where it has sensors
   };
   using Trip = UnitMachine::Trip;
 
@@ -55,6 +66,7 @@ class Firmware {
 
  private:
   [[nodiscard]] Board MakeBoard();
+  void Sense(HostInstant now, std::span<std::uint16_t> counts);
   /// After whatever may have begun or ended a motion: when the planted fault is due.
   void FollowMotion();
   void TripIfDue(HostInstant now, Outbox* out);
@@ -74,6 +86,7 @@ class Firmware {
   HostInstant trip_at_ = kNever;    // planted
   // Of the requests to it alone, for answers under the wrong one.
   std::uint8_t sequence_ = 0;
+  std::uint32_t readings_ = 0;  // of the sensors
   std::uint8_t sequence_before_ = 0;
 };
 

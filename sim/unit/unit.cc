@@ -6,14 +6,24 @@ namespace focalfleet::sim {
 namespace {
 // Ids come round after 65536 moves; long before that the record starts anew.
 constexpr std::size_t kBegunMax = 32'768;
+
+Firmware::Hardware::Joint JointOf(const Unit::Parts& parts, const Mechanism& mechanism) {
+  if (parts.magnets == nullptr) return {};
+  return {parts.description.id, parts.description.sensors, parts.description.spine_mm, &mechanism,
+          parts.magnets};
+}
 }  // namespace
 
 Unit::Unit(const Parts& parts)
     : traits_(parts.traits),
       flash_(parts.flash),
       axis_(parts.axis),
-      firmware_(
-          {parts.description.node, parts.traits.clock, &flash_, {&axis_[0], &axis_[1]}, &faults_}),
+      firmware_({parts.description.node,
+                 parts.traits.clock,
+                 &flash_,
+                 {&axis_[0], &axis_[1]},
+                 &faults_,
+                 JointOf(parts, traits_.mechanism)}),
       recorded_(flash_.moves_begun) {
   if (flash_.last_begun.value != 0) begun_.push_back(flash_.last_begun.value);
 }

@@ -19,6 +19,7 @@ class Unit {
     UnitTraits traits;
     Flash flash;
     std::array<AxisModel, kAxisCount> axis;
+    const JointSensors* magnets = nullptr;  // outlives the unit
   };
   explicit Unit(const Parts& parts);
   Unit(const Unit&) = delete;  // the firmware points into it

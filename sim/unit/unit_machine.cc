@@ -80,6 +80,7 @@ void UnitMachine::Begin(BoardInstant now) {
   board_.keep(board_.context);  // before the first step
   const StagedMove held = Held();
   staged_ = {};
+  sensed_ = false;
   begin_at_ = kNever;
   began_at_ = end_at_ = now;
   began_ticks_ = board_.ticks(board_.context, now);

@@ -112,6 +112,7 @@ class UnitMachine {
   void On(const IdentifyRequest& m, const Context& c);
   void On(const ParameterRead& m, const Context& c);
   void On(const ParameterWrite& m, const Context& c);
+  void On(const SensorsRequest& m, const Context& c);
 
   void Enter(UnitState next);
   void Say(const UnitMessage& message, const Context& c);
@@ -156,6 +157,8 @@ class UnitMachine {
   Staged staged_;
   Granted granted_arm_;
   Granted granted_home_;
+  std::array<std::uint16_t, limits::kSensorsPerUnit> counts_{};  // the last reading
+  bool sensed_ = false;                                          // since the last motion began
   std::uint64_t malformed_ = 0;
 };
 

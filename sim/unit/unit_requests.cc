@@ -151,6 +151,7 @@ void UnitMachine::On(const Home& m, const Context& c) {
   flash.last_begun = m.move;
   ++flash.moves_begun;
   board_.keep(board_.context);
+  sensed_ = false;
   began_at_ = c.now;
   began_ticks_ = board_.ticks(board_.context, c.now);
   Enter(UnitState::kHoming);
@@ -208,8 +209,24 @@ void UnitMachine::On(const FaultRequest& m, const Context& c) {
 }
 
 void UnitMachine::On(const IdentifyRequest&, const Context& c) {
-  Say(IdentifyReply{flash_->serial, kProtocolVersion, kFirmwareMajor, kFirmwareMinor, kHardware},
-      c);
+  const std::uint8_t version = board_.sensors > 0 ? kProtocolVersionWithSensors : kProtocolVersion;
+  Say(IdentifyReply{flash_->serial, version, kFirmwareMajor, kFirmwareMinor, kHardware}, c);
+}
+
+void UnitMachine::On(const SensorsRequest& m, const Context& c) {
+  if (board_.sensors == 0) {  // version 1 has no such frame
+    ++malformed_;
+    return;
+  }
+  if (m.part == 0 || !sensed_) {
+    counts_.fill(kNoCount);
+    board_.sense(board_.context, c.now, counts_.data());
+    sensed_ = true;
+  }
+  SensorsReply reply{m.part, {}};
+  for (std::size_t k = 0; k < kSensorsPerPart; ++k)
+    reply.counts[k] = counts_[m.part * kSensorsPerPart + k];
+  Say(reply, c);
 }
 
 }  // namespace focalfleet::sim

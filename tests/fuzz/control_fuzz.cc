@@ -27,6 +27,8 @@ void CheckUnits(const Command& command) {
           if (what.unit) exists(*what.unit);
         } else if constexpr (std::is_same_v<What, ApplyCommand>) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
+        } else if constexpr (std::is_same_v<What, KeepModelCommand>) {
+          FOCALFLEET_CHECK(false);  // made by the desk itself
         } else {
           exists(what.unit);
         }

@@ -126,6 +126,7 @@ struct Puppet {
     if (m.clear && state == UnitState::kFault) state = UnitState::kRest;
     return {FaultReply{}};
   }
+  Answers On(const SensorsRequest&) { return {SensorsReply{}}; }
   Answers On(const IdentifyRequest&) { return {IdentifyReply{.serial = serial}}; }
   Answers On(const ParameterRead& m) {
     return {ParameterReply{false, m.axis, m.parameter, Answer::kOk, counter1}};

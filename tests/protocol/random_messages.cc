@@ -65,6 +65,7 @@ void Fill(Rng& rng, ParameterRead* m) { *m = {AnyAxis(rng), AnyParameter(rng)}; 
 void Fill(Rng& rng, ParameterWrite* m) {
   *m = {AnyAxis(rng), AnyParameter(rng), Whole<std::int32_t>(rng)};
 }
+void Fill(Rng& rng, SensorsRequest* m) { m->part = Draw<std::uint8_t>(rng, kSensorParts); }
 
 void Fill(Rng& rng, Done* m) {
   *m = {Draw<Outcome>(rng, 4), {Position24(rng), Position24(rng)}, AnyMove(rng)};
@@ -119,6 +120,10 @@ void Fill(Rng& rng, IdentifyReply* m) {
 void Fill(Rng& rng, ParameterReply* m) {
   *m = {rng.Below(2) != 0, AnyAxis(rng), AnyParameter(rng), AnyAnswer(rng),
         Whole<std::int32_t>(rng)};
+}
+void Fill(Rng& rng, SensorsReply* m) {
+  m->part = Draw<std::uint8_t>(rng, kSensorParts);
+  for (std::uint16_t& count : m->counts) count = Whole<std::uint16_t>(rng);
 }
 
 template <class T>
@@ -189,6 +194,11 @@ void Put(Text& out, const IdentifyReply& m) {
 }
 void Put(Text& out, const ParameterReply& m) {
   out << m.written << m.axis << m.parameter << m.answer << m.value;
+}
+void Put(Text& out, const SensorsRequest& m) { out << m.part; }
+void Put(Text& out, const SensorsReply& m) {
+  out << m.part;
+  for (const std::uint16_t count : m.counts) out << count;
 }
 template <class T>
 void Put(Text&, const T&) {

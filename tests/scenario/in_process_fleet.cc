@@ -31,6 +31,8 @@ sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDriv
                                  .base_x_mm = unit.base_fp.x_mm,
                                  .base_y_mm = unit.base_fp.y_mm,
                                  .axis = {},
+                                 .sensors = unit.sensors,
+                                 .spine_mm = unit.spine_mm,
                                  .enabled = unit.enabled};
   for (const Axis axis : kAxes) {
     const AxisGeometry& g = unit.axis[Index(axis)];
@@ -87,8 +89,8 @@ const VectorRow* MemoryStore::Vector(SerialNumber serial) const {
 }
 
 InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
-  std::vector<focalfleet::Unit> units =
-      MakeHexLayout({.count = options.count, .units_per_bus = options.units_per_bus});
+  std::vector<focalfleet::Unit> units = MakeHexLayout(
+      {.count = options.count, .units_per_bus = options.units_per_bus, .sensors = options.sensors});
   for (focalfleet::Unit& unit : units) unit.id.value += options.first_id - 1;
   auto layout = Layout::Create(std::move(units), {});
   FOCALFLEET_CHECK(layout.has_value());
@@ -103,6 +105,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
                           .faults = options.faults};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
+  config.joint_sensors = MakeJoints(*layout_, options.seed, options.spread);
   config.start = now_;
   config.clock_error_max = options.clock_error_max;
   FOCALFLEET_CHECK(sim::World::Validate(config).has_value());
@@ -192,7 +195,9 @@ void InProcessFleet::Perform(const Effects& effects) {
 // A camera that sees every fibre and knows whose it is: to see and to tell apart is tried
 // elsewhere.
 ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
-  ExposureFindings exposure{.id = job.id, .sightings = {}};
+  if (measurer) return measurer(job);
+  ExposureFindings exposure{
+      .id = job.id, .sightings = {}, .after_request_s = options_.exposure_delay.seconds()};
   for (std::uint32_t n = 0; n < layout_->size(); ++n) {
     const sim::UnitTruth truth = world_->Truth(n);
     const double noise_mm = 1e-3 * options_.centroid_sigma_um;
@@ -201,7 +206,7 @@ ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
                       .other = {},
                       .x_mm = truth.x_mm + noise_mm * camera_noise_.Normal(),
                       .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
-                      .sigma_um = options_.centroid_sigma_um,
+                      .covariance = RoundCovariance(options_.centroid_sigma_um),
                       .place = {}};
     if (job.expected[n][0].witness >= Witness::kReported)
       sighting.place = PlaceSeen(layout_->units()[n], drives_[n], {sighting.x_mm, sighting.y_mm},
@@ -273,9 +278,14 @@ std::uint64_t InProcessFleet::ApplyRandomMeasured(std::uint64_t seed,
   std::vector<std::optional<Pose>> standing(layout_->size());
   const auto poses = DrawConfiguration(*layout_, drives_, standing, Rng::Stream(seed, "targets"));
   FOCALFLEET_CHECK(poses.has_value());
+  return ApplyMeasured({poses->begin(), poses->end()}, measure);
+}
+
+std::uint64_t InProcessFleet::ApplyMeasured(std::vector<std::optional<Pose>> targets,
+                                            const ApplyCommand::Measure& measure) {
   const std::uint64_t request = next_request_++;
   Send({request, ApplyCommand{.source = "measured",
-                              .targets = {poses->begin(), poses->end()},
+                              .targets = std::move(targets),
                               .fixed = false,
                               .measure = measure}});
   return request;

@@ -49,6 +49,7 @@ class InProcessFleet {
     std::uint32_t first_id = 1;
     sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
     std::vector<sim::PlannedFault> faults = {};
+    std::uint8_t sensors = 0;  // at the joint of each unit
   };
 
   explicit InProcessFleet(const Options& options);
@@ -80,6 +81,8 @@ class InProcessFleet {
   /// Applies a random configuration that is clear of what stands; returns its request number.
   std::uint64_t ApplyRandom(std::uint64_t seed);
   std::uint64_t Apply(std::vector<std::optional<Pose>> targets);
+  std::uint64_t ApplyMeasured(std::vector<std::optional<Pose>> targets,
+                              const ApplyCommand::Measure& measure);
   /// The same configuration as ApplyRandom's, measured and corrected.
   std::uint64_t ApplyRandomMeasured(std::uint64_t seed, const ApplyCommand::Measure& measure);
 
@@ -109,6 +112,8 @@ class InProcessFleet {
   bool store_fails = false;
   /// What the camera makes of an exposure before the coordinator hears of it.
   std::function<void(ExposureDone*)> camera_fault;
+  /// Answers exposure jobs in the stead of that camera.
+  std::function<ExposureDone(const ExposureJob&)> measurer;
   std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
   std::vector<OutFrame>* sent = nullptr;        // where it is given: all frames of the coordinator
 

@@ -265,7 +265,8 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.Run(Seconds(40));
   EXPECT_EQ(fleet.coordinator().unit({11}).outcome, TargetOutcome::kFailed);
-  EXPECT_EQ(fleet.coordinator().unit({11}).outcome_reason, "it speaks protocol version 0, not 1");
+  EXPECT_EQ(fleet.coordinator().unit({11}).outcome_reason,
+            "it speaks protocol version 0, not 1 or 2");
   EXPECT_EQ(fleet.coordinator().unit({11}).knowledge[0].witness, Witness::kUnknown);
   EXPECT_EQ(fleet.world().Truth(std::size_t{11}).moves_begun, 1u);
   EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 30u) << Unserved(fleet);

@@ -23,10 +23,10 @@ class FirmwareRig {
  public:
   static constexpr NodeId kNode{9};
 
-  explicit FirmwareRig(double clock_rate = 1)
+  explicit FirmwareRig(double clock_rate = 1, const Firmware::Hardware::Joint& joint = {})
       : axes_{AxisModel(Traits(), &BenchMotor(), AxisModel::Start{0, 96, kBenchGear}),
               AxisModel(Traits(), &BenchMotor(), AxisModel::Start{960, 96, kBenchGear})},
-        firmware_({kNode, {clock_rate}, &flash_, {&axes_[0], &axes_[1]}, &faults_}) {
+        firmware_({kNode, {clock_rate}, &flash_, {&axes_[0], &axes_[1]}, &faults_, joint}) {
     flash_.serial = {4711};
     for (std::size_t i = 0; i < kAxisCount; ++i) {
       flash_.axis[i].min_position = kBenchMin;

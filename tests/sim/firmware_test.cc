@@ -160,6 +160,44 @@ const std::vector<Row>& Rows() {
   return rows;
 }
 
+/// A joint whose sensors show the number of the reading.
+class CountingJoint final : public JointSensors {
+ public:
+  void Read(UnitId unit, std::uint32_t reading, const SpineTip& tip,
+            std::span<std::uint16_t> counts) const override {
+    EXPECT_EQ(unit.value, 77u);
+    EXPECT_EQ(tip.length_mm, 30);
+    for (std::size_t k = 0; k < counts.size(); ++k)
+      counts[k] = static_cast<std::uint16_t>(100 * (reading + 1) + k);
+  }
+};
+
+TEST(FirmwareSensors, TellsOneReadingInPartsUntilItIsAskedForTheFirstAgain) {
+  const CountingJoint magnets;
+  const Mechanism mechanism{};
+  FirmwareRig rig(1, {UnitId{77}, 6, 30, &mechanism, &magnets});
+  EXPECT_EQ(rig.Ask<IdentifyReply>(IdentifyRequest{})->protocol_version, 2);
+  const auto part = [&](std::uint8_t number) {
+    const auto reply = rig.Ask<SensorsReply>(SensorsRequest{number});
+    EXPECT_EQ(reply->part, number);
+    return reply->counts;
+  };
+  using Counts = std::array<std::uint16_t, kSensorsPerPart>;
+  EXPECT_EQ(part(1), (Counts{104, 105, kNoCount, kNoCount})) << "nothing was read before";
+  EXPECT_EQ(part(0), (Counts{200, 201, 202, 203}));
+  EXPECT_EQ(part(1), (Counts{204, 205, kNoCount, kNoCount})) << "the rest of the same reading";
+  EXPECT_EQ(part(3), (Counts{kNoCount, kNoCount, kNoCount, kNoCount}));
+  EXPECT_EQ(part(0), (Counts{300, 301, 302, 303}));
+}
+
+TEST(FirmwareSensors, ABoardWithoutAnySpeaksVersion1AndDropsTheFrame) {
+  FirmwareRig rig;
+  EXPECT_EQ(rig.Ask<IdentifyReply>(IdentifyRequest{})->protocol_version, 1);
+  const std::uint64_t malformed = rig.firmware().malformed();
+  EXPECT_TRUE(rig.Give(SensorsRequest{0}).empty());
+  EXPECT_EQ(rig.firmware().malformed(), malformed + 1);
+}
+
 TEST(Firmware, AnswersEveryMessageInEveryStateAsTheTableSays) {
   for (const Row& row : Rows()) {
     for (const At at : kAllAt) {

@@ -70,10 +70,19 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Standard deviation, over the arcs, of how far one and the same move goes; the median over all
-/// moves in the middle of the arcs (the first after a reversal and the last before it have play and
-/// the hard stop in them).
-double ScatterOfAMove(const std::string& folder, const std::string& axis) {
+/// Whether the moves that end at `first` .. `last` go one way, and those before and after them,
+/// too: the first after a reversal and the last before it have play and the hard stop in them.
+bool AreInTheMiddle(const std::vector<double>& commanded, std::size_t first, std::size_t last) {
+  if (first < 2 || last + 1 >= commanded.size()) return false;
+  const bool up = commanded[first] > commanded[first - 1];
+  for (std::size_t i = first - 1; i <= last + 1; ++i)
+    if ((commanded[i] > commanded[i - 1]) != up) return false;
+  return true;
+}
+
+/// Standard deviation, over the arcs, of how far one and the same way of `moves` moves goes; the
+/// median over all ways in the middle of the arcs. Units: degrees.
+double ScatterOfAWay(const std::string& folder, const std::string& axis, std::size_t moves = 1) {
   std::map<std::pair<int, int>, std::vector<double>> ways;
   for (const auto& [arc, rows] : Arcs(folder)) {
     std::vector<std::complex<double>> points;
@@ -84,10 +93,14 @@ double ScatterOfAMove(const std::string& folder, const std::string& axis) {
       commanded.push_back(row.at(axis + "_cmd_deg"));
     }
     const std::complex<double> centre = CentreOf(points);
-    for (std::size_t i = 1; i < points.size(); ++i) {
-      const double way = std::arg((points[i] - centre) / (points[i - 1] - centre));
+    for (std::size_t i = 1; i + moves <= points.size(); ++i) {
+      const std::size_t last = i + moves - 1;
+      if (!AreInTheMiddle(commanded, i, last)) continue;
+      double way = 0;
+      for (std::size_t k = i; k <= last; ++k)
+        way += std::arg((points[k] - centre) / (points[k - 1] - centre));
       const auto key = std::pair(static_cast<int>(std::lround(commanded[i - 1])),
-                                 static_cast<int>(std::lround(commanded[i] - commanded[i - 1])));
+                                 static_cast<int>(std::lround(commanded[last] - commanded[i - 1])));
       ways[key].push_back(way * 180 / std::numbers::pi);
     }
   }
@@ -100,7 +113,7 @@ double ScatterOfAMove(const std::string& folder, const std::string& axis) {
     for (const double value : values) squares += (value - mean) * (value - mean);
     spreads.push_back(std::sqrt(squares / static_cast<double>(values.size() - 1)));
   }
-  EXPECT_GE(spreads.size(), 16u);
+  EXPECT_GE(spreads.size(), 6u);
   return Median(spreads);
 }
 
@@ -116,8 +129,8 @@ TEST(MeasuredMoves, ScatterAsTheLawHasItForShortMoves) {
     const double noise_deg = std::sqrt(2.0) * 1e-3 / radius_mm * 180 / std::numbers::pi;
     return std::hypot(LawDeg(0.1, way_deg), noise_deg);
   };
-  const double theta = ScatterOfAMove("theta-arcs-may", "theta");
-  const double phi = ScatterOfAMove("phi-arcs-may", "phi");
+  const double theta = ScatterOfAWay("theta-arcs-may", "theta");
+  const double phi = ScatterOfAWay("phi-arcs-may", "phi");
   std::printf("scatter of a move: theta 30 deg %.3f deg, law %.3f; phi 15 deg %.3f, law %.3f\n",
               theta, seen_as(30, 6), phi, seen_as(15, 3));
   EXPECT_NEAR(theta / seen_as(30, 6), 1, 0.25);
@@ -125,6 +138,22 @@ TEST(MeasuredMoves, ScatterAsTheLawHasItForShortMoves) {
   // A scatter that is drawn anew by every move, however short, it is not.
   EXPECT_LT(theta, 0.5 * std::sqrt(2.0) * 0.09);
   EXPECT_LT(phi, 0.5 * std::sqrt(2.0) * 0.09);
+}
+
+TEST(MeasuredMoves, LongerWaysScatterMoreInPhiAndNeverMoreThanTwiceTheLaw) {
+  // One unit. Its phi grows somewhat faster than the law, its theta stays what it is after 30 deg:
+  // the law stands between the two, and at no length is a way half as good as it says.
+  std::vector<double> phi;
+  for (const std::size_t moves : {1u, 2u, 3u, 4u, 5u, 6u}) {
+    const double way_deg = 15.0 * static_cast<double>(moves);
+    phi.push_back(ScatterOfAWay("phi-arcs-may", "phi", moves));
+    const double theta = ScatterOfAWay("theta-arcs-may", "theta", moves);
+    std::printf("phi %3.0f deg: %.3f deg, law %.3f; theta %3.0f deg: %.3f deg, law %.3f\n", way_deg,
+                phi.back(), LawDeg(0.1, way_deg), 2 * way_deg, theta, LawDeg(0.1, 2 * way_deg));
+    EXPECT_LT(phi.back(), 2 * LawDeg(0.1, way_deg));
+    EXPECT_LT(theta, 2 * LawDeg(0.1, 2 * way_deg));
+  }
+  EXPECT_GT(phi[5], 2 * phi[0]);  // and not the same for every length, either
 }
 
 }  // namespace

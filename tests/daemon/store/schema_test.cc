@@ -84,6 +84,29 @@ TEST_F(StoreTest, AStoreOfVersionOneKeepsWhatItHasAndTakesTunings) {
             37);
 }
 
+TEST_F(StoreTest, AStoreOfVersionFourGetsRoundCovariancesOfItsMeasurements) {
+  {
+    auto connection = Open(Path());
+    ASSERT_TRUE(Migrate(*connection, 0, Migrations().first(4)));
+    ASSERT_TRUE(connection->Execute(
+        "INSERT INTO measurement VALUES(7, 12, 7001, 3, 0, NULL, 1.5, 2.5, 4, 5, 6, 1, 2, 9, 5)"));
+  }
+  {
+    auto store = OpenStore();
+    ASSERT_TRUE(store->Load());
+  }
+  const auto read = OpenReader()->Measurements(7);
+  ASSERT_TRUE(read) << read.error().text;
+  ASSERT_EQ(read->size(), 1u);
+  const MeasurementRow& row = read->front().row;
+  EXPECT_NEAR(row.covariance.xx, 16e-6, 1e-18);
+  EXPECT_EQ(row.covariance.xy, 0);
+  EXPECT_NEAR(SigmaUm(row.covariance), 4, 1e-12);
+  EXPECT_EQ(row.x_mm, 1.5);
+  EXPECT_EQ(row.target_id, "");
+  EXPECT_FALSE(row.delay_s);
+}
+
 TEST_F(StoreTest, OpeningANewStoreSurvivesEveryFailingWrite) {
   focalfleet::testing::FaultyDisk disk;
   std::uint64_t n = 1;

@@ -95,6 +95,70 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
   EXPECT_EQ(fleet->next_alarm, 10u);
 }
 
+ModelRow Loaded(std::uint64_t entry, const std::string& sha256, const std::string& text) {
+  return {.entry = entry,
+          .sha256 = sha256,
+          .restores = 0,
+          .name = "night-extended",
+          .campaign = "night",
+          .campaign_sha256 = "c0ffee",
+          .rms_before_um = 54,
+          .rms_after_um = std::nan(""),
+          .text = std::make_shared<const std::string>(text)};
+}
+
+TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
+  auto store = OpenStore();
+  testing::ExpectDone(store->Commit(std::vector<Row>{Loaded(1, "aa", "name = 'a'\n")}, kEight));
+  testing::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 2}}, kNine));
+  ModelRow back = Loaded(3, "aa", "");
+  back.text.reset();
+  back.restores = 1;
+  testing::ExpectDone(store->Commit(std::vector<Row>{back}, kNine));
+  const auto reader = OpenReader();
+  const auto changes = reader->Models(10);
+  ASSERT_TRUE(changes) << changes.error().text;
+  ASSERT_EQ(changes->size(), 3u);  // newest first
+  EXPECT_EQ((*changes)[0].row.restores, 1u);
+  EXPECT_EQ((*changes)[0].row.sha256, "aa");
+  EXPECT_EQ((*changes)[1].row.sha256, "");
+  const ModelRow& first = (*changes)[2].row;
+  EXPECT_EQ(first.entry, 1u);
+  EXPECT_EQ(first.name, "night-extended");
+  EXPECT_EQ(first.campaign, "night");
+  EXPECT_EQ(first.campaign_sha256, "c0ffee");
+  EXPECT_EQ(first.rms_before_um, 54);
+  EXPECT_TRUE(std::isnan(first.rms_after_um));
+  EXPECT_EQ((*changes)[2].at.ns, kEight.ns);
+  EXPECT_EQ(*reader->ModelText("aa"), "name = 'a'\n");
+  const auto none = reader->ModelText("bb");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kRefused);
+  // What could not be read back is not written.
+  EXPECT_FALSE(store->Commit(std::vector<Row>{ModelRow{.entry = 0}}, kNine));
+  ModelRow later = back;
+  later.entry = 4;
+  later.restores = 4;
+  EXPECT_FALSE(store->Commit(std::vector<Row>{later}, kNine));
+  EXPECT_EQ(OpenReader()->Models(10)->size(), 3u);
+}
+
+TEST_F(StoreTest, TellsWhoWasHomedSince) {
+  auto store = OpenStore();
+  const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
+    testing::ExpectDone(store->Commit(
+        std::vector<Row>{Intent(unit, serial, 3, {0, 0}, {5, 5}), IntentEndRow{{serial}, {3}, end}},
+        at));
+  };
+  home(12, 7001, IntentEnd::kHomed, kEight);
+  home(13, 7002, IntentEnd::kHomed, kNine);
+  home(14, 7003, IntentEnd::kArrived, kNine);
+  const auto since = OpenReader()->HomedSince(kEight);
+  ASSERT_TRUE(since) << since.error().text;
+  ASSERT_EQ(since->size(), 1u);
+  EXPECT_EQ(since->front().value, 13u);
+}
+
 TuningRow Tuned(std::uint16_t critical, double margin) {
   return {.serial = {7},
           .axis = Axis::kPhi,
@@ -280,7 +344,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
       no_witness,
       turned_hull,
       Vector(0, Witness::kReported, 5, 5),
-      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(7)),
+      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(8)),
       IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
       ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
       Tuned(0, 0.5),   // no n at all
@@ -339,7 +403,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE axis_state SET vector = NULL", "vector and turns do not belong"},
         Garbage{"UPDATE axis_state SET vector = 96", "vector is 96"},
         Garbage{"UPDATE axis_state SET subdivision = 70000", "subdivision is 70000"},
-        Garbage{"UPDATE axis_state SET origin = 7", "origin is 7"},
+        Garbage{"UPDATE axis_state SET origin = 8", "origin is 8"},
         Garbage{"UPDATE axis_state SET move = 65536", "move is 65536"},
         Garbage{"UPDATE axis_state SET axis = 2 WHERE axis = 1", "axis is 2"},
         Garbage{"UPDATE axis_state SET move = 7 WHERE axis = 1", "of different moves"},
@@ -356,7 +420,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE tuning SET critical = 55", "tuning, row serial 7, axis 1: its n are not"},
         Garbage{"UPDATE tuning SET load_uNm = 0", "load"},
         Garbage{"UPDATE tuning SET mode = 3", "mode is 3"},
-        Garbage{"UPDATE tuning SET origin = 7", "origin is 7"},
+        Garbage{"UPDATE tuning SET origin = 8", "origin is 8"},
         Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
         Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 
@@ -370,6 +434,84 @@ TEST_F(StoreTest, GarbageInHistoryIsAnErrorToo) {
   auto reader = OpenReader();
   EXPECT_THAT(ErrorOf(reader->Moves({}, 9)).text, HasSubstr("end is 77"));
   EXPECT_THAT(ErrorOf(reader->Alarms(9)).text, HasSubstr("severity is 3"));
+}
+
+TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
+  MeasurementRow row{.exposure = 7,
+                     .configuration = 3,
+                     .serial = {7001},
+                     .unit = {12},
+                     .status = SightingStatus::kDidNotMove,
+                     .other = UnitId{9},
+                     .x_mm = 1.0 / 3,
+                     .y_mm = -2e-7,
+                     .covariance = {1e-5 / 3, -3e-6 / 7, 2e-5 / 3},
+                     .place = Pose{-5, 8},
+                     .target_fp = PointFp{0.1, 0.2},
+                     .error_um = 12.3,
+                     .target_id = "NGC 4565, \"needle\"",
+                     .delay_s = 0.7};
+  MeasurementRow bare{.exposure = 7,
+                      .serial = {7002},
+                      .unit = {13},
+                      .other = {},
+                      .place = {},
+                      .target_fp = {},
+                      .error_um = {},
+                      .target_id = {},
+                      .delay_s = {}};
+  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, bare}, {6}));
+  const auto read = OpenReader()->Measurements(7);
+  ASSERT_TRUE(read) << read.error().text;
+  ASSERT_EQ(read->size(), 2u);
+  const MeasurementRow& back = (*read)[0].row;
+  EXPECT_EQ(back.covariance, row.covariance);
+  EXPECT_EQ(back.target_id, row.target_id);
+  EXPECT_EQ(back.delay_s, row.delay_s);
+  EXPECT_EQ(back.x_mm, row.x_mm);
+  EXPECT_EQ(back.place, row.place);
+  EXPECT_EQ((*read)[1].row.target_id, "");
+  EXPECT_FALSE((*read)[1].row.delay_s);
+  EXPECT_FALSE(back.spine);
+  row.covariance.yy = -1;
+  EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{row}, {6}));
+}
+
+TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithWhoeverMeasured) {
+  MeasurementRow row{.exposure = 8,
+                     .serial = {7001},
+                     .unit = {12},
+                     .status = SightingStatus::kTooCoarse,
+                     .other = {},
+                     .place = {},
+                     .target_fp = {},
+                     .error_um = {},
+                     .target_id = {},
+                     .delay_s = {},
+                     .source = SightingSource::kSensors};
+  row.spine = SpineReading{.angles_deg = {1.0 / 3, -20.0 / 7, 0.1},
+                           .covariance_deg2 = {1e-5 / 3, -1e-6, 2e-7, 3e-5 / 7, 0, 1e-4},
+                           .used = 0xf7,
+                           .solved = true,
+                           .trusted = true,
+                           .verdict = "missing v4"};
+  MeasurementRow lying = row;
+  lying.serial = {7002};
+  lying.unit = {13};
+  lying.status = SightingStatus::kSensorsDoubted;
+  lying.spine = SpineReading{.used = 0x7, .verdict = "too few sensors"};
+  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
+  const auto read = OpenReader()->Measurements(8);
+  ASSERT_TRUE(read) << read.error().text;
+  ASSERT_EQ(read->size(), 2u);
+  EXPECT_EQ((*read)[0].row.source, SightingSource::kSensors);
+  EXPECT_EQ((*read)[0].row.status, SightingStatus::kTooCoarse);
+  EXPECT_EQ((*read)[0].row.spine, row.spine);
+  EXPECT_EQ((*read)[1].row.spine, lying.spine);
+  lying.spine->trusted = true;
+  EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{lying}, {6})) << "trusted, and there is none";
+  row.spine->covariance_deg2[3] = -1;
+  EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{row}, {6}));
 }
 
 TEST_F(StoreTest, ASecondWriterIsRefusedAndTheFirstNamed) {

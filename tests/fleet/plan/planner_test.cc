@@ -341,6 +341,49 @@ TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
   ExpectSound(fleet, *plan, options);
 }
 
+TEST(Planner, SendsNobodyElseThroughItsCellBecauseTwoStartTooNear) {
+  // The two of the test above, and one far away that has a degree to go.
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
+  fleet.StandAt(
+      {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5), PoseDeg(fleet, 2, 10, 30)});
+  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
+                   PoseDeg(fleet, 2, 9, 31)};
+  const auto plan = MakePlan(fleet.request(), {.fixed = false, .lead_apart = true});
+  ASSERT_TRUE(plan) << plan.error().text;
+  EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
+  ASSERT_EQ(plan->moves.size(), 3u);
+  for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[2].path[Index(axis)].size(), 1u);
+}
+
+TEST(Planner, LeavesWhoIsStuckWhenAskedToAndTheOthersGoStraight) {
+  // Two arms across each other, and one far away that has a degree to go.
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
+  fleet.StandAt({PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 10, 30)});
+  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
+                   PoseDeg(fleet, 2, 9, 31)};
+  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
+  ASSERT_TRUE(plan) << plan.error().text;
+  ASSERT_EQ(plan->unserved.size(), 2u);
+  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kBlocked);
+  ASSERT_EQ(plan->moves.size(), 1u);
+  EXPECT_EQ(plan->moves[0].unit.value, 2u);
+  for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[0].path[Index(axis)].size(), 1u);
+}
+
+TEST(Planner, KeepsToTheRangeOfAUnitsOwnCount) {
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0)});
+  fleet.StandAt({PoseDeg(fleet, 0, 90, 100)});
+  fleet.targets = {PoseDeg(fleet, 0, 90, 178)};
+  PlanRequest request = fleet.request();
+  // It stands 3 degrees of phi less than it counts: 178 degrees would be 181 to it.
+  const std::vector<Pose> less{PoseDeg(fleet, 0, 0, -3)};
+  request.offsets = less;
+  EXPECT_FALSE(MakePlan(request, {}));
+  const std::vector<Pose> more{PoseDeg(fleet, 0, 0, 3)};
+  request.offsets = more;
+  EXPECT_TRUE(MakePlan(request, {}));
+}
+
 TEST(Planner, RefusesATargetOutOfRangeAndArraysOfTheWrongSize) {
   PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
   fleet.StandAt({PoseDeg(fleet, 0, 90, 170), PoseDeg(fleet, 1, 90, 170)});

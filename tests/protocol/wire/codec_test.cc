@@ -146,6 +146,7 @@ std::vector<Golden> GoldenHostFrames() {
       {"14C152E1#", host(FaultRequest{true})},
       {"18D152E0#", host(IdentifyRequest{})},
       {"18E152E1#08", host(ParameterRead{Axis::kPhi, Parameter::kHostTimeoutMs})},
+      {"151152E1#", host(SensorsRequest{1})},
       {"18F152E0#04FEFFFFFF", host(ParameterWrite{Axis::kTheta, Parameter::kPosition, -2})},
   };
 }
@@ -177,6 +178,7 @@ std::vector<Golden> GoldenUnitFrames() {
       {"18D952E0#0403020101020304", unit(IdentifyReply{{0x01020304}, 1, 2, 3, 4})},
       {"18E952E0#0200 60000000",
        unit(ParameterReply{false, Axis::kTheta, Parameter::kSubdivision, Answer::kOk, 96})},
+      {"151952E1#01020304FFFFFEFF", unit(SensorsReply{1, {0x0201, 0x0403, kNoCount, kFullCount}})},
       {"18F952E1#040600000080",
        unit(ParameterReply{true, Axis::kPhi, Parameter::kPosition, Answer::kBadValue, INT32_MIN})},
   };
@@ -312,8 +314,8 @@ TEST(Codec, EnumeratorsAreCheckedOverAll256Values) {
 
 TEST(Codec, DetailBitsAreCheckedForEveryFunction) {
   // Highest detail that each function takes, by direction; -1: no such message.
-  const int host_max[kFunctionCount] = {0, 0, -1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1, 1};
-  const int unit_max[kFunctionCount] = {-1, -1, 3, 0, 0, -1, -1, 0, 0, 6, 0, 1, 0, 0, 1, 1};
+  const int host_max[kFunctionCount] = {0, 0, -1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1, 1, -1, 3};
+  const int unit_max[kFunctionCount] = {-1, -1, 3, 0, 0, -1, -1, 0, 0, 6, 0, 1, 0, 0, 1, 1, -1, 3};
   for (std::uint32_t f = 0; f < kFunctionCount; ++f) {
     int host_seen = -1;
     int unit_seen = -1;

@@ -7,38 +7,14 @@
 #include <string>
 #include <thread>
 
-#include "sim/diagnosis/planted.h"
 #include "sim/effects/registry.h"
+#include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {
 
 using testing::Contains;
 using testing::UnorderedElementsAre;
-
-Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions options = {}) {
-  options.units = options.units == 60 ? 24 : options.units;
-  options.effects = std::move(effects);
-  auto campaign = PlantCampaign(options);
-  EXPECT_TRUE(campaign) << campaign.error().text;
-  return *campaign;
-}
-
-Diagnosis Verdicts(const Campaign& campaign, DiagnoseOptions options = {}) {
-  options.with_gain = false;
-  return Diagnose(campaign, options);
-}
-
-std::string Told(const Diagnosis& diagnosis) {
-  std::string text(Name(diagnosis.verdict));
-  for (const CauseFound& cause : diagnosis.causes) {
-    text += "; " + cause.cause + " " + cause.axis + " " + cause.scope + " " +
-            std::to_string(cause.amplitude);
-    for (const std::string& candidate : cause.candidates) text += " " + candidate;
-  }
-  for (const UnknownFound& unknown : diagnosis.unknown) text += "; against " + unknown.covariate;
-  return text;
-}
 
 TEST(Diagnosis, NothingWrongIsConsistent) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -65,7 +41,8 @@ TEST_P(EveryEffect, IsNamedAndMeasured) {
   EXPECT_THAT(diagnosis.causes[0].candidates, Contains(plant.cause)) << Told(diagnosis);
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
   if (diagnosis.causes[0].cause != plant.cause) return;  // an honest tie
-  EXPECT_NEAR(std::abs(diagnosis.causes[0].amplitude), plant.amplitude, 0.25 * plant.amplitude);
+  // A quarter, and a little: another shape of the same cause counts its amplitude another way.
+  EXPECT_NEAR(std::abs(diagnosis.causes[0].amplitude), plant.amplitude, 0.3 * plant.amplitude);
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -1,12 +1,17 @@
-// Campaigns with one planted cause or none, drawn by an independent plant and diagnosed from what a
-// file would hold. Prints how many were named right, and ends with 1 where a figure is missed: of
-// nulls named at most 1 %, of single causes with lambda >= 100 named exactly at least 97 %, wrong
-// and sure at most 0.5 % (with few campaigns: at most one of each more).
-//   hall_campaigns [--per 6] [--nulls 20] [--magnets 0] [--seed 1]
+// Campaigns with planted causes or none, drawn by an independent plant and diagnosed from what a
+// file would hold, with the figures of merit of every diagnosis (docs/hall.md). Lambda is the chi^2
+// of what was planted after amplitude and phase of the field, which nobody knows, are projected
+// out; it is drawn from 15 to 4000. Ends with 1 where a figure is missed by more than its few
+// campaigns allow: nulls named 1 % (dirty 2 %), exact at lambda >= 100 97 %, wrong and sure 0.5 %.
+//   hall_campaigns [--per 6] [--nulls 20] [--dirty 10] [--pairs 6] [--outside 6] [--magnets 0]
+//                  [--seed 1]
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "sim/hall/diagnosis/hall_diagnosis.h"
 #include "sim/hall/field_fit.h"
@@ -24,8 +29,8 @@ using focalfleet::testing::Vec;
 
 constexpr double kAmplitude_T = 0.08;
 constexpr const char* kCauses[] = {
-    "none",          "field_width",     "field_harmonics", "sensor_gain",
-    "sensor_offset", "sensor_position", "centre_offset",   "temperature_coefficient"};
+    "field_width",   "field_harmonics",        "sensor_gain", "sensor_offset", "sensor_position",
+    "centre_offset", "temperature_coefficient"};
 
 sim::HallCampaign Read(const PlantedCampaign& campaign) {
   sim::HallCampaign out;
@@ -87,27 +92,218 @@ Plant OfMagnets(const testing::DipoleRotor& rotor) {
   return {law, sim::MakeField(sim::FitField(map, sim::FieldKind::kSpherical)->parameters)};
 }
 
-PlantedCampaign Draw(const Plant& plant, const char* cause, std::uint64_t seed, int index) {
-  Rng rng = Rng::Stream(seed, cause, static_cast<std::uint64_t>(index));
-  CampaignPlan plan{.seed = rng.Bits()};
-  plan.rows = 80 + rng.Below(120);
+struct Drawn {
+  PlantedCampaign campaign;
+  std::vector<std::string> causes;
+};
+
+Planted Some(const char* cause, Rng* rng) {
   Planted planted{.cause = cause};
-  planted.sensor = rng.Below(8);
-  planted.variant = static_cast<int>(rng.Below(5));
-  const double sign = rng.Uniform() < 0.5 ? -1 : 1;
-  // lambda counts before amplitude and phase are projected out: the least is taken larger.
-  const double wanted = std::exp(rng.Uniform(std::log(160), std::log(4000)));
-  const auto make = [&](double size) {
-    planted.size = size;
-    return testing::MakeCampaign(plan, plant.law, Wrong(plant.law, planted), planted);
-  };
-  if (planted.cause == "none") return make(0);
-  const double first = (planted.cause == "temperature_coefficient" ? 0.001 : 0.01) * sign;
-  return make(first * std::sqrt(wanted / make(first).lambda));
+  planted.sensor = rng->Below(8);
+  planted.variant = static_cast<int>(rng->Below(5));
+  const double sign = rng->Uniform() < 0.5 ? -1 : 1;
+  planted.size = (planted.cause == "temperature_coefficient" ? 0.001 : 0.01) * sign;
+  return planted;
 }
 
-struct Count {
-  int campaigns = 0, right = 0, wrong = 0, unsure = 0;
+// Its size so that it is worth `wanted` by itself.
+Planted Sized(const Plant& plant, const CampaignPlan& plan, Planted planted, double wanted) {
+  for (int pass = 0; pass < 2; ++pass) {  // not quite linear
+    const auto made = testing::MakeCampaign(plan, plant.law, Wrong(plant.law, planted), planted);
+    planted.size *= std::sqrt(wanted / std::max(made.lambda_free, 1e-9));
+  }
+  return planted;
+}
+
+Drawn Draw(const Plant& plant, const std::vector<const char*>& causes, double lambda_min, Rng rng,
+           bool dirty) {
+  CampaignPlan plan{.seed = rng.Bits()};
+  plan.rows = 80 + rng.Below(120);
+  plan.dirty = dirty;
+  Drawn drawn;
+  std::vector<Planted> planted;
+  FieldLaw law = plant.law;
+  for (const char* cause : causes) {
+    drawn.causes.emplace_back(cause);
+    const double wanted = std::exp(rng.Uniform(std::log(lambda_min), std::log(4000)));
+    planted.push_back(Sized(plant, plan, Some(cause, &rng), wanted));
+    law = Wrong(law, planted.back());
+  }
+  if (planted.empty()) planted.emplace_back();
+  plan.also.assign(planted.begin() + 1, planted.end());
+  drawn.campaign = testing::MakeCampaign(plan, plant.law, law, planted.front());
+  return drawn;
+}
+
+struct Outcome {
+  std::string said;
+  std::vector<std::string> first;  // of each cause found
+  std::vector<std::string> all;    // its candidates, too
+  bool sure = false;               // explained, each cause with a single name
+  bool flagged = false;            // says that something is not known
+  double gain = 0;                 // of what an oracle gains, in variance
+};
+
+Outcome Diagnose(const Plant& plant, const Drawn& drawn) {
+  const auto diagnosis = sim::DiagnoseHall(Read(drawn.campaign), {}, *plant.model);
+  Outcome outcome;
+  outcome.said = Name(diagnosis.verdict);
+  for (const auto& found : diagnosis.causes) {
+    outcome.said += " ";
+    outcome.first.emplace_back(Name(found.candidates.front()));
+    for (const auto candidate : found.candidates) {
+      outcome.said +=
+          std::string(candidate == found.candidates.front() ? "" : "|") + Name(candidate);
+      outcome.all.emplace_back(Name(candidate));
+    }
+  }
+  for (const auto& unknown : diagnosis.unknown) outcome.said += " ?" + unknown.covariate;
+  outcome.sure = diagnosis.verdict == sim::HallVerdict::kExplained;
+  outcome.flagged = diagnosis.verdict == sim::HallVerdict::kUnknown || !diagnosis.unknown.empty();
+  const auto square = [](double value) { return value * value; };
+  const double noise2_V2 = square(25 * CampaignPlan{}.noise_T);
+  outcome.gain = (square(diagnosis.gain.rms_before_V) - square(diagnosis.gain.rms_after_V)) /
+                 (square(diagnosis.gain.rms_before_V) - noise2_V2);
+  return outcome;
+}
+
+bool Has(const std::vector<std::string>& list, const std::string& what) {
+  return std::find(list.begin(), list.end(), what) != list.end();
+}
+
+// The 95 % interval of a share, Wilson's.
+void Line(const char* what, int count, int of, const char* wanted) {
+  if (of == 0) return;
+  const double n = of, p = count / n, z2 = 1.96 * 1.96;
+  const double middle = (p + z2 / (2 * n)) / (1 + z2 / n);
+  const double half = 1.96 * std::sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n);
+  std::printf("%-62s %4d of %4d  %5.1f..%5.1f %%  %s\n", what, count, of,
+              100 * std::max(0.0, middle - half), 100 * std::min(1.0, middle + half), wanted);
+}
+
+class Suite {
+ public:
+  Suite(const Plant* plant, std::uint64_t seed) : plant_(*plant), seed_(seed) {}
+
+  /// How many of them a cause was named in.
+  int Nulls(int count, bool dirty) {
+    int named = 0;
+    for (int k = 0; k < count; ++k) {
+      const Outcome outcome = Take({}, 1, dirty ? "dirty" : "none", k, dirty);
+      named += outcome.first.empty() ? 0 : 1;
+    }
+    Line(dirty ? "nothing planted, dirty: a cause is named" : "nothing planted: a cause is named",
+         named, count, dirty ? "<= 2 %" : "<= 1 %");
+    return named;
+  }
+
+  struct Singles {
+    int strong = 0, exact = 0, campaigns = 0, wrong_and_sure = 0;
+  };
+  Singles Single(int per) {
+    constexpr double kBins[] = {15, 30, 50, 100, 1e9};
+    std::array<int, 4> detected{}, of{};
+    Singles singles;
+    int covered = 0, to_cover = 0;
+    std::vector<double> gains;
+    for (const char* cause : kCauses)
+      for (int k = 0; k < per; ++k) {
+        const Outcome outcome = Take({cause}, 15, cause, k, false);
+        std::size_t bin = 0;
+        while (bin < 3 && lambda_ >= kBins[bin + 1]) ++bin;
+        ++of[bin];
+        detected[bin] += outcome.first.empty() && !outcome.flagged ? 0 : 1;
+        ++singles.campaigns;
+        const bool exact =
+            outcome.sure && outcome.first.size() == 1 && outcome.first.front() == cause;
+        singles.wrong_and_sure += outcome.sure && !exact ? 1 : 0;
+        to_cover += lambda_ >= 50 ? 1 : 0;
+        covered += lambda_ >= 50 && Has(outcome.all, cause) ? 1 : 0;
+        if (lambda_ < 100) continue;
+        ++singles.strong;
+        singles.exact += exact ? 1 : 0;
+        gains.push_back(outcome.gain);
+      }
+    for (std::size_t bin = 0; bin < 4; ++bin) {
+      char what[64];
+      std::snprintf(what, sizeof what, "detected, lambda from %.0f%s", kBins[bin],
+                    bin == 3 ? " on" : "");
+      Line(what, detected[bin], of[bin], bin == 3 ? ">= 99 %" : "");
+    }
+    Line("one cause, lambda >= 100: named exactly", singles.exact, singles.strong, ">= 97 %");
+    Line("one cause: wrong and sure", singles.wrong_and_sure, singles.campaigns, "<= 0.5 %");
+    Line("one cause, lambda >= 50: among the candidates", covered, to_cover, ">= 99 %");
+    Gain("one cause", std::move(gains), ">= 0.95");
+    return singles;
+  }
+
+  void Pairs(int count) {
+    int exact = 0, extra = 0;
+    std::vector<double> gains;
+    constexpr std::size_t kCount = std::size(kCauses);
+    for (int k = 0; k < count; ++k) {
+      const auto one = static_cast<std::size_t>(k) % kCount;
+      const std::size_t two = (one + 1 + static_cast<std::size_t>(k) / kCount) % kCount;
+      if (one == two) continue;
+      const Outcome outcome = Take({kCauses[one], kCauses[two]}, 100, "pair", k, false);
+      const bool both = Has(outcome.all, kCauses[one]) && Has(outcome.all, kCauses[two]);
+      const bool no_other = std::all_of(
+          outcome.first.begin(), outcome.first.end(),
+          [&](const std::string& name) { return name == kCauses[one] || name == kCauses[two]; });
+      exact += both && no_other ? 1 : 0;
+      extra += outcome.sure && !no_other ? 1 : 0;
+      gains.push_back(outcome.gain);
+    }
+    Line("two causes, both lambda >= 100: exact by class", exact, count, ">= 95 %");
+    Line("two causes: another one named surely", extra, count, "");
+    Gain("two causes", std::move(gains), ">= 0.90");
+  }
+
+  void Outside(int per) {
+    int flagged = 0, misnamed = 0, count = 0;
+    for (const char* effect : {"drift", "pose_scale", "crosstalk"})
+      for (int k = 0; k < per; ++k) {
+        const Outcome outcome = Take({effect}, 250, effect, k, false);
+        ++count;
+        flagged += outcome.flagged ? 1 : 0;
+        misnamed += outcome.sure ? 1 : 0;
+      }
+    Line("outside the library, lambda >= 250: flagged", flagged, count, ">= 90 %");
+    Line("outside the library: named surely and not flagged", misnamed, count, "<= 5 %");
+  }
+
+  void Confusions() const {
+    for (const auto& [what, verdicts] : verdicts_) {
+      std::printf("%s\n", what.c_str());
+      for (const auto& [said, count] : verdicts) std::printf("  %5d %s\n", count, said.c_str());
+    }
+  }
+
+ private:
+  Outcome Take(const std::vector<const char*>& causes, double lambda_min, const char* stream,
+               int index, bool dirty) {
+    const Drawn drawn = Draw(plant_, causes, lambda_min,
+                             Rng::Stream(seed_, stream, static_cast<std::uint64_t>(index)), dirty);
+    lambda_ = drawn.campaign.lambda_free;
+    Outcome outcome = Diagnose(plant_, drawn);
+    std::string what = dirty ? "dirty" : "";
+    for (const std::string& cause : drawn.causes) what += (what.empty() ? "" : " + ") + cause;
+    const std::string strength = causes.size() != 1 ? "" : lambda_ >= 100 ? " >= 100" : " < 100";
+    ++verdicts_[what.empty() ? "none" : what + strength][outcome.said];
+    return outcome;
+  }
+  static void Gain(const char* what, std::vector<double> gains, const char* wanted) {
+    if (gains.empty()) return;
+    std::sort(gains.begin(), gains.end());
+    std::printf("%-62s median %.3f, tenth %.3f  %s\n",
+                (std::string(what) + ": held-out gain to an oracle's").c_str(),
+                gains[gains.size() / 2], gains[gains.size() / 10], wanted);
+  }
+
+  const Plant& plant_;
+  std::uint64_t seed_;
+  double lambda_ = 0;  // of the last campaign
+  std::map<std::string, std::map<std::string, int>> verdicts_;
 };
 
 }  // namespace
@@ -115,52 +311,21 @@ struct Count {
 int main(int argc, char** argv) {
   const int per = bench::Option(argc, argv, "--per", 6);
   const int nulls = bench::Option(argc, argv, "--nulls", 20);
+  const int dirty = bench::Option(argc, argv, "--dirty", 10);
   const bool magnets = bench::Option(argc, argv, "--magnets", 0) != 0;
-  const auto seed = static_cast<std::uint64_t>(bench::Option(argc, argv, "--seed", 1));
   const testing::DipoleRotor rotor(testing::PlantedOneShell(), 4);
   Plant plant{testing::OfSurface(kAmplitude_T, 21),
               sim::MakeField(sim::SurfaceParameters{.amplitude_T = 0.05})};
   if (magnets) plant = OfMagnets(rotor);
-  Count singles, empties;
-  double held_out = 0, gain = 0;
-  for (const char* cause : kCauses) {
-    const bool none = std::string(cause) == "none";
-    std::map<std::string, int> verdicts;
-    for (int k = 0; k < (none ? nulls : per); ++k) {
-      const auto diagnosis = sim::DiagnoseHall(Read(Draw(plant, cause, seed, k)), {}, *plant.model);
-      std::string said = Name(diagnosis.verdict);
-      for (const auto& found : diagnosis.causes) {
-        said += " ";
-        for (const auto candidate : found.candidates)
-          said += std::string(candidate == found.candidates.front() ? "" : "|") + Name(candidate);
-      }
-      for (const auto& unknown : diagnosis.unknown) said += " ?" + unknown.covariate;
-      ++verdicts[said];
-      Count& count = none ? empties : singles;
-      ++count.campaigns;
-      if (said == (none ? std::string("consistent") : "explained " + std::string(cause)))
-        ++count.right;
-      else if (none ? !diagnosis.causes.empty() : diagnosis.verdict == sim::HallVerdict::kExplained)
-        ++count.wrong;
-      else
-        ++count.unsure;
-      if (!none) {
-        held_out += diagnosis.gain.rms_after_V / diagnosis.noise_V;
-        gain += diagnosis.gain.explained;
-      }
-    }
-    std::printf("%s\n", cause);
-    for (const auto& [said, count] : verdicts) std::printf("  %5d %s\n", count, said.c_str());
-    std::fflush(stdout);
-  }
-  std::printf(
-      "nulls: %d of %d named; single causes: %d of %d exact, %d wrong and sure, %d unsure; "
-      "held out %.3f of the noise, gain %.3f\n",
-      empties.wrong, empties.campaigns, singles.right, singles.campaigns, singles.wrong,
-      singles.unsure, held_out / std::max(1, singles.campaigns),
-      gain / std::max(1, singles.campaigns));
-  const bool good = empties.wrong <= 0.01 * empties.campaigns + (empties.campaigns < 100 ? 0 : 1) &&
-                    singles.right >= 0.97 * singles.campaigns - 1 &&
-                    singles.wrong <= 0.005 * singles.campaigns + 1;
+  Suite suite(&plant, static_cast<std::uint64_t>(bench::Option(argc, argv, "--seed", 1)));
+  const int named = suite.Nulls(nulls, false);
+  const int named_dirty = suite.Nulls(dirty, true);
+  const Suite::Singles singles = suite.Single(per);
+  suite.Pairs(bench::Option(argc, argv, "--pairs", 6));
+  suite.Outside(bench::Option(argc, argv, "--outside", 6));
+  suite.Confusions();
+  const bool good = named <= 0.01 * nulls + (nulls < 100 ? 0 : 1) &&
+                    named_dirty <= 0.02 * dirty + 1 && singles.exact >= 0.97 * singles.strong - 1 &&
+                    singles.wrong_and_sure <= 0.005 * singles.campaigns + 1;
   return good ? 0 : 1;
 }

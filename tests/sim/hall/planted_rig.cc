@@ -1,5 +1,6 @@
 #include "tests/sim/hall/planted_rig.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
@@ -103,18 +104,43 @@ FieldLaw OfSurface(double amplitude_T, double width_deg) {
   };
 }
 
-PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, const FieldLaw& wrong,
-                             const Planted& planted) {
-  PlantedCampaign campaign;
-  campaign.planted = planted;
-  Rng rng = Rng::Stream(plan.seed, "planted rig");
-  const std::vector<Vec> nominal = PlantedSensors();
-  std::vector<Vec> sensors = nominal;
-  const double turn = rng.Uniform(0, 6.283185307179586);
+namespace {
+
+// What chi^2 is left of a change when two directions are free: Gram and Schmidt.
+class FreeDirections {
+ public:
+  void Add(double change, double amplitude, double phase) {
+    const double row[3] = {amplitude, phase, change};
+    for (std::size_t i = 0; i < 3; ++i)
+      for (std::size_t j = 0; j < 3; ++j) product_[i][j] += row[i] * row[j];
+  }
+  [[nodiscard]] double Left() const {
+    double p[3][3];
+    std::copy(&product_[0][0], &product_[0][0] + 9, &p[0][0]);
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (p[i][i] <= 0) continue;
+      for (std::size_t j = i + 1; j < 3; ++j) {
+        const double share = p[i][j] / p[i][i];
+        for (std::size_t k = 0; k < 3; ++k) p[j][k] -= share * p[i][k];
+      }
+    }
+    return p[2][2];
+  }
+
+ private:
+  double product_[3][3] = {};
+};
+
+struct AsMade {
+  std::vector<Vec> sensors = PlantedSensors();
   Vec centre{};
+};
+
+void Displace(const Planted& planted, Rng* rng, AsMade* made) {
+  const double turn = rng->Uniform(0, 6.283185307179586);
   if (planted.cause == "sensor_position") {
     // Size in degrees along the sphere, in a direction by chance.
-    Vec& s = sensors[planted.sensor];
+    Vec& s = made->sensors[planted.sensor];
     const Vec other = std::abs(s[2]) < 0.9 ? Vec{0, 0, 1} : Vec{1, 0, 0};
     Vec east = {other[1] * s[2] - other[2] * s[1], other[2] * s[0] - other[0] * s[2],
                 other[0] * s[1] - other[1] * s[0]};
@@ -129,37 +155,92 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
     for (double& part : s) part /= stretched;
   }
   if (planted.cause == "centre_offset") {
-    const double z = rng.Uniform(-1, 1), flat = std::sqrt(1 - z * z);
-    centre = {planted.size * flat * std::cos(turn), planted.size * flat * std::sin(turn),
-              planted.size * z};
+    const double z = rng->Uniform(-1, 1), flat = std::sqrt(1 - z * z);
+    made->centre = {planted.size * flat * std::cos(turn), planted.size * flat * std::sin(turn),
+                    planted.size * z};
   }
+}
+
+struct Moment {
+  std::size_t sensor;
+  double temp_C;
+  double share;        // of the campaign that has passed
+  double neighbour_V;  // of the next sensor, from half of the supply
+};
+double Spoiled(double volts, const Planted& planted, const Moment& at) {
+  const bool own = at.sensor == planted.sensor;
+  if (planted.cause == "sensor_gain" && own) return 2.5 + (1 + planted.size) * (volts - 2.5);
+  if (planted.cause == "sensor_offset" && own) return volts + planted.size;
+  if (planted.cause == "temperature_coefficient")
+    return 2.5 + (1 + planted.size * (at.temp_C - 20)) * (volts - 2.5);
+  if (planted.cause == "drift" && own) return volts + planted.size * (at.share - 0.5);
+  if (planted.cause == "crosstalk" && own) return volts + planted.size * at.neighbour_V;
+  return volts;
+}
+
+double Dirt(double volts, double noise_V, Rng* rng) {
+  const double draw = rng->Uniform();
+  if (draw < 0.01) return std::nan("");
+  if (draw < 0.02) return rng->Uniform(0, 5);
+  if (draw < 0.07) return volts + 4 * noise_V * rng->Normal();
+  return volts;
+}
+
+double ScaleOfAlpha(const std::vector<Planted>& causes) {
+  double scale = 1;
+  for (const Planted& planted : causes)
+    if (planted.cause == "pose_scale") scale += planted.size;
+  return scale;
+}
+
+}  // namespace
+
+PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, const FieldLaw& wrong,
+                             const Planted& planted) {
+  PlantedCampaign campaign;
+  campaign.planted = planted;
+  Rng rng = Rng::Stream(plan.seed, "planted rig");
+  const std::vector<Vec> nominal = PlantedSensors();
+  AsMade made;
+  std::vector<Planted> causes = plan.also;
+  causes.insert(causes.begin(), planted);
+  for (const Planted& cause : causes) Displace(cause, &rng, &made);
+  const double scale = ScaleOfAlpha(causes), noise_V = 25 * plan.noise_T;
+  FreeDirections free;
   for (std::size_t row = 0; row < plan.rows; ++row) {
     PlantedPose pose;
     pose.alpha_deg = rng.Uniform(-plan.tilt_deg, plan.tilt_deg);
     pose.beta_deg = rng.Uniform(-plan.tilt_deg, plan.tilt_deg);
     pose.gamma_deg = rng.Uniform(-45, 45);
     pose.temp_C = rng.Uniform(5, 25);
-    const Mat m =
-        RotationMatrix(pose.alpha_deg * kDeg, pose.beta_deg * kDeg, pose.gamma_deg * kDeg);
-    for (std::size_t k = 0; k < sensors.size(); ++k) {
-      const auto read = [&](const FieldLaw& field, const Vec& direction, const Vec& shift) {
-        const Vec place = {59 * direction[0] - shift[0], 59 * direction[1] - shift[1],
-                           59 * direction[2] - shift[2]};
-        return field(BackTurned(m, place), BackTurned(m, direction));
-      };
-      const double clean_T = read(law, nominal[k], Vec{});
-      double volts = 2.5 + 25 * read(wrong, sensors[k], centre);
-      if (planted.cause == "sensor_gain" && k == planted.sensor)
-        volts = 2.5 + (1 + planted.size) * (volts - 2.5);
-      if (planted.cause == "sensor_offset" && k == planted.sensor) volts += planted.size;
-      if (planted.cause == "temperature_coefficient")
-        volts = 2.5 + (1 + planted.size * (pose.temp_C - 20)) * (volts - 2.5);
-      const double change = (volts - 2.5 - 25 * clean_T) / (25 * plan.noise_T);
+    const auto turned = [&](double alpha_scale, double more_gamma_deg) {
+      return RotationMatrix(alpha_scale * pose.alpha_deg * kDeg, pose.beta_deg * kDeg,
+                            (pose.gamma_deg + more_gamma_deg) * kDeg);
+    };
+    const Mat told = turned(1, 0), truly = turned(scale, 0), beside = turned(1, 0.01);
+    const auto read = [](const Mat& m, const FieldLaw& field, const Vec& direction,
+                         const Vec& shift) {
+      const Vec place = {59 * direction[0] - shift[0], 59 * direction[1] - shift[1],
+                         59 * direction[2] - shift[2]};
+      return 25 * field(BackTurned(m, place), BackTurned(m, direction));
+    };
+    for (std::size_t k = 0; k < nominal.size(); ++k) {
+      const double clean_V = read(told, law, nominal[k], Vec{});
+      const std::size_t next = (k + 1) % nominal.size();
+      const Moment at{k, pose.temp_C, static_cast<double>(row) / static_cast<double>(plan.rows),
+                      read(truly, wrong, made.sensors[next], made.centre)};
+      double volts = 2.5 + read(truly, wrong, made.sensors[k], made.centre);
+      for (const Planted& cause : causes) volts = Spoiled(volts, cause, at);
+      const double change = (volts - 2.5 - clean_V) / noise_V;
       campaign.lambda += change * change;
-      pose.volts.push_back(volts + 25 * plan.noise_T * rng.Normal());
+      free.Add(change, clean_V / noise_V,
+               (read(beside, law, nominal[k], Vec{}) - clean_V) / noise_V);
+      volts += noise_V * rng.Normal();
+      pose.volts.push_back(plan.dirty ? Dirt(volts, noise_V, &rng) : volts);
     }
     campaign.poses.push_back(pose);
   }
+  campaign.lambda_free = free.Left();
   return campaign;
 }
 

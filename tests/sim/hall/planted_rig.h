@@ -53,6 +53,8 @@ struct PlantedPose {
   std::vector<double> volts;
 };
 
+/// Causes of the library, or what is outside of it: `drift` of a sensor's offset over the rows (V
+/// in all), `pose_scale` of the told alpha, `crosstalk` of a sensor with the next.
 struct Planted {
   std::string cause = "none";
   double size = 0;  // in the cause's own unit
@@ -63,7 +65,8 @@ struct Planted {
 struct PlantedCampaign {
   std::vector<PlantedPose> poses;
   Planted planted;
-  double lambda = 0;  // chi^2 of what was planted, before anything is projected out
+  double lambda = 0;       // chi^2 of what was planted, before anything is projected out
+  double lambda_free = 0;  // and after the field's amplitude and phase, which nobody knows, are
 };
 
 struct CampaignPlan {
@@ -71,6 +74,8 @@ struct CampaignPlan {
   double tilt_deg = 12;
   double noise_T = 5e-4;
   bool temperatures = true;
+  bool dirty = false;  // 1 % of readings missing, 1 % anything, 5 % four times as noisy
+  std::vector<Planted> also = {};
   std::uint64_t seed = 1;
 };
 

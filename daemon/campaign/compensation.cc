@@ -1,0 +1,176 @@
+#include "daemon/campaign/compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace focalfleet {
+namespace {
+
+using sim::kPhi;
+using sim::kTheta;
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kSameDeg = 1e-6;
+constexpr double kEnoughMm = 2e-4;
+constexpr double kStepMaxDeg = 10;  // of one iteration
+constexpr double kAwayMaxDeg = 30;  // from the guess: then it is another way, not a correction
+constexpr int kIterations = 12;
+constexpr std::size_t kRestsMax = 32;
+constexpr std::size_t kRestsKept = 8;  // whatever forgets itself has done so by then
+
+bool IsCompensated(const sim::Template& form) {
+  return form.axis != sim::EffectAxis::kNone && sim::IsOfPosesAlone(*form.effect);
+}
+
+/// One damped step of Newton's method, in degrees: both joints turn what lies beyond them.
+std::array<double, 2> StepTowards(const sim::CampaignUnit& unit, const PointFp& place,
+                                  const PointFp& elbow, const PointFp& wanted) {
+  const double theta_x = -(place.y_mm - unit.base_y_mm), theta_y = place.x_mm - unit.base_x_mm;
+  const double phi_x = -(place.y_mm - elbow.y_mm), phi_y = place.x_mm - elbow.x_mm;
+  const double x = wanted.x_mm - place.x_mm, y = wanted.y_mm - place.y_mm;
+  // Stretched or folded, both turn the fibre the same way: damping shares the step among them.
+  const double damping =
+      1e-6 * (unit.arm_mm[kTheta] * unit.arm_mm[kTheta] + unit.arm_mm[kPhi] * unit.arm_mm[kPhi]);
+  const double a = theta_x * theta_x + theta_y * theta_y + damping;
+  const double b = theta_x * phi_x + theta_y * phi_y;
+  const double d = phi_x * phi_x + phi_y * phi_y + damping;
+  const double u = theta_x * x + theta_y * y, v = phi_x * x + phi_y * y;
+  const double determinant = a * d - b * b;
+  const auto bounded = [](double radians) {
+    return std::clamp(radians / kRadians, -kStepMaxDeg, kStepMaxDeg);
+  };
+  return {bounded((d * u - b * v) / determinant), bounded((a * v - b * u) / determinant)};
+}
+
+}  // namespace
+
+Compensation::Compensation(const ModelFile& file, const Layout& layout) : units_(layout.size()) {
+  const sim::CampaignModel& model = file.model;
+  for (std::size_t n = 0; n < units_.size(); ++n) {
+    if (!file.left[n]) continue;
+    units_[n] = KnownUnit{.geometry = model.units[n],
+                          .terms = {},
+                          .added_deg = file.left[n]->added_deg,
+                          .begin_deg = file.left[n]->pose_deg,
+                          .rests_deg = {}};
+    for (const sim::ModelTerm& term : model.terms) {
+      const std::span<const double> amplitude = term.AmplitudeOf(n);
+      if (!amplitude.empty() && IsCompensated(term.form))
+        units_[n]->terms.push_back({term.form, {amplitude.begin(), amplitude.end()}});
+    }
+  }
+  for (const sim::ModelTerm& term : model.terms) {
+    const std::string cause(term.form.effect->cause);
+    if (!IsCompensated(term.form) && std::ranges::find(left_out_, cause) == left_out_.end())
+      left_out_.push_back(cause);
+  }
+}
+
+sim::PoseTrack Compensation::WayOf(const KnownUnit& unit) {
+  sim::PoseTrack way(unit.geometry, unit.begin_deg);
+  for (const AxisPair& rest : unit.rests_deg) way.Go(rest);
+  return way;
+}
+
+/// Where the fibre is after the last move of the way.
+PointFp Compensation::PlaceAfter(const KnownUnit& unit, sim::PoseTrack* way,
+                                 sim::PoseErrors* errors) {
+  const sim::UnitTrack& track = way->track();
+  errors->Reset(track.moves);
+  for (const Term& term : unit.terms)
+    term.form.effect->apply(track, term.form, term.amplitude, errors);
+  const std::size_t last = track.moves - 1;
+  sim::CampaignUnit bent = unit.geometry;
+  std::array<double, 2> angle_deg{};
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    bent.arm_mm[axis] += errors->arm_mm[axis][last];
+    angle_deg[axis] =
+        track.cmd_deg[axis][last] + errors->angle_deg[axis][last] + unit.added_deg[axis];
+  }
+  const sim::PlacePoint place = sim::PlaceOf(bent, angle_deg[kTheta], angle_deg[kPhi]);
+  return {place.x_mm + errors->x_mm[last], place.y_mm + errors->y_mm[last]};
+}
+
+std::optional<AxisAngles> Compensation::CountFor(PositionerIndex i, const Wish& wish) const {
+  if (!units_[i.value]) return std::nullopt;
+  const KnownUnit& unit = *units_[i.value];
+  sim::PoseTrack way = WayOf(unit);
+  const AxisPair now{wish.now.theta_deg, wish.now.phi_deg};
+  const AxisPair& known = unit.rests_deg.empty() ? unit.begin_deg : unit.rests_deg.back();
+  if (std::abs(now[0] - known[0]) > kSameDeg || std::abs(now[1] - known[1]) > kSameDeg) way.Go(now);
+  const std::size_t before = way.moves();
+  const bool runs_up = wish.last_deg[0] != 0 || wish.last_deg[1] != 0;
+  sim::PoseErrors errors;
+  AxisPair count{wish.guess.theta_deg, wish.guess.phi_deg};
+  AxisPair best = count;
+  double best_mm = INFINITY;
+  for (int k = 0; k < kIterations; ++k) {
+    way.Cut(before);
+    if (runs_up) way.Go({count[0] - wish.last_deg[0], count[1] - wish.last_deg[1]});
+    way.Go(count);
+    const PointFp place = PlaceAfter(unit, &way, &errors);
+    const double off_mm =
+        std::hypot(place.x_mm - wish.fibre_fp.x_mm, place.y_mm - wish.fibre_fp.y_mm);
+    if (!std::isfinite(off_mm)) return std::nullopt;
+    if (off_mm < best_mm) {
+      best_mm = off_mm;
+      best = count;
+    }
+    if (off_mm < kEnoughMm) break;
+    const double theta = (count[0] + errors.angle_deg[kTheta].back() + unit.added_deg[kTheta] +
+                          unit.geometry.zero_deg[kTheta]) *
+                         kRadians;
+    const PointFp elbow{unit.geometry.base_x_mm + unit.geometry.arm_mm[kTheta] * std::cos(theta),
+                        unit.geometry.base_y_mm + unit.geometry.arm_mm[kTheta] * std::sin(theta)};
+    const auto step = StepTowards(unit.geometry, place, elbow, wish.fibre_fp);
+    count = {count[0] + step[0], count[1] + step[1]};
+  }
+  if (std::abs(best[0] - wish.guess.theta_deg) > kAwayMaxDeg ||
+      std::abs(best[1] - wish.guess.phi_deg) > kAwayMaxDeg)
+    return std::nullopt;
+  return AxisAngles{best[0], best[1]};
+}
+
+std::optional<PointFp> Compensation::FibreAfter(PositionerIndex i, const AxisAngles& count) const {
+  if (!units_[i.value]) return std::nullopt;
+  sim::PoseTrack way = WayOf(*units_[i.value]);
+  way.Go({count.theta_deg, count.phi_deg});
+  sim::PoseErrors errors;
+  return PlaceAfter(*units_[i.value], &way, &errors);
+}
+
+void Compensation::Rests(PositionerIndex i, const AxisAngles& count) {
+  if (!units_[i.value]) return;
+  KnownUnit& unit = *units_[i.value];
+  const AxisPair& known = unit.rests_deg.empty() ? unit.begin_deg : unit.rests_deg.back();
+  if (std::abs(count.theta_deg - known[0]) < kSameDeg &&
+      std::abs(count.phi_deg - known[1]) < kSameDeg)
+    return;
+  unit.rests_deg.push_back({count.theta_deg, count.phi_deg});
+  if (unit.rests_deg.size() > kRestsMax) Shorten(&unit);
+}
+
+/// The older rests become what they added up to.
+void Compensation::Shorten(KnownUnit* unit) {
+  const std::size_t gone = unit->rests_deg.size() - kRestsKept;
+  sim::PoseTrack way = WayOf(*unit);
+  way.Cut(gone);
+  sim::PoseErrors errors;
+  errors.Reset(gone);
+  for (const Term& term : unit->terms)
+    if (term.form.memory == sim::Memory::kChain)
+      term.form.effect->apply(way.track(), term.form, term.amplitude, &errors);
+  for (const std::size_t axis : {kTheta, kPhi})
+    unit->added_deg[axis] += errors.angle_deg[axis].back();
+  unit->begin_deg = unit->rests_deg[gone - 1];
+  unit->rests_deg.erase(unit->rests_deg.begin(),
+                        unit->rests_deg.begin() + static_cast<std::ptrdiff_t>(gone));
+}
+
+std::size_t Compensation::units() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(units_, [](const auto& unit) { return unit.has_value(); }));
+}
+
+}  // namespace focalfleet

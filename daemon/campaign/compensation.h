@@ -1,0 +1,77 @@
+// Commands go through the model of a campaign: what a unit has to be told, in angles of its own
+// count, so that its fibre comes to its target. The model predicts the place after a move from the
+// count's end, the direction that it comes from, and what has added up since the campaign; the
+// command is its inverse, by Newton's method on the model's own arms.
+//
+// A unit's way since the campaign is kept here: from where the campaign left it, each place at
+// which it came to rest. What happened while nobody looked (another daemon, a restart) counts as
+// one straight move. A unit that was homed counts anew, and the model's zeros are no longer its
+// own: it goes uncompensated until there is another model. So do units that the campaign did not
+// measure. Effects that need conditions which the daemon is not told of (temperature, supply,
+// elevation), and those of camera, rails and plate, are left out, by name.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/campaign/model_file.h"
+#include "fleet/kinematics.h"
+#include "fleet/layout.h"
+#include "sim/effects/pose_track.h"
+
+namespace focalfleet {
+
+class Compensation {
+ public:
+  /// `model` was read for the units of `layout`.
+  Compensation(const ModelFile& model, const Layout& layout);
+
+  struct Wish {
+    PointFp fibre_fp;                           // where the fibre is to end
+    AxisAngles now;                             // what it counts before the move
+    AxisAngles guess;                           // the count that leads there but for the model
+    std::array<double, kAxisCount> last_deg{};  // its last piece, where it runs up; 0: straight
+  };
+  /// What it is to count at the end. None: the model does not know the unit, or does not lead there
+  /// (farther than 30 degrees from the guess). Not held to the axes' ranges. Error: below 0.5 um by
+  /// the model where the fibre can get there, else near the nearest.
+  /// Cost: some microseconds for each effect and iteration; at most 12 iterations.
+  [[nodiscard]] std::optional<AxisAngles> CountFor(PositionerIndex i, const Wish& wish) const;
+  /// Where the model has the fibre when the unit comes from its last rest to `count`.
+  [[nodiscard]] std::optional<PointFp> FibreAfter(PositionerIndex i, const AxisAngles& count) const;
+
+  /// The unit rests, and counts that.
+  void Rests(PositionerIndex i, const AxisAngles& count);
+  /// It was homed, or another unit stands in its place.
+  void Forget(PositionerIndex i) { units_[i.value].reset(); }
+
+  /// Units that it has a say on.
+  [[nodiscard]] std::size_t units() const;
+  /// Causes in the model that are not compensated, once each.
+  [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
+
+ private:
+  using AxisPair = sim::PoseTrack::AxisPair;
+  struct Term {
+    sim::Template form;
+    std::vector<double> amplitude;
+  };
+  struct KnownUnit {
+    sim::CampaignUnit geometry;
+    std::vector<Term> terms;
+    AxisPair added_deg{};
+    AxisPair begin_deg{};
+    std::vector<AxisPair> rests_deg;
+  };
+
+  static sim::PoseTrack WayOf(const KnownUnit& unit);
+  static PointFp PlaceAfter(const KnownUnit& unit, sim::PoseTrack* way, sim::PoseErrors* errors);
+  static void Shorten(KnownUnit* unit);
+
+  std::vector<std::optional<KnownUnit>> units_;  // by position
+  std::vector<std::string> left_out_;
+};
+
+}  // namespace focalfleet

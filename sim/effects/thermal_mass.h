@@ -1,0 +1,14 @@
+// What follows its surroundings late: a thermal mass behind a measured temperature.
+#pragma once
+
+#include <span>
+#include <vector>
+
+namespace focalfleet::sim {
+
+/// The temperature of a body with the time constant `tau_s` in surroundings of `temperature_C`,
+/// from rest at the first value; surroundings change linearly between the times `time_s`.
+std::vector<double> Late(std::span<const double> temperature_C, std::span<const double> time_s,
+                         double tau_s);
+
+}  // namespace focalfleet::sim

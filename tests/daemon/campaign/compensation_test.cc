@@ -1,0 +1,256 @@
+#include "daemon/campaign/compensation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "daemon/campaign/campaign_log.h"
+#include "fleet/hex_layout.h"
+#include "protocol/base/rng.h"
+#include "sim/effects/registry.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet {
+namespace {
+
+using sim::kPhi;
+using sim::kTheta;
+
+Layout SmallLayout() {
+  auto layout = Layout::Create(MakeHexLayout({.count = 7}), {});
+  EXPECT_TRUE(layout);
+  return std::move(*layout);
+}
+
+std::vector<sim::CampaignUnit> Described(const Layout& layout) {
+  std::vector<sim::CampaignUnit> units;
+  for (const Unit& unit : layout.units()) units.push_back(DescribeUnit(unit));
+  return units;
+}
+
+sim::ModelTerm TermOf(std::string_view cause, sim::EffectAxis axis, sim::Memory memory,
+                      std::size_t units, std::size_t columns, double shape, double size, Rng* rng) {
+  sim::ModelTerm term;
+  term.form = {.effect = sim::FindEffect(cause),
+               .axis = axis,
+               .columns = columns,
+               .memory = memory,
+               .shape = shape};
+  term.sharing = sim::Sharing::kUnit;
+  for (std::size_t u = 0; u < units; ++u) {
+    term.group_of_unit.push_back(static_cast<std::uint32_t>(u));
+    for (std::size_t c = 0; c < columns; ++c) term.amplitude.push_back(size * rng->Normal());
+  }
+  term.sigma.assign(term.amplitude.size(), 0);
+  return term;
+}
+
+/// A model of gears as they are, arms and zeros of their own.
+sim::CampaignModel GearsInService(const Layout& layout, Rng* rng) {
+  sim::CampaignModel model;
+  model.units = Described(layout);
+  for (sim::CampaignUnit& unit : model.units)
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      unit.arm_mm[axis] += 0.06 * rng->Normal();
+      unit.zero_deg[axis] += 0.5 * rng->Normal();
+    }
+  const std::size_t n = model.units.size();
+  model.terms = {
+      TermOf("gear_scale", sim::EffectAxis::kTheta, sim::Memory::kChain, n, 1, 0, 3e-3, rng),
+      TermOf("scale_asymmetry", sim::EffectAxis::kPhi, sim::Memory::kChain, n, 1, 0, 3e-4, rng),
+      TermOf("ramp_travel", sim::EffectAxis::kTheta, sim::Memory::kChain, n, 1, 0, 0.01, rng),
+      TermOf("backlash", sim::EffectAxis::kPhi, sim::Memory::kHold, n, 1, 1.5, 0.5, rng),
+      TermOf("friction_windup", sim::EffectAxis::kTheta, sim::Memory::kHold, n, 1, 2, 0.1, rng),
+      TermOf("eccentricity", sim::EffectAxis::kTheta, sim::Memory::kHold, n, 2, 0, 0.1, rng)};
+  return model;
+}
+
+/// Moves of all units, straight on from each other; one row a unit and move.
+class Moves {
+ public:
+  Moves(const Layout& layout, Rng* rng) : units_(Described(layout)), rng_(*rng) {
+    for (std::size_t u = 0; u < units_.size(); ++u) poses_.push_back({Drawn(u)});
+  }
+  void GoAnywhere() {
+    for (std::size_t u = 0; u < units_.size(); ++u) poses_[u].push_back(Drawn(u));
+  }
+  void Go(std::size_t unit, const AxisAngles& to) {
+    poses_[unit].push_back({to.theta_deg, to.phi_deg});
+  }
+  [[nodiscard]] AxisAngles Last(std::size_t unit) const {
+    return {poses_[unit].back()[0], poses_[unit].back()[1]};
+  }
+  [[nodiscard]] sim::Campaign Campaign() const {
+    sim::Campaign campaign{.name = "made"};
+    campaign.units = units_;
+    campaign.first_row = {0};
+    for (const auto& way : poses_) {
+      for (std::size_t move = 1; move < way.size(); ++move) {
+        campaign.move_id.push_back(static_cast<std::int64_t>(move));
+        for (const std::size_t axis : {kTheta, kPhi}) {
+          campaign.from_deg[axis].push_back(way[move - 1][axis]);
+          campaign.cmd_deg[axis].push_back(way[move][axis]);
+        }
+        campaign.x_mm.push_back(0);
+        campaign.y_mm.push_back(0);
+      }
+      campaign.first_row.push_back(campaign.move_id.size());
+    }
+    return campaign;
+  }
+
+ private:
+  std::array<double, 2> Drawn(std::size_t unit) {
+    const sim::CampaignUnit& u = units_[unit];
+    return {rng_.Uniform(u.min_deg[0], u.max_deg[0]),
+            rng_.Uniform(u.min_deg[1] + 20, u.max_deg[1] - 20)};
+  }
+  std::vector<sim::CampaignUnit> units_;
+  std::vector<std::vector<std::array<double, 2>>> poses_;
+  Rng& rng_;
+};
+
+ModelFile FileOf(const sim::CampaignModel& model, const sim::Campaign& campaign) {
+  ModelFile file{.model = model};
+  for (const sim::UnitLeft& left : LeftByCampaign(model, campaign)) file.left.emplace_back(left);
+  return file;
+}
+
+// The oracle is the model's own prediction of the whole campaign with all moves since: the
+// compensation has neither the campaign's moves nor a track of facts.
+TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
+  const std::uint64_t seed = testing::TestSeed(1);
+  FOCALFLEET_TRACE_SEED(seed);
+  Rng rng(seed);
+  const Layout layout = SmallLayout();
+  const sim::CampaignModel model = GearsInService(layout, &rng);
+  Moves moves(layout, &rng);
+  for (int k = 0; k < 9; ++k) moves.GoAnywhere();
+  Compensation compensation(FileOf(model, moves.Campaign()), layout);
+  ASSERT_EQ(compensation.units(), layout.size());
+  EXPECT_TRUE(compensation.left_out().empty());
+  double worst_um = 0, uncompensated_um = 0;
+  for (int k = 0; k < 45; ++k) {  // more than it keeps
+    std::vector<PointFp> wanted;
+    for (std::uint32_t n = 0; n < layout.size(); ++n) {
+      const Unit& unit = layout.units()[n];
+      const AxisAngles aim{rng.Uniform(unit.theta().min_deg + 20, unit.theta().max_deg - 20),
+                           rng.Uniform(unit.phi().min_deg + 30, unit.phi().max_deg - 30)};
+      wanted.push_back(FibreAt(unit, aim));
+      const bool runs_up = k % 2 == 1;
+      const std::array<double, kAxisCount> last =
+          runs_up ? std::array<double, kAxisCount>{-2, -2} : std::array<double, kAxisCount>{};
+      const auto count = compensation.CountFor(
+          {n}, {.fibre_fp = wanted[n], .now = moves.Last(n), .guess = aim, .last_deg = last});
+      ASSERT_TRUE(count);
+      const AxisAngles past{count->theta_deg + 2, count->phi_deg + 2};
+      moves.Go(n, runs_up ? past : moves.Last(n));
+      moves.Go(n, *count);
+      if (runs_up) compensation.Rests({n}, past);
+      compensation.Rests({n}, *count);
+    }
+    const sim::Campaign all = moves.Campaign();
+    const sim::CampaignFacts facts = sim::MakeFacts(all);
+    const sim::Places places = Predict(model, facts, sim::OneAfterTheOther());
+    for (std::uint32_t n = 0; n < layout.size(); ++n) {
+      const std::size_t row = all.first_row[n + 1] - 1;
+      worst_um = std::max(worst_um, 1e3 * std::hypot(places.x_mm[row] - wanted[n].x_mm,
+                                                     places.y_mm[row] - wanted[n].y_mm));
+      const PointFp plain = FibreAt(layout.units()[n], moves.Last(n));
+      uncompensated_um = std::max(uncompensated_um, 1e3 * std::hypot(plain.x_mm - wanted[n].x_mm,
+                                                                     plain.y_mm - wanted[n].y_mm));
+    }
+  }
+  EXPECT_LT(worst_um, 0.5);
+  EXPECT_GT(uncompensated_um, 50);  // or there was nothing to do
+}
+
+TEST(Compensation, KnowsNothingOfUnitsThatWereNotMeasuredOrWereHomed) {
+  Rng rng(3);
+  const Layout layout = SmallLayout();
+  Moves moves(layout, &rng);
+  moves.GoAnywhere();
+  ModelFile file = FileOf(GearsInService(layout, &rng), moves.Campaign());
+  file.left[2].reset();
+  Compensation compensation(file, layout);
+  EXPECT_EQ(compensation.units(), layout.size() - 1);
+  const Compensation::Wish wish{
+      .fibre_fp = FibreAt(layout.units()[3], {10, 90}), .now = moves.Last(3), .guess = {10, 90}};
+  EXPECT_FALSE(compensation.CountFor({2}, wish));
+  EXPECT_TRUE(compensation.CountFor({3}, wish));
+  compensation.Forget({3});
+  EXPECT_FALSE(compensation.CountFor({3}, wish));
+  EXPECT_FALSE(compensation.FibreAfter({3}, {10, 90}));
+}
+
+TEST(Compensation, SaysWhatItLeavesOut) {
+  Rng rng(3);
+  const Layout layout = SmallLayout();
+  Moves moves(layout, &rng);
+  moves.GoAnywhere();
+  sim::CampaignModel model;
+  model.units = Described(layout);
+  for (const char* cause : {"gravity_sag", "camera_similarity", "gravity_sag", "eccentricity"})
+    model.terms.push_back(
+        TermOf(cause, sim::EffectAxis::kTheta, sim::Memory::kHold, 7, 2, 0, 0, &rng));
+  const Compensation compensation(FileOf(model, moves.Campaign()), layout);
+  EXPECT_THAT(compensation.left_out(), ::testing::ElementsAre("gravity_sag", "camera_similarity"));
+}
+
+TEST(Compensation, DoesNotGoFarForATargetOutOfReach) {
+  Rng rng(3);
+  const Layout layout = SmallLayout();
+  Moves moves(layout, &rng);
+  moves.GoAnywhere();
+  sim::CampaignModel model;
+  model.units = Described(layout);
+  const Compensation compensation(FileOf(model, moves.Campaign()), layout);
+  const Unit& unit = layout.units()[0];
+  const double reach_mm = unit.theta().arm_mm + unit.phi().arm_mm;
+  const auto count = compensation.CountFor(
+      {0}, {.fibre_fp = {unit.base_fp.x_mm + reach_mm + 0.05, unit.base_fp.y_mm},
+            .now = moves.Last(0),
+            .guess = {-unit.theta().zero_deg, 2 - unit.phi().zero_deg}});
+  ASSERT_TRUE(count);
+  const PointFp fibre = FibreAt(unit, *count);
+  EXPECT_NEAR(fibre.x_mm, unit.base_fp.x_mm + reach_mm, 0.03);
+  EXPECT_NEAR(fibre.y_mm, unit.base_fp.y_mm, 1);
+}
+
+// ---- model.toml
+
+TEST(ModelFile, RefusesWhatNoUnitOfThisFleetCanBe) {
+  const Layout layout = SmallLayout();
+  const std::vector<sim::CampaignUnit> units = Described(layout);
+  const auto error_of = [&](const std::string& text) {
+    const auto read = ReadModelFile(text, "m.toml", units);
+    return read ? std::string() : read.error().text;
+  };
+  const auto unit_text = [&](const std::string& base_x, const std::string& arm) {
+    return "[[unit]]\nunit_id = 1\nbase_x_mm = " + base_x +
+           "\nbase_y_mm = " + std::to_string(units[0].base_y_mm) + "\narm_theta_mm = " + arm +
+           "\narm_phi_mm = " + std::to_string(units[0].arm_mm[1]) +
+           "\ntheta_zero_deg = 0\nphi_zero_deg = 0\n";
+  };
+  const std::string x = std::to_string(units[0].base_x_mm),
+                    arm = std::to_string(units[0].arm_mm[0]);
+  EXPECT_EQ(error_of(unit_text(x, arm)), "");
+  EXPECT_EQ(error_of(unit_text("1e4", arm)),
+            "m.toml:1: unit 1 has its base more than 10 mm from where it is described");
+  EXPECT_THAT(error_of(unit_text(x, "999")), ::testing::HasSubstr("m.toml:1: unit 1 has an arm"));
+  EXPECT_THAT(error_of(unit_text(x, arm) + "left_theta_deg = 3\n"),
+              ::testing::HasSubstr("left_phi_deg is missing"));
+  const std::string effect =
+      "[[effect]]\ncause = \"gear_scale\"\naxis = \"theta\"\nform = 0\nshape = 0\nmemory = 2\n"
+      "columns = 1\nunits = [1]\n";
+  EXPECT_EQ(error_of(effect + "amplitude = [0.003]\nsigma = [1e-4]\n"), "");
+  EXPECT_THAT(error_of(effect + "amplitude = [7]\n"),
+              ::testing::HasSubstr("none that gear_scale can have"));
+  EXPECT_THAT(error_of(effect + "amplitude = [0.003]\nsigma = []\n"),
+              ::testing::HasSubstr("not one an amplitude"));
+  EXPECT_THAT(error_of("[[effect"), ::testing::HasSubstr("m.toml:1"));
+}
+
+}  // namespace
+}  // namespace focalfleet

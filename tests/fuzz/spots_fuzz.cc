@@ -1,0 +1,89 @@
+// Any bytes as one exposure of the camera, as CSV or as a FITS file by the first byte, or as the
+// fiducials' table: an exposure that holds to all rules or an error that names the file, never
+// more. What was read and is written again reads back the same.
+#include <unistd.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include "daemon/camera/spots_fits.h"
+#include "fleet/files/fiducials_file.h"
+#include "fleet/files/spots_file.h"
+#include "protocol/base/check.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr SensorLimits kSensor{11'000, 11'000};
+
+/// On a file system in memory where there is one; gone when the process ends.
+class Scratch {
+ public:
+  Scratch() {
+    const char* where = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp";
+    std::string name = std::string(where) + "/spots_fuzz.XXXXXX";
+    FOCALFLEET_CHECK(mkdtemp(name.data()) != nullptr);
+    folder_ = name;
+  }
+  ~Scratch() {
+    for (const char* name : {"/in.fits", "/again.fits"}) unlink((folder_ + name).c_str());
+    rmdir(folder_.c_str());
+  }
+  [[nodiscard]] std::string File(const char* name) const { return folder_ + "/" + name; }
+
+ private:
+  std::string folder_;
+};
+
+void ExpectSame(const Exposure& one, const Result<Exposure>& other) {
+  FOCALFLEET_CHECK(other.has_value());
+  FOCALFLEET_CHECK(other->id == one.id && other->taken_unix_ns == one.taken_unix_ns);
+  FOCALFLEET_CHECK(ContentOf(*other) == ContentOf(one));
+}
+
+void TryCsv(std::string_view text) {
+  const auto exposure = ReadSpots(text, "fuzz.csv", kSensor);
+  if (!exposure) {
+    FOCALFLEET_CHECK(exposure.error().text.find("fuzz.csv") == 0);
+    return;
+  }
+  FOCALFLEET_CHECK(CheckSpots(*exposure, kSensor).has_value());
+  ExpectSame(*exposure, ReadSpots(WriteSpots(*exposure), "again.csv", kSensor));
+}
+
+void TryFits(std::string_view bytes) {
+  static const Scratch scratch;
+  const std::string path = scratch.File("in.fits");
+  std::ofstream(path, std::ios::binary | std::ios::trunc)
+      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const auto exposure = ReadSpotsFits(path, kSensor);
+  if (!exposure) {
+    FOCALFLEET_CHECK(exposure.error().text.find("in.fits") != std::string::npos);
+    return;
+  }
+  FOCALFLEET_CHECK(CheckSpots(*exposure, kSensor).has_value());
+  const std::string again = scratch.File("again.fits");
+  FOCALFLEET_CHECK(WriteSpotsFits(again, *exposure).has_value());
+}
+
+void TryFiducials(std::string_view text) {
+  const auto fiducials = ReadFiducials(text, "fuzz.csv");
+  FOCALFLEET_CHECK(fiducials || fiducials.error().text.find("fuzz.csv") == 0);
+}
+
+}  // namespace
+}  // namespace focalfleet
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const std::string_view rest(static_cast<const char*>(static_cast<const void*>(data + 1)),
+                              size - 1);
+  constexpr void (*kReaders[])(std::string_view) = {focalfleet::TryCsv, focalfleet::TryFits,
+                                                    focalfleet::TryFiducials};
+  kReaders[data[0] % 3](rest);
+  return 0;
+}

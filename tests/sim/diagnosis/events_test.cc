@@ -1,0 +1,88 @@
+// Steps in single units' angles: slips by whole turns of the rotor, moves that were not made.
+#include "sim/diagnosis/events.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr double kRadians = std::numbers::pi / 180;
+
+// Moves the fibre as if theta stood `by_deg` off from the unit's row `from` on.
+void TurnTheta(std::size_t unit, std::size_t from, std::size_t count, double by_deg,
+               Campaign* campaign) {
+  const CampaignUnit& u = campaign->units[unit];
+  const double c = std::cos(by_deg * kRadians), s = std::sin(by_deg * kRadians);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t row = campaign->first_row[unit] + from + i;
+    if (row >= campaign->first_row[unit + 1]) return;
+    const double x = campaign->x_mm[row] - u.base_x_mm, y = campaign->y_mm[row] - u.base_y_mm;
+    campaign->x_mm[row] = u.base_x_mm + c * x - s * y;
+    campaign->y_mm[row] = u.base_y_mm + s * x + c * y;
+  }
+}
+
+// The first move from `from` on that turns theta to the given side.
+std::size_t MoveTo(const Campaign& campaign, std::size_t unit, std::size_t from, int side) {
+  for (std::size_t i = from;; ++i) {
+    const std::size_t row = campaign.first_row[unit] + i;
+    if (row >= campaign.first_row[unit + 1]) return 0;
+    if (side * (campaign.cmd_deg[kTheta][row] - campaign.from_deg[kTheta][row]) > 5) return i;
+  }
+}
+
+TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  constexpr std::size_t kUnit = 5;
+  const std::size_t move = MoveTo(campaign, kUnit, 30, 1);
+  ASSERT_NE(move, 0u);
+  const double turn_deg = 360 / campaign.units[kUnit].gear[kTheta];
+  TurnTheta(kUnit, move, 1000, -2 * turn_deg, &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "step_loss");
+  EXPECT_EQ(diagnosis.causes[0].axis, "theta");
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[kUnit].id));
+  ASSERT_EQ(diagnosis.model.events.size(), 1u);
+  EXPECT_NEAR(diagnosis.model.events[0].step_deg, -2 * turn_deg, 1e-9);
+}
+
+TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  constexpr std::size_t kUnit = 5;
+  const std::size_t move = MoveTo(campaign, kUnit, 30, 1);
+  ASSERT_NE(move, 0u);
+  TurnTheta(kUnit, move, 2, -2 * 360 / campaign.units[kUnit].gear[kTheta], &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_TRUE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_GE(diagnosis.outliers.rows, 1u);
+}
+
+TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  constexpr std::size_t kUnit = 7;
+  std::size_t move = 40;
+  const auto row_of = [&](std::size_t i) { return campaign.first_row[kUnit] + i; };
+  // One that turns theta alone, so that turning the places back is exact.
+  while (campaign.cmd_deg[kPhi][row_of(move)] != campaign.from_deg[kPhi][row_of(move)] ||
+         std::abs(campaign.cmd_deg[kTheta][row_of(move)] -
+                  campaign.from_deg[kTheta][row_of(move)]) < 2)
+    ++move;
+  const double step_deg =
+      campaign.cmd_deg[kTheta][row_of(move)] - campaign.from_deg[kTheta][row_of(move)];
+  TurnTheta(kUnit, move, 1000, -step_deg, &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[kUnit].id));
+}
+
+}  // namespace
+}  // namespace focalfleet::sim

@@ -1,0 +1,102 @@
+// What weak names beside strong ones are worth.
+#include "sim/diagnosis/families.h"
+
+#include <gmock/gmock.h>
+
+namespace focalfleet::sim {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+CauseFound Cause(const char* name, const char* axis, double delta_log_likelihood,
+                 std::vector<std::string> rivals = {}) {
+  CauseFound cause;
+  cause.cause = name;
+  cause.candidates = {name};
+  for (std::string& rival : rivals) cause.candidates.push_back(std::move(rival));
+  cause.axis = axis;
+  cause.all_units = true;
+  cause.delta_log_likelihood = delta_log_likelihood;
+  cause.size_um = 1;
+  return cause;
+}
+
+TEST(Families, AFaintRelativeIsTheShapeOfTheStrongOne) {
+  std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000),
+                                    Cause("friction_windup", "theta", 20)};
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(1));
+  EXPECT_THAT(causes[0].shape, HasSubstr("friction_windup"));
+}
+
+TEST(Families, AWeakRelativeIsNotSure) {
+  std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000),
+                                    Cause("friction_windup", "theta", 60)};
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(2));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("friction_windup", "backlash"));
+}
+
+TEST(Families, TheOtherAxisIsAnotherMatter) {
+  std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000),
+                                    Cause("friction_windup", "phi", 20)};
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(2));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("friction_windup"));
+}
+
+TEST(Families, ACandidateOfTheStrongOneBesideItIsItsRemainder) {
+  std::vector<CauseFound> causes = {Cause("phase_imbalance", "phi", 600, {"cogging"}),
+                                    Cause("cogging", "phi", 120)};
+  JudgeRemainders(&causes);
+  EXPECT_THAT(causes, SizeIs(1));
+}
+
+TEST(Families, WhatAnythingCouldBeIsUnknownUnlessItIsARemainder) {
+  const std::vector<std::string> anything = {"a", "b", "c", "d", "e", "f", "g", "h"};
+  std::vector<CauseFound> causes = {Cause("wear", "theta", 30, anything)};
+  std::vector<UnknownFound> unknown;
+  JudgeNames(&causes, &unknown);
+  EXPECT_TRUE(causes.empty());
+  ASSERT_THAT(unknown, SizeIs(1));
+  EXPECT_EQ(unknown[0].covariate, "theta_cmd_deg");
+
+  causes = {Cause("backlash", "theta", 2000), Cause("wear", "theta", 30, anything)};
+  unknown.clear();
+  JudgeNames(&causes, &unknown);
+  EXPECT_THAT(causes, SizeIs(1));
+  EXPECT_TRUE(unknown.empty());
+}
+
+TEST(Families, AUnitWithManyCausesIsNamedAsAUnit) {
+  std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000)};
+  for (const char* name : {"ramp_travel", "fibre_torque", "command_quantisation", "zero_offset"}) {
+    causes.push_back(Cause(name, "theta", 40));
+    causes.back().all_units = false;
+    causes.back().units = {3};
+  }
+  OutliersFound outliers;
+  std::vector<UnknownFound> unknown;
+  JudgeUnits(20, &causes, &outliers, &unknown);
+  ASSERT_THAT(causes, SizeIs(2));  // and the unit's zero
+  EXPECT_EQ(causes[1].cause, "zero_offset");
+  EXPECT_THAT(outliers.units, ElementsAre(3u));
+  EXPECT_THAT(unknown, SizeIs(1));
+}
+
+TEST(Families, ASeriesOfAngleCausesOnOneAxisIsUnknown) {
+  std::vector<CauseFound> causes = {Cause("eccentricity", "theta", 300),
+                                    Cause("pinion_runout", "theta", 200),
+                                    Cause("tooth_mesh", "theta", 100)};
+  std::vector<UnknownFound> unknown;
+  JudgeSeries(&causes, &unknown);
+  ASSERT_THAT(unknown, SizeIs(1));
+  EXPECT_EQ(unknown[0].covariate, "theta_cmd_deg");
+  EXPECT_THAT(causes[0].candidates, Contains("tooth_mesh"));
+}
+
+}  // namespace
+}  // namespace focalfleet::sim

@@ -1,0 +1,92 @@
+// Motion of the whole image: its own unrest, the air's, or something that the table knows.
+#include "sim/diagnosis/image.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "protocol/base/rng.h"
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+struct Shift {
+  double x_um, y_um;
+};
+
+// A campaign whose image is shifted at each exposure; `shift` knows the exposure's index.
+Campaign Shifted(const std::function<Shift(std::size_t)>& shift) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  const Exposures exposures = FindExposures(campaign);
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const Shift s = shift(exposures.of_row[row]);
+    campaign.x_mm[row] += 1e-3 * s.x_um;
+    campaign.y_mm[row] += 1e-3 * s.y_um;
+  }
+  return campaign;
+}
+
+TEST(Image, AWanderingImageIsTheCameras) {
+  Rng rng = Rng::Stream(1, "wander");
+  std::vector<Shift> walk(80);
+  for (std::size_t e = 1; e < walk.size(); ++e)
+    walk[e] = {walk[e - 1].x_um + 2 * rng.Normal(), walk[e - 1].y_um + 2 * rng.Normal()};
+  const Diagnosis diagnosis = Verdicts(Shifted([&](std::size_t e) { return walk[e]; }));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity"));
+  EXPECT_THAT(diagnosis.unknown, IsEmpty()) << Told(diagnosis);
+}
+
+TEST(Image, OneThatForgetsMayBeAir) {
+  Rng rng = Rng::Stream(2, "forgets");
+  std::vector<Shift> anew(80);
+  for (Shift& s : anew) s = {4 * rng.Normal(), 4 * rng.Normal()};
+  const Diagnosis diagnosis = Verdicts(Shifted([&](std::size_t e) { return anew[e]; }));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates,
+              testing::UnorderedElementsAre("camera_similarity", "air_turbulence"));
+}
+
+TEST(Image, OneThatSwingsSlowlyIsUnknown) {
+  const Campaign plain = Planted({}, {.moves = 80, .seed = 8});
+  const Exposures exposures = FindExposures(plain);
+  std::vector<double> phase(exposures.size());
+  double last_s = 0;
+  for (std::size_t row = 0; row < plain.rows(); ++row)
+    last_s = std::max(last_s, plain.Find("t_s")[row]);
+  for (std::size_t row = 0; row < plain.rows(); ++row)
+    phase[exposures.of_row[row]] = 3 * std::numbers::pi * plain.Find("t_s")[row] / last_s;
+  const Diagnosis diagnosis = Verdicts(Shifted([&](std::size_t e) {
+    return Shift{6 * std::sin(phase[e]), 3 * std::cos(phase[e])};
+  }));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Told(diagnosis);
+  for (const CauseFound& cause : diagnosis.causes)
+    EXPECT_NE(cause.cause, "camera_similarity") << Told(diagnosis);
+  ASSERT_FALSE(diagnosis.unknown.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.unknown[0].covariate, "t_s");
+}
+
+TEST(Image, OneThatFollowsTheWindIsUnknownByTheWind) {
+  Rng rng = Rng::Stream(3, "wind");
+  std::vector<double> wind(80);
+  for (double& w : wind) w = rng.Uniform(0, 12);
+  Campaign campaign = Shifted([&](std::size_t e) { return Shift{0.5 * wind[e], 0}; });
+  const Exposures exposures = FindExposures(campaign);
+  Covariate column{.name = "wind_m_s"};
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    column.values.push_back(wind[exposures.of_row[row]]);
+  campaign.covariates.push_back(std::move(column));
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_THAT(diagnosis.causes, IsEmpty()) << Told(diagnosis);
+  ASSERT_FALSE(diagnosis.unknown.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.unknown[0].covariate, "wind_m_s");
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
