@@ -20,9 +20,13 @@ namespace {
 /// bytes a frame.
 constexpr int kReceiveBufferBytes = 1 << 20;
 
-// protocol/wire/identifier.h: bit 19 says who sends; functions above 15 do not exist.
+// protocol/wire/identifier.h: bit 19 says who sends, bits 25..20 are the function. The first
+// sixteen need one filter, those after them one each.
 constexpr canid_t kFromUnit = 1u << 19;
-constexpr canid_t kNoFunction = 0x30u << 20;  // but for the one of groups
+constexpr canid_t kFunctionMask = 0x3Fu << 20;
+constexpr canid_t kAboveSixteen = 0x30u << 20;
+constexpr canid_t kSensors = static_cast<canid_t>(Function::kSensors) << 20;
+static_assert(kFunctionCount == 18, "a function without a filter is never heard");
 
 bool Set(int fd, int level, int option, const void* value, socklen_t size) {
   return ::setsockopt(fd, level, option, value, size) == 0;
@@ -35,14 +39,15 @@ Status Configure(int fd, const Listening& listening, bool confirms) {
   const can_err_mask_t errors = ErrorsOfInterest();
   const int fd_frames = listening.groups ? 1 : 0;
   const bool hears_hosts = listening.hears == Hears::kHosts;
-  const canid_t theirs = hears_hosts ? 0 : kFromUnit;
-  const canid_t exact = CAN_EFF_FLAG | CAN_RTR_FLAG | kNoFunction;
-  const std::array<can_filter, 2> filters{
-      can_filter{CAN_EFF_FLAG | (confirms ? 0 : theirs), exact | (confirms ? 0 : kFromUnit)},
+  const canid_t theirs = CAN_EFF_FLAG | (confirms || hears_hosts ? 0 : kFromUnit);
+  const canid_t exact = CAN_EFF_FLAG | CAN_RTR_FLAG | (confirms ? 0 : kFromUnit);
+  const std::array<can_filter, 3> filters{
+      can_filter{theirs, exact | kAboveSixteen},
+      can_filter{theirs | kSensors, exact | kFunctionMask},
       can_filter{CAN_EFF_FLAG | kGroupId, CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_EFF_MASK}};
   // Groups come from hosts: from others for units, as confirmations for the one that sent them.
   const bool groups_come = listening.groups && (hears_hosts || confirms);
-  const auto filter_bytes = static_cast<socklen_t>(sizeof(can_filter) * (groups_come ? 2 : 1));
+  const auto filter_bytes = static_cast<socklen_t>(sizeof(can_filter) * (groups_come ? 3 : 2));
   if (!Set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &own, sizeof own) ||
       !Set(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors) ||
       !Set(fd, SOL_CAN_RAW, CAN_RAW_FD_FRAMES, &fd_frames, sizeof fd_frames) ||
