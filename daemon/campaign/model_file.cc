@@ -123,13 +123,11 @@ class ModelReader {
     return {};
   }
 
-  /// What an amplitude can be, by physics or twenty times what it usually is.
   static bool IsPossible(const sim::Effect& effect, double amplitude) {
-    constexpr double kTimes = 20 * (1 + 1e-6);
-    if (!std::isfinite(amplitude)) return false;
-    if (effect.amplitude_low == 0 && effect.amplitude_high == 0)
-      return std::abs(amplitude) <= kTimes * effect.prior_size;
-    return amplitude >= effect.amplitude_low && amplitude <= effect.amplitude_high;
+    constexpr double kDigits = 1e-6;  // that a file rounds by
+    const auto [low, high] = sim::RangeOfAmplitude(effect);
+    return amplitude >= low - kDigits * std::abs(low) &&
+           amplitude <= high + kDigits * std::abs(high);
   }
 
   Result<sim::Template> ReadForm(const toml::table& table) const {

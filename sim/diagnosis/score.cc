@@ -210,10 +210,8 @@ double Leverage(const MatrixXd& m, double kept) {
 
 // An amplitude beyond what physics allows, for sure.
 bool IsImpossible(const Effect& effect, const VectorXd& b, const MatrixXd& g) {
-  constexpr double kSigmas = 3, kUsual = 20;
-  const bool bounded = effect.amplitude_low < effect.amplitude_high;
-  const double high = bounded ? effect.amplitude_high : kUsual * effect.prior_size;
-  const double low = bounded ? effect.amplitude_low : -high;
+  constexpr double kSigmas = 3;
+  const auto [low, high] = RangeOfAmplitude(effect);
   if (!(g.trace() > 0)) return false;
   if (b.size() == 1) {
     const double a = b[0] / g(0, 0), sigma = 1 / std::sqrt(g(0, 0));

@@ -115,6 +115,13 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   return solution;
 }
 
+// A unit's own data may well pull its amplitude beyond what can be; the other unknowns then make up
+// for the rest in the next round.
+void Advance(double step, const Effect& effect, double* amplitude) {
+  const auto [low, high] = RangeOfAmplitude(effect);
+  *amplitude = std::clamp(*amplitude + step, low, high);
+}
+
 void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit* fit) {
   AddStatic(step.head<6>(), &fit->model.units[unit]);
   Index at = kStaticColumns;
@@ -122,7 +129,7 @@ void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit*
     const std::uint32_t group = term.group_of_unit[unit];
     if (term.sharing != Sharing::kUnit || group == kNoGroup) continue;
     for (std::size_t c = 0; c < term.form.columns; ++c, ++at) {
-      term.amplitude[group * term.form.columns + c] += step[at];
+      Advance(step[at], *term.form.effect, &term.amplitude[group * term.form.columns + c]);
       term.sigma[group * term.form.columns + c] = sigma[at];
     }
   }
@@ -172,7 +179,8 @@ void StepFit(Fit* fit) {
     ModelTerm& term = fit->model.terms[t];
     if (term.sharing == Sharing::kUnit) continue;
     for (std::size_t k = 0; k < term.amplitude.size(); ++k) {
-      term.amplitude[k] += shared[shared_begin[t] + static_cast<Index>(k)];
+      Advance(shared[shared_begin[t] + static_cast<Index>(k)], *term.form.effect,
+              &term.amplitude[k]);
       term.sigma[k] = shared_sigma[shared_begin[t] + static_cast<Index>(k)];
     }
   }

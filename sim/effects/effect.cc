@@ -55,6 +55,13 @@ std::string_view Name(Memory memory) {
   return "until the next move";
 }
 
+AmplitudeRange RangeOfAmplitude(const Effect& effect) {
+  constexpr double kTimes = 20;
+  if (effect.amplitude_low < effect.amplitude_high)
+    return {effect.amplitude_low, effect.amplitude_high};
+  return {-kTimes * effect.prior_size, kTimes * effect.prior_size};
+}
+
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
                  PoseErrors* errors) {
   double amplitudes[kColumnsMax] = {};

@@ -74,6 +74,13 @@ struct Effect {
   double amplitude_high = 0;
 };
 
+/// What an amplitude of it can be: by physics, or twenty times what it usually is.
+struct AmplitudeRange {
+  double low = 0;
+  double high = 0;
+};
+AmplitudeRange RangeOfAmplitude(const Effect& effect);
+
 /// What one column does at the given amplitude, the others at 0. `errors` is reset.
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
                  PoseErrors* errors);
