@@ -190,6 +190,7 @@ class Pursuit {
   void SetState(State state);
   void JudgeTargets();
   [[nodiscard]] std::vector<Pose> PastTarget(PositionerIndex i, const Pose& target) const;
+  [[nodiscard]] std::vector<Pose> AsideOf(PositionerIndex i) const;
   void NoteDirections(PositionerIndex i, const UnitPlan* reached);
   bool GoPast(std::vector<std::optional<Pose>>* targets);
   void MeasureOrFinish();

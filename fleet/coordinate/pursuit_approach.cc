@@ -12,9 +12,10 @@
 // scatters by and what its gain may be off by, so that the last way is a very short one in the same
 // direction; the last correction runs up only where the tolerance cannot be met without.
 //
-// Who finds no room for its run-up between its neighbours keeps that axis still, and is tried again
-// when they have come back from theirs: a correction is made in waves. Neighbours that a plan leads
-// aside meanwhile may come back from the wrong side; they go in the next wave.
+// Who finds no room for its run-up between its neighbours sends them aside, where they can come
+// back from the same side; else it keeps that axis still, and is tried again when they have come
+// back from theirs: a correction is made in waves. Neighbours that a plan leads aside meanwhile may
+// come back from the wrong side; they go in the next wave.
 
 #include <algorithm>
 #include <cmath>
@@ -138,6 +139,27 @@ std::vector<Pose> Pursuit::PastTarget(PositionerIndex i, const Pose& target) con
   return wished;
 }
 
+/// Where one that is corrected may go so that another has room: back on the side from which it was
+/// measured, so that it comes to the same place again. Empty where it must not move.
+std::vector<Pose> Pursuit::AsideOf(PositionerIndex i) const {
+  const UnitView& view = core_.units[i.value].view;
+  const bool may_go =
+      approaches_[i.value] && view.phase == UnitPhase::kReady && view.enabled &&
+      excluded_[i.value] == 0 &&
+      (view.outcome == TargetOutcome::kArrived || view.outcome == TargetOutcome::kPending);
+  if (!may_go) return {};
+  const auto& [aim, side, has_no_room] = *approaches_[i.value];
+  const std::array<VectorRange, kAxisCount> range = core_.RangesOf(i);
+  std::vector<Pose> aside;
+  for (const std::int32_t times : {1, 2})
+    for (const auto& [theta, phi] : {std::array{1, 0}, std::array{0, 1}, std::array{1, 1}}) {
+      const Pose pose{aim[0] - theta * times * side[0] * RunUpOf(i, Axis::kTheta),
+                      aim[1] - phi * times * side[1] * RunUpOf(i, Axis::kPhi)};
+      if (range[0].contains(pose[0]) && range[1].contains(pose[1])) aside.push_back(pose);
+    }
+  return aside;
+}
+
 /// Puts where they go first in the place of the targets; false: nobody goes anywhere first.
 bool Pursuit::GoPast(std::vector<std::optional<Pose>>* targets) {
   const bool blind = view_.measured.empty();
@@ -148,13 +170,19 @@ bool Pursuit::GoPast(std::vector<std::optional<Pose>>* targets) {
     const std::optional<Pose>& target = (*targets)[n];
     units[n].otherwise = target && blind ? *target : PlaceOf(knowledge);
     if (target) units[n].wished = PastTarget({n}, approaches_[n] ? approaches_[n]->aim : *target);
+    if (units[n].wished.empty() && !blind) units[n].aside = AsideOf({n});
   }
   const auto chosen = ChooseRunUps(core_.layout, core_.drives, units, kRunUpGuardMm);
   std::vector<std::optional<Pose>> first(targets->size());
   bool any = false;
   std::uint32_t without = 0;
   for (std::uint32_t n = 0; n < units.size(); ++n) {
-    if (!(*targets)[n]) continue;
+    if (!chosen[n]) continue;
+    if (!(*targets)[n]) {
+      if (*chosen[n] == *units[n].otherwise) continue;
+      Reopen({n});  // it goes aside, and comes back
+      targets_[n] = approaches_[n]->aim;
+    }
     if (!units[n].wished.empty() && *chosen[n] == *units[n].otherwise) ++without;
     const bool goes = *chosen[n] != PlaceOf(core_.units[n].view.knowledge);
     if (goes) first[n] = chosen[n];
@@ -200,19 +228,20 @@ void Pursuit::NoteWhoHasNoRoom() {
     if (approaches_[n]) approaches_[n]->has_no_room |= Waits({n});
 }
 
-/// The target where it is in reach with its run-up, else a whole turn of theta on where that is,
-/// else as near as it gets.
+/// The target where it is in reach with room for its run-up and for corrections either way, else a
+/// whole turn of theta on where that is, else as near as it gets.
 Pose Pursuit::GoalFor(PositionerIndex i, const Pose& target) const {
   const std::array<VectorRange, kAxisCount> ranges = core_.RangesOf(i);
   const std::size_t theta = Index(Axis::kTheta);
   const AxisGeometry& geometry = core_.layout.unit(i).axis[theta];
   const AxisDrive& drive = core_.drives[i.value].axis[theta];
   // Twice, because the range moves with what the next exposure makes of the unit's count.
-  const std::int32_t past = NearestVectors(-2 * core_.config.approach_deg[theta], geometry, drive);
+  const std::int32_t room =
+      NearestVectors(2 * std::abs(core_.config.approach_deg[theta]), geometry, drive);
   const std::int32_t turn = NearestVectors(360, geometry, drive);
   for (const std::int32_t turns : {0, turn, -turn}) {
     const std::int32_t there = target[theta] + turns;
-    if (ranges[theta].contains(there) && ranges[theta].contains(there + past))
+    if (ranges[theta].contains(there - room) && ranges[theta].contains(there + room))
       return core_.NearestInReach(i, {there, target[1]});
   }
   return core_.NearestInReach(i, target);

@@ -28,6 +28,16 @@ class Chooser {
     return changed;
   }
 
+  /// Neighbours go aside for those that still have nothing of what they wish.
+  void MakeRoom() {
+    for (std::uint32_t n = 0; n < units_.size(); ++n) {
+      const RunUp& unit = units_[n];
+      if (!unit.otherwise || unit.wished.empty() || *chosen_[n] != *unit.otherwise) continue;
+      for (const Pose& pose : unit.wished)
+        if (MakeRoomAt({n}, pose)) break;
+    }
+  }
+
   [[nodiscard]] std::vector<std::optional<Pose>> chosen() && { return std::move(chosen_); }
 
  private:
@@ -38,10 +48,45 @@ class Chooser {
   bool Improve(PositionerIndex i) {
     for (const Pose& pose : units_[i.value].wished) {
       if (pose == *chosen_[i.value]) return false;  // what comes after is worse
-      const SegmentFp arm = ArmOfUnit(i, pose);
-      if (!HasRoom(i, arm)) continue;
-      chosen_[i.value] = pose;
-      arms_[i.value] = arm;
+      if (!HasRoom(i, ArmOfUnit(i, pose))) continue;
+      Take(i, pose);
+      return true;
+    }
+    return false;
+  }
+
+  void Take(PositionerIndex i, const Pose& pose) {
+    chosen_[i.value] = pose;
+    arms_[i.value] = ArmOfUnit(i, pose);
+  }
+
+  /// True: `i` is there now, and whoever was in its way is aside. False: nothing has changed.
+  bool MakeRoomAt(PositionerIndex i, const Pose& pose) {
+    constexpr std::size_t kAsideMost = 2;
+    const SegmentFp arm = ArmOfUnit(i, pose);
+    std::vector<PositionerIndex> in_the_way;
+    for (const PositionerIndex j : layout_.neighbours(i))
+      if (arms_[j.value] && !IsClear(layout_, {i, arm}, {j, *arms_[j.value]}, guard_mm_))
+        in_the_way.push_back(j);
+    if (in_the_way.empty() || in_the_way.size() > kAsideMost) return false;
+    const Pose before = *chosen_[i.value];
+    Take(i, pose);
+    std::size_t gone = 0;
+    while (gone < in_the_way.size() && GoAside(in_the_way[gone])) ++gone;
+    if (gone == in_the_way.size() && HasRoom(i, arm)) return true;
+    for (std::size_t k = 0; k < gone; ++k)
+      Take(in_the_way[k], *units_[in_the_way[k].value].otherwise);
+    Take(i, before);
+    return false;
+  }
+
+  /// Only from where it would stay.
+  bool GoAside(PositionerIndex j) {
+    const RunUp& unit = units_[j.value];
+    if (*chosen_[j.value] != *unit.otherwise) return false;
+    for (const Pose& pose : unit.aside) {
+      if (!HasRoom(j, ArmOfUnit(j, pose))) continue;
+      Take(j, pose);
       return true;
     }
     return false;
@@ -74,6 +119,7 @@ std::vector<std::optional<Pose>> ChooseRunUps(const Layout& layout,
   Chooser chooser(layout, drives, units, guard_mm);
   for (int pass = 0; pass < kPasses && chooser.Pass(); ++pass) {
   }
+  chooser.MakeRoom();
   return std::move(chooser).chosen();
 }
 

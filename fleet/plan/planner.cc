@@ -481,6 +481,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     DropCollidingTargets();
     scene_.AllowFor(start_);
     scene_.AllowFor(goal_);
+    if (options_.lead_apart) scene_.LeadApartThroughout(start_);
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
     std::optional<PowerLedger> ledger;
     double within_s = std::max({BoundS(), plan_.makespan_s, options_.within_s});
@@ -638,7 +639,6 @@ Result<Plan> Planner::Run() {
   // An order sends everybody through its cell, which costs a fleet that a camera corrects most of
   // its accuracy: that a few stand too near must not lead to it.
   const Scene as_ruled = scene_;
-  if (at_once && !too_near_.empty()) scene_.LeadApartThroughout(start_);
   if (at_once && AllAtOnce(request_.motions)) return Finish();
   if (at_once && options_.leave_stuck && LeaveStuck()) return Finish();
   scene_ = as_ruled;

@@ -20,24 +20,10 @@ using ::focalfleet::testing::FleetOf;
 using ::focalfleet::testing::HexFleet;
 using ::focalfleet::testing::MoveOf;
 using ::focalfleet::testing::PlanningFleet;
+using ::focalfleet::testing::PoseDeg;
 using ::focalfleet::testing::TestSeed;
+using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
-
-Pose PoseDeg(const PlanningFleet& fleet, std::uint32_t unit, double theta_deg, double phi_deg) {
-  const Unit& u = fleet.layout.unit({unit});
-  const UnitDrive& d = fleet.drives[unit];
-  return {NearestVectors(theta_deg, u.axis[0], d.axis[0]),
-          NearestVectors(phi_deg, u.axis[1], d.axis[1])};
-}
-
-Unit UnitAt(std::uint32_t id, double x_mm, double theta_zero_deg = 0) {
-  Unit unit;
-  unit.id = UnitId{id};
-  unit.base_fp = {x_mm, 0};
-  unit.axis[0] = {8.25, theta_zero_deg, 337 * 45 / 17.0, -190, 190};
-  unit.axis[1] = {8.25, 0, 337 * 45 / 17.0, 0, 180};
-  return unit;
-}
 
 /// Two arms side by side between the bases, each below or above the other so that folding back (phi
 /// grows, the tip turns counter-clockwise) runs into the other one.
@@ -353,6 +339,24 @@ TEST(Planner, SendsNobodyElseThroughItsCellBecauseTwoStartTooNear) {
   EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
   ASSERT_EQ(plan->moves.size(), 3u);
   for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[2].path[Index(axis)].size(), 1u);
+}
+
+TEST(Planner, LeavesNobodyWhoMerelyStartsTooNear) {
+  // The two of the tests above; whether both go, or the other stands and may not move.
+  for (const bool frozen : {false, true}) {
+    PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
+    fleet.StandAt({PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5),
+                   PoseDeg(fleet, 2, 10, 30)});
+    fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
+                     PoseDeg(fleet, 2, 9, 31)};
+    fleet.frozen[1] = frozen ? 1 : 0;
+    if (frozen) fleet.targets = {PoseDeg(fleet, 0, -90, 120), std::nullopt, fleet.targets[2]};
+    const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
+    ASSERT_TRUE(plan) << plan.error().text;
+    EXPECT_TRUE(plan->unserved.empty()) << frozen;
+    ASSERT_EQ(plan->moves.size(), frozen ? 2u : 3u);
+    for (const Axis axis : kAxes) EXPECT_EQ(plan->moves.back().path[Index(axis)].size(), 1u);
+  }
 }
 
 TEST(Planner, LeavesWhoIsStuckWhenAskedToAndTheOthersGoStraight) {

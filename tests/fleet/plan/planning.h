@@ -43,6 +43,24 @@ inline PlanningFleet FleetOf(std::vector<Unit> units, Layout::Options options = 
   return fleet;
 }
 
+/// On the x axis; angles count from where the arm is stretched along it.
+inline Unit UnitAt(std::uint32_t id, double x_mm, double theta_zero_deg = 0) {
+  Unit unit;
+  unit.id = UnitId{id};
+  unit.base_fp = {x_mm, 0};
+  unit.axis[0] = {8.25, theta_zero_deg, 337 * 45 / 17.0, -190, 190};
+  unit.axis[1] = {8.25, 0, 337 * 45 / 17.0, 0, 180};
+  return unit;
+}
+
+inline Pose PoseDeg(const PlanningFleet& fleet, std::uint32_t unit, double theta_deg,
+                    double phi_deg) {
+  const Unit& u = fleet.layout.unit({unit});
+  const UnitDrive& d = fleet.drives[unit];
+  return {NearestVectors(theta_deg, u.axis[0], d.axis[0]),
+          NearestVectors(phi_deg, u.axis[1], d.axis[1])};
+}
+
 inline PlanningFleet HexFleet(std::uint32_t count, Layout::Options options = {}) {
   return FleetOf(MakeHexLayout({.count = count}), std::move(options));
 }
