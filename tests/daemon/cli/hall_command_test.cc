@@ -307,7 +307,8 @@ TEST(HallCommand, ReproducesThePaper) {
   EXPECT_EQ(find("models")["status"], "ordering");
   EXPECT_LT(find("models")["simulated"][2], 0.05);
   const std::string page = Slurp(scratch / "claims/report.html");
-  for (const char* figure : {"figure 4: alpha", "figure 5: beta", "figure 6", "figure 8"})
+  for (const char* figure : {"figure 4: alpha", "figure 5: beta", "figure 6", "figure 8",
+                             "seen obliquely, 2D", "seen obliquely, 3D"})
     EXPECT_THAT(page, HasSubstr(figure));
 }
 
