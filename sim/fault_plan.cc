@@ -4,12 +4,22 @@
 #include <array>
 
 #include "protocol/base/check.h"
+#include "protocol/base/limits.h"
 #include "protocol/base/rng.h"
 #include "protocol/wire/can_frame.h"
 #include "sim/world.h"
 
 namespace focalfleet::sim {
 namespace {
+
+constexpr FaultKindInfo OfSensor(FaultKind kind, const char* name, double last) {
+  return {.kind = kind,
+          .name = name,
+          .of_unit = true,
+          .value = "sensor",
+          .value_min = 1,
+          .value_max = last};
+}
 
 constexpr std::array<FaultKindInfo, kFaultKindCount> kKinds{{
     {.kind = FaultKind::kNoise, .name = "noise", .needs_bit_clock = true},
@@ -47,6 +57,11 @@ constexpr std::array<FaultKindInfo, kFaultKindCount> kKinds{{
      .value_max = 100},
     {.kind = FaultKind::kWrongDigest, .name = "wrong_digest", .of_unit = true},
     {.kind = FaultKind::kMuteDone, .name = "mute_done", .of_unit = true},
+    OfSensor(FaultKind::kSensorStuck, "sensor_stuck", limits::kSensorsPerUnit),
+    OfSensor(FaultKind::kSensorSaturated, "sensor_saturated", limits::kSensorsPerUnit),
+    OfSensor(FaultKind::kSensorMissing, "sensor_missing", limits::kSensorsPerUnit),
+    OfSensor(FaultKind::kSensorSwapped, "sensor_swapped", limits::kSensorsPerUnit - 1),
+    OfSensor(FaultKind::kSensorGain, "sensor_gain", limits::kSensorsPerUnit),
 }};
 
 /// No function of the protocol has this number: the host counts it as malformed.
@@ -89,6 +104,23 @@ void ApplyToBus(const PlannedFault& fault, bool begins, World* world) {
   }
 }
 
+UnitFaults::Sensor SensorFault(const PlannedFault& fault) {
+  using Kind = UnitFaults::Sensor::Kind;
+  const auto sensor = static_cast<std::uint8_t>(fault.value - 1);
+  switch (fault.kind) {
+    case FaultKind::kSensorSaturated:
+      return {Kind::kSaturated, sensor, 0};
+    case FaultKind::kSensorMissing:
+      return {Kind::kMissing, sensor, 0};
+    case FaultKind::kSensorSwapped:
+      return {Kind::kSwapped, sensor, static_cast<std::uint8_t>(sensor + 1)};
+    case FaultKind::kSensorGain:
+      return {Kind::kGain, sensor, 0};
+    default:
+      return {Kind::kStuck, sensor, 0};
+  }
+}
+
 void ApplyToUnit(const PlannedFault& fault, bool begins, World* world) {
   UnitFaults& faults = *world->faults(fault.unit);
   switch (fault.kind) {
@@ -119,8 +151,12 @@ void ApplyToUnit(const PlannedFault& fault, bool begins, World* world) {
     case FaultKind::kWrongDigest:
       faults.wrong_digest = begins;
       return;
-    default:
+    case FaultKind::kMuteDone:
       faults.mute_done = begins;
+      return;
+    default:
+      faults.sensor.reset();
+      if (begins) faults.sensor = SensorFault(fault);
   }
 }
 

@@ -36,8 +36,14 @@ enum class FaultKind : std::uint8_t {
   kCopies,  // value: copies of every answer
   kWrongDigest,
   kMuteDone,
+  // of a sensor at a unit's joint, one at a time; value: its number
+  kSensorStuck,
+  kSensorSaturated,
+  kSensorMissing,
+  kSensorSwapped,  // with the next
+  kSensorGain,
 };
-inline constexpr std::size_t kFaultKindCount = 16;
+inline constexpr std::size_t kFaultKindCount = 21;
 inline constexpr std::size_t kBusFaultKindCount = 7;  // the first ones
 
 struct FaultKindInfo {

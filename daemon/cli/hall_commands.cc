@@ -1,5 +1,5 @@
 // hall: orientation of ball joints from Hall sensors. fit: a field map to a model; orient: voltages
-// to orientations. diagnose and reproduce have files of their own.
+// to orientations. calibrate, diagnose and reproduce have files of their own.
 
 #include <fmt/format.h>
 
@@ -10,7 +10,6 @@
 #include "daemon/cli/hall_options.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
-#include "daemon/hall/hall_tables.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -236,7 +235,8 @@ ExitCode RunHallOrient(const Context& context, const HallOrientOptions& options)
 
 void AddHallSensorOptions(CLI::App* command, HallSensorOptions* options) {
   AddFile(command, "--sensors", &options->sensors,
-          "Directions of the sensors: sensor, x, y, z (default: the eight by their angles)");
+          "Directions of the sensors: sensor, x, y, z; gain, offset_V if any (default: the eight "
+          "by their angles)");
   command
       ->add_option("--sensor-angles-deg", options->angles_deg,
                    "Of sensors 1, 2 from X, of 3, 4 from Z, of 5, 6 from Y (default: 11.25,75,15)")
@@ -314,6 +314,7 @@ void AddHallCommands(CommandLine* line) {
   hall->require_subcommand(1);
   AddHallFit(line, hall);
   AddHallOrient(line, hall);
+  AddHallCalibrate(line, hall);
   AddHallDiagnose(line, hall);
   AddHallReproduce(line, hall);
 }

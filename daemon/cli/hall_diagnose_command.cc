@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "daemon/campaign/sha256.h"
@@ -9,7 +10,6 @@
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "daemon/hall/hall_report.h"
-#include "daemon/hall/hall_tables.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -28,21 +28,6 @@ HallModelFile PaperModel() {
           .origin = "the paper's 3D array",
           .field = sim::SurfaceParameters{.amplitude_T = 0.08},
           .peak_T = 0.08};
-}
-
-sim::HallCampaign CampaignOf(PoseTable table) {
-  sim::HallCampaign campaign;
-  campaign.poses = std::move(table.poses);
-  campaign.rows = std::move(table.rows);
-  campaign.has_temperature = table.has_temperature;
-  double sum = 0, count = 0;
-  for (const sim::VoltageRow& row : campaign.rows)
-    if (std::isfinite(row.temperature_C)) {
-      sum += row.temperature_C;
-      count += 1;
-    }
-  if (count > 0) campaign.temperature_mean_C = sum / count;
-  return campaign;
 }
 
 Status WriteAll(const std::filesystem::path& out, const sim::HallDiagnosis& diagnosis,
@@ -117,6 +102,21 @@ ExitCode RunHallDiagnose(const Context& context, const HallDiagnoseOptions& opti
 }
 
 }  // namespace
+
+sim::HallCampaign CampaignOf(PoseTable table) {
+  sim::HallCampaign campaign;
+  campaign.poses = std::move(table.poses);
+  campaign.rows = std::move(table.rows);
+  campaign.has_temperature = table.has_temperature;
+  double sum = 0, count = 0;
+  for (const sim::VoltageRow& row : campaign.rows)
+    if (std::isfinite(row.temperature_C)) {
+      sum += row.temperature_C;
+      count += 1;
+    }
+  if (count > 0) campaign.temperature_mean_C = sum / count;
+  return campaign;
+}
 
 void AddHallDiagnose(CommandLine* line, CLI::App* hall) {
   CLI::App* command = AddCommand(

@@ -7,6 +7,8 @@
 
 #include "daemon/cli/command_line.h"
 #include "daemon/hall/field_model_file.h"
+#include "daemon/hall/hall_tables.h"
+#include "sim/hall/diagnosis/parameters.h"
 
 namespace focalfleet::cli {
 
@@ -23,8 +25,11 @@ Result<std::vector<sim::HallSensor>> SensorsOf(const HallSensorOptions& options)
 /// Errors: as ReadHallModel and ReadTextFile.
 Result<HallModelFile> LoadHallModel(const std::string& path);
 
+sim::HallCampaign CampaignOf(PoseTable table);
+
 void AddHallFit(CommandLine* line, CLI::App* hall);
 void AddHallOrient(CommandLine* line, CLI::App* hall);
+void AddHallCalibrate(CommandLine* line, CLI::App* hall);
 void AddHallDiagnose(CommandLine* line, CLI::App* hall);
 void AddHallReproduce(CommandLine* line, CLI::App* hall);
 

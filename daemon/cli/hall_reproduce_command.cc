@@ -19,6 +19,8 @@ struct HallReproduceCommandOptions {
 report::Axis AxisX(const std::string& figure) {
   if (figure.starts_with("figure 6") || figure.find("along theta") != std::string::npos)
     return {.label = "theta", .unit = "deg"};
+  if (figure.find("obliquely") != std::string::npos)
+    return {.label = "phi + theta / 2", .unit = "deg"};
   if (figure.starts_with("figure 8")) return {.label = "phi", .unit = "deg"};
   return {.label = "actual", .unit = "deg"};
 }
@@ -26,6 +28,8 @@ report::Axis AxisX(const std::string& figure) {
 report::Axis AxisY(const std::string& figure) {
   if (figure.starts_with("figure 6"))
     return {.label = "slope of the radial field", .unit = "mT/deg"};
+  if (figure.find("obliquely") != std::string::npos)
+    return {.label = "radial field + 1 mT a deg of theta", .unit = "mT"};
   if (figure.starts_with("figure 8")) return {.label = "radial field", .unit = "mT"};
   return {.label = "found", .unit = "deg"};
 }

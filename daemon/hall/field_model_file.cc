@@ -303,8 +303,8 @@ Result<sim::HallRig> RigOf(const HallModelFile& model, std::vector<sim::HallSens
                   fmt::format("the model knows sensor {}, there are {} sensors", known.sensor + 1,
                               rig.sensors.size()));
     sim::HallSensor& sensor = rig.sensors[known.sensor];
-    sensor.gain = known.gain;
-    sensor.offset_V = known.offset_V;
+    sensor.gain *= known.gain;
+    sensor.offset_V += known.offset_V;
     sensor.direction =
         sim::Shifted(sensor.direction, {known.shift_east_rad, known.shift_north_rad});
   }

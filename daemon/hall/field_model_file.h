@@ -14,7 +14,7 @@
 
 namespace focalfleet {
 
-/// What a campaign found about one sensor, from its nominal direction.
+/// What a campaign found about one sensor, from what is known of it otherwise.
 struct SensorCalibration {
   std::size_t sensor = 0;  // from 0
   double gain = 1;
@@ -46,7 +46,7 @@ std::string WriteHallModel(const HallModelFile& model);
 /// Errors: kInvalid with file and line: not TOML, a key missing, unknown or out of its range.
 Result<HallModelFile> ReadHallModel(std::string_view text, const std::string& file);
 
-/// The model's calibration on sensors in their nominal directions.
+/// The model's calibration upon that of the sensors: gains multiply, offsets and shifts add up.
 /// Errors: kInvalid: the model knows a sensor that is not there.
 Result<sim::HallRig> RigOf(const HallModelFile& model, std::vector<sim::HallSensor> sensors);
 

@@ -14,6 +14,8 @@ constexpr double kFieldMax_T = 10;
 constexpr double kVoltageMax_V = 1000;
 constexpr double kAngleMax_deg = 3600;
 constexpr double kLengthTolerance = 0.01;
+constexpr double kGainMax = 100;
+constexpr double kOffsetMax_V = 100;
 
 std::string VoltageColumn(std::size_t sensor) { return "v" + std::to_string(sensor + 1) + "_V"; }
 
@@ -51,6 +53,15 @@ sim::VoltageRow ReadRow(CsvRow* row, std::size_t sensors) {
 Status NotEmpty(const CsvTable& table) {
   if (table.size() > 0) return {};
   return Fail(ErrorCode::kInvalid, table.file() + ": there are no rows below the header");
+}
+
+void ReadGainAndOffset(CsvRow* row, sim::HallSensor* sensor) {
+  sensor->gain = row->NumberIfAny("gain").value_or(1);
+  if (sensor->gain == 0 || std::abs(sensor->gain) > kGainMax)
+    row->Reject("gain", row->Text("gain") + " is no gain of a sensor: 1 is nominal");
+  sensor->offset_V = row->NumberIfAny("offset_V").value_or(0);
+  if (std::abs(sensor->offset_V) > kOffsetMax_V)
+    row->Reject("offset_V", row->Text("offset_V") + " V is no offset from half of the supply");
 }
 
 }  // namespace
@@ -104,11 +115,35 @@ Result<std::vector<sim::HallSensor>> ReadSensors(std::string_view text, std::str
     const double length = Length(direction);
     if (std::abs(length - 1) > kLengthTolerance)
       row.Reject("x", "x, y, z have length " + NumberText(length) + ", a unit vector is expected");
+    ReadGainAndOffset(&row, &sensors[index]);
     if (row.error()) return tl::unexpected<Error>(*row.error());
     line_of[index] = row.line();
     sensors[index].direction = Unit(direction);
   }
   return sensors;
+}
+
+std::string WriteCalibration(const std::vector<sim::SensorFit>& sensors) {
+  CsvWriter csv({"sensor", "x", "y", "z", "gain", "offset_V", "sd_gain", "sd_offset_V",
+                 "sd_east_deg", "sd_north_deg", "readings", "rms_V", "status"});
+  for (std::size_t k = 0; k < sensors.size(); ++k) {
+    const sim::SensorFit& fit = sensors[k];
+    const sim::HallSensor& sensor = fit.sensor;
+    csv.Integer(static_cast<std::int64_t>(k + 1));
+    for (const double value :
+         {sensor.direction.x, sensor.direction.y, sensor.direction.z, sensor.gain, sensor.offset_V})
+      csv.Number(value);
+    for (const double sd : {fit.sd_gain, fit.sd_offset_V, fit.sd_east_rad / kRadPerDeg,
+                            fit.sd_north_rad / kRadPerDeg}) {
+      if (fit.status == sim::CalibrationStatus::kOk)
+        csv.Number(sd);
+      else
+        csv.Missing();
+    }
+    csv.Integer(static_cast<std::int64_t>(fit.readings));
+    csv.Number(fit.rms_after_V).Text(sim::Name(fit.status)).EndRow();
+  }
+  return csv.Take();
 }
 
 Result<std::vector<sim::VoltageRow>> ReadVoltages(std::string_view text, std::string file,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
+#include "sim/hall/diagnosis/calibration.h"
 #include "sim/hall/estimate.h"
 #include "sim/hall/field_fit.h"
 
@@ -18,15 +19,20 @@ namespace focalfleet {
 /// 10 T.
 Result<sim::FieldMap> ReadFieldMap(std::string_view text, std::string file);
 
-/// sensor, x, y, z: unit directions from the centre, stator frame, sensors 1..n in any order.
-/// Errors: kInvalid with file:line and column: a number twice or left out, no unit vector, more
-/// than kSensorsMax.
+/// sensor, x, y, z: unit directions from the centre, stator frame, sensors 1..n in any order; gain
+/// (1) and offset_V (0) where they are there. Other columns are passed over.
+/// Errors: kInvalid with file:line and column: a number twice or left out, no unit vector, a gain
+/// of 0 or beyond +-100, an offset beyond +-100 V, more than kSensorsMax.
 Result<std::vector<sim::HallSensor>> ReadSensors(std::string_view text, std::string file);
 
 /// v1_V ... vn_V, and temp_C where it is there; an empty voltage is a missing one.
 /// Errors: kInvalid with file:line and column: a column missing, no number, beyond +-1000 V.
 Result<std::vector<sim::VoltageRow>> ReadVoltages(std::string_view text, std::string file,
                                                   std::size_t sensors);
+
+/// sensor, x, y, z, gain, offset_V as ReadSensors reads them; sd_gain, sd_offset_V, sd_east_deg,
+/// sd_north_deg (missing where a sensor was not calibrated), readings, rms_V, status.
+std::string WriteCalibration(const std::vector<sim::SensorFit>& sensors);
 
 struct PoseTable {
   std::vector<sim::Orientation> poses;

@@ -34,6 +34,7 @@ void Contact::OnSensors(PositionerIndex i, const SensorsReply& reply) {
 
 void Contact::SensorsDoNotAnswer(PositionerIndex i, const std::string& what) {
   core_.unit(i).sensing = {};
+  core_.unit(i).sensing.given_up = true;
   core_.Raise(Severity::kWarning, i, {}, core_.NameOf(i) + " has sensors, but " + what);
 }
 

@@ -80,7 +80,9 @@ struct UnitRecord {
   struct Sensing {
     std::uint8_t next_part = 0;
     std::uint8_t parts = 0;
+    bool given_up = false;  // it does not tell them
     SensorReading reading;  // none before all parts have come
+    [[nodiscard]] bool begun() const { return parts > 0 || given_up; }
     [[nodiscard]] bool under_way() const { return next_part < parts; }
   } sensing;
   bool wants_start = false;  // began with the others; when, is not known yet

@@ -266,6 +266,7 @@ class Pursuit {
   HostInstant exposure_asked_;
   std::uint64_t exposure_ = 0;
   HostInstant sense_at_ = kNever;  // the sensors of units are read from then on
+  HostInstant sense_until_{0};     // who is read anew is awaited until then
   bool sensing_ = false;           // and are being read
   int exposures_refused_ = 0;
 

@@ -57,16 +57,26 @@ void Pursuit::MeasureOrFinish() {
   SetState(State::kMeasuring);
 }
 
-/// The readings of all units with sensors are there, as far as they come.
+/// The readings of all units with sensors are there, as far as they come. A unit that is read anew
+/// meanwhile, because it missed us for a while, is awaited and asked as soon as it is known again.
 bool Pursuit::SensorsAreRead() {
   if (sense_at_ == kNever) return true;
   if (core_.now < sense_at_) return false;
+  const bool first = !std::exchange(sensing_, true);
+  if (first) sense_until_ = core_.now + core_.config.silence_limit;
+  const bool patient = core_.now < sense_until_;
+  bool read = true;
   const auto count = static_cast<std::uint32_t>(core_.units.size());
-  if (!std::exchange(sensing_, true))
-    for (std::uint32_t n = 0; n < count; ++n) contact_.Sense({n});
-  return std::none_of(core_.units.begin(), core_.units.end(), [](const UnitRecord& unit) {
-    return unit.view.phase == UnitPhase::kReady && unit.sensing.under_way();
-  });
+  for (std::uint32_t n = 0; n < count; ++n) {
+    if (core_.layout.unit({n}).sensors == 0) continue;
+    UnitRecord& unit = core_.units[n];
+    if (first) unit.sensing = {};  // of an exposure before
+    const bool is_ready = unit.view.phase == UnitPhase::kReady;
+    if (is_ready && !unit.sensing.begun() && (first || patient)) contact_.Sense({n});
+    if (is_ready ? unit.sensing.under_way() : patient && unit.view.phase == UnitPhase::kIdentifying)
+      read = false;
+  }
+  return read;
 }
 
 void Pursuit::AskForExposure() {
@@ -112,7 +122,8 @@ void Pursuit::OnExposure(const ExposureDone& done) {
   }
   Summarise(std::move(errors_um), &round);
   view_.measured.push_back(round);
-  measured_batch_ = core_.batch_now();
+  // Where nobody was found there is nothing to wait for.
+  measured_batch_ = core_.out->rows.empty() ? 0 : core_.batch_now();
   CorrectOrFinish();
 }
 

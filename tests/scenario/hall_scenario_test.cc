@@ -113,6 +113,19 @@ TEST_F(HallScenario, WhoDoesNotTellItsSensorsIsNotLost) {
   EXPECT_EQ(fleet_->coordinator().configuration().measured.back().measured, 18u);
 }
 
+// A unit that missed its host for a while says so, and is read anew before anything else is asked
+// of it: its sensors, too, as soon as it is known again.
+TEST_F(HallScenario, WhoIsReadAnewInBetweenIsMeasuredNevertheless) {
+  Make({.count = 40, .seed = 8, .config = {.reads_sensors = true}, .sensors = 8});
+  fleet_->ApplyRandomMeasured(1, {.corrections = 0, .tolerance_um = 20});
+  ASSERT_TRUE(fleet_->RunUntil([&] { return fleet_->CountOutcome(TargetOutcome::kArrived) == 40; },
+                               Seconds(300)));
+  fleet_->Freeze(Seconds(120), InProcessFleet::Heard::kWaits);
+  ASSERT_TRUE(fleet_->RunUntilIdle()) << "also where nobody is measured";
+  const MeasuredRound& last = fleet_->coordinator().configuration().measured.back();
+  EXPECT_EQ(last.measured, 40u);
+}
+
 TEST_F(HallScenario, ASensorsReadingTakesHalfAMillisecondOfItsBus) {
   Make({.count = 40,
         .units_per_bus = 40,

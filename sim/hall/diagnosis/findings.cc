@@ -34,6 +34,7 @@ std::vector<Merged> Merge(const Selected& selected, const ParameterLayout& layou
   std::vector<Merged> merged;
   for (std::size_t k = 0; k < selected.on.size(); ++k) {
     const HallHypothesis& one = selected.on[k];
+    if (one.cause == HallCause::kOutside) continue;
     const HallCause cause =
         one.cause == HallCause::kFieldWidth && other_shape ? HallCause::kFieldHarmonics : one.cause;
     auto same = std::find_if(merged.begin(), merged.end(),
@@ -52,8 +53,9 @@ std::vector<Merged> Merge(const Selected& selected, const ParameterLayout& layou
   }
   for (Merged& one : merged) {
     std::sort(one.all.sensors.begin(), one.all.sensors.end());
-    one.rivals.erase(std::remove(one.rivals.begin(), one.rivals.end(), one.all.cause),
-                     one.rivals.end());
+    std::erase_if(one.rivals, [&](HallCause rival) {
+      return rival == one.all.cause || rival == HallCause::kOutside;
+    });
   }
   return merged;
 }
@@ -148,6 +150,8 @@ Size SizeOf(const HallHypothesis& one, const HallDiagnosis& found) {
     }
     case HallCause::kTemperatureCoefficient:
       return {value, sd, "1/K", "the field changes with temp_C"};
+    case HallCause::kOutside:
+      break;
   }
   return {};
 }
@@ -179,7 +183,9 @@ HallGain GainOf(const HallForward& forward, const HallCampaign& campaign, const 
     if (test.empty() || train.empty()) continue;
     HallSearch part(forward, campaign, train);
     const HallFit simple = part.Free();
-    const HallFit full = part.Fit(selected.on, selected.fit.parameters);
+    HallFit full = part.Fit(selected.on, selected.fit.parameters);
+    // What no model can hold does not help to predict.
+    full.parameters.tail(full.parameters.size() - At(forward.layout().library())).setZero();
     part.set_readings(test);
     part.TakeMeasured();
     VectorXd predicted;
@@ -221,6 +227,26 @@ double Sensitivity(const HallForward& forward, const HallCampaign& campaign,
   return std::sqrt(squares / (2 * static_cast<double>(std::max<Index>(1, here.size()))));
 }
 
+// What is none of the causes, each with what its absence would cost.
+std::vector<HallUnknown> OutsideFound(const HallForward& forward, const HallSearch& search,
+                                      const Selected& selected) {
+  std::vector<HallUnknown> found;
+  for (std::size_t k = 0; k < selected.on.size(); ++k) {
+    if (selected.on[k].cause != HallCause::kOutside) continue;
+    std::vector<HallHypothesis> rest = selected.on;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(k));
+    const std::size_t parameter = selected.on[k].parameters.front();
+    VectorXd start = selected.fit.parameters;
+    start[At(parameter)] = 0;
+    const double explained = search.Fit(rest, start).squares - selected.fit.squares;
+    const auto n = static_cast<double>(search.readings().size());
+    found.push_back({Text(forward.layout().effects[parameter - forward.layout().library()]),
+                     ChanceOf(explained / selected.variance, 1),
+                     std::sqrt(std::max(0.0, explained) / n)});
+  }
+  return found;
+}
+
 // What its absence would cost, all else fitted anew.
 void AddWorth(const HallSearch& search, const Selected& selected, HallCauseFound* cause) {
   std::vector<HallHypothesis> rest;
@@ -246,7 +272,9 @@ void AddWorth(const HallSearch& search, const Selected& selected, HallCauseFound
 
 void AddFindings(const HallForward& forward, const HallCampaign& campaign, const HallSearch& search,
                  const Selected& selected, HallDiagnosis* out) {
+  out->layout = forward.layout();
   out->parameters = selected.fit.parameters;
+  out->sd = VectorXd::Zero(out->parameters.size());
   for (std::size_t k = 0; k < selected.fit.free.size(); ++k)
     out->sd[At(selected.fit.free[k])] =
         std::sqrt(std::max(0.0, selected.variance * selected.fit.covariance(At(k), At(k))));
@@ -272,7 +300,9 @@ void AddFindings(const HallForward& forward, const HallCampaign& campaign, const
   }
   std::sort(out->causes.begin(), out->causes.end(),
             [](const HallCauseFound& a, const HallCauseFound& b) { return a.chi2 > b.chi2; });
-  out->unknown = RemainingStructure(forward, campaign, search, selected);
+  out->unknown = OutsideFound(forward, search, selected);
+  for (HallUnknown& more : RemainingStructure(forward, campaign, search, selected))
+    out->unknown.push_back(std::move(more));
   out->gain = GainOf(forward, campaign, search, selected, out->noise_V);
 }
 

@@ -21,6 +21,9 @@ constexpr double kSwapLeaves = 0.3;  // of the squares
 constexpr int kPassesMax = 8;
 constexpr double kFarOff = 6;  // robust standard deviations
 constexpr double kPosesSpread_rad = 0.5 * kRadPerDeg;
+// By how much in 2 ln L, less ln n a number, what is none of the causes has to be the better
+// explanation: the margin of every rival, and that some 140 of them are tried.
+constexpr double kOutsideMargin = 9 + 10;
 
 struct Column {
   std::size_t count = 0;
@@ -180,6 +183,11 @@ bool DropFarOff(const Selected& selected, HallSearch* search, HallDiagnosis* out
   return dropped > 0;
 }
 
+double PenalisedSquares(const Selected& selected, double variance, std::size_t readings) {
+  return selected.fit.squares / variance +
+         static_cast<double>(selected.fit.free.size()) * std::log(static_cast<double>(readings));
+}
+
 }  // namespace
 
 const char* Name(HallVerdict verdict) {
@@ -225,14 +233,27 @@ HallDiagnosis DiagnoseHall(const HallCampaign& given, const HallRig& rig, const 
   }
   out.readings = search.readings();
   out.noise_V = std::sqrt(selected.variance);
-  AddFindings(forward, campaign, search, selected, &out);
+  const HallForward wider(campaign, rig, field,
+                          OutsideEffects(rig.sensors.size(), campaign.has_temperature));
+  HallSearch with_others(wider, campaign, search.readings());
+  const Selected other = SelectHall(with_others);
+  const double variance = std::min(selected.variance, other.variance);
+  const std::size_t n = search.readings().size();
+  const bool outside = PenalisedSquares(other, variance, n) + kOutsideMargin <
+                       PenalisedSquares(selected, variance, n);
+  if (outside)
+    AddFindings(wider, campaign, with_others, other, &out);
+  else
+    AddFindings(forward, campaign, search, selected, &out);
   out.verdict = HallVerdict::kConsistent;
   if (!out.causes.empty() || !out.troubles.empty()) out.verdict = HallVerdict::kExplained;
   for (const HallCauseFound& cause : out.causes)
     if (cause.candidates.size() > 1) out.verdict = HallVerdict::kAmbiguous;
   if (!out.unknown.empty()) out.verdict = HallVerdict::kUnknown;
   if (out.verdict == HallVerdict::kAmbiguous || out.verdict == HallVerdict::kUnknown)
-    out.next_poses = ProposePoses(forward, out.parameters, out.readings, out.noise_V);
+    out.next_poses =
+        ProposePoses(forward, out.parameters.head(static_cast<Index>(forward.layout().size())),
+                     out.readings, out.noise_V);
   return out;
 }
 

@@ -4,7 +4,8 @@
 // beforehand, are projected out first; causes enter one by one by evidence (explained chi^2 less ln
 // n a parameter), after a gate that chance passes once in a hundred thousand tries; each entry is
 // followed by a joint nonlinear fit. A name is given alone where every rival that could replace it
-// is worse by 9 or more in 2 ln L; else the set is told. What remains with structure is `unknown`.
+// is worse by 9 or more in 2 ln L; else the set is told. What remains with structure is `unknown`,
+// and so is what something that is none of the causes (outside.h) explains clearly better.
 //
 // The noise is that of the residuals when every parameter is free, so nothing has to be known about
 // it. Readings far from all of that, at the ends of the range or missing are counted and left out;
@@ -73,7 +74,7 @@ struct HallDiagnosis {
   std::vector<Orientation> next_poses;
 };
 
-/// Cost: about 50 ms for 150 poses.
+/// Cost: a second or so for 150 poses: the search is made twice.
 HallDiagnosis DiagnoseHall(const HallCampaign& campaign, const HallRig& rig,
                            const FieldModel& field);
 

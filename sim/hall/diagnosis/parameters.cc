@@ -1,6 +1,8 @@
 #include "sim/hall/diagnosis/parameters.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "protocol/base/check.h"
 
@@ -67,6 +69,8 @@ const char* Name(HallCause cause) {
       return "centre_offset";
     case HallCause::kTemperatureCoefficient:
       return "temperature_coefficient";
+    case HallCause::kOutside:
+      return "outside";
   }
   return "";
 }
@@ -85,13 +89,72 @@ ParameterLayout LayoutOf(std::size_t sensors) {
   return layout;
 }
 
-HallForward::HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field)
+HallForward::HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field,
+                         std::vector<OutsideEffect> effects)
     : campaign_(campaign), rig_(rig), field_(field), layout_(LayoutOf(rig.sensors.size())) {
+  layout_.effects = std::move(effects);
   for (const Orientation& pose : campaign.poses) rotations_.emplace_back(pose);
   Measure(field, &peak_T_, &width_rad_);
+  effects_of_.resize(layout_.sensors);
+  for (std::size_t k = 0; k < layout_.effects.size(); ++k) {
+    const OutsideEffect& effect = layout_.effects[k];
+    if (effect.kind == OutsideKind::kPose) pose_effects_.push_back(k);
+    for (std::size_t s = 0; s < layout_.sensors; ++s)
+      if (effect.kind != OutsideKind::kPose && (effect.sensor < 0 || effect.sensor == int(s)))
+        effects_of_[s].push_back(k);
+  }
 }
 
 double HallForward::One(const Eigen::VectorXd& p, const Reading& reading) const {
+  const std::size_t s = reading.sensor;
+  const double rest_V = rig_.electronics.zero_V() + rig_.sensors[s].offset_V +
+                        p[static_cast<Eigen::Index>(layout_.offset(s))];
+  if (layout_.effects.empty()) return rest_V + Signal_V(p, reading, rotations_[reading.row]);
+  const bool misread = std::any_of(pose_effects_.begin(), pose_effects_.end(), [&](std::size_t k) {
+    return p[static_cast<Eigen::Index>(layout_.effect(k))] != 0;
+  });
+  const Rotation rotation = misread ? Rotation(Misread(p, reading.row)) : rotations_[reading.row];
+  const double signal_V = Signal_V(p, reading, rotation);
+  return rest_V + signal_V + Outside_V(p, reading, rotation, signal_V);
+}
+
+Orientation HallForward::Misread(const Eigen::VectorXd& p, std::size_t row) const {
+  const Orientation& told = campaign_.poses[row];
+  Orientation truly = told;
+  double* angles[] = {&truly.alpha_rad, &truly.beta_rad, &truly.gamma_rad};
+  for (const std::size_t k : pose_effects_)
+    *angles[layout_.effects[k].angle] += p[static_cast<Eigen::Index>(layout_.effect(k))] *
+                                         PoseFunction(layout_.effects[k].function, told);
+  return truly;
+}
+
+OutsideMoment HallForward::MomentOf(const Reading& reading, double signal_V) const {
+  OutsideMoment at{.signal_V = signal_V};
+  at.share = static_cast<double>(reading.row) / static_cast<double>(campaign_.rows.size()) - 0.5;
+  const double temperature_C = campaign_.rows[reading.row].temperature_C;
+  if (std::isfinite(temperature_C)) at.warm_K = temperature_C - campaign_.temperature_mean_C;
+  return at;
+}
+
+double HallForward::Outside_V(const Eigen::VectorXd& p, const Reading& reading,
+                              const Rotation& rotation, double signal_V) const {
+  double volts = 0;
+  for (const std::size_t k : effects_of_[reading.sensor]) {
+    const double size = p[static_cast<Eigen::Index>(layout_.effect(k))];
+    if (size == 0) continue;
+    const OutsideEffect& effect = layout_.effects[k];
+    OutsideMoment at = MomentOf(reading, signal_V);
+    if (effect.kind == OutsideKind::kHears)
+      at.other_V = Signal_V(p, {reading.row, effect.other}, rotation);
+    if (effect.kind == OutsideKind::kLag && reading.row > 0)
+      at.other_V = Signal_V(p, {reading.row - 1, reading.sensor}, rotations_[reading.row - 1]);
+    volts += size * OutsideSlope(effect.kind, at);
+  }
+  return volts;
+}
+
+double HallForward::Signal_V(const Eigen::VectorXd& p, const Reading& reading,
+                             const Rotation& rotation) const {
   const auto at = [&](std::size_t k) { return p[static_cast<Eigen::Index>(k)]; };
   const std::size_t s = reading.sensor;
   HallSensor sensor = rig_.sensors[s];
@@ -107,7 +170,7 @@ double HallForward::One(const Eigen::VectorXd& p, const Reading& reading) const 
     direction = Unit(direction - (1 + TangentialShare(decay)) * away);
     factor = std::pow(Length(sensor.direction - away), -decay);
   }
-  Vector3 local = rotations_[reading.row].ToRotor(direction);
+  Vector3 local = rotation.ToRotor(direction);
   const double phase_rad = at(ParameterLayout::kPhase);
   const double c = std::cos(phase_rad), sn = std::sin(phase_rad);
   local = {c * local.x + sn * local.y, c * local.y - sn * local.x, local.z};
@@ -136,9 +199,8 @@ double HallForward::One(const Eigen::VectorXd& p, const Reading& reading) const 
   factor *= (1 + at(ParameterLayout::kAmplitude)) * (1 + at(ParameterLayout::kTemperature) * warm);
   if (std::isfinite(temperature_C))
     factor *= 1 + rig_.temperature_per_K * (temperature_C - rig_.temperature_reference_C);
-  return rig_.electronics.zero_V() + sensor.offset_V + at(layout_.offset(s)) +
-         rig_.electronics.sensitivity_V_per_T * sensor.gain * (1 + at(layout_.gain(s))) * factor *
-             b_T;
+  return rig_.electronics.sensitivity_V_per_T * sensor.gain * (1 + at(layout_.gain(s))) * factor *
+         b_T;
 }
 
 void HallForward::Predict(const Eigen::VectorXd& parameters, const std::vector<Reading>& readings,
@@ -155,6 +217,7 @@ double HallForward::Step(std::size_t parameter) const {
 }
 
 int HallForward::SensorOf(std::size_t parameter) const {
+  if (parameter >= layout_.library()) return layout_.effects[parameter - layout_.library()].sensor;
   if (parameter < ParameterLayout::kFirstSensor || parameter >= layout_.term(0)) return -1;
   const std::size_t k = parameter - ParameterLayout::kFirstSensor;
   if (k < 2 * layout_.sensors) return static_cast<int>(k % layout_.sensors);
@@ -176,6 +239,48 @@ Eigen::MatrixXd HallForward::Slopes(const Eigen::VectorXd& parameters,
       if (own >= 0 && readings[k].sensor != static_cast<std::size_t>(own)) continue;
       slopes(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) =
           (One(up, readings[k]) - One(down, readings[k])) / (2 * step);
+    }
+  }
+  return slopes;
+}
+
+Eigen::MatrixXd HallForward::EffectSlopes(const Eigen::VectorXd& p,
+                                          const std::vector<Reading>& readings) const {
+  constexpr double kStep_rad = 1e-5;
+  const auto at = [](std::size_t k) { return static_cast<Eigen::Index>(k); };
+  // What every sensor shows in every row, also where a reading is not judged: others hear it.
+  Eigen::MatrixXd signals_V(at(rotations_.size()), at(layout_.sensors));
+  std::vector<Orientation> truly;
+  for (std::size_t row = 0; row < rotations_.size(); ++row) {
+    truly.push_back(Misread(p, row));
+    const Rotation rotation(truly.back());
+    for (std::size_t s = 0; s < layout_.sensors; ++s)
+      signals_V(at(row), at(s)) = Signal_V(p, {row, s}, rotation);
+  }
+  Eigen::MatrixXd slopes = Eigen::MatrixXd::Zero(at(readings.size()), at(layout_.effects.size()));
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const Reading& reading = readings[k];
+    double by_angle_V[3];
+    for (int angle = 0; angle < 3; ++angle) {
+      const auto turned = [&](double step_rad) {
+        Orientation o = truly[reading.row];
+        (angle == 0 ? o.alpha_rad : angle == 1 ? o.beta_rad : o.gamma_rad) += step_rad;
+        return Signal_V(p, reading, Rotation(o));
+      };
+      by_angle_V[angle] = (turned(kStep_rad) - turned(-kStep_rad)) / (2 * kStep_rad);
+    }
+    for (const std::size_t e : pose_effects_)
+      slopes(at(k), at(e)) =
+          by_angle_V[layout_.effects[e].angle] *
+          PoseFunction(layout_.effects[e].function, campaign_.poses[reading.row]);
+    OutsideMoment moment = MomentOf(reading, signals_V(at(reading.row), at(reading.sensor)));
+    for (const std::size_t e : effects_of_[reading.sensor]) {
+      const OutsideEffect& effect = layout_.effects[e];
+      const bool lags = effect.kind == OutsideKind::kLag;
+      moment.other_V =
+          lags ? (reading.row > 0 ? signals_V(at(reading.row - 1), at(reading.sensor)) : 0)
+               : signals_V(at(reading.row), at(effect.other));
+      slopes(at(k), at(e)) = OutsideSlope(effect.kind, moment);
     }
   }
   return slopes;

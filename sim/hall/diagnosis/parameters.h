@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/hall/diagnosis/outside.h"
 #include "sim/hall/estimate.h"
 #include "sim/hall/field_model.h"
 
@@ -27,6 +28,7 @@ enum class HallCause {
   kSensorPosition,
   kCentreOffset,
   kTemperatureCoefficient,
+  kOutside,  // none of them: what outside.h has
 };
 inline constexpr HallCause kHallCauses[] = {
     HallCause::kFieldHarmonics,        HallCause::kFieldWidth,     HallCause::kSensorGain,
@@ -45,6 +47,7 @@ struct FieldTerm {
 struct ParameterLayout {
   std::size_t sensors = 8;
   std::vector<FieldTerm> terms;
+  std::vector<OutsideEffect> effects;  // none where only causes are fitted
 
   static constexpr std::size_t kAmplitude = 0;
   static constexpr std::size_t kPhase = 1;
@@ -62,7 +65,10 @@ struct ParameterLayout {
     return kFirstSensor + 2 * sensors + 2 * sensor;
   }
   [[nodiscard]] std::size_t term(std::size_t k) const { return kFirstSensor + 4 * sensors + k; }
-  [[nodiscard]] std::size_t size() const { return term(terms.size()); }
+  [[nodiscard]] std::size_t effect(std::size_t k) const { return term(terms.size()) + k; }
+  /// Of the causes alone.
+  [[nodiscard]] std::size_t library() const { return effect(0); }
+  [[nodiscard]] std::size_t size() const { return effect(effects.size()); }
 };
 
 ParameterLayout LayoutOf(std::size_t sensors);
@@ -82,12 +88,13 @@ struct Reading {
 
 class HallForward {
  public:
-  /// Lifetime: keeps all three.
-  HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field);
+  /// Lifetime: keeps all three. `effects`: what it can do beyond the causes.
+  HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field,
+              std::vector<OutsideEffect> effects = {});
 
   /// The same rig in other poses. Lifetime: keeps `campaign`.
   [[nodiscard]] HallForward At(const HallCampaign& campaign) const {
-    return HallForward(campaign, rig_, field_);
+    return HallForward(campaign, rig_, field_, layout_.effects);
   }
 
   [[nodiscard]] double zero_V() const { return rig_.electronics.zero_V(); }
@@ -104,8 +111,20 @@ class HallForward {
                                        const std::vector<Reading>& readings,
                                        const std::vector<std::size_t>& chosen) const;
 
+  /// The same of all effects, which are straight in their sizes. Shape: (readings, effects).
+  /// Cost: six predictions, and a product a number.
+  [[nodiscard]] Eigen::MatrixXd EffectSlopes(const Eigen::VectorXd& parameters,
+                                             const std::vector<Reading>& readings) const;
+
  private:
   [[nodiscard]] double One(const Eigen::VectorXd& parameters, const Reading& reading) const;
+  // Without offsets.
+  [[nodiscard]] double Signal_V(const Eigen::VectorXd& parameters, const Reading& reading,
+                                const Rotation& rotation) const;
+  [[nodiscard]] OutsideMoment MomentOf(const Reading& reading, double signal_V) const;
+  [[nodiscard]] double Outside_V(const Eigen::VectorXd& parameters, const Reading& reading,
+                                 const Rotation& rotation, double signal_V) const;
+  [[nodiscard]] Orientation Misread(const Eigen::VectorXd& parameters, std::size_t row) const;
   [[nodiscard]] double Step(std::size_t parameter) const;
   [[nodiscard]] int SensorOf(std::size_t parameter) const;  // -1: of all
 
@@ -114,6 +133,8 @@ class HallForward {
   const FieldModel& field_;
   ParameterLayout layout_;
   std::vector<Rotation> rotations_;
+  std::vector<std::size_t> pose_effects_;
+  std::vector<std::vector<std::size_t>> effects_of_;  // of each sensor, common ones in all
   double peak_T_ = 0;
   double width_rad_ = 0;
 };

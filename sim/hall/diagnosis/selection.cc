@@ -53,6 +53,8 @@ std::vector<HallHypothesis> MakeHypotheses(const ParameterLayout& layout, bool t
     list.push_back(term);
     if (pair) ++k;
   }
+  for (std::size_t k = 0; k < layout.effects.size(); ++k)
+    list.push_back({HallCause::kOutside, {layout.effect(k)}, {}, 0});
   return list;
 }
 
@@ -156,7 +158,7 @@ HallFit HallSearch::Fit(const std::vector<HallHypothesis>& on, const VectorXd& s
 
 HallSearch::Rich HallSearch::AllFree(const HallFit& fit) const {
   std::vector<std::size_t> all;
-  for (std::size_t k = 0; k < forward_.layout().size(); ++k) {
+  for (std::size_t k = 0; k < forward_.layout().library(); ++k) {
     if (k == ParameterLayout::kDecay) continue;
     if (k == ParameterLayout::kTemperature && !campaign_.has_temperature) continue;
     all.push_back(k);
@@ -181,12 +183,22 @@ std::vector<double> HallSearch::Explained(const HallFit& fit) const {
     return MatrixXd(columns - basis * (basis.transpose() * columns));
   };
   const VectorXd rest = projected(fit.residuals);
+  const ParameterLayout& layout = forward_.layout();
+  MatrixXd effects;
+  if (!layout.effects.empty())
+    effects = projected(forward_.EffectSlopes(fit.parameters, readings_));
   const bool centre_on = fit.parameters[At(ParameterLayout::kCentre)] != 0;
   std::vector<double> explained;
   for (const HallHypothesis& hypothesis : hypotheses_) {
     if (Touches(hypothesis, fit.free) ||
         (centre_on && hypothesis.cause == HallCause::kCentreOffset)) {
       explained.push_back(0);
+      continue;
+    }
+    if (hypothesis.cause == HallCause::kOutside) {
+      const auto own = effects.col(At(hypothesis.parameters.front() - layout.library()));
+      const double right = own.dot(rest);
+      explained.push_back(right * right / (own.squaredNorm() + 1e-15));
       continue;
     }
     VectorXd at = fit.parameters;

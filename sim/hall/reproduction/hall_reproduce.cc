@@ -2,6 +2,8 @@
 
 #include "sim/hall/reproduction/hall_reproduce.h"
 
+#include <limits>
+
 #include "protocol/base/check.h"
 #include "sim/hall/closed_form.h"
 #include "sim/hall/reproduction/hall_parts.h"
@@ -11,6 +13,8 @@ namespace reproduction {
 namespace {
 
 constexpr double kMapStep_deg = 3;
+constexpr double kObliqueRight = 0.5;  // a deg of theta
+constexpr double kObliqueUp_mT = 1;
 
 void Set(Orientation* orientation, int axis, double angle_rad) {
   (axis == 0   ? orientation->alpha_rad
@@ -58,6 +62,35 @@ void AddCut(const std::string& figure, const HallArray& array, double from_deg, 
     ours.y.push_back(array.models[spherical]->Radial_T(local) * 1e3);
   }
   for (ClaimCurve* curve : {&computed, &fitted, &ours}) out->curves.push_back(std::move(*curve));
+}
+
+// The fitted surface over theta and phi, seen obliquely: what is farther in theta is farther up and
+// to the right. Lines of equal theta and of equal phi, apart from each other by a gap.
+void AddView(const HallArray& array, Reproduction* out) {
+  constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
+  const FieldModel& surface = *array.models[static_cast<std::size_t>(FieldKind::kSurface)];
+  ClaimCurve view{"figure 8: the fitted surface, seen obliquely, " + std::string(array.name),
+                  "surface fit",
+                  {},
+                  {}};
+  const auto add = [&](double theta_deg, double phi_deg) {
+    const Vector3 local = DirectionAt(theta_deg * kRadPerDeg, phi_deg * kRadPerDeg);
+    view.x.push_back(phi_deg + kObliqueRight * theta_deg);
+    view.y.push_back(surface.Radial_T(local) * 1e3 + kObliqueUp_mT * theta_deg);
+  };
+  const auto end_line = [&] {
+    view.x.push_back(kGap);
+    view.y.push_back(kGap);
+  };
+  for (double theta_deg = 0; theta_deg <= 180; theta_deg += 6) {
+    for (double phi_deg = 0; phi_deg <= 360; phi_deg += 3) add(theta_deg, phi_deg);
+    end_line();
+  }
+  for (double phi_deg = 0; phi_deg <= 360; phi_deg += 11.25) {
+    for (double theta_deg = 0; theta_deg <= 180; theta_deg += 3) add(theta_deg, phi_deg);
+    end_line();
+  }
+  out->curves.push_back(std::move(view));
 }
 
 }  // namespace
@@ -132,6 +165,7 @@ void AddHallFigures(const HallReproduceOptions& options, const HallArray& two,
     AddCut(
         "figure 8: field along theta at phi 0, " + name, *array, 0, 180,
         [](double angle_rad) { return DirectionAt(angle_rad, 0); }, out);
+    AddView(*array, out);
   }
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 
 #include "daemon/control/messages.h"
@@ -159,6 +160,74 @@ TEST(HallCommand, DiagnosesIntoItsReport) {
   EXPECT_EQ(Json::parse(again.out)["verdict"], "consistent");
 }
 
+// The largest error of an angle in rows that `orient` finished.
+double WorstError(const std::string& estimates, const testing::PlantedCampaign& campaign) {
+  const auto rows = Cells(estimates);
+  double worst_deg = 0;
+  for (std::size_t k = 0; k < campaign.poses.size(); ++k) {
+    const testing::PlantedPose& pose = campaign.poses[k];
+    const double truly_deg[] = {pose.alpha_deg, pose.beta_deg, pose.gamma_deg};
+    for (std::size_t angle = 0; angle < 3; ++angle)
+      worst_deg = std::max(worst_deg, std::abs(std::stod(rows[k + 1][angle]) - truly_deg[angle]));
+  }
+  return worst_deg;
+}
+
+TEST(HallCommand, CalibratesSensorsThatOrientTakes) {
+  const ScratchDirectory scratch;
+  const std::string model = scratch.Put(
+      "m.toml", "[field]\nkind = \"surface\"\namplitude_T = 0.08\nwidth_deg = 21\nphase_deg = 0\n");
+  const auto law = testing::OfSurface(0.08, 21);
+  const std::vector<testing::Planted> also = {{"sensor_offset", -0.05, 1},
+                                              {"sensor_position", 1.5, 3}};
+  const auto planted = [&](double noise_T, std::uint64_t seed) {
+    return testing::MakeCampaign({.rows = 120, .noise_T = noise_T, .also = also, .seed = seed}, law,
+                                 law, {"sensor_gain", 0.04, 6});
+  };
+  const std::string poses = scratch.Put("poses.csv", testing::CampaignText(planted(1e-4, 7), true));
+  const auto result = Focalfleet({"hall", "calibrate", "--model", model, "--data", poses, "--out",
+                                  scratch / "sensors.csv", "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json said = Json::parse(result.out);
+  EXPECT_EQ(said["calibrated"], 8);
+  EXPECT_NEAR(said["sensors"][6]["gain"], 1.04, 0.004);
+  EXPECT_LT(said["sensors"][6]["sd_gain"], 0.004);
+  EXPECT_NEAR(said["sensors"][1]["offset_V"], -0.05, 0.002);
+  EXPECT_NEAR(said["rms_held_out_mV"], 2.5, 0.4) << "0.1 mT";
+  EXPECT_THAT(
+      Cells(Slurp(scratch / "sensors.csv"))[0],
+      ::testing::ElementsAre("sensor", "x", "y", "z", "gain", "offset_V", "sd_gain", "sd_offset_V",
+                             "sd_east_deg", "sd_north_deg", "readings", "rms_V", "status"));
+
+  const auto again = planted(1e-4, 7);
+  const std::string volts = scratch.Put("volts.csv", VoltsText(again));
+  std::vector<std::string> orient = {"hall",   "orient", "--model", model,
+                                     "--data", volts,    "--out",   "-"};
+  const double before_deg = WorstError(Focalfleet(orient).out, again);
+  orient.insert(orient.end(), {"--sensors", scratch / "sensors.csv"});
+  const double after_deg = WorstError(Focalfleet(orient).out, again);
+  EXPECT_GT(before_deg, 0.4);
+  EXPECT_LT(after_deg, 0.15);
+
+  const auto refused = [&](const std::string& with_model, const std::string& text) {
+    const auto bad = Focalfleet({"hall", "calibrate", "--model", with_model, "--data",
+                                 scratch.Put("bad.csv", text), "--out", scratch / "none.csv"});
+    EXPECT_EQ(bad.exit, 1);
+    return bad.err;
+  };
+  const std::string head = "alpha_deg,beta_deg,gamma_deg,v1_V,v2_V,v3_V,v4_V,v5_V,v6_V,v7_V,v8_V\n";
+  EXPECT_THAT(refused(model, head + "1,2,3,1,2,3,4,1,2,3\n"), HasSubstr("bad.csv:2: 10 cells"));
+  EXPECT_THAT(refused(model, head + "1,x,3,1,2,3,4,1,2,3,4\n"),
+              HasSubstr("bad.csv:2: column beta_deg: 'x' is not a number"));
+  EXPECT_THAT(refused(model, head + "1,2,3,1,2,3,4,1,2,3,4\n"),
+              HasSubstr("no sensor can be calibrated"));
+  const std::string known = scratch.Put("known.toml", Slurp(model) + "[[sensor]]\nsensor = 1\n");
+  EXPECT_THAT(refused(known, head), HasSubstr("has [[sensor]]"));
+  EXPECT_FALSE(std::filesystem::exists(scratch / "none.csv"));
+  orient.back() = scratch.Put("s.csv", "sensor,x,y,z,gain\n1,1,0,0,0\n");
+  EXPECT_THAT(Focalfleet(orient).err, HasSubstr("s.csv:2: column gain: 0 is no gain"));
+}
+
 TEST(HallCommand, BadInputIsRefusedByFileRowAndColumn) {
   const ScratchDirectory scratch;
   const auto fit_error = [&](const std::string& text) {
@@ -238,7 +307,8 @@ TEST(HallCommand, ReproducesThePaper) {
   EXPECT_EQ(find("models")["status"], "ordering");
   EXPECT_LT(find("models")["simulated"][2], 0.05);
   const std::string page = Slurp(scratch / "claims/report.html");
-  for (const char* figure : {"figure 4: alpha", "figure 5: beta", "figure 6", "figure 8"})
+  for (const char* figure : {"figure 4: alpha", "figure 5: beta", "figure 6", "figure 8",
+                             "seen obliquely, 2D", "seen obliquely, 3D"})
     EXPECT_THAT(page, HasSubstr(figure));
 }
 

@@ -96,6 +96,22 @@ TEST(HallDiagnosis, SaysWhatCannotBeTested) {
   EXPECT_TRUE(diagnosis.causes.empty());
 }
 
+// Some causes together imitate these nearly to within the noise; none is named surely.
+TEST(HallDiagnosis, WhatIsNoneOfTheCausesIsUnknown) {
+  const std::pair<testing::Planted, const char*> outside[] = {
+      {{"pose_scale", -0.02}, "alpha_deg is told wrongly, by alpha: its scale"},
+      {{"crosstalk", 0.05, 2}, "v3 hears v4"},
+      {{"drift", 0.05, 5}, "v6 drifts from row to row"}};
+  for (const auto& [planted, what] : outside) {
+    const HallDiagnosis diagnosis = Diagnosed(Read(Plant(planted)));
+    EXPECT_EQ(diagnosis.verdict, HallVerdict::kUnknown) << what;
+    EXPECT_TRUE(diagnosis.causes.empty()) << what;
+    ASSERT_FALSE(diagnosis.unknown.empty()) << what;
+    EXPECT_EQ(diagnosis.unknown[0].covariate, what);
+    EXPECT_FALSE(diagnosis.next_poses.empty());
+  }
+}
+
 TEST(HallDiagnosis, SaysThatDataAreTooFew) {
   const HallDiagnosis diagnosis = Diagnosed(Read(Plant({}, 8)));
   EXPECT_EQ(diagnosis.verdict, HallVerdict::kInsufficient);

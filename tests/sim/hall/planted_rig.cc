@@ -166,6 +166,7 @@ struct Moment {
   double temp_C;
   double share;        // of the campaign that has passed
   double neighbour_V;  // of the next sensor, from half of the supply
+  double alpha_rad;
 };
 double Spoiled(double volts, const Planted& planted, const Moment& at) {
   const bool own = at.sensor == planted.sensor;
@@ -175,6 +176,8 @@ double Spoiled(double volts, const Planted& planted, const Moment& at) {
     return 2.5 + (1 + planted.size * (at.temp_C - 20)) * (volts - 2.5);
   if (planted.cause == "drift" && own) return volts + planted.size * (at.share - 0.5);
   if (planted.cause == "crosstalk" && own) return volts + planted.size * at.neighbour_V;
+  if (planted.cause == "iron" && own)
+    return 2.5 + (1 + planted.size * at.alpha_rad) * (volts - 2.5);
   return volts;
 }
 
@@ -186,11 +189,20 @@ double Dirt(double volts, double noise_V, Rng* rng) {
   return volts;
 }
 
-double ScaleOfAlpha(const std::vector<Planted>& causes) {
-  double scale = 1;
-  for (const Planted& planted : causes)
-    if (planted.cause == "pose_scale") scale += planted.size;
-  return scale;
+struct Angles {
+  double alpha_deg, beta_deg, gamma_deg;
+};
+// Where the rotor stands when it is told to be somewhere.
+Angles Truly(const PlantedPose& told, double alpha_before_deg, const std::vector<Planted>& causes) {
+  Angles truly{told.alpha_deg, told.beta_deg, told.gamma_deg};
+  for (const Planted& planted : causes) {
+    if (planted.cause == "pose_scale") truly.alpha_deg += planted.size * told.alpha_deg;
+    if (planted.cause == "play")
+      truly.alpha_deg += told.alpha_deg > alpha_before_deg ? planted.size / 2 : -planted.size / 2;
+    if (planted.cause == "cogging")
+      truly.gamma_deg += planted.size * std::cos(8 * told.gamma_deg * kDeg);
+  }
+  return truly;
 }
 
 }  // namespace
@@ -205,7 +217,8 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
   std::vector<Planted> causes = plan.also;
   causes.insert(causes.begin(), planted);
   for (const Planted& cause : causes) Displace(cause, &rng, &made);
-  const double scale = ScaleOfAlpha(causes), noise_V = 25 * plan.noise_T;
+  const double noise_V = 25 * plan.noise_T;
+  double alpha_before_deg = 0;
   FreeDirections free;
   for (std::size_t row = 0; row < plan.rows; ++row) {
     PlantedPose pose;
@@ -213,11 +226,13 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
     pose.beta_deg = rng.Uniform(-plan.tilt_deg, plan.tilt_deg);
     pose.gamma_deg = rng.Uniform(-45, 45);
     pose.temp_C = rng.Uniform(5, 25);
-    const auto turned = [&](double alpha_scale, double more_gamma_deg) {
-      return RotationMatrix(alpha_scale * pose.alpha_deg * kDeg, pose.beta_deg * kDeg,
-                            (pose.gamma_deg + more_gamma_deg) * kDeg);
+    const auto turned = [](const Angles& at) {
+      return RotationMatrix(at.alpha_deg * kDeg, at.beta_deg * kDeg, at.gamma_deg * kDeg);
     };
-    const Mat told = turned(1, 0), truly = turned(scale, 0), beside = turned(1, 0.01);
+    const Mat told = turned({pose.alpha_deg, pose.beta_deg, pose.gamma_deg});
+    const Mat truly = turned(Truly(pose, alpha_before_deg, causes));
+    const Mat beside = turned({pose.alpha_deg, pose.beta_deg, pose.gamma_deg + 0.01});
+    alpha_before_deg = pose.alpha_deg;
     const auto read = [](const Mat& m, const FieldLaw& field, const Vec& direction,
                          const Vec& shift) {
       const Vec place = {59 * direction[0] - shift[0], 59 * direction[1] - shift[1],
@@ -228,7 +243,7 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
       const double clean_V = read(told, law, nominal[k], Vec{});
       const std::size_t next = (k + 1) % nominal.size();
       const Moment at{k, pose.temp_C, static_cast<double>(row) / static_cast<double>(plan.rows),
-                      read(truly, wrong, made.sensors[next], made.centre)};
+                      read(truly, wrong, made.sensors[next], made.centre), pose.alpha_deg * kDeg};
       double volts = 2.5 + read(truly, wrong, made.sensors[k], made.centre);
       for (const Planted& cause : causes) volts = Spoiled(volts, cause, at);
       const double change = (volts - 2.5 - clean_V) / noise_V;

@@ -54,7 +54,9 @@ struct PlantedPose {
 };
 
 /// Causes of the library, or what is outside of it: `drift` of a sensor's offset over the rows (V
-/// in all), `pose_scale` of the told alpha, `crosstalk` of a sensor with the next.
+/// in all), `pose_scale` of the told alpha, `crosstalk` of a sensor with the next; and what the
+/// diagnosis has no number for either: `play` of the told alpha (deg), `cogging` of gamma (deg),
+/// `iron` that turns with alpha and changes a sensor's gain.
 struct Planted {
   std::string cause = "none";
   double size = 0;  // in the cause's own unit
