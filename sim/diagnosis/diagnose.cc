@@ -453,6 +453,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   const Selection selection = FindModel(templates, options, rule, &fit, &diagnosis);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
+  JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   for (UnknownFound& left : Screen(fit, options))
     if (std::none_of(diagnosis.unknown.begin(), diagnosis.unknown.end(),

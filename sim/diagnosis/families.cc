@@ -141,6 +141,16 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
   }
 }
 
+void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
+  // Of the one the supply sinks as the night goes on, of the other the air cools.
+  constexpr std::string_view kOverTheNight[] = {"thermal_backlash", "supply_drift"};
+  for (CauseFound& cause : *causes)
+    for (const NotTestable& other : not_testable)
+      if (Has(kOverTheNight, cause.cause) && Has(kOverTheNight, other.cause) &&
+          !IsCandidate(cause, other.cause))
+        cause.candidates.push_back(other.cause);
+}
+
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
   constexpr std::size_t kSeries = 3;
   for (const char* axis : {"theta", "phi"}) {

@@ -30,4 +30,8 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
 /// causes: each gets the others as candidates, and the axis is told as not understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
+/// Lag and clearance that change over a night look alike: where the column that would tell them
+/// apart is missing, who could not be tested is a candidate, too.
+void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
+
 }  // namespace focalfleet::sim

@@ -36,7 +36,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 Effect MakeWear() {
   return {.cause = "wear",
           .amplitude_unit = "deg per 100 turns",
-          .prior_size = 0.05,
+          .prior_size = 1,
           .owner = Owner::kUnit,
           .needs = {"cycles_theta", "cycles_phi"},
           .paragraph =
@@ -44,7 +44,9 @@ Effect MakeWear() {
               "zero creeps, its clearance opens, or its scale drifts. Re-calibrate by turns, "
               "not by the calendar.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .amplitude_low = -20,  // a gear that falls apart
+          .amplitude_high = 20};
 }
 
 }  // namespace focalfleet::sim

@@ -87,6 +87,16 @@ TEST(Families, AUnitWithManyCausesIsNamedAsAUnit) {
   EXPECT_THAT(unknown, SizeIs(1));
 }
 
+TEST(Families, WhoCannotBeTestedIsACandidateBesideItsLikeOverTheNight) {
+  std::vector<CauseFound> causes = {Cause("thermal_backlash", "theta", 100),
+                                    Cause("eccentricity", "phi", 90)};
+  JudgeUntested({{"wear", "column cycles_theta is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, SizeIs(1));
+  JudgeUntested({{"supply_drift", "column v_bus_V is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("thermal_backlash", "supply_drift"));
+  EXPECT_THAT(causes[1].candidates, SizeIs(1));
+}
+
 TEST(Families, ASeriesOfAngleCausesOnOneAxisIsUnknown) {
   std::vector<CauseFound> causes = {Cause("eccentricity", "theta", 300),
                                     Cause("pinion_runout", "theta", 200),
