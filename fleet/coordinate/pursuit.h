@@ -218,6 +218,7 @@ class Pursuit {
                                const std::array<bool, kAxisCount>& runs_up) const;
   [[nodiscard]] std::string WhyItStays(PositionerIndex i) const;
   void Reopen(PositionerIndex i);
+  void SendAgain(PositionerIndex i);
   void ReportArrivals();
   void Record();
   void CountPrediction();

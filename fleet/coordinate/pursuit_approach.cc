@@ -83,8 +83,10 @@ std::int8_t Pursuit::SideAfter(PositionerIndex i, Axis axis, std::int32_t left) 
 bool Pursuit::NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const {
   const std::int32_t run_up = RunUpOf(i, axis);
   if (run_up == 0) return false;
-  if (const auto& approach = approaches_[i.value])
-    return SideAfter(i, axis, left) != approach->side[Index(axis)];
+  if (const auto& approach = approaches_[i.value]) {
+    const std::int8_t side = approach->side[Index(axis)];
+    return side != 0 && SideAfter(i, axis, left) != side;
+  }
   if (core_.units[i.value].view.knowledge[Index(axis)].witness != Witness::kMeasured) return true;
   return left != 0 &&
          (play_[i.value][Index(axis)].side() != SignOf(left) || std::abs(left) > run_up);
@@ -155,7 +157,9 @@ std::vector<Pose> Pursuit::AsideOf(PositionerIndex i) const {
     for (const auto& [theta, phi] : {std::array{1, 0}, std::array{0, 1}, std::array{1, 1}}) {
       const Pose pose{aim[0] - theta * times * side[0] * RunUpOf(i, Axis::kTheta),
                       aim[1] - phi * times * side[1] * RunUpOf(i, Axis::kPhi)};
-      if (range[0].contains(pose[0]) && range[1].contains(pose[1])) aside.push_back(pose);
+      const bool comes_back = (theta == 0 || side[0] != 0) && (phi == 0 || side[1] != 0);
+      if (comes_back && range[0].contains(pose[0]) && range[1].contains(pose[1]))
+        aside.push_back(pose);
     }
   return aside;
 }
@@ -180,7 +184,7 @@ bool Pursuit::GoPast(std::vector<std::optional<Pose>>* targets) {
     if (!chosen[n]) continue;
     if (!(*targets)[n]) {
       if (*chosen[n] == *units[n].otherwise) continue;
-      Reopen({n});  // it goes aside, and comes back
+      SendAgain({n});  // it goes aside, and comes back
       targets_[n] = approaches_[n]->aim;
     }
     if (!units[n].wished.empty() && *chosen[n] == *units[n].otherwise) ++without;
@@ -267,7 +271,7 @@ bool Pursuit::AnotherWave() {
       goes |= left != 0 || NeedsRunUp({n}, axis, left);
     }
     if (!goes) continue;
-    Reopen({n});
+    SendAgain({n});
     targets_[n] = approaches_[n]->aim;
     any = true;
   }
@@ -289,12 +293,14 @@ bool Pursuit::Correct() {
     units[n].otherwise = PlaceOf(view.knowledge);
     if (view.outcome != TargetOutcome::kArrived || !view.target || !view.error_um) continue;
     approaches_[n] = Approach{.aim = *units[n].otherwise, .side = {}};
+    const bool is_off = *view.error_um > kWorthwhile * measure_->tolerance_um;
     for (const Axis axis : kAxes) {
       std::int8_t& side = approaches_[n]->side[Index(axis)];
       side = play_[n][Index(axis)].side();
-      if (side == 0) side = SignOf(core_.config.approach_deg[Index(axis)]);
+      // Who is where it should be is left alone, though nobody knows from which side it came.
+      if (side == 0 && is_off) side = SignOf(core_.config.approach_deg[Index(axis)]);
     }
-    if (*view.error_um > kWorthwhile * measure_->tolerance_um) units[n].wished = AimsOf({n});
+    if (is_off) units[n].wished = AimsOf({n});
   }
   // Who stays may stand a little nearer to a neighbour's target than its own target is.
   const auto chosen = ChooseRunUps(core_.layout, core_.drives, units, kAimGuardMm);
@@ -303,7 +309,7 @@ bool Pursuit::Correct() {
     if (units[n].wished.empty()) continue;
     approaches_[n]->has_no_room = *chosen[n] != units[n].wished.front();
     if (*chosen[n] == *units[n].otherwise) continue;
-    Reopen({n});
+    SendAgain({n});
     approaches_[n]->aim = *chosen[n];
     targets_[n] = chosen[n];
     again = true;

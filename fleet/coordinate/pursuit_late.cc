@@ -158,6 +158,7 @@ Status Pursuit::Retarget(std::uint64_t request, const RetargetCommand& command) 
   if (view.outcome == TargetOutcome::kFailed) --view_.failed;
   std::erase_if(arrivals_, [i](const Arrival& arrival) { return arrival.unit == i; });
   targets_[i.value] = goals_[i.value] = view.target = command.target;
+  approaches_[i.value].reset();                            // of a correction to the other target
   if (!target_ids_.empty()) target_ids_[i.value].clear();  // the name was the other target's
   view.outcome = TargetOutcome::kPending;
   view.outcome_reason.clear();

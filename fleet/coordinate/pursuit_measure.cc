@@ -218,6 +218,12 @@ void Pursuit::CorrectOrFinish() {
   FinishWhenDurable(ConfigurationState::kDone);
 }
 
+/// How far it was off says nothing of where it goes now.
+void Pursuit::SendAgain(PositionerIndex i) {
+  Reopen(i);
+  core_.unit(i).view.error_um.reset();
+}
+
 /// Takes its arrival back: the camera knows better.
 void Pursuit::Reopen(PositionerIndex i) {
   UnitView& view = core_.unit(i).view;

@@ -68,6 +68,7 @@ class Planner {
                       const char* what, std::string* text) const;
   void Classify();
   void Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by);
+  void DropTargetsThatMeet();
   void DropCollidingTargets();
   [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
   bool Attempt(std::vector<Piece>* order);
@@ -206,7 +207,10 @@ Status Planner::Check() {
             UnitName(layout_, i) + " is outside its axes' ranges";
   }
   NameCollisions(start_, movable_, "the starts", options_.lead_apart ? &too_near_ : &text);
-  NameCollisions(goal_, served_, "the targets", &text);
+  if (options_.leave_stuck)
+    DropTargetsThatMeet();
+  else
+    NameCollisions(goal_, served_, "the targets", &text);
   if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
   return {};
 }
@@ -227,6 +231,23 @@ bool Planner::CollidesWith(std::uint32_t unit, std::uint32_t* by) const {
       return true;
   }
   return false;
+}
+
+/// Of two targets that would touch one stays where it stands, and the plan of the others stands.
+void Planner::DropTargetsThatMeet() {
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::uint32_t i = 0; i < scene_.size(); ++i) {
+      for (const NeighbourNeed& near : scene_.neighbours(i)) {
+        const std::uint32_t j = near.unit;
+        if (served_[i] == 0 || served_[j] == 0 || goal_[i] == start_[i]) continue;
+        const double least = scene_.FullNeed(i, j) - kClearToleranceMm;
+        if (DistanceMm(scene_.arm(i).At(goal_[i]), scene_.arm(j).At(goal_[j])) >= least) continue;
+        Unserve(i, UnservedWhy::kTargetCollides, j);
+        changed = true;
+      }
+    }
+  }
 }
 
 /// A target that would touch what stands is not served; its unit then stands too, so others may

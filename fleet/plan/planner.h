@@ -47,7 +47,8 @@ struct PlanOptions {
   /// Pairs that start nearer than allowed (a unit was cut short while its neighbour went on) are no
   /// error: they are never brought nearer, and named in Plan::too_near.
   bool lead_apart = false;
-  /// Who finds no way when all go at once stays where it stands, and the others go. For
+  /// Who finds no way when all go at once, and one of two whose targets would touch, stays where it
+  /// stands, and the others go. For
   /// corrections: an order sends everybody through its cell, which costs all of them more than it
   /// serves.
   bool leave_stuck = false;

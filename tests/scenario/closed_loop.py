@@ -2,6 +2,7 @@
 import csv
 import json
 import math
+import statistics
 import sys
 
 
@@ -29,7 +30,8 @@ def blind_errors_um(folder):
 
 planted = sys.argv[1]
 before = rms(blind_errors_um("blind"))
-achieved = rms([json.load(open(f"apply{move}.json"))["measured"][0]["rms_um"] for move in (1, 2, 3)])
+# Of three moves the middle one: where a busy machine lets a unit start late, it is planned anew and may come from its other side.
+achieved = statistics.median(json.load(open(f"apply{move}.json"))["measured"][0]["rms_um"] for move in (1, 2, 3))
 with open("report/report.json") as text:
     report = json.load(text)
 named = [cause["cause"] + ("" if cause["axis"] in ("none", "both") else " of " + cause["axis"]) for cause in report["causes"]]

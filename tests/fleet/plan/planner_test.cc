@@ -359,6 +359,31 @@ TEST(Planner, LeavesNobodyWhoMerelyStartsTooNear) {
   }
 }
 
+TEST(Planner, OfTwoTargetsThatMeetOneStaysWhereStuckOnesAreLeft) {
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
+  fleet.StandAt(
+      {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120), PoseDeg(fleet, 2, 10, 30)});
+  fleet.targets = {PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 9, 31)};
+  EXPECT_FALSE(MakePlan(fleet.request(), {.lead_apart = true}));
+  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
+  ASSERT_TRUE(plan) << plan.error().text;
+  ASSERT_EQ(plan->unserved.size(), 1u);
+  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kTargetCollides);
+  EXPECT_EQ(plan->moves.size(), 2u);
+  ExpectSound(fleet, *plan, {});
+}
+
+TEST(Planner, TwoThatStandTooNearAndShallStayAreNoError) {
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
+  fleet.StandAt(
+      {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5), PoseDeg(fleet, 2, 10, 30)});
+  fleet.targets = {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5),
+                   PoseDeg(fleet, 2, 9, 31)};
+  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
+  ASSERT_TRUE(plan) << plan.error().text;
+  EXPECT_EQ(plan->moves.size(), 1u);
+}
+
 TEST(Planner, LeavesWhoIsStuckWhenAskedToAndTheOthersGoStraight) {
   // Two arms across each other, and one far away that has a degree to go.
   PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
