@@ -15,7 +15,7 @@
 #include "sim/diagnosis/image.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/screen.h"
-#include "sim/diagnosis/select.h"
+#include "sim/diagnosis/select_however.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -201,7 +201,7 @@ std::vector<UnknownFound> Screen(const Fit& fit, const DiagnoseOptions& options)
       FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * options.family_wise);
   if (best.at == kNoTerm) return found;
   UnknownFound unknown{looks[best.at].covariate, ChannelOf(looks[best.at]),
-                       std::exp(best.log_p_family), 0};
+                       std::exp(best.log_p_family), 0, best.standing.chi_square / 2};
   Fit patched = fit;
   patched.parallel = fit.parallel;
   patched.model.terms.push_back(MakeTerm(looks[best.at], best.standing, groups));
@@ -262,40 +262,6 @@ CauseFound SwapCause(const Campaign& campaign,
   return cause;
 }
 
-// With and without steps in single units' angles; the better fit for its price.
-Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
-  Fit stepped = *fit;
-  const std::size_t events = AddEvents(&stepped);
-  Selection selection = Select(templates, rule, fit);
-  if (events == 0) return selection;
-  Selection again = Select(templates, rule, &stepped);
-  // A step is a large claim about one move: it has to be worth more than its price.
-  constexpr double kClearly = 20, kEach = 10;
-  if (Merit(stepped) <= Merit(*fit) + kClearly + kEach * static_cast<double>(events))
-    return selection;
-  *fit = std::move(stepped);
-  return again;
-}
-
-// Zeros that differ from homing to homing, where they are worth their number. The terms are then
-// and steps are chosen anew: what was one homing's zero may have passed for something else.
-bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
-                Fit* fit) {
-  constexpr double kBetterBy = 20;
-  Fit freed = *fit;
-  FreeHomings(&freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
-  freed.model.terms.clear();
-  freed.model.events.clear();
-  UpdateResiduals(&freed);
-  FreeHomings(&freed);
-  Selection again = SelectWithEvents(templates, rule, &freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
-  *fit = std::move(freed);
-  *selection = std::move(again);
-  return true;
-}
-
 CauseFound HomingCause(const Fit& fit) {
   CauseFound cause;
   cause.cause = "zero_offset";
@@ -345,9 +311,8 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
 // The terms, steps, zeros of homings and motion of the image that explain the data.
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
-  Selection selection = SelectWithEvents(templates, rule, fit);
-  if (fit->facts->homings > 0 && TryHomings(templates, rule, &selection, fit))
-    diagnosis->causes.push_back(HomingCause(*fit));
+  Selection selection = SelectHowever(templates, rule, fit);
+  if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
   ImageFound image = AddImageTerms(fit, options.family_wise);
   if (!image.moves) return selection;
   if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
@@ -459,6 +424,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     if (std::none_of(diagnosis.unknown.begin(), diagnosis.unknown.end(),
                      [&](const UnknownFound& told) { return told.covariate == left.covariate; }))
       diagnosis.unknown.push_back(std::move(left));
+  JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
   if (!diagnosis.unknown.empty())
     for (CauseFound& cause : diagnosis.causes)
       for (const std::string& name : cause.behind)

@@ -40,6 +40,7 @@ struct UnknownFound {
   std::string channel;  // where it shows: "theta angle", "x" ...
   double p_value = 0;
   double size_um = 0;
+  double delta_log_likelihood = 0;  // of the structure, as if it were a cause
 };
 
 struct NotTestable {

@@ -44,6 +44,14 @@ bool IsCandidate(const CauseFound& cause, std::string_view name) {
          cause.candidates.end();
 }
 
+// Some units have it, and all of these have the other, too: hardly by accident.
+bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause) {
+  return !cause.all_units && !other.all_units &&
+         std::all_of(cause.units.begin(), cause.units.end(), [&](std::uint32_t unit) {
+           return std::find(other.units.begin(), other.units.end(), unit) != other.units.end();
+         });
+}
+
 bool AxesMeet(const std::string& a, const std::string& b) {
   const auto open = [](const std::string& axis) { return axis == "both" || axis == "none"; };
   return a == b || open(a) || open(b);
@@ -58,18 +66,26 @@ bool AreRelated(std::string_view a, std::string_view b) {
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
-  constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3;  // of the relative's evidence
+  // Of the stronger one's evidence.
+  constexpr double kFaint = 0.01, kShape = 0.03, kCandidate = 0.1, kSameName = 0.3;
+  constexpr double kSameUnits = 0.3;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
     bool related = false, same = false;
     for (CauseFound& other : kept) {
-      if (cause.delta_log_likelihood >= kCandidate * other.delta_log_likelihood ||
-          Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause))
+      if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
+      const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
+      const bool of_axes = other.axis != "none" && cause.axis != "none";
+      related = (share < kFaint && of_axes) ||
+                (share < kCandidate && AreRelated(other.cause, cause.cause) &&
+                 AxesMeet(other.axis, cause.axis));
+      // Of whatever kind: so little of what happens on one axis, or to the same few units, may be
+      // the other's shape.
+      const bool same_axis = other.axis == cause.axis && of_axes;
+      if (!related && !(share < kShape && same_axis) &&
+          !(share < kSameUnits && IsAmongUnitsOf(other, cause)))
         continue;
-      related = AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis);
-      // Of whatever kind: so little of what happens on one axis may be the other's shape.
-      if (!related && (other.axis != cause.axis || cause.axis == "none")) continue;
       relative = &other;
       break;
     }
@@ -149,6 +165,22 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
       if (Has(kOverTheNight, cause.cause) && Has(kOverTheNight, other.cause) &&
           !IsCandidate(cause, other.cause))
         cause.candidates.push_back(other.cause);
+}
+
+void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
+  for (UnknownFound& left : *unknown) {
+    const std::string axis = left.channel.starts_with("theta") ? "theta"
+                             : left.channel.starts_with("phi") ? "phi"
+                                                               : "";
+    if (axis.empty()) continue;
+    std::erase_if(*causes, [&](const CauseFound& cause) {
+      if (cause.axis != axis || Has(kElsewhere, cause.cause) ||
+          cause.delta_log_likelihood >= left.delta_log_likelihood)
+        return false;
+      left.size_um = std::hypot(left.size_um, cause.size_um);
+      return true;
+    });
+  }
 }
 
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {

@@ -12,9 +12,10 @@ namespace focalfleet::sim {
 /// Have the two causes a family in common?
 bool AreRelated(std::string_view a, std::string_view b);
 
-/// A weak cause beside a strong relative on the same axis is no cause of its own for sure: below a
-/// small share of the relative's evidence it is told as the relative's shape, below a larger share
-/// the relative becomes one of its candidates. Pre: strongest first.
+/// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
+/// one's shape leaves: a relative on the same axis, something faint on it, or what only units of
+/// the strong one have. It gets the strong one as a candidate; where it is a faint relative, or
+/// faint beside anything of an axis, it is told as the strong one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
@@ -25,6 +26,10 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 /// What half of the library could be is no name: a weak remainder of a strong cause goes, anything
 /// else is unknown. Pre: strongest first.
 void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
+
+/// On an axis with something unknown a cause that explains less than what is left is a name for a
+/// part of it: it goes into the unknown.
+void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Three causes or more that depend on where one axis stands are a series of shapes rather than
 /// causes: each gets the others as candidates, and the axis is told as not understood.

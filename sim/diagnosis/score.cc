@@ -208,20 +208,6 @@ double Leverage(const MatrixXd& m, double kept) {
   return most / kept;
 }
 
-// An amplitude beyond what physics allows, for sure.
-bool IsImpossible(const Effect& effect, const VectorXd& b, const MatrixXd& g) {
-  constexpr double kSigmas = 3;
-  const auto [low, high] = RangeOfAmplitude(effect);
-  if (!(g.trace() > 0)) return false;
-  if (b.size() == 1) {
-    const double a = b[0] / g(0, 0), sigma = 1 / std::sqrt(g(0, 0));
-    return a < low - kSigmas * sigma || a > high + kSigmas * sigma;
-  }
-  const double size = std::sqrt(std::max(b.dot(g.ldlt().solve(b)) / g.trace(), 0.0) *
-                                static_cast<double>(b.size()));
-  return size > high + kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
-}
-
 void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std::size_t without,
                ScorePass* pass, ChunkPart* part) {
   UnitScorer scorer(fit, unit, without);
@@ -245,9 +231,7 @@ void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std
     fleet.kept += kept;
     const auto c = static_cast<Index>(templates[k].columns);
     const MatrixXd g = m.transpose() * m;
-    VectorXd b = m.transpose() * scorer.y();
-    // An amplitude that cannot be says nothing for the effect.
-    if (IsImpossible(*templates[k].effect, b, g)) b.setZero();
+    const VectorXd b = m.transpose() * scorer.y();
     const VectorXd target_b = m.transpose() * scorer.target();
     Score& score = pass->scores[k];
     const auto at = static_cast<Index>(unit) * c;
@@ -331,14 +315,33 @@ void TakeFleet(const ChunkPart& all, const Templates& templates, ScorePass* pass
           Eigen::Map<const MatrixXd>(&score.g[static_cast<std::size_t>(u * c * c)], c, c);
     }
     if (shared == 0) continue;
+    const double own = score.fleet_g.trace();
     const MatrixXd gone = solver.solve(all.shared_cross[k]);
     score.fleet_b -= gone.transpose() * all.shared_b;
     score.fleet_target_b -= gone.transpose() * all.shared_target_b;
     score.fleet_g -= all.shared_cross[k].transpose() * gone;
+    // What the model has already says nothing new: what is left of it is rounding.
+    if (score.fleet_g.trace() > kKeptMin * own) continue;
+    score.fleet_b.setZero();
+    score.fleet_target_b.setZero();
+    score.fleet_g.setZero();
   }
 }
 
 }  // namespace
+
+bool IsImpossible(const Effect& effect, const VectorXd& b, const MatrixXd& g) {
+  constexpr double kSigmas = 3;
+  const auto [low, high] = RangeOfAmplitude(effect);
+  if (!(g.trace() > 0)) return false;
+  if (b.size() == 1) {
+    const double a = b[0] / g(0, 0), sigma = 1 / std::sqrt(g(0, 0));
+    return a < low - kSigmas * sigma || a > high + kSigmas * sigma;
+  }
+  const double size = std::sqrt(std::max(b.dot(g.ldlt().solve(b)) / g.trace(), 0.0) *
+                                static_cast<double>(b.size()));
+  return size > high + kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
+}
 
 ScorePass ScoreTemplates(const Fit& fit, const Templates& templates, std::size_t without) {
   const std::size_t units = fit.model.units.size();

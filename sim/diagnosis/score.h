@@ -40,6 +40,9 @@ struct ScorePass {
   std::size_t values = 0;      // whitened numbers in the data
 };
 
+/// Whether the amplitude that fits best, (g)^-1 b, is for sure beyond what physics allows.
+bool IsImpossible(const Effect& effect, const Eigen::VectorXd& b, const Eigen::MatrixXd& g);
+
 inline constexpr std::size_t kNoTerm = SIZE_MAX;
 
 /// Scores the templates against the residuals; with `without`, as if that term of the model were

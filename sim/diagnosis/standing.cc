@@ -18,8 +18,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10};   // of the prior size
-constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};  // of units that have it
+constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30};  // of the prior size
+constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 
 // One group's score along its principal directions.
@@ -58,12 +58,37 @@ GroupScore Decompose(const VectorXd& b, const MatrixXd& g, double dispersion) {
   return out;
 }
 
+// An amplitude that cannot be says nothing for the effect.
+GroupScore DecomposePossible(const Effect& effect, const VectorXd& b, const MatrixXd& g,
+                             double dispersion) {
+  if (IsImpossible(effect, b, g)) return Decompose(VectorXd::Zero(b.size()), g, dispersion);
+  return Decompose(b, g, dispersion);
+}
+
 VectorXd UnitB(const std::vector<double>& values, std::size_t unit, std::size_t c) {
   return Eigen::Map<const VectorXd>(&values[unit * c], static_cast<Index>(c));
 }
 MatrixXd UnitG(const Score& score, std::size_t unit, std::size_t c) {
   return Eigen::Map<const MatrixXd>(&score.g[unit * c * c], static_cast<Index>(c),
                                     static_cast<Index>(c));
+}
+
+// Sums over the units of each group.
+struct GroupSums {
+  std::vector<VectorXd> b;
+  std::vector<MatrixXd> g;
+};
+GroupSums SumGroups(const std::vector<double>& unit_b, const Score& score, std::size_t c,
+                    const std::vector<std::uint32_t>& group_of_unit, std::size_t groups) {
+  const auto ic = static_cast<Index>(c);
+  GroupSums sums{std::vector<VectorXd>(groups, VectorXd::Zero(ic)),
+                 std::vector<MatrixXd>(groups, MatrixXd::Zero(ic, ic))};
+  for (std::size_t unit = 0; unit < group_of_unit.size(); ++unit) {
+    if (group_of_unit[unit] == kNoGroup) continue;
+    sums.b[group_of_unit[unit]] += UnitB(unit_b, unit, c);
+    sums.g[group_of_unit[unit]] += UnitG(score, unit, c);
+  }
+  return sums;
 }
 
 // A level: groups with an amplitude each.
@@ -73,20 +98,13 @@ struct Level {
   std::vector<std::uint32_t> group_of_unit;
 };
 
-Level SumLevel(const Score& score, std::size_t c, Sharing sharing,
+Level SumLevel(const Score& score, const Template& form, Sharing sharing,
                const std::vector<std::uint32_t>& group_of_unit, std::size_t groups,
                double dispersion) {
-  const auto ic = static_cast<Index>(c);
-  std::vector<VectorXd> b(groups, VectorXd::Zero(ic));
-  std::vector<MatrixXd> g(groups, MatrixXd::Zero(ic, ic));
-  for (std::size_t unit = 0; unit < group_of_unit.size(); ++unit) {
-    if (group_of_unit[unit] == kNoGroup) continue;
-    b[group_of_unit[unit]] += UnitB(score.b, unit, c);
-    g[group_of_unit[unit]] += UnitG(score, unit, c);
-  }
+  const GroupSums sums = SumGroups(score.b, score, form.columns, group_of_unit, groups);
   Level level{sharing, {}, group_of_unit};
   for (std::size_t k = 0; k < groups; ++k)
-    level.groups.push_back(Decompose(b[k], g[k], dispersion));
+    level.groups.push_back(DecomposePossible(*form.effect, sums.b[k], sums.g[k], dispersion));
   return level;
 }
 
@@ -297,22 +315,23 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   const bool of_the_whole =
       form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
   if (units == 1 || !of_the_whole)
-    levels.push_back(SumLevel(score, c, Sharing::kUnit, Each(units), units, best.dispersion));
+    levels.push_back(SumLevel(score, form, Sharing::kUnit, Each(units), units, best.dispersion));
   if (units > 1) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.
     const double fleet = std::max(best.dispersion, FleetDispersion(score, c));
     const Level cautious{Sharing::kFleet,
-                         {Decompose(score.fleet_b, score.fleet_g, fleet)},
+                         {DecomposePossible(*form.effect, score.fleet_b, score.fleet_g, fleet)},
                          std::vector<std::uint32_t>(units, 0)};
     best.log_p = LevelLogP(cautious);
     const auto look = [&](Sharing sharing, const std::vector<std::uint32_t>& of,
                           std::size_t count) {
-      best.log_p = std::min(best.log_p, LevelLogP(SumLevel(score, c, sharing, of, count, fleet)));
-      levels.push_back(SumLevel(score, c, sharing, of, count, best.dispersion));
+      best.log_p =
+          std::min(best.log_p, LevelLogP(SumLevel(score, form, sharing, of, count, fleet)));
+      levels.push_back(SumLevel(score, form, sharing, of, count, best.dispersion));
     };
     Level all{Sharing::kFleet,
-              {Decompose(score.fleet_b, score.fleet_g, best.dispersion)},
+              {DecomposePossible(*form.effect, score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
     const Owner owner = form.effect->owner;
     if (groups.rails > 0 && !of_the_whole && owner != Owner::kBus)
@@ -365,10 +384,8 @@ double ShareOfTarget(const Score& score, const Template& form, const Standing& a
     std::size_t count = units;
     if (as.sharing == Sharing::kRail) group_of = groups.rail, count = groups.rails;
     if (as.sharing == Sharing::kBus) group_of = groups.bus, count = groups.buses;
-    Score target = score;
-    target.b = score.target_b;
-    for (const GroupScore& group : SumLevel(target, c, as.sharing, group_of, count, 1).groups)
-      taken += group.chi_square;
+    const GroupSums sums = SumGroups(score.target_b, score, c, group_of, count);
+    for (std::size_t k = 0; k < count; ++k) taken += Decompose(sums.b[k], sums.g[k], 1).chi_square;
   }
   return std::clamp(taken / target_square, 0.0, 1.0);
 }

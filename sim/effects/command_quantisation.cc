@@ -8,10 +8,11 @@ namespace {
 
 void List(const CampaignFacts&, Templates* out) {
   for (const int form : {0, 1})
-    ListGrid({.shapes = {0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.25, 0.5, 1},
-              .shape_name = form == 0 ? "step, deg," : "moves are cut; step, deg,",
-              .form = form},
-             out);
+    ListGrid(
+        {.shapes = {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2},
+         .shape_name = form == 0 ? "step, deg," : "moves are cut; step, deg,",
+         .form = form},
+        out);
   ListGrid({.shapes = {1, 4, 24, 96}, .shape_name = "steps a motor turn:", .form = 2}, out);
   for (const int form : {3, 4})
     ListGrid({.shapes = {9, 10, 11, 12, 13, 14},

@@ -56,7 +56,7 @@ std::string_view Name(Memory memory) {
 }
 
 AmplitudeRange RangeOfAmplitude(const Effect& effect) {
-  constexpr double kTimes = 20;
+  constexpr double kTimes = 100;
   if (effect.amplitude_low < effect.amplitude_high)
     return {effect.amplitude_low, effect.amplitude_high};
   return {-kTimes * effect.prior_size, kTimes * effect.prior_size};

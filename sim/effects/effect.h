@@ -69,12 +69,12 @@ struct Effect {
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
-  // Amplitudes that physics allows; 0 and 0: twenty times the usual size either way.
+  // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;
 };
 
-/// What an amplitude of it can be: by physics, or twenty times what it usually is.
+/// What an amplitude of it can be: by physics, or a hundred times what it usually is.
 struct AmplitudeRange {
   double low = 0;
   double high = 0;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <complex>
+#include <numbers>
 #include <string>
 #include <thread>
 
@@ -101,6 +103,59 @@ TEST(Diagnosis, IsTheSameBitForBitOnTwoThreads) {
       }});
   EXPECT_EQ(Told(one), Told(two));
   EXPECT_EQ(one.x_after_um, two.x_after_um);
+}
+
+// The plate turned under the sky, with all that is told of it: base, zero of theta, places.
+Campaign Turned(Campaign campaign, double turn_deg) {
+  const std::complex<double> turn = std::polar(1.0, turn_deg * std::numbers::pi / 180);
+  for (CampaignUnit& unit : campaign.units) {
+    const auto base = turn * std::complex(unit.base_x_mm, unit.base_y_mm);
+    unit.base_x_mm = base.real(), unit.base_y_mm = base.imag();
+    unit.zero_deg[kTheta] += turn_deg;
+  }
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const auto place = turn * std::complex(campaign.x_mm[row], campaign.y_mm[row]);
+    campaign.x_mm[row] = place.real(), campaign.y_mm[row] = place.imag();
+  }
+  return campaign;
+}
+
+class OnATurnedPlate : public testing::TestWithParam<Plant> {};
+
+TEST_P(OnATurnedPlate, TheCausesAreTheSame) {
+  const Plant& plant = GetParam();
+  const Campaign campaign =
+      Planted({{.cause = plant.cause, .amplitude = plant.amplitude, .axis = plant.axis}},
+              {.moves = 80, .seed = 3});
+  const Diagnosis straight = Verdicts(campaign), turned = Verdicts(Turned(campaign, 37));
+  ASSERT_EQ(straight.causes.size(), 1u) << Told(straight);
+  ASSERT_EQ(turned.causes.size(), 1u) << Told(turned);
+  EXPECT_EQ(turned.verdict, straight.verdict);
+  EXPECT_EQ(turned.causes[0].cause, straight.causes[0].cause);
+  EXPECT_EQ(turned.causes[0].candidates, straight.causes[0].candidates);
+  EXPECT_EQ(turned.causes[0].units, straight.causes[0].units);
+  EXPECT_NEAR(turned.causes[0].amplitude, straight.causes[0].amplitude,
+              0.02 * std::abs(straight.causes[0].amplitude));
+}
+
+// Without those of gravity and of pixels, which do not turn with it.
+INSTANTIATE_TEST_SUITE_P(
+    Planted, OnATurnedPlate,
+    testing::Values(Plant{"gear_scale", "theta", 3e-4}, Plant{"backlash", "theta", 0.05},
+                    Plant{"eccentricity", "theta", 0.1}, Plant{"pinion_runout", "theta", 0.03},
+                    Plant{"thermal_arm_growth", "both", 6e-5},
+                    Plant{"plate_expansion", "none", 3e-5}, Plant{"axis_crosstalk", "theta", 5e-4},
+                    Plant{"self_heating", "theta", 0.1}),
+    [](const auto& plant) { return std::string(plant.param.cause); });
+
+// Large as it is, it is an amplitude that can be.
+TEST(Diagnosis, WhatOneUnitDoesAlmostAloneIsNamed) {
+  const Diagnosis diagnosis = Verdicts(
+      Planted({{.cause = "gravity_torque", .amplitude = 2.5, .axis = "phi", .unit_share = 0.04}}));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "gravity_torque");
+  EXPECT_EQ(diagnosis.causes[0].candidates.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].units.size(), 1u);
 }
 
 TEST(Diagnosis, AMissingColumnIsNotTestable) {

@@ -40,9 +40,37 @@ TEST(Families, AWeakRelativeIsNotSure) {
   EXPECT_THAT(causes[1].candidates, ElementsAre("friction_windup", "backlash"));
 }
 
+TEST(Families, WhatTheSameFewUnitsHaveBesideIsNotSure) {
+  const auto of = [](CauseFound cause, std::vector<std::uint32_t> units) {
+    cause.all_units = false;
+    cause.units = std::move(units);
+    return cause;
+  };
+  std::vector<CauseFound> causes = {of(Cause("collision_contact", "phi", 800), {10, 39, 69}),
+                                    of(Cause("self_heating", "theta", 80), {10}),
+                                    of(Cause("stage_ripple", "theta", 70), {11})};
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(3));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("self_heating", "collision_contact"));
+  EXPECT_THAT(causes[2].candidates, ElementsAre("stage_ripple"));
+}
+
+TEST(Families, WhatIsFaintBesideTheStrongestIsNoName) {
+  std::vector<CauseFound> causes = {Cause("axis_crosstalk", "theta", 2500),
+                                    Cause("self_heating", "phi", 22)};
+  JudgeRemainders(&causes);
+  EXPECT_THAT(causes, SizeIs(1));
+
+  // What moves the image has nothing to do with it.
+  causes = {Cause("camera_similarity", "none", 30000), Cause("self_heating", "phi", 22)};
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(2));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("self_heating"));
+}
+
 TEST(Families, TheOtherAxisIsAnotherMatter) {
   std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000),
-                                    Cause("friction_windup", "phi", 20)};
+                                    Cause("friction_windup", "phi", 60)};
   JudgeRemainders(&causes);
   ASSERT_THAT(causes, SizeIs(2));
   EXPECT_THAT(causes[1].candidates, ElementsAre("friction_windup"));
@@ -95,6 +123,17 @@ TEST(Families, WhoCannotBeTestedIsACandidateBesideItsLikeOverTheNight) {
   JudgeUntested({{"supply_drift", "column v_bus_V is missing"}}, &causes);
   EXPECT_THAT(causes[0].candidates, ElementsAre("thermal_backlash", "supply_drift"));
   EXPECT_THAT(causes[1].candidates, SizeIs(1));
+}
+
+TEST(Families, WhatExplainsLessThanIsLeftOnItsAxisIsPartOfTheUnknown) {
+  std::vector<CauseFound> causes = {Cause("backlash", "theta", 900), Cause("stiction", "phi", 90),
+                                    Cause("tooth_damage", "theta", 60)};
+  std::vector<UnknownFound> unknown = {{"theta_from_deg", "theta angle", 0, 2, 300}};
+  JudgeBesideUnknown(&causes, &unknown);
+  ASSERT_THAT(causes, SizeIs(2));
+  EXPECT_EQ(causes[0].cause, "backlash");
+  EXPECT_EQ(causes[1].cause, "stiction");
+  EXPECT_DOUBLE_EQ(unknown[0].size_um, std::hypot(2, 1));
 }
 
 TEST(Families, ASeriesOfAngleCausesOnOneAxisIsUnknown) {

@@ -1,0 +1,50 @@
+#include "sim/diagnosis/select_however.h"
+
+#include "sim/diagnosis/events.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// With and without steps in single units' angles; the better fit for its price.
+Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  Fit stepped = *fit;
+  const std::size_t events = AddEvents(&stepped);
+  Selection selection = Select(templates, rule, fit);
+  if (events == 0) return selection;
+  Selection again = Select(templates, rule, &stepped);
+  // A step is a large claim about one move: it has to be worth more than its price.
+  constexpr double kClearly = 20, kEach = 10;
+  if (Merit(stepped) <= Merit(*fit) + kClearly + kEach * static_cast<double>(events))
+    return selection;
+  *fit = std::move(stepped);
+  return again;
+}
+
+// Zeros that differ from homing to homing, where they are worth their number. The terms are then
+// and steps are chosen anew: what was one homing's zero may have passed for something else.
+bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
+                Fit* fit) {
+  constexpr double kBetterBy = 20;
+  Fit freed = *fit;
+  FreeHomings(&freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  freed.model.terms.clear();
+  freed.model.events.clear();
+  UpdateResiduals(&freed);
+  FreeHomings(&freed);
+  Selection again = SelectWithEvents(templates, rule, &freed);
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  *fit = std::move(freed);
+  *selection = std::move(again);
+  return true;
+}
+
+}  // namespace
+
+Selection SelectHowever(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  Selection selection = SelectWithEvents(templates, rule, fit);
+  if (fit->facts->homings > 0) TryHomings(templates, rule, &selection, fit);
+  return selection;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,13 @@
+// Selection from several beginnings, where one may lead astray: with and without steps of single
+// units, and with zeros that differ from homing to homing.
+#pragma once
+
+#include "sim/diagnosis/select.h"
+
+namespace focalfleet::sim {
+
+/// The beginning with the most Merit decides; beginnings that claim more must be clearly better.
+/// Post: the model's homing_zero_deg are empty where zeros are the same after each homing.
+Selection SelectHowever(const Templates& templates, const SelectionRule& rule, Fit* fit);
+
+}  // namespace focalfleet::sim

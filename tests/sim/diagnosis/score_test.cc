@@ -1,0 +1,65 @@
+// Scores of templates: sums over units, and what is left of them beside the model's shared terms.
+#include "sim/diagnosis/score.h"
+
+#include <numeric>
+
+#include "sim/diagnosis/select.h"
+#include "sim/effects/registry.h"
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+Fit Started(const CampaignFacts& facts) {
+  CampaignModel model;
+  model.units = facts.campaign->units;
+  return StartFit(facts, model, std::vector<char>(facts.campaign->rows(), 0), OneAfterTheOther());
+}
+
+Template Of(const char* cause, const CampaignFacts& facts) {
+  return ListTemplates(*FindEffect(cause), facts).front();
+}
+
+ModelTerm OfTheFleet(const Template& form, std::size_t units) {
+  Standing standing;
+  standing.sharing = Sharing::kFleet;
+  standing.has.assign(units, 1);
+  return MakeTerm(form, standing, {});
+}
+
+TEST(Score, WhatTheModelHasAlreadySaysNothingNew) {
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = Started(facts);
+  const Template form = Of("backlash", facts);
+  ASSERT_GT(ScoreTemplates(fit, {form}).scores[0].fleet_g(0, 0), 0);
+  for (const char* cause : {"friction_windup", "eccentricity", "gear_scale", "backlash"})
+    fit.model.terms.push_back(OfTheFleet(Of(cause, facts), campaign.units.size()));
+  StepFit(&fit);
+  const ScorePass pass = ScoreTemplates(fit, {form});
+  EXPECT_EQ(pass.scores[0].fleet_g(0, 0), 0);
+  EXPECT_EQ(pass.scores[0].fleet_b[0], 0);
+}
+
+// An amplitude below 0 is no stiction of that unit; what it says of the fleet's stays in the sum.
+TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
+  const Campaign campaign = Planted(
+      {{.cause = "gear_scale", .amplitude = 0.01, .axis = "theta", .unit_share = 0.2}});
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = Started(facts);
+  Templates templates = ListTemplates(*FindEffect("stiction"), facts);
+  const ScorePass pass = ScoreTemplates(fit, templates);
+  std::size_t impossible = 0;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    const Score& score = pass.scores[k];
+    for (std::size_t unit = 0; unit < score.b.size(); ++unit)
+      if (score.g[unit] > 0 && score.b[unit] / score.g[unit] < -3 / std::sqrt(score.g[unit]))
+        ++impossible;
+    const double sum = std::accumulate(score.b.begin(), score.b.end(), 0.0);
+    EXPECT_NEAR(score.fleet_b[0], sum, 1e-9 * std::abs(sum) + 1e-9);
+  }
+  EXPECT_GT(impossible, 10u);
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
