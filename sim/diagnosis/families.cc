@@ -67,8 +67,7 @@ bool AreRelated(std::string_view a, std::string_view b) {
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
   // Of the stronger one's evidence.
-  constexpr double kFaint = 0.01, kShape = 0.03, kCandidate = 0.1, kSameName = 0.3;
-  constexpr double kSameUnits = 0.3;
+  constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
@@ -76,16 +75,11 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
     for (CauseFound& other : kept) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
       const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
-      const bool of_axes = other.axis != "none" && cause.axis != "none";
-      related = (share < kFaint && of_axes) ||
+      // Of whatever kind: so little of what axes do may be the strong one's shape.
+      related = (share < kShape && other.axis != "none" && cause.axis != "none") ||
                 (share < kCandidate && AreRelated(other.cause, cause.cause) &&
                  AxesMeet(other.axis, cause.axis));
-      // Of whatever kind: so little of what happens on one axis, or to the same few units, may be
-      // the other's shape.
-      const bool same_axis = other.axis == cause.axis && of_axes;
-      if (!related && !(share < kShape && same_axis) &&
-          !(share < kSameUnits && IsAmongUnitsOf(other, cause)))
-        continue;
+      if (!related && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
       relative = &other;
       break;
     }

@@ -13,9 +13,9 @@ namespace focalfleet::sim {
 bool AreRelated(std::string_view a, std::string_view b);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
-/// one's shape leaves: a relative on the same axis, something faint on it, or what only units of
-/// the strong one have. It gets the strong one as a candidate; where it is a faint relative, or
-/// faint beside anything of an axis, it is told as the strong one's shape. Pre: strongest first.
+/// one's shape leaves: a relative on the same axis, or what only units of the strong one have. It
+/// gets the strong one as a candidate. What is faint beside any cause of an axis is told as that
+/// one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as

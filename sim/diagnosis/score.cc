@@ -1,6 +1,7 @@
 #include "sim/diagnosis/score.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace focalfleet::sim {
@@ -171,32 +172,45 @@ void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
   }
 }
 
-// Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled.
+// Variance of a sum of numbers of which neighbours are alike (Newey and West, 1987): fed one by
+// one.
+class NeighbourSum {
+ public:
+  template <class Vector>
+  void Add(const Vector& v, const MatrixXd& inverse) {
+    const Small w = inverse * v;
+    sum_ += v.dot(w);
+    for (std::size_t lag = 0; lag < std::min(kLags, seen_); ++lag)
+      sum_ += 2 * (1 - static_cast<double>(lag + 1) / (kLags + 1)) *
+              past_[(seen_ - 1 - lag) % kLags].dot(w);
+    past_[seen_++ % kLags] = v;
+  }
+  [[nodiscard]] double sum() const { return std::max(sum_, 0.0); }
+
+ private:
+  using Small = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1>;
+  static constexpr std::size_t kLags = 4;
+  std::array<Small, kLags> past_;
+  std::size_t seen_ = 0;
+  double sum_ = 0;
+};
+
+// Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise that
+// remembers makes more of it.
 void AddSpread(const MatrixXd& m, const VectorXd& y, Index spent, FleetPart* part) {
   const Index c = m.cols();
-  double sum = 0;
-  if (c == 1) {
-    const double g = m.squaredNorm();
-    const double own = m.col(0).dot(y) / g;
-    const double* a = m.data();
-    for (Index at = 0; at + 1 < y.size(); at += 2) {
-      const double v = a[at] * (y[at] - a[at] * own) + a[at + 1] * (y[at + 1] - a[at + 1] * own);
-      sum += v * v;
-    }
-    sum /= g;
-  } else {
-    const MatrixXd inverse = (m.transpose() * m).ldlt().solve(MatrixXd::Identity(c, c));
-    const VectorXd left = y - m * (inverse * (m.transpose() * y));
-    Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1> v(c);
-    for (Index at = 0; at + 1 < y.size(); at += 2) {
-      v.noalias() = m.row(at).transpose() * left[at] + m.row(at + 1).transpose() * left[at + 1];
-      sum += v.dot(inverse * v);
-    }
+  const MatrixXd inverse = (m.transpose() * m).ldlt().solve(MatrixXd::Identity(c, c));
+  const VectorXd left = y - m * (inverse * (m.transpose() * y));
+  NeighbourSum sum;
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1> v(c);
+  for (Index at = 0; at + 1 < y.size(); at += 2) {
+    v.noalias() = m.row(at).transpose() * left[at] + m.row(at + 1).transpose() * left[at + 1];
+    sum.Add(v, inverse);
   }
   const double n = static_cast<double>(y.size());
   const double free = n - static_cast<double>(spent + c);
-  if (free < 4 || !std::isfinite(sum)) return;
-  part->spread_sum += sum * n / free;
+  if (free < 4 || !std::isfinite(sum.sum())) return;
+  part->spread_sum += sum.sum() * n / free;
   part->spread_count += static_cast<double>(c);
 }
 
@@ -330,17 +344,14 @@ void TakeFleet(const ChunkPart& all, const Templates& templates, ScorePass* pass
 
 }  // namespace
 
-bool IsImpossible(const Effect& effect, const VectorXd& b, const MatrixXd& g) {
+bool IsImpossible(const Template& form, const VectorXd& b, const MatrixXd& g) {
   constexpr double kSigmas = 3;
-  const auto [low, high] = RangeOfAmplitude(effect);
   if (!(g.trace() > 0)) return false;
-  if (b.size() == 1) {
-    const double a = b[0] / g(0, 0), sigma = 1 / std::sqrt(g(0, 0));
-    return a < low - kSigmas * sigma || a > high + kSigmas * sigma;
-  }
+  if (b.size() == 1) return !CanBe(form, b[0] / g(0, 0), kSigmas / std::sqrt(g(0, 0)));
   const double size = std::sqrt(std::max(b.dot(g.ldlt().solve(b)) / g.trace(), 0.0) *
                                 static_cast<double>(b.size()));
-  return size > high + kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
+  return size > RangeOfAmplitude(*form.effect).high +
+                    kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
 }
 
 ScorePass ScoreTemplates(const Fit& fit, const Templates& templates, std::size_t without) {

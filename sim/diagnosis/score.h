@@ -41,7 +41,7 @@ struct ScorePass {
 };
 
 /// Whether the amplitude that fits best, (g)^-1 b, is for sure beyond what physics allows.
-bool IsImpossible(const Effect& effect, const Eigen::VectorXd& b, const Eigen::MatrixXd& g);
+bool IsImpossible(const Template& form, const Eigen::VectorXd& b, const Eigen::MatrixXd& g);
 
 inline constexpr std::size_t kNoTerm = SIZE_MAX;
 

@@ -59,9 +59,9 @@ GroupScore Decompose(const VectorXd& b, const MatrixXd& g, double dispersion) {
 }
 
 // An amplitude that cannot be says nothing for the effect.
-GroupScore DecomposePossible(const Effect& effect, const VectorXd& b, const MatrixXd& g,
+GroupScore DecomposePossible(const Template& form, const VectorXd& b, const MatrixXd& g,
                              double dispersion) {
-  if (IsImpossible(effect, b, g)) return Decompose(VectorXd::Zero(b.size()), g, dispersion);
+  if (IsImpossible(form, b, g)) return Decompose(VectorXd::Zero(b.size()), g, dispersion);
   return Decompose(b, g, dispersion);
 }
 
@@ -104,7 +104,7 @@ Level SumLevel(const Score& score, const Template& form, Sharing sharing,
   const GroupSums sums = SumGroups(score.b, score, form.columns, group_of_unit, groups);
   Level level{sharing, {}, group_of_unit};
   for (std::size_t k = 0; k < groups; ++k)
-    level.groups.push_back(DecomposePossible(*form.effect, sums.b[k], sums.g[k], dispersion));
+    level.groups.push_back(DecomposePossible(form, sums.b[k], sums.g[k], dispersion));
   return level;
 }
 
@@ -321,7 +321,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     // with one dispersion.
     const double fleet = std::max(best.dispersion, FleetDispersion(score, c));
     const Level cautious{Sharing::kFleet,
-                         {DecomposePossible(*form.effect, score.fleet_b, score.fleet_g, fleet)},
+                         {DecomposePossible(form, score.fleet_b, score.fleet_g, fleet)},
                          std::vector<std::uint32_t>(units, 0)};
     best.log_p = LevelLogP(cautious);
     const auto look = [&](Sharing sharing, const std::vector<std::uint32_t>& of,
@@ -331,7 +331,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
       levels.push_back(SumLevel(score, form, sharing, of, count, best.dispersion));
     };
     Level all{Sharing::kFleet,
-              {DecomposePossible(*form.effect, score.fleet_b, score.fleet_g, best.dispersion)},
+              {DecomposePossible(form, score.fleet_b, score.fleet_g, best.dispersion)},
               std::vector<std::uint32_t>(units, 0)};
     const Owner owner = form.effect->owner;
     if (groups.rails > 0 && !of_the_whole && owner != Owner::kBus)

@@ -44,7 +44,8 @@ Effect MakeBacklash() {
               "reversal.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .amplitude_is_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -53,7 +53,8 @@ Effect MakeCommandQuantisation() {
           .list = List,
           .apply = Apply,
           .amplitude_low = 0,
-          .amplitude_high = 1.5};
+          .amplitude_high = 1.5,
+          .amplitude_least = 0.5};
 }
 
 }  // namespace focalfleet::sim

@@ -1,5 +1,7 @@
 #include "sim/effects/effect.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 namespace focalfleet::sim {
@@ -60,6 +62,18 @@ AmplitudeRange RangeOfAmplitude(const Effect& effect) {
   if (effect.amplitude_low < effect.amplitude_high)
     return {effect.amplitude_low, effect.amplitude_high};
   return {-kTimes * effect.prior_size, kTimes * effect.prior_size};
+}
+
+bool CanBe(const Template& form, double amplitude, double sigmas) {
+  constexpr double kFactor = 5;
+  auto [low, high] = RangeOfAmplitude(*form.effect);
+  double least = form.effect->amplitude_least;
+  if (form.effect->amplitude_is_shape && form.shape > 0) {
+    least = form.shape / kFactor;
+    high = std::min(high, kFactor * form.shape), low = std::max(low, -kFactor * form.shape);
+  }
+  return amplitude >= low - sigmas && amplitude <= high + sigmas &&
+         std::abs(amplitude) >= least - sigmas;
 }
 
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,

@@ -72,6 +72,10 @@ struct Effect {
   // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;
+  double amplitude_least = 0;  // less of it, either way, is another thing
+  // A play of two degrees loses two degrees: shape and amplitude agree within a factor of five.
+  // Shape 0 stands for any that is below all moves.
+  bool amplitude_is_shape = false;
 };
 
 /// What an amplitude of it can be: by physics, or a hundred times what it usually is.
@@ -80,6 +84,8 @@ struct AmplitudeRange {
   double high = 0;
 };
 AmplitudeRange RangeOfAmplitude(const Effect& effect);
+/// Whether the template can have an amplitude within some sigmas of this one. Pre: one column.
+bool CanBe(const Template& form, double amplitude, double sigmas);
 
 /// What one column does at the given amplitude, the others at 0. `errors` is reset.
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,

@@ -60,7 +60,8 @@ Effect MakeStiction() {
           .apply = Apply,
           .continuous_shape = true,
           .amplitude_low = 0,
-          .amplitude_high = 1.2};
+          .amplitude_high = 1.2,
+          .amplitude_least = 0.3};
 }
 
 }  // namespace focalfleet::sim

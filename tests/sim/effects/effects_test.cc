@@ -106,6 +106,21 @@ TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
   }
 }
 
+TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
+  const Template play{.effect = FindEffect("backlash"), .axis = EffectAxis::kTheta, .shape = 2};
+  EXPECT_TRUE(CanBe(play, 2, 0));
+  EXPECT_TRUE(CanBe(play, -1, 0));
+  EXPECT_FALSE(CanBe(play, 0.05, 0)) << "a gap of two degrees loses more than that";
+  EXPECT_TRUE(CanBe(play, 0.05, 1)) << "but who knows its amplitude so badly?";
+  Template narrow = play;
+  narrow.shape = 0;
+  EXPECT_TRUE(CanBe(narrow, 0.05, 0));
+  const Template rounding{.effect = FindEffect("command_quantisation"), .shape = 0.5};
+  EXPECT_TRUE(CanBe(rounding, 1, 0));
+  EXPECT_FALSE(CanBe(rounding, 0.1, 0));
+  EXPECT_FALSE(CanBe(rounding, -1, 0.1));
+}
+
 TEST(Effects, AMissingColumnLeavesNoTemplates) {
   Campaign campaign = Made();
   std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "temp_C"; });
