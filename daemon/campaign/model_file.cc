@@ -268,10 +268,4 @@ Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
   return ModelReader(file, units).Read(parsed.table());
 }
 
-Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
-                                     const sim::Campaign& campaign) {
-  FOCALFLEET_TRY_ASSIGN(ModelFile read, ReadModelFile(text, file, campaign.units));
-  return std::move(read.model);
-}
-
 }  // namespace focalfleet

@@ -33,8 +33,4 @@ struct ModelFile {
 Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
                                 const std::vector<sim::CampaignUnit>& units);
 
-/// The model alone, for a campaign's units. Errors: as above.
-Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
-                                     const sim::Campaign& campaign);
-
 }  // namespace focalfleet
