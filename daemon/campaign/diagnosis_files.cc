@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fleet/files/csv.h"
 #include "sim/diagnosis/left_by.h"
+#include "sim/effects/empirical.h"
 
 namespace focalfleet {
 namespace {
@@ -31,6 +31,17 @@ json CauseJson(const sim::CauseFound& cause) {
           {"shape", cause.shape}};
 }
 
+json UnknownJson(const sim::UnknownFound& found) {
+  json unknown{{"covariate", found.covariate},
+               {"channel", found.channel},
+               {"p_value", Finite(found.p_value)},
+               {"rms_um", Finite(found.size_um)}};
+  if (found.patched)
+    unknown["patched"] = {{"term", found.patched->term},
+                          {"rms_um", Finite(found.patched->size_um)}};
+  return unknown;
+}
+
 json GainJson(const sim::HeldOutGain& gain) {
   return {{"rms_before_um", Finite(gain.rms_before_um)},
           {"rms_after_um", Finite(gain.rms_after_um)},
@@ -50,26 +61,26 @@ std::string Quoted(std::string_view text) {
   return out + "\"";
 }
 
-std::string NumberList(std::span<const double> values) {
+std::string NumberList(std::span<const double> values, int digits = 9) {
   std::string text = "[";
   for (std::size_t i = 0; i < values.size(); ++i)
     text += (i == 0 ? "" : ", ") +
-            (std::isfinite(values[i]) ? fmt::format("{:.9g}", values[i]) : "nan");
+            (std::isfinite(values[i]) ? fmt::format("{:.{}g}", values[i], digits) : "nan");
   return text + "]";
 }
 
-const char* SharingWord(sim::Sharing sharing) {
-  switch (sharing) {
-    case sim::Sharing::kRail:
-      return "rail";
-    case sim::Sharing::kBus:
-      return "bus";
-    case sim::Sharing::kFleet:
-      return "fleet";
-    case sim::Sharing::kUnit:
-      break;
-  }
-  return "unit";
+// Where an empirical term acts, and the knots that a curve is read through.
+std::string EmpiricalText(const sim::Template& form) {
+  std::string text = "covariate = " + Quoted(form.covariate) + "\n";
+  text += "channel = " + Quoted(sim::ChannelOf(form)) + "\n";
+  if (form.knots.empty()) return text;
+  std::vector<double> values, ranks;
+  for (const sim::RankKnot& knot : form.knots)
+    values.push_back(knot.value), ranks.push_back(knot.rank);
+  // To the last digit: of times since 1970 nine digits are ten seconds, and knots must ascend.
+  constexpr int kAllDigits = 17;
+  return text + "knot_values = " + NumberList(values, kAllDigits) +
+         "\nknot_ranks = " + NumberList(ranks) + "\n";
 }
 
 std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis) {
@@ -79,8 +90,9 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
   text += fmt::format("form = {}\nshape = {:.9g}\nmemory = {}\n", term.form.form, term.form.shape,
                       static_cast<int>(term.form.memory));
   text += "shape_text = " + Quoted(term.form.label) + "\n";
+  if (sim::FindEmpirical(term.form.effect->cause) != nullptr) text += EmpiricalText(term.form);
   text += "amplitude_unit = " + Quoted(term.form.effect->amplitude_unit) + "\n";
-  text += fmt::format("shared_by = \"{}\"\n", SharingWord(term.sharing));
+  text += "shared_by = " + Quoted(sim::Name(term.sharing)) + "\n";
   for (const sim::CauseFound& cause : diagnosis.causes)
     if (cause.cause == term.form.effect->cause) {
       text += "candidates = [";
@@ -111,11 +123,7 @@ json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
   json causes = json::array();
   for (const sim::CauseFound& cause : diagnosis.causes) causes.push_back(CauseJson(cause));
   json unknown = json::array();
-  for (const sim::UnknownFound& found : diagnosis.unknown)
-    unknown.push_back({{"covariate", found.covariate},
-                       {"channel", found.channel},
-                       {"p_value", Finite(found.p_value)},
-                       {"rms_um", Finite(found.size_um)}});
+  for (const sim::UnknownFound& found : diagnosis.unknown) unknown.push_back(UnknownJson(found));
   json not_testable = json::array();
   for (const sim::NotTestable& cause : diagnosis.not_testable)
     not_testable.push_back({{"cause", cause.cause}, {"why", cause.why}});
@@ -187,6 +195,12 @@ std::string VerdictSentence(const sim::Diagnosis& diagnosis) {
   if (!diagnosis.unknown.empty())
     text += fmt::format("; structure that no candidate explains remains against {} ({:.1f} um)",
                         diagnosis.unknown.front().covariate, diagnosis.unknown.front().size_um);
+  const auto patches =
+      std::count_if(diagnosis.unknown.begin(), diagnosis.unknown.end(),
+                    [](const sim::UnknownFound& found) { return found.patched.has_value(); });
+  if (patches > 0)
+    text += fmt::format("; {} of {} such structures patched by empirical terms, which name nothing",
+                        patches, diagnosis.unknown.size());
   return text + fmt::format("; held-out rms {:.1f} um before, {:.1f} um after.",
                             diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
 }

@@ -122,9 +122,15 @@ void AddRest(const Diagnosis& diagnosis, const std::vector<sim::ProposedMove>& m
     page->Heading("What no candidate explains");
     std::vector<std::vector<std::string>> rows;
     for (const sim::UnknownFound& found : diagnosis.unknown)
-      rows.push_back({found.covariate, found.channel, fmt::format("{:.2g}", found.p_value),
-                      fmt::format("{:.2f}", found.size_um)});
-    page->Table({"against", "in", "p", "rms (um)"}, rows);
+      rows.push_back(
+          {found.covariate, found.channel, fmt::format("{:.2g}", found.p_value),
+           fmt::format("{:.2f}", found.size_um),
+           found.patched ? fmt::format("{}, {:.2f} um", found.patched->term, found.patched->size_um)
+                         : "no"});
+    page->Table({"against", "in", "p", "rms (um)", "patched"}, rows);
+    page->Paragraph(
+        "A patch is a smooth curve or a ripple that follows the data: it corrects, and explains "
+        "nothing.");
   }
   page->Heading("Moves to make next");
   page->Paragraph(moves.empty()

@@ -7,8 +7,10 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
+#include "sim/effects/empirical.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet {
@@ -93,6 +95,7 @@ class ModelReader {
     if (!(unit.arm_mm[0] > 0) || !(unit.arm_mm[1] > 0))
       return Wrong(table, "an arm is not above 0");
     FOCALFLEET_TRY(CheckGeometry(table, described, unit));
+    ++read_.units_known;
     return ReadLeft(table, at->second);
   }
 
@@ -132,7 +135,8 @@ class ModelReader {
 
   Result<sim::Template> ReadForm(const toml::table& table) const {
     const std::string cause = table["cause"].value_or(std::string());
-    const sim::Effect* effect = sim::FindEffect(cause);
+    const sim::Effect* empirical = sim::FindEmpirical(cause);
+    const sim::Effect* effect = empirical != nullptr ? empirical : sim::FindEffect(cause);
     if (effect == nullptr) return Wrong(table, "there is no effect '" + cause + "'");
     sim::Template form;
     form.effect = effect;
@@ -151,7 +155,64 @@ class ModelReader {
     form.memory = static_cast<sim::Memory>(static_cast<int>(memory));
     form.columns = static_cast<std::size_t>(columns);
     form.label = table["shape_text"].value_or(std::string());
+    if (empirical != nullptr) {
+      FOCALFLEET_TRY(ReadEmpirical(table, &form));
+    }
     return form;
+  }
+
+  Status ReadEmpirical(const toml::table& table, sim::Template* form) const {
+    form->covariate = table["covariate"].value_or(std::string());
+    if (form->covariate.empty()) return Wrong(table, "covariate is missing");
+    if (form->effect == &sim::EmpiricalRipple()) {
+      const bool of_one =
+          form->axis == sim::EffectAxis::kTheta || form->axis == sim::EffectAxis::kPhi;
+      if (!of_one || form->columns != 2 || !(form->shape > 0))
+        return Wrong(table, "a ripple is of theta or phi, of an order above 0, in 2 columns");
+      return {};
+    }
+    const std::string name = table["channel"].value_or(std::string());
+    const auto channel = sim::ChannelNamed(name);
+    if (!channel) return Wrong(table, "there is no channel '" + name + "'");
+    form->form = *channel;
+    if (form->columns > sim::kEmpiricalCosines)
+      return Wrong(table,
+                   "a curve has at most " + std::to_string(sim::kEmpiricalCosines) + " columns");
+    FOCALFLEET_TRY_ASSIGN(const std::vector<double> values, Numbers(table, "knot_values"));
+    FOCALFLEET_TRY_ASSIGN(const std::vector<double> ranks, Numbers(table, "knot_ranks"));
+    if (values.empty() || values.size() != ranks.size())
+      return Wrong(table, "knot_values and knot_ranks are not of one length");
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const bool ascends = k == 0 || values[k] > values[k - 1];
+      if (!std::isfinite(values[k]) || !ascends || !(ranks[k] >= 0 && ranks[k] <= 1))
+        return Wrong(table, "knots: values that ascend and ranks from 0 to 1 are expected");
+      form->knots.push_back({values[k], ranks[k]});
+    }
+    return {};
+  }
+
+  static sim::Sharing SharingOf(const toml::table& table) {
+    const std::string word = table["shared_by"].value_or(std::string());
+    for (const sim::Sharing sharing :
+         {sim::Sharing::kRail, sim::Sharing::kBus, sim::Sharing::kFleet})
+      if (sim::Name(sharing) == word) return sharing;
+    return sim::Sharing::kUnit;
+  }
+
+  using GroupNumbers = std::map<std::vector<double>, std::uint32_t>;
+
+  /// A shared amplitude stands in the file once for each unit: who has the same is of one group.
+  static void AddUnit(std::size_t unit, std::span<const double> amplitude,
+                      std::span<const double> sigma, GroupNumbers* groups, sim::ModelTerm* term) {
+    std::vector<double> key(amplitude.begin(), amplitude.end());
+    key.insert(key.end(), sigma.begin(), sigma.end());
+    if (term->sharing == sim::Sharing::kUnit) key = {static_cast<double>(unit)};
+    const auto [group, fresh] =
+        groups->emplace(std::move(key), static_cast<std::uint32_t>(groups->size()));
+    term->group_of_unit[unit] = group->second;
+    if (!fresh) return;
+    term->amplitude.insert(term->amplitude.end(), amplitude.begin(), amplitude.end());
+    term->sigma.insert(term->sigma.end(), sigma.begin(), sigma.end());
   }
 
   Status ReadEffect(const toml::table& table) {
@@ -163,27 +224,26 @@ class ModelReader {
     if (amplitude.size() != ids.size() * c)
       return Wrong(table, "amplitude: " + std::to_string(amplitude.size()) + " numbers for " +
                               std::to_string(ids.size()) + " units");
-    term.sharing = sim::Sharing::kUnit;
     std::vector<double> sigma(amplitude.size(), 0);
     if (table.contains("sigma")) {
       FOCALFLEET_TRY_ASSIGN(sigma, Numbers(table, "sigma"));
       if (sigma.size() != amplitude.size()) return Wrong(table, "sigma: not one an amplitude");
+      for (double& one : sigma)
+        if (!std::isfinite(one)) one = 0;  // not known
     }
+    term.sharing = SharingOf(table);
     term.group_of_unit.assign(model_.units.size(), sim::kNoGroup);
-    term.amplitude.assign(model_.units.size() * c, 0);
-    term.sigma.assign(model_.units.size() * c, 0);
+    GroupNumbers groups;
     for (std::size_t k = 0; k < ids.size(); ++k) {
       const auto at = index_.find(static_cast<std::uint32_t>(ids[k]));
       if (at == index_.end()) continue;
-      term.group_of_unit[at->second] = static_cast<std::uint32_t>(at->second);
-      for (std::size_t j = 0; j < c; ++j) {
-        if (!IsPossible(*term.form.effect, amplitude[k * c + j]))
+      const std::span<const double> own = std::span(amplitude).subspan(k * c, c);
+      for (const double one : own)
+        if (!IsPossible(*term.form.effect, one))
           return Wrong(table, "unit " + std::to_string(at->first) + ": an amplitude of " +
-                                  std::to_string(amplitude[k * c + j]) + " is none that " +
+                                  std::to_string(one) + " is none that " +
                                   std::string(term.form.effect->cause) + " can have");
-        term.amplitude[at->second * c + j] = amplitude[k * c + j];
-        term.sigma[at->second * c + j] = sigma[k * c + j];
-      }
+      AddUnit(at->second, own, std::span<const double>(sigma).subspan(k * c, c), &groups, &term);
     }
     model_.terms.push_back(std::move(term));
     read_.candidates.push_back(Words(table, "candidates"));
@@ -206,12 +266,6 @@ Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
                                          std::to_string(parsed.error().source().begin.line) + ": " +
                                          std::string(parsed.error().description()));
   return ModelReader(file, units).Read(parsed.table());
-}
-
-Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
-                                     const sim::Campaign& campaign) {
-  FOCALFLEET_TRY_ASSIGN(ModelFile read, ReadModelFile(text, file, campaign.units));
-  return std::move(read.model);
 }
 
 }  // namespace focalfleet

@@ -21,6 +21,7 @@ struct ModelFile {
   std::string verdict;
   double rms_before_um = 0;  // on moves that no fit has seen; NaN: it does not say
   double rms_after_um = 0;
+  std::size_t units_known = 0;                       // of those that it was read for
   std::vector<std::vector<std::string>> candidates;  // of each term, its rivals; empty: none
   /// How the campaign left each unit; none: it did not measure it. Shape: (units).
   std::vector<std::optional<sim::UnitLeft>> left;
@@ -31,9 +32,5 @@ struct ModelFile {
 /// what their effect can have, arms or bases that are those of another unit.
 Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
                                 const std::vector<sim::CampaignUnit>& units);
-
-/// The model alone, for a campaign's units. Errors: as above.
-Result<sim::CampaignModel> ReadModel(std::string_view text, const std::string& file,
-                                     const sim::Campaign& campaign);
 
 }  // namespace focalfleet

@@ -1,20 +1,19 @@
-// diagnose: what the simulation gets wrong about a measured campaign, by name.
-// simulate campaign: a made-up campaign with chosen effects in it.
+// diagnose: what the simulation gets wrong about a measured campaign, by name; with --against,
+// which of two models predicts it better. simulate campaign: a made-up campaign with chosen effects
+// in it.
 
 #include <fmt/format.h>
 
-#include <atomic>
 #include <charconv>
 #include <filesystem>
 #include <optional>
-#include <thread>
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
-#include "daemon/campaign/model_file.h"
-#include "daemon/campaign/sha256.h"
 #include "daemon/cli/command_line.h"
+#include "daemon/cli/compare_models_command.h"
+#include "daemon/cli/measured_campaign.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
@@ -33,45 +32,9 @@ struct DiagnoseCommandOptions {
   std::vector<std::string> leave_out;
   std::uint64_t shuffle = 0;
   std::string model;
+  std::string against;
+  bool patch = false;
 };
-
-sim::ParallelFor OnThreads(int threads) {
-  const unsigned count = threads > 0 ? static_cast<unsigned>(threads)
-                                     : std::max(1u, std::thread::hardware_concurrency());
-  if (count == 1) return sim::OneAfterTheOther();
-  return [count](std::size_t chunks, const std::function<void(std::size_t)>& work) {
-    std::atomic<std::size_t> next{0};
-    const auto take = [&] {
-      for (std::size_t chunk = 0; (chunk = next++) < chunks;) work(chunk);
-    };
-    std::vector<std::thread> others;
-    for (unsigned k = 1; k < count; ++k) others.emplace_back(take);
-    take();
-    for (std::thread& other : others) other.join();
-  };
-}
-
-struct ReadIn {
-  sim::Campaign campaign;
-  ReportNames names;
-};
-
-Result<ReadIn> ReadFolder(const std::string& folder) {
-  const std::filesystem::path path(folder);
-  const std::string moves_file = path / "moves.csv", units_file = path / "units.csv";
-  FOCALFLEET_TRY_ASSIGN(const std::string moves, ReadTextFile(moves_file));
-  FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTextFile(units_file));
-  ReadIn in;
-  in.names.campaign = path.filename().empty() ? path.parent_path().filename() : path.filename();
-  FOCALFLEET_TRY_ASSIGN(in.campaign, ReadCampaign({.moves = moves,
-                                                   .units = units,
-                                                   .moves_file = moves_file,
-                                                   .units_file = units_file,
-                                                   .name = in.names.campaign}));
-  in.names.sha256 = Sha256Hex(moves + units);
-  in.names.model_after = in.names.campaign + "-extended";
-  return in;
-}
 
 Status CheckCauses(const std::vector<std::string>& causes) {
   for (const std::string& cause : causes)
@@ -80,7 +43,7 @@ Status CheckCauses(const std::vector<std::string>& causes) {
   return {};
 }
 
-Status WriteReport(const std::filesystem::path& out, const ReadIn& in,
+Status WriteReport(const std::filesystem::path& out, const MeasuredCampaign& in,
                    const sim::Diagnosis& diagnosis, const Json& report) {
   std::error_code failed;
   std::filesystem::create_directories(out, failed);
@@ -114,19 +77,47 @@ std::string CauseTable(const sim::Diagnosis& diagnosis) {
   return AlignColumns(rows);
 }
 
+// Where the model has empirical terms, what for.
+std::string PatchTable(const sim::Diagnosis& diagnosis) {
+  std::vector<std::vector<std::string>> rows = {
+      {"patched, not explained", "in", "against", "um rms"}};
+  for (const sim::UnknownFound& found : diagnosis.unknown)
+    if (found.patched)
+      rows.push_back({found.patched->term, found.channel, found.covariate,
+                      fmt::format("{:.2f}", found.patched->size_um)});
+  return rows.size() == 1 ? "" : AlignColumns(rows);
+}
+
+// What goes together on the command line. Empty: it does.
+std::string WrongUsage(const DiagnoseCommandOptions& options) {
+  if (options.against.empty())
+    return options.out.empty() ? "--out is required (or --against, to compare two models)" : "";
+  if (!options.out.empty())
+    return "--out and --against exclude each other: a comparison of models writes no report";
+  if (options.patch || options.shuffle != 0 || !options.leave_out.empty())
+    return "--against fits nothing: --patch, --without and --shuffle have no meaning with it";
+  return {};
+}
+
 ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& options) {
+  if (const std::string wrong = WrongUsage(options); !wrong.empty())
+    return Report(context, Error{ErrorCode::kInvalid, wrong}, ExitCode::kUsage);
+  if (!options.against.empty())
+    return RunCompareModels(context, {.campaign = options.campaign,
+                                      .model_a = options.model,
+                                      .model_b = options.against,
+                                      .seed = options.seed,
+                                      .threads = options.threads});
   if (const auto known = CheckCauses(options.leave_out); !known)
     return Report(context, known.error(), ExitCode::kUsage);
-  auto in = ReadFolder(options.campaign);
+  auto in = ReadMeasuredCampaign(options.campaign);
   if (!in) return Report(context, in.error());
   std::optional<sim::CampaignModel> before;
   if (!options.model.empty()) {
-    const auto text = ReadTextFile(options.model);
-    if (!text) return Report(context, text.error());
-    auto model = ReadModel(*text, options.model, in->campaign);
-    if (!model) return Report(context, model.error());
-    in->names.model_before = model->name;
-    before = std::move(*model);
+    auto read = ReadModelFor(in->campaign, options.model);
+    if (!read) return Report(context, read.error());
+    in->names.model_before = read->model.name;
+    before = std::move(read->model);
   }
   sim::Diagnosis diagnosis;
   {
@@ -135,6 +126,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
                                 .leave_out = options.leave_out,
                                 .shuffle_library = options.shuffle,
                                 .before = before ? &*before : nullptr,
+                                .patch = options.patch,
                                 .parallel = OnThreads(options.threads)};
     wanted.progress = [&](double share, std::string_view stage) {
       bar.Show(share, "diagnosing", std::string(stage));
@@ -147,6 +139,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
   if (context.json) PrintJson(report);
   Say(context, VerdictSentence(diagnosis));
   if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
+  if (const std::string patches = PatchTable(diagnosis); !patches.empty()) Say(context, patches);
   Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv}");
   return ExitCode::kOk;
 }
@@ -209,17 +202,22 @@ void AddDiagnoseCommand(CommandLine* line) {
   CLI::App* command = AddCommand(
       &line->app, "diagnose", "Name what the simulation gets wrong about a measured campaign",
       "  focalfleet diagnose night-12 --out night-12-report\n"
-      "  focalfleet diagnose night-12 --out without --without backlash,relaxation --json");
+      "  focalfleet diagnose night-12 --out without --without backlash,relaxation --json\n"
+      "  focalfleet diagnose night-12 --out patched --patch\n"
+      "  focalfleet diagnose night-40 --model night-12-report/model.toml --against "
+      "night-40-report/model.toml");
   auto options = std::make_shared<DiagnoseCommandOptions>();
   command->add_option("campaign", options->campaign, "Folder with moves.csv and units.csv")
       ->required()
       ->type_name("DIR");
   command
       ->add_option("--out", options->out,
-                   "Folder for report.json, report.html, model.toml, next_moves.csv")
-      ->required()
+                   "Folder for report.json, report.html, model.toml, next_moves.csv; required but "
+                   "with --against")
       ->type_name("DIR");
-  command->add_option("--seed", options->seed, "Of the calibration by chance")
+  command
+      ->add_option("--seed", options->seed,
+                   "Of the calibration by chance; with --against, of the interval")
       ->capture_default_str();
   command
       ->add_option("--threads", options->threads,
@@ -232,6 +230,10 @@ void AddDiagnoseCommand(CommandLine* line) {
   AddFile(
       command, "--model", &options->model,
       "model.toml to start from: what it explains is no misfit (default: the ideal kinematics)");
+  AddFile(command, "--against", &options->against,
+          "model.toml to hold against --model on these moves, as both stand: no fit, no report");
+  command->add_flag("--patch", options->patch,
+                    "Empirical terms in the model for what is unknown; they name nothing");
   OnChosen(line, command, options, RunDiagnose);
 }
 

@@ -14,6 +14,7 @@
 #include "sim/diagnosis/geometry_causes.h"
 #include "sim/diagnosis/image.h"
 #include "sim/diagnosis/outliers.h"
+#include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/select_however.h"
 #include "sim/effects/registry.h"
@@ -24,7 +25,6 @@ namespace {
 constexpr std::size_t kMovesMin = 8;  // of a unit, seen
 constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
 constexpr double kKeptMin = 0.03;
-constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
 // Causes that come from other looks than a template's.
 constexpr std::string_view kEventCauses[] = {"sensor_bias"};
 
@@ -87,33 +87,6 @@ std::string ScopeOf(const ModelTerm& term, std::size_t units) {
       Name(term.form.effect->owner == Owner::kUnit ? Owner::kPlate : term.form.effect->owner));
 }
 
-void TakeAmplitude(const ModelTerm& term, CauseFound* cause) {
-  // One number: the mean over groups by their certainty, where it has a sign, else the rms of the
-  // vectors.
-  const std::size_t c = term.form.columns;
-  double mean = 0, square = 0, weight = 0;
-  std::set<std::uint32_t> groups;
-  for (const std::uint32_t group : term.group_of_unit)
-    if (group != kNoGroup) groups.insert(group);
-  for (const std::uint32_t group : groups) {
-    double s = 0, sigma2 = 0;
-    for (std::size_t k = 0; k < c; ++k) {
-      const double a = term.amplitude[group * c + k];
-      s += a * a;
-      sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
-    }
-    const double w = 1 / std::max(sigma2, 1e-30);
-    mean += w * (c == 1 ? term.amplitude[group] : 0);
-    square += w * s, weight += w;
-  }
-  if (!(weight > 0)) return;
-  const double rms = std::sqrt(square / weight);
-  cause->amplitude = c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms;
-  const double sigma = 1 / std::sqrt(weight);
-  cause->ci95[0] = cause->amplitude - 1.96 * sigma;
-  cause->ci95[1] = cause->amplitude + 1.96 * sigma;
-}
-
 CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
   CauseFound cause;
   const Effect& effect = *term.form.effect;
@@ -135,7 +108,10 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   constexpr double kNearlyAll = 0.9;
   cause.all_units = static_cast<double>(have) >= kNearlyAll * static_cast<double>(all);
   cause.amplitude_unit = effect.amplitude_unit;
-  TakeAmplitude(term, &cause);
+  const AmplitudeSummary amplitude = Summarise(term);
+  cause.amplitude = amplitude.value;
+  cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
+  cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
   cause.size_um = SizeOf(fit, term);
   cause.delta_log_likelihood = accepted.standing.chi_square / 2;
   cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
@@ -189,26 +165,30 @@ double RmsOf(const Fit& fit) {
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
-// The clearest structures that are left, a column once.
-std::vector<UnknownFound> Screen(const Fit& fit, const DiagnoseOptions& options) {
-  const Templates looks = ScreenTemplates(*fit.facts);
-  if (looks.empty()) return {};
-  const FleetGroups groups = GroupsOf(*fit.facts);
-  const ScorePass pass = ScoreTemplates(fit, looks);
-  const double tests = EffectiveTests(pass.scores, looks, options.seed);
-  std::vector<UnknownFound> found;
-  const Best best =
-      FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * options.family_wise);
-  if (best.at == kNoTerm) return found;
-  UnknownFound unknown{looks[best.at].covariate, ChannelOf(looks[best.at]),
-                       std::exp(best.log_p_family), 0, best.standing.chi_square / 2};
-  Fit patched = fit;
-  patched.parallel = fit.parallel;
-  patched.model.terms.push_back(MakeTerm(looks[best.at], best.standing, groups));
-  StepFit(&patched);
-  unknown.size_um = SizeOf(patched, patched.model.terms.back());
-  found.push_back(unknown);
-  return found;
+// What the screen sees joins what is told: a column once, but for each term that patches it.
+void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* told) {
+  for (UnknownFound& one : seen) {
+    const auto of_column = [&](const UnknownFound& other) {
+      return other.covariate == one.covariate && (!one.patched || !other.patched);
+    };
+    const auto same = std::find_if(told->begin(), told->end(), of_column);
+    if (same == told->end())
+      told->push_back(std::move(one));
+    else if (one.patched)
+      same->patched = std::move(one.patched);
+  }
+}
+
+// What is left that no cause explains; with `patch`, terms for it.
+void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
+  std::vector<UnknownFound> seen;
+  if (options.patch) {
+    seen = PatchStructures({.family_wise = options.family_wise, .seed = options.seed},
+                           &diagnosis->unknown, fit);
+  } else if (auto structure = FindStructure(*fit, options.family_wise, options.seed)) {
+    seen.push_back(std::move(structure->told));
+  }
+  TakeSeen(std::move(seen), &diagnosis->unknown);
 }
 
 std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
@@ -388,7 +368,12 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.moves = facts.exposures.size();
   std::vector<char> aside;
   diagnosis.outliers = FindBeforeFit(facts, &aside);
-  if (options.before != nullptr) TakeAway(*options.before, facts, options.parallel, &campaign);
+  CampaignModel before;
+  if (options.before != nullptr) {
+    before = *options.before;
+    diagnosis.not_testable = LeaveOutUntold(facts, &before);
+    TakeAway(before, facts, options.parallel, &campaign);
+  }
   diagnosis.model.units = campaign.units;
   diagnosis.insufficient = WhyInsufficient(facts, aside);
   if (!diagnosis.insufficient.empty()) return diagnosis;
@@ -420,10 +405,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   NameCauses(fit, selection, options, &diagnosis);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
-  for (UnknownFound& left : Screen(fit, options))
-    if (std::none_of(diagnosis.unknown.begin(), diagnosis.unknown.end(),
-                     [&](const UnknownFound& told) { return told.covariate == left.covariate; }))
-      diagnosis.unknown.push_back(std::move(left));
+  LookAtRest(options, &fit, &diagnosis);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
   if (!diagnosis.unknown.empty())
     for (CauseFound& cause : diagnosis.causes)
@@ -441,9 +423,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   }
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
-  if (options.before != nullptr)
-    diagnosis.model.terms.insert(diagnosis.model.terms.begin(), options.before->terms.begin(),
-                                 options.before->terms.end());
+  diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),
+                               before.terms.end());
   options.progress(1, "done");
   return diagnosis;
 }

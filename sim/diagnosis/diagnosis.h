@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,17 +36,19 @@ struct CauseFound {
   std::string paragraph;  // for the operator
 };
 
+/// An empirical term that the model has for what no cause explains (patch.h).
+struct Patched {
+  std::string term;    // "empirical_curve" or "empirical_ripple"
+  double size_um = 0;  // rms at the fibre
+};
+
 struct UnknownFound {
   std::string covariate;
   std::string channel;  // where it shows: "theta angle", "x" ...
   double p_value = 0;
   double size_um = 0;
   double delta_log_likelihood = 0;  // of the structure, as if it were a cause
-};
-
-struct NotTestable {
-  std::string cause;
-  std::string why;
+  std::optional<Patched> patched = std::nullopt;
 };
 
 struct OutliersFound {
@@ -86,6 +89,7 @@ struct DiagnoseOptions {
   std::vector<const Effect*> also;        // effects beside the library
   std::uint64_t shuffle_library = 0;      // not 0: another order of its templates
   const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
+  bool patch = false;                     // empirical terms for what is unknown
   bool with_gain = true;
   ParallelFor parallel = OneAfterTheOther();
   std::function<void(double share, std::string_view stage)> progress = [](double,

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+
+#include "sim/effects/empirical.h"
+#include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -20,7 +24,32 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
   }
 }
 
+// Why nobody can say what the term does in these moves; empty: it can be said.
+std::string WhyUntold(const Template& form, const CampaignFacts& facts) {
+  const bool empirical = FindEmpirical(form.effect->cause) != nullptr;
+  std::string_view missing = MissingCovariate(*form.effect, facts);
+  if (empirical && !facts.Has(form.covariate)) missing = form.covariate;
+  if (!missing.empty()) return "column " + std::string(missing) + " is missing";
+  if (empirical) return {};
+  // What a form needs beyond its effect's columns is known to its list.
+  const Templates listed = ListTemplates(*form.effect, facts);
+  const bool has = std::any_of(listed.begin(), listed.end(), [&](const Template& one) {
+    return one.form == form.form && one.axis == form.axis && one.memory == form.memory;
+  });
+  return has ? "" : "these units or moves have no such part";
+}
+
 }  // namespace
+
+std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model) {
+  std::vector<NotTestable> left_out;
+  std::erase_if(model->terms, [&](const ModelTerm& term) {
+    const std::string why = WhyUntold(term.form, facts);
+    if (!why.empty()) left_out.push_back({std::string(term.form.effect->cause), why});
+    return !why.empty();
+  });
+  return left_out;
+}
 
 ParallelFor OneAfterTheOther() {
   return [](std::size_t chunks, const std::function<void(std::size_t)>& work) {
@@ -32,6 +61,43 @@ std::span<const double> ModelTerm::AmplitudeOf(std::size_t unit) const {
   const std::uint32_t group = group_of_unit[unit];
   if (group == kNoGroup) return {};
   return std::span(amplitude).subspan(group * form.columns, form.columns);
+}
+
+std::string_view Name(Sharing sharing) {
+  switch (sharing) {
+    case Sharing::kRail:
+      return "rail";
+    case Sharing::kBus:
+      return "bus";
+    case Sharing::kFleet:
+      return "fleet";
+    case Sharing::kUnit:
+      break;
+  }
+  return "unit";
+}
+
+AmplitudeSummary Summarise(const ModelTerm& term) {
+  const std::size_t c = term.form.columns;
+  double mean = 0, square = 0, weight = 0;
+  std::set<std::uint32_t> groups;
+  for (const std::uint32_t group : term.group_of_unit)
+    if (group != kNoGroup) groups.insert(group);
+  for (const std::uint32_t group : groups) {
+    double s = 0, sigma2 = 0;
+    for (std::size_t k = 0; k < c; ++k) {
+      const double a = term.amplitude[group * c + k];
+      s += a * a;
+      sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
+    }
+    const double w = 1 / std::max(sigma2, 1e-30);
+    mean += w * (c == 1 ? term.amplitude[group] : 0);
+    square += w * s, weight += w;
+  }
+  if (!(weight > 0)) return {};
+  const double rms = std::sqrt(square / weight);
+  return {c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms,
+          1 / std::sqrt(weight)};
 }
 
 std::vector<UnitChunk> ChunksOf(std::size_t units) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sim/campaign/campaign.h"
@@ -22,6 +23,7 @@ ParallelFor OneAfterTheOther();
 
 /// At which level the amplitudes are the same.
 enum class Sharing { kUnit, kRail, kBus, kFleet };
+std::string_view Name(Sharing sharing);
 
 inline constexpr std::uint32_t kNoGroup = UINT32_MAX;
 
@@ -38,6 +40,14 @@ struct ModelTerm {
   /// {} where the unit does not have it.
   [[nodiscard]] std::span<const double> AmplitudeOf(std::size_t unit) const;
 };
+
+/// All amplitudes of a term as one number: their mean over groups by certainty, where it has a
+/// sign, else their root mean square.
+struct AmplitudeSummary {
+  double value = 0;
+  double sigma = 0;  // 0: nothing is known of it
+};
+AmplitudeSummary Summarise(const ModelTerm& term);
 
 /// Shift and turn of the whole image at one exposure. Frame: plate, about its centre.
 struct ExposureTerm {
@@ -81,6 +91,16 @@ void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* error
 /// The pose errors of one unit by all terms, events and homings of the model.
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors);
+
+/// What these data cannot say anything of.
+struct NotTestable {
+  std::string cause;
+  std::string why;
+};
+
+/// Takes out the terms that this campaign cannot be predicted with: it lacks a column, or its units
+/// and moves have no such part. Returns which, and why.
+std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model);
 
 struct Places {
   std::vector<double> x_mm;  // Shape: (rows)

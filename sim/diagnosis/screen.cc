@@ -1,74 +1,16 @@
 #include "sim/diagnosis/screen.h"
 
-#include <algorithm>
 #include <cmath>
-#include <numbers>
 
-#include "sim/effects/harmonic.h"
+#include "sim/diagnosis/select.h"
+#include "sim/effects/empirical.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr int kCurves = 5;  // cosines over the ranks
-enum Channel { kThetaAngle, kPhiAngle, kPlaceX, kPlaceY, kThetaOdd, kPhiOdd, kChannels };
-constexpr const char* kChannelNames[] = {"theta angle",
-                                         "phi angle",
-                                         "x",
-                                         "y",
-                                         "theta angle against its direction",
-                                         "phi angle against its direction"};
-
-void ApplyCurve(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-                PoseErrors* errors) {
-  const std::span<const float> rank =
-      std::span<const float>(track.facts->Find(form.covariate)->rank)
-          .subspan(track.first_row, track.moves);
-  double direction = 0;
-  const std::size_t axis = form.form == kPhiOdd ? kPhi : kTheta;
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const double curve = amplitude[0] * std::cos(std::numbers::pi * form.shape * double{rank[i]});
-    if (track.restarts[i] != 0) direction = 0;
-    if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
-    if (form.form == kThetaAngle) errors->angle_deg[kTheta][i] += curve;
-    if (form.form == kPhiAngle) errors->angle_deg[kPhi][i] += curve;
-    if (form.form == kPlaceX) errors->x_mm[i] += 0.1 * curve;
-    if (form.form == kPlaceY) errors->y_mm[i] += 0.1 * curve;
-    if (form.form >= kThetaOdd) errors->angle_deg[axis][i] += curve * direction;
-  }
-}
-
-void ApplyRipple(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
-                 PoseErrors* errors) {
-  AddHarmonic(track, AxisIndex(form), form.shape, amplitude, errors);
-}
-
-void ListNone(const CampaignFacts&, Templates*) {}
-
-const Effect& Curve() {
-  static const Effect effect{.cause = "curve",
-                             .amplitude_unit = "deg",
-                             .prior_size = 0.05,
-                             .owner = Owner::kUnit,
-                             .list = ListNone,
-                             .apply = ApplyCurve};
-  return effect;
-}
-const Effect& Ripple() {
-  static const Effect effect{.cause = "ripple",
-                             .amplitude_unit = "deg",
-                             .prior_size = 0.05,
-                             .owner = Owner::kUnit,
-                             .list = ListNone,
-                             .apply = ApplyRipple};
-  return effect;
-}
+constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
 
 }  // namespace
-
-std::string ChannelOf(const Template& look) {
-  if (look.effect == &Ripple()) return std::string(Name(look.axis)) + " angle";
-  return kChannelNames[look.form];
-}
 
 Templates ScreenTemplates(const CampaignFacts& facts) {
   Templates looks;
@@ -76,12 +18,12 @@ Templates ScreenTemplates(const CampaignFacts& facts) {
     if (!column.varies() || name == "sigma_um" || name == "rehomed" || name == "pixel_x" ||
         name == "pixel_y")
       continue;
-    for (int channel = 0; channel < kChannels; ++channel)
-      for (int curve = 1; curve <= kCurves; ++curve)
-        looks.push_back({.effect = &Curve(),
+    for (int channel = 0; channel < kEmpiricalChannels; ++channel)
+      for (std::size_t cosine = 1; cosine <= kEmpiricalCosines; ++cosine)
+        looks.push_back({.effect = &EmpiricalCurve(),
                          .axis = EffectAxis::kNone,
                          .form = channel,
-                         .shape = static_cast<double>(curve),
+                         .shape = static_cast<double>(cosine),
                          .label = "curve",
                          .covariate = name});
   }
@@ -90,13 +32,33 @@ Templates ScreenTemplates(const CampaignFacts& facts) {
   for (double order = 17; order <= 60; order += 1) orders.push_back(order);
   for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi})
     for (const double order : orders)
-      looks.push_back({.effect = &Ripple(),
+      looks.push_back({.effect = &EmpiricalRipple(),
                        .axis = axis,
                        .columns = 2,
                        .shape = order,
                        .label = "ripple",
                        .covariate = std::string(kCommand[axis == EffectAxis::kTheta ? 0 : 1])});
   return looks;
+}
+
+std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, std::uint64_t seed) {
+  const Templates looks = ScreenTemplates(*fit.facts);
+  if (looks.empty()) return std::nullopt;
+  const FleetGroups groups = GroupsOf(*fit.facts);
+  const ScorePass pass = ScoreTemplates(fit, looks);
+  const double tests = EffectiveTests(pass.scores, looks, seed);
+  const Best best = FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise);
+  if (best.at == kNoTerm) return std::nullopt;
+  const Template& look = looks[best.at];
+  Fit stepped = fit;
+  stepped.model.terms.push_back(MakeTerm(look, best.standing, groups));
+  StepFit(&stepped);
+  return StructureLeft{{.covariate = look.covariate,
+                        .channel = std::string(ChannelOf(look)),
+                        .p_value = std::exp(best.log_p_family),
+                        .size_um = SizeOf(stepped, stepped.model.terms.back()),
+                        .delta_log_likelihood = best.standing.chi_square / 2},
+                       stepped.model.terms.back()};
 }
 
 }  // namespace focalfleet::sim

@@ -5,13 +5,23 @@
 // shared and gated the same way; what they find is called empirical, never a cause.
 #pragma once
 
-#include "sim/effects/effect.h"
+#include <cstdint>
+#include <optional>
+
+#include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/fit.h"
 
 namespace focalfleet::sim {
 
 Templates ScreenTemplates(const CampaignFacts& facts);
 
-/// Where the look sees it: "theta angle", "x" ...
-std::string ChannelOf(const Template& look);
+/// Structure that chance does not explain.
+struct StructureLeft {
+  UnknownFound told;
+  ModelTerm term;  // the look that shows it best, as one step fits it
+};
+
+/// The clearest. None: chance explains what is left, at a share of the family-wise rate.
+std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, std::uint64_t seed);
 
 }  // namespace focalfleet::sim

@@ -45,15 +45,24 @@ inline constexpr std::size_t kColumnsMax = 6;
 
 struct Effect;
 
+/// A column's value and its rank, 0..1, among the rows of the campaign that it was taken from.
+struct RankKnot {
+  double value = 0;
+  double rank = 0;
+};
+
 struct Template {
   const Effect* effect = nullptr;
   EffectAxis axis = EffectAxis::kNone;
   std::size_t columns = 1;
   Memory memory = Memory::kHold;
-  int form = 0;           // of the effect's own forms
-  double shape = 0;       // of the effect's own shape parameter
-  std::string label;      // the shape in words
-  std::string covariate;  // of the screen for what no effect explains: the column it looks at
+  int form = 0;       // of the effect's own forms
+  double shape = 0;   // of the effect's own shape parameter
+  std::string label;  // the shape in words
+  // Of an empirical term (empirical.h): the column it looks at, and a curve's knots, ascending;
+  // none: it goes by the campaign's own ranks.
+  std::string covariate;
+  std::vector<RankKnot> knots;
 };
 
 using Templates = std::vector<Template>;

@@ -12,10 +12,10 @@ bool IsOfPosesAlone(const Effect& effect) {
   // By name, because it is a fact about the code of an effect: these read no column, not even a
   // computed one.
   static constexpr std::string_view kCauses[] = {
-      "axis_crosstalk", "axis_tilt",       "backlash",     "eccentricity",
-      "fibre_torque",   "friction_windup", "gear_scale",   "hard_stop",
-      "mode_threshold", "pinion_runout",   "ramp_travel",  "scale_asymmetry",
-      "stage_ripple",   "stiction",        "tooth_damage", "tooth_mesh"};
+      "axis_crosstalk", "axis_tilt",       "backlash",        "eccentricity", "empirical_ripple",
+      "fibre_torque",   "friction_windup", "gear_scale",      "hard_stop",    "mode_threshold",
+      "pinion_runout",  "ramp_travel",     "scale_asymmetry", "stage_ripple", "stiction",
+      "tooth_damage",   "tooth_mesh"};
   return std::find(std::begin(kCauses), std::end(kCauses), effect.cause) != std::end(kCauses);
 }
 

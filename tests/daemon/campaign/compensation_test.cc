@@ -8,6 +8,7 @@
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/hex_layout.h"
 #include "protocol/base/rng.h"
+#include "sim/effects/empirical.h"
 #include "sim/effects/registry.h"
 #include "tests/support/seed.h"
 
@@ -32,7 +33,8 @@ std::vector<sim::CampaignUnit> Described(const Layout& layout) {
 sim::ModelTerm TermOf(std::string_view cause, sim::EffectAxis axis, sim::Memory memory,
                       std::size_t units, std::size_t columns, double shape, double size, Rng* rng) {
   sim::ModelTerm term;
-  term.form = {.effect = sim::FindEffect(cause),
+  const sim::Effect* empirical = sim::FindEmpirical(cause);
+  term.form = {.effect = empirical != nullptr ? empirical : sim::FindEffect(cause),
                .axis = axis,
                .columns = columns,
                .memory = memory,
@@ -166,6 +168,41 @@ TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
   EXPECT_GT(uncompensated_um, 50);  // or there was nothing to do
 }
 
+TEST(Compensation, AnEmpiricalRippleIsCompensatedLikeThatOfAGear) {
+  Rng rng(4);
+  const Layout layout = SmallLayout();
+  Moves moves(layout, &rng);
+  moves.GoAnywhere();
+  sim::CampaignModel model;
+  model.units = Described(layout);
+  model.terms = {TermOf("empirical_ripple", sim::EffectAxis::kTheta, sim::Memory::kHold,
+                        layout.size(), 2, 5, 0.1, &rng)};
+  const Compensation compensation(FileOf(model, moves.Campaign()), layout);
+  EXPECT_TRUE(compensation.left_out().empty());
+  std::vector<PointFp> wanted;
+  for (std::uint32_t n = 0; n < layout.size(); ++n) {
+    const AxisAngles aim{30.0 * n - 80, 90};
+    wanted.push_back(FibreAt(layout.units()[n], aim));
+    const auto count =
+        compensation.CountFor({n}, {.fibre_fp = wanted[n], .now = moves.Last(n), .guess = aim});
+    ASSERT_TRUE(count);
+    EXPECT_NE(count->theta_deg, aim.theta_deg);
+    moves.Go(n, *count);
+  }
+  const sim::Campaign all = moves.Campaign();
+  const sim::Places places = Predict(model, sim::MakeFacts(all), sim::OneAfterTheOther());
+  double uncompensated_um = 0;
+  for (std::uint32_t n = 0; n < layout.size(); ++n) {
+    const std::size_t row = all.first_row[n + 1] - 1;
+    EXPECT_NEAR(places.x_mm[row], wanted[n].x_mm, 5e-4);
+    EXPECT_NEAR(places.y_mm[row], wanted[n].y_mm, 5e-4);
+    const PointFp plain = FibreAt(layout.units()[n], moves.Last(n));
+    uncompensated_um = std::max(uncompensated_um, 1e3 * std::hypot(plain.x_mm - wanted[n].x_mm,
+                                                                   plain.y_mm - wanted[n].y_mm));
+  }
+  EXPECT_GT(uncompensated_um, 5);  // or there was nothing to do
+}
+
 TEST(Compensation, KnowsNothingOfUnitsThatWereNotMeasuredOrWereHomed) {
   Rng rng(3);
   const Layout layout = SmallLayout();
@@ -194,8 +231,11 @@ TEST(Compensation, SaysWhatItLeavesOut) {
   for (const char* cause : {"gravity_sag", "camera_similarity", "gravity_sag", "eccentricity"})
     model.terms.push_back(
         TermOf(cause, sim::EffectAxis::kTheta, sim::Memory::kHold, 7, 2, 0, 0, &rng));
+  model.terms.push_back(
+      TermOf("empirical_curve", sim::EffectAxis::kNone, sim::Memory::kHold, 7, 5, 1, 0, &rng));
   const Compensation compensation(FileOf(model, moves.Campaign()), layout);
-  EXPECT_THAT(compensation.left_out(), ::testing::ElementsAre("gravity_sag", "camera_similarity"));
+  EXPECT_THAT(compensation.left_out(),
+              ::testing::ElementsAre("gravity_sag", "camera_similarity", "empirical_curve"));
 }
 
 TEST(Compensation, DoesNotGoFarForATargetOutOfReach) {

@@ -3,9 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+#include <numbers>
 #include <string>
 #include <vector>
 
+#include "protocol/base/rng.h"
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/planted.h"
 
@@ -17,6 +21,36 @@ inline Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions optio
   auto campaign = PlantCampaign(options);
   EXPECT_TRUE(campaign) << campaign.error().text;
   return *campaign;
+}
+
+/// What no effect of the library does: every fibre turned about its base, as if the theta angle of
+/// that row were off.
+inline void TurnTheta(const std::function<double(std::size_t row)>& off_deg, Campaign* campaign) {
+  for (std::size_t unit = 0; unit < campaign->units.size(); ++unit)
+    for (std::size_t row = campaign->first_row[unit]; row < campaign->first_row[unit + 1]; ++row) {
+      const double off = off_deg(row) * std::numbers::pi / 180;
+      const CampaignUnit& base = campaign->units[unit];
+      const double x = campaign->x_mm[row] - base.base_x_mm;
+      const double y = campaign->y_mm[row] - base.base_y_mm;
+      campaign->x_mm[row] = base.base_x_mm + std::cos(off) * x - std::sin(off) * y;
+      campaign->y_mm[row] = base.base_y_mm + std::sin(off) * x + std::cos(off) * y;
+    }
+}
+
+/// A theta angle that follows the air's humidity, bent, up to 0.12 degrees.
+inline Campaign Damp(std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+  const Exposures exposures = FindExposures(campaign);
+  Rng rng = Rng::Stream(seed, "humidity");
+  std::vector<double> of_exposure(exposures.size());
+  for (double& humidity : of_exposure) humidity = rng.Uniform(20, 90);
+  Covariate column{.name = "humidity_pct", .values = {}};
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    column.values.push_back(of_exposure[exposures.of_row[row]]);
+  TurnTheta([&](std::size_t row) { return 0.12 * std::pow((column.values[row] - 20) / 70, 2); },
+            &campaign);
+  campaign.covariates.push_back(std::move(column));
+  return campaign;
 }
 
 inline Diagnosis Verdicts(const Campaign& campaign, DiagnoseOptions options = {}) {

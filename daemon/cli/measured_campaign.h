@@ -1,0 +1,29 @@
+// What the commands on a measured campaign have in common: its folder, the models that they are
+// given, and the threads that they run on.
+#pragma once
+
+#include <string>
+
+#include "daemon/campaign/diagnosis_files.h"
+#include "daemon/campaign/model_file.h"
+#include "protocol/base/result.h"
+#include "sim/campaign/campaign.h"
+#include "sim/diagnosis/model.h"
+
+namespace focalfleet::cli {
+
+struct MeasuredCampaign {
+  sim::Campaign campaign;
+  ReportNames names;
+};
+
+/// moves.csv and units.csv of the folder. Errors: a file that cannot be read, or is no such table.
+Result<MeasuredCampaign> ReadMeasuredCampaign(const std::string& folder);
+
+/// Errors: as above, of a model.toml for the campaign's units.
+Result<ModelFile> ReadModelFor(const sim::Campaign& campaign, const std::string& file);
+
+/// 0: as many as the machine has.
+sim::ParallelFor OnThreads(int threads);
+
+}  // namespace focalfleet::cli

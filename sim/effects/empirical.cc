@@ -1,0 +1,142 @@
+#include "sim/effects/empirical.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+#include <string>
+
+#include "sim/effects/harmonic.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kKnotsMax = 65;
+constexpr double kPlaceMm = 0.1;  // of an amplitude of 1
+constexpr std::string_view kChannelNames[] = {"theta angle",
+                                              "phi angle",
+                                              "x",
+                                              "y",
+                                              "theta angle against its direction",
+                                              "phi angle against its direction"};
+static_assert(std::size(kChannelNames) == kEmpiricalChannels);
+
+double CosinesAt(const Template& form, std::span<const double> amplitude, double rank) {
+  double sum = 0;
+  for (std::size_t c = 0; c < form.columns; ++c)
+    if (amplitude[c] != 0)
+      sum +=
+          amplitude[c] * std::cos(std::numbers::pi * (form.shape + static_cast<double>(c)) * rank);
+  return sum;
+}
+
+void ApplyCurve(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                PoseErrors* errors) {
+  const FilledColumn& column = *track.facts->Find(form.covariate);
+  double direction = 0;
+  const std::size_t axis = form.form == kPhiOdd ? kPhi : kTheta;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const std::size_t row = track.first_row + i;
+    const double rank =
+        form.knots.empty() ? double{column.rank[row]} : RankAt(form.knots, column.values[row]);
+    const double curve = CosinesAt(form, amplitude, rank);
+    if (track.restarts[i] != 0) direction = 0;
+    if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
+    if (form.form == kThetaAngle) errors->angle_deg[kTheta][i] += curve;
+    if (form.form == kPhiAngle) errors->angle_deg[kPhi][i] += curve;
+    if (form.form == kPlaceX) errors->x_mm[i] += kPlaceMm * curve;
+    if (form.form == kPlaceY) errors->y_mm[i] += kPlaceMm * curve;
+    if (form.form >= kThetaOdd) errors->angle_deg[axis][i] += curve * direction;
+  }
+}
+
+void ApplyRipple(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                 PoseErrors* errors) {
+  AddHarmonic(track, AxisIndex(form), form.shape, amplitude, errors);
+}
+
+void ListNone(const CampaignFacts&, Templates*) {}
+
+}  // namespace
+
+const Effect& EmpiricalCurve() {
+  static const Effect effect{.cause = "empirical_curve",
+                             .amplitude_unit = "deg; in x and y 0.1 mm",
+                             .prior_size = 0.05,
+                             .owner = Owner::kUnit,
+                             .list = ListNone,
+                             .apply = ApplyCurve};
+  return effect;
+}
+
+const Effect& EmpiricalRipple() {
+  static const Effect effect{.cause = "empirical_ripple",
+                             .amplitude_unit = "deg",
+                             .prior_size = 0.05,
+                             .owner = Owner::kUnit,
+                             .list = ListNone,
+                             .apply = ApplyRipple};
+  return effect;
+}
+
+const Effect* FindEmpirical(std::string_view cause) {
+  for (const Effect* effect : {&EmpiricalCurve(), &EmpiricalRipple()})
+    if (effect->cause == cause) return effect;
+  return nullptr;
+}
+
+std::string_view ChannelOf(const Template& form) {
+  if (form.effect == &EmpiricalRipple())
+    return kChannelNames[form.axis == EffectAxis::kPhi ? kPhiAngle : kThetaAngle];
+  return kChannelNames[form.form];
+}
+
+std::optional<EmpiricalChannel> ChannelNamed(std::string_view name) {
+  for (int channel = 0; channel < kEmpiricalChannels; ++channel)
+    if (kChannelNames[channel] == name) return static_cast<EmpiricalChannel>(channel);
+  return std::nullopt;
+}
+
+std::vector<RankKnot> KnotsOf(const FilledColumn& column) {
+  std::vector<RankKnot> all;
+  for (std::size_t row = 0; row < column.values.size(); ++row)
+    all.push_back({column.values[row], double{column.rank[row]}});
+  std::sort(all.begin(), all.end(),
+            [](const RankKnot& a, const RankKnot& b) { return a.value < b.value; });
+  all.erase(std::unique(all.begin(), all.end(),
+                        [](const RankKnot& a, const RankKnot& b) { return !(a.value < b.value); }),
+            all.end());
+  if (all.size() <= kKnotsMax) return all;
+  std::vector<RankKnot> knots;
+  std::size_t next = 0;
+  const double first = all.front().rank, span = all.back().rank - all.front().rank;
+  for (std::size_t k = 0; k + 1 < kKnotsMax; ++k) {
+    const double wanted = first + span * static_cast<double>(k) / (kKnotsMax - 1);
+    while (next + 1 < all.size() && all[next].rank < wanted) ++next;
+    if (knots.empty() || all[next].value > knots.back().value) knots.push_back(all[next]);
+  }
+  if (all.back().value > knots.back().value) knots.push_back(all.back());
+  return knots;
+}
+
+double RankAt(std::span<const RankKnot> knots, double value) {
+  const auto above =
+      std::upper_bound(knots.begin(), knots.end(), value,
+                       [](double wanted, const RankKnot& knot) { return wanted < knot.value; });
+  if (above == knots.begin()) return knots.front().rank;
+  if (above == knots.end()) return knots.back().rank;
+  const RankKnot& low = *std::prev(above);
+  return low.rank + (above->rank - low.rank) * (value - low.value) / (above->value - low.value);
+}
+
+Template WholeCurve(const Template& look, const CampaignFacts& facts) {
+  Template curve = look;
+  curve.knots = KnotsOf(*facts.Find(look.covariate));
+  // As many cosines as the column's values can tell apart, but for the constant.
+  curve.columns = std::clamp<std::size_t>(curve.knots.size() - 1, 1, kEmpiricalCosines);
+  curve.shape = 1;
+  curve.label = "smooth curve over the ranks of " + look.covariate;
+  return curve;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,122 @@
+// diagnose as a process: two models held against each other, and the patch.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "daemon/control/messages.h"
+#include "tests/daemon/cli/program.h"
+
+namespace focalfleet {
+namespace {
+
+using test::Focalfleet;
+using test::ScratchDirectory;
+using test::Slurp;
+using ::testing::HasSubstr;
+
+std::string MadeCampaign(const ScratchDirectory& scratch, const std::string& name,
+                         const std::string& gear_scale, const std::string& seed) {
+  const auto made =
+      Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--seed", seed,
+                  "--effect", "gear_scale:theta=" + gear_scale, "--out", scratch / name});
+  EXPECT_EQ(made.exit, 0) << made.err;
+  return scratch / name;
+}
+
+std::string FittedModel(const std::string& campaign) {
+  const auto done = Focalfleet({"diagnose", campaign, "--out", campaign + "-report", "-q"});
+  EXPECT_EQ(done.exit, 0) << done.err;
+  return campaign + "-report/model.toml";
+}
+
+TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
+  const ScratchDirectory scratch;
+  const std::string old_model = FittedModel(MadeCampaign(scratch, "then", "4e-4", "1"));
+  const std::string today = MadeCampaign(scratch, "today", "8e-4", "2");
+  const std::string new_model = FittedModel(today);
+  const auto result =
+      Focalfleet({"diagnose", today, "--model", old_model, "--against", new_model, "--json"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json told = Json::parse(result.out);
+  EXPECT_EQ(told["verdict"], "B is better");
+  EXPECT_LT(told["difference"]["ci95_um"][1], 0);
+  EXPECT_EQ(told["rows"], 480);
+  EXPECT_EQ(told["a"]["name"], "then-extended");
+  EXPECT_FALSE(told["a"]["fitted_to_these_moves"]);
+  EXPECT_TRUE(told["b"]["fitted_to_these_moves"]);
+  ASSERT_EQ(told["notes"].size(), 1u) << told["notes"];
+  EXPECT_THAT(std::string(told["notes"][0]), HasSubstr("B was fitted to these very moves"));
+  ASSERT_GE(told["terms"].size(), 1u);
+  EXPECT_EQ(told["terms"][0]["cause"], "gear_scale");
+  EXPECT_EQ(told["terms"][0]["in"], "both");
+  EXPECT_GT(told["terms"][0]["difference_sigmas"], 3);
+  EXPECT_EQ(told["geometry"].size(), 5u);
+
+  // The same seed gives the same interval, another one nearly.
+  const auto again =
+      Focalfleet({"diagnose", today, "--model", old_model, "--against", new_model, "--json"});
+  EXPECT_EQ(result.out, again.out);
+  const auto reseeded = Focalfleet(
+      {"diagnose", today, "--model", old_model, "--against", new_model, "--seed", "7", "--json"});
+  const Json other = Json::parse(reseeded.out);
+  EXPECT_NE(other["difference"]["ci95_um"], told["difference"]["ci95_um"]);
+  EXPECT_EQ(other["difference"]["rms_um"], told["difference"]["rms_um"]);
+}
+
+TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
+  const ScratchDirectory scratch;
+  const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
+  const std::string model = FittedModel(campaign);
+  const auto result = Focalfleet({"diagnose", campaign, "--against", model});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("nominal"));
+  EXPECT_THAT(result.out, HasSubstr("night-extended"));
+  EXPECT_THAT(result.out, HasSubstr("B is better: B less A -"));
+  EXPECT_THAT(result.out, HasSubstr("note: B was fitted to these very moves"));
+  EXPECT_THAT(result.out, HasSubstr("gear_scale"));
+  const auto itself =
+      Focalfleet({"diagnose", campaign, "--model", model, "--against", model, "--json"});
+  EXPECT_EQ(Json::parse(itself.out)["verdict"], "no difference that these data show");
+}
+
+TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreTold) {
+  const ScratchDirectory scratch;
+  const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
+  const std::string bad = scratch.Put("bad.toml", "[[effect]]\ncause = \"moods\"\n");
+  const auto neither = Focalfleet({"diagnose", campaign});
+  EXPECT_EQ(neither.exit, 2);
+  EXPECT_THAT(neither.err, HasSubstr("--out is required"));
+  const auto both =
+      Focalfleet({"diagnose", campaign, "--against", bad, "--out", scratch / "report"});
+  EXPECT_EQ(both.exit, 2);
+  EXPECT_THAT(both.err, HasSubstr("--out and --against exclude each other"));
+  EXPECT_EQ(Focalfleet({"diagnose", campaign, "--against", bad, "--patch"}).exit, 2);
+  const auto refused = Focalfleet({"diagnose", campaign, "--against", bad});
+  EXPECT_EQ(refused.exit, 1);
+  EXPECT_THAT(refused.err, HasSubstr("bad.toml:1: there is no effect 'moods'"));
+  EXPECT_EQ(Focalfleet({"diagnose", campaign, "--against", scratch / "none.toml"}).exit, 1);
+  EXPECT_THAT(scratch.List(), ::testing::ElementsAre("bad.toml", "night"));
+}
+
+TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
+  const ScratchDirectory scratch;
+  const auto made = Focalfleet({"simulate", "campaign", "--units", "24", "--moves", "60",
+                                "--effect", "stage_ripple:theta=0.1", "--out", scratch / "night"});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  const auto result = Focalfleet({"diagnose", scratch / "night", "--out", scratch / "report",
+                                  "--without", "stage_ripple", "--patch"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("Unknown: "));
+  EXPECT_THAT(result.out, HasSubstr("patched by empirical terms"));
+  EXPECT_THAT(result.out, HasSubstr("empirical_ripple"));
+  const Json report = Json::parse(Slurp(scratch / "report/report.json"));
+  EXPECT_EQ(report["verdict"], "unknown");
+  EXPECT_EQ(report["unknown"][0]["patched"]["term"], "empirical_ripple");
+  const auto again = Focalfleet(
+      {"diagnose", scratch / "night", "--against", scratch / "report/model.toml", "--json"});
+  ASSERT_EQ(again.exit, 0) << again.err;
+  EXPECT_EQ(Json::parse(again.out)["verdict"], "B is better");
+}
+
+}  // namespace
+}  // namespace focalfleet
