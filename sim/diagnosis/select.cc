@@ -189,10 +189,13 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
                             std::size_t own, const SelectionRule& rule) {
   std::map<std::string_view, Rival> by_cause;
   const Standing& best = look.standings[own];
+  // Where geometry leaves little of the term's own signature, as little of a rival's is enough.
+  const Score& mine = look.pass.scores[own];
+  const double kept_min = std::min(kKeptMin, 0.5 * mine.kept / mine.raw);
   for (std::size_t k = 0; k < templates.size(); ++k) {
     const std::string_view cause = templates[k].effect->cause;
     if (cause == templates[own].effect->cause) continue;
-    if (!(look.pass.scores[k].kept > kKeptMin * look.pass.scores[k].raw)) continue;
+    if (!(look.pass.scores[k].kept > kept_min * look.pass.scores[k].raw)) continue;
     const double behind = 2 * (best.evidence - look.standings[k].evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
