@@ -1,0 +1,63 @@
+// A real positioner's arcs, of one length each, from the hard stop: what is wrong with it is found,
+// and what these moves cannot tell apart is told as such.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "daemon/campaign/campaign_files.h"
+#include "daemon/files/text_file.h"
+#include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/next_moves.h"
+
+namespace focalfleet {
+namespace {
+
+using testing::Contains;
+using testing::IsSupersetOf;
+
+sim::Campaign Measured(const std::string& arcs) {
+  const std::string folder = std::string(FOCALFLEET_MEASURED_MOVES) + "/" + arcs;
+  const auto moves = ReadTextFile(folder + "/moves.csv");
+  const auto units = ReadTextFile(folder + "/units.csv");
+  EXPECT_TRUE(moves && units);
+  auto campaign = ReadCampaign({.moves = *moves, .units = *units});
+  EXPECT_TRUE(campaign) << campaign.error().text;
+  return std::move(*campaign);
+}
+
+struct Arcs {
+  const char* folder;
+  const char* axis;
+  double left;  // of the rms that arcs which no fit has seen had before, at most
+};
+
+class MeasuredArcs : public testing::TestWithParam<Arcs> {};
+
+TEST_P(MeasuredArcs, TheStrongCauseIsFoundWithTheRivalThatMovesOfOneLengthLeaveIt) {
+  const sim::Campaign campaign = Measured(GetParam().folder);
+  const sim::Diagnosis diagnosis = sim::Diagnose(campaign, {});
+  ASSERT_FALSE(diagnosis.causes.empty());
+  const sim::CauseFound& first = diagnosis.causes.front();
+  EXPECT_THAT(first.candidates, IsSupersetOf({"gear_scale", "ramp_travel"}));
+  EXPECT_TRUE(first.axis == GetParam().axis || first.axis == "both") << first.axis;
+  // Arcs differ among each other by what no column shows.
+  EXPECT_NE(diagnosis.verdict, sim::Verdict::kExplained);
+  EXPECT_LT(diagnosis.gain.rms_after_um, GetParam().left * diagnosis.gain.rms_before_um);
+  EXPECT_LT(diagnosis.gain.mad_after_um, GetParam().left * diagnosis.gain.mad_before_um);
+  EXPECT_THAT(diagnosis.gain.held_out, testing::HasSubstr("whole homings"));
+
+  std::vector<std::string> separates;
+  for (const sim::ProposedMove& move : sim::ProposeMoves(campaign, diagnosis))
+    separates.push_back(move.separates);
+  EXPECT_THAT(separates,
+              Contains(testing::AnyOf("gear_scale | ramp_travel", "ramp_travel | gear_scale")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Real, MeasuredArcs,
+                         testing::Values(Arcs{"theta-arcs-may", "theta", 0.06},
+                                         Arcs{"phi-arcs-may", "phi", 0.3}),
+                         [](const auto& arcs) { return std::string(arcs.param.axis); });
+
+}  // namespace
+}  // namespace focalfleet
