@@ -172,45 +172,61 @@ void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
   }
 }
 
-// Variance of a sum of numbers of which neighbours are alike (Newey and West, 1987): fed one by
-// one.
+// Variance of a sum of vectors of which neighbours are alike (Newey and West, 1987), in units of
+// the inverse: fed one by one.
+template <int kSize>
 class NeighbourSum {
  public:
-  template <class Vector>
-  void Add(const Vector& v, const MatrixXd& inverse) {
-    const Small w = inverse * v;
+  static constexpr int kMost = kSize == Eigen::Dynamic ? static_cast<int>(kColumnsMax) : kSize;
+  using Small = Eigen::Matrix<double, kSize, 1, 0, kMost, 1>;
+  using Square = Eigen::Matrix<double, kSize, kSize, 0, kMost, kMost>;
+  explicit NeighbourSum(const Square& inverse) : inverse_(inverse) {
+    past_.fill(Small::Zero(inverse.rows()));
+  }
+  void Add(const Small& v) {
+    const Small w = inverse_ * v;
     sum_ += v.dot(w);
-    for (std::size_t lag = 0; lag < std::min(kLags, seen_); ++lag)
+    for (std::size_t lag = 0; lag < kLags; ++lag)
       sum_ += 2 * (1 - static_cast<double>(lag + 1) / (kLags + 1)) *
-              past_[(seen_ - 1 - lag) % kLags].dot(w);
-    past_[seen_++ % kLags] = v;
+              past_[(next_ + kLags - 1 - lag) % kLags].dot(w);
+    past_[next_++ % kLags] = v;
   }
   [[nodiscard]] double sum() const { return std::max(sum_, 0.0); }
 
  private:
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1>;
   static constexpr std::size_t kLags = 4;
+  Square inverse_;
   std::array<Small, kLags> past_;
-  std::size_t seen_ = 0;
+  std::size_t next_ = 0;
   double sum_ = 0;
 };
+
+template <int kSize>
+double SpreadOf(const MatrixXd& m, const VectorXd& y) {
+  using Sum = NeighbourSum<kSize>;
+  const Index c = m.cols();
+  const typename Sum::Square g = m.transpose() * m;
+  const typename Sum::Square inverse = g.ldlt().solve(Sum::Square::Identity(c, c));
+  const typename Sum::Small own = inverse * (m.transpose() * y);
+  Sum sum(inverse);
+  typename Sum::Small row(c);
+  for (Index at = 0; at + 1 < y.size(); at += 2) {
+    row = m.row(at).transpose() * (y[at] - m.row(at).dot(own)) +
+          m.row(at + 1).transpose() * (y[at + 1] - m.row(at + 1).dot(own));
+    sum.Add(row);
+  }
+  return sum.sum();
+}
 
 // Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise that
 // remembers makes more of it.
 void AddSpread(const MatrixXd& m, const VectorXd& y, Index spent, FleetPart* part) {
   const Index c = m.cols();
-  const MatrixXd inverse = (m.transpose() * m).ldlt().solve(MatrixXd::Identity(c, c));
-  const VectorXd left = y - m * (inverse * (m.transpose() * y));
-  NeighbourSum sum;
-  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kColumnsMax, 1> v(c);
-  for (Index at = 0; at + 1 < y.size(); at += 2) {
-    v.noalias() = m.row(at).transpose() * left[at] + m.row(at + 1).transpose() * left[at + 1];
-    sum.Add(v, inverse);
-  }
+  const double sum = c == 1 ? SpreadOf<1>(m, y) : SpreadOf<Eigen::Dynamic>(m, y);
   const double n = static_cast<double>(y.size());
   const double free = n - static_cast<double>(spent + c);
-  if (free < 4 || !std::isfinite(sum.sum())) return;
-  part->spread_sum += sum.sum() * n / free;
+  if (free < 4 || !std::isfinite(sum)) return;
+  part->spread_sum += sum * n / free;
   part->spread_count += static_cast<double>(c);
 }
 
