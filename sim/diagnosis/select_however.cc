@@ -11,6 +11,9 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   const std::size_t events = AddEvents(&stepped);
   Selection selection = Select(templates, rule, fit);
   if (events == 0) return selection;
+  // What a cause does to a few moves looks like steps until the cause is known.
+  Fit explained = *fit;
+  if (AddEvents(&explained) == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
   // A step is a large claim about one move: it has to be worth more than its price.
   constexpr double kClearly = 20, kEach = 10;
