@@ -1,22 +1,19 @@
 #include "fleet/plan/planner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
-#include <map>
-#include <numbers>
 
-#include "fleet/estimate.h"
+#include "fleet/plan/bounds.h"
 #include "fleet/plan/choreography.h"
 #include "fleet/plan/guarantee.h"
+#include "fleet/plan/lone_way.h"
 #include "fleet/plan/midway.h"
-#include "fleet/plan/no_way.h"
 #include "fleet/plan/objective.h"
 #include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
+#include "fleet/plan/service.h"
 
 namespace focalfleet {
 namespace {
@@ -49,40 +46,23 @@ class Planner {
         layout_(*request.layout),
         start_(StartsOf(request)),
         scene_(layout_, request.drives, request.start, request.offsets),
-        surroundings_(&scene_, start_) {}
+        surroundings_(&scene_, start_),
+        service_(request, scene_, start_),
+        aside_(scene_.size(), 0),
+        by_itself_(scene_.size(), 0),
+        hopeful_(scene_.size(), 0) {}
 
   Result<Plan> Run();
-  Status CheckOnly() {
-    Classify();
-    return Check();
-  }
+  [[nodiscard]] Status Check() const;
 
  private:
-  Status Check();
-  [[nodiscard]] bool IsGiven(std::uint32_t unit) const {
-    return !request_.given.empty() && request_.given[unit] != 0;
-  }
-  void TakeGiven(std::uint32_t unit);
   Result<Plan> AmongGiven();
-  void NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
-                      const char* what, std::string* text) const;
-  void Classify();
-  void Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by);
-  void DropTargetsThatMeet();
-  void DropCollidingTargets();
-  [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
   bool Attempt(std::vector<Piece>* order);
   void GiveWay();
-  void Abandon(std::uint32_t unit);
-  bool CanEver(std::uint32_t unit, std::optional<NoWay>* proof);
-  [[nodiscard]] std::optional<NoWay> NoWayFor(std::uint32_t unit) const;
+  void Abandon(std::uint32_t unit, std::optional<NoWay> proof = std::nullopt);
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
-  [[nodiscard]] std::uint32_t Blames(std::uint32_t unit) const;
-  [[nodiscard]] Status CheckPower() const;
   [[nodiscard]] double MeanNeighbours() const;
-  [[nodiscard]] double BoundS() const;
-  double PowerBoundS(PowerLedger* ledger) const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   bool LeaveStuck();
   void PlanOfChoreography();
@@ -96,20 +76,16 @@ class Planner {
   const std::vector<Pose> start_;  // of units without a place: meaningless
   Scene scene_;
   Surroundings surroundings_;
-  std::vector<Pose> goal_;
-  std::vector<std::uint8_t> movable_;
-  std::vector<std::uint8_t> served_;
+  Service service_;
+  std::string too_near_;  // pairs that start so, by name
   std::vector<std::uint8_t> aside_;
   std::vector<std::uint8_t> by_itself_;  // goes from start to target in one way, not by its cell
   std::vector<std::uint8_t> hopeful_;    // CanEver was asked and said yes
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
-  std::vector<Unserved> unserved_;
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
   Choreography choreography_;                   // tracks of plan_
   Plan plan_;
-  double given_end_s_ = 0;  // of the last motion that is given
-  std::string too_near_;    // pairs that start nearer than allowed, by name
 };
 
 Status CheckShapes(const PlanRequest& request) {
@@ -127,145 +103,19 @@ Status CheckShapes(const PlanRequest& request) {
                   std::to_string(n) + " units");
 }
 
-std::string UnitName(const Layout& layout, std::uint32_t unit) {
-  return std::to_string(layout.unit({unit}).id.value);
-}
-
-void Planner::Classify() {
-  const std::size_t n = layout_.size();
-  goal_ = start_;
-  movable_.assign(n, 0);
-  served_.assign(n, 0);
-  aside_.assign(n, 0);
-  by_itself_.assign(n, 0);
-  hopeful_.assign(n, 0);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const bool enabled = layout_.unit({i}).enabled;
-    const bool frozen = request_.frozen[i] != 0;
-    const bool place = scene_.is_place(i);
-    if (IsGiven(i) && place) {
-      TakeGiven(i);
-      continue;
-    }
-    movable_[i] = enabled && !frozen && place ? 1 : 0;
-    if (!request_.targets[i]) continue;
-    if (movable_[i] != 0) {
-      served_[i] = 1;
-      goal_[i] = *request_.targets[i];
-    } else if (!enabled) {
-      Unserve(i, UnservedWhy::kDisabled, kNobody);
-    } else if (!place) {
-      Unserve(i, UnservedWhy::kUnknownPlace, kNobody);
-    } else if (*request_.targets[i] != start_[i]) {
-      Unserve(i, UnservedWhy::kBlocked, i);
-    }
-  }
-}
-
-void Planner::TakeGiven(std::uint32_t unit) {
-  const AxisPaths& motion = request_.motions[unit];
-  for (std::size_t k = 0; k < kAxisCount; ++k)
-    for (const Segment& segment : motion[k].segments()) {
-      goal_[unit][k] += segment.delta;
-      given_end_s_ = std::max(given_end_s_, TimeOf(segment, request_.drives[unit].axis[k]).t1_s);
-    }
-}
-
-void Planner::Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by) {
-  served_[unit] = 0;
-  goal_[unit] = start_[unit];
-  Unserved unserved{{unit}, why, std::nullopt, std::nullopt};
-  if (by != kNobody) unserved.by = PositionerIndex{by};
-  unserved_.push_back(unserved);
-}
-
-void Planner::NameCollisions(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
-                             const char* what, std::string* text) const {
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (counts[i] == 0) continue;
-    for (const NeighbourNeed& near : scene_.neighbours(i)) {
-      if (near.unit < i || counts[near.unit] == 0) continue;
-      const double distance =
-          DistanceMm(scene_.arm(i).At(poses[i]), scene_.arm(near.unit).At(poses[near.unit]));
-      const double need = scene_.FullNeed(i, near.unit);
-      if (distance >= need - kClearToleranceMm) continue;
-      std::array<char, 160> line{};
-      std::snprintf(line.data(), line.size(),
-                    "%s%s of units %s and %s are %.4f mm apart, %.4f mm needed",
-                    text->empty() ? "" : "; ", what, UnitName(layout_, i).c_str(),
-                    UnitName(layout_, near.unit).c_str(), distance, need);
-      *text += line.data();
-    }
-  }
-}
-
-Status Planner::Check() {
-  std::string text;
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (served_[i] == 0 || scene_.arm(i).range().Contains(goal_[i])) continue;
-    text += (text.empty() ? "the target of unit " : "; the target of unit ") +
-            UnitName(layout_, i) + " is outside its axes' ranges";
-  }
-  NameCollisions(start_, movable_, "the starts", options_.lead_apart ? &too_near_ : &text);
-  if (options_.leave_stuck)
-    DropTargetsThatMeet();
-  else
-    NameCollisions(goal_, served_, "the targets", &text);
-  if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
-  return {};
-}
-
-bool Planner::CollidesWith(std::uint32_t unit, std::uint32_t* by) const {
-  const ArmGeometry& arm = scene_.arm(unit);
-  const SegmentFp line = arm.At(goal_[unit]);
-  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
-    if (!scene_.is_place(near.unit) || served_[near.unit] != 0) continue;
-    *by = near.unit;
-    const double least = scene_.FullNeed(unit, near.unit) - kClearToleranceMm;
-    if (DistanceMm(line, scene_.arm(near.unit).At(goal_[near.unit])) < least) return true;
-  }
-  for (const StandingThing& thing : scene_.standing(unit)) {
-    if (thing.in_cell && scene_.InCell(unit, goal_[unit])) continue;
-    *by = thing.by;
-    if (DistanceMm(line, thing.capsule.line) < thing.capsule.radius_mm + thing.least_mm)
-      return true;
-  }
-  return false;
-}
-
-/// Of two targets that would touch one stays where it stands, and the plan of the others stands.
-void Planner::DropTargetsThatMeet() {
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-      for (const NeighbourNeed& near : scene_.neighbours(i)) {
-        const std::uint32_t j = near.unit;
-        if (served_[i] == 0 || served_[j] == 0 || goal_[i] == start_[i]) continue;
-        const double least = scene_.FullNeed(i, j) - kClearToleranceMm;
-        if (DistanceMm(scene_.arm(i).At(goal_[i]), scene_.arm(j).At(goal_[j])) >= least) continue;
-        Unserve(i, UnservedWhy::kTargetCollides, j);
-        changed = true;
-      }
-    }
-  }
-}
-
-/// A target that would touch what stands is not served; its unit then stands too, so others may
-/// follow.
-void Planner::DropCollidingTargets() {
-  for (bool changed = true; changed;) {
-    changed = false;
-    for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-      std::uint32_t by = kNobody;
-      if (served_[i] == 0 || goal_[i] == start_[i] || !CollidesWith(i, &by)) continue;
-      Unserve(i, UnservedWhy::kTargetCollides, by);
-      changed = true;
-    }
-  }
-}
-
 Piece BackOf(const Piece& piece) {
   return {piece.unit, {piece.sweep.to, piece.sweep.from, piece.sweep.out_of_step}};
+}
+
+/// That every target is in reach, and nobody starts or ends nearer to another than allowed.
+Status Planner::Check() const {
+  std::string text = service_.TargetsOutOfRange();
+  const auto add = [&text](const std::string& more) {
+    text += (text.empty() || more.empty() ? "" : "; ") + more;
+  };
+  if (!options_.lead_apart) add(service_.StartsTooNear());
+  if (!options_.leave_stuck) add(service_.TargetsTooNear());
+  return text.empty() ? Status{} : Fail(ErrorCode::kInvalid, text);
 }
 
 /// One whole try: in, turn, out. False: stuck_ says who could not.
@@ -274,13 +124,14 @@ bool Planner::Attempt(std::vector<Piece>* order) {
   stuck_.clear();
   movers_.assign(scene_.size(), 0);
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    movers_[i] = movable_[i] != 0 && (goal_[i] != start_[i] || aside_[i] != 0) ? 1 : 0;
+    movers_[i] =
+        service_.is_movable(i) && (service_.goal(i) != start_[i] || aside_[i] != 0) ? 1 : 0;
   std::vector<std::uint8_t> by_cell = movers_;
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     if (by_itself_[i] != 0) by_cell[i] = 0;
   Retreat in(&scene_, request_.drives, &surroundings_, start_, by_cell);
   in.Run();
-  Retreat out(&scene_, request_.drives, &surroundings_, goal_, by_cell);
+  Retreat out(&scene_, request_.drives, &surroundings_, service_.goals(), by_cell);
   out.Run();
   stuck_ = in.stuck();
   stuck_.insert(stuck_.end(), out.stuck().begin(), out.stuck().end());
@@ -300,32 +151,12 @@ bool Planner::Attempt(std::vector<Piece>* order) {
   return stuck_.empty();
 }
 
-/// Who stands in the straight way of a stuck unit; kNobody where that cannot be told or is an
-/// obstacle.
-std::uint32_t Planner::Blames(std::uint32_t unit) const {
-  const ArmGeometry& arm = scene_.arm(unit);
-  const PhiSpan& cell = scene_.cell(unit);
-  if (!scene_.HasCell(unit)) return kNobody;
-  for (const std::vector<Pose>* poses : {&start_, &goal_}) {
-    Pose end = (*poses)[unit];
-    end[1] = std::clamp(end[1], cell.low, cell.high);
-    const Sweep sweep{(*poses)[unit], end};
-    for (const NeighbourNeed& near : scene_.neighbours(unit)) {
-      if (!scene_.is_place(near.unit)) continue;
-      const Capsule there{scene_.arm(near.unit).At((*poses)[near.unit]), 0};
-      if (!SweepClearOf(arm, sweep, there, near.need_mm)) return near.unit;
-    }
-    for (const StandingThing& thing : scene_.standing(unit))
-      if (!SweepClearOf(arm, sweep, thing.capsule, thing.need_mm)) return thing.by;
-  }
-  return kNobody;
-}
-
 bool Planner::LetStepAside(std::uint32_t stuck) {
   bool added = false;
   for (const NeighbourNeed& near : scene_.neighbours(stuck)) {
     const std::uint32_t j = near.unit;
-    if (movable_[j] == 0 || movers_[j] != 0 || aside_[j] != 0 || !scene_.HasCell(j)) continue;
+    if (!service_.is_movable(j) || movers_[j] != 0 || aside_[j] != 0 || !scene_.HasCell(j))
+      continue;
     if (options_.fixed && !request_.targets[j]) continue;
     aside_[j] = 1;
     added = true;
@@ -333,58 +164,14 @@ bool Planner::LetStepAside(std::uint32_t stuck) {
   return added;
 }
 
-void Planner::Abandon(std::uint32_t unit) {
-  if (served_[unit] != 0 && goal_[unit] != start_[unit]) {
+void Planner::Abandon(std::uint32_t unit, std::optional<NoWay> proof) {
+  if (service_.goes(unit)) {
     if (hopeful_[unit] != 0) stuck_for_order_.push_back(unit);
-    Unserve(unit, UnservedWhy::kBlocked, Blames(unit));
+    service_.Unserve(unit, UnservedWhy::kBlocked, InTheWayOf(service_, unit), std::move(proof));
   } else
-    movable_[unit] = 0;
+    service_.Hold(unit);
   aside_[unit] = 0;
   by_itself_[unit] = 0;
-}
-
-/// Whether a way may lead from the start to the target if all that can move were away. False: there
-/// is none that a search finds; `proof` (where that is possible): there is none at all.
-bool Planner::CanEver(std::uint32_t unit, std::optional<NoWay>* proof) {
-  proof->reset();
-  if (goal_[unit] == start_[unit]) return true;
-  std::vector<std::uint8_t> immovable(scene_.size());
-  for (const NeighbourNeed& near : scene_.neighbours(unit))
-    immovable[near.unit] = movable_[near.unit] == 0 && !IsGiven(near.unit) ? 1 : 0;
-  PathSearch::Question question;
-  question.arm = &scene_.arm(unit);
-  question.drive = &request_.drives[unit];
-  question.blockers = surroundings_.AroundOf(unit, immovable);
-  question.from = start_[unit];
-  question.within = RangeAround(*question.arm, question.from);
-  question.goal = PoseBox::Of(goal_[unit]);
-  for (const double grid_deg : kSearchGridsDeg) {
-    question.grid_deg = grid_deg;
-    if (!surroundings_.search().Find(question).empty()) return true;
-  }
-  *proof = NoWayFor(unit);
-  return false;
-}
-
-/// A proof that whatever never moves leaves the unit no way to this pose. Covers of uncertain units
-/// are wider than these may be, so next to one there is none.
-std::optional<NoWay> Planner::NoWayFor(std::uint32_t unit) const {
-  std::vector<Blocker> never_move;
-  for (const NeighbourNeed& near : scene_.neighbours(unit)) {
-    const std::uint32_t j = near.unit;
-    if (!scene_.is_place(j)) continue;
-    if (layout_.unit({j}).enabled && request_.frozen[j] == 0) continue;
-    const double least_mm = std::min(scene_.FullNeed(unit, j) - kClearToleranceMm, near.need_mm);
-    never_move.push_back({{scene_.arm(j).At(start_[j]), 0}, least_mm, j});
-  }
-  for (const StandingThing& thing : scene_.standing(unit)) {
-    if (thing.by != kNobody) continue;
-    never_move.push_back({thing.capsule, thing.least_mm, thing.by});
-  }
-  return ProveNoWay({.arm = &scene_.arm(unit),
-                     .never_move = never_move,
-                     .from = start_[unit],
-                     .to = goal_[unit]});
 }
 
 /// Gives up on stuck units that no order of moves can help. True: there was one.
@@ -393,12 +180,11 @@ bool Planner::AbandonHopeless() {
   for (const std::uint32_t i : stuck_) {
     if (hopeful_[i] != 0) continue;
     std::optional<NoWay> proof;
-    if (CanEver(i, &proof)) {
+    if (CanEver(service_, i, &surroundings_, &proof)) {
       hopeful_[i] = 1;
       continue;
     }
-    Abandon(i);
-    if (proof) unserved_.back().proof = std::move(proof);
+    Abandon(i, std::move(proof));
     any = true;
   }
   return any;
@@ -422,39 +208,11 @@ void Planner::GiveWay() {
         near.begin(), near.end(), [&](const NeighbourNeed& n) { return by_itself_[n.unit] != 0; });
     const std::uint32_t which = by_itself_[i] != 0 || alone == near.end() ? i : alone->unit;
     changed[which] = 1;
-    if (by_itself_[which] != 0 || goal_[which] == start_[which])
+    if (by_itself_[which] != 0 || service_.goal(which) == start_[which])
       Abandon(which);
     else
       by_itself_[which] = 1;
   }
-}
-
-/// A limit below what one motor draws lets nobody move; one that takes longer than offsets can say
-/// leaves some no time.
-Status Planner::CheckPower() const {
-  PowerLedger ledger(layout_, request_.drives, options_.motor, options_.power, {});
-  double least_W = 0;  // of those that go somewhere
-  for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    for (std::size_t k = 0; k < kAxisCount; ++k)
-      if (served_[i] != 0 && goal_[i][k] != start_[i][k])
-        least_W = std::max(least_W, ledger.Motor_W(i, k));
-  std::array<char, 160> text{};
-  for (const auto& [limit_W, name] :
-       {std::pair{options_.power.rail_W, "rail"}, std::pair{options_.power.total_W, "total"}}) {
-    if (limit_W <= 0 || limit_W >= least_W) continue;
-    std::snprintf(text.data(), text.size(),
-                  "the %s limit of %.4f W is below what one motor draws; at least %.4f W "
-                  "are needed",
-                  name, limit_W, least_W);
-    return Fail(ErrorCode::kRefused, text.data());
-  }
-  const double least_s = PowerBoundS(&ledger);
-  if (least_s <= kOffsetMaxS) return {};
-  std::snprintf(text.data(), text.size(),
-                "the limits of power need %.0f s at least, a start can be put off for %.0f s; "
-                "limits must be at least %.3f times as high",
-                least_s, kOffsetMaxS, least_s / kOffsetMaxS);
-  return Fail(ErrorCode::kRefused, text.data());
 }
 
 double Planner::MeanNeighbours() const {
@@ -463,35 +221,9 @@ double Planner::MeanNeighbours() const {
   return scene_.size() == 0 ? 0 : static_cast<double>(sum) / static_cast<double>(scene_.size());
 }
 
-double Planner::BoundS() const {
-  double bound_s = 0;
-  for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    if (served_[i] != 0)
-      bound_s = std::max(bound_s, Straight(request_.drives[i], start_[i], goal_[i]).end_s);
-  return bound_s;
-}
-
-/// With limits of power no plan is shorter than the energy of straight moves over the limit.
-double Planner::PowerBoundS(PowerLedger* ledger) const {
-  std::map<std::uint32_t, double> rails;
-  double total_J = 0;
-  for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (served_[i] == 0) continue;
-    const double energy_J =
-        ledger->Energy(i, Straight(request_.drives[i], start_[i], goal_[i]).path);
-    rails[layout_.unit({i}).rail.value] += energy_J;
-    total_J += energy_J;
-  }
-  double bound_s = options_.power.total_W > 0 ? total_J / options_.power.total_W : 0;
-  if (options_.power.rail_W > 0)
-    for (const auto& [rail, energy_J] : rails)
-      bound_s = std::max(bound_s, energy_J / options_.power.rail_W);
-  return bound_s;
-}
-
 /// Everybody at once. False: somebody is left who meets others; nothing is planned then.
 bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
-  std::vector<std::uint8_t> may_move = movable_;
+  std::vector<std::uint8_t> may_move(service_.movable().begin(), service_.movable().end());
   if (options_.fixed)
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
       if (!request_.targets[i]) may_move[i] = 0;
@@ -499,26 +231,26 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::uint64_t fresh_starts = 0;
   double slack = 0;  // of the time with limits of power; 0: not known yet
   for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
-    DropCollidingTargets();
+    service_.DropCollidingTargets();
     scene_.AllowFor(start_);
-    scene_.AllowFor(goal_);
+    scene_.AllowFor(service_.goals());
     if (options_.lead_apart) scene_.LeadApartThroughout(start_);
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
     std::optional<PowerLedger> ledger;
-    double within_s = std::max({BoundS(), plan_.makespan_s, options_.within_s});
+    double within_s = std::max({TimeBoundS(service_), plan_.makespan_s, options_.within_s});
     // Each turn of sectors may take a little longer than its bound: that must not add up.
-    if (given_end_s_ > kLongGiven * within_s) within_s = given_end_s_;
+    if (service_.given_end_s() > kLongGiven * within_s) within_s = service_.given_end_s();
     if (options_.power.any()) {
       ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
       // Where power is what takes the time, rails that are full leave no room to give way.
-      const double power_s = PowerBoundS(&*ledger);
+      const double power_s = PowerBoundS(service_, options_.power, &*ledger);
       if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
       within_s = std::min(std::max(within_s, power_s) * slack, kOffsetMaxS);
     }
     choreography_ = Choreograph({.scene = &scene_,
                                  .drives = request_.drives,
                                  .from = start_,
-                                 .to = goal_,
+                                 .to = service_.goals(),
                                  .movable = may_move,
                                  .begin_with = paths,
                                  .given = request_.given,
@@ -533,7 +265,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     }
     // Some may have no way at all: they stay, and the others are asked again.
     stuck_ = choreography_.in_conflict;
-    std::erase_if(stuck_, [&](std::uint32_t i) { return movable_[i] == 0; });
+    std::erase_if(stuck_, [&](std::uint32_t i) { return !service_.is_movable(i); });
     if (AbandonHopeless()) continue;
     // The others may need more time within limits of power, or other luck.
     if (ledger) slack *= 1.1;
@@ -548,10 +280,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
 /// many, or do not move; nothing has changed then.
 bool Planner::LeaveStuck() {
   constexpr int kTimes = 8;
-  const std::vector<Unserved> unserved = unserved_;
-  const std::vector<std::uint8_t> served = served_;
-  const std::vector<std::uint8_t> movable = movable_;
-  const std::vector<Pose> goal = goal_;
+  const Service before = service_;
   for (int time = 0; time < kTimes && !stuck_.empty(); ++time) {
     // One of each cluster at a time: with it at rest the others may find a way.
     std::vector<std::uint8_t> stays(scene_.size(), 0);
@@ -560,16 +289,13 @@ bool Planner::LeaveStuck() {
       const auto is_at_rest = [&](const NeighbourNeed& n) { return stays[n.unit] != 0; };
       if (std::any_of(near.begin(), near.end(), is_at_rest)) continue;
       stays[i] = 1;
-      if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, Blames(i));
-      movable_[i] = 0;
+      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, InTheWayOf(service_, i));
+      service_.Hold(i);
     }
     stuck_.clear();
     if (AllAtOnce(request_.motions)) return true;
   }
-  unserved_ = unserved;
-  served_ = served;
-  movable_ = movable;
-  goal_ = goal;
+  service_ = before;
   return false;
 }
 
@@ -580,7 +306,7 @@ void Planner::PlanOfChoreography() {
     if (paths[0].size() + paths[1].size() == 0) continue;
     UnitPlan unit{.unit = {i},
                   .from = start_[i],
-                  .to = goal_[i],
+                  .to = service_.goal(i),
                   .mode = request_.drives[i].mode,
                   .path = paths,
                   .followers = {}};
@@ -604,21 +330,13 @@ void Planner::TracksOfPlan() {
 
 /// Those that found no turn in the order go among the others as these are planned.
 void Planner::ServeTheRest() {
-  const std::vector<Unserved> unserved = unserved_;
-  const std::vector<std::uint8_t> served = served_;
-  const std::vector<Pose> goal = goal_;
+  const Service before = service_;
   const Plan ordered = plan_;
   std::vector<AxisPaths> paths(scene_.size());
   for (const UnitPlan& move : plan_.moves) paths[move.unit.value] = move.path;
-  for (const std::uint32_t i : stuck_for_order_) {
-    movable_[i] = served_[i] = 1;
-    goal_[i] = *request_.targets[i];
-    std::erase_if(unserved_, [i](const Unserved& u) { return u.unit.value == i; });
-  }
+  for (const std::uint32_t i : stuck_for_order_) service_.Readmit(i);
   if (AllAtOnce(paths)) return;
-  served_ = served;
-  goal_ = goal;
-  unserved_ = unserved;
+  service_ = before;
   plan_ = ordered;
 }
 
@@ -634,16 +352,14 @@ Plan Planner::Finish() {
                 &plan_);
   plan_.tightest = FindTightest(scene_, choreography_.tracks, plain, kTightest);
   plan_.too_near = too_near_;
-  plan_.bound_s = BoundS();
-  std::sort(unserved_.begin(), unserved_.end(),
-            [](const Unserved& a, const Unserved& b) { return a.unit < b.unit; });
-  plan_.unserved = std::move(unserved_);
+  plan_.bound_s = TimeBoundS(service_);
+  plan_.unserved = service_.NotServed();
   return std::move(plan_);
 }
 
 /// An order would not know what is given.
 Result<Plan> Planner::AmongGiven() {
-  if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
+  if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
   if (too_near_.empty() && AllAtOnce(request_.motions)) return Finish();
   std::string text = "no way was found among the motions that are given";
   for (const std::uint32_t i : stuck_) text += ", unit " + UnitName(layout_, i);
@@ -651,10 +367,11 @@ Result<Plan> Planner::AmongGiven() {
 }
 
 Result<Plan> Planner::Run() {
-  Classify();
   FOCALFLEET_TRY(Check());
+  if (options_.lead_apart) too_near_ = service_.StartsTooNear();
+  if (options_.leave_stuck) service_.DropTargetsThatMeet();
   if (!request_.given.empty()) return AmongGiven();
-  if (options_.power.any()) FOCALFLEET_TRY(CheckPower());
+  if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
   const bool dense = MeanNeighbours() > kDenseNeighbours;
   const bool at_once = !dense && !options_.stall_tolerant;
   // An order sends everybody through its cell, which costs a fleet that a camera corrects most of
@@ -666,9 +383,9 @@ Result<Plan> Planner::Run() {
   std::vector<Piece> order;
   bool done = false;
   for (int attempt = 0; attempt < kAttemptsMax && !done; ++attempt) {
-    DropCollidingTargets();
+    service_.DropCollidingTargets();
     scene_.AllowFor(start_);
-    scene_.AllowFor(goal_);
+    scene_.AllowFor(service_.goals());
     if (options_.lead_apart) scene_.LeadApart(start_);
     done = Attempt(&order);
     if (!done) GiveWay();
@@ -676,7 +393,7 @@ Result<Plan> Planner::Run() {
   if (!done) {
     order.clear();
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
-      if (served_[i] != 0 && goal_[i] != start_[i]) Unserve(i, UnservedWhy::kBlocked, kNobody);
+      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, kNobody);
   }
   // Stages gain nothing from short legs.
   const std::vector<Piece> pieces = options_.stall_tolerant ? order : CutPieces(order, scene_);
@@ -699,7 +416,7 @@ Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) 
     return Fail(ErrorCode::kInvalid, "a start can be put off for " +
                                          std::to_string(static_cast<int>(kOffsetMaxS)) +
                                          " s at most: no plan can use more time");
-  return Planner(request, options).CheckOnly();
+  return Planner(request, options).Check();
 }
 
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {

@@ -48,9 +48,8 @@ struct PlanOptions {
   /// error: they are never brought nearer, and named in Plan::too_near.
   bool lead_apart = false;
   /// Who finds no way when all go at once, and one of two whose targets would touch, stays where it
-  /// stands, and the others go. For
-  /// corrections: an order sends everybody through its cell, which costs all of them more than it
-  /// serves.
+  /// stands, and the others go. For corrections: an order sends everybody through its cell, which
+  /// costs all of them more than it serves.
   bool leave_stuck = false;
   double start_skew_s = 0.020;  // any unit may start this early or late
   double clock_error = 0.005;   // and its clock may run this fast or slow
@@ -70,9 +69,10 @@ struct PlanOptions {
 };
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the
-/// reason. Errors: kInvalid where the start or the targets collide (all pairs named), or an array
-/// has the wrong size; kRefused where limits of power or given motions leave no way. Cost: O(n) for
-/// bounded neighbourhoods, a fraction of a second for 5000 units; path searches come on top.
+/// reason. Errors: kInvalid where starts collide (not with lead_apart) or targets do (not with
+/// leave_stuck), all pairs named, or an array has the wrong size; kRefused where limits of power or
+/// given motions leave no way. Cost: O(n) for bounded neighbourhoods, a fraction of a second for
+/// 5000 units; path searches come on top.
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options);
 
 /// What MakePlan asks of its input, all collisions of starts and of targets named. Errors:
