@@ -87,32 +87,28 @@ Json SideJson(const Side& side, const sim::JudgedModel& judged, const Compared& 
           {"left_out", left_out}};
 }
 
-Json AmplitudeJson(bool in, const sim::AmplitudeSummary& amplitude) {
-  return in ? Finite(amplitude.value) : Json(nullptr);
-}
-
-Json SigmaJson(bool in, const sim::AmplitudeSummary& amplitude) {
-  return in && amplitude.sigma > 0 ? Finite(amplitude.sigma) : Json(nullptr);
+void AddSide(const std::optional<sim::TermSide>& side, const std::string& letter, Json* term) {
+  const bool spread = side && side->amplitude.sigma > 0;
+  (*term)["amplitude_" + letter] = side ? Finite(side->amplitude.value) : Json(nullptr);
+  (*term)["sigma_" + letter] = spread ? Finite(side->amplitude.sigma) : Json(nullptr);
+  (*term)["units_" + letter] = side ? side->units : 0;
+  (*term)["shape_" + letter] = side ? side->shape : "";
 }
 
 Json TermsJson(const sim::ModelDifference& difference) {
   Json terms = Json::array();
-  for (const sim::TermDifference& term : difference.terms)
-    terms.push_back({{"cause", term.cause},
-                     {"axis", term.axis},
-                     {"in", term.in_a && term.in_b ? "both"
-                            : term.in_a            ? "a"
-                                                   : "b"},
-                     {"amplitude_unit", term.amplitude_unit},
-                     {"amplitude_a", AmplitudeJson(term.in_a, term.a)},
-                     {"amplitude_b", AmplitudeJson(term.in_b, term.b)},
-                     {"sigma_a", SigmaJson(term.in_a, term.a)},
-                     {"sigma_b", SigmaJson(term.in_b, term.b)},
-                     {"units_a", term.units_a},
-                     {"units_b", term.units_b},
-                     {"shape_a", term.shape_a},
-                     {"shape_b", term.shape_b},
-                     {"difference_sigmas", Finite(term.sigmas)}});
+  for (const sim::TermDifference& term : difference.terms) {
+    Json one = {{"cause", term.cause},
+                {"axis", term.axis},
+                {"in", term.a && term.b ? "both"
+                       : term.a         ? "a"
+                                        : "b"},
+                {"amplitude_unit", term.amplitude_unit},
+                {"difference_sigmas", Finite(term.sigmas)}};
+    AddSide(term.a, "a", &one);
+    AddSide(term.b, "b", &one);
+    terms.push_back(std::move(one));
+  }
   return terms;
 }
 
@@ -152,8 +148,9 @@ std::string ModelTable(const Compared& compared) {
   return AlignColumns(rows);
 }
 
-std::string AmplitudeCell(bool in, const sim::AmplitudeSummary& amplitude) {
-  if (!in) return "-";
+std::string AmplitudeCell(const std::optional<sim::TermSide>& side) {
+  if (!side) return "-";
+  const sim::AmplitudeSummary& amplitude = side->amplitude;
   if (!(amplitude.sigma > 0)) return fmt::format("{:.4g}", amplitude.value);
   return fmt::format("{:.4g} +- {:.1g}", amplitude.value, amplitude.sigma);
 }
@@ -165,11 +162,10 @@ std::string DifferenceTables(const sim::ModelDifference& difference) {
         {"term", "axis", "in", "A", "B", "unit", "sigmas apart"}};
     for (const sim::TermDifference& term : difference.terms)
       rows.push_back({term.cause, term.axis,
-                      term.in_a && term.in_b ? "both"
-                      : term.in_a            ? "A"
-                                             : "B",
-                      AmplitudeCell(term.in_a, term.a), AmplitudeCell(term.in_b, term.b),
-                      term.amplitude_unit,
+                      term.a && term.b ? "both"
+                      : term.a         ? "A"
+                                       : "B",
+                      AmplitudeCell(term.a), AmplitudeCell(term.b), term.amplitude_unit,
                       std::isfinite(term.sigmas) ? fmt::format("{:.1f}", term.sigmas) : "-"});
     text += AlignColumns(rows) + "\n\n";
   }

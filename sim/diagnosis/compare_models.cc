@@ -143,18 +143,8 @@ TermDifference DescribeTerm(const Template& form) {
   return out;
 }
 
-void TakeA(const ModelTerm& term, TermDifference* out) {
-  out->in_a = true;
-  out->shape_a = term.form.label;
-  out->units_a = UnitsOf(term);
-  out->a = Summarise(term);
-}
-
-void TakeB(const ModelTerm& term, TermDifference* out) {
-  out->in_b = true;
-  out->shape_b = term.form.label;
-  out->units_b = UnitsOf(term);
-  out->b = Summarise(term);
+TermSide SideOf(const ModelTerm& term) {
+  return {.shape = term.form.label, .units = UnitsOf(term), .amplitude = Summarise(term)};
 }
 
 // B's counterpart of A's term that no other has taken; one of the same shape first.
@@ -175,17 +165,17 @@ std::vector<TermDifference> TermDifferences(const ModelPair& models) {
   std::vector<char> taken(models.b->terms.size(), 0);
   for (const ModelTerm& term : models.a->terms) {
     out.push_back(DescribeTerm(term.form));
-    TakeA(term, &out.back());
+    out.back().a = SideOf(term);
     const std::size_t at = CounterpartOf(term, models.b->terms, taken);
     if (at == models.b->terms.size()) continue;
     taken[at] = 1;
-    TakeB(models.b->terms[at], &out.back());
+    out.back().b = SideOf(models.b->terms[at]);
     out.back().sigmas = SigmasBetween(term, models.b->terms[at]);
   }
   for (std::size_t k = 0; k < models.b->terms.size(); ++k) {
     if (taken[k] != 0) continue;
     out.push_back(DescribeTerm(models.b->terms[k].form));
-    TakeB(models.b->terms[k], &out.back());
+    out.back().b = SideOf(models.b->terms[k]);
   }
   return out;
 }

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,15 +54,19 @@ struct CompareOptions {
 ModelComparison CompareModels(const ModelPair& models, const Campaign& campaign,
                               const CompareOptions& options);
 
+/// A term as one model has it.
+struct TermSide {
+  std::string shape;      // in words
+  std::size_t units = 0;  // that have it
+  AmplitudeSummary amplitude;
+};
+
 /// A term of A, of B, or the same of both.
 struct TermDifference {
   std::string cause;
   std::string axis;  // of an empirical term the channel
   std::string amplitude_unit;
-  bool in_a = false, in_b = false;
-  std::string shape_a, shape_b;  // in words
-  std::size_t units_a = 0, units_b = 0;
-  AmplitudeSummary a, b;
+  std::optional<TermSide> a, b;
   /// How many standard deviations of one number would be as unlikely as all amplitudes' changes
   /// together. NaN: not in both, another shape, or no standard deviations.
   double sigmas = 0;

@@ -13,10 +13,10 @@
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
 #include "sim/diagnosis/image.h"
+#include "sim/diagnosis/multi_start.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/screen.h"
-#include "sim/diagnosis/select_however.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -81,8 +81,8 @@ std::string ScopeOf(const ModelTerm& term, std::size_t units) {
     return std::string(Name(units == 1 && term.form.effect->owner != Owner::kUnit
                                 ? term.form.effect->owner
                                 : Owner::kUnit));
-  if (term.sharing == Sharing::kRail) return "rail";
-  if (term.sharing == Sharing::kBus) return "bus";
+  if (term.sharing == Sharing::kRail || term.sharing == Sharing::kBus)
+    return std::string(Name(term.sharing));
   return std::string(
       Name(term.form.effect->owner == Owner::kUnit ? Owner::kPlate : term.form.effect->owner));
 }
@@ -291,7 +291,7 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
 // The terms, steps, zeros of homings and motion of the image that explain the data.
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
-  Selection selection = SelectHowever(templates, rule, fit);
+  Selection selection = SelectMultiStart(templates, rule, fit);
   if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
   ImageFound image = AddImageTerms(fit, options.family_wise);
   if (!image.moves) return selection;

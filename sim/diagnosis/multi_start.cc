@@ -1,4 +1,4 @@
-#include "sim/diagnosis/select_however.h"
+#include "sim/diagnosis/multi_start.h"
 
 #include "sim/diagnosis/events.h"
 
@@ -25,26 +25,25 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
 
 // Zeros that differ from homing to homing, where they are worth their number. The terms are then
 // and steps are chosen anew: what was one homing's zero may have passed for something else.
-bool TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
+void TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
                 Fit* fit) {
   constexpr double kBetterBy = 20;
   Fit freed = *fit;
   FreeHomings(&freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return;
   freed.model.terms.clear();
   freed.model.events.clear();
   UpdateResiduals(&freed);
   FreeHomings(&freed);
   Selection again = SelectWithEvents(templates, rule, &freed);
-  if (Merit(freed) < Merit(*fit) + kBetterBy) return false;
+  if (Merit(freed) < Merit(*fit) + kBetterBy) return;
   *fit = std::move(freed);
   *selection = std::move(again);
-  return true;
 }
 
 }  // namespace
 
-Selection SelectHowever(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);
   if (fit->facts->homings > 0) TryHomings(templates, rule, &selection, fit);
   return selection;

@@ -8,6 +8,6 @@ namespace focalfleet::sim {
 
 /// The beginning with the most Merit decides; beginnings that claim more must be clearly better.
 /// Post: the model's homing_zero_deg are empty where zeros are the same after each homing.
-Selection SelectHowever(const Templates& templates, const SelectionRule& rule, Fit* fit);
+Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit);
 
 }  // namespace focalfleet::sim

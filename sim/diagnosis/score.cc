@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "sim/diagnosis/neighbour_sum.h"
+
 namespace focalfleet::sim {
 namespace {
 
@@ -171,35 +173,6 @@ void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
     }
   }
 }
-
-// Variance of a sum of vectors of which neighbours are alike (Newey and West, 1987), in units of
-// the inverse: fed one by one.
-template <int kSize>
-class NeighbourSum {
- public:
-  static constexpr int kMost = kSize == Eigen::Dynamic ? static_cast<int>(kColumnsMax) : kSize;
-  using Small = Eigen::Matrix<double, kSize, 1, 0, kMost, 1>;
-  using Square = Eigen::Matrix<double, kSize, kSize, 0, kMost, kMost>;
-  explicit NeighbourSum(const Square& inverse) : inverse_(inverse) {
-    past_.fill(Small::Zero(inverse.rows()));
-  }
-  void Add(const Small& v) {
-    const Small w = inverse_ * v;
-    sum_ += v.dot(w);
-    for (std::size_t lag = 0; lag < kLags; ++lag)
-      sum_ += 2 * (1 - static_cast<double>(lag + 1) / (kLags + 1)) *
-              past_[(next_ + kLags - 1 - lag) % kLags].dot(w);
-    past_[next_++ % kLags] = v;
-  }
-  [[nodiscard]] double sum() const { return std::max(sum_, 0.0); }
-
- private:
-  static constexpr std::size_t kLags = 4;
-  Square inverse_;
-  std::array<Small, kLags> past_;
-  std::size_t next_ = 0;
-  double sum_ = 0;
-};
 
 template <int kSize>
 double SpreadOf(const MatrixXd& m, const VectorXd& y) {

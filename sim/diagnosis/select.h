@@ -30,7 +30,7 @@ struct SelectionRule {
   double family_wise = 0.01;
   std::size_t terms_max = 8;
   double size_min_um = 0.05;  // less is no misfit worth a name, however certain
-  double rival_behind = 9;   // 2 d ln L
+  double rival_behind = 9;    // 2 d ln L
   double rival_share = 0.99;  // squared cosine: what takes over more is the same thing here
   std::uint64_t seed = 1;
   std::function<void(std::string_view)> progress = [](std::string_view) {};

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -10,6 +9,7 @@
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/neighbour_sum.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -283,25 +283,17 @@ double FleetDispersion(const Score& score, std::size_t columns) {
   if (!(g.trace() > 0)) return 1;
   const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(g);
   const VectorXd own = solver.solve(b);
-  double sum = 0, fourth = 0;
-  constexpr std::size_t kLags = 4;
-  std::deque<VectorXd> past;
+  // A generalised inverse: columns may be alike in what all units have of them.
+  NeighbourSum<Eigen::Dynamic> sum(solver.pseudoInverse());
+  double fourth = 0;
   for (std::size_t e = 0; e < exposures; ++e) {
-    const VectorXd v = at_b(e) - at_g(e) * own;
-    const VectorXd w = solver.solve(v);
-    sum += v.dot(w);
-    // Noise with a memory: neighbouring exposures err alike (Newey and West, 1987).
-    for (std::size_t lag = 0; lag < past.size(); ++lag)
-      sum += 2 * (1 - static_cast<double>(lag + 1) / (kLags + 1)) * past[lag].dot(w);
-    past.push_front(v);
-    if (past.size() > kLags) past.pop_back();
+    sum.Add(at_b(e) - at_g(e) * own);
     fourth += at_g(e).trace() * at_g(e).trace();
   }
   // Few exposures carry the score: their own dispersion says little.
   const double effective = g.trace() * g.trace() / std::max(fourth, 1e-300);
   constexpr double kPrior = 6;
-  const double raw =
-      std::max(sum, 0.0) / static_cast<double>(c) * effective / std::max(effective - 1, 1.0);
+  const double raw = sum.sum() / static_cast<double>(c) * effective / std::max(effective - 1, 1.0);
   return (effective * raw + kPrior) / (effective + kPrior);
 }
 

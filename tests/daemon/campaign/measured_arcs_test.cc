@@ -18,12 +18,9 @@ using testing::IsSupersetOf;
 
 sim::Campaign Measured(const std::string& arcs) {
   const std::string folder = std::string(FOCALFLEET_MEASURED_MOVES) + "/" + arcs;
-  const auto moves = ReadTextFile(folder + "/moves.csv");
-  const auto units = ReadTextFile(folder + "/units.csv");
-  EXPECT_TRUE(moves && units);
-  auto campaign = ReadCampaign({.moves = *moves, .units = *units});
-  EXPECT_TRUE(campaign) << campaign.error().text;
-  return std::move(*campaign);
+  const std::string moves = ReadTextFile(folder + "/moves.csv").value();
+  const std::string units = ReadTextFile(folder + "/units.csv").value();
+  return ReadCampaign({.moves = moves, .units = units}).value();
 }
 
 struct Arcs {

@@ -54,9 +54,9 @@ TEST(CompareModels, WhatWasFittedToAnEffectBeatsTheIdealOnOtherMoves) {
   const ModelDifference difference = DifferenceOf({&ideal, &fitted});
   ASSERT_EQ(difference.terms.size(), 1u);
   EXPECT_EQ(difference.terms[0].cause, "gear_scale");
-  EXPECT_FALSE(difference.terms[0].in_a);
-  EXPECT_TRUE(difference.terms[0].in_b);
-  EXPECT_NEAR(difference.terms[0].b.value, 3e-4, 3e-5);
+  EXPECT_FALSE(difference.terms[0].a);
+  ASSERT_TRUE(difference.terms[0].b);
+  EXPECT_NEAR(difference.terms[0].b->amplitude.value, 3e-4, 3e-5);
   EXPECT_TRUE(std::isnan(difference.terms[0].sigmas));
 }
 
@@ -83,10 +83,10 @@ TEST(CompareModels, AFleetThatHasDriftedIsFound) {
   ASSERT_EQ(difference.terms.size(), 1u);
   const TermDifference& gear = difference.terms[0];
   EXPECT_EQ(gear.cause, "gear_scale");
-  EXPECT_TRUE(gear.in_a && gear.in_b);
-  EXPECT_NEAR(gear.b.value - gear.a.value, 2e-4, 3e-5);
+  ASSERT_TRUE(gear.a && gear.b);
+  EXPECT_NEAR(gear.b->amplitude.value - gear.a->amplitude.value, 2e-4, 3e-5);
   EXPECT_GT(gear.sigmas, 5);
-  EXPECT_EQ(gear.units_a, 24u);
+  EXPECT_EQ(gear.a->units, 24u);
 }
 
 // Models that are as far from the truth on either side: which of them wins is chance.

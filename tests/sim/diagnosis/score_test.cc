@@ -43,8 +43,8 @@ TEST(Score, WhatTheModelHasAlreadySaysNothingNew) {
 
 // An amplitude below 0 is no stiction of that unit; what it says of the fleet's stays in the sum.
 TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
-  const Campaign campaign = Planted(
-      {{.cause = "gear_scale", .amplitude = 0.01, .axis = "theta", .unit_share = 0.2}});
+  const Campaign campaign =
+      Planted({{.cause = "gear_scale", .amplitude = 0.01, .axis = "theta", .unit_share = 0.2}});
   const CampaignFacts facts = MakeFacts(campaign);
   const Fit fit = Started(facts);
   Templates templates = ListTemplates(*FindEffect("stiction"), facts);
