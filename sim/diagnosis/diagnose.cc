@@ -340,6 +340,16 @@ void Conclude(Diagnosis* diagnosis) {
                                                    : Verdict::kExplained;
 }
 
+HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
+                   const DiagnoseOptions& options) {
+  if (!as_named) return MeasureGain(fit);
+  const CampaignFacts facts = MakeFacts(*as_named);
+  CampaignModel geometry;
+  geometry.units = as_named->units;
+  const Fit misnamed = StartFit(facts, std::move(geometry), fit.aside, options.parallel);
+  return MeasureGain(fit, &misnamed);
+}
+
 }  // namespace
 
 std::string_view Name(Verdict verdict) {
@@ -380,7 +390,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   options.progress(0.02, "static geometry");
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
   const auto swaps = FindSwaps(fit);
+  std::optional<Campaign> as_named;  // under the table's names, where some of these are wrong
   if (!swaps.empty()) {
+    as_named = campaign;
     for (const auto& [a, b] : swaps) UndoSwap(facts.exposures, a, b, &campaign);
     diagnosis.causes.push_back(SwapCause(campaign, swaps));
     fit = StartFit(facts, diagnosis.model, aside, options.parallel);
@@ -419,7 +431,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   Conclude(&diagnosis);
   if (options.with_gain) {
     options.progress(0.9, "held-out moves");
-    diagnosis.gain = MeasureGain(fit);
+    diagnosis.gain = GainOf(fit, as_named, options);
   }
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;

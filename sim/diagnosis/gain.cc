@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "sim/diagnosis/chances.h"
 
@@ -39,9 +40,9 @@ std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   return fold;
 }
 
-// The zeros of a homing that no fit has seen are its own: from its exposures, everything else
-// fixed.
-void FitHeldOutHomings(const std::vector<char>& hold, Fit* fit) {
+// The zeros of a homing that no fit has seen are its own: from those of its exposures that are
+// judged, everything else fixed.
+void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& judged, Fit* fit) {
   if (fit->model.homing_zero_deg[kTheta].empty()) return;
   constexpr int kRounds = 3;
   constexpr double kRadians = std::numbers::pi / 180;
@@ -55,7 +56,7 @@ void FitHeldOutHomings(const std::vector<char>& hold, Fit* fit) {
         Eigen::Vector2d right = Eigen::Vector2d::Zero();
         for (std::size_t i = begin; i < end; ++i) {
           const std::size_t row = track.first_row + i;
-          if (hold[row] == 0 || !std::isfinite(fit->x_um[row])) continue;
+          if (hold[row] == 0 || judged[row] == 0 || !std::isfinite(fit->x_um[row])) continue;
           Eigen::Matrix2d j;
           j << -(track.elbow_y_mm[i] + track.reach_y_mm[i]), -track.reach_y_mm[i],
               track.elbow_x_mm[i] + track.reach_x_mm[i], track.reach_x_mm[i];
@@ -76,7 +77,8 @@ void FitHeldOutHomings(const std::vector<char>& hold, Fit* fit) {
   }
 }
 
-Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_terms) {
+Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, const std::vector<char>& judged,
+               bool with_terms) {
   Fit fit = final_fit;
   for (std::size_t row = 0; row < hold.size(); ++row)
     if (hold[row] != 0) fit.aside[row] = 1;
@@ -92,8 +94,15 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, bool with_te
     UpdateWeights(&fit);
   }
   StepFit(&fit);
-  FitHeldOutHomings(hold, &fit);
+  FitHeldOutHomings(hold, judged, &fit);
   return fit;
+}
+
+// Is the row's place another one once names are right?
+bool IsUnderAnother(const Fit& as_named, const Fit& fit, std::size_t row) {
+  const Campaign& a = *as_named.facts->campaign;
+  const Campaign& b = *fit.facts->campaign;
+  return a.x_mm[row] != b.x_mm[row] || a.y_mm[row] != b.y_mm[row];
 }
 
 // Of an angle at one exposure; what adds up from move to move, as after ten of them at most.
@@ -127,7 +136,7 @@ double NoiseFloor(const Fit& fit) {
   return count > 0 ? std::sqrt(sum / count) : 0;
 }
 
-HeldOutGain MeasureGain(const Fit& fit) {
+HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
   const Campaign& campaign = *fit.facts->campaign;
   HeldOutGain gain;
   const std::vector<std::size_t> fold = FoldsOf(fit, &gain.held_out);
@@ -147,11 +156,14 @@ HeldOutGain MeasureGain(const Fit& fit) {
   for (std::size_t k = 0; k < kFolds; ++k) {
     std::vector<char> hold(campaign.rows(), 0);
     for (std::size_t row = 0; row < hold.size(); ++row) hold[row] = fold[row] == k ? 1 : 0;
-    const Fit plain = FitWithout(fit, hold, false);
-    const Fit full = FitWithout(fit, hold, true);
+    const Fit plain = FitWithout(fit, hold, judged, false);
+    const Fit full = FitWithout(fit, hold, judged, true);
+    std::optional<Fit> misnamed;
+    if (as_named != nullptr) misnamed = FitWithout(*as_named, hold, judged, false);
     for (std::size_t row = 0; row < hold.size(); ++row) {
-      if (hold[row] == 0 || judged[row] == 0) continue;
-      before.push_back(std::hypot(plain.x_um[row], plain.y_um[row]));
+      if (hold[row] == 0 || judged[row] == 0 || judged[row] == 0) continue;
+      const Fit& had = misnamed && IsUnderAnother(*as_named, fit, row) ? *misnamed : plain;
+      before.push_back(std::hypot(had.x_um[row], had.y_um[row]));
       after.push_back(std::hypot(full.x_um[row], full.y_um[row]));
     }
   }

@@ -10,7 +10,9 @@
 namespace focalfleet::sim {
 
 /// Pre: fit has the final model. Rows that are outliers of the final model are not judged.
-HeldOutGain MeasureGain(const Fit& fit);
+/// `as_named`: where names of fibres were exchanged, the static fit under the names that the table
+/// has; their rows are as far off before as they are under these. nullptr: none were.
+HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named = nullptr);
 
 /// Root mean square of the noise that the fit found, two-dimensional, um.
 double NoiseFloor(const Fit& fit);
