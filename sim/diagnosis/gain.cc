@@ -161,7 +161,7 @@ HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
     std::optional<Fit> misnamed;
     if (as_named != nullptr) misnamed = FitWithout(*as_named, hold, judged, false);
     for (std::size_t row = 0; row < hold.size(); ++row) {
-      if (hold[row] == 0 || judged[row] == 0 || judged[row] == 0) continue;
+      if (hold[row] == 0 || judged[row] == 0) continue;
       const Fit& had = misnamed && IsUnderAnother(*as_named, fit, row) ? *misnamed : plain;
       before.push_back(std::hypot(had.x_um[row], had.y_um[row]));
       after.push_back(std::hypot(full.x_um[row], full.y_um[row]));

@@ -1,10 +1,14 @@
 // Supply droop: the rail sags with those that move at once.
 #include <algorithm>
+#include <cmath>
 
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
+
+constexpr int kLoadedByPlace = 4;
+constexpr int kLoadedEvenly = 5;
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
@@ -14,6 +18,38 @@ void List(const CampaignFacts& facts, Templates* out) {
   ListGrid({.axes = axes, .memories = {Memory::kNow}}, out);
   if (!facts.Has("rail_slot")) return;
   for (const int form : {1, 2, 3}) ListGrid({.axes = axes, .form = form}, out);
+  // A rotor under load: its angle is an arcsine of what the drive has left, and a deep droop bends.
+  if (!facts.Has("drive_amplitude")) return;
+  for (const int form : {kLoadedByPlace, kLoadedEvenly})
+    ListGrid({.axes = axes,
+              .shapes = {0.2, 0.4, 0.55},
+              .shape_name = form == kLoadedByPlace
+                                ? "load, of the pull-out at nominal drive,"
+                                : "movers evenly along the rail; load, of the pull-out,",
+              .form = form,
+              .columns = 2},
+             out);
+}
+
+// Place along the harness: how much of the rail's droop a unit has.
+double PlaceOf(int form, double slot, double slots) {
+  const double share = (slot + 1) / slots;
+  if (form == 0) return 1;
+  if (form == 1 || form == kLoadedByPlace) return share;
+  if (form == 2) return 0.5 + slot / slots;
+  return 0.1 + share * (1 - share / 2);
+}
+
+// asin(x / (1 - droop)) - asin(x), x = load / drive, to second order in the droop.
+struct LoadedLag {
+  double first = 0;
+  double second = 0;
+};
+LoadedLag LagOf(double load, double level) {
+  constexpr double kPullOut = 0.95;  // beyond it the rotor slips, which is another cause
+  const double x = std::min(load / level, kPullOut);
+  const double left = 1 - x * x;
+  return {x / std::sqrt(left), x * (2 - x * x) / (2 * std::pow(left, 1.5))};
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -26,19 +62,22 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   if (form.form != 0) slot = track.Column("rail_slot");
   if (form.form != 0) slots = std::max(track.facts->Find("rail_slot")->high, 0.0) + 1;
   if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
+  const bool loaded = form.form == kLoadedByPlace || form.form == kLoadedEvenly;
   for (const std::size_t axis : AxesOf(form)) {
     const std::span<const double> step = track.step_deg[axis];
     AddRemembered(
         track, axis, form.memory,
         [&](std::size_t i) {
-          double place = 1;
-          if (form.form == 1) place = (slot[i] + 1) / slots;
-          if (form.form == 2) place = 0.5 + slot[i] / slots;
-          const double share = form.form == 3 ? (slot[i] + 1) / slots : 0;
-          if (form.form == 3) place = 0.1 + share * (1 - share / 2);
-          // The load angle grows with what the drive lacks.
+          const double droop =
+              PlaceOf(form.form, slot.empty() ? 0 : slot[i], slots) * movers[i] / most;
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
-          return -amplitude[0] * Direction(step[i]) * place * movers[i] / most / level;
+          // The load angle grows with what the drive lacks.
+          double lag = amplitude[0] * droop / level;
+          if (loaded) {
+            const auto [first, second] = LagOf(form.shape, level);
+            lag = amplitude[0] * droop * first + amplitude[1] * droop * droop * second;
+          }
+          return -Direction(step[i]) * lag;
         },
         &errors->angle_deg[axis]);
   }

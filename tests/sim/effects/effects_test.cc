@@ -106,6 +106,38 @@ TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
   }
 }
 
+// A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
+// voltage gone, asin(x / (1 - share)).
+TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  constexpr double kMissing = 0.04;  // of the voltage, with all movers, at the harness' end
+  std::size_t loaded = 0;
+  for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
+    if (form.columns != 2 || form.axis != EffectAxis::kTheta ||
+        form.label.find("movers evenly") != std::string::npos)
+      continue;
+    ++loaded;
+    const UnitTrack track = MakeTrack(facts, 6, campaign.units[6]);
+    const auto movers = track.Column("movers_on_rail"), slot = track.Column("rail_slot");
+    const auto drive = track.Column("drive_amplitude");
+    const double most = facts.Find("movers_on_rail")->high;
+    const double slots = facts.Find("rail_slot")->high + 1;
+    PoseErrors errors;
+    errors.Reset(track.moves);
+    const std::vector<double> amplitude = {kMissing, kMissing * kMissing};
+    form.effect->apply(track, form, amplitude, &errors);
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      const double step = track.step_deg[kTheta][i], x = form.shape / drive[i];
+      if (step == 0 || x > 0.9) continue;
+      const double left = 1 - kMissing * movers[i] / most * (slot[i] + 1) / slots;
+      const double lag = std::asin(x / left) - std::asin(x);
+      EXPECT_NEAR(errors.angle_deg[kTheta][i], step > 0 ? -lag : lag, 0.05 * lag) << form.label;
+    }
+  }
+  EXPECT_EQ(loaded, 3u);
+}
+
 TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
   const Template play{.effect = FindEffect("backlash"), .axis = EffectAxis::kTheta, .shape = 2};
   EXPECT_TRUE(CanBe(play, 2, 0));
