@@ -3,6 +3,7 @@
 
 #include <toml++/toml.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -10,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "sim/diagnosis/planted.h"
 #include "sim/effects/empirical.h"
 #include "sim/effects/registry.h"
 
@@ -133,6 +135,19 @@ class ModelReader {
            amplitude <= high + kDigits * std::abs(high);
   }
 
+  // Does the effect offer it for some campaign, at whatever shape?
+  static bool IsListed(const sim::Template& form) {
+    // A campaign with all columns: what an effect lists depends on which there are.
+    static const Result<sim::Campaign> whole = sim::PlantCampaign({.units = 4, .moves = 8});
+    static const sim::CampaignFacts facts = sim::MakeFacts(whole.value());
+    sim::Templates listed;
+    form.effect->list(facts, &listed);
+    return std::ranges::any_of(listed, [&](const sim::Template& other) {
+      return other.axis == form.axis && other.form == form.form && other.memory == form.memory &&
+             other.columns == form.columns;
+    });
+  }
+
   Result<sim::Template> ReadForm(const toml::table& table) const {
     const std::string cause = table["cause"].value_or(std::string());
     const sim::Effect* empirical = sim::FindEmpirical(cause);
@@ -157,6 +172,8 @@ class ModelReader {
     form.label = table["shape_text"].value_or(std::string());
     if (empirical != nullptr) {
       FOCALFLEET_TRY(ReadEmpirical(table, &form));
+    } else if (!IsListed(form)) {
+      return Wrong(table, "the effect has no such axis, form, memory and columns");
     }
     return form;
   }

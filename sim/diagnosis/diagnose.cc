@@ -8,6 +8,7 @@
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/distortion.h"
 #include "sim/diagnosis/events.h"
 #include "sim/diagnosis/families.h"
 #include "sim/diagnosis/gain.h"
@@ -305,15 +306,32 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
   return selection;
 }
 
+// The causes of the model's terms. What a distortion of a stronger one explains as well is told as
+// what that one's shape leaves; what it explains in part has it as a candidate.
+std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
+  const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
+  const double rms_um = RmsOf(fit);
+  std::vector<CauseFound> all, kept;
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
+  for (std::size_t t = 0; t < all.size(); ++t)
+    if (beside[t].is_remainder()) TellAsRemainder(all[t], &all[beside[t].of]);
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    if (beside[t].is_remainder()) continue;
+    if (beside[t].is_doubtful()) all[t].candidates.push_back(all[beside[t].of].cause);
+    kept.push_back(all[t]);
+  }
+  return kept;
+}
+
 // What the model means, by name.
 void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOptions& options,
                 Diagnosis* diagnosis) {
   std::vector<CauseFound>& causes = diagnosis->causes;
   for (CauseFound& cause : EventCauses(fit)) causes.push_back(std::move(cause));
-  const double rms_um = RmsOf(fit);
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    causes.push_back(CauseOf(fit, fit.model.terms[t], selection.accepted[t], rms_um));
+  for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
   options.progress(0.8, "geometry against the table");
+  const double rms_um = RmsOf(fit);
   for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
     cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <set>
 
 #include "sim/diagnosis/chances.h"
@@ -17,7 +18,7 @@ constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be tol
 constexpr int kTurnsMax = 20;
 constexpr double kEventEvidence = 25;  // at least, of an event that was taken
 
-// ---- lost and doubled commands: so large that only the exact place tells
+// ---- lost and doubled commands, and slips: so large that only the exact place tells
 
 constexpr double kCap_mm = 0.5;  // what an outlier costs at most
 
@@ -44,43 +45,60 @@ double TotalCost(const UnitRows& rows) {
   return sum;
 }
 
-struct WholeMove {
+// What may have happened in a move: what it added to the angles.
+struct Change {
   std::size_t move = 0;
-  double sign = 0;  // -1: not made; +1: made twice
+  double by_deg[2] = {0, 0};
   double gained = 0;
 };
+enum class ChangeKind { kWholeMove, kSlip };
 
-WholeMove BestWholeMove(const UnitRows& rows) {
-  const UnitTrack& track = rows.track;
-  WholeMove best;
-  for (std::size_t move = 0; move < track.moves; ++move) {
-    const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
-    if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) continue;
-    const std::size_t end = EndOfHistory(track, move);
-    for (const double sign : {-1.0, 1.0}) {
-      double gained = 0;
+// A command that was lost, or made twice; or whole turns of a rotor, against its motion.
+std::vector<Change> ChangesIn(const UnitTrack& track, std::size_t move, ChangeKind kind) {
+  constexpr int kTurnsAtOnce = 2;
+  const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
+  std::vector<Change> changes;
+  if (kind == ChangeKind::kWholeMove) {
+    if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) return changes;
+    for (const double sign : {-1.0, 1.0})
+      changes.push_back({move, {sign * steps[0], sign * steps[1]}});
+    return changes;
+  }
+  for (const std::size_t axis : {kTheta, kPhi})
+    for (int turns = 1; steps[axis] != 0 && turns <= kTurnsAtOnce; ++turns) {
+      Change slip{.move = move};
+      slip.by_deg[axis] = std::copysign(turns * 360 / track.unit->gear[axis], -steps[axis]);
+      changes.push_back(slip);
+    }
+  return changes;
+}
+
+Change BestChange(const UnitRows& rows, ChangeKind kind) {
+  Change best;
+  for (std::size_t move = 0; move < rows.track.moves; ++move) {
+    const std::size_t end = EndOfHistory(rows.track, move);
+    for (Change& change : ChangesIn(rows.track, move, kind)) {
       for (std::size_t i = move; i < end; ++i) {
         const double theta = rows.added_deg[kTheta][i], phi = rows.added_deg[kPhi][i];
-        gained += RowCost(rows, i, theta, phi) -
-                  RowCost(rows, i, theta + sign * steps[0], phi + sign * steps[1]);
+        change.gained += RowCost(rows, i, theta, phi) -
+                         RowCost(rows, i, theta + change.by_deg[kTheta], phi + change.by_deg[kPhi]);
       }
-      if (gained > best.gained) best = {move, sign, gained};
+      if (change.gained > best.gained) best = change;
     }
   }
   return best;
 }
 
-// Whole moves that explain the rows, from one geometry to begin at.
-std::vector<WholeMove> FindWholeMoves(double far_mm, UnitRows* rows) {
+// Changes that explain the rows, from one geometry to begin at.
+std::vector<Change> FindChanges(ChangeKind kind, double far_mm, UnitRows* rows) {
   const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
-  std::vector<WholeMove> found;
+  std::vector<Change> found;
   while (found.size() < kEventsMax) {
-    const WholeMove best = BestWholeMove(*rows);
+    const Change best = BestChange(*rows, kind);
     if (best.gained < gain_min) break;
     const std::size_t end = EndOfHistory(rows->track, best.move);
     for (std::size_t i = best.move; i < end; ++i)
-      for (const std::size_t axis : {kTheta, kPhi})
-        rows->added_deg[axis][i] += best.sign * rows->track.step_deg[axis][best.move];
+      for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += best.by_deg[axis];
     found.push_back(best);
   }
   return found;
@@ -97,50 +115,64 @@ UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) 
   return rows;
 }
 
-// The unit's lost and doubled commands; its geometry is set to the one that they belong to, as a
-// fit that did not know of them may have been dragged along.
-std::vector<EventTerm> LostCommands(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  std::vector<EventTerm> events;
-  UnitRows rows = RowsOf(fit, unit, fit.model.units[unit]);
+// One way to explain a unit's rows that lie far off.
+struct Explained {
+  std::vector<Change> changes;
+  CampaignUnit geometry;  // that they belong to
+  double cost = 0;        // that is left
+  std::size_t far = 0;    // rows that are
+};
+
+Explained ExplainedBy(ChangeKind kind, const Fit& fit, std::size_t unit,
+                      const CampaignUnit& geometry, double far_mm) {
+  UnitRows rows = RowsOf(fit, unit, geometry);
+  Explained out{.changes = FindChanges(kind, far_mm, &rows), .geometry = geometry};
+  out.cost = TotalCost(rows);
+  for (std::size_t i = 0; i < rows.track.moves; ++i)
+    if (fit.aside[rows.track.first_row + i] == 0 &&
+        RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]) > far_mm * far_mm)
+      ++out.far;
+  return out;
+}
+
+// The unit's lost and doubled commands, or else its slips, where these are far larger than noise;
+// its geometry is set to the one that they belong to, as a fit that did not know of them may have
+// been dragged along.
+std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
+  constexpr double kStillFarMax = 0.2;      // what changes do not explain is something else
+  constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
   // A row is worth a look that noise does not put there.
   const double far_mm =
       std::clamp(15e-3 * fit.noise.place_um * fit.noise.unit_factor[unit], 0.04, 0.4);
-  const auto far_rows = [&](const UnitRows& some) {
-    std::size_t far = 0;
-    for (std::size_t i = 0; i < some.track.moves; ++i)
-      if (fit.aside[some.track.first_row + i] == 0 &&
-          RowCost(some, i, some.added_deg[kTheta][i], some.added_deg[kPhi][i]) > far_mm * far_mm)
-        ++far;
-    return far;
-  };
-  const std::size_t far = far_rows(rows);
-  if (far < 3) return events;
+  const CampaignUnit& fitted = fit.model.units[unit];
+  const UnitRows rows = RowsOf(fit, unit, fitted);
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < rows.track.moves; ++i)
+    if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
+  if (far < 3) return {};
   const double before = TotalCost(rows);
-  std::vector<WholeMove> found = FindWholeMoves(far_mm, &rows);
-  double after = TotalCost(rows);
-  UnitRows table = RowsOf(fit, unit, fit.facts->campaign->units[unit]);
-  const std::vector<WholeMove> by_table = FindWholeMoves(far_mm, &table);
-  const CampaignUnit* chosen = &fit.model.units[unit];
-  std::size_t still_far = far_rows(rows);
-  if (const double cost = TotalCost(table); cost < after)
-    after = cost, found = by_table, chosen = &fit.facts->campaign->units[unit],
-    still_far = far_rows(table);
-  // The rest must lie near: what whole moves do not explain is something else.
-  constexpr double kStillFarMax = 0.2;
-  if (found.empty() || after > 0.5 * before ||
-      static_cast<double>(still_far) > kStillFarMax * static_cast<double>(far))
-    return events;
-  *geometry = *chosen;
-  for (const WholeMove& whole : found)
-    for (const std::size_t axis : {kTheta, kPhi}) {
-      const double step = rows.track.step_deg[axis][whole.move];
-      if (step != 0)
-        events.push_back({unit, rows.track.first_row + whole.move, axis, true, whole.sign * step});
+  std::optional<Explained> best;
+  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip})
+    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
+      Explained one = ExplainedBy(kind, fit, unit, from, far_mm);
+      if (one.changes.empty() || one.cost > 0.5 * before ||
+          static_cast<double>(one.far) > kStillFarMax * static_cast<double>(far) ||
+          (kind == ChangeKind::kSlip && one.changes.size() * kRowsForASlip > far))
+        continue;
+      if (!best || one.cost < best->cost) best = std::move(one);
     }
+  if (!best) return {};
+  *geometry = best->geometry;
+  std::vector<EventTerm> events;
+  for (const Change& change : best->changes)
+    for (const std::size_t axis : {kTheta, kPhi})
+      if (change.by_deg[axis] != 0)
+        events.push_back(
+            {unit, rows.track.first_row + change.move, axis, true, change.by_deg[axis]});
   return events;
 }
 
-// ---- slips: whole turns of the rotor, against the motion
+// ---- slips near the noise: whole turns of the rotor, against the motion
 
 struct AngleRow {
   std::size_t move = 0;
@@ -314,7 +346,7 @@ std::size_t AddEvents(Fit* fit) {
   };
   fit->parallel(chunks.size(), [&](std::size_t chunk) {
     for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
-      of_unit[unit] = LostCommands(*fit, unit, &geometry[unit]);
+      of_unit[unit] = ExactEvents(*fit, unit, &geometry[unit]);
   });
   std::size_t added = take();
   for (int round = 0; round < 2; ++round) {

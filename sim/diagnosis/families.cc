@@ -65,6 +65,12 @@ bool AreRelated(std::string_view a, std::string_view b) {
                      [&](const auto& family) { return Has(family, a) && Has(family, b); });
 }
 
+void TellAsRemainder(const CauseFound& rest, CauseFound* of) {
+  char size[32];
+  std::snprintf(size, sizeof size, "%.2g", rest.size_um);
+  of->shape += "; what its shape leaves, " + std::string(size) + " um, looks like " + rest.cause;
+}
+
 void JudgeRemainders(std::vector<CauseFound>* causes) {
   // Of the stronger one's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
@@ -96,10 +102,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       continue;
     }
     if (same || (related && cause.delta_log_likelihood < kShape * relative->delta_log_likelihood)) {
-      char size[32];
-      std::snprintf(size, sizeof size, "%.2g", cause.size_um);
-      relative->shape +=
-          "; what its shape leaves, " + std::string(size) + " um, looks like " + cause.cause;
+      TellAsRemainder(cause, relative);
       continue;
     }
     const std::string name = relative->cause;

@@ -12,6 +12,9 @@ namespace focalfleet::sim {
 /// Have the two causes a family in common?
 bool AreRelated(std::string_view a, std::string_view b);
 
+/// Tells `rest` as what the shape of `of` leaves, not as a cause.
+void TellAsRemainder(const CauseFound& rest, CauseFound* of);
+
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves: a relative on the same axis, or what only units of the strong one have. It
 /// gets the strong one as a candidate. What is faint beside any cause of an axis is told as that

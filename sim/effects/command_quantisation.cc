@@ -1,40 +1,63 @@
 // Command quantisation: commands are rounded.
 #include <cmath>
+#include <iterator>
 
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
 
+enum class Step { kDegrees, kMotorTurns, kBits };
+enum class Rounding { kNearest, kCutMove, kDown };
+/// A template's form is its index: model files have it.
+struct Form {
+  Step step;
+  Rounding rounding;
+  std::string_view name;
+};
+constexpr Form kForms[] = {
+    {Step::kDegrees, Rounding::kNearest, "step, deg,"},
+    {Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
+    {Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
+    {Step::kBits, Rounding::kNearest, "bits a turn:"},
+    {Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
+    {Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
+    {Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
+};
+
+std::vector<double> ShapesOf(Step step) {
+  if (step == Step::kMotorTurns) return {1, 4, 24, 96};
+  if (step == Step::kBits) return {9, 10, 11, 12, 13, 14};
+  return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
+}
+
+double Step_deg(const Form& form, double shape, double gear) {
+  if (form.step == Step::kMotorTurns) return 360 / (shape * gear);
+  return form.step == Step::kBits ? 360 / std::exp2(shape) : shape;
+}
+
 void List(const CampaignFacts&, Templates* out) {
-  for (const int form : {0, 1})
-    ListGrid(
-        {.shapes = {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2},
-         .shape_name = form == 0 ? "step, deg," : "moves are cut; step, deg,",
-         .form = form},
-        out);
-  ListGrid({.shapes = {1, 4, 24, 96}, .shape_name = "steps a motor turn:", .form = 2}, out);
-  for (const int form : {3, 4})
-    ListGrid({.shapes = {9, 10, 11, 12, 13, 14},
-              .shape_name = form == 3 ? "bits a turn:" : "moves are cut; bits a turn:",
-              .form = form},
+  for (std::size_t k = 0; k < std::size(kForms); ++k)
+    ListGrid({.shapes = ShapesOf(kForms[k].step),
+              .shape_name = kForms[k].name,
+              .form = static_cast<int>(k)},
              out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  double step_deg = form.shape;
-  if (form.form == 2) step_deg = 360 / (form.shape * track.unit->gear[axis]);
-  if (form.form >= 3) step_deg = 360 / std::exp2(form.shape);
-  const bool cut = form.form == 1 || form.form == 4;
+  const Form& kind = kForms[static_cast<std::size_t>(form.form)];
+  const double step_deg = Step_deg(kind, form.shape, track.unit->gear[axis]);
   double behind_deg = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
     if (track.restarts[i]) behind_deg = 0;
     const double q = track.cmd_deg[axis][i];
     const double move = track.step_deg[axis][i];
     behind_deg += std::trunc(move / step_deg) * step_deg - move;
-    const double error = cut ? behind_deg : std::round(q / step_deg) * step_deg - q;
+    const bool down = kind.rounding == Rounding::kDown;
+    const double steps = down ? std::floor(q / step_deg) : std::round(q / step_deg);
+    const double error = kind.rounding == Rounding::kCutMove ? behind_deg : steps * step_deg - q;
     errors->angle_deg[axis][i] += amplitude[0] * error;
   }
 }
@@ -48,7 +71,8 @@ Effect MakeCommandQuantisation() {
           .owner = Owner::kUnit,
           .needs = {},
           .paragraph =
-              "The command is rounded (or cut) to a step of the controller, so that the error "
+              "The command is rounded (or cut, or rounded down) to a step of the controller, so "
+              "that the error "
               "is a saw-tooth of the command. It adds up if each move is rounded by itself.",
           .list = List,
           .apply = Apply,

@@ -15,6 +15,23 @@ void PoseErrors::Reset(std::size_t moves) {
   y_mm.assign(moves, 0);
 }
 
+void ApplyTable(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                PoseErrors* errors) {
+  const auto add = [&](double size, const std::vector<double>& from, std::vector<double>* to) {
+    for (std::size_t i = 0; i < track.moves; ++i) (*to)[i] += size * from[track.first_row + i];
+  };
+  for (std::size_t c = 0; c < form.columns; ++c) {
+    if (amplitude[c] == 0) continue;
+    const PoseErrors& column = form.table->columns[c];
+    for (const std::size_t axis : {kTheta, kPhi}) {
+      add(amplitude[c], column.angle_deg[axis], &errors->angle_deg[axis]);
+      add(amplitude[c], column.arm_mm[axis], &errors->arm_mm[axis]);
+    }
+    add(amplitude[c], column.x_mm, &errors->x_mm);
+    add(amplitude[c], column.y_mm, &errors->y_mm);
+  }
+}
+
 std::string_view Name(EffectAxis axis) {
   switch (axis) {
     case EffectAxis::kTheta:

@@ -51,6 +51,11 @@ struct RankKnot {
   double rank = 0;
 };
 
+/// What the columns of a template do at every row of one campaign, where no formula says it.
+struct ErrorTable {
+  std::vector<PoseErrors> columns;  // of all rows each
+};
+
 struct Template {
   const Effect* effect = nullptr;
   EffectAxis axis = EffectAxis::kNone;
@@ -63,6 +68,7 @@ struct Template {
   // none: it goes by the campaign's own ranks.
   std::string covariate;
   std::vector<RankKnot> knots;
+  const ErrorTable* table = nullptr;  // of ApplyTable
 };
 
 using Templates = std::vector<Template>;
@@ -99,6 +105,10 @@ bool CanBe(const Template& form, double amplitude, double sigmas);
 /// What one column does at the given amplitude, the others at 0. `errors` is reset.
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
                  PoseErrors* errors);
+
+/// An effect's `apply`: the columns of form.table. Pre: the track is of the table's campaign.
+void ApplyTable(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+                PoseErrors* errors);
 
 std::string_view Name(EffectAxis axis);
 std::string_view Name(Owner owner);

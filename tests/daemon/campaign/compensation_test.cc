@@ -289,6 +289,14 @@ TEST(ModelFile, RefusesWhatNoUnitOfThisFleetCanBe) {
               ::testing::HasSubstr("none that gear_scale can have"));
   EXPECT_THAT(error_of(effect + "amplitude = [0.003]\nsigma = []\n"),
               ::testing::HasSubstr("not one an amplitude"));
+  for (const auto& [from, to] :
+       {std::pair("form = 0", "form = 7"), std::pair("columns = 1", "columns = 2"),
+        std::pair("\"theta\"", "\"both\"")}) {
+    std::string other = effect + "amplitude = [0.003, 0.003]\n";
+    other.replace(other.find(from), std::string(from).size(), to);
+    EXPECT_THAT(error_of(other), ::testing::HasSubstr("no such axis, form, memory and columns"))
+        << to;
+  }
   EXPECT_THAT(error_of("[[effect"), ::testing::HasSubstr("m.toml:1"));
 }
 

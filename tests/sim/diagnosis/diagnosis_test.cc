@@ -195,6 +195,21 @@ TEST(Diagnosis, GeometryThatDiffersIsNamed) {
   EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.5, 0.15);
 }
 
+TEST(Diagnosis, CommandsThatAreRoundedDownAreNamed) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 5});
+  TurnTheta(
+      [&](std::size_t row) {
+        const double steps = campaign.cmd_deg[kTheta][row] / 0.1;
+        return 0.1 * (std::floor(steps) - steps);
+      },
+      &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "command_quantisation") << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].shape, testing::HasSubstr("rounded down; step, deg, 0.1"));
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, 1, 0.05);
+}
+
 TEST(Diagnosis, SwappedFibresAreFound) {
   Campaign campaign = Planted({});
   for (std::size_t i = 0; i < 60; ++i) {

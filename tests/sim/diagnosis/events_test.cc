@@ -54,6 +54,35 @@ TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
   EXPECT_NEAR(diagnosis.model.events[0].step_deg, -2 * turn_deg, 1e-9);
 }
 
+TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
+  // Stretched, the arm's places do not tell theta from phi; small moves of theta all around.
+  Campaign campaign = Planted({}, {.moves = 120, .seed = 4});
+  constexpr std::size_t kUnit = 5, kFrom = 30, kSlipAt = 36, kTo = 50, kBackAt = 80;
+  const CampaignUnit& u = campaign.units[kUnit];
+  const double turn_deg = 360 / u.gear[kTheta];
+  Rng rng = Rng::Stream(4, "stretched");
+  for (std::size_t i = kFrom; i < 120; ++i) {
+    const std::size_t row = campaign.first_row[kUnit] + i;
+    const bool stretched = i < kTo;
+    double* cmd[2] = {&campaign.cmd_deg[kTheta][row], &campaign.cmd_deg[kPhi][row]};
+    if (stretched) *cmd[kTheta] = (i % 2 == 0 ? 0.2 : -0.1), *cmd[kPhi] = 0.5 - u.zero_deg[kPhi];
+    if (i == kBackAt) *cmd[kTheta] = campaign.cmd_deg[kTheta][row - 1] - 20;
+    for (const std::size_t axis : {kTheta, kPhi})
+      campaign.from_deg[axis][row] = campaign.cmd_deg[axis][row - 1];
+    const bool slipped = i >= kSlipAt && i < kBackAt;
+    const PlacePoint at = PlaceOf(u, *cmd[kTheta] - (slipped ? turn_deg : 0), *cmd[kPhi]);
+    campaign.x_mm[row] = at.x_mm + 0.003 * rng.Normal();
+    campaign.y_mm[row] = at.y_mm + 0.003 * rng.Normal();
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "step_loss");
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(u.id));
+  ASSERT_EQ(diagnosis.model.events.size(), 2u);
+  EXPECT_NEAR(diagnosis.model.events[0].step_deg, -turn_deg, 1e-9);
+  EXPECT_NEAR(diagnosis.model.events[1].step_deg, turn_deg, 1e-9);
+}
+
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;

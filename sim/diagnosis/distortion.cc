@@ -1,0 +1,139 @@
+#include "sim/diagnosis/distortion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kStrong = 100;     // chi-square: a tenth of it could pass the gate
+constexpr double kWeakShare = 0.5;  // of the strong one's chi-square
+constexpr double kSpread = 0.3;     // of the cause: more is no distortion of it
+
+// Every channel of what the term does to one unit.
+template <class Each>
+void ForEachChannel(PoseErrors* errors, Each&& each) {
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    each(&errors->angle_deg[axis]);
+    each(&errors->arm_mm[axis]);
+  }
+  each(&errors->x_mm);
+  each(&errors->y_mm);
+}
+
+PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
+  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  PoseErrors errors;
+  errors.Reset(track.moves);
+  const std::span<const double> amplitude = term.AmplitudeOf(unit);
+  if (!amplitude.empty()) term.form.effect->apply(track, term.form, amplitude, &errors);
+  return errors;
+}
+
+// The term's own errors, times what a distortion makes of them.
+ErrorTable DistortionsOf(const ModelTerm& term, const Fit& fit) {
+  const Campaign& campaign = *fit.facts->campaign;
+  const FilledColumn* drive = fit.facts->Find("drive_amplitude");
+  ErrorTable table;
+  table.columns.resize(drive == nullptr ? 3 : 4);
+  for (PoseErrors& column : table.columns) column.Reset(campaign.rows());
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    PoseErrors done = DoneBy(term, fit, unit);
+    const std::size_t begin = campaign.first_row[unit];
+    const std::size_t moves = campaign.first_row[unit + 1] - begin;
+    std::vector<std::vector<double>*> from;
+    ForEachChannel(&done, [&](std::vector<double>* channel) { from.push_back(channel); });
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      std::size_t channel = 0;
+      ForEachChannel(&table.columns[c], [&](std::vector<double>* to) {
+        const std::vector<double>& error = *from[channel++];
+        double square = 0;
+        for (const double e : error) square += e * e;
+        const double rms = std::sqrt(square / static_cast<double>(std::max<std::size_t>(moves, 1)));
+        if (!(rms > 0)) return;
+        for (std::size_t i = 0; i < moves; ++i) {
+          const double e = error[i], size = std::abs(e) / rms;
+          const double factor = c == 0   ? 1
+                                : c == 1 ? size
+                                : c == 2 ? size * size
+                                         : 1 / std::max(drive->values[begin + i], 0.05) - 1;
+          (*to)[begin + i] = e * factor;
+        }
+      });
+    }
+  }
+  return table;
+}
+
+void ListNothing(const CampaignFacts&, Templates*) {}
+
+const Effect& Distortion() {
+  static const Effect effect = {.cause = "distortion",
+                                .amplitude_unit = "of the cause",
+                                .prior_size = kSpread,
+                                .owner = Owner::kUnit,
+                                .needs = {},
+                                .paragraph = "",
+                                .list = ListNothing,
+                                .apply = ApplyTable};
+  return effect;
+}
+
+// The fit with each unit's own distortions of the term beside it.
+Fit WithDistortions(const Fit& fit, std::size_t strong, const ErrorTable& table) {
+  Fit free = fit;
+  ModelTerm term;
+  term.form = {.effect = &Distortion(), .columns = table.columns.size(), .table = &table};
+  term.sharing = Sharing::kUnit;
+  term.spread = kSpread;
+  const std::size_t units = fit.model.units.size();
+  for (std::size_t unit = 0; unit < units; ++unit)
+    term.group_of_unit.push_back(fit.model.terms[strong].group_of_unit[unit] == kNoGroup
+                                     ? kNoGroup
+                                     : static_cast<std::uint32_t>(unit));
+  term.amplitude.assign(units * term.form.columns, 0);
+  term.sigma = term.amplitude;
+  free.model.terms.push_back(std::move(term));
+  StepFit(&free);
+  SettleFit(&free, 2);
+  return free;
+}
+
+bool AxesMeet(EffectAxis a, EffectAxis b) {
+  const auto open = [](EffectAxis axis) {
+    return axis == EffectAxis::kBoth || axis == EffectAxis::kNone;
+  };
+  return a == b || open(a) || open(b);
+}
+
+}  // namespace
+
+std::vector<Undistorted> BesideDistortions(const Fit& fit, const std::vector<Accepted>& accepted) {
+  const std::vector<ModelTerm>& terms = fit.model.terms;
+  std::vector<Undistorted> out(terms.size());
+  const FleetGroups groups = GroupsOf(*fit.facts);
+  for (std::size_t strong = 0; strong < terms.size(); ++strong) {
+    const double most = accepted[strong].standing.chi_square;
+    std::vector<std::size_t> weak;
+    for (std::size_t t = 0; t < terms.size(); ++t)
+      if (accepted[t].standing.chi_square < kWeakShare * most &&
+          terms[t].form.effect != terms[strong].form.effect &&
+          AxesMeet(terms[t].form.axis, terms[strong].form.axis))
+        weak.push_back(t);
+    if (most < kStrong || weak.empty()) continue;
+    const ErrorTable table = DistortionsOf(terms[strong], fit);
+    const Fit free = WithDistortions(fit, strong, table);
+    for (const std::size_t t : weak) {
+      const Templates own = {terms[t].form};
+      const ScorePass pass = ScoreTemplates(free, own, t);
+      const double kept = Assess(pass.scores[0], own[0], groups).chi_square /
+                          std::max(accepted[t].standing.chi_square, 1e-300);
+      if (kept < out[t].kept) out[t] = {kept, strong};
+    }
+  }
+  return out;
+}
+
+}  // namespace focalfleet::sim
