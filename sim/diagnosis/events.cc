@@ -141,9 +141,9 @@ Explained ExplainedBy(ChangeKind kind, const Fit& fit, std::size_t unit,
 std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
   constexpr double kStillFarMax = 0.2;      // what changes do not explain is something else
   constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
-  // A row is worth a look that noise does not put there.
-  const double far_mm =
-      std::clamp(15e-3 * fit.noise.place_um * fit.noise.unit_factor[unit], 0.04, 0.4);
+  // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
+  const double noise_um = fit.noise.place_um * std::min(fit.noise.unit_factor[unit], 1.5);
+  const double far_mm = std::clamp(10e-3 * noise_um, 0.04, 0.4);
   const CampaignUnit& fitted = fit.model.units[unit];
   const UnitRows rows = RowsOf(fit, unit, fitted);
   std::size_t far = 0;

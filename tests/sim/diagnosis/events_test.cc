@@ -57,16 +57,15 @@ TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
 TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
   // Stretched, the arm's places do not tell theta from phi; small moves of theta all around.
   Campaign campaign = Planted({}, {.moves = 120, .seed = 4});
-  constexpr std::size_t kUnit = 5, kFrom = 30, kSlipAt = 36, kTo = 50, kBackAt = 80;
+  constexpr std::size_t kUnit = 5, kFrom = 30, kSlipAt = 36, kBackAt = 81;
   const CampaignUnit& u = campaign.units[kUnit];
   const double turn_deg = 360 / u.gear[kTheta];
   Rng rng = Rng::Stream(4, "stretched");
   for (std::size_t i = kFrom; i < 120; ++i) {
     const std::size_t row = campaign.first_row[kUnit] + i;
-    const bool stretched = i < kTo;
+    const bool stretched = i < 50 || (i >= 74 && i < 90);
     double* cmd[2] = {&campaign.cmd_deg[kTheta][row], &campaign.cmd_deg[kPhi][row]};
-    if (stretched) *cmd[kTheta] = (i % 2 == 0 ? 0.2 : -0.1), *cmd[kPhi] = 0.5 - u.zero_deg[kPhi];
-    if (i == kBackAt) *cmd[kTheta] = campaign.cmd_deg[kTheta][row - 1] - 20;
+    if (stretched) *cmd[kTheta] = (i % 2 == 0 ? 0.3 : 0.0), *cmd[kPhi] = 0.5 - u.zero_deg[kPhi];
     for (const std::size_t axis : {kTheta, kPhi})
       campaign.from_deg[axis][row] = campaign.cmd_deg[axis][row - 1];
     const bool slipped = i >= kSlipAt && i < kBackAt;
