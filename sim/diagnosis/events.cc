@@ -50,21 +50,38 @@ struct WholeMove {
   double gained = 0;
 };
 
-WholeMove BestWholeMove(const UnitRows& rows) {
+// What every row costs now, and all from a row on.
+struct Costs {
+  std::vector<double> of_row, from;
+};
+Costs CostsOf(const UnitRows& rows) {
+  const std::size_t moves = rows.track.moves;
+  Costs costs{std::vector<double>(moves), std::vector<double>(moves + 1, 0)};
+  for (std::size_t i = moves; i-- > 0;) {
+    costs.of_row[i] = RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]);
+    costs.from[i] = costs.from[i + 1] + costs.of_row[i];
+  }
+  return costs;
+}
+
+// The one that gains most, if it gains `gain_min`.
+WholeMove BestWholeMove(const UnitRows& rows, double gain_min) {
+  constexpr double kRounding = 1e-9;  // of sums of squares, mm^2
   const UnitTrack& track = rows.track;
+  const Costs costs = CostsOf(rows);
   WholeMove best;
   for (std::size_t move = 0; move < track.moves; ++move) {
     const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
     if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) continue;
     const std::size_t end = EndOfHistory(track, move);
     for (const double sign : {-1.0, 1.0}) {
+      const double enough = std::max(best.gained, gain_min) - kRounding;
       double gained = 0;
-      for (std::size_t i = move; i < end; ++i) {
-        const double theta = rows.added_deg[kTheta][i], phi = rows.added_deg[kPhi][i];
-        gained += RowCost(rows, i, theta, phi) -
-                  RowCost(rows, i, theta + sign * steps[0], phi + sign * steps[1]);
-      }
-      if (gained > best.gained) best = {move, sign, gained};
+      // No more can be gained than what the rows to come cost: most moves are out after a few.
+      for (std::size_t i = move; i < end && gained + costs.from[i] - costs.from[end] >= enough; ++i)
+        gained += costs.of_row[i] - RowCost(rows, i, rows.added_deg[kTheta][i] + sign * steps[0],
+                                            rows.added_deg[kPhi][i] + sign * steps[1]);
+      if (gained > best.gained && gained >= enough) best = {move, sign, gained};
     }
   }
   return best;
@@ -75,7 +92,7 @@ std::vector<WholeMove> FindWholeMoves(double far_mm, UnitRows* rows) {
   const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
   std::vector<WholeMove> found;
   while (found.size() < kEventsMax) {
-    const WholeMove best = BestWholeMove(*rows);
+    const WholeMove best = BestWholeMove(*rows, gain_min);
     if (best.gained < gain_min) break;
     const std::size_t end = EndOfHistory(rows->track, best.move);
     for (std::size_t i = best.move; i < end; ++i)
