@@ -1,6 +1,8 @@
 #include "sim/diagnosis/lanes.h"
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <vector>
 
 #include "sim/diagnosis/neighbour_sum.h"
@@ -25,9 +27,9 @@ void Put(const Pair* pairs, Lanes* lanes) {
 }
 
 bool IsAllZero(const std::vector<double>& values) {
-  bool any = false;
-  for (const double value : values) any |= value != 0;
-  return !any;
+  std::uint64_t bits = 0;
+  for (const double value : values) bits |= std::bit_cast<std::uint64_t>(value);
+  return bits << 1 == 0;  // but for the sign
 }
 
 // Of one axis' angle alone, as most effects are.

@@ -248,28 +248,39 @@ struct Scratch {
   std::vector<Lanes> raw, m;          // Shape: (2 moves): before and after the projection
   std::vector<Lanes> gg, by;          // Shape: (moves): products of m with itself and with the data
   std::vector<Lanes> parts;           // along a plane's columns
+  std::vector<double> products;       // of several columns with each other. Shape: (moves, c, c)
   std::vector<std::size_t> exposure;  // Shape: (moves)
 };
 
-MatrixXd ColumnsOf(const Lanes* rows, Index count, const Placed& placed, std::size_t columns) {
-  MatrixXd m(count, static_cast<Index>(columns));
-  for (std::size_t c = 0; c < columns; ++c)
-    for (Index r = 0; r < count; ++r) m(r, static_cast<Index>(c)) = rows[r].at[placed.lane + c];
-  return m;
+// Products of a template's columns with each other, move by move. Shape: (moves, c, c).
+void MultiplyColumns(const std::vector<Lanes>& m, const Placed& placed, std::size_t columns,
+                     std::vector<double>* products) {
+  products->resize(m.size() / 2 * columns * columns);
+  double* product = products->data();
+  for (const Lanes *x = m.data(), *end = x + m.size(); x != end; x += 2)
+    for (std::size_t p = placed.lane; p < placed.lane + columns; ++p)
+      for (std::size_t q = placed.lane; q < placed.lane + columns; ++q)
+        *product++ = x[0].at[p] * x[0].at[q] + x[1].at[p] * x[1].at[q];
 }
 
+// As SumAlikeNeighbours, in units of g. `by`: the columns' products with the data.
 template <int kSize>
-double SpreadOf(const MatrixXd& m, const MatrixXd& g, const VectorXd& b, const VectorXd& y) {
+double SpreadOf(const std::vector<double>& products, const std::vector<Lanes>& by,
+                const Placed& placed, const MatrixXd& g, const VectorXd& b) {
   using Sum = NeighbourSum<kSize>;
-  const Index c = m.cols();
-  const typename Sum::Square inverse = g.ldlt().solve(Sum::Square::Identity(c, c));
-  const typename Sum::Small own = inverse * b;
+  using Small = typename Sum::Small;
+  using Square = typename Sum::Square;
+  const Index c = g.rows();
+  const Square inverse = g.ldlt().solve(Square::Identity(c, c));
+  const Small own = inverse * b;
   Sum sum(inverse);
-  typename Sum::Small row(c);
-  for (Index at = 0; at + 1 < y.size(); at += 2) {
-    row = m.row(at).transpose() * (y[at] - m.row(at).dot(own)) +
-          m.row(at + 1).transpose() * (y[at + 1] - m.row(at + 1).dot(own));
+  Small row(c);
+  const double* product = products.data();
+  for (const Lanes& of_move : by) {
+    row = Eigen::Map<const Small>(of_move.at + placed.lane, c);
+    row.noalias() -= Eigen::Map<const Square>(product, c, c) * own;
     sum.Add(row);
+    product += c * c;
   }
   return sum.sum();
 }
@@ -284,14 +295,13 @@ void AddSpread(double sum, Index values, Index spent, std::size_t columns, Fleet
   part->spread_count += static_cast<double>(columns);
 }
 
-void AddExposureProducts(const MatrixXd& m, const std::vector<std::size_t>& exposure,
+void AddExposureProducts(const std::vector<double>& products,
+                         const std::vector<std::size_t>& exposure, std::size_t size,
                          std::vector<double>* sums) {
-  const Index c = m.cols();
-  for (std::size_t k = 0; k < exposure.size(); ++k) {
-    double* sum = sums->data() + exposure[k] * static_cast<std::size_t>(c * c);
-    const auto at = static_cast<Index>(2 * k);
-    for (Index p = 0; p < c; ++p)
-      for (Index q = 0; q < c; ++q) *sum++ += m(at, p) * m(at, q) + m(at + 1, p) * m(at + 1, q);
+  const double* product = products.data();
+  for (const std::size_t e : exposure) {
+    double* sum = sums->data() + e * size;
+    for (std::size_t i = 0; i < size; ++i) sum[i] += *product++;
   }
 }
 
@@ -429,13 +439,16 @@ class BlockScorer {
                    FleetPart* fleet) {
     const std::size_t c = plan_.templates[placed.form].columns;
     const auto ic = static_cast<Index>(c);
-    const MatrixXd m = ColumnsOf(scratch_.m.data(), look.y.size(), placed, c);
-    const MatrixXd g = m.transpose() * m;
+    std::vector<double>& products = scratch_.products;
+    MultiplyColumns(scratch_.m, placed, c, &products);
+    MatrixXd g = MatrixXd::Zero(ic, ic);
+    for (std::size_t k = 0; k < moves_; ++k)
+      for (std::size_t i = 0; i < c * c; ++i) g.data()[i] += products.data()[k * c * c + i];
     std::copy_n(g.data(), c * c, score->g.data() + unit_ * c * c);
     const VectorXd b = Eigen::Map<const VectorXd>(score->b.data() + unit_ * c, ic);
-    AddExposureProducts(m, scratch_.exposure, &fleet->exposure_g);
-    const double sum =
-        c == 2 ? SpreadOf<2>(m, g, b, look.y) : SpreadOf<Eigen::Dynamic>(m, g, b, look.y);
+    AddExposureProducts(products, scratch_.exposure, c * c, &fleet->exposure_g);
+    const double sum = c == 2 ? SpreadOf<2>(products, scratch_.by, placed, g, b)
+                              : SpreadOf<Eigen::Dynamic>(products, scratch_.by, placed, g, b);
     AddSpread(sum, look.y.size(), spent_, c, fleet);
   }
 
@@ -469,6 +482,7 @@ void AddUnit(const UnitScorer& scorer, const SharedColumns& shared, ChunkPart* p
 
 void ScoreUnit(const PassPlan& plan, std::size_t unit, Scratch* scratch,
                std::vector<ScorePass>* passes, ChunkPart* part) {
+  if (!plan.fit.UsesUnit(unit)) return;
   UnitScorer scorer(plan.fit, unit, plan.withouts, plan.shared);
   if (!scorer.usable()) return;
   AddUnit(scorer, plan.shared, part);
