@@ -73,17 +73,38 @@ std::vector<Change> ChangesIn(const UnitTrack& track, std::size_t move, ChangeKi
   return changes;
 }
 
-Change BestChange(const UnitRows& rows, ChangeKind kind) {
+// What every row costs now, and all from a row on.
+struct Costs {
+  std::vector<double> of_row, from;
+};
+Costs CostsOf(const UnitRows& rows) {
+  const std::size_t moves = rows.track.moves;
+  Costs costs{std::vector<double>(moves), std::vector<double>(moves + 1, 0)};
+  for (std::size_t i = moves; i-- > 0;) {
+    costs.of_row[i] = RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]);
+    costs.from[i] = costs.from[i + 1] + costs.of_row[i];
+  }
+  return costs;
+}
+
+// The one that gains most, if it gains `gain_min`.
+Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
+  constexpr double kRounding = 1e-9;  // of sums of squares, mm^2
+  const Costs costs = CostsOf(rows);
   Change best;
   for (std::size_t move = 0; move < rows.track.moves; ++move) {
     const std::size_t end = EndOfHistory(rows.track, move);
     for (Change& change : ChangesIn(rows.track, move, kind)) {
-      for (std::size_t i = move; i < end; ++i) {
-        const double theta = rows.added_deg[kTheta][i], phi = rows.added_deg[kPhi][i];
-        change.gained += RowCost(rows, i, theta, phi) -
-                         RowCost(rows, i, theta + change.by_deg[kTheta], phi + change.by_deg[kPhi]);
-      }
-      if (change.gained > best.gained) best = change;
+      const double enough = std::max(best.gained, gain_min) - kRounding;
+      double gained = 0;
+      // No more can be gained than what the rows to come cost: most moves are out after a few.
+      for (std::size_t i = move; i < end && gained + costs.from[i] - costs.from[end] >= enough; ++i)
+        gained +=
+            costs.of_row[i] - RowCost(rows, i, rows.added_deg[kTheta][i] + change.by_deg[kTheta],
+                                      rows.added_deg[kPhi][i] + change.by_deg[kPhi]);
+      if (gained <= best.gained || gained < enough) continue;
+      best = change;
+      best.gained = gained;
     }
   }
   return best;
@@ -94,7 +115,7 @@ std::vector<Change> FindChanges(ChangeKind kind, double far_mm, UnitRows* rows) 
   const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
   std::vector<Change> found;
   while (found.size() < kEventsMax) {
-    const Change best = BestChange(*rows, kind);
+    const Change best = BestChange(*rows, kind, gain_min);
     if (best.gained < gain_min) break;
     const std::size_t end = EndOfHistory(rows->track, best.move);
     for (std::size_t i = best.move; i < end; ++i)

@@ -26,6 +26,13 @@ struct Fit {
   ParallelFor parallel;
 
   [[nodiscard]] bool Used(std::size_t row) const { return weight[row] > 0; }
+  /// Whether any row of the unit is used.
+  [[nodiscard]] bool UsesUnit(std::size_t unit) const {
+    const std::vector<std::size_t>& first = facts->campaign->first_row;
+    for (std::size_t row = first[unit]; row < first[unit + 1]; ++row)
+      if (Used(row)) return true;
+    return false;
+  }
 };
 
 /// Starts from the table's geometry: finds each unit's static geometry robustly, also where zeros

@@ -12,6 +12,13 @@
 
 namespace focalfleet::sim {
 
+inline constexpr std::size_t kNeighbourLags = 4;
+
+/// With which share the product of vectors so many places apart counts.
+constexpr double NeighbourShare(std::size_t lag) {
+  return 1 - static_cast<double>(lag) / (kNeighbourLags + 1);
+}
+
 /// kSize: of the vectors; Eigen::Dynamic: up to kColumnsMax.
 template <int kSize>
 class NeighbourSum {
@@ -27,18 +34,17 @@ class NeighbourSum {
   void Add(const Small& v) {
     const Small w = inverse_ * v;
     sum_ += v.dot(w);
-    for (std::size_t lag = 0; lag < kLags; ++lag)
-      sum_ += 2 * (1 - static_cast<double>(lag + 1) / (kLags + 1)) *
-              past_[(next_ + kLags - 1 - lag) % kLags].dot(w);
-    past_[next_++ % kLags] = v;
+    for (std::size_t lag = 1; lag <= kNeighbourLags; ++lag)
+      sum_ +=
+          2 * NeighbourShare(lag) * past_[(next_ + kNeighbourLags - lag) % kNeighbourLags].dot(w);
+    past_[next_++ % kNeighbourLags] = v;
   }
   /// Trace of inverse * variance. Never negative.
   [[nodiscard]] double sum() const { return std::max(sum_, 0.0); }
 
  private:
-  static constexpr std::size_t kLags = 4;
   Square inverse_;
-  std::array<Small, kLags> past_;
+  std::array<Small, kNeighbourLags> past_;
   std::size_t next_ = 0;
   double sum_ = 0;
 };

@@ -1,9 +1,9 @@
 #include "sim/diagnosis/score.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "sim/diagnosis/lanes.h"
 #include "sim/diagnosis/neighbour_sum.h"
 
 namespace focalfleet::sim {
@@ -38,254 +38,497 @@ class Basis {
     columns->noalias() -= columns_ * parts;
   }
   [[nodiscard]] Index size() const { return columns_.cols(); }
+  [[nodiscard]] const MatrixXd& columns() const { return columns_; }
 
  private:
   MatrixXd columns_;
 };
 
+// Where the templates' columns stand: whole templates, those of one column first.
+struct Placed {
+  std::size_t form = 0;
+  std::size_t lane = 0;
+};
+struct Block {
+  std::vector<Placed> forms;
+  bool single = true;  // all of one column
+};
+
+std::vector<Block> PlaceInLanes(const Templates& templates) {
+  std::vector<Block> blocks;
+  for (const bool single : {true, false}) {
+    std::size_t used = kLanes;
+    for (std::size_t k = 0; k < templates.size(); ++k) {
+      const std::size_t c = templates[k].columns;
+      if ((c == 1) != single) continue;
+      if (used + c > kLanes) blocks.push_back({{}, single}), used = 0;
+      blocks.back().forms.push_back({k, used});
+      used += c;
+    }
+  }
+  return blocks;
+}
+
+// Which of the terms' shared columns stand beside the templates in a look without one term.
+struct SharedColumns {
+  std::vector<Index> begin_of_term;  // kNone: its amplitudes are units' own
+  Index count = 0;
+  std::vector<std::vector<Index>> of_look;
+  static constexpr Index kNone = -1;
+};
+
+SharedColumns ListShared(const std::vector<ModelTerm>& terms,
+                         std::span<const std::size_t> withouts) {
+  SharedColumns shared;
+  for (const ModelTerm& term : terms) {
+    const bool own = term.sharing == Sharing::kUnit;
+    shared.begin_of_term.push_back(own ? SharedColumns::kNone : shared.count);
+    if (!own) shared.count += static_cast<Index>(term.form.columns);
+  }
+  for (const std::size_t without : withouts) {
+    std::vector<Index>& columns = shared.of_look.emplace_back();
+    for (std::size_t t = 0; t < terms.size(); ++t) {
+      if (t == without || shared.begin_of_term[t] == SharedColumns::kNone) continue;
+      for (std::size_t c = 0; c < terms[t].form.columns; ++c)
+        columns.push_back(shared.begin_of_term[t] + static_cast<Index>(c));
+    }
+  }
+  return shared;
+}
+
+// One unit as each of the looks sees it. What differs between looks is which term is left out; the
+// rows and their whitening are the same.
 class UnitScorer {
  public:
-  UnitScorer(const Fit& fit, std::size_t unit, std::size_t without)
-      : fit_(fit),
-        unit_(unit),
-        without_(without),
-        white_(Whiten(fit, unit)),
-        basis_(white_.y.size()) {
-    y_ = white_.y;
-    target_ = VectorXd::Zero(y_.size());
-    shared_.resize(y_.size(), 0);
-    for (Index c = 0; c < white_.geometry.cols(); ++c) basis_.Add(white_.geometry.col(c));
-    AddTerms();
-    AddHomings();
-    basis_.Remove(&y_);
-    basis_.Remove(&target_);
-    basis_.Remove(&shared_);
-  }
+  // What the unit's own unknowns span, and the shared columns beside it.
+  struct Plane {
+    Basis basis;
+    MatrixXd shared;
+  };
+  struct UnitLook {
+    std::size_t plane = 0;
+    VectorXd y, target;
+    bool usable = false;
+  };
 
-  [[nodiscard]] bool usable() const { return y_.size() > basis_.size() + 3; }
-  [[nodiscard]] const VectorXd& y() const { return y_; }
-  [[nodiscard]] const VectorXd& target() const { return target_; }
-  [[nodiscard]] const MatrixXd& shared() const { return shared_; }
-  [[nodiscard]] const WhiteUnit& white() const { return white_; }
-
-  /// The template's projected columns; `raw` gets their squared length before.
-  MatrixXd Signature(const Template& form, double* raw) {
-    MatrixXd m(y_.size(), static_cast<Index>(form.columns));
-    for (std::size_t c = 0; c < form.columns; ++c) {
-      ApplyColumn(white_.track, form, c, 1, &errors_);
-      WhiteDisplacement(white_, errors_, m.col(static_cast<Index>(c)).data());
+  UnitScorer(const Fit& fit, std::size_t unit, std::span<const std::size_t> withouts,
+             const SharedColumns& shared)
+      : fit_(fit), unit_(unit), white_(Whiten(fit, unit)) {
+    const std::size_t terms = fit.model.terms.size();
+    shared_ = MatrixXd::Zero(white_.y.size(), shared.count);
+    own_.resize(terms);
+    for (std::size_t t = 0; t < terms; ++t) MakeColumns(t, shared.begin_of_term[t]);
+    MakeHomings();
+    std::vector<std::size_t> plane_of(terms + 1, kNoTerm);
+    for (const std::size_t without : withouts) {
+      const bool own = without != kNoTerm && own_[without].cols() > 0;
+      std::size_t& plane = plane_of[own ? without : terms];
+      if (plane == kNoTerm) plane = planes_.size(), planes_.push_back(PlaneWithout(without));
+      looks_.push_back(LookWithout(without, plane));
     }
-    *raw = m.squaredNorm();
-    basis_.Remove(&m);
-    return m;
   }
-  [[nodiscard]] Index freedom_spent() const { return basis_.size(); }
+
+  [[nodiscard]] const WhiteUnit& white() const { return white_; }
+  [[nodiscard]] const std::vector<Plane>& planes() const { return planes_; }
+  [[nodiscard]] const std::vector<UnitLook>& looks() const { return looks_; }
+  [[nodiscard]] bool usable() const {
+    return std::any_of(looks_.begin(), looks_.end(),
+                       [](const UnitLook& look) { return look.usable; });
+  }
+
+  /// The templates' whitened columns.
+  void MakeSignatures(const Templates& templates, const Block& block, std::vector<Lanes>* rows) {
+    std::fill(rows->begin(), rows->end(), Lanes{});
+    for (const Placed& placed : block.forms) {
+      const Template& form = templates[placed.form];
+      for (std::size_t c = 0; c < form.columns; ++c) {
+        ApplyColumn(white_.track, form, c, 1, &errors_);
+        PutDisplacement(white_, errors_, placed.lane + c, rows->data());
+      }
+    }
+    WhitenLanes(white_, rows->data());
+  }
 
  private:
-  void AddTerms() {
-    for (std::size_t t = 0; t < fit_.model.terms.size(); ++t) {
-      const ModelTerm& term = fit_.model.terms[t];
-      const std::span<const double> amplitude = term.AmplitudeOf(unit_);
-      if (t == without_) {
-        if (amplitude.empty()) continue;
-        errors_.Reset(white_.track.moves);
-        term.form.effect->apply(white_.track, term.form, amplitude, &errors_);
-        WhiteDisplacement(white_, errors_, target_.data());
-        y_ += target_;
-        continue;
-      }
-      VectorXd column = VectorXd::Zero(y_.size());
-      for (std::size_t c = 0; c < term.form.columns; ++c) {
-        if (!amplitude.empty()) {
-          const bool plain = term.sharing == Sharing::kFleet || term.sharing == Sharing::kUnit;
-          ApplyColumn(white_.track, term.form, c, plain ? 1 : amplitude[c], &errors_);
-          WhiteDisplacement(white_, errors_, column.data());
-        }
-        if (term.sharing == Sharing::kUnit) {
-          basis_.Add(column);
-        } else {
-          shared_.conservativeResize(Eigen::NoChange, shared_.cols() + 1);
-          shared_.col(shared_.cols() - 1) = column;
-        }
-      }
+  void MakeColumns(std::size_t t, Index shared_begin) {
+    const ModelTerm& term = fit_.model.terms[t];
+    const std::span<const double> amplitude = term.AmplitudeOf(unit_);
+    if (amplitude.empty()) return;
+    const bool plain = term.sharing == Sharing::kFleet || term.sharing == Sharing::kUnit;
+    const auto c = static_cast<Index>(term.form.columns);
+    MatrixXd columns(white_.y.size(), c);
+    for (Index k = 0; k < c; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      ApplyColumn(white_.track, term.form, at, plain ? 1 : amplitude[at], &errors_);
+      WhiteDisplacement(white_, errors_, columns.col(k).data());
+    }
+    if (shared_begin == SharedColumns::kNone)
+      own_[t] = std::move(columns);
+    else
+      shared_.middleCols(shared_begin, c) = columns;
+  }
+
+  void MakeHomings() {
+    const std::vector<Homing> homings = FreeHomingsOf(fit_.model, white_.track);
+    homings_.resize(white_.y.size(), static_cast<Index>(homings.size()));
+    for (std::size_t h = 0; h < homings.size(); ++h) {
+      ApplyHoming(white_.track, homings[h], &errors_);
+      WhiteDisplacement(white_, errors_, homings_.col(static_cast<Index>(h)).data());
     }
   }
 
-  void AddHomings() {
-    VectorXd column(y_.size());
-    for (const Homing& homing : FreeHomingsOf(fit_.model, white_.track)) {
-      ApplyHoming(white_.track, homing, &errors_);
-      WhiteDisplacement(white_, errors_, column.data());
-      basis_.Add(column);
+  Plane PlaneWithout(std::size_t without) const {
+    Plane plane{Basis(white_.y.size()), shared_};
+    for (Index c = 0; c < white_.geometry.cols(); ++c) plane.basis.Add(white_.geometry.col(c));
+    for (std::size_t t = 0; t < own_.size(); ++t)
+      for (Index c = 0; t != without && c < own_[t].cols(); ++c) plane.basis.Add(own_[t].col(c));
+    for (Index c = 0; c < homings_.cols(); ++c) plane.basis.Add(homings_.col(c));
+    plane.basis.Remove(&plane.shared);
+    return plane;
+  }
+
+  UnitLook LookWithout(std::size_t without, std::size_t plane) {
+    UnitLook look{plane, white_.y, VectorXd::Zero(white_.y.size())};
+    if (without != kNoTerm) {
+      const ModelTerm& term = fit_.model.terms[without];
+      const std::span<const double> amplitude = term.AmplitudeOf(unit_);
+      if (!amplitude.empty()) {
+        errors_.Reset(white_.track.moves);
+        term.form.effect->apply(white_.track, term.form, amplitude, &errors_);
+        WhiteDisplacement(white_, errors_, look.target.data());
+        look.y += look.target;
+      }
     }
+    const Basis& basis = planes_[plane].basis;
+    look.usable = look.y.size() > basis.size() + 3;
+    basis.Remove(&look.y);
+    basis.Remove(&look.target);
+    return look;
   }
 
   const Fit& fit_;
   std::size_t unit_;
-  std::size_t without_;
   WhiteUnit white_;
-  Basis basis_;
-  VectorXd y_, target_;
-  MatrixXd shared_;
+  std::vector<MatrixXd> own_;  // Shape: (terms): columns of units' own amplitudes
+  MatrixXd shared_, homings_;
+  std::vector<Plane> planes_;
+  std::vector<UnitLook> looks_;
   PoseErrors errors_;
 };
 
-// What a chunk of units adds to the sums over the fleet.
+// What a chunk of units adds to a template's sums over the fleet.
 struct FleetPart {
-  std::vector<double> exposure_b, exposure_g;
-  VectorXd shared_b;  // of one template: shared' m, per column
   double raw = 0, kept = 0, spread_sum = 0, spread_count = 0;
+  std::vector<double> exposure_g;  // of several columns. Shape: (exposures, c, c)
 };
 
-struct ChunkPart {
+struct LookPart {
   std::vector<FleetPart> of_template;
-  std::vector<MatrixXd> shared_cross;  // shared' M, per template
+  std::vector<Lanes> exposure_b, exposure_g;  // Shape: (blocks, exposures)
+  std::vector<Lanes> shared_cross;            // shared' M. Shape: (blocks, shared columns of all)
   MatrixXd shared_g;
   VectorXd shared_b, shared_target_b;
   double target_square = 0, residual_square = 0;
   std::size_t values = 0;
 };
 
-void AddRows(const MatrixXd& m, const VectorXd& y, const WhiteUnit& white,
-             const Exposures& exposures, FleetPart* part) {
-  const auto c = static_cast<std::size_t>(m.cols());
-  if (c == 1) {  // most templates
-    const double* a = m.data();
-    for (std::size_t k = 0; k < white.moves.size(); ++k, a += 2) {
-      const std::size_t e = exposures.of_row[white.track.first_row + white.moves[k]];
-      const auto at = static_cast<Index>(2 * k);
-      part->exposure_b[e] += a[0] * y[at] + a[1] * y[at + 1];
-      part->exposure_g[e] += a[0] * a[0] + a[1] * a[1];
-    }
-    return;
-  }
-  for (std::size_t k = 0; k < white.moves.size(); ++k) {
-    const std::size_t e = exposures.of_row[white.track.first_row + white.moves[k]];
-    const auto at = static_cast<Index>(2 * k);
-    for (std::size_t p = 0; p < c; ++p) {
-      const auto ip = static_cast<Index>(p);
-      part->exposure_b[e * c + p] += m(at, ip) * y[at] + m(at + 1, ip) * y[at + 1];
-      for (std::size_t q = 0; q < c; ++q) {
-        const auto iq = static_cast<Index>(q);
-        part->exposure_g[(e * c + p) * c + q] +=
-            m(at, ip) * m(at, iq) + m(at + 1, ip) * m(at + 1, iq);
-      }
-    }
-  }
+using ChunkPart = std::vector<LookPart>;  // Shape: (looks)
+
+// All that the units of a pass have in common.
+struct PassPlan {
+  const Fit& fit;
+  const Templates& templates;
+  std::span<const std::size_t> withouts;
+  std::vector<Block> blocks;
+  SharedColumns shared;
+};
+
+// Room for one block of one unit.
+struct Scratch {
+  std::vector<Lanes> raw, m;          // Shape: (2 moves): before and after the projection
+  std::vector<Lanes> gg, by;          // Shape: (moves): products of m with itself and with the data
+  std::vector<Lanes> parts;           // along a plane's columns
+  std::vector<double> products;       // of several columns with each other. Shape: (moves, c, c)
+  std::vector<std::size_t> exposure;  // Shape: (moves)
+};
+
+// Products of a template's columns with each other, move by move. Shape: (moves, c, c).
+void MultiplyColumns(const std::vector<Lanes>& m, const Placed& placed, std::size_t columns,
+                     std::vector<double>* products) {
+  products->resize(m.size() / 2 * columns * columns);
+  double* product = products->data();
+  for (const Lanes *x = m.data(), *end = x + m.size(); x != end; x += 2)
+    for (std::size_t p = placed.lane; p < placed.lane + columns; ++p)
+      for (std::size_t q = placed.lane; q < placed.lane + columns; ++q)
+        *product++ = x[0].at[p] * x[0].at[q] + x[1].at[p] * x[1].at[q];
 }
 
+// As SumAlikeNeighbours, in units of g. `by`: the columns' products with the data.
 template <int kSize>
-double SpreadOf(const MatrixXd& m, const VectorXd& y) {
+double SpreadOf(const std::vector<double>& products, const std::vector<Lanes>& by,
+                const Placed& placed, const MatrixXd& g, const VectorXd& b) {
   using Sum = NeighbourSum<kSize>;
-  const Index c = m.cols();
-  const typename Sum::Square g = m.transpose() * m;
-  const typename Sum::Square inverse = g.ldlt().solve(Sum::Square::Identity(c, c));
-  const typename Sum::Small own = inverse * (m.transpose() * y);
+  using Small = typename Sum::Small;
+  using Square = typename Sum::Square;
+  const Index c = g.rows();
+  const Square inverse = g.ldlt().solve(Square::Identity(c, c));
+  const Small own = inverse * b;
   Sum sum(inverse);
-  typename Sum::Small row(c);
-  for (Index at = 0; at + 1 < y.size(); at += 2) {
-    row = m.row(at).transpose() * (y[at] - m.row(at).dot(own)) +
-          m.row(at + 1).transpose() * (y[at + 1] - m.row(at + 1).dot(own));
+  Small row(c);
+  const double* product = products.data();
+  for (const Lanes& of_move : by) {
+    row = Eigen::Map<const Small>(of_move.at + placed.lane, c);
+    row.noalias() -= Eigen::Map<const Square>(product, c, c) * own;
     sum.Add(row);
+    product += c * c;
   }
   return sum.sum();
 }
 
 // Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise that
 // remembers makes more of it.
-void AddSpread(const MatrixXd& m, const VectorXd& y, Index spent, FleetPart* part) {
-  const Index c = m.cols();
-  const double sum = c == 1 ? SpreadOf<1>(m, y) : SpreadOf<Eigen::Dynamic>(m, y);
-  const double n = static_cast<double>(y.size());
-  const double free = n - static_cast<double>(spent + c);
+void AddSpread(double sum, Index values, Index spent, std::size_t columns, FleetPart* part) {
+  const auto n = static_cast<double>(values);
+  const double free = n - static_cast<double>(spent) - static_cast<double>(columns);
   if (free < 4 || !std::isfinite(sum)) return;
   part->spread_sum += sum * n / free;
-  part->spread_count += static_cast<double>(c);
+  part->spread_count += static_cast<double>(columns);
 }
 
-// Share of a signature that one row has.
-double Leverage(const MatrixXd& m, double kept) {
-  double most = 0;
-  for (Index at = 0; at + 1 < m.rows(); at += 2)
-    most = std::max(most, m.row(at).squaredNorm() + m.row(at + 1).squaredNorm());
-  return most / kept;
+void AddExposureProducts(const std::vector<double>& products,
+                         const std::vector<std::size_t>& exposure, std::size_t size,
+                         std::vector<double>* sums) {
+  const double* product = products.data();
+  for (const std::size_t e : exposure) {
+    double* sum = sums->data() + e * size;
+    for (std::size_t i = 0; i < size; ++i) sum[i] += *product++;
+  }
 }
 
-void ScoreUnit(const Fit& fit, const Templates& templates, std::size_t unit, std::size_t without,
-               ScorePass* pass, ChunkPart* part) {
-  UnitScorer scorer(fit, unit, without);
-  if (!scorer.usable()) return;
-  part->residual_square += scorer.y().squaredNorm();
-  part->target_square += scorer.target().squaredNorm();
-  part->values += static_cast<std::size_t>(scorer.y().size());
-  const MatrixXd& shared = scorer.shared();
-  part->shared_g.noalias() += shared.transpose() * shared;
-  part->shared_b.noalias() += shared.transpose() * scorer.y();
-  part->shared_target_b.noalias() += shared.transpose() * scorer.target();
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    double raw = 0;
-    const MatrixXd m = scorer.Signature(templates[k], &raw);
-    FleetPart& fleet = part->of_template[k];
-    fleet.raw += raw;
-    const double kept = m.squaredNorm();
+void AddAtExposures(const std::vector<Lanes>& of_move, const std::vector<std::size_t>& exposure,
+                    Lanes* sums) {
+  for (std::size_t k = 0; k < exposure.size(); ++k) AddLanes(of_move[k], sums + exposure[k]);
+}
+
+// Scores one unit in the lanes of one block after the other.
+class BlockScorer {
+ public:
+  BlockScorer(const PassPlan& plan, std::size_t unit, UnitScorer* scorer, Scratch* scratch)
+      : plan_(plan), unit_(unit), scorer_(*scorer), scratch_(*scratch) {
+    moves_ = scorer_.white().moves.size();
+    scratch_.raw.resize(2 * moves_), scratch_.m.resize(2 * moves_);
+    scratch_.gg.resize(moves_), scratch_.by.resize(moves_);
+    scratch_.exposure.clear();
+    for (const std::size_t move : scorer_.white().moves)
+      scratch_.exposure.push_back(
+          plan.fit.facts->exposures.of_row[scorer_.white().track.first_row + move]);
+  }
+
+  void Score(std::size_t block, std::vector<ScorePass>* passes, ChunkPart* part) {
+    block_ = block;
+    scorer_.MakeSignatures(plan_.templates, plan_.blocks[block], &scratch_.raw);
+    raw_ = SquareLanes(scratch_.raw.data(), 2 * moves_);
+    for (std::size_t p = 0; p < scorer_.planes().size(); ++p) {
+      Project(scorer_.planes()[p]);
+      for (std::size_t l = 0; l < scorer_.looks().size(); ++l) {
+        const UnitScorer::UnitLook& look = scorer_.looks()[l];
+        if (look.plane != p || !look.usable) continue;
+        AddLengths(&(*part)[l]);
+        AddShared(plan_.shared.of_look[l], &(*part)[l]);
+        TakeLook(look, &(*passes)[l], &(*part)[l]);
+      }
+    }
+  }
+
+ private:
+  // Off with what the plane absorbs; lanes whose rest says nothing are emptied.
+  void Project(const UnitScorer::Plane& plane) {
+    const MatrixXd& columns = plane.basis.columns();
+    scratch_.parts.resize(static_cast<std::size_t>(columns.cols()));
+    MultiplyLanes(columns, scratch_.raw.data(), scratch_.parts.data());
+    SubtractColumns(columns, scratch_.parts.data(), scratch_.raw.data(), scratch_.m.data());
+    spent_ = plane.basis.size();
+    const OwnProducts own = MultiplyByThemselves(scratch_.m.data(), moves_, scratch_.gg.data());
+    kept_ = own.sum;
+    says_.clear();
+    Lanes mask;
+    for (const Placed& placed : plan_.blocks[block_].forms) {
+      says_.push_back(SaysSomething(placed, own));
+      if (!says_.back()) continue;
+      for (std::size_t c = 0; c < plan_.templates[placed.form].columns; ++c)
+        mask.at[placed.lane + c] = 1;
+    }
+    if (std::find(says_.begin(), says_.end(), false) != says_.end()) Empty(mask);
+    shared_cross_.resize(static_cast<std::size_t>(plane.shared.cols()));
+    MultiplyLanes(plane.shared, scratch_.m.data(), shared_cross_.data());
+  }
+
+  [[nodiscard]] bool SaysSomething(const Placed& placed, const OwnProducts& own) const {
+    const std::size_t c = plan_.templates[placed.form].columns;
+    double raw = 0, kept = 0;
+    for (std::size_t lane = placed.lane; lane < placed.lane + c; ++lane)
+      raw += raw_.at[lane], kept += kept_.at[lane];
     // Less than this is what the unit's geometry explains as well, and large amplitudes of it.
-    if (!(kept > kKeptMin * raw)) continue;
-    if (templates[k].columns == 1 && Leverage(m, kept) > kLeverageMax) continue;
-    fleet.kept += kept;
-    const auto c = static_cast<Index>(templates[k].columns);
-    const MatrixXd g = m.transpose() * m;
-    const VectorXd b = m.transpose() * scorer.y();
-    const VectorXd target_b = m.transpose() * scorer.target();
-    Score& score = pass->scores[k];
-    const auto at = static_cast<Index>(unit) * c;
-    std::copy_n(b.data(), c, score.b.begin() + at);
-    std::copy_n(target_b.data(), c, score.target_b.begin() + at);
-    std::copy_n(g.data(), c * c, score.g.begin() + at * c);
-    AddRows(m, scorer.y(), scorer.white(), fit.facts->exposures, &fleet);
-    AddSpread(m, scorer.y(), scorer.freedom_spent(), &fleet);
-    part->shared_cross[k].noalias() += shared.transpose() * m;
+    if (!(kept > kKeptMin * raw)) return false;
+    return c > 1 || own.most.at[placed.lane] / kept <= kLeverageMax;
+  }
+
+  void Empty(const Lanes& mask) {
+    for (std::vector<Lanes>* rows : {&scratch_.m, &scratch_.gg})
+      for (Lanes& row : *rows)
+        for (std::size_t j = 0; j < kLanes; ++j) row.at[j] = mask.at[j] > 0 ? row.at[j] : 0;
+  }
+
+  void AddLengths(LookPart* part) const {
+    for (std::size_t i = 0; i < says_.size(); ++i) {
+      const Placed& placed = plan_.blocks[block_].forms[i];
+      FleetPart& fleet = part->of_template[placed.form];
+      for (std::size_t c = 0; c < plan_.templates[placed.form].columns; ++c) {
+        fleet.raw += raw_.at[placed.lane + c];
+        if (says_[i]) fleet.kept += kept_.at[placed.lane + c];
+      }
+    }
+  }
+
+  void AddShared(const std::vector<Index>& columns, LookPart* part) const {
+    Lanes* sums = part->shared_cross.data() + block_ * columns.size();
+    for (const Index column : columns)
+      AddLanes(shared_cross_[static_cast<std::size_t>(column)], sums++);
+  }
+
+  void TakeLook(const UnitScorer::UnitLook& look, ScorePass* pass, LookPart* part) {
+    const std::size_t exposures = plan_.fit.facts->exposures.size();
+    const Lanes b = MultiplyByData(scratch_.m.data(), look.y, scratch_.by.data());
+    AddAtExposures(scratch_.by, scratch_.exposure, &part->exposure_b[block_ * exposures]);
+    Lanes target_b;
+    MultiplyLanes(look.target, scratch_.m.data(), &target_b);
+    const Block& block = plan_.blocks[block_];
+    if (block.single) {
+      AddAtExposures(scratch_.gg, scratch_.exposure, &part->exposure_g[block_ * exposures]);
+      TakeSingles(look, b, part);
+    }
+    for (std::size_t i = 0; i < block.forms.size(); ++i) {
+      if (!says_[i]) continue;
+      const Placed& placed = block.forms[i];
+      const std::size_t c = plan_.templates[placed.form].columns;
+      sim::Score& score = pass->scores[placed.form];
+      for (std::size_t k = 0; k < c; ++k) {
+        score.b[unit_ * c + k] = b.at[placed.lane + k];
+        score.target_b[unit_ * c + k] = target_b.at[placed.lane + k];
+      }
+      if (c == 1)
+        score.g[unit_] = kept_.at[placed.lane];
+      else
+        TakeSeveral(placed, look, &score, &part->of_template[placed.form]);
+    }
+  }
+
+  void TakeSingles(const UnitScorer::UnitLook& look, const Lanes& b, LookPart* part) {
+    Lanes own;
+    const std::vector<Placed>& forms = plan_.blocks[block_].forms;
+    for (std::size_t i = 0; i < forms.size(); ++i)
+      if (says_[i]) own.at[i] = b.at[i] / kept_.at[i];
+    const Lanes sums = SumAlikeNeighbours(scratch_.by.data(), scratch_.gg.data(), own, moves_);
+    for (std::size_t i = 0; i < forms.size(); ++i)
+      if (says_[i])
+        AddSpread(sums.at[i] / kept_.at[i], look.y.size(), spent_, 1,
+                  &part->of_template[forms[i].form]);
+  }
+
+  void TakeSeveral(const Placed& placed, const UnitScorer::UnitLook& look, sim::Score* score,
+                   FleetPart* fleet) {
+    const std::size_t c = plan_.templates[placed.form].columns;
+    const auto ic = static_cast<Index>(c);
+    std::vector<double>& products = scratch_.products;
+    MultiplyColumns(scratch_.m, placed, c, &products);
+    MatrixXd g = MatrixXd::Zero(ic, ic);
+    for (std::size_t k = 0; k < moves_; ++k)
+      for (std::size_t i = 0; i < c * c; ++i) g.data()[i] += products.data()[k * c * c + i];
+    std::copy_n(g.data(), c * c, score->g.data() + unit_ * c * c);
+    const VectorXd b = Eigen::Map<const VectorXd>(score->b.data() + unit_ * c, ic);
+    AddExposureProducts(products, scratch_.exposure, c * c, &fleet->exposure_g);
+    const double sum = c == 2 ? SpreadOf<2>(products, scratch_.by, placed, g, b)
+                              : SpreadOf<Eigen::Dynamic>(products, scratch_.by, placed, g, b);
+    AddSpread(sum, look.y.size(), spent_, c, fleet);
+  }
+
+  const PassPlan& plan_;
+  std::size_t unit_;
+  UnitScorer& scorer_;
+  Scratch& scratch_;
+  std::size_t moves_ = 0;
+  // Of the block and plane at hand.
+  std::size_t block_ = 0;
+  Lanes raw_, kept_;
+  Index spent_ = 0;
+  std::vector<bool> says_;  // Shape: (templates of the block)
+  std::vector<Lanes> shared_cross_;
+};
+
+void AddUnit(const UnitScorer& scorer, const SharedColumns& shared, ChunkPart* part) {
+  for (std::size_t l = 0; l < scorer.looks().size(); ++l) {
+    const UnitScorer::UnitLook& look = scorer.looks()[l];
+    if (!look.usable) continue;
+    LookPart& sums = (*part)[l];
+    sums.residual_square += look.y.squaredNorm();
+    sums.target_square += look.target.squaredNorm();
+    sums.values += static_cast<std::size_t>(look.y.size());
+    const MatrixXd beside = scorer.planes()[look.plane].shared(Eigen::all, shared.of_look[l]);
+    sums.shared_g.noalias() += beside.transpose() * beside;
+    sums.shared_b.noalias() += beside.transpose() * look.y;
+    sums.shared_target_b.noalias() += beside.transpose() * look.target;
   }
 }
 
-Index SharedColumns(const Fit& fit, std::size_t without) {
-  Index columns = 0;
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    if (t != without && fit.model.terms[t].sharing != Sharing::kUnit)
-      columns += static_cast<Index>(fit.model.terms[t].form.columns);
-  return columns;
+void ScoreUnit(const PassPlan& plan, std::size_t unit, Scratch* scratch,
+               std::vector<ScorePass>* passes, ChunkPart* part) {
+  if (!plan.fit.UsesUnit(unit)) return;
+  UnitScorer scorer(plan.fit, unit, plan.withouts, plan.shared);
+  if (!scorer.usable()) return;
+  AddUnit(scorer, plan.shared, part);
+  BlockScorer blocks(plan, unit, &scorer, scratch);
+  for (std::size_t block = 0; block < plan.blocks.size(); ++block)
+    blocks.Score(block, passes, part);
 }
 
-ChunkPart EmptyPart(const Fit& fit, const Templates& templates, Index shared) {
-  const std::size_t exposures = fit.facts->exposures.size();
-  ChunkPart part;
-  part.of_template.resize(templates.size());
-  part.shared_cross.resize(templates.size());
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    const std::size_t c = templates[k].columns;
-    part.of_template[k].exposure_b.assign(exposures * c, 0);
-    part.of_template[k].exposure_g.assign(exposures * c * c, 0);
-    part.shared_cross[k] = MatrixXd::Zero(shared, static_cast<Index>(c));
+ChunkPart EmptyPart(const PassPlan& plan) {
+  const std::size_t exposures = plan.fit.facts->exposures.size();
+  ChunkPart part(plan.withouts.size());
+  for (std::size_t l = 0; l < part.size(); ++l) {
+    LookPart& look = part[l];
+    const auto shared = static_cast<Index>(plan.shared.of_look[l].size());
+    look.of_template.resize(plan.templates.size());
+    for (std::size_t k = 0; k < plan.templates.size(); ++k)
+      if (const std::size_t c = plan.templates[k].columns; c > 1)
+        look.of_template[k].exposure_g.assign(exposures * c * c, 0);
+    look.exposure_b.resize(plan.blocks.size() * exposures);
+    look.exposure_g.resize(plan.blocks.size() * exposures);
+    look.shared_cross.resize(plan.blocks.size() * plan.shared.of_look[l].size());
+    look.shared_g = MatrixXd::Zero(shared, shared);
+    look.shared_b = VectorXd::Zero(shared);
+    look.shared_target_b = VectorXd::Zero(shared);
   }
-  part.shared_g = MatrixXd::Zero(shared, shared);
-  part.shared_b = VectorXd::Zero(shared);
-  part.shared_target_b = VectorXd::Zero(shared);
   return part;
 }
 
 void AddTo(const std::vector<double>& from, std::vector<double>* to) {
   for (std::size_t i = 0; i < from.size(); ++i) (*to)[i] += from[i];
 }
+void AddTo(const std::vector<Lanes>& from, std::vector<Lanes>* to) {
+  for (std::size_t i = 0; i < from.size(); ++i) AddLanes(from[i], to->data() + i);
+}
 
-void Merge(const ChunkPart& from, ChunkPart* to) {
+void Merge(const LookPart& from, LookPart* to) {
   for (std::size_t k = 0; k < from.of_template.size(); ++k) {
     const FleetPart& a = from.of_template[k];
     FleetPart& b = to->of_template[k];
-    AddTo(a.exposure_b, &b.exposure_b);
     AddTo(a.exposure_g, &b.exposure_g);
     b.raw += a.raw, b.kept += a.kept;
     b.spread_sum += a.spread_sum, b.spread_count += a.spread_count;
-    to->shared_cross[k] += from.shared_cross[k];
   }
+  AddTo(from.exposure_b, &to->exposure_b);
+  AddTo(from.exposure_g, &to->exposure_g);
+  AddTo(from.shared_cross, &to->shared_cross);
   to->shared_g += from.shared_g;
   to->shared_b += from.shared_b;
   to->shared_target_b += from.shared_target_b;
@@ -294,46 +537,84 @@ void Merge(const ChunkPart& from, ChunkPart* to) {
   to->values += from.values;
 }
 
-void TakeFleet(const ChunkPart& all, const Templates& templates, ScorePass* pass) {
+// One template's lanes, as numbers one after the other.
+std::vector<double> OutOfLanes(const Lanes* rows, std::size_t count, const Placed& placed,
+                               std::size_t columns) {
+  std::vector<double> values;
+  values.reserve(count * columns);
+  for (std::size_t r = 0; r < count; ++r)
+    for (std::size_t c = 0; c < columns; ++c) values.push_back(rows[r].at[placed.lane + c]);
+  return values;
+}
+
+void SumUnits(Index c, Score* score) {
+  score->fleet_b = VectorXd::Zero(c);
+  score->fleet_target_b = VectorXd::Zero(c);
+  score->fleet_g = MatrixXd::Zero(c, c);
+  const auto units = static_cast<Index>(score->b.size()) / c;
+  for (Index u = 0; u < units; ++u) {
+    score->fleet_b += Eigen::Map<const VectorXd>(score->b.data() + u * c, c);
+    score->fleet_target_b += Eigen::Map<const VectorXd>(score->target_b.data() + u * c, c);
+    score->fleet_g += Eigen::Map<const MatrixXd>(score->g.data() + u * c * c, c, c);
+  }
+}
+
+void TakeFleet(const PassPlan& plan, const LookPart& all, ScorePass* pass) {
+  const std::size_t exposures = plan.fit.facts->exposures.size();
   const Index shared = all.shared_g.rows();
   const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(
       shared > 0 ? all.shared_g : MatrixXd::Identity(1, 1));
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    Score& score = pass->scores[k];
-    const FleetPart& part = all.of_template[k];
-    const auto c = static_cast<Index>(templates[k].columns);
-    score.exposure_b = part.exposure_b;
-    score.exposure_g = part.exposure_g;
+  const auto take = [&](std::size_t block, const Placed& placed) {
+    Score& score = pass->scores[placed.form];
+    const FleetPart& part = all.of_template[placed.form];
+    const std::size_t columns = plan.templates[placed.form].columns;
+    const auto c = static_cast<Index>(columns);
+    score.exposure_b = OutOfLanes(&all.exposure_b[block * exposures], exposures, placed, columns);
+    score.exposure_g = columns > 1
+                           ? part.exposure_g
+                           : OutOfLanes(&all.exposure_g[block * exposures], exposures, placed, 1);
     score.raw = part.raw, score.kept = part.kept;
     score.spread_sum = part.spread_sum, score.spread_count = part.spread_count;
-    score.fleet_b = VectorXd::Zero(c);
-    score.fleet_target_b = VectorXd::Zero(c);
-    score.fleet_g = MatrixXd::Zero(c, c);
-    const auto units = static_cast<Index>(score.b.size()) / c;
-    for (Index u = 0; u < units; ++u) {
-      score.fleet_b += Eigen::Map<const VectorXd>(&score.b[static_cast<std::size_t>(u * c)], c);
-      score.fleet_target_b +=
-          Eigen::Map<const VectorXd>(&score.target_b[static_cast<std::size_t>(u * c)], c);
-      score.fleet_g +=
-          Eigen::Map<const MatrixXd>(&score.g[static_cast<std::size_t>(u * c * c)], c, c);
-    }
-    if (shared == 0) continue;
+    SumUnits(c, &score);
+    if (shared == 0) return;
     const double own = score.fleet_g.trace();
-    const MatrixXd gone = solver.solve(all.shared_cross[k]);
+    const std::vector<double> crossed =
+        OutOfLanes(all.shared_cross.data() + block * static_cast<std::size_t>(shared),
+                   static_cast<std::size_t>(shared), placed, columns);
+    const MatrixXd cross = Eigen::Map<const MatrixXd>(crossed.data(), c, shared).transpose();
+    const MatrixXd gone = solver.solve(cross);
     score.fleet_b -= gone.transpose() * all.shared_b;
     score.fleet_target_b -= gone.transpose() * all.shared_target_b;
-    score.fleet_g -= all.shared_cross[k].transpose() * gone;
+    score.fleet_g -= cross.transpose() * gone;
     // What the model has already says nothing new: what is left of it is rounding.
-    if (score.fleet_g.trace() > kKeptMin * own) continue;
+    if (score.fleet_g.trace() > kKeptMin * own) return;
     score.fleet_b.setZero();
     score.fleet_target_b.setZero();
     score.fleet_g.setZero();
+  };
+  for (std::size_t block = 0; block < plan.blocks.size(); ++block)
+    for (const Placed& placed : plan.blocks[block].forms) take(block, placed);
+  pass->target_square = all.target_square;
+  pass->residual_square = all.residual_square;
+  pass->values = all.values;
+}
+
+ScorePass EmptyPass(const Templates& templates, std::size_t units) {
+  ScorePass pass;
+  pass.scores.resize(templates.size());
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    const std::size_t c = templates[k].columns;
+    pass.scores[k].b.assign(units * c, 0);
+    pass.scores[k].target_b.assign(units * c, 0);
+    pass.scores[k].g.assign(units * c * c, 0);
   }
+  return pass;
 }
 
 }  // namespace
 
-bool IsImpossible(const Template& form, const VectorXd& b, const MatrixXd& g) {
+bool IsImpossible(const Template& form, const Eigen::Ref<const VectorXd>& b,
+                  const Eigen::Ref<const MatrixXd>& g) {
   constexpr double kSigmas = 3;
   if (!(g.trace() > 0)) return false;
   if (b.size() == 1) return !CanBe(form, b[0] / g(0, 0), kSigmas / std::sqrt(g(0, 0)));
@@ -343,31 +624,34 @@ bool IsImpossible(const Template& form, const VectorXd& b, const MatrixXd& g) {
                     kSigmas * std::sqrt(static_cast<double>(b.size()) / g.trace());
 }
 
-ScorePass ScoreTemplates(const Fit& fit, const Templates& templates, std::size_t without) {
+std::vector<ScorePass> ScoreWithouts(const Fit& fit, const Templates& templates,
+                                     std::span<const std::size_t> withouts) {
   const std::size_t units = fit.model.units.size();
-  ScorePass pass;
-  pass.scores.resize(templates.size());
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    const std::size_t c = templates[k].columns;
-    pass.scores[k].b.assign(units * c, 0);
-    pass.scores[k].target_b.assign(units * c, 0);
-    pass.scores[k].g.assign(units * c * c, 0);
-  }
-  const Index shared = SharedColumns(fit, without);
+  const PassPlan plan{fit, templates, withouts, PlaceInLanes(templates),
+                      ListShared(fit.model.terms, withouts)};
+  std::vector<ScorePass> passes(withouts.size(), EmptyPass(templates, units));
+  ChunkPart all = EmptyPart(plan);
+  // A few chunks at a time: what each adds is as large as a pass.
+  constexpr std::size_t kAtOnce = 8;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
-  std::vector<ChunkPart> parts(chunks.size());
-  fit.parallel(chunks.size(), [&](std::size_t chunk) {
-    parts[chunk] = EmptyPart(fit, templates, shared);
-    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
-      ScoreUnit(fit, templates, unit, without, &pass, &parts[chunk]);
-  });
-  ChunkPart all = EmptyPart(fit, templates, shared);
-  for (const ChunkPart& part : parts) Merge(part, &all);
-  pass.target_square = all.target_square;
-  pass.residual_square = all.residual_square;
-  pass.values = all.values;
-  TakeFleet(all, templates, &pass);
-  return pass;
+  for (std::size_t begin = 0; begin < chunks.size(); begin += kAtOnce) {
+    std::vector<ChunkPart> parts(std::min(kAtOnce, chunks.size() - begin));
+    fit.parallel(parts.size(), [&](std::size_t k) {
+      parts[k] = EmptyPart(plan);
+      Scratch scratch;
+      const UnitChunk& chunk = chunks[begin + k];
+      for (std::size_t unit = chunk.begin; unit < chunk.end; ++unit)
+        ScoreUnit(plan, unit, &scratch, &passes, &parts[k]);
+    });
+    for (const ChunkPart& part : parts)
+      for (std::size_t l = 0; l < part.size(); ++l) Merge(part[l], &all[l]);
+  }
+  for (std::size_t l = 0; l < all.size(); ++l) TakeFleet(plan, all[l], &passes[l]);
+  return passes;
+}
+
+ScorePass ScoreTemplates(const Fit& fit, const Templates& templates, std::size_t without) {
+  return std::move(ScoreWithouts(fit, templates, std::span(&without, 1)).front());
 }
 
 }  // namespace focalfleet::sim

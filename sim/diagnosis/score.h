@@ -10,6 +10,7 @@
 
 #include <Eigen/Dense>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "sim/diagnosis/fit.h"
@@ -41,12 +42,18 @@ struct ScorePass {
 };
 
 /// Whether the amplitude that fits best, (g)^-1 b, is for sure beyond what physics allows.
-bool IsImpossible(const Template& form, const Eigen::VectorXd& b, const Eigen::MatrixXd& g);
+bool IsImpossible(const Template& form, const Eigen::Ref<const Eigen::VectorXd>& b,
+                  const Eigen::Ref<const Eigen::MatrixXd>& g);
 
 inline constexpr std::size_t kNoTerm = SIZE_MAX;
 
 /// Scores the templates against the residuals; with `without`, as if that term of the model were
 /// not in it, and against its signal too.
 ScorePass ScoreTemplates(const Fit& fit, const Templates& templates, std::size_t without = kNoTerm);
+
+/// The same for several left-out terms (or kNoTerm) of one state of the fit: signatures are made
+/// and whitened once for all of them. Shape: (withouts).
+std::vector<ScorePass> ScoreWithouts(const Fit& fit, const Templates& templates,
+                                     std::span<const std::size_t> withouts);
 
 }  // namespace focalfleet::sim

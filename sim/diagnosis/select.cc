@@ -92,13 +92,39 @@ struct Look {
   std::vector<Standing> standings;
 };
 
-Look LookWithout(const Fit& fit, const Templates& templates, const FleetGroups& groups,
-                 std::size_t without) {
-  Look look;
-  look.pass = ScoreTemplates(fit, templates, without);
-  look.standings = AssessAll(look.pass, templates, templates, groups, fit.parallel);
-  return look;
-}
+// Looks at one state of the fit, with all of its terms (kNoTerm) and without each: whoever asks for
+// one soon asks for the others, and the signatures are the same in all.
+class LookBook {
+ public:
+  /// `one_by_one`: the others are not asked for.
+  LookBook(const FleetGroups& groups, bool one_by_one) : groups_(groups), one_by_one_(one_by_one) {}
+
+  const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
+    if (looks_.find(without) == looks_.end()) Open(fit, templates, without);
+    Look& look = looks_.at(without);
+    if (look.standings.empty())
+      look.standings = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
+    return look;
+  }
+  /// The fit has changed, or the templates.
+  void Forget() { looks_.clear(); }
+
+ private:
+  void Open(const Fit& fit, const Templates& templates, std::size_t without) {
+    std::vector<std::size_t> withouts = {without};
+    if (!one_by_one_) {
+      withouts = {kNoTerm};
+      for (std::size_t t = 0; t < fit.model.terms.size(); ++t) withouts.push_back(t);
+    }
+    std::vector<ScorePass> passes = ScoreWithouts(fit, templates, withouts);
+    for (std::size_t k = 0; k < withouts.size(); ++k)
+      looks_[withouts[k]].pass = std::move(passes[k]);
+  }
+
+  const FleetGroups& groups_;
+  bool one_by_one_;
+  std::map<std::size_t, Look> looks_;
+};
 
 // A template whose shape is being refined.
 struct Contender {
@@ -216,13 +242,14 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
 // One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if
 // anything changed.
 bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
-               double tests, Fit* fit, std::vector<Accepted>* accepted) {
+               double tests, LookBook* looks, Fit* fit, std::vector<Accepted>* accepted) {
   accepted->clear();
   bool changed = false;
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
-    const Look look = LookWithout(*fit, templates, groups, t);
+    const Look& look = looks->At(*fit, templates, t);
     const Best best = BestOf(look.pass, templates, look.standings, tests, rule.family_wise);
     if (best.at == kNoTerm) {
+      looks->Forget();
       DropTerm(t, fit);
       return true;
     }
@@ -236,6 +263,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
       accepted->push_back({look.standings[own], RivalsOf(look, templates, groups, own, rule)});
       continue;
     }
+    looks->Forget();
     fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
     StepFit(fit);
     Refit(fit);
@@ -245,10 +273,10 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
 }
 
 void TakeRivals(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
-                const Fit& fit, std::vector<Accepted>* accepted) {
+                const Fit& fit, LookBook* looks, std::vector<Accepted>* accepted) {
   accepted->clear();
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
-    const Look look = LookWithout(fit, templates, groups, t);
+    const Look& look = looks->At(fit, templates, t);
     const std::size_t own = IndexOf(templates, fit.model.terms[t].form);
     accepted->push_back({look.standings[own], RivalsOf(look, templates, groups, own, rule)});
   }
@@ -256,7 +284,7 @@ void TakeRivals(const Templates& templates, const FleetGroups& groups, const Sel
 
 // Terms that the others have made needless go, the weakest first.
 void DropTheNeedless(const Templates& templates, const FleetGroups& groups,
-                     const SelectionRule& rule, double tests, Fit* fit,
+                     const SelectionRule& rule, double tests, LookBook* looks, Fit* fit,
                      std::vector<Accepted>* accepted) {
   for (;;) {
     std::size_t weakest = kNoTerm;
@@ -267,8 +295,9 @@ void DropTheNeedless(const Templates& templates, const FleetGroups& groups,
         weakest = t;
     }
     if (weakest == kNoTerm) return;
+    looks->Forget();
     DropTerm(weakest, fit);
-    TakeRivals(templates, groups, rule, *fit, accepted);
+    TakeRivals(templates, groups, rule, *fit, looks, accepted);
   }
 }
 
@@ -329,10 +358,10 @@ Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGrou
 namespace {
 
 // Adds the best template, with the shape that suits it. False: chance explains what is left.
-bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates, Fit* fit,
-             Selection* selection) {
+bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates,
+             LookBook* looks, Fit* fit, Selection* selection) {
   rule.progress("signatures");
-  const Look look = LookWithout(*fit, *templates, groups, kNoTerm);
+  const Look& look = looks->At(*fit, *templates, kNoTerm);
   if (selection->kept_share.empty()) {
     selection->tests = EffectiveTests(look.pass.scores, *templates, rule.seed);
     for (const Score& score : look.pass.scores)
@@ -341,7 +370,9 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   Best best = BestOf(look.pass, *templates, look.standings, selection->tests, rule.family_wise);
   if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) return false;
   const std::size_t listed = templates->size();
-  RefineContenders(*fit, groups, ContendersOf(look, *templates, best), templates);
+  std::vector<Contender> contenders = ContendersOf(look, *templates, best);
+  looks->Forget();
+  RefineContenders(*fit, groups, std::move(contenders), templates);
   if (templates->size() > listed)
     best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
   const CampaignModel before = fit->model;
@@ -358,20 +389,23 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
 Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* fit) {
   Templates templates = library;  // and refined ones
   const FleetGroups groups = GroupsOf(*fit->facts);
+  LookBook looks(groups, false);
   Selection selection;
   for (std::size_t round = 0;
-       round < rule.terms_max && AddTerm(groups, rule, &templates, fit, &selection); ++round) {
+       round < rule.terms_max && AddTerm(groups, rule, &templates, &looks, fit, &selection);
+       ++round) {
     if (fit->model.terms.size() < 2) continue;
     rule.progress("exchanges");
     for (int sweep = 0; sweep < kSwapSweepsMax; ++sweep)
-      if (!SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted)) break;
+      if (!SwapSweep(templates, groups, rule, selection.tests, &looks, fit, &selection.accepted))
+        break;
   }
   rule.progress("rivals");
   bool rests = selection.accepted.size() == fit->model.terms.size() && fit->model.terms.size() > 1;
   for (int sweep = 0; !rests && sweep < kSwapSweepsMax; ++sweep)
-    rests = !SwapSweep(templates, groups, rule, selection.tests, fit, &selection.accepted);
-  if (!rests) TakeRivals(templates, groups, rule, *fit, &selection.accepted);
-  DropTheNeedless(templates, groups, rule, selection.tests, fit, &selection.accepted);
+    rests = !SwapSweep(templates, groups, rule, selection.tests, &looks, fit, &selection.accepted);
+  if (!rests) TakeRivals(templates, groups, rule, *fit, &looks, &selection.accepted);
+  DropTheNeedless(templates, groups, rule, selection.tests, &looks, fit, &selection.accepted);
   return selection;
 }
 
@@ -446,12 +480,15 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
   const FleetGroups groups = GroupsOf(*fit->facts);
   rule.progress("all units");
   Templates templates = library;
-  while (AddTerm(groups, rule, &templates, fit, &selection)) {
+  LookBook of_library(groups, true);
+  while (AddTerm(groups, rule, &templates, &of_library, fit, &selection)) {
   }
+  of_library.Forget();
   rule.progress("rivals of all units");
   const Templates near = NearTemplates(templates, selection.accepted, *fit);
-  TakeRivals(near, groups, rule, *fit, &selection.accepted);
-  DropTheNeedless(near, groups, rule, selection.tests, fit, &selection.accepted);
+  LookBook of_near(groups, false);
+  TakeRivals(near, groups, rule, *fit, &of_near, &selection.accepted);
+  DropTheNeedless(near, groups, rule, selection.tests, &of_near, fit, &selection.accepted);
   return selection;
 }
 

@@ -1,11 +1,12 @@
 #include "sim/diagnosis/standing.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>
-#include <optional>
+#include <span>
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
@@ -15,11 +16,14 @@ namespace focalfleet::sim {
 namespace {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
+constexpr int kMost = static_cast<int>(kColumnsMax);
+// Of one group: no memory of the heap, as there may be thousands of groups for each template.
+using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
 
 constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30};  // of the prior size
 constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
+constexpr double kOddsMax = 1e90;  // beyond, one of two summands is lost in the other's rounding
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 
 // One group's score along its principal directions.
@@ -28,61 +32,69 @@ struct Direction2 {
   double g = 0;
 };
 struct GroupScore {
-  std::vector<Direction2> along;
   double chi_square = 0;
+  [[nodiscard]] std::span<const Direction2> along() const {
+    return std::span(along_).first(count_);
+  }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+  void Add(const Direction2& direction) { along_[count_++] = direction; }
   [[nodiscard]] double Evidence(double size) const {
     double sum = 0;
     const double a2 = size * size;
-    for (const Direction2& d : along)
+    for (const Direction2& d : along())
       sum += 0.5 * d.b2 * a2 / (1 + a2 * d.g) - 0.5 * std::log1p(a2 * d.g);
     return sum;
   }
+
+ private:
+  std::array<Direction2, kColumnsMax> along_;
+  std::size_t count_ = 0;
 };
 
-GroupScore Decompose(const VectorXd& b, const MatrixXd& g, double dispersion) {
+GroupScore Decompose(const Vector& b, const Square& g, double dispersion) {
   GroupScore out;
   if (b.size() == 1) {
     if (!(g(0, 0) > 0)) return out;
-    out.along.push_back({b[0] * b[0] / (dispersion * dispersion), g(0, 0) / dispersion});
+    out.Add({b[0] * b[0] / (dispersion * dispersion), g(0, 0) / dispersion});
   } else {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(g);
+    const Eigen::SelfAdjointEigenSolver<Square> solver(g);
     const double most = solver.eigenvalues().maxCoeff();
     for (Index k = 0; k < b.size(); ++k) {
       const double value = solver.eigenvalues()[k];
       if (!(value > kFlat * most) || !(most > 0)) continue;
       const double along = solver.eigenvectors().col(k).dot(b);
-      out.along.push_back({along * along / (dispersion * dispersion), value / dispersion});
+      out.Add({along * along / (dispersion * dispersion), value / dispersion});
     }
   }
-  for (const Direction2& d : out.along) out.chi_square += d.b2 / d.g;
+  for (const Direction2& d : out.along()) out.chi_square += d.b2 / d.g;
   return out;
 }
 
 // An amplitude that cannot be says nothing for the effect.
-GroupScore DecomposePossible(const Template& form, const VectorXd& b, const MatrixXd& g,
+GroupScore DecomposePossible(const Template& form, const Vector& b, const Square& g,
                              double dispersion) {
-  if (IsImpossible(form, b, g)) return Decompose(VectorXd::Zero(b.size()), g, dispersion);
+  if (IsImpossible(form, b, g)) return Decompose(Vector::Zero(b.size()), g, dispersion);
   return Decompose(b, g, dispersion);
 }
 
-VectorXd UnitB(const std::vector<double>& values, std::size_t unit, std::size_t c) {
-  return Eigen::Map<const VectorXd>(&values[unit * c], static_cast<Index>(c));
+Vector UnitB(const std::vector<double>& values, std::size_t unit, std::size_t c) {
+  return Eigen::Map<const Vector>(values.data() + unit * c, static_cast<Index>(c));
 }
-MatrixXd UnitG(const Score& score, std::size_t unit, std::size_t c) {
-  return Eigen::Map<const MatrixXd>(&score.g[unit * c * c], static_cast<Index>(c),
-                                    static_cast<Index>(c));
+Square UnitG(const Score& score, std::size_t unit, std::size_t c) {
+  return Eigen::Map<const Square>(score.g.data() + unit * c * c, static_cast<Index>(c),
+                                  static_cast<Index>(c));
 }
 
 // Sums over the units of each group.
 struct GroupSums {
-  std::vector<VectorXd> b;
-  std::vector<MatrixXd> g;
+  std::vector<Vector> b;
+  std::vector<Square> g;
 };
 GroupSums SumGroups(const std::vector<double>& unit_b, const Score& score, std::size_t c,
                     const std::vector<std::uint32_t>& group_of_unit, std::size_t groups) {
   const auto ic = static_cast<Index>(c);
-  GroupSums sums{std::vector<VectorXd>(groups, VectorXd::Zero(ic)),
-                 std::vector<MatrixXd>(groups, MatrixXd::Zero(ic, ic))};
+  GroupSums sums{std::vector<Vector>(groups, Vector::Zero(ic)),
+                 std::vector<Square>(groups, Square::Zero(ic, ic))};
   for (std::size_t unit = 0; unit < group_of_unit.size(); ++unit) {
     if (group_of_unit[unit] == kNoGroup) continue;
     sums.b[group_of_unit[unit]] += UnitB(unit_b, unit, c);
@@ -98,6 +110,23 @@ struct Level {
   std::vector<std::uint32_t> group_of_unit;
 };
 
+std::vector<std::uint32_t> Each(std::size_t units) {
+  std::vector<std::uint32_t> each(units);
+  std::iota(each.begin(), each.end(), 0u);
+  return each;
+}
+
+// Each unit by itself.
+Level UnitLevel(const Score& score, const Template& form, double dispersion) {
+  const std::size_t c = form.columns, units = score.b.size() / c;
+  Level level{Sharing::kUnit, {}, Each(units)};
+  level.groups.reserve(units);
+  for (std::size_t unit = 0; unit < units; ++unit)
+    level.groups.push_back(
+        DecomposePossible(form, UnitB(score.b, unit, c), UnitG(score, unit, c), dispersion));
+  return level;
+}
+
 Level SumLevel(const Score& score, const Template& form, Sharing sharing,
                const std::vector<std::uint32_t>& group_of_unit, std::size_t groups,
                double dispersion) {
@@ -110,21 +139,26 @@ Level SumLevel(const Score& score, const Template& form, Sharing sharing,
 
 // ln p of the level: its best group among all, or all together.
 double LevelLogP(const Level& level) {
-  double sum = 0, dof = 0, best = 0;
+  double sum = 0, dof = 0;
   double tests = 0;
+  std::array<double, kColumnsMax + 1> most{};  // chi-square of the best group, by its freedom
   // One unit's noise is known from its own rows only.
   constexpr double kOwnNoise = 1.15;
   const double inflation =
       level.sharing == Sharing::kUnit && level.groups.size() > 1 ? kOwnNoise : 1;
   for (const GroupScore& group : level.groups) {
-    if (group.along.empty()) continue;
+    if (group.empty()) continue;
     sum += group.chi_square;
-    dof += static_cast<double>(group.along.size());
+    dof += static_cast<double>(group.along().size());
     tests += 1;
-    best = std::min(best, LogChiSquareTail(group.chi_square / inflation,
-                                           static_cast<double>(group.along.size())));
+    most[group.along().size()] = std::max(most[group.along().size()], group.chi_square);
   }
   if (tests == 0) return 0;
+  double best = 0;
+  for (std::size_t freedom = 1; freedom < most.size(); ++freedom)
+    if (most[freedom] > 0)
+      best =
+          std::min(best, LogChiSquareTail(most[freedom] / inflation, static_cast<double>(freedom)));
   // A sum over many units also counts what is wrong with the noise of all of them.
   constexpr double kNoiseOfNoise = 0.2, kMany = 20;
   const double all =
@@ -137,27 +171,42 @@ struct MixtureFit {
   double size = 0, share = 1;
 };
 
+// ln of the product of 1 - share + share exp(e) over the groups: each has it or has it not.
+// `odds`: exp(e), as far as that is a number.
+double LogMixture(const std::vector<double>& evidence, const std::vector<double>& odds,
+                  double share) {
+  constexpr double kLarge = 1e200;
+  double sum = 0, product = 1;
+  for (std::size_t k = 0; k < evidence.size(); ++k) {
+    if (odds[k] > kOddsMax) {
+      sum += std::log(share) + evidence[k];  // the other summand is nothing beside it
+      continue;
+    }
+    product *= 1 - share + share * odds[k];
+    // One logarithm for many factors.
+    if (product > kLarge || product < 1 / kLarge) sum += std::log(product), product = 1;
+  }
+  return sum + std::log(product);
+}
+
 // Average over sizes and shares; the best of them tells who has it.
 MixtureFit Mix(const Level& level, double prior_size) {
   MixtureFit best;
   double most = -std::numeric_limits<double>::infinity();
-  std::vector<double> terms;
+  std::vector<double> terms, evidence, odds;
   const bool mixes = level.groups.size() > 1;
   for (const double relative : kSizes) {
     const double size = prior_size * relative;
-    std::vector<double> evidence;
-    for (const GroupScore& group : level.groups) evidence.push_back(group.Evidence(size));
+    evidence.clear(), odds.clear();
+    for (const GroupScore& group : level.groups) {
+      if (group.empty()) continue;
+      evidence.push_back(group.Evidence(size));
+      odds.push_back(std::exp(evidence.back()));
+    }
     for (const double share : kShares) {
       if (!mixes && share < 1) break;
-      double sum = 0;
-      for (const double e : evidence) {
-        if (share >= 1) {
-          sum += e;
-        } else {
-          const double pair[] = {std::log1p(-share), std::log(share) + e};
-          sum += LogSum(pair);
-        }
-      }
+      const double sum = share >= 1 ? std::accumulate(evidence.begin(), evidence.end(), 0.0)
+                                    : LogMixture(evidence, odds, share);
       terms.push_back(sum);
       if (sum > most) most = sum, best.size = size, best.share = share;
     }
@@ -214,7 +263,7 @@ void TakeMixture(const Level& level, const MixtureFit& fit, Standing* out) {
   out->has.assign(level.group_of_unit.size(), 0);
   std::vector<char> group_has(level.groups.size(), 0);
   for (std::size_t k = 0; k < level.groups.size(); ++k) {
-    if (level.groups[k].along.empty()) continue;
+    if (level.groups[k].empty()) continue;
     const double odds = fit.share >= 1 ? 1
                                        : std::log(fit.share) - std::log1p(-fit.share) +
                                              level.groups[k].Evidence(fit.size);
@@ -229,12 +278,6 @@ double UnitDispersion(const Score& score) {
   // One unit's own estimate is noisy: some prior weight at 1.
   constexpr double kPrior = 4;
   return (score.spread_sum + kPrior) / (score.spread_count + kPrior);
-}
-
-std::vector<std::uint32_t> Each(std::size_t units) {
-  std::vector<std::uint32_t> each(units);
-  std::iota(each.begin(), each.end(), 0u);
-  return each;
 }
 
 std::vector<std::uint32_t> Numbered(std::span<const double> ids, std::span<const std::size_t> first,
@@ -270,19 +313,19 @@ FleetGroups GroupsOf(const CampaignFacts& facts) {
 
 double FleetDispersion(const Score& score, std::size_t columns) {
   const auto c = static_cast<Index>(columns);
-  VectorXd b = VectorXd::Zero(c);
-  MatrixXd g = MatrixXd::Zero(c, c);
+  Vector b = Vector::Zero(c);
+  Square g = Square::Zero(c, c);
   const std::size_t exposures = score.exposure_b.size() / columns;
   const auto at_b = [&](std::size_t e) {
-    return Eigen::Map<const VectorXd>(&score.exposure_b[e * columns], c);
+    return Eigen::Map<const Vector>(score.exposure_b.data() + e * columns, c);
   };
   const auto at_g = [&](std::size_t e) {
-    return Eigen::Map<const MatrixXd>(&score.exposure_g[e * columns * columns], c, c);
+    return Eigen::Map<const Square>(score.exposure_g.data() + e * columns * columns, c, c);
   };
   for (std::size_t e = 0; e < exposures; ++e) b += at_b(e), g += at_g(e);
   if (!(g.trace() > 0)) return 1;
-  const Eigen::CompleteOrthogonalDecomposition<MatrixXd> solver(g);
-  const VectorXd own = solver.solve(b);
+  const Eigen::CompleteOrthogonalDecomposition<Square> solver(g);
+  const Vector own = solver.solve(b);
   // A generalised inverse: columns may be alike in what all units have of them.
   NeighbourSum<Eigen::Dynamic> sum(solver.pseudoInverse());
   double fourth = 0;
@@ -306,8 +349,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   std::vector<Level> levels;
   const bool of_the_whole =
       form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
-  if (units == 1 || !of_the_whole)
-    levels.push_back(SumLevel(score, form, Sharing::kUnit, Each(units), units, best.dispersion));
+  if (units == 1 || !of_the_whole) levels.push_back(UnitLevel(score, form, best.dispersion));
   if (units > 1) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.
@@ -371,11 +413,13 @@ double ShareOfTarget(const Score& score, const Template& form, const Standing& a
   double taken = 0;
   if (as.sharing == Sharing::kFleet) {
     taken = Decompose(score.fleet_target_b, score.fleet_g, 1).chi_square;
+  } else if (as.sharing == Sharing::kUnit) {
+    for (std::size_t unit = 0; unit < units; ++unit)
+      taken += Decompose(UnitB(score.target_b, unit, c), UnitG(score, unit, c), 1).chi_square;
   } else {
-    std::vector<std::uint32_t> group_of = Each(units);
-    std::size_t count = units;
-    if (as.sharing == Sharing::kRail) group_of = groups.rail, count = groups.rails;
-    if (as.sharing == Sharing::kBus) group_of = groups.bus, count = groups.buses;
+    const bool by_rail = as.sharing == Sharing::kRail;
+    const std::vector<std::uint32_t>& group_of = by_rail ? groups.rail : groups.bus;
+    const std::size_t count = by_rail ? groups.rails : groups.buses;
     const GroupSums sums = SumGroups(score.target_b, score, c, group_of, count);
     for (std::size_t k = 0; k < count; ++k) taken += Decompose(sums.b[k], sums.g[k], 1).chi_square;
   }

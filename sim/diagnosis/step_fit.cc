@@ -133,6 +133,7 @@ void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit*
       term.sigma[group * term.form.columns + c] = sigma[at];
     }
   }
+  if (fit->model.homing_zero_deg[kTheta].empty()) return;
   const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
   for (const Homing& homing : FreeHomingsOf(fit->model, track)) {
     for (std::size_t i = homing.begin; i < homing.end; ++i)
@@ -157,6 +158,7 @@ void StepFit(Fit* fit) {
   fit->parallel(chunks.size(), [&](std::size_t chunk) {
     parts[chunk] = {MatrixXd::Zero(shared_count, shared_count), VectorXd::Zero(shared_count)};
     for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      if (!fit->UsesUnit(unit)) continue;
       const WhiteUnit white = Whiten(*fit, unit);
       if (white.moves.size() < 3) continue;
       solutions[unit] = Eliminate(MakeEquations(*fit, unit, white, shared_begin), &parts[chunk]);

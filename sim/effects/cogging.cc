@@ -1,6 +1,5 @@
 // Cogging: the motor's detent.
 #include <algorithm>
-#include <cmath>
 
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
@@ -27,7 +26,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     const double strength = form.form == 1 ? 1 / level : 1 / (level * level);
     const double phase = HarmonicPhase(track, axis, i, form.shape * track.unit->gear[axis]);
     errors->angle_deg[axis][i] +=
-        strength * (amplitude[0] * std::sin(phase) + amplitude[1] * std::cos(phase));
+        strength * (amplitude[0] * SineOfTurns(phase) + amplitude[1] * CosineOfTurns(phase));
   }
 }
 

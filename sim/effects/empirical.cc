@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numbers>
 #include <string>
 
 #include "sim/effects/harmonic.h"
@@ -21,33 +20,54 @@ constexpr std::string_view kChannelNames[] = {"theta angle",
                                               "phi angle against its direction"};
 static_assert(std::size(kChannelNames) == kEmpiricalChannels);
 
-double CosinesAt(const Template& form, std::span<const double> amplitude, double rank) {
-  double sum = 0;
-  for (std::size_t c = 0; c < form.columns; ++c)
-    if (amplitude[c] != 0)
-      sum +=
-          amplitude[c] * std::cos(std::numbers::pi * (form.shape + static_cast<double>(c)) * rank);
-  return sum;
+std::vector<double> RanksOf(const UnitTrack& track, const Template& form) {
+  const FilledColumn& column = *track.facts->Find(form.covariate);
+  std::vector<double> ranks(track.moves);
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const std::size_t row = track.first_row + i;
+    ranks[i] =
+        form.knots.empty() ? double{column.rank[row]} : RankAt(form.knots, column.values[row]);
+  }
+  return ranks;
+}
+
+std::vector<double> CurveOf(const UnitTrack& track, const Template& form,
+                            std::span<const double> amplitude) {
+  const std::vector<double> ranks = RanksOf(track, form);
+  std::vector<double> curve(track.moves, 0);
+  for (std::size_t c = 0; c < form.columns; ++c) {
+    if (amplitude[c] == 0) continue;
+    const double half_turns = form.shape + static_cast<double>(c);
+    const double* rank = ranks.data();
+    double* sum = curve.data();
+    for (std::size_t i = 0; i < track.moves; ++i)
+      sum[i] += amplitude[c] * CosineOfTurns(half_turns / 2 * rank[i]);
+  }
+  return curve;
+}
+
+// Times the direction of the axis' motion; nothing before its first move.
+void TurnWithMotion(const UnitTrack& track, std::size_t axis, std::vector<double>* curve) {
+  double direction = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i] != 0) direction = 0;
+    if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
+    (*curve)[i] *= direction;
+  }
+}
+
+void AddCurve(const std::vector<double>& curve, double factor, std::vector<double>* sum) {
+  for (std::size_t i = 0; i < curve.size(); ++i) (*sum)[i] += factor * curve[i];
 }
 
 void ApplyCurve(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
                 PoseErrors* errors) {
-  const FilledColumn& column = *track.facts->Find(form.covariate);
-  double direction = 0;
-  const std::size_t axis = form.form == kPhiOdd ? kPhi : kTheta;
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const std::size_t row = track.first_row + i;
-    const double rank =
-        form.knots.empty() ? double{column.rank[row]} : RankAt(form.knots, column.values[row]);
-    const double curve = CosinesAt(form, amplitude, rank);
-    if (track.restarts[i] != 0) direction = 0;
-    if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
-    if (form.form == kThetaAngle) errors->angle_deg[kTheta][i] += curve;
-    if (form.form == kPhiAngle) errors->angle_deg[kPhi][i] += curve;
-    if (form.form == kPlaceX) errors->x_mm[i] += kPlaceMm * curve;
-    if (form.form == kPlaceY) errors->y_mm[i] += kPlaceMm * curve;
-    if (form.form >= kThetaOdd) errors->angle_deg[axis][i] += curve * direction;
-  }
+  std::vector<double> curve = CurveOf(track, form, amplitude);
+  if (form.form == kPlaceX) return AddCurve(curve, kPlaceMm, &errors->x_mm);
+  if (form.form == kPlaceY) return AddCurve(curve, kPlaceMm, &errors->y_mm);
+  const std::size_t axis = form.form == kPhiAngle || form.form == kPhiOdd ? kPhi : kTheta;
+  if (form.form >= kThetaOdd) TurnWithMotion(track, axis, &curve);
+  AddCurve(curve, 1, &errors->angle_deg[axis]);
 }
 
 void ApplyRipple(const UnitTrack& track, const Template& form, std::span<const double> amplitude,

@@ -1,7 +1,6 @@
 #include "sim/effects/harmonic.h"
 
 #include <cmath>
-#include <numbers>
 
 namespace focalfleet::sim {
 namespace {
@@ -25,17 +24,15 @@ bool HasPinion(const CampaignFacts& facts) {
   return false;
 }
 
-double HarmonicPhase(const UnitTrack& track, std::size_t axis, std::size_t i, double order) {
-  // Whole turns first: at order 5000 the phase keeps its digits.
-  const double turns = std::remainder(order * track.cmd_deg[axis][i], 360.0) / 360;
-  return 2 * std::numbers::pi * turns;
-}
-
 void AddHarmonic(const UnitTrack& track, std::size_t axis, double order,
                  std::span<const double> amplitude, PoseErrors* errors) {
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const double phase = HarmonicPhase(track, axis, i, order);
-    errors->angle_deg[axis][i] += amplitude[0] * std::sin(phase) + amplitude[1] * std::cos(phase);
+  const double* cmd_deg = track.cmd_deg[axis].data();
+  double* angle_deg = errors->angle_deg[axis].data();
+  for (std::size_t part = 0; part < 2; ++part) {
+    if (amplitude[part] == 0) continue;
+    const double ahead = part == 0 ? 0 : 0.25;  // a cosine is a sine a quarter ahead
+    for (std::size_t i = 0; i < track.moves; ++i)
+      angle_deg[i] += amplitude[part] * SineOfTurns(WithoutTurns(order * cmd_deg[i]) / 360 + ahead);
   }
 }
 

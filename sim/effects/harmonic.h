@@ -8,6 +8,7 @@
 #include <span>
 
 #include "sim/effects/effect.h"
+#include "sim/effects/wave.h"
 
 namespace focalfleet::sim {
 
@@ -21,8 +22,11 @@ inline constexpr double kRingTeeth = 46;
 double PinionRatio(const CampaignUnit& unit, std::size_t axis);
 bool HasPinion(const CampaignFacts& facts);
 
-/// Phase of the order at the commanded angle of move i, in radians.
-double HarmonicPhase(const UnitTrack& track, std::size_t axis, std::size_t i, double order);
+/// Phase of the order at the commanded angle of move i, in turns, -1/2 to 1/2.
+inline double HarmonicPhase(const UnitTrack& track, std::size_t axis, std::size_t i, double order) {
+  // Whole turns first: at order 5000 the phase keeps its digits.
+  return WithoutTurns(order * track.cmd_deg[axis][i]) / 360;
+}
 
 /// amplitude[0] sin + amplitude[1] cos of the order, on the axis' angle.
 void AddHarmonic(const UnitTrack& track, std::size_t axis, double order,

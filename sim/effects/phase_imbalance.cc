@@ -1,6 +1,5 @@
 // Phase imbalance: unequal phases or dead time of the bridge.
 #include <algorithm>
-#include <cmath>
 
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
@@ -29,7 +28,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   for (std::size_t i = 0; i < track.moves; ++i) {
     const double phase = HarmonicPhase(track, axis, i, order);
     errors->angle_deg[axis][i] +=
-        (amplitude[0] * std::sin(phase) + amplitude[1] * std::cos(phase)) /
+        (amplitude[0] * SineOfTurns(phase) + amplitude[1] * CosineOfTurns(phase)) /
         std::max(drive[i], 0.05);
   }
 }

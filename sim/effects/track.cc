@@ -348,6 +348,26 @@ std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
   return end;
 }
 
+namespace {
+
+void TakePoses(const CampaignUnit& geometry, UnitTrack* track) {
+  for (std::vector<double>* place : {&track->elbow_x_mm, &track->elbow_y_mm, &track->reach_x_mm,
+                                     &track->reach_y_mm, &track->fibre_x_mm, &track->fibre_y_mm})
+    place->resize(track->moves);
+  for (std::size_t i = 0; i < track->moves; ++i) {
+    const double theta = (track->cmd_deg[kTheta][i] + geometry.zero_deg[kTheta]) * kRadians;
+    const double both = theta + (track->cmd_deg[kPhi][i] + geometry.zero_deg[kPhi]) * kRadians;
+    track->elbow_x_mm[i] = geometry.arm_mm[kTheta] * std::cos(theta);
+    track->elbow_y_mm[i] = geometry.arm_mm[kTheta] * std::sin(theta);
+    track->reach_x_mm[i] = geometry.arm_mm[kPhi] * std::cos(both);
+    track->reach_y_mm[i] = geometry.arm_mm[kPhi] * std::sin(both);
+    track->fibre_x_mm[i] = geometry.base_x_mm + track->elbow_x_mm[i] + track->reach_x_mm[i];
+    track->fibre_y_mm[i] = geometry.base_y_mm + track->elbow_y_mm[i] + track->reach_y_mm[i];
+  }
+}
+
+}  // namespace
+
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry) {
   const Campaign& campaign = *facts.campaign;
   UnitTrack track;
@@ -361,16 +381,7 @@ UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const Campaign
     track.step_deg[axis] = std::span(facts.step_deg[axis]).subspan(track.first_row, track.moves);
   }
   track.restarts = std::span(facts.restarts).subspan(track.first_row, track.moves);
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const double theta = (track.cmd_deg[kTheta][i] + geometry.zero_deg[kTheta]) * kRadians;
-    const double both = theta + (track.cmd_deg[kPhi][i] + geometry.zero_deg[kPhi]) * kRadians;
-    track.elbow_x_mm.push_back(geometry.arm_mm[kTheta] * std::cos(theta));
-    track.elbow_y_mm.push_back(geometry.arm_mm[kTheta] * std::sin(theta));
-    track.reach_x_mm.push_back(geometry.arm_mm[kPhi] * std::cos(both));
-    track.reach_y_mm.push_back(geometry.arm_mm[kPhi] * std::sin(both));
-    track.fibre_x_mm.push_back(geometry.base_x_mm + track.elbow_x_mm[i] + track.reach_x_mm[i]);
-    track.fibre_y_mm.push_back(geometry.base_y_mm + track.elbow_y_mm[i] + track.reach_y_mm[i]);
-  }
+  TakePoses(geometry, &track);
   return track;
 }
 

@@ -61,5 +61,37 @@ TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
   EXPECT_GT(impossible, 10u);
 }
 
+// Signatures made once for several looks say what they say made for each look alone.
+TEST(Score, LooksTogetherAreWhatTheyAreAlone) {
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = Started(facts);
+  fit.model.terms.push_back(OfTheFleet(Of("backlash", facts), campaign.units.size()));
+  ModelTerm own = OfTheFleet(Of("eccentricity", facts), campaign.units.size());
+  own.sharing = Sharing::kUnit;
+  std::iota(own.group_of_unit.begin(), own.group_of_unit.end(), 0u);
+  own.group_of_unit[3] = kNoGroup;
+  own.amplitude.assign(campaign.units.size() * own.form.columns, 0);
+  own.sigma = own.amplitude;
+  fit.model.terms.push_back(own);
+  StepFit(&fit);
+  Templates templates = ListTemplates(*FindEffect("friction_windup"), facts);
+  for (const char* cause : {"axis_tilt", "camera_distortion", "tooth_damage"})
+    for (const Template& form : ListTemplates(*FindEffect(cause), facts)) templates.push_back(form);
+  const std::size_t withouts[] = {0, kNoTerm, 1};
+  const std::vector<ScorePass> together = ScoreWithouts(fit, templates, withouts);
+  for (std::size_t l = 0; l < 3; ++l) {
+    const ScorePass alone = ScoreTemplates(fit, templates, withouts[l]);
+    EXPECT_EQ(together[l].target_square, alone.target_square);
+    for (std::size_t k = 0; k < templates.size(); ++k) {
+      EXPECT_EQ(together[l].scores[k].b, alone.scores[k].b);
+      EXPECT_EQ(together[l].scores[k].target_b, alone.scores[k].target_b);
+      EXPECT_EQ(together[l].scores[k].exposure_g, alone.scores[k].exposure_g);
+      EXPECT_EQ(together[l].scores[k].fleet_b, alone.scores[k].fleet_b);
+      EXPECT_EQ(together[l].scores[k].spread_sum, alone.scores[k].spread_sum);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace focalfleet::sim
