@@ -48,12 +48,16 @@ void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
 void AddGain(const Diagnosis& diagnosis, report::Page* page) {
   const sim::HeldOutGain& gain = diagnosis.gain;
   page->Heading("Gain on moves that no fit has seen");
+  const bool exchanged = std::ranges::any_of(diagnosis.causes, [](const sim::CauseFound& cause) {
+    return cause.cause == "identity_swap";
+  });
   page->Paragraph(gain.held_out + ".");
   page->Plot(report::DrawBars(
       {.title = "2-D residual",
        .categories = {"rms", "median"},
        .y = {.label = "residual", .unit = "um"},
-       .groups = {{"static geometry alone", {gain.rms_before_um, gain.mad_before_um}},
+       .groups = {{exchanged ? "static geometry, exchanged names" : "static geometry alone",
+                   {gain.rms_before_um, gain.mad_before_um}},
                   {"extended model", {gain.rms_after_um, gain.mad_after_um}}},
        .horizontal = {{gain.noise_floor_um, "noise"}}}));
 }

@@ -135,17 +135,12 @@ class ModelReader {
            amplitude <= high + kDigits * std::abs(high);
   }
 
-  // Does the effect offer it for some campaign, at whatever shape?
-  static bool IsListed(const sim::Template& form) {
-    // A campaign with all columns: what an effect lists depends on which there are.
-    static const Result<sim::Campaign> whole = sim::PlantCampaign({.units = 4, .moves = 8});
+  // Does its effect offer it at all? What an effect lists depends on the columns, units and moves
+  // that there are: this campaign has all of them.
+  static bool IsOfTheLibrary(const sim::Template& form) {
+    static const Result<sim::Campaign> whole = sim::PlantCampaign({});
     static const sim::CampaignFacts facts = sim::MakeFacts(whole.value());
-    sim::Templates listed;
-    form.effect->list(facts, &listed);
-    return std::ranges::any_of(listed, [&](const sim::Template& other) {
-      return other.axis == form.axis && other.form == form.form && other.memory == form.memory &&
-             other.columns == form.columns;
-    });
+    return sim::IsOffered(form, facts);
   }
 
   Result<sim::Template> ReadForm(const toml::table& table) const {
@@ -172,7 +167,7 @@ class ModelReader {
     form.label = table["shape_text"].value_or(std::string());
     if (empirical != nullptr) {
       FOCALFLEET_TRY(ReadEmpirical(table, &form));
-    } else if (!IsListed(form)) {
+    } else if (!IsOfTheLibrary(form)) {
       return Wrong(table, "the effect has no such axis, form, memory and columns");
     }
     return form;

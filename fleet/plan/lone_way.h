@@ -10,8 +10,9 @@
 
 namespace focalfleet {
 
-/// Whether a way may lead from the start to the target. False: there is none that a search finds;
-/// `proof` (where that is possible): there is none at all.
+/// Whether a way may lead from the start to the target. Pre: `surroundings` is of the same scene
+/// and starts. False: there is none that a search finds; `proof` (where that is possible): there is
+/// none at all.
 bool CanEver(const Service& service, std::uint32_t unit, Surroundings* surroundings,
              std::optional<NoWay>* proof);
 

@@ -314,13 +314,21 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
   std::vector<CauseFound> all, kept;
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
     all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
-  for (std::size_t t = 0; t < all.size(); ++t)
-    if (beside[t].is_remainder()) TellAsRemainder(all[t], &all[beside[t].of]);
+  // Whose remainder a remainder is: of is stronger each time, so that this ends.
+  const auto named = [&](std::size_t of) {
+    while (beside[of].is_remainder()) of = beside[of].of;
+    return of;
+  };
   for (std::size_t t = 0; t < all.size(); ++t) {
-    if (beside[t].is_remainder()) continue;
-    if (beside[t].is_doubtful()) all[t].candidates.push_back(all[beside[t].of].cause);
-    kept.push_back(all[t]);
+    if (!beside[t].is_doubtful()) continue;
+    CauseFound& strong = all[named(beside[t].of)];
+    if (beside[t].is_remainder())
+      TellAsRemainder(all[t], &strong);
+    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
+      all[t].candidates.push_back(strong.cause);
   }
+  for (std::size_t t = 0; t < all.size(); ++t)
+    if (!beside[t].is_remainder()) kept.push_back(std::move(all[t]));
   return kept;
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kStrong = 100;     // chi-square: a tenth of it could pass the gate
 constexpr double kWeakShare = 0.5;  // of the strong one's chi-square
-constexpr double kSpread = 0.3;     // of the cause: more is no distortion of it
+constexpr double kSpread = 0.3;     // of the cause: a prior that keeps the fit determined
 
 // Every channel of what the term does to one unit.
 template <class Each>

@@ -14,8 +14,10 @@ namespace focalfleet::sim {
 
 /// What a term of the model still explains.
 struct Undistorted {
-  double kept = 1;           // of its chi-square, beside distortions of `of`
-  std::size_t of = kNoTerm;  // the strong term; none: no term is so strong
+  /// Of its chi-square, beside distortions of `of` of any size; both with their own noise and
+  /// level.
+  double kept = 1;
+  std::size_t of = kNoTerm;  // the strong term; none: no strong term takes anything
   // Of 200 hidden campaigns true causes beside a strong one kept 0.82 and more.
   [[nodiscard]] bool is_remainder() const { return kept < 0.6; }
   [[nodiscard]] bool is_doubtful() const { return kept < 0.8; }

@@ -111,10 +111,11 @@ Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
 }
 
 // Changes that explain the rows, from one geometry to begin at.
-std::vector<Change> FindChanges(ChangeKind kind, double far_mm, UnitRows* rows) {
+std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
+                                UnitRows* rows) {
   const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
   std::vector<Change> found;
-  while (found.size() < kEventsMax) {
+  while (found.size() < at_most) {
     const Change best = BestChange(*rows, kind, gain_min);
     if (best.gained < gain_min) break;
     const std::size_t end = EndOfHistory(rows->track, best.move);
@@ -144,10 +145,10 @@ struct Explained {
   std::size_t far = 0;    // rows that are
 };
 
-Explained ExplainedBy(ChangeKind kind, const Fit& fit, std::size_t unit,
+Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
                       const CampaignUnit& geometry, double far_mm) {
   UnitRows rows = RowsOf(fit, unit, geometry);
-  Explained out{.changes = FindChanges(kind, far_mm, &rows), .geometry = geometry};
+  Explained out{.changes = FindChanges(kind, at_most, far_mm, &rows), .geometry = geometry};
   out.cost = TotalCost(rows);
   for (std::size_t i = 0; i < rows.track.moves; ++i)
     if (fit.aside[rows.track.first_row + i] == 0 &&
@@ -173,15 +174,17 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
   if (far < 3) return {};
   const double before = TotalCost(rows);
   std::optional<Explained> best;
-  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip})
+  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {
+    const std::size_t at_most =
+        kind == ChangeKind::kSlip ? std::min(far / kRowsForASlip, kEventsMax) : kEventsMax;
     for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
-      Explained one = ExplainedBy(kind, fit, unit, from, far_mm);
+      Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
       if (one.changes.empty() || one.cost > 0.5 * before ||
-          static_cast<double>(one.far) > kStillFarMax * static_cast<double>(far) ||
-          (kind == ChangeKind::kSlip && one.changes.size() * kRowsForASlip > far))
+          static_cast<double>(one.far) > kStillFarMax * static_cast<double>(far))
         continue;
       if (!best || one.cost < best->cost) best = std::move(one);
     }
+  }
   if (!best) return {};
   *geometry = best->geometry;
   std::vector<EventTerm> events;

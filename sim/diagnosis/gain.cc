@@ -98,11 +98,11 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, const std::v
   return fit;
 }
 
-// Is the row's place another one once names are right?
+// Is the row's place another one once names are right? No, where none is known under the old name.
 bool IsUnderAnother(const Fit& as_named, const Fit& fit, std::size_t row) {
   const Campaign& a = *as_named.facts->campaign;
   const Campaign& b = *fit.facts->campaign;
-  return a.x_mm[row] != b.x_mm[row] || a.y_mm[row] != b.y_mm[row];
+  return std::isfinite(a.x_mm[row]) && (a.x_mm[row] != b.x_mm[row] || a.y_mm[row] != b.y_mm[row]);
 }
 
 // Of an angle at one exposure; what adds up from move to move, as after ten of them at most.

@@ -32,11 +32,7 @@ std::string WhyUntold(const Template& form, const CampaignFacts& facts) {
   if (!missing.empty()) return "column " + std::string(missing) + " is missing";
   if (empirical) return {};
   // What a form needs beyond its effect's columns is known to its list.
-  const Templates listed = ListTemplates(*form.effect, facts);
-  const bool has = std::any_of(listed.begin(), listed.end(), [&](const Template& one) {
-    return one.form == form.form && one.axis == form.axis && one.memory == form.memory;
-  });
-  return has ? "" : "these units or moves have no such part";
+  return IsOffered(form, facts) ? "" : "these units or moves have no such part";
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Command quantisation: commands are rounded.
+#include <array>
 #include <cmath>
-#include <iterator>
 
 #include "sim/effects/registry.h"
 
@@ -15,14 +15,14 @@ struct Form {
   Rounding rounding;
   std::string_view name;
 };
-constexpr Form kForms[] = {
-    {Step::kDegrees, Rounding::kNearest, "step, deg,"},
-    {Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
-    {Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
-    {Step::kBits, Rounding::kNearest, "bits a turn:"},
-    {Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
-    {Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
-    {Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
+constexpr std::array kForms = {
+    Form{Step::kDegrees, Rounding::kNearest, "step, deg,"},
+    Form{Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
+    Form{Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
+    Form{Step::kBits, Rounding::kNearest, "bits a turn:"},
+    Form{Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
+    Form{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
+    Form{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
 };
 
 std::vector<double> ShapesOf(Step step) {
@@ -37,7 +37,7 @@ double Step_deg(const Form& form, double shape, double gear) {
 }
 
 void List(const CampaignFacts&, Templates* out) {
-  for (std::size_t k = 0; k < std::size(kForms); ++k)
+  for (std::size_t k = 0; k < kForms.size(); ++k)
     ListGrid({.shapes = ShapesOf(kForms[k].step),
               .shape_name = kForms[k].name,
               .form = static_cast<int>(k)},
@@ -72,8 +72,8 @@ Effect MakeCommandQuantisation() {
           .needs = {},
           .paragraph =
               "The command is rounded (or cut, or rounded down) to a step of the controller, so "
-              "that the error "
-              "is a saw-tooth of the command. It adds up if each move is rounded by itself.",
+              "that the error is a saw-tooth of the command. It adds up if each move is rounded "
+              "by itself.",
           .list = List,
           .apply = Apply,
           .amplitude_low = 0,

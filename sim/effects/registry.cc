@@ -1,5 +1,7 @@
 #include "sim/effects/registry.h"
 
+#include <algorithm>
+
 namespace focalfleet::sim {
 
 const std::vector<Effect>& EffectLibrary() {
@@ -63,6 +65,14 @@ Templates ListTemplates(const Effect& effect, const CampaignFacts& facts) {
   effect.list(facts, &templates);
   for (Template& made : templates) made.effect = &effect;
   return templates;
+}
+
+bool IsOffered(const Template& form, const CampaignFacts& facts) {
+  const Templates listed = ListTemplates(*form.effect, facts);
+  return std::any_of(listed.begin(), listed.end(), [&](const Template& one) {
+    return one.form == form.form && one.axis == form.axis && one.memory == form.memory &&
+           one.columns == form.columns;
+  });
 }
 
 }  // namespace focalfleet::sim

@@ -56,6 +56,9 @@ const Effect* FindEffect(std::string_view cause);
 /// The effect's templates in this campaign, with `effect` set. Empty: a covariate is missing, or
 /// nothing of the kind can be built from these data.
 Templates ListTemplates(const Effect& effect, const CampaignFacts& facts);
+/// Does the effect offer the template's axis, form, memory and columns in this campaign, at
+/// whatever shape?
+bool IsOffered(const Template& form, const CampaignFacts& facts);
 
 /// The first covariate that the effect needs and the campaign lacks; empty: none.
 std::string_view MissingCovariate(const Effect& effect, const CampaignFacts& facts);

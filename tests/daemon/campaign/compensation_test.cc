@@ -1,13 +1,16 @@
 #include "daemon/campaign/compensation.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/hex_layout.h"
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/planted.h"
 #include "sim/effects/empirical.h"
 #include "sim/effects/registry.h"
 #include "tests/support/seed.h"
@@ -303,6 +306,23 @@ TEST(ModelFile, RefusesWhatNoUnitOfThisFleetCanBe) {
     other.replace(other.find(from), std::string(from).size(), to);
     EXPECT_THAT(error_of(other), ::testing::HasSubstr("no such axis, form, memory and columns"))
         << to;
+  }
+  // Whatever a diagnosis of a small or a large fleet can put into a model is read.
+  for (const std::size_t fleet : {3u, 19u, 61u}) {
+    const sim::Campaign campaign = sim::PlantCampaign({.units = fleet, .moves = 30}).value();
+    const sim::CampaignFacts facts = sim::MakeFacts(campaign);
+    for (const sim::Effect& one : sim::EffectLibrary())
+      for (const sim::Template& form : sim::ListTemplates(one, facts)) {
+        const auto [low, high] = sim::RangeOfAmplitude(one);
+        const double size = std::clamp(one.prior_size, low, high);
+        std::string text = fmt::format(
+            "[[effect]]\ncause = \"{}\"\naxis = \"{}\"\nform = {}\nshape = {}\nmemory = {}\n"
+            "columns = {}\nunits = [1]\namplitude = [{}",
+            one.cause, sim::Name(form.axis), form.form, form.shape, static_cast<int>(form.memory),
+            form.columns, size);
+        for (std::size_t c = 1; c < form.columns; ++c) text += fmt::format(", {}", size);
+        EXPECT_EQ(error_of(text + "]\n"), "") << text;
+      }
   }
   EXPECT_THAT(error_of("[[effect"), ::testing::HasSubstr("m.toml:1"));
 }

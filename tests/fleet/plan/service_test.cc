@@ -3,206 +3,108 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <vector>
 
+#include "fleet/plan/bounds.h"
 #include "tests/fleet/plan/planning.h"
 
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::ExpectSound;
 using ::focalfleet::testing::FleetOf;
 using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::TestSeed;
 using ::focalfleet::testing::UnitAt;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
-
-TEST(Service, PassesOverDisabledAndUnknownUnitsByName) {
-  auto units = MakeHexLayout({.count = 19});
-  units[5].enabled = false;
-  PlanningFleet fleet = FleetOf(units);
-  FOCALFLEET_TRACE_SEED(Seed(2));
-  DrawStartAndTargets(&fleet, Seed(2));
-  fleet.targets[5] = PoseDeg(fleet, 5, 0, 170);
-  fleet.start[18][1].witness = Witness::kUnknown;
-  fleet.frozen[12] = 1;
-  fleet.targets[12] = PoseDeg(fleet, 12, 0, 170);
-  const auto plan = MakePlan(fleet.request(), {});
-  ASSERT_TRUE(plan) << plan.error().text;
-  const auto why = [&](std::uint32_t unit) {
-    for (const Unserved& u : plan->unserved)
-      if (u.unit.value == unit) return u.why;
-    ADD_FAILURE() << "unit index " << unit << " is not named";
-    return UnservedWhy::kBlocked;
-  };
-  EXPECT_EQ(why(5), UnservedWhy::kDisabled);
-  EXPECT_EQ(why(18), UnservedWhy::kUnknownPlace);
-  EXPECT_EQ(why(12), UnservedWhy::kBlocked);
-  EXPECT_TRUE(std::is_sorted(plan->unserved.begin(), plan->unserved.end(),
-                             [](const auto& a, const auto& b) { return a.unit < b.unit; }));
-}
-
-TEST(Service, NamesEveryPairOfCollidingTargets) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 51.2)});
-  fleet.StandAt(
-      {PoseDeg(fleet, 0, 90, 170), PoseDeg(fleet, 1, 90, 170), PoseDeg(fleet, 2, 90, 170)});
-  fleet.targets = {PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 180, 5)};
-  fleet.targets[1] = PoseDeg(fleet, 1, 0, 0);
-  const auto plan = MakePlan(fleet.request(), {});
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().code, ErrorCode::kInvalid);
-  EXPECT_THAT(plan.error().text, HasSubstr("22 and 33"));
-  EXPECT_THAT(plan.error().text, ::testing::Not(HasSubstr("11")));
-  EXPECT_THAT(plan.error().text, HasSubstr("4.4032 mm needed"));
-  fleet.targets[1] = PoseDeg(fleet, 1, 180, 0);
-  const auto other = MakePlan(fleet.request(), {});
-  ASSERT_FALSE(other);
-  EXPECT_THAT(other.error().text, HasSubstr("11 and 22"));
-}
-
-TEST(Service, RefusesAStartThatCollides) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
-  fleet.StandAt({PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0)});
-  fleet.targets = {PoseDeg(fleet, 0, 90, 170), std::nullopt};
-  const auto plan = MakePlan(fleet.request(), {});
-  ASSERT_FALSE(plan);
-  EXPECT_EQ(plan.error().code, ErrorCode::kInvalid);
-  EXPECT_THAT(plan.error().text, HasSubstr("the starts of units 11 and 22"));
-}
-
-TEST(Service, LeadsApartWhatStartsTooNearWhenAskedTo) {
-  // Two arms side by side, 0.8 mm nearer than allowed.
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
-  fleet.StandAt({PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5)});
-  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120)};
-  const auto refused = MakePlan(fleet.request(), {});
-  ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().text, HasSubstr("the starts of units 11 and 22"));
-  const auto plan = MakePlan(fleet.request(), {.fixed = false, .lead_apart = true});
-  ASSERT_TRUE(plan) << plan.error().text;
-  EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
-  EXPECT_TRUE(plan->unserved.empty());
-  // Never nearer than they start, by the checker's own distance.
-  const auto before = focalfleet::testing::Witnessed(fleet, {});
-  ASSERT_LT(before.worst_margin_mm, -0.1);
-  CheckOptions options;
-  options.tolerance_mm = -before.worst_margin_mm + 2e-4;
-  ExpectSound(fleet, *plan, options);
-}
-
-TEST(Service, SendsNobodyElseThroughItsCellBecauseTwoStartTooNear) {
-  // The two of the test above, and one far away that has a degree to go.
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
-  fleet.StandAt(
-      {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5), PoseDeg(fleet, 2, 10, 30)});
-  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
-                   PoseDeg(fleet, 2, 9, 31)};
-  const auto plan = MakePlan(fleet.request(), {.fixed = false, .lead_apart = true});
-  ASSERT_TRUE(plan) << plan.error().text;
-  EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
-  ASSERT_EQ(plan->moves.size(), 3u);
-  for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[2].path[Index(axis)].size(), 1u);
-}
-
-TEST(Service, LeavesNobodyWhoMerelyStartsTooNear) {
-  // The two of the tests above; whether both go, or the other stands and may not move.
-  for (const bool frozen : {false, true}) {
-    PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
-    fleet.StandAt({PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5),
-                   PoseDeg(fleet, 2, 10, 30)});
-    fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
-                     PoseDeg(fleet, 2, 9, 31)};
-    fleet.frozen[1] = frozen ? 1 : 0;
-    if (frozen) fleet.targets = {PoseDeg(fleet, 0, -90, 120), std::nullopt, fleet.targets[2]};
-    const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
-    ASSERT_TRUE(plan) << plan.error().text;
-    EXPECT_TRUE(plan->unserved.empty()) << frozen;
-    ASSERT_EQ(plan->moves.size(), frozen ? 2u : 3u);
-    for (const Axis axis : kAxes) EXPECT_EQ(plan->moves.back().path[Index(axis)].size(), 1u);
+/// Three units side by side; the first two would touch at their targets, the third is far away.
+class ServiceTest : public ::testing::Test {
+ protected:
+  ServiceTest() : fleet_(FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)})) {
+    start_ = {PoseDeg(fleet_, 0, 90, 120), PoseDeg(fleet_, 1, -90, 120),
+              PoseDeg(fleet_, 2, 10, 30)};
+    fleet_.StandAt(start_);
+    fleet_.targets = {PoseDeg(fleet_, 0, 0, 0), PoseDeg(fleet_, 1, 180, 0),
+                      PoseDeg(fleet_, 2, 50, 31)};
+    request_ = fleet_.request();
+    scene_.emplace(fleet_.layout, request_.drives, request_.start, request_.offsets);
   }
+  [[nodiscard]] Service Made() const { return {request_, *scene_, start_}; }
+
+  PlanningFleet fleet_;
+  std::vector<Pose> start_;
+  PlanRequest request_;
+  std::optional<Scene> scene_;
+};
+
+TEST_F(ServiceTest, ACopyBringsBackGoalsAndReasons) {
+  Service service = Made();
+  const Service before = service;
+  service.Unserve(0, UnservedWhy::kBlocked, 1);
+  service.Hold(0);
+  EXPECT_FALSE(service.goes(0));
+  EXPECT_EQ(service.goal(0), start_[0]);
+  ASSERT_EQ(service.NotServed().size(), 1u);
+  EXPECT_EQ(service.NotServed()[0].by, PositionerIndex{1});
+  service = before;
+  EXPECT_TRUE(service.goes(0));
+  EXPECT_TRUE(service.is_movable(0));
+  EXPECT_EQ(service.goal(0), *fleet_.targets[0]);
+  EXPECT_TRUE(service.NotServed().empty());
 }
 
-TEST(Service, OfTwoTargetsThatMeetOneStaysWhereStuckOnesAreLeft) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
-  fleet.StandAt(
-      {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120), PoseDeg(fleet, 2, 10, 30)});
-  fleet.targets = {PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 9, 31)};
-  EXPECT_FALSE(MakePlan(fleet.request(), {.lead_apart = true}));
-  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
-  ASSERT_TRUE(plan) << plan.error().text;
-  ASSERT_EQ(plan->unserved.size(), 1u);
-  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kTargetCollides);
-  EXPECT_EQ(plan->moves.size(), 2u);
-  ExpectSound(fleet, *plan, {});
+TEST_F(ServiceTest, WhoIsReadmittedGoesAndHasNoReasonLeft) {
+  Service service = Made();
+  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(0, UnservedWhy::kTargetCollides, 1);
+  service.Hold(2);
+  service.Readmit(2);
+  EXPECT_TRUE(service.goes(2));
+  EXPECT_EQ(service.goal(2), *fleet_.targets[2]);
+  ASSERT_EQ(service.NotServed().size(), 1u);
+  EXPECT_EQ(service.NotServed()[0].unit.value, 0u);
 }
 
-TEST(Service, TwoThatStandTooNearAndShallStayAreNoError) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
-  fleet.StandAt(
-      {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5), PoseDeg(fleet, 2, 10, 30)});
-  fleet.targets = {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5),
-                   PoseDeg(fleet, 2, 9, 31)};
-  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
-  ASSERT_TRUE(plan) << plan.error().text;
-  EXPECT_EQ(plan->moves.size(), 1u);
+TEST_F(ServiceTest, NamesTargetsThatMeetAndDropsOneOfThem) {
+  Service service = Made();
+  EXPECT_THAT(service.TargetsTooNear(), HasSubstr("units 11 and 22"));
+  EXPECT_EQ(service.StartsTooNear(), "");
+  EXPECT_EQ(service.TargetsOutOfRange(), "");
+  service.DropTargetsThatMeet();
+  EXPECT_EQ(service.TargetsTooNear(), "");
+  EXPECT_THAT(std::vector<bool>({service.goes(0), service.goes(1), service.goes(2)}),
+              ElementsAre(false, true, true));
 }
 
-TEST(Service, LeavesWhoIsStuckWhenAskedToAndTheOthersGoStraight) {
-  // Two arms across each other, and one far away that has a degree to go.
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
-  fleet.StandAt({PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 10, 30)});
-  fleet.targets = {PoseDeg(fleet, 0, 90, 120), PoseDeg(fleet, 1, -90, 120),
-                   PoseDeg(fleet, 2, 9, 31)};
-  const auto plan = MakePlan(fleet.request(), {.lead_apart = true, .leave_stuck = true});
-  ASSERT_TRUE(plan) << plan.error().text;
-  ASSERT_EQ(plan->unserved.size(), 2u);
-  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kBlocked);
-  ASSERT_EQ(plan->moves.size(), 1u);
-  EXPECT_EQ(plan->moves[0].unit.value, 2u);
-  for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[0].path[Index(axis)].size(), 1u);
+TEST_F(ServiceTest, BoundsAreThoseOfTheServed) {
+  Service service = Made();
+  const double all_s = TimeBoundS(service);
+  service.Unserve(0, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(1, UnservedWhy::kBlocked, kNobody);
+  const double far_one_s = TimeBoundS(service);
+  EXPECT_GT(all_s, far_one_s);
+  EXPECT_GT(far_one_s, 0);
+  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  EXPECT_EQ(TimeBoundS(service), 0);
 }
 
-TEST(Service, KeepsToTheRangeOfAUnitsOwnCount) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0)});
-  fleet.StandAt({PoseDeg(fleet, 0, 90, 100)});
-  fleet.targets = {PoseDeg(fleet, 0, 90, 178)};
-  PlanRequest request = fleet.request();
-  // It stands 3 degrees of phi less than it counts: 178 degrees would be 181 to it.
-  const std::vector<Pose> less{PoseDeg(fleet, 0, 0, -3)};
-  request.offsets = less;
-  EXPECT_FALSE(MakePlan(request, {}));
-  const std::vector<Pose> more{PoseDeg(fleet, 0, 0, 3)};
-  request.offsets = more;
-  EXPECT_TRUE(MakePlan(request, {}));
-}
-
-TEST(Service, RefusesATargetOutOfRangeAndArraysOfTheWrongSize) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
-  fleet.StandAt({PoseDeg(fleet, 0, 90, 170), PoseDeg(fleet, 1, 90, 170)});
-  fleet.targets[0] = PoseDeg(fleet, 0, 0, 185);
-  const auto plan = MakePlan(fleet.request(), {});
-  ASSERT_FALSE(plan);
-  EXPECT_THAT(plan.error().text, HasSubstr("unit 11"));
-  fleet.targets.pop_back();
-  EXPECT_FALSE(MakePlan(fleet.request(), {}));
-}
-
-TEST(Service, DropsATargetThatTouchesWhatCannotMove) {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6)});
-  fleet.StandAt({PoseDeg(fleet, 0, 180, 170), PoseDeg(fleet, 1, 180, 0)});
-  fleet.frozen[1] = 1;
-  fleet.targets[0] = PoseDeg(fleet, 0, 0, 0);
-  const auto plan = MakePlan(fleet.request(), {});
-  ASSERT_TRUE(plan) << plan.error().text;
-  ASSERT_EQ(plan->unserved.size(), 1u);
-  EXPECT_EQ(plan->unserved[0].why, UnservedWhy::kTargetCollides);
-  EXPECT_EQ(plan->unserved[0].by, PositionerIndex{1});
-  EXPECT_TRUE(plan->moves.empty());
+TEST_F(ServiceTest, ALimitBelowOneMotorIsRefusedWithTheLeastThatWouldDo) {
+  Service service = Made();
+  PlanOptions options{.power = {.rail_W = 1e-6}};
+  const Status refused = CheckPower(service, options);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kRefused);
+  const std::string& text = refused.error().text;
+  const auto at = text.find("at least ");
+  ASSERT_NE(at, std::string::npos) << text;
+  options.power.rail_W = 1.001 * std::stod(text.substr(at + 9)) + 1e-4;
+  EXPECT_TRUE(CheckPower(service, options));
+  // Nobody goes: nothing is drawn.
+  for (std::uint32_t unit = 0; unit < 3; ++unit)
+    service.Unserve(unit, UnservedWhy::kBlocked, kNobody);
+  options.power.rail_W = 1e-6;
+  EXPECT_TRUE(CheckPower(service, options));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,8 @@ TEST(HeldOutGain, NamesThatWereExchangedCountBeforeAndNotAfter) {
     std::swap(campaign.x_mm[a], campaign.x_mm[b]);
     std::swap(campaign.y_mm[a], campaign.y_mm[b]);
   }
+  campaign.x_mm[campaign.first_row[3] + 7] = campaign.y_mm[campaign.first_row[3] + 7] =
+      std::numeric_limits<double>::quiet_NaN();  // one was not seen
   const Diagnosis diagnosis = Diagnose(campaign, {});
   EXPECT_GT(diagnosis.gain.rms_before_um, 500) << Told(diagnosis);
   EXPECT_LT(diagnosis.gain.rms_after_um, 1.3 * diagnosis.gain.noise_floor_um) << Told(diagnosis);
