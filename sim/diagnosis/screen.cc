@@ -10,6 +10,15 @@ namespace {
 
 constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
 
+// Of the rotor behind the gear, where all units have the same.
+void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<double>* orders) {
+  const std::vector<CampaignUnit>& units = facts.campaign->units;
+  const double gear = units.front().gear[axis];
+  for (const CampaignUnit& unit : units)
+    if (unit.gear[axis] != gear) return;
+  for (const double harmonic : {1.0, 2.0, 6.0}) orders->push_back(harmonic * gear);
+}
+
 }  // namespace
 
 Templates ScreenTemplates(const CampaignFacts& facts) {
@@ -30,14 +39,17 @@ Templates ScreenTemplates(const CampaignFacts& facts) {
   std::vector<double> orders;
   for (double order = 2; order <= 16; order += 0.5) orders.push_back(order);
   for (double order = 17; order <= 60; order += 1) orders.push_back(order);
-  for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi})
-    for (const double order : orders)
+  for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi}) {
+    std::vector<double> all = orders;
+    AddRotorOrders(facts, axis == EffectAxis::kTheta ? kTheta : kPhi, &all);
+    for (const double order : all)
       looks.push_back({.effect = &EmpiricalRipple(),
                        .axis = axis,
                        .columns = 2,
                        .shape = order,
                        .label = "ripple",
                        .covariate = std::string(kCommand[axis == EffectAxis::kTheta ? 0 : 1])});
+  }
   return looks;
 }
 

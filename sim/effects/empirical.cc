@@ -17,7 +17,9 @@ constexpr std::string_view kChannelNames[] = {"theta angle",
                                               "x",
                                               "y",
                                               "theta angle against its direction",
-                                              "phi angle against its direction"};
+                                              "phi angle against its direction",
+                                              "theta angle against its direction when it moved",
+                                              "phi angle against its direction when it moved"};
 static_assert(std::size(kChannelNames) == kEmpiricalChannels);
 
 std::vector<double> RanksOf(const UnitTrack& track, const Template& form) {
@@ -46,13 +48,18 @@ std::vector<double> CurveOf(const UnitTrack& track, const Template& form,
   return curve;
 }
 
-// Times the direction of the axis' motion; nothing before its first move.
-void TurnWithMotion(const UnitTrack& track, std::size_t axis, std::vector<double>* curve) {
-  double direction = 0;
+// Times the direction of the axis' motion; nothing before its first move. `held`: what it was when
+// the axis moved.
+void TurnWithMotion(const UnitTrack& track, std::size_t axis, bool held,
+                    std::vector<double>* curve) {
+  double direction = 0, made = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    if (track.restarts[i] != 0) direction = 0;
-    if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
-    (*curve)[i] *= direction;
+    if (track.restarts[i] != 0) direction = made = 0;
+    if (track.step_deg[axis][i] != 0) {
+      direction = Direction(track.step_deg[axis][i]);
+      made = direction * (*curve)[i];
+    }
+    (*curve)[i] = held ? made : direction * (*curve)[i];
   }
 }
 
@@ -65,8 +72,9 @@ void ApplyCurve(const UnitTrack& track, const Template& form, std::span<const do
   std::vector<double> curve = CurveOf(track, form, amplitude);
   if (form.form == kPlaceX) return AddCurve(curve, kPlaceMm, &errors->x_mm);
   if (form.form == kPlaceY) return AddCurve(curve, kPlaceMm, &errors->y_mm);
-  const std::size_t axis = form.form == kPhiAngle || form.form == kPhiOdd ? kPhi : kTheta;
-  if (form.form >= kThetaOdd) TurnWithMotion(track, axis, &curve);
+  const bool of_phi = form.form == kPhiAngle || form.form == kPhiOdd || form.form == kPhiHeld;
+  const std::size_t axis = of_phi ? kPhi : kTheta;
+  if (form.form >= kThetaOdd) TurnWithMotion(track, axis, form.form >= kThetaHeld, &curve);
   AddCurve(curve, 1, &errors->angle_deg[axis]);
 }
 

@@ -71,6 +71,30 @@ TEST(EmpiricalCurve, MeansTheSameValueInAnotherCampaign) {
   EXPECT_GT(std::abs(angle_of(one, facts, 7) - angle_of(colder, colder_facts, 7)), 1e-3);
 }
 
+TEST(Empirical, WhatIsHeldIsTheCurveOfTheMoveThatLedThere) {
+  const Campaign campaign = PlantCampaign({.units = 8, .moves = 40, .seed = 3}).value();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 2, campaign.units[2]);
+  const std::vector<double> amplitude = {0.1};
+  PoseErrors now, held;
+  for (const auto& [channel, errors] : {std::pair(kThetaOdd, &now), std::pair(kThetaHeld, &held)}) {
+    const Template look{
+        .effect = &EmpiricalCurve(), .form = channel, .shape = 1, .covariate = "movers_on_rail"};
+    errors->Reset(track.moves);
+    look.effect->apply(track, look, amplitude, errors);
+  }
+  std::size_t moved = 0, stood = 0;
+  for (std::size_t i = 1; i < track.moves; ++i) {
+    if (track.restarts[i] != 0) continue;
+    const bool moves = track.step_deg[kTheta][i] != 0;
+    const double before = held.angle_deg[kTheta][i - 1];
+    EXPECT_EQ(held.angle_deg[kTheta][i], moves ? now.angle_deg[kTheta][i] : before) << i;
+    (moves ? moved : stood) += 1;
+  }
+  EXPECT_GT(moved, 5u);
+  EXPECT_GT(stood, 5u);
+}
+
 TEST(Empirical, ChannelsAreKnownByName) {
   for (int channel = 0; channel < kEmpiricalChannels; ++channel) {
     const Template look{.effect = &EmpiricalCurve(), .form = channel};
