@@ -40,8 +40,8 @@ std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   return fold;
 }
 
-// The zeros of a homing that no fit has seen are its own: from those of its exposures that are
-// judged, everything else fixed.
+// The zeros of a homing of which no fit has seen anything are its own: from those of its exposures
+// that are judged, everything else fixed. The prior keeps what few poses do not show.
 void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& judged, Fit* fit) {
   if (fit->model.homing_zero_deg[kTheta].empty()) return;
   constexpr int kRounds = 3;
@@ -52,9 +52,17 @@ void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& j
       const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
       for (std::size_t begin = 0; begin < track.moves;) {
         const std::size_t end = EndOfHistory(track, begin);
-        Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * 1e-9;
+        Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
         Eigen::Vector2d right = Eigen::Vector2d::Zero();
+        bool seen = false;
+        for (const std::size_t axis : {kTheta, kPhi}) {
+          const auto a = static_cast<Eigen::Index>(axis);
+          const double ratio = fit->noise.place_um / fit->model.homing_spread_deg[axis];
+          normal(a, a) = ratio * ratio;
+          right[a] = -normal(a, a) * fit->model.homing_zero_deg[axis][track.first_row + begin];
+        }
         for (std::size_t i = begin; i < end; ++i) {
+          seen = seen || fit->Used(track.first_row + i);
           const std::size_t row = track.first_row + i;
           if (hold[row] == 0 || judged[row] == 0 || !std::isfinite(fit->x_um[row])) continue;
           Eigen::Matrix2d j;
@@ -65,7 +73,7 @@ void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& j
           right += j.transpose() * Eigen::Vector2d(fit->x_um[row], fit->y_um[row]);
         }
         const Eigen::Vector2d step = normal.ldlt().solve(right);
-        for (std::size_t i = begin; i < end; ++i)
+        for (std::size_t i = begin; i < end && !seen; ++i)
           for (const std::size_t axis : {kTheta, kPhi})
             if (hold[track.first_row + i] != 0)
               fit->model.homing_zero_deg[axis][track.first_row + i] +=
@@ -141,7 +149,7 @@ HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
   HeldOutGain gain;
   const std::vector<std::size_t> fold = FoldsOf(fit, &gain.held_out);
   if (!fit.model.homing_zero_deg[kTheta].empty())
-    gain.held_out += "; before and after, the two zeros of each held-out homing are its own";
+    gain.held_out += "; before and after, the two zeros of a homing that is held out whole are its own";
   std::vector<char> judged(campaign.rows(), 0);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     const WhiteUnit white = Whiten(fit, unit);
