@@ -149,7 +149,8 @@ HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
   HeldOutGain gain;
   const std::vector<std::size_t> fold = FoldsOf(fit, &gain.held_out);
   if (!fit.model.homing_zero_deg[kTheta].empty())
-    gain.held_out += "; before and after, the two zeros of a homing that is held out whole are its own";
+    gain.held_out +=
+        "; before and after, the two zeros of a homing that is held out whole are its own";
   std::vector<char> judged(campaign.rows(), 0);
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     const WhiteUnit white = Whiten(fit, unit);

@@ -23,7 +23,8 @@ TEST(HeldOutGain, OutliersOfAHomingThatNoFitHasSeenDoNotMoveItsZeros) {
   Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
   FreeHomings(&fit);
   const HeldOutGain gain = MeasureGain(fit);
-  ASSERT_THAT(gain.held_out, testing::HasSubstr("the two zeros of a homing that is held out whole"));
+  ASSERT_THAT(gain.held_out,
+              testing::HasSubstr("the two zeros of a homing that is held out whole"));
   EXPECT_LT(gain.rms_after_um, 1.5 * gain.noise_floor_um);
   EXPECT_LT(gain.rms_before_um, 1.5 * gain.noise_floor_um);
 }
