@@ -9,6 +9,9 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
+// Of a look beside the model: a name is often nearly what is there, and the screen looks for what
+// little it leaves.
+constexpr double kKeptMin = 0.012;
 
 // Of the rotor behind the gear, where all units have the same.
 void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<double>* orders) {
@@ -59,7 +62,8 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   const FleetGroups groups = GroupsOf(*fit.facts);
   const ScorePass pass = ScoreTemplates(fit, looks);
   const double tests = EffectiveTests(pass.scores, looks, seed);
-  const Best best = FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise);
+  const Best best =
+      FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise, kKeptMin);
   if (best.at == kNoTerm) return std::nullopt;
   const Template& look = looks[best.at];
   Fit stepped = fit;

@@ -52,13 +52,14 @@ bool ComesFirst(const Template& a, const Template& b) {
 }
 
 Best BestOf(const ScorePass& pass, const Templates& templates,
-            const std::vector<Standing>& standings, double tests, double family_wise) {
+            const std::vector<Standing>& standings, double tests, double family_wise,
+            double kept_min = kKeptMin) {
   constexpr double kTie = 1e-6;
   Best best;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < standings.size(); ++k) {
     const Score& score = pass.scores[k];
-    if (!(score.kept > kKeptMin * score.raw)) continue;
+    if (!(score.kept > kept_min * score.raw)) continue;
     const double log_p = LogLeastOf(standings[k].log_p, tests);
     if (log_p > std::log(family_wise) || standings[k].evidence < most - kTie) continue;
     if (best.at != kNoTerm && standings[k].evidence < most + kTie &&
@@ -350,9 +351,9 @@ double SizeOf(const Fit& fit, const ModelTerm& term) {
 }
 
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
-              const ParallelFor& parallel, double tests, double family_wise) {
+              const ParallelFor& parallel, double tests, double family_wise, double kept_min) {
   return BestOf(pass, templates, AssessAll(pass, templates, templates, groups, parallel), tests,
-                family_wise);
+                family_wise, kept_min);
 }
 
 namespace {

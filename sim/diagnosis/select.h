@@ -48,14 +48,15 @@ Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit
 /// The term that a standing calls for, with amplitudes 0.
 ModelTerm MakeTerm(const Template& form, const Standing& standing, const FleetGroups& groups);
 
-/// The best of the templates that chance does not explain. kNoTerm: none.
+/// The best of the templates that chance does not explain. kNoTerm: none. `kept_min`: share of a
+/// signature that must be left of it beside geometry and model.
 struct Best {
   std::size_t at = kNoTerm;
   Standing standing;
   double log_p_family = 0;  // chance for the whole family of tests
 };
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
-              const ParallelFor& parallel, double tests, double family_wise);
+              const ParallelFor& parallel, double tests, double family_wise, double kept_min);
 
 /// Root mean square of what the term does to its units' fibres, in um.
 double SizeOf(const Fit& fit, const ModelTerm& term);

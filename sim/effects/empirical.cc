@@ -19,7 +19,11 @@ constexpr std::string_view kChannelNames[] = {"theta angle",
                                               "theta angle against its direction",
                                               "phi angle against its direction",
                                               "theta angle against its direction when it moved",
-                                              "phi angle against its direction when it moved"};
+                                              "phi angle against its direction when it moved",
+                                              "theta angle by its sine",
+                                              "theta angle by its cosine",
+                                              "phi angle by its sine",
+                                              "phi angle by its cosine"};
 static_assert(std::size(kChannelNames) == kEmpiricalChannels);
 
 std::vector<double> RanksOf(const UnitTrack& track, const Template& form) {
@@ -63,6 +67,14 @@ void TurnWithMotion(const UnitTrack& track, std::size_t axis, bool held,
   }
 }
 
+void TurnWithAngle(const UnitTrack& track, std::size_t axis, bool sine,
+                   std::vector<double>* curve) {
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double turns = (track.cmd_deg[axis][i] + track.unit->zero_deg[axis]) / 360;
+    (*curve)[i] *= sine ? SineOfTurns(turns) : CosineOfTurns(turns);
+  }
+}
+
 void AddCurve(const std::vector<double>& curve, double factor, std::vector<double>* sum) {
   for (std::size_t i = 0; i < curve.size(); ++i) (*sum)[i] += factor * curve[i];
 }
@@ -72,9 +84,11 @@ void ApplyCurve(const UnitTrack& track, const Template& form, std::span<const do
   std::vector<double> curve = CurveOf(track, form, amplitude);
   if (form.form == kPlaceX) return AddCurve(curve, kPlaceMm, &errors->x_mm);
   if (form.form == kPlaceY) return AddCurve(curve, kPlaceMm, &errors->y_mm);
-  const bool of_phi = form.form == kPhiAngle || form.form == kPhiOdd || form.form == kPhiHeld;
-  const std::size_t axis = of_phi ? kPhi : kTheta;
-  if (form.form >= kThetaOdd) TurnWithMotion(track, axis, form.form >= kThetaHeld, &curve);
+  const std::size_t axis = kChannelNames[form.form].starts_with("phi") ? kPhi : kTheta;
+  if (form.form >= kThetaSine)
+    TurnWithAngle(track, axis, form.form == kThetaSine || form.form == kPhiSine, &curve);
+  else if (form.form >= kThetaOdd)
+    TurnWithMotion(track, axis, form.form >= kThetaHeld, &curve);
   AddCurve(curve, 1, &errors->angle_deg[axis]);
 }
 

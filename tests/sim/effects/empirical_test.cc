@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "protocol/base/rng.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
@@ -93,6 +94,27 @@ TEST(Empirical, WhatIsHeldIsTheCurveOfTheMoveThatLedThere) {
   }
   EXPECT_GT(moved, 5u);
   EXPECT_GT(stood, 5u);
+}
+
+TEST(Empirical, ACurveByTheSineTurnsWithTheArm) {
+  const Campaign campaign = PlantCampaign({.units = 8, .moves = 40, .seed = 3}).value();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 2, campaign.units[2]);
+  const std::vector<double> amplitude = {0.1};
+  const auto angles = [&](EmpiricalChannel channel) {
+    const Template look{
+        .effect = &EmpiricalCurve(), .form = channel, .shape = 1, .covariate = "elevation_deg"};
+    PoseErrors errors;
+    errors.Reset(track.moves);
+    look.effect->apply(track, look, amplitude, &errors);
+    return errors.angle_deg[kPhi];
+  };
+  const auto plain = angles(kPhiAngle), sine = angles(kPhiSine), cosine = angles(kPhiCosine);
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double phi = (track.cmd_deg[kPhi][i] + campaign.units[2].zero_deg[kPhi]) / 180;
+    EXPECT_NEAR(sine[i], plain[i] * std::sin(phi * std::numbers::pi), 1e-12);
+    EXPECT_NEAR(cosine[i], plain[i] * std::cos(phi * std::numbers::pi), 1e-12);
+  }
 }
 
 TEST(Empirical, ChannelsAreKnownByName) {
