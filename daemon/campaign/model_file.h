@@ -28,8 +28,9 @@ struct ModelFile {
 };
 
 /// Errors: kInvalid with file and line where the text is no TOML; a key that is missing or wrong,
-/// an effect that the library does not have, amplitudes that are not as many as its units or beyond
-/// what their effect can have, arms or bases that are those of another unit.
+/// an effect that the library does not have, or not in that axis, form, memory and number of
+/// columns, amplitudes that are not as many as its units or beyond what their effect can have, arms
+/// or bases that are those of another unit.
 Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
                                 const std::vector<sim::CampaignUnit>& units);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/effects/registry.h"
+#include "sim/diagnosis/families.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -11,17 +11,6 @@ namespace {
 constexpr double kStrong = 100;     // chi-square: a tenth of it could pass the gate
 constexpr double kWeakShare = 0.5;  // of the strong one's chi-square
 constexpr double kSpread = 0.3;     // of the cause: a prior that keeps the fit determined
-
-// Every channel of what the term does to one unit.
-template <class Each>
-void ForEachChannel(PoseErrors* errors, Each&& each) {
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    each(&errors->angle_deg[axis]);
-    each(&errors->arm_mm[axis]);
-  }
-  each(&errors->x_mm);
-  each(&errors->y_mm);
-}
 
 PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
   const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
@@ -32,6 +21,22 @@ PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
   return errors;
 }
 
+// What makes a distortion of the error `e` of a channel with this rms: the unit's own amplitude,
+// two bends, another dependence on the drive.
+double Factor(std::size_t column, double e, double rms, double drive) {
+  const double size = std::abs(e) / rms;
+  if (column == 0) return 1;
+  if (column == 1) return size;
+  if (column == 2) return size * size;
+  return 1 / std::max(drive, 0.05) - 1;
+}
+
+double RmsOf(const std::vector<double>& error) {
+  double square = 0;
+  for (const double e : error) square += e * e;
+  return std::sqrt(square / static_cast<double>(std::max<std::size_t>(error.size(), 1)));
+}
+
 // The term's own errors, times what a distortion makes of them.
 ErrorTable DistortionsOf(const ModelTerm& term, const Fit& fit) {
   const Campaign& campaign = *fit.facts->campaign;
@@ -40,28 +45,16 @@ ErrorTable DistortionsOf(const ModelTerm& term, const Fit& fit) {
   table.columns.resize(drive == nullptr ? 3 : 4);
   for (PoseErrors& column : table.columns) column.Reset(campaign.rows());
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    PoseErrors done = DoneBy(term, fit, unit);
+    const PoseErrors done = DoneBy(term, fit, unit);
     const std::size_t begin = campaign.first_row[unit];
-    const std::size_t moves = campaign.first_row[unit + 1] - begin;
-    std::vector<std::vector<double>*> from;
-    ForEachChannel(&done, [&](std::vector<double>* channel) { from.push_back(channel); });
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      std::size_t channel = 0;
-      ForEachChannel(&table.columns[c], [&](std::vector<double>* to) {
-        const std::vector<double>& error = *from[channel++];
-        double square = 0;
-        for (const double e : error) square += e * e;
-        const double rms = std::sqrt(square / static_cast<double>(std::max<std::size_t>(moves, 1)));
-        if (!(rms > 0)) return;
-        for (std::size_t i = 0; i < moves; ++i) {
-          const double e = error[i], size = std::abs(e) / rms;
-          const double factor = c == 0   ? 1
-                                : c == 1 ? size
-                                : c == 2 ? size * size
-                                         : 1 / std::max(drive->values[begin + i], 0.05) - 1;
-          (*to)[begin + i] = e * factor;
-        }
-      });
+    for (std::size_t channel = 0; channel < done.channels().size(); ++channel) {
+      const std::vector<double>& error = *done.channels()[channel];
+      const double rms = RmsOf(error);
+      if (!(rms > 0)) continue;
+      for (std::size_t c = 0; c < table.columns.size(); ++c)
+        for (std::size_t i = 0; i < error.size(); ++i)
+          (*table.columns[c].channels()[channel])[begin + i] =
+              error[i] * Factor(c, error[i], rms, drive == nullptr ? 1 : drive->values[begin + i]);
     }
   }
   return table;
@@ -101,13 +94,6 @@ Fit WithDistortions(const Fit& fit, std::size_t strong, const ErrorTable& table)
   return free;
 }
 
-bool AxesMeet(EffectAxis a, EffectAxis b) {
-  const auto open = [](EffectAxis axis) {
-    return axis == EffectAxis::kBoth || axis == EffectAxis::kNone;
-  };
-  return a == b || open(a) || open(b);
-}
-
 }  // namespace
 
 std::vector<Undistorted> BesideDistortions(const Fit& fit, const std::vector<Accepted>& accepted) {
@@ -120,7 +106,7 @@ std::vector<Undistorted> BesideDistortions(const Fit& fit, const std::vector<Acc
     for (std::size_t t = 0; t < terms.size(); ++t)
       if (accepted[t].standing.chi_square < kWeakShare * most &&
           terms[t].form.effect != terms[strong].form.effect &&
-          AxesMeet(terms[t].form.axis, terms[strong].form.axis))
+          AxesMeet(Name(terms[t].form.axis), Name(terms[strong].form.axis)))
         weak.push_back(t);
     if (most < kStrong || weak.empty()) continue;
     const ErrorTable table = DistortionsOf(terms[strong], fit);

@@ -52,12 +52,12 @@ bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause) {
          });
 }
 
-bool AxesMeet(const std::string& a, const std::string& b) {
-  const auto open = [](const std::string& axis) { return axis == "both" || axis == "none"; };
+}  // namespace
+
+bool AxesMeet(std::string_view a, std::string_view b) {
+  const auto open = [](std::string_view axis) { return axis == "both" || axis == "none"; };
   return a == b || open(a) || open(b);
 }
-
-}  // namespace
 
 bool AreRelated(std::string_view a, std::string_view b) {
   const std::span<const std::string_view> families[] = {kMoves, kAngles, kNight, kImage, kRotor};

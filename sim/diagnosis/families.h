@@ -12,6 +12,9 @@ namespace focalfleet::sim {
 /// Have the two causes a family in common?
 bool AreRelated(std::string_view a, std::string_view b);
 
+/// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
+bool AxesMeet(std::string_view a, std::string_view b);
+
 /// Tells `rest` as what the shape of `of` leaves, not as a cause.
 void TellAsRemainder(const CauseFound& rest, CauseFound* of);
 

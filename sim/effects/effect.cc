@@ -7,28 +7,26 @@
 namespace focalfleet::sim {
 
 void PoseErrors::Reset(std::size_t moves) {
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    angle_deg[axis].assign(moves, 0);
-    arm_mm[axis].assign(moves, 0);
-  }
-  x_mm.assign(moves, 0);
-  y_mm.assign(moves, 0);
+  for (std::vector<double>* channel : channels()) channel->assign(moves, 0);
+}
+
+std::array<std::vector<double>*, 6> PoseErrors::channels() {
+  return {&angle_deg[kTheta], &angle_deg[kPhi], &arm_mm[kTheta], &arm_mm[kPhi], &x_mm, &y_mm};
+}
+
+std::array<const std::vector<double>*, 6> PoseErrors::channels() const {
+  return {&angle_deg[kTheta], &angle_deg[kPhi], &arm_mm[kTheta], &arm_mm[kPhi], &x_mm, &y_mm};
 }
 
 void ApplyTable(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
                 PoseErrors* errors) {
-  const auto add = [&](double size, const std::vector<double>& from, std::vector<double>* to) {
-    for (std::size_t i = 0; i < track.moves; ++i) (*to)[i] += size * from[track.first_row + i];
-  };
+  const auto to = errors->channels();
   for (std::size_t c = 0; c < form.columns; ++c) {
     if (amplitude[c] == 0) continue;
-    const PoseErrors& column = form.table->columns[c];
-    for (const std::size_t axis : {kTheta, kPhi}) {
-      add(amplitude[c], column.angle_deg[axis], &errors->angle_deg[axis]);
-      add(amplitude[c], column.arm_mm[axis], &errors->arm_mm[axis]);
-    }
-    add(amplitude[c], column.x_mm, &errors->x_mm);
-    add(amplitude[c], column.y_mm, &errors->y_mm);
+    const auto from = form.table->columns[c].channels();
+    for (std::size_t k = 0; k < to.size(); ++k)
+      for (std::size_t i = 0; i < track.moves; ++i)
+        (*to[k])[i] += amplitude[c] * (*from[k])[track.first_row + i];
   }
 }
 

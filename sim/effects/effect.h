@@ -11,6 +11,7 @@
 // Angles are in degrees, places in mm; amplitudes are in `amplitude_unit`.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -28,6 +29,9 @@ struct PoseErrors {
   std::vector<double> x_mm;
   std::vector<double> y_mm;
   void Reset(std::size_t moves);
+  /// All of them, always in the same order.
+  std::array<std::vector<double>*, 6> channels();
+  [[nodiscard]] std::array<const std::vector<double>*, 6> channels() const;
 };
 
 enum class EffectAxis { kTheta, kPhi, kBoth, kNone };

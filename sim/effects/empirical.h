@@ -22,8 +22,7 @@ inline constexpr std::size_t kEmpiricalCosines = 5;
 
 /// What a curve adds to: an angle, a direction of the plate, an angle with the sign of the motion
 /// that led there; the same as it was when the axis moved, until it moves again; an angle by the
-/// sine or cosine of itself. The `form` of
-/// its template. In x and y an amplitude of 1 is 0.1 mm.
+/// sine or cosine of itself. The `form` of its template. In x and y an amplitude of 1 is 0.1 mm.
 enum EmpiricalChannel {
   kThetaAngle,
   kPhiAngle,

@@ -32,7 +32,7 @@ void List(const CampaignFacts& facts, Templates* out) {
 }
 
 // Place along the harness: how much of the rail's droop a unit has.
-double PlaceOf(int form, double slot, double slots) {
+double ShareOfDroop(int form, double slot, double slots) {
   const double share = (slot + 1) / slots;
   if (form == 0) return 1;
   if (form == 1 || form == kLoadedByPlace) return share;
@@ -69,7 +69,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         track, axis, form.memory,
         [&](std::size_t i) {
           const double droop =
-              PlaceOf(form.form, slot.empty() ? 0 : slot[i], slots) * movers[i] / most;
+              ShareOfDroop(form.form, slot.empty() ? 0 : slot[i], slots) * movers[i] / most;
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
           // The load angle grows with what the drive lacks.
           double lag = amplitude[0] * droop / level;

@@ -14,11 +14,9 @@ using ::focalfleet::testing::FleetOf;
 using ::focalfleet::testing::HexFleet;
 using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::testing::Seed;
 using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
-
-std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
 
 TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {
   PlanningFleet fleet = HexFleet(19);

@@ -20,7 +20,7 @@ using ::focalfleet::testing::HexFleet;
 using ::focalfleet::testing::MoveOf;
 using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::testing::Seed;
 using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
 
@@ -31,8 +31,6 @@ PlanningFleet YinYang(double left_theta_zero_deg = 0) {
   fleet.StandAt({PoseDeg(fleet, 0, -20 - left_theta_zero_deg, 20), PoseDeg(fleet, 1, 160, 20)});
   return fleet;
 }
-
-std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
 
 TEST(Planner, ServesEveryUnitOfSmallHexagonalFleets) {
   for (const std::uint32_t count : {7u, 19u, 61u, 127u}) {

@@ -33,6 +33,9 @@ struct PlanningFleet {
   }
 };
 
+/// Of the k-th draw of a test.
+inline std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
+
 inline PlanningFleet FleetOf(std::vector<Unit> units, Layout::Options options = {}) {
   auto layout = Layout::Create(std::move(units), std::move(options));
   EXPECT_TRUE(layout) << layout.error().text;

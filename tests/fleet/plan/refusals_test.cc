@@ -15,11 +15,9 @@ using ::focalfleet::testing::ExpectSound;
 using ::focalfleet::testing::FleetOf;
 using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::testing::Seed;
 using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
-
-std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
 
 TEST(Planner, PassesOverDisabledAndUnknownUnitsByName) {
   auto units = MakeHexLayout({.count = 19});

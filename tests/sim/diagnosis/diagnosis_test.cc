@@ -212,11 +212,7 @@ TEST(Diagnosis, CommandsThatAreRoundedDownAreNamed) {
 
 TEST(Diagnosis, SwappedFibresAreFound) {
   Campaign campaign = Planted({});
-  for (std::size_t i = 0; i < 60; ++i) {
-    const std::size_t a = campaign.first_row[3] + i, b = campaign.first_row[9] + i;
-    std::swap(campaign.x_mm[a], campaign.x_mm[b]);
-    std::swap(campaign.y_mm[a], campaign.y_mm[b]);
-  }
+  ExchangePlaces(3, 9, &campaign);
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "identity_swap");

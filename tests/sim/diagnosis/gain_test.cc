@@ -31,11 +31,7 @@ TEST(HeldOutGain, OutliersOfAHomingThatNoFitHasSeenDoNotMoveItsZeros) {
 
 TEST(HeldOutGain, NamesThatWereExchangedCountBeforeAndNotAfter) {
   Campaign campaign = Planted({});
-  for (std::size_t i = 0; i < 60; ++i) {
-    const std::size_t a = campaign.first_row[3] + i, b = campaign.first_row[9] + i;
-    std::swap(campaign.x_mm[a], campaign.x_mm[b]);
-    std::swap(campaign.y_mm[a], campaign.y_mm[b]);
-  }
+  ExchangePlaces(3, 9, &campaign);
   campaign.x_mm[campaign.first_row[3] + 7] = campaign.y_mm[campaign.first_row[3] + 7] =
       std::numeric_limits<double>::quiet_NaN();  // one was not seen
   const Diagnosis diagnosis = Diagnose(campaign, {});

@@ -2,6 +2,7 @@
 #include "sim/diagnosis/lanes.h"
 
 #include "sim/diagnosis/fit.h"
+#include "sim/diagnosis/neighbour_sum.h"
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -48,6 +49,26 @@ TEST(Lanes, ColumnsAreTakenOffEach) {
     for (std::size_t j = 0; j < kLanes; ++j)
       EXPECT_NEAR(left[static_cast<std::size_t>(r)].at[j], wanted(r, static_cast<Eigen::Index>(j)),
                   1e-14);
+}
+
+TEST(Lanes, AlikeNeighboursSumAsInOneColumn) {
+  constexpr std::size_t kMoves = 40;
+  Rng rng = Rng::Stream(5, "alike");
+  std::vector<Lanes> b(kMoves), g(kMoves);
+  Lanes own;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    own.at[lane] = rng.Uniform(-1, 1);
+    for (std::size_t k = 0; k < kMoves; ++k)
+      b[k].at[lane] = rng.Normal(), g[k].at[lane] = rng.Uniform(0, 2);
+  }
+  const Lanes sums = SumAlikeNeighbours(b.data(), g.data(), own, kMoves);
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    using Sum = NeighbourSum<1>;
+    Sum sum(Sum::Square::Constant(1));
+    for (std::size_t k = 0; k < kMoves; ++k)
+      sum.Add(Sum::Small::Constant(b[k].at[lane] - g[k].at[lane] * own.at[lane]));
+    EXPECT_NEAR(sums.at[lane], sum.sum(), 1e-12 * (1 + sum.sum())) << lane;
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -35,6 +36,16 @@ inline void TurnTheta(const std::function<double(std::size_t row)>& off_deg, Cam
       campaign->x_mm[row] = base.base_x_mm + std::cos(off) * x - std::sin(off) * y;
       campaign->y_mm[row] = base.base_y_mm + std::sin(off) * x + std::cos(off) * y;
     }
+}
+
+/// The fibres of two units under each other's name. Pre: as many moves of both.
+inline void ExchangePlaces(std::size_t a, std::size_t b, Campaign* campaign) {
+  for (std::vector<double>* place : {&campaign->x_mm, &campaign->y_mm}) {
+    const auto at = [&](std::size_t k) {
+      return place->begin() + static_cast<std::ptrdiff_t>(campaign->first_row[k]);
+    };
+    std::swap_ranges(at(a), at(a + 1), at(b));
+  }
 }
 
 /// A theta angle that follows the air's humidity, bent, up to 0.12 degrees.
