@@ -229,7 +229,8 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
     // Signatures are as good as their shapes: of a large cause a small share decides nothing.
     const double near = std::max(rule.rival_behind, kShapeDoubt * best.chi_square);
-    const bool alike = share >= rule.rival_share && !hopeless;
+    const bool alike = share >= rule.rival_share && !hopeless &&
+                       AreTogether(templates[k].effect->owner, best.has, groups);
     if (behind >= near && !alike) continue;
     const Rival rival{cause, behind, share, behind >= kAlike * near};
     const auto [it, fresh] = by_cause.emplace(cause, rival);

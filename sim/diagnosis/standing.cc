@@ -108,12 +108,23 @@ struct Level {
   Sharing sharing = Sharing::kUnit;
   std::vector<GroupScore> groups;
   std::vector<std::uint32_t> group_of_unit;
+  // Groups that have it together or not at all, as a rail's units; empty: each by itself.
+  std::vector<std::uint32_t> together;
 };
 
 std::vector<std::uint32_t> Each(std::size_t units) {
   std::vector<std::uint32_t> each(units);
   std::iota(each.begin(), each.end(), 0u);
   return each;
+}
+
+// The units that have an effect of this owner together, whatever each has of it.
+std::vector<std::uint32_t> Together(Owner owner, const FleetGroups& groups, std::size_t units) {
+  if (owner == Owner::kRail)
+    return groups.rails > 0 ? groups.rail : std::vector<std::uint32_t>(units, 0);
+  if (owner == Owner::kBus)
+    return groups.buses > 0 ? groups.bus : std::vector<std::uint32_t>(units, 0);
+  return {};
 }
 
 // Each unit by itself.
@@ -189,22 +200,32 @@ double LogMixture(const std::vector<double>& evidence, const std::vector<double>
   return sum + std::log(product);
 }
 
+// Evidence of the groups that are not empty, summed over those that have it together.
+void EvidenceOf(const Level& level, double size, std::vector<double>* evidence) {
+  evidence->clear();
+  if (level.together.empty()) {
+    for (const GroupScore& group : level.groups)
+      if (!group.empty()) evidence->push_back(group.Evidence(size));
+    return;
+  }
+  std::map<std::uint32_t, double> sums;
+  for (std::size_t k = 0; k < level.groups.size(); ++k)
+    if (!level.groups[k].empty()) sums[level.together[k]] += level.groups[k].Evidence(size);
+  for (const auto& [group, sum] : sums) evidence->push_back(sum);
+}
+
 // Average over sizes and shares; the best of them tells who has it.
 MixtureFit Mix(const Level& level, double prior_size) {
   MixtureFit best;
   double most = -std::numeric_limits<double>::infinity();
   std::vector<double> terms, evidence, odds;
-  const bool mixes = level.groups.size() > 1;
   for (const double relative : kSizes) {
     const double size = prior_size * relative;
-    evidence.clear(), odds.clear();
-    for (const GroupScore& group : level.groups) {
-      if (group.empty()) continue;
-      evidence.push_back(group.Evidence(size));
-      odds.push_back(std::exp(evidence.back()));
-    }
+    EvidenceOf(level, size, &evidence);
+    odds.clear();
+    for (const double one : evidence) odds.push_back(std::exp(one));
     for (const double share : kShares) {
-      if (!mixes && share < 1) break;
+      if (evidence.size() < 2 && share < 1) break;
       const double sum = share >= 1 ? std::accumulate(evidence.begin(), evidence.end(), 0.0)
                                     : LogMixture(evidence, odds, share);
       terms.push_back(sum);
@@ -262,11 +283,16 @@ void TakeMixture(const Level& level, const MixtureFit& fit, Standing* out) {
   out->chi_square = 0;
   out->has.assign(level.group_of_unit.size(), 0);
   std::vector<char> group_has(level.groups.size(), 0);
+  std::map<std::uint32_t, double> evidence_of;
+  const auto who = [&](std::size_t k) {
+    return level.together.empty() ? static_cast<std::uint32_t>(k) : level.together[k];
+  };
+  for (std::size_t k = 0; k < level.groups.size(); ++k)
+    if (!level.groups[k].empty()) evidence_of[who(k)] += level.groups[k].Evidence(fit.size);
   for (std::size_t k = 0; k < level.groups.size(); ++k) {
     if (level.groups[k].empty()) continue;
-    const double odds = fit.share >= 1 ? 1
-                                       : std::log(fit.share) - std::log1p(-fit.share) +
-                                             level.groups[k].Evidence(fit.size);
+    const double odds =
+        fit.share >= 1 ? 1 : std::log(fit.share) - std::log1p(-fit.share) + evidence_of[who(k)];
     group_has[k] = odds > 0 ? 1 : 0;
     if (group_has[k] != 0) out->chi_square += level.groups[k].chi_square;
   }
@@ -311,6 +337,22 @@ FleetGroups GroupsOf(const CampaignFacts& facts) {
   return groups;
 }
 
+bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups) {
+  const std::vector<std::uint32_t> group_of = Together(owner, groups, has.size());
+  struct Count {
+    std::size_t have = 0, all = 0;
+  };
+  std::map<std::uint32_t, Count> counts;
+  for (std::size_t unit = 0; unit < group_of.size(); ++unit) {
+    Count& count = counts[group_of[unit]];
+    ++count.all;
+    if (has[unit] != 0) ++count.have;
+  }
+  return std::none_of(counts.begin(), counts.end(), [](const auto& entry) {
+    return entry.second.have > 0 && 2 * entry.second.have < entry.second.all;
+  });
+}
+
 double FleetDispersion(const Score& score, std::size_t columns) {
   const auto c = static_cast<Index>(columns);
   Vector b = Vector::Zero(c);
@@ -349,7 +391,10 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   std::vector<Level> levels;
   const bool of_the_whole =
       form.effect->owner == Owner::kPlate || form.effect->owner == Owner::kCamera;
-  if (units == 1 || !of_the_whole) levels.push_back(UnitLevel(score, form, best.dispersion));
+  if (units == 1 || !of_the_whole) {
+    levels.push_back(UnitLevel(score, form, best.dispersion));
+    levels.back().together = Together(form.effect->owner, groups, units);
+  }
   if (units > 1) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.

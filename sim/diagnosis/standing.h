@@ -34,6 +34,10 @@ struct FleetGroups {
 };
 FleetGroups GroupsOf(const CampaignFacts& facts);
 
+/// Can units with this flag have what such an owner has? A rail's units, and a bus', have it
+/// together: most of those of each that has any. Shape of has: (units).
+bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups);
+
 /// Pre: score belongs to form.
 Standing Assess(const Score& score, const Template& form, const FleetGroups& groups);
 

@@ -1,14 +1,30 @@
 // Supply droop: the rail sags with those that move at once.
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <span>
+#include <vector>
 
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr int kLoadedByPlace = 4;
-constexpr int kLoadedEvenly = 5;
+// From here on a form says how much of the droop is the feed's, and how deep it is: shares of the
+// voltage that are missing at the harness' end with all in motion.
+constexpr int kLoaded = 4;
+constexpr double kFeedShares[] = {0, 0.5, 1};
+constexpr double kDepths[] = {0.05, 0.3, 0.55};
+
+const char* const kLoadedNames[] = {"harness; load, of the pull-out,",
+                                    "harness, deep; load, of the pull-out,",
+                                    "harness, deeper; load, of the pull-out,",
+                                    "harness and feed; load, of the pull-out,",
+                                    "harness and feed, deep; load, of the pull-out,",
+                                    "harness and feed, deeper; load, of the pull-out,",
+                                    "feed; load, of the pull-out,",
+                                    "feed, deep; load, of the pull-out,",
+                                    "feed, deeper; load, of the pull-out,"};
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
@@ -18,66 +34,73 @@ void List(const CampaignFacts& facts, Templates* out) {
   ListGrid({.axes = axes, .memories = {Memory::kNow}}, out);
   if (!facts.Has("rail_slot")) return;
   for (const int form : {1, 2, 3}) ListGrid({.axes = axes, .form = form}, out);
-  // A rotor under load: its angle is an arcsine of what the drive has left, and a deep droop bends.
-  if (!facts.Has("drive_amplitude")) return;
-  for (const int form : {kLoadedByPlace, kLoadedEvenly})
+  // The current of each motor through the harness, and a rotor under load: its angle is an arcsine
+  // of what the drive has left, and a deep droop bends.
+  if (!facts.Has("drive_amplitude") || !facts.Has(kSharedMotors)) return;
+  for (std::size_t k = 0; k < std::size(kFeedShares) * std::size(kDepths); ++k)
     ListGrid({.axes = axes,
-              .shapes = {0.2, 0.4, 0.55},
-              .shape_name = form == kLoadedByPlace
-                                ? "load, of the pull-out at nominal drive,"
-                                : "movers evenly along the rail; load, of the pull-out,",
-              .form = form,
-              .columns = 2},
+              .shapes = {0.2, 0.4, 0.6},
+              .shape_name = kLoadedNames[k],
+              .form = kLoaded + static_cast<int>(k)},
              out);
 }
 
-// Place along the harness: how much of the rail's droop a unit has.
-double ShareOfDroop(int form, double slot, double slots) {
-  const double share = (slot + 1) / slots;
-  if (form == 0) return 1;
-  if (form == 1 || form == kLoadedByPlace) return share;
-  if (form == 2) return 0.5 + slot / slots;
-  return 0.1 + share * (1 - share / 2);
+// Share of the largest droop, by the place along the harness.
+std::vector<double> ByPlace(const UnitTrack& track, int form) {
+  const std::span<const double> movers = track.Column("movers_on_rail");
+  const double most = std::max(track.facts->Find("movers_on_rail")->high, 1.0);
+  std::vector<double> droop(movers.begin(), movers.end());
+  for (double& one : droop) one /= most;
+  if (form == 0) return droop;
+  const std::span<const double> slot = track.Column("rail_slot");
+  const double slots = std::max(track.facts->Find("rail_slot")->high, 0.0) + 1;
+  for (std::size_t i = 0; i < droop.size(); ++i) {
+    const double place = (slot[i] + 1) / slots;
+    droop[i] *= form == 1   ? place
+                : form == 2 ? 0.5 + slot[i] / slots
+                            : 0.1 + place * (1 - place / 2);
+  }
+  return droop;
 }
 
-// asin(x / (1 - droop)) - asin(x), x = load / drive, to second order in the droop.
-struct LoadedLag {
-  double first = 0;
-  double second = 0;
-};
-LoadedLag LagOf(double load, double level) {
-  constexpr double kPullOut = 0.95;  // beyond it the rotor slips, which is another cause
-  const double x = std::min(load / level, kPullOut);
-  const double left = 1 - x * x;
-  return {x / std::sqrt(left), x * (2 - x * x) / (2 * std::pow(left, 1.5))};
+// The same, by the motors whose current goes through the unit's part of the harness.
+std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
+  const std::span<const double> motors = track.Column(kRailMotors);
+  const std::span<const double> shared = track.Column(kSharedMotors);
+  const double most = std::max(track.facts->Find(kRailMotors)->high, 1.0);
+  const double most_shared = std::max(track.facts->Find(kSharedMotors)->high, 1e-9);
+  std::vector<double> droop(motors.size());
+  for (std::size_t i = 0; i < droop.size(); ++i)
+    droop[i] = feed_share * motors[i] / most + (1 - feed_share) * shared[i] / most_shared;
+  return droop;
+}
+
+// What a missing share adds to the angle of a rotor that holds a load.
+double LagOf(double load, double level, double missing) {
+  constexpr double kPullOut = 0.985;  // beyond it the rotor slips, which is another cause
+  const auto angle = [&](double drive) { return std::asin(std::min(load / drive, kPullOut)); };
+  return angle(level * (1 - missing)) - angle(level);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  const std::span<const double> movers = track.Column("movers_on_rail");
-  const double most = std::max(track.facts->Find("movers_on_rail")->high, 1.0);
-  std::span<const double> slot;
+  const bool loaded = form.form >= kLoaded;
+  const auto k = static_cast<std::size_t>(std::max(form.form - kLoaded, 0));
+  const double depth = kDepths[k % std::size(kDepths)];
+  const std::vector<double> droop =
+      loaded ? ByCurrent(track, kFeedShares[k / std::size(kDepths)]) : ByPlace(track, form.form);
   std::span<const double> drive;
-  double slots = 1;
-  if (form.form != 0) slot = track.Column("rail_slot");
-  if (form.form != 0) slots = std::max(track.facts->Find("rail_slot")->high, 0.0) + 1;
   if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
-  const bool loaded = form.form == kLoadedByPlace || form.form == kLoadedEvenly;
   for (const std::size_t axis : AxesOf(form)) {
     const std::span<const double> step = track.step_deg[axis];
     AddRemembered(
         track, axis, form.memory,
         [&](std::size_t i) {
-          const double droop =
-              ShareOfDroop(form.form, slot.empty() ? 0 : slot[i], slots) * movers[i] / most;
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
           // The load angle grows with what the drive lacks.
-          double lag = amplitude[0] * droop / level;
-          if (loaded) {
-            const auto [first, second] = LagOf(form.shape, level);
-            lag = amplitude[0] * droop * first + amplitude[1] * droop * droop * second;
-          }
-          return -Direction(step[i]) * lag;
+          const double lag =
+              loaded ? LagOf(form.shape, level, depth * droop[i]) / depth : droop[i] / level;
+          return -amplitude[0] * Direction(step[i]) * lag;
         },
         &errors->angle_deg[axis]);
   }
@@ -96,7 +119,8 @@ Effect MakeSupplyDroop() {
               "sits, the lower its voltage and the larger its lag. Move fewer at once, or "
               "feed the rail at both ends.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          .continuous_shape = true};
 }
 
 }  // namespace focalfleet::sim

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "sim/effects/arm_gap.h"
+#include "sim/effects/harness.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -248,6 +249,20 @@ void FindContacts(const Campaign& campaign, CampaignFacts* facts) {
   facts->columns[std::string(kArmGapSide)] = Fill(gaps.side, campaign, facts->exposures);
 }
 
+void FindRailLoads(const Campaign& campaign, CampaignFacts* facts) {
+  const FilledColumn* rail = facts->Find("rail_id");
+  const FilledColumn* movers = facts->Find("movers_on_rail");
+  if (rail == nullptr || movers == nullptr) return;
+  const FilledColumn* slot = facts->Find("rail_slot");
+  const HarnessLoads loads =
+      FindHarnessLoads(facts->exposures, facts->step_deg, rail->values,
+                       slot == nullptr ? std::vector<double>() : slot->values, movers->values);
+  facts->columns[std::string(kRailMotors)] = Fill(loads.motors, campaign, facts->exposures);
+  if (!loads.shared_motors.empty())
+    facts->columns[std::string(kSharedMotors)] =
+        Fill(loads.shared_motors, campaign, facts->exposures);
+}
+
 // Columns that the units' table has and the moves' table lacks.
 void AddUnitColumns(const Campaign& campaign, CampaignFacts* facts) {
   struct UnitColumn {
@@ -335,6 +350,7 @@ CampaignFacts MakeFacts(const Campaign& campaign) {
   FindGradients(campaign, &facts);
   FindNeighbourPull(campaign, &facts);
   FindContacts(campaign, &facts);
+  FindRailLoads(campaign, &facts);
   return facts;
 }
 

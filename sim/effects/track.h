@@ -36,6 +36,8 @@ inline constexpr std::string_view kStep[] = {"theta step", "phi step"};
 inline constexpr std::string_view kOrder = "move order";
 inline constexpr std::string_view kGradientX = "temperature gradient x";
 inline constexpr std::string_view kGradientY = "temperature gradient y";
+inline constexpr std::string_view kRailMotors = "motors in motion on the rail";  // harness.h
+inline constexpr std::string_view kSharedMotors = "motors behind shared harness";
 inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";
 inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
 // Only where arms come near each other (arm_gap.h).

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <string>
 
@@ -107,46 +108,63 @@ TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
 }
 
 // A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
-// voltage gone, asin(x / (1 - share)).
+// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
-  constexpr double kMissing = 0.1;  // of the voltage, with all movers, at the harness' end
   std::size_t loaded = 0, bent = 0;
-  const auto slot_of = [&](std::size_t unit) {
-    return facts.Find("rail_slot")->values[campaign.first_row[unit]];
-  };
-  std::size_t last = 0;  // along its harness
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
-    if (slot_of(unit) > slot_of(last)) last = unit;
   for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
-    if (form.columns != 2 || form.axis != EffectAxis::kTheta) continue;
+    if (form.form < 4 || form.axis != EffectAxis::kTheta) continue;
     ++loaded;
-    // At the end of a rail with movers evenly along it: 0.1 of the feed, and half of the rail.
-    const double share = form.label.find("movers evenly") == std::string::npos ? 1 : 0.6;
-    const UnitTrack track = MakeTrack(facts, last, campaign.units[last]);
-    const auto movers = track.Column("movers_on_rail");
+    const int feed = (form.form - 4) / 3, deep = (form.form - 4) % 3;
+    const double of_feed = feed == 0 ? 0 : feed == 1 ? 0.5 : 1;
+    const double depth = deep == 0 ? 0.05 : deep == 1 ? 0.3 : 0.55;
+    const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+    const auto motors = track.Column(kRailMotors), shared = track.Column(kSharedMotors);
     const auto drive = track.Column("drive_amplitude");
-    const double most = facts.Find("movers_on_rail")->high;
-    PoseErrors errors;
-    errors.Reset(track.moves);
-    const std::vector<double> amplitude = {kMissing, kMissing * kMissing};
-    form.effect->apply(track, form, amplitude, &errors);
-    PoseErrors straight;
-    straight.Reset(track.moves);
-    form.effect->apply(track, form, std::vector<double>{kMissing, 0}, &straight);
+    const double most = facts.Find(kRailMotors)->high, furthest = facts.Find(kSharedMotors)->high;
+    const auto errors = Applied(track, form, depth);
     for (std::size_t i = 0; i < track.moves; ++i) {
       const double step = track.step_deg[kTheta][i], x = form.shape / drive[i];
-      if (step == 0 || x > 0.9) continue;
-      const double left = 1 - kMissing * share * movers[i] / most;
+      const double droop = of_feed * motors[i] / most + (1 - of_feed) * shared[i] / furthest;
+      const double left = 1 - depth * droop;
+      if (step == 0 || x / left > 0.98) continue;
       const double lag = std::asin(x / left) - std::asin(x);
-      const double wanted = step > 0 ? -lag : lag;
-      EXPECT_NEAR(errors.angle_deg[kTheta][i], wanted, 0.04 * lag) << form.label;
-      if (std::abs(straight.angle_deg[kTheta][i] - wanted) > 0.06 * lag) ++bent;
+      EXPECT_NEAR(errors[i], step > 0 ? -lag : lag, 1e-12) << form.label;
+      const double straight = depth * droop * x / std::sqrt(1 - x * x);
+      if (std::abs(straight - lag) > 0.06 * lag) ++bent;
     }
   }
-  EXPECT_EQ(loaded, 6u);
-  EXPECT_GT(bent, 10u);  // or the second column would not be needed
+  EXPECT_EQ(loaded, 27u);
+  EXPECT_GT(bent, 100u);  // or one depth would do
+}
+
+// Two phases against one carry a current: at 0, 60, ... degrees of the field one of them passes
+// zero, and what dead time takes across the field jumps.
+TEST(Effects, DeadTimeTurnsTheFieldSixTimesATurn) {
+  Campaign campaign = Made();
+  const double gear = campaign.units[5].gear[kTheta];
+  const std::size_t first = campaign.first_row[5];
+  const std::size_t moves = campaign.first_row[6] - first;
+  for (std::size_t i = 0; i < moves; ++i)
+    campaign.cmd_deg[kTheta][first + i] = (2.5 + 5.0 * static_cast<double>(i)) / gear;
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  const auto drive = track.Column("drive_amplitude");
+  std::size_t looked = 0;
+  for (const Template& form : ListTemplates(*FindEffect("phase_imbalance"), facts)) {
+    if (form.label.find("dead time") == std::string::npos || form.axis != EffectAxis::kTheta)
+      continue;
+    ++looked;
+    const auto errors = Applied(track, form, 1);
+    for (std::size_t i = 0; i < moves; ++i) {
+      // Between jumps at 30, 90, ... degrees it is twice the sine of what the field is past the
+      // middle.
+      const double past_deg = std::remainder(2.5 + 5.0 * static_cast<double>(i), 60);
+      EXPECT_NEAR(errors[i] * drive[i], 2 * std::sin(past_deg * std::numbers::pi / 180), 1e-9);
+    }
+  }
+  EXPECT_EQ(looked, 1u);
 }
 
 TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
