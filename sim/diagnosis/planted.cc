@@ -162,6 +162,8 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
   Rng rng = Rng::Stream(seed, planted.cause);
   term.sharing = Sharing::kUnit;
   const std::size_t c = term.form.columns;
+  const bool of_all = effect->owner == Owner::kPlate || effect->owner == Owner::kCamera;
+  double phase = 0;
   for (std::size_t u = 0; u < units; ++u) {
     const bool has = planted.unit_share >= 1 || rng.Uniform() < planted.unit_share ||
                      (u + 1 == units && planted.unit_share > 0 &&
@@ -169,7 +171,8 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
                                   [](std::uint32_t g) { return g == kNoGroup; }));
     term.group_of_unit.push_back(has ? static_cast<std::uint32_t>(u) : kNoGroup);
     const double size = planted.amplitude * (1 + planted.unit_scatter * rng.Normal());
-    const double phase = rng.Uniform(0, 2 * std::numbers::pi);
+    const double drawn = rng.Uniform(0, 2 * std::numbers::pi);
+    if (!of_all || u == 0) phase = drawn;  // a plate bends one way for all
     for (std::size_t k = 0; k < c; ++k)
       term.amplitude.push_back(c == 1   ? size
                                : k == 0 ? size * std::cos(phase)

@@ -65,6 +65,13 @@ INSTANTIATE_TEST_SUITE_P(
                     Plant{"mode_threshold", "theta", 0.04}),
     [](const auto& plant) { return std::string(plant.param.cause); });
 
+TEST(Diagnosis, APlateThatBendsOneWayForAllIsNamed) {
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = "plate_gradient", .amplitude = 1e-4, .form = 1}}));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "plate_gradient");
+}
+
 TEST(Diagnosis, TwoNamesForOneEffectAreAnAmbiguityOfTwo) {
   Effect twin = *FindEffect("eccentricity");
   twin.cause = "eccentricity_again";
