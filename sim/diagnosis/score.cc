@@ -128,7 +128,7 @@ class BlockScorer {
   void Score(std::size_t block, std::vector<ScorePass>* passes, ChunkPart* part) {
     block_ = block;
     scorer_.MakeSignatures(plan_.templates, plan_.blocks[block], &scratch_.raw);
-    raw_ = SquareLanes(scratch_.raw.data(), 2 * moves_);
+    whole_ = SquareLanes(scratch_.raw.data(), 2 * moves_);
     for (std::size_t p = 0; p < scorer_.planes().size(); ++p) {
       Project(scorer_.planes()[p]);
       for (std::size_t l = 0; l < scorer_.looks().size(); ++l) {
@@ -147,6 +147,7 @@ class BlockScorer {
     const MatrixXd& columns = plane.basis.columns();
     scratch_.parts.resize(static_cast<std::size_t>(columns.cols()));
     MultiplyLanes(columns, scratch_.raw.data(), scratch_.parts.data());
+    LeaveOutShifts();
     SubtractColumns(columns, scratch_.parts.data(), scratch_.raw.data(), scratch_.m.data());
     spent_ = plane.basis.size();
     const OwnProducts own = MultiplyByThemselves(scratch_.m.data(), moves_, scratch_.gg.data());
@@ -162,6 +163,20 @@ class BlockScorer {
     if (std::find(says_.begin(), says_.end(), false) != says_.end()) Empty(mask);
     shared_cross_.resize(static_cast<std::size_t>(plane.shared.cols()));
     MultiplyLanes(plane.shared, scratch_.m.data(), shared_cross_.data());
+  }
+
+  // What bends the plate or its image shifts each unit far more than it bends what the unit sees;
+  // the shift is its base's. The first two columns of the basis are those of the base.
+  void LeaveOutShifts() {
+    raw_ = whole_;
+    for (const Placed& placed : plan_.blocks[block_].forms) {
+      const Template& form = plan_.templates[placed.form];
+      const Owner owner = form.effect->owner;
+      if (owner != Owner::kPlate && owner != Owner::kCamera) continue;
+      for (std::size_t lane = placed.lane; lane < placed.lane + form.columns; ++lane)
+        for (const std::size_t base : {0u, 1u})
+          raw_.at[lane] -= scratch_.parts[base].at[lane] * scratch_.parts[base].at[lane];
+    }
   }
 
   [[nodiscard]] bool SaysSomething(const Placed& placed, const OwnProducts& own) const {
@@ -260,7 +275,7 @@ class BlockScorer {
   std::size_t moves_ = 0;
   // Of the block and plane at hand.
   std::size_t block_ = 0;
-  Lanes raw_, kept_;
+  Lanes whole_, raw_, kept_;  // squared lengths
   Index spent_ = 0;
   std::vector<bool> says_;  // Shape: (templates of the block)
   std::vector<Lanes> shared_cross_;

@@ -28,7 +28,9 @@ struct Score {
   // The sum over the fleet with the model's shared terms projected out.
   Eigen::VectorXd fleet_b, fleet_target_b;
   Eigen::MatrixXd fleet_g;
-  double raw = 0;         // squared length before anything was projected out
+  // Squared length before anything was projected out; of what plate or camera own, without what
+  // shifts a unit as a whole.
+  double raw = 0;
   double kept = 0;        // and after
   double spread_sum = 0;  // dispersion of the units' scores about their own fits, summed
   double spread_count = 0;

@@ -72,6 +72,15 @@ TEST(Diagnosis, APlateThatBendsOneWayForAllIsNamed) {
   EXPECT_EQ(diagnosis.causes[0].cause, "plate_gradient");
 }
 
+// On a wide plate a lens shifts each unit far more than it bends what the unit sees.
+TEST(Diagnosis, ALensOverAWidePlateIsNoTiltOfEachUnit) {
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = "camera_distortion", .amplitude = 40}}, {.units = 120}));
+  ASSERT_FALSE(diagnosis.causes.empty());
+  EXPECT_EQ(diagnosis.causes[0].cause, "camera_distortion") << Told(diagnosis);
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, 40, 2);
+}
+
 TEST(Diagnosis, TwoNamesForOneEffectAreAnAmbiguityOfTwo) {
   Effect twin = *FindEffect("eccentricity");
   twin.cause = "eccentricity_again";
