@@ -174,7 +174,7 @@ class BlockScorer {
       const Owner owner = form.effect->owner;
       if (owner != Owner::kPlate && owner != Owner::kCamera) continue;
       for (std::size_t lane = placed.lane; lane < placed.lane + form.columns; ++lane)
-        for (const std::size_t base : {0u, 1u})
+        for (std::size_t base = 0; base < std::min<std::size_t>(2, scratch_.parts.size()); ++base)
           raw_.at[lane] -= scratch_.parts[base].at[lane] * scratch_.parts[base].at[lane];
     }
   }

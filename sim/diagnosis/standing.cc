@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <span>
 
@@ -110,21 +109,15 @@ struct Level {
   std::vector<std::uint32_t> group_of_unit;
   // Groups that have it together or not at all, as a rail's units; empty: each by itself.
   std::vector<std::uint32_t> together;
+  [[nodiscard]] std::size_t as_one(std::size_t group) const {
+    return together.empty() ? group : together[group];
+  }
 };
 
 std::vector<std::uint32_t> Each(std::size_t units) {
   std::vector<std::uint32_t> each(units);
   std::iota(each.begin(), each.end(), 0u);
   return each;
-}
-
-// The units that have an effect of this owner together, whatever each has of it.
-std::vector<std::uint32_t> Together(Owner owner, const FleetGroups& groups, std::size_t units) {
-  if (owner == Owner::kRail)
-    return groups.rails > 0 ? groups.rail : std::vector<std::uint32_t>(units, 0);
-  if (owner == Owner::kBus)
-    return groups.buses > 0 ? groups.bus : std::vector<std::uint32_t>(units, 0);
-  return {};
 }
 
 // Each unit by itself.
@@ -200,18 +193,15 @@ double LogMixture(const std::vector<double>& evidence, const std::vector<double>
   return sum + std::log(product);
 }
 
-// Evidence of the groups that are not empty, summed over those that have it together.
-void EvidenceOf(const Level& level, double size, std::vector<double>* evidence) {
-  evidence->clear();
-  if (level.together.empty()) {
-    for (const GroupScore& group : level.groups)
-      if (!group.empty()) evidence->push_back(group.Evidence(size));
-    return;
+// Evidence summed over the groups that have it together; NaN where none of them is told anything.
+// Shape: (groups), by `Level::as_one`.
+void SumTogether(const Level& level, double size, std::vector<double>* evidence) {
+  evidence->assign(level.groups.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t k = 0; k < level.groups.size(); ++k) {
+    if (level.groups[k].empty()) continue;
+    double& sum = (*evidence)[level.as_one(k)];
+    sum = (std::isnan(sum) ? 0 : sum) + level.groups[k].Evidence(size);
   }
-  std::map<std::uint32_t, double> sums;
-  for (std::size_t k = 0; k < level.groups.size(); ++k)
-    if (!level.groups[k].empty()) sums[level.together[k]] += level.groups[k].Evidence(size);
-  for (const auto& [group, sum] : sums) evidence->push_back(sum);
 }
 
 // Average over sizes and shares; the best of them tells who has it.
@@ -221,7 +211,8 @@ MixtureFit Mix(const Level& level, double prior_size) {
   std::vector<double> terms, evidence, odds;
   for (const double relative : kSizes) {
     const double size = prior_size * relative;
-    EvidenceOf(level, size, &evidence);
+    SumTogether(level, size, &evidence);
+    std::erase_if(evidence, [](double one) { return std::isnan(one); });
     odds.clear();
     for (const double one : evidence) odds.push_back(std::exp(one));
     for (const double share : kShares) {
@@ -283,16 +274,13 @@ void TakeMixture(const Level& level, const MixtureFit& fit, Standing* out) {
   out->chi_square = 0;
   out->has.assign(level.group_of_unit.size(), 0);
   std::vector<char> group_has(level.groups.size(), 0);
-  std::map<std::uint32_t, double> evidence_of;
-  const auto who = [&](std::size_t k) {
-    return level.together.empty() ? static_cast<std::uint32_t>(k) : level.together[k];
-  };
-  for (std::size_t k = 0; k < level.groups.size(); ++k)
-    if (!level.groups[k].empty()) evidence_of[who(k)] += level.groups[k].Evidence(fit.size);
+  std::vector<double> evidence;
+  SumTogether(level, fit.size, &evidence);
   for (std::size_t k = 0; k < level.groups.size(); ++k) {
     if (level.groups[k].empty()) continue;
     const double odds =
-        fit.share >= 1 ? 1 : std::log(fit.share) - std::log1p(-fit.share) + evidence_of[who(k)];
+        fit.share >= 1 ? 1
+                       : std::log(fit.share) - std::log1p(-fit.share) + evidence[level.as_one(k)];
     group_has[k] = odds > 0 ? 1 : 0;
     if (group_has[k] != 0) out->chi_square += level.groups[k].chi_square;
   }
@@ -306,52 +294,7 @@ double UnitDispersion(const Score& score) {
   return (score.spread_sum + kPrior) / (score.spread_count + kPrior);
 }
 
-std::vector<std::uint32_t> Numbered(std::span<const double> ids, std::span<const std::size_t> first,
-                                    std::size_t* groups) {
-  std::map<double, std::uint32_t> number;
-  std::vector<std::uint32_t> of;
-  for (std::size_t unit = 0; unit + 1 < first.size(); ++unit) {
-    if (first[unit] == first[unit + 1]) {
-      of.push_back(kNoGroup);
-      continue;
-    }
-    const auto [it, fresh] =
-        number.emplace(ids[first[unit]], static_cast<std::uint32_t>(number.size()));
-    of.push_back(it->second);
-  }
-  *groups = number.size();
-  return of;
-}
-
 }  // namespace
-
-FleetGroups GroupsOf(const CampaignFacts& facts) {
-  FleetGroups groups;
-  const Campaign& campaign = *facts.campaign;
-  if (const FilledColumn* rail = facts.Find("rail_id"))
-    groups.rail = Numbered(rail->values, campaign.first_row, &groups.rails);
-  if (const FilledColumn* bus = facts.Find("bus_id"))
-    groups.bus = Numbered(bus->values, campaign.first_row, &groups.buses);
-  if (groups.rails < 2) groups.rails = 0;
-  if (groups.buses < 2) groups.buses = 0;
-  return groups;
-}
-
-bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups) {
-  const std::vector<std::uint32_t> group_of = Together(owner, groups, has.size());
-  struct Count {
-    std::size_t have = 0, all = 0;
-  };
-  std::map<std::uint32_t, Count> counts;
-  for (std::size_t unit = 0; unit < group_of.size(); ++unit) {
-    Count& count = counts[group_of[unit]];
-    ++count.all;
-    if (has[unit] != 0) ++count.have;
-  }
-  return std::none_of(counts.begin(), counts.end(), [](const auto& entry) {
-    return entry.second.have > 0 && 2 * entry.second.have < entry.second.all;
-  });
-}
 
 double FleetDispersion(const Score& score, std::size_t columns) {
   const auto c = static_cast<Index>(columns);

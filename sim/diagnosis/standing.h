@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "sim/diagnosis/fleet_groups.h"
 #include "sim/diagnosis/score.h"
 
 namespace focalfleet::sim {
@@ -25,18 +26,6 @@ struct Standing {
   double spread = 0;       // of the units' amplitudes, where they are their own
   bool scattered = false;  // units' own amplitudes about a mean of the fleet
 };
-
-struct FleetGroups {
-  std::vector<std::uint32_t> rail;  // Shape: (units); kNoGroup where unknown
-  std::vector<std::uint32_t> bus;
-  std::size_t rails = 0;  // 0: unknown, or one
-  std::size_t buses = 0;
-};
-FleetGroups GroupsOf(const CampaignFacts& facts);
-
-/// Can units with this flag have what such an owner has? A rail's units, and a bus', have it
-/// together: most of those of each that has any. Shape of has: (units).
-bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups);
 
 /// Pre: score belongs to form.
 Standing Assess(const Score& score, const Template& form, const FleetGroups& groups);

@@ -20,7 +20,8 @@ HarnessLoads FindHarnessLoads(const Exposures& exposures, const std::vector<doub
   HarnessLoads loads;
   loads.motors.resize(rows);
   if (!slot.empty()) loads.shared_motors.resize(rows);
-  const double slots = slot.empty() ? 1 : *std::max_element(slot.begin(), slot.end()) + 1;
+  const double slots =
+      slot.empty() ? 1 : std::max(*std::max_element(slot.begin(), slot.end()), 0.0) + 1;
   std::vector<std::size_t> order(rows);
   std::iota(order.begin(), order.end(), std::size_t{0});
   const auto key = [&](std::size_t row) {

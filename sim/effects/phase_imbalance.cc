@@ -1,14 +1,11 @@
 // Phase imbalance: unequal phases or dead time of the bridge.
 #include <algorithm>
-#include <cmath>
 
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr int kDeadTime = 2;
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Unequal gains grow with the drive, so that the angle does not know it; an offset (order 1) and
@@ -20,31 +17,16 @@ void List(const CampaignFacts& facts, Templates* out) {
             .form = levels ? 1 : 0,
             .columns = 2},
            out);
-  // The same dead time where all count electrical angles from the same phase.
-  if (levels) ListGrid({.shape_name = "dead time", .form = kDeadTime}, out);
-}
-
-// The bridge takes a fixed voltage off each phase, against the sign of its current; what is left of
-// that across the field turns it. `turns`: of the field.
-double DeadTimeWave(double turns) {
-  double across = 0;
-  for (const double phase : {0.0, 1.0 / 3, 2.0 / 3})
-    across += std::copysign(1.0, CosineOfTurns(turns - phase)) * SineOfTurns(turns - phase);
-  return across;
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  const double order = (form.form == kDeadTime ? 1 : form.shape) * track.unit->gear[axis];
+  const double order = form.shape * track.unit->gear[axis];
   if (form.form == 0) return AddHarmonic(track, axis, order, amplitude, errors);
   const std::span<const double> drive = track.Column("drive_amplitude");
   for (std::size_t i = 0; i < track.moves; ++i) {
     const double phase = HarmonicPhase(track, axis, i, order);
-    if (form.form == kDeadTime) {
-      errors->angle_deg[axis][i] += amplitude[0] * DeadTimeWave(phase) / std::max(drive[i], 0.05);
-      continue;
-    }
     errors->angle_deg[axis][i] +=
         (amplitude[0] * SineOfTurns(phase) + amplitude[1] * CosineOfTurns(phase)) /
         std::max(drive[i], 0.05);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iterator>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sim/effects/registry.h"
@@ -13,18 +14,12 @@ namespace {
 // From here on a form says how much of the droop is the feed's, and how deep it is: shares of the
 // voltage that are missing at the harness' end with all in motion.
 constexpr int kLoaded = 4;
-constexpr double kFeedShares[] = {0, 0.5, 1};
-constexpr double kDepths[] = {0.05, 0.3, 0.55};
-
-const char* const kLoadedNames[] = {"harness; load, of the pull-out,",
-                                    "harness, deep; load, of the pull-out,",
-                                    "harness, deeper; load, of the pull-out,",
-                                    "harness and feed; load, of the pull-out,",
-                                    "harness and feed, deep; load, of the pull-out,",
-                                    "harness and feed, deeper; load, of the pull-out,",
-                                    "feed; load, of the pull-out,",
-                                    "feed, deep; load, of the pull-out,",
-                                    "feed, deeper; load, of the pull-out,"};
+struct Named {
+  double value;
+  const char* name;
+};
+constexpr Named kFeeds[] = {{0, "harness"}, {0.5, "harness and feed"}, {1, "feed"}};
+constexpr Named kDepths[] = {{0.05, ""}, {0.3, ", deep"}, {0.55, ", deeper"}};
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
@@ -37,12 +32,12 @@ void List(const CampaignFacts& facts, Templates* out) {
   // The current of each motor through the harness, and a rotor under load: its angle is an arcsine
   // of what the drive has left, and a deep droop bends.
   if (!facts.Has("drive_amplitude") || !facts.Has(kSharedMotors)) return;
-  for (std::size_t k = 0; k < std::size(kFeedShares) * std::size(kDepths); ++k)
-    ListGrid({.axes = axes,
-              .shapes = {0.2, 0.4, 0.6},
-              .shape_name = kLoadedNames[k],
-              .form = kLoaded + static_cast<int>(k)},
-             out);
+  int form = kLoaded;
+  for (const Named& feed : kFeeds)
+    for (const Named& depth : kDepths) {
+      const std::string name = std::string(feed.name) + depth.name + "; load, of the pull-out,";
+      ListGrid({.axes = axes, .shapes = {0.2, 0.4, 0.6}, .shape_name = name, .form = form++}, out);
+    }
 }
 
 // Share of the largest droop, by the place along the harness.
@@ -78,7 +73,9 @@ std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
 // What a missing share adds to the angle of a rotor that holds a load.
 double LagOf(double load, double level, double missing) {
   constexpr double kPullOut = 0.985;  // beyond it the rotor slips, which is another cause
-  const auto angle = [&](double drive) { return std::asin(std::min(load / drive, kPullOut)); };
+  const auto angle = [&](double drive) {
+    return std::asin(std::clamp(load / drive, 0.0, kPullOut));
+  };
   return angle(level * (1 - missing)) - angle(level);
 }
 
@@ -86,9 +83,9 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
            PoseErrors* errors) {
   const bool loaded = form.form >= kLoaded;
   const auto k = static_cast<std::size_t>(std::max(form.form - kLoaded, 0));
-  const double depth = kDepths[k % std::size(kDepths)];
+  const double depth = kDepths[k % std::size(kDepths)].value;
   const std::vector<double> droop =
-      loaded ? ByCurrent(track, kFeedShares[k / std::size(kDepths)]) : ByPlace(track, form.form);
+      loaded ? ByCurrent(track, kFeeds[k / std::size(kDepths)].value) : ByPlace(track, form.form);
   std::span<const double> drive;
   if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
   for (const std::size_t axis : AxesOf(form)) {

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <string>
 
@@ -137,34 +136,6 @@ TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   }
   EXPECT_EQ(loaded, 27u);
   EXPECT_GT(bent, 100u);  // or one depth would do
-}
-
-// Two phases against one carry a current: at 0, 60, ... degrees of the field one of them passes
-// zero, and what dead time takes across the field jumps.
-TEST(Effects, DeadTimeTurnsTheFieldSixTimesATurn) {
-  Campaign campaign = Made();
-  const double gear = campaign.units[5].gear[kTheta];
-  const std::size_t first = campaign.first_row[5];
-  const std::size_t moves = campaign.first_row[6] - first;
-  for (std::size_t i = 0; i < moves; ++i)
-    campaign.cmd_deg[kTheta][first + i] = (2.5 + 5.0 * static_cast<double>(i)) / gear;
-  const CampaignFacts facts = MakeFacts(campaign);
-  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
-  const auto drive = track.Column("drive_amplitude");
-  std::size_t looked = 0;
-  for (const Template& form : ListTemplates(*FindEffect("phase_imbalance"), facts)) {
-    if (form.label.find("dead time") == std::string::npos || form.axis != EffectAxis::kTheta)
-      continue;
-    ++looked;
-    const auto errors = Applied(track, form, 1);
-    for (std::size_t i = 0; i < moves; ++i) {
-      // Between jumps at 30, 90, ... degrees it is twice the sine of what the field is past the
-      // middle.
-      const double past_deg = std::remainder(2.5 + 5.0 * static_cast<double>(i), 60);
-      EXPECT_NEAR(errors[i] * drive[i], 2 * std::sin(past_deg * std::numbers::pi / 180), 1e-9);
-    }
-  }
-  EXPECT_EQ(looked, 1u);
 }
 
 TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
