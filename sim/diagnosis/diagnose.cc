@@ -11,6 +11,7 @@
 #include "sim/diagnosis/distortion.h"
 #include "sim/diagnosis/events.h"
 #include "sim/diagnosis/families.h"
+#include "sim/diagnosis/fine_structure.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
 #include "sim/diagnosis/image.h"
@@ -190,6 +191,9 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
     seen.push_back(std::move(structure->told));
   }
   TakeSeen(std::move(seen), &diagnosis->unknown);
+  if (!diagnosis->unknown.empty()) return;
+  if (auto fine = FindFineStructure(*fit, options.family_wise))
+    diagnosis->unknown.push_back(std::move(*fine));
 }
 
 std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
@@ -444,6 +448,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);
+  const std::vector<std::size_t> far = FindAfterFit(fit, &diagnosis.outliers);
+  if (auto crowd = FindCrowd(fit, far, options.family_wise))
+    TakeSeen({std::move(*crowd)}, &diagnosis.unknown);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
   if (!diagnosis.unknown.empty())
     for (CauseFound& cause : diagnosis.causes)
@@ -451,7 +458,6 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
         if (std::find(cause.candidates.begin(), cause.candidates.end(), name) ==
             cause.candidates.end())
           cause.candidates.push_back(name);
-  FindAfterFit(fit, &diagnosis.outliers);
   for (const std::string_view cause : kEventCauses)
     diagnosis.not_testable.push_back({std::string(cause), "this version has no test for it"});
   Conclude(&diagnosis);

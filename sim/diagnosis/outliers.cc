@@ -15,7 +15,11 @@ constexpr double kStuckTravel_deg = 5;
 constexpr double kStuckSpread_mm = 0.03;
 constexpr double kBadUnit_mm = 0.3;  // median miss after the static fit
 constexpr double kSwapBetter = 0.2;  // of the miss that is left once names are exchanged
-constexpr double kMostRows = 0.3;    // of a unit's rows: the unit itself is named
+constexpr double kCrowdShare = 0.3;  // of the family-wise rate
+constexpr double kCrowdLeast = 4;    // units and exposures
+constexpr std::size_t kCrowdMost = 200;
+constexpr std::string_view kCrowdColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
+constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 
 double SpreadOf(const std::vector<double>& values) {
   return values.empty() ? 0 : Quantile(values, 0.95) - Quantile(values, 0.05);
@@ -71,6 +75,69 @@ bool Stayed(const Fit& fit, std::size_t unit, std::size_t row) {
       PlaceOf(fit.model.units[unit], campaign.from_deg[kTheta][row], campaign.from_deg[kPhi][row]);
   const double miss = std::hypot(fit.x_um[row], fit.y_um[row]);
   return std::hypot(from_x_um - 1e3 * start.x_mm, from_y_um - 1e3 * start.y_mm) < 0.2 * miss;
+}
+
+// An axis' stay at one value of a column: a row that is far because of where it stands is far for
+// as long as it stands there.
+struct Visit {
+  double value = 0;
+  std::size_t row = 0;  // its first, or its first far one
+  std::size_t unit = 0;
+  bool far = false;
+};
+
+std::vector<Visit> VisitsOf(const Fit& fit, const FilledColumn& column,
+                            const std::vector<char>& is_far) {
+  const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
+  std::vector<Visit> visits;
+  for (std::size_t unit = 0; unit + 1 < first_row.size(); ++unit) {
+    bool begins = true;
+    for (std::size_t row = first_row[unit]; row < first_row[unit + 1]; ++row) {
+      if (fit.aside[row] != 0 || !std::isfinite(fit.x_um[row])) continue;
+      if (begins || column.values[row] != visits.back().value)
+        visits.push_back({.value = column.values[row], .row = row, .unit = unit});
+      begins = false;
+      if (is_far[row] == 0 || visits.back().far) continue;
+      visits.back().far = true;
+      visits.back().row = row;
+    }
+  }
+  std::ranges::stable_sort(visits, {}, &Visit::value);
+  return visits;
+}
+
+struct Crowd {
+  double log_p = 0;  // of so many far visits in so narrow a window, of all windows
+  std::vector<const Visit*> visits;
+};
+
+// Of all windows from one far visit to another the one that chance fills least. `visits` in the
+// order of their values.
+Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
+  std::vector<std::size_t> far;
+  for (std::size_t k = 0; k < visits.size(); ++k)
+    if (visits[k].far) far.push_back(k);
+  const auto all = static_cast<double>(far.size());
+  Crowd densest;
+  std::size_t begin = 0, end = 0;
+  for (std::size_t i = 0; i < far.size(); ++i) {
+    // Many of one unit, or of one exposure, count once: they may have something else in common.
+    std::set<std::size_t> units, together;
+    for (std::size_t j = i; j < std::min(far.size(), i + kCrowdMost); ++j) {
+      units.insert(visits[far[j]].unit);
+      together.insert(exposures.of_row[visits[far[j]].row]);
+      const auto k = static_cast<double>(std::min(units.size(), together.size()));
+      if (k < kCrowdLeast) continue;
+      const double share =
+          static_cast<double>(far[j] + 1 - far[i]) / static_cast<double>(visits.size());
+      // At most the expected number of sets of k in the window, of all windows.
+      const double log_p = std::lgamma(all + 1) - std::lgamma(k + 1) - std::lgamma(all - k + 1) +
+                           k * std::log(share) + 2 * std::log(all);
+      if (log_p < densest.log_p) densest.log_p = log_p, begin = i, end = j + 1;
+    }
+  }
+  for (std::size_t i = begin; i < end; ++i) densest.visits.push_back(&visits[far[i]]);
+  return densest;
 }
 
 }  // namespace
@@ -145,7 +212,8 @@ void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign
     if (met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
 }
 
-void FindAfterFit(const Fit& fit, OutliersFound* found) {
+std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
+  std::vector<std::size_t> far_rows;
   const Campaign& campaign = *fit.facts->campaign;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     const WhiteUnit white = Whiten(fit, unit);
@@ -156,6 +224,7 @@ void FindAfterFit(const Fit& fit, OutliersFound* found) {
       const double length = std::hypot(white.y[at], white.y[at + 1]) / std::sqrt(fit.weight[row]);
       if (length <= kFar) continue;
       ++far;
+      far_rows.push_back(row);
       ++found->rows;
       ++found->why[Stayed(fit, unit, row) ? "move did not happen" : "far from every prediction"];
     }
@@ -163,6 +232,33 @@ void FindAfterFit(const Fit& fit, OutliersFound* found) {
       found->units.push_back(campaign.units[unit].id);
   }
   std::sort(found->units.begin(), found->units.end());
+  return far_rows;
+}
+
+std::optional<UnknownFound> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
+                                      double family_wise) {
+  std::vector<char> is_far(fit.weight.size(), 0);
+  for (const std::size_t row : far) is_far[row] = 1;
+  std::optional<UnknownFound> best;
+  double least =
+      std::log(kCrowdShare * family_wise / static_cast<double>(std::size(kCrowdColumns)));
+  for (const std::string_view name : kCrowdColumns) {
+    const FilledColumn* column = fit.facts->Find(name);
+    if (column == nullptr || !column->varies()) continue;
+    const std::vector<Visit> visits = VisitsOf(fit, *column, is_far);
+    const Crowd crowd = DensestOf(visits, fit.facts->exposures);
+    if (crowd.log_p >= least) continue;
+    least = crowd.log_p;
+    double square = 0;
+    for (const Visit* visit : crowd.visits)
+      square += std::pow(std::hypot(fit.x_um[visit->row], fit.y_um[visit->row]), 2);
+    best = {.covariate = std::string(name),
+            .channel = "rows far from every prediction",
+            .p_value = std::exp(crowd.log_p) * static_cast<double>(std::size(kCrowdColumns)),
+            .size_um = std::sqrt(square / static_cast<double>(visits.size())),
+            .delta_log_likelihood = -crowd.log_p};
+  }
+  return best;
 }
 
 }  // namespace focalfleet::sim

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -21,7 +22,13 @@ std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit);
 /// only one become missing.
 void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign);
 
-/// Rows far from the final model, added by reason.
-void FindAfterFit(const Fit& fit, OutliersFound* found);
+/// Rows far from the final model, added by reason. Returns them.
+std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found);
+
+/// Outliers that are far for a reason of their own lie anywhere. Where they crowd at one angle, or
+/// where arms come near each other, something happens there that no term has. `far`: rows. None:
+/// chance puts them so, at a share of the family-wise rate.
+std::optional<UnknownFound> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
+                                      double family_wise);
 
 }  // namespace focalfleet::sim

@@ -1,0 +1,112 @@
+// What varies too fast for a smooth curve, and outliers that crowd at one place.
+#include "sim/diagnosis/fine_structure.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// The only thing that is unknown, or nothing.
+UnknownFound OnlyUnknown(const Diagnosis& diagnosis) {
+  EXPECT_EQ(diagnosis.unknown.size(), 1u) << Told(diagnosis);
+  return diagnosis.unknown.empty() ? UnknownFound{} : diagnosis.unknown.front();
+}
+
+Campaign Rounded(double step_deg) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  TurnTheta(
+      [&](std::size_t row) {
+        const double commanded = campaign.cmd_deg[kTheta][row];
+        return std::round(commanded / step_deg) * step_deg - commanded;
+      },
+      &campaign);
+  return campaign;
+}
+
+TEST(FineStructure, RoundedAnglesAreNoNoise) {
+  for (const double step_deg : {0.1, 0.237, 1.0}) {
+    const UnknownFound unknown =
+        OnlyUnknown(Verdicts(Rounded(step_deg), {.leave_out = {"command_quantisation"}}));
+    EXPECT_EQ(unknown.covariate, "theta_cmd_deg") << step_deg;
+    EXPECT_EQ(unknown.channel, "theta angle") << step_deg;
+    EXPECT_LT(unknown.p_value, 1e-3) << step_deg;
+  }
+}
+
+TEST(FineStructure, AFractionOfAPixelIsSeenWithoutItsShape) {
+  constexpr double kPixel_mm = 0.06;
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  Covariate pixel{.name = "pixel_y", .values = {}};
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    pixel.values.push_back(1000 + campaign.y_mm[row] / kPixel_mm);
+    const double fraction = pixel.values[row] - std::floor(pixel.values[row]);
+    campaign.y_mm[row] += fraction < 0.3 ? 0.008 : -0.003;
+  }
+  campaign.covariates.push_back(std::move(pixel));
+  const UnknownFound unknown = OnlyUnknown(Verdicts(campaign, {.leave_out = {"centroid_bias"}}));
+  EXPECT_EQ(unknown.covariate, "pixel_y");
+  EXPECT_EQ(unknown.channel, "y");
+  EXPECT_GT(unknown.size_um, 3);  // 5.2 planted, some of it taken for noise
+  EXPECT_LT(unknown.size_um, 6);
+}
+
+TEST(FineStructure, ArmsThatLeanOnEachOtherAreSeenByTheirGap) {
+  const Diagnosis diagnosis = Verdicts(
+      Planted({{.cause = "collision_contact", .amplitude = 0.1}}, {.moves = 80, .seed = 3}),
+      {.leave_out = {"collision_contact"}});
+  const UnknownFound unknown = OnlyUnknown(diagnosis);
+  EXPECT_EQ(unknown.covariate, "gap to the next arm");
+  EXPECT_EQ(unknown.channel, "phi angle");
+}
+
+TEST(FineStructure, ChanceShowsItNoMoreOftenThanItSays) {
+  constexpr int kCampaigns = 60;
+  constexpr double kRate = 1;
+  constexpr double kShare = 0.3;  // of which are this look's
+  int shown = 0;
+  for (std::uint64_t seed = 1; seed <= kCampaigns; ++seed) {
+    const Campaign campaign = Planted({}, {.moves = 40, .seed = seed});
+    const CampaignFacts facts = MakeFacts(campaign);
+    CampaignModel model;
+    model.units = campaign.units;
+    const Fit fit =
+        StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+    if (FindFineStructure(fit, kRate)) ++shown;
+  }
+  EXPECT_LE(shown, kShare * kRate * kCampaigns);
+}
+
+// Rows up to 2 mm off: anywhere, or only where theta stands between 40 and 48 degrees.
+Campaign WithFarRows(bool crowded) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Rng rng = Rng::Stream(8, "far rows");
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const double theta_deg = campaign.cmd_deg[kTheta][row];
+    if (crowded ? theta_deg < 40 || theta_deg > 48 : rng.Uniform() > 0.02) continue;
+    campaign.x_mm[row] += rng.Uniform(-1.4, 1.4);
+    campaign.y_mm[row] += rng.Uniform(-1.4, 1.4);
+  }
+  return campaign;
+}
+
+TEST(Crowd, OutliersAtOneAngleAreUnknown) {
+  const Diagnosis diagnosis = Verdicts(WithFarRows(true));
+  ASSERT_GE(diagnosis.outliers.rows, 10u);
+  const UnknownFound unknown = OnlyUnknown(diagnosis);
+  EXPECT_EQ(unknown.covariate, "theta_cmd_deg");
+  EXPECT_EQ(unknown.channel, "rows far from every prediction");
+}
+
+TEST(Crowd, OutliersAnywhereAreOutliers) {
+  const Diagnosis diagnosis = Verdicts(WithFarRows(false));
+  ASSERT_GE(diagnosis.outliers.rows, 20u);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kConsistent) << Told(diagnosis);
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
