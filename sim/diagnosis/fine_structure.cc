@@ -20,7 +20,7 @@ constexpr std::size_t kNext = 8;   // partners of a row, by rank
 constexpr std::size_t kApart = 4;  // exposures; nearer ones may share the air
 constexpr double kClip = 3;        // an outlier is one row
 constexpr double kPairsMin = 100;
-constexpr double kShareMin = 0.05;    // of the channel's variance
+constexpr double kShareMin = 0.08;    // of the channel's variance
 constexpr double kShareOfRate = 0.3;  // the family-wise one
 // How near is nearly, as a share of the column's range.
 constexpr std::array kNear = {1.0 / 20000, 1.0 / 5000, 1.0 / 1250, 1.0 / 300, 1.0 / 80};
@@ -74,28 +74,30 @@ std::vector<Row> RowsOf(const Fit& fit) {
   return rows;
 }
 
+// What is left along a column that a named cause reads is left by that cause's shape.
+bool IsNamed(const CampaignModel& model, std::string_view column) {
+  return std::ranges::any_of(model.terms, [&](const ModelTerm& term) {
+    return std::ranges::find(term.form.effect->needs, column) != term.form.effect->needs.end();
+  });
+}
+
 // Angles where they were told to go and how far from there; arms that come near each other; where
 // on a pixel a spot lies.
-std::vector<Column> ColumnsOf(const CampaignFacts& facts) {
+std::vector<Column> ColumnsOf(const CampaignFacts& facts, const CampaignModel& model) {
   const std::vector<Channel> angles = {kAlongTheta, kAlongPhi};
   std::vector<Column> columns;
-  const auto take = [&](std::string_view name, std::vector<Channel> channels) {
+  const auto take = [&](std::string_view name, std::vector<Channel> channels) -> Column* {
     const FilledColumn* column = facts.Find(name);
-    if (column != nullptr && column->varies())
-      columns.push_back({std::string(name), column->values, {}, std::move(channels)});
+    if (column == nullptr || !column->varies() || IsNamed(model, name)) return nullptr;
+    columns.push_back({std::string(name), column->values, {}, std::move(channels)});
+    return &columns.back();
   };
   for (const std::size_t axis : {kTheta, kPhi}) take(kCommand[axis], angles);
   for (const std::size_t axis : {kTheta, kPhi}) take(kStep[axis], angles);
-  if (const FilledColumn* side = facts.Find(kArmGapSide)) {
-    take(kArmGap, {kAlongPhi});
-    columns.back().sign = side->values;
-  }
-  for (const std::string_view name : {"pixel_x", "pixel_y"}) {
-    const std::size_t before = columns.size();
-    take(name, {name == "pixel_x" ? kAlongX : kAlongY});
-    if (columns.size() == before) continue;
-    for (double& value : columns.back().values) value -= std::floor(value);
-  }
+  if (Column* gap = take(kArmGap, {kAlongPhi})) gap->sign = facts.Find(kArmGapSide)->values;
+  for (const auto& [name, channel] : {std::pair{"pixel_x", kAlongX}, {"pixel_y", kAlongY}})
+    if (Column* pixel = take(name, {channel}))
+      for (double& value : pixel->values) value -= std::floor(value);
   return columns;
 }
 
@@ -246,7 +248,7 @@ void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axi
 
 std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise) {
   const std::vector<Row> rows = RowsOf(fit);
-  const std::vector<Column> columns = ColumnsOf(*fit.facts);
+  const std::vector<Column> columns = ColumnsOf(*fit.facts, fit.model);
   double looks = 2 * kOrders;
   for (const Column& column : columns)
     looks += static_cast<double>(column.channels.size() * kNear.size());

@@ -83,6 +83,7 @@ struct Visit {
   double value = 0;
   std::size_t row = 0;  // its first, or its first far one
   std::size_t unit = 0;
+  std::size_t rows = 0;
   bool far = false;
 };
 
@@ -97,6 +98,7 @@ std::vector<Visit> VisitsOf(const Fit& fit, const FilledColumn& column,
       if (begins || column.values[row] != visits.back().value)
         visits.push_back({.value = column.values[row], .row = row, .unit = unit});
       begins = false;
+      ++visits.back().rows;
       if (is_far[row] == 0 || visits.back().far) continue;
       visits.back().far = true;
       visits.back().row = row;
@@ -114,9 +116,11 @@ struct Crowd {
 // Of all windows from one far visit to another the one that chance fills least. `visits` in the
 // order of their values.
 Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
-  std::vector<std::size_t> far;
-  for (std::size_t k = 0; k < visits.size(); ++k)
+  std::vector<std::size_t> far, rows_before = {0};
+  for (std::size_t k = 0; k < visits.size(); ++k) {
     if (visits[k].far) far.push_back(k);
+    rows_before.push_back(rows_before.back() + visits[k].rows);
+  }
   const auto all = static_cast<double>(far.size());
   Crowd densest;
   std::size_t begin = 0, end = 0;
@@ -128,8 +132,9 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
       together.insert(exposures.of_row[visits[far[j]].row]);
       const auto k = static_cast<double>(std::min(units.size(), together.size()));
       if (k < kCrowdLeast) continue;
-      const double share =
-          static_cast<double>(far[j] + 1 - far[i]) / static_cast<double>(visits.size());
+      // A longer visit has more rows that can be far.
+      const double share = static_cast<double>(rows_before[far[j] + 1] - rows_before[far[i]]) /
+                           static_cast<double>(rows_before.back());
       // At most the expected number of sets of k in the window, of all windows.
       const double log_p = std::lgamma(all + 1) - std::lgamma(k + 1) - std::lgamma(all - k + 1) +
                            k * std::log(share) + 2 * std::log(all);
