@@ -51,6 +51,7 @@ Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options
       continue;
     }
     Templates made = ListTemplates(effect, facts);
+    std::erase_if(made, [&](const Template& form) { return !Shows(facts, form); });
     if (made.empty())
       not_testable->push_back(
           {std::string(effect.cause), "these units or moves have no such part"});
@@ -183,17 +184,26 @@ void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* told) {
 
 // What is left that no cause explains; with `patch`, terms for it.
 void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
-  std::vector<UnknownFound> seen;
-  if (options.patch) {
-    seen = PatchStructures({.family_wise = options.family_wise, .seed = options.seed},
-                           &diagnosis->unknown, fit);
-  } else if (auto structure = FindStructure(*fit, options.family_wise, options.seed)) {
-    seen.push_back(std::move(structure->told));
-  }
-  TakeSeen(std::move(seen), &diagnosis->unknown);
+  const double noise_um = RmsOf(*fit);
+  const auto tell = [&](const std::optional<UnknownFound>& left) {
+    if (!left) return false;
+    CauseFound* of = WhoLeaves(*left, noise_um, &diagnosis->causes);
+    if (of != nullptr) TellAsRemainder(left->size_um, left->covariate, of);
+    return of == nullptr;
+  };
+  std::optional<UnknownFound> left;
+  if (auto structure = FindStructure(*fit, options.family_wise, options.seed))
+    left = std::move(structure->told);
+  const bool seen = tell(left);
+  if (options.patch && (seen || !diagnosis->unknown.empty()))
+    TakeSeen(PatchStructures({.family_wise = options.family_wise, .seed = options.seed},
+                             &diagnosis->unknown, fit),
+             &diagnosis->unknown);
+  else if (seen)
+    TakeSeen({std::move(*left)}, &diagnosis->unknown);
   if (!diagnosis->unknown.empty()) return;
-  if (auto fine = FindFineStructure(*fit, options.family_wise))
-    diagnosis->unknown.push_back(std::move(*fine));
+  left = FindFineStructure(*fit, options.family_wise);
+  if (tell(left)) diagnosis->unknown.push_back(std::move(*left));
 }
 
 std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
@@ -327,7 +337,7 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
     if (!beside[t].is_doubtful()) continue;
     CauseFound& strong = all[named(beside[t].of)];
     if (beside[t].is_remainder())
-      TellAsRemainder(all[t], &strong);
+      TellAsRemainder(all[t].size_um, all[t].cause, &strong);
     else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
       all[t].candidates.push_back(strong.cause);
   }

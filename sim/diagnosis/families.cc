@@ -65,15 +65,30 @@ bool AreRelated(std::string_view a, std::string_view b) {
                      [&](const auto& family) { return Has(family, a) && Has(family, b); });
 }
 
-void TellAsRemainder(const CauseFound& rest, CauseFound* of) {
+void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of) {
   char size[32];
-  std::snprintf(size, sizeof size, "%.2g", rest.size_um);
-  of->shape += "; what its shape leaves, " + std::string(size) + " um, looks like " + rest.cause;
+  std::snprintf(size, sizeof size, "%.2g", size_um);
+  of->shape += "; what its shape leaves, " + std::string(size) + " um, looks like ";
+  of->shape += looks_like;
+}
+
+CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes) {
+  constexpr double kOfCause = 0.1, kOfNoise = 0.16;
+  if (left.size_um >= kOfNoise * noise_um) return nullptr;
+  CauseFound* largest = nullptr;
+  for (CauseFound& cause : *causes)
+    if (!Has(kElsewhere, cause.cause) && left.size_um < kOfCause * cause.size_um &&
+        (largest == nullptr || cause.size_um > largest->size_um))
+      largest = &cause;
+  return largest;
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
   // Of the stronger one's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
+  // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
+  // stronger one's evidence.
+  constexpr double kFaint = 20, kBesideFaint = 0.3;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
@@ -85,7 +100,9 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       related = (share < kShape && other.axis != "none" && cause.axis != "none") ||
                 (share < kCandidate && AreRelated(other.cause, cause.cause) &&
                  AxesMeet(other.axis, cause.axis));
-      if (!related && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
+      const bool faint = cause.delta_log_likelihood < kFaint && share < kBesideFaint &&
+                         AxesMeet(other.axis, cause.axis);
+      if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
       relative = &other;
       break;
     }
@@ -102,7 +119,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       continue;
     }
     if (same || (related && cause.delta_log_likelihood < kShape * relative->delta_log_likelihood)) {
-      TellAsRemainder(cause, relative);
+      TellAsRemainder(cause.size_um, cause.cause, relative);
       continue;
     }
     const std::string name = relative->cause;
@@ -155,13 +172,16 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 }
 
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
-  // Of the one the supply sinks as the night goes on, of the other the air cools.
-  constexpr std::string_view kOverTheNight[] = {"thermal_backlash", "supply_drift"};
+  // Over a night the supply sinks, for one, and the air cools, for the other; at one drive level a
+  // lag of the load is play, and what phases do is what the rotor's poles do.
+  constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
+                                                         {"backlash", "load_angle_lag"},
+                                                         {"phase_imbalance", "cogging"}};
   for (CauseFound& cause : *causes)
     for (const NotTestable& other : not_testable)
-      if (Has(kOverTheNight, cause.cause) && Has(kOverTheNight, other.cause) &&
-          !IsCandidate(cause, other.cause))
-        cause.candidates.push_back(other.cause);
+      for (const auto& pair : kAlikeWithoutColumn)
+        if (Has(pair, cause.cause) && Has(pair, other.cause) && !IsCandidate(cause, other.cause))
+          cause.candidates.push_back(other.cause);
 }
 
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {

@@ -15,13 +15,18 @@ bool AreRelated(std::string_view a, std::string_view b);
 /// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
-/// Tells `rest` as what the shape of `of` leaves, not as a cause.
-void TellAsRemainder(const CauseFound& rest, CauseFound* of);
+/// Tells what the shape of `of` leaves and what that looks like, by name: a cause or a column.
+void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of);
+
+/// Whose shape leaves so little structure: a cause ten times its size, where it is also far below
+/// the noise; pooled over many rows the least becomes significant. `noise_um`: rms of the
+/// residuals. nullptr: nobody's, it is worth telling.
+CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
-/// one's shape leaves: a relative on the same axis, or what only units of the strong one have. It
-/// gets the strong one as a candidate. What is faint beside any cause of an axis is told as that
-/// one's shape. Pre: strongest first.
+/// one's shape leaves: a relative on the same axis, what only units of the strong one have, or what
+/// is faint by itself. It gets the strong one as a candidate. What is faint beside any cause of an
+/// axis is told as that one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
@@ -41,8 +46,8 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
 /// causes: each gets the others as candidates, and the axis is told as not understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// Lag and clearance that change over a night look alike: where the column that would tell them
-/// apart is missing, who could not be tested is a candidate, too.
+/// Where the column is missing that would tell two causes apart, who could not be tested is a
+/// candidate, too.
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
 
 }  // namespace focalfleet::sim

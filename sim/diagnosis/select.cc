@@ -185,6 +185,7 @@ void RefineContenders(const Fit& fit, const FleetGroups& groups, std::vector<Con
       double most = -std::numeric_limits<double>::infinity();
       for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
         if (tried[k].shape <= 0 && tried[3 * c].shape > 0) continue;
+        if (!Shows(*fit.facts, tried[k])) continue;
         const double evidence = Assess(pass.scores[k], tried[k], groups).evidence;
         if (evidence > most) most = evidence, contenders[c].form = tried[k];
       }

@@ -109,6 +109,10 @@ std::span<const std::size_t> AxesOf(const Template& form) {
   return std::span(kAxes).subspan(AxisIndex(form), 1);
 }
 
+bool Shows(const CampaignFacts& facts, const Template& form) {
+  return form.effect->shows == nullptr || form.effect->shows(form, facts);
+}
+
 void ListGrid(const Grid& grid, Templates* out) {
   for (const EffectAxis axis : grid.axes)
     for (const Memory memory : grid.memories)

@@ -95,7 +95,12 @@ struct Effect {
   // A play of two degrees loses two degrees: shape and amplitude agree within a factor of five.
   // Shape 0 stands for any that is below all moves.
   bool amplitude_is_shape = false;
+  // Whether moves can tell that it is this shape; none: any can.
+  bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
 };
+
+/// Whether the effect's own shape can be told from these moves.
+bool Shows(const CampaignFacts& facts, const Template& form);
 
 /// What an amplitude of it can be: by physics, or a hundred times what it usually is.
 struct AmplitudeRange {

@@ -1,5 +1,6 @@
 // Hard stop: the axis runs into its end before the table says so.
 #include <algorithm>
+#include <vector>
 
 #include "sim/effects/registry.h"
 
@@ -7,11 +8,9 @@ namespace focalfleet::sim {
 namespace {
 
 void List(const CampaignFacts&, Templates* out) {
-  ListGrid({.shapes = {1, 2, 5, 10, 20}, .shape_name = "upper end; begins before it by, deg,"},
-           out);
-  ListGrid({.shapes = {1, 2, 5, 10, 20},
-            .shape_name = "lower end; begins before it by, deg,",
-            .form = 1},
+  const std::vector<double> begins_deg = {1, 2, 4, 7, 10, 13, 16, 20};
+  ListGrid({.shapes = begins_deg, .shape_name = "upper end; begins before it by, deg,"}, out);
+  ListGrid({.shapes = begins_deg, .shape_name = "lower end; begins before it by, deg,", .form = 1},
            out);
 }
 

@@ -1,5 +1,6 @@
 // Tooth damage: a bump at one angle of a gear.
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include "sim/effects/harmonic.h"
@@ -16,6 +17,13 @@ void List(const CampaignFacts& facts, Templates* out) {
   if (HasPinion(facts))
     ListGrid({.shapes = places_deg, .shape_name = "at the pinion's angle, deg,"}, out);
   ListGrid({.shapes = places_deg, .shape_name = "at the gear's angle, deg,", .form = 1}, out);
+}
+
+// A bump of which the axis never comes to the top is the end of a range rather than a tooth.
+bool Shows(const Template& form, const CampaignFacts& facts) {
+  if (form.form == 0) return true;
+  const FilledColumn& angle = facts.columns.at(std::string(kCommand[AxisIndex(form)]));
+  return form.shape + 360 * std::ceil((angle.low - form.shape) / 360) <= angle.high;
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -45,7 +53,8 @@ Effect MakeToothDamage() {
               "passes that tooth, at the same place each turn of it and in both directions.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .shows = Shows};
 }
 
 }  // namespace focalfleet::sim

@@ -68,6 +68,44 @@ TEST(Families, WhatIsFaintBesideTheStrongestIsNoName) {
   EXPECT_THAT(causes[1].candidates, ElementsAre("self_heating"));
 }
 
+TEST(Families, WhatIsFaintByItselfIsNotSureBesideAStrongerOne) {
+  const auto beside = [](const char* axis, double delta_log_likelihood) {
+    std::vector<CauseFound> causes = {Cause("relaxation", "phi", 92),
+                                      Cause("thermal_arm_growth", axis, delta_log_likelihood)};
+    JudgeRemainders(&causes);
+    return causes.back().candidates;
+  };
+  EXPECT_THAT(beside("both", 14), ElementsAre("thermal_arm_growth", "relaxation"));
+  EXPECT_THAT(beside("both", 22), ElementsAre("thermal_arm_growth"));
+  EXPECT_THAT(beside("theta", 14), ElementsAre("thermal_arm_growth"));
+}
+
+TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
+  std::vector<CauseFound> causes = {Cause("base_offset", "none", 9000),
+                                    Cause("gravity_sag", "none", 5000), Cause("wear", "theta", 90)};
+  causes[0].size_um = 50;
+  causes[1].size_um = 20;
+  const auto who = [&](double size_um, double noise_um) {
+    const CauseFound* of = WhoLeaves({.size_um = size_um}, noise_um, &causes);
+    return of == nullptr ? "nobody" : of->cause;
+  };
+  EXPECT_EQ(who(0.8, 6), "gravity_sag");
+  EXPECT_EQ(who(0.8, 4), "nobody");   // near the noise
+  EXPECT_EQ(who(2.5, 60), "nobody");  // a large part of the strongest
+  TellAsRemainder(0.8, "move order", &causes[1]);
+  EXPECT_THAT(causes[1].shape, HasSubstr("0.8 um, looks like move order"));
+}
+
+TEST(Families, WhereAColumnIsMissingItsCauseIsACandidate) {
+  std::vector<CauseFound> causes = {Cause("phase_imbalance", "phi", 300),
+                                    Cause("backlash", "theta", 200)};
+  JudgeUntested({{"cogging", "column drive_amplitude is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("phase_imbalance", "cogging"));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("backlash"));
+  JudgeUntested({{"load_angle_lag", "column drive_amplitude is missing"}}, &causes);
+  EXPECT_THAT(causes[1].candidates, ElementsAre("backlash", "load_angle_lag"));
+}
+
 TEST(Families, TheOtherAxisIsAnotherMatter) {
   std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000),
                                     Cause("friction_windup", "phi", 60)};

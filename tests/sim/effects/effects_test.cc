@@ -108,6 +108,25 @@ TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
 
 // A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
 // voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
+TEST(Effects, AToothThatTheAxisNeverReachesDoesNotShow) {
+  Campaign campaign = Made();
+  const auto shown = [&](double low_deg, double high_deg, EffectAxis axis, double place_deg) {
+    std::vector<double>& angle = campaign.cmd_deg[AxisIndex({.axis = axis})];
+    for (std::size_t row = 0; row < angle.size(); ++row)
+      angle[row] = low_deg + (high_deg - low_deg) * static_cast<double>(row) /
+                                 static_cast<double>(angle.size() - 1);
+    return Shows(
+        MakeFacts(campaign),
+        {.effect = FindEffect("tooth_damage"), .axis = axis, .form = 1, .shape = place_deg});
+  };
+  EXPECT_TRUE(shown(2, 178, EffectAxis::kPhi, 170));
+  EXPECT_FALSE(shown(2, 178, EffectAxis::kPhi, 190));
+  EXPECT_FALSE(shown(2, 178, EffectAxis::kPhi, 359));
+  EXPECT_TRUE(shown(-150, -20, EffectAxis::kTheta, 330));  // -30
+  EXPECT_FALSE(shown(-150, -20, EffectAxis::kTheta, 345));
+  EXPECT_TRUE(shown(-190, 190, EffectAxis::kTheta, 345));
+}
+
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
