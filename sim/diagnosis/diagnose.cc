@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <set>
@@ -19,6 +20,7 @@
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/wrong_sensors.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -27,8 +29,7 @@ namespace {
 constexpr std::size_t kMovesMin = 8;  // of a unit, seen
 constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
 constexpr double kKeptMin = 0.03;
-// Causes that come from other looks than a template's.
-constexpr std::string_view kEventCauses[] = {"sensor_bias"};
+constexpr double kUndecided = 6;  // 2 d ln L between two ways to read the temperatures
 
 bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
   return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
@@ -320,6 +321,30 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
   return selection;
 }
 
+// The same by the temperatures as they were told and, where sensors are suspect, by those around
+// them: whoever explains the moves better.
+Selection FindModelBySensors(const Templates& templates, const DiagnoseOptions& options,
+                             const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
+                             Diagnosis* diagnosis) {
+  if (truth == nullptr) return FindModel(templates, options, rule, fit, diagnosis);
+  Diagnosis corrected = *diagnosis;
+  Fit by_others = StartFit(truth->facts, diagnosis->model, fit->aside, options.parallel);
+  Selection selection = FindModel(templates, options, rule, fit, diagnosis);
+  if (!ReadsTemperature(fit->model)) {
+    diagnosis->not_testable.push_back(
+        {std::string(kSensorBias), "sensors are suspect, but nothing goes with the temperature"});
+    return selection;
+  }
+  Selection again = FindModel(templates, options, rule, &by_others, &corrected);
+  const double better = Merit(by_others) - Merit(*fit);
+  if (better < -kUndecided || !ReadsTemperature(by_others.model)) return selection;
+  const CampaignFacts& as_told = *fit->facts;
+  *fit = std::move(by_others);
+  *diagnosis = std::move(corrected);
+  diagnosis->causes.push_back(SensorCause(*fit, *truth, as_told, better > kUndecided));
+  return again;
+}
+
 // The causes of the model's terms. What a distortion of a stronger one explains as well is told as
 // what that one's shape leaves; what it explains in part has it as a candidate.
 std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
@@ -452,7 +477,13 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     share += (0.75 - share) * 0.15;
     options.progress(share, stage);
   };
-  const Selection selection = FindModel(templates, options, rule, &fit, &diagnosis);
+  std::unique_ptr<TrueTemperatures> truth;
+  if (const std::string why = WhyNoSensorIsTested(facts); !why.empty())
+    diagnosis.not_testable.push_back({std::string(kSensorBias), why});
+  else if (!IsLeftOut(options, kSensorBias))
+    truth = FindSuspectSensors(campaign, facts);
+  const Selection selection =
+      FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
@@ -468,8 +499,6 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
         if (std::find(cause.candidates.begin(), cause.candidates.end(), name) ==
             cause.candidates.end())
           cause.candidates.push_back(name);
-  for (const std::string_view cause : kEventCauses)
-    diagnosis.not_testable.push_back({std::string(cause), "this version has no test for it"});
   Conclude(&diagnosis);
   if (options.with_gain) {
     options.progress(0.9, "held-out moves");
