@@ -7,6 +7,7 @@
 #include <charconv>
 #include <filesystem>
 #include <optional>
+#include <regex>
 
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/diagnosis_files.h"
@@ -149,22 +150,26 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
 struct SimulateCampaignOptions {
   sim::PlantedOptions planted;
   std::vector<std::string> effects;
+  double unit_share = 1;
   std::string out;
 };
 
 Result<sim::PlantedEffect> EffectOf(const std::string& text) {
-  // cause[:axis]=amplitude
-  const std::size_t equals = text.find('=');
-  const std::size_t colon = text.find(':');
+  static const std::regex kForm("([a-z_]+)(:([a-z]+))?(#([0-9]{1,3}))?=([-+.0-9eE]+)");
+  std::smatch part;
   sim::PlantedEffect effect;
-  effect.cause = text.substr(0, std::min(equals, colon));
-  if (colon < equals) effect.axis = text.substr(colon + 1, equals - colon - 1);
-  const std::string number = equals == std::string::npos ? "" : text.substr(equals + 1);
-  const auto [end, problem] =
-      std::from_chars(number.data(), number.data() + number.size(), effect.amplitude);
-  if (number.empty() || problem != std::errc() || end != number.data() + number.size())
+  const auto take = [&](std::size_t group, auto* number) {
+    const std::string digits = part[group].str();
+    const auto [end, problem] =
+        std::from_chars(digits.data(), digits.data() + digits.size(), *number);
+    return problem == std::errc() && end == digits.data() + digits.size();
+  };
+  if (!std::regex_match(text, part, kForm) || !take(6, &effect.amplitude) ||
+      (part[5].matched && !take(5, &effect.form)))
     return Fail(ErrorCode::kInvalid,
-                "--effect " + text + ": cause=amplitude or cause:axis=amplitude is expected");
+                "--effect " + text + ": cause[:axis][#shape]=amplitude is expected");
+  effect.cause = part[1].str();
+  effect.axis = part[3].str();
   return effect;
 }
 
@@ -174,6 +179,7 @@ ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptio
     const auto effect = EffectOf(text);
     if (!effect) return Report(context, effect.error(), ExitCode::kUsage);
     planted.effects.push_back(*effect);
+    planted.effects.back().unit_share = options.unit_share;
   }
   const auto campaign = sim::PlantCampaign(planted);
   if (!campaign) return Report(context, campaign.error(), ExitCode::kUsage);
@@ -242,11 +248,18 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
                                  "  focalfleet simulate campaign --units 60 --moves 80 --effect "
                                  "backlash:theta=0.1 --out made\n"
                                  "  focalfleet simulate campaign --effect gravity_sag=5 --effect "
-                                 "eccentricity:phi=0.2 --out two");
+                                 "eccentricity:phi=0.2 --out two\n"
+                                 "  focalfleet simulate campaign --effect stiction:theta#24=1 "
+                                 "--effect lost_command=2 --unit-share 0.1 --out jumps");
   auto options = std::make_shared<SimulateCampaignOptions>();
   sim::PlantedOptions& planted = options->planted;
-  command->add_option("--effect", options->effects,
-                      "cause=amplitude or cause:axis=amplitude, in the cause's own unit; repeat");
+  command->add_option(
+      "--effect", options->effects,
+      "cause[:axis][#shape]=amplitude, in the cause's own unit; repeat. Shapes count "
+      "from 0; one that there is not, as #999, lists them");
+  command->add_option("--unit-share", options->unit_share, "Of the units, who have the effects")
+      ->check(NumberBetween(0, 1))
+      ->capture_default_str();
   command->add_option("--units", planted.units, "Units, on a hexagonal lattice")
       ->check(CLI::Range(1, 20000).description(""))
       ->capture_default_str();

@@ -186,25 +186,23 @@ void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* told) {
 // What is left that no cause explains; with `patch`, terms for it.
 void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
   const double noise_um = RmsOf(*fit);
-  const auto tell = [&](const std::optional<UnknownFound>& left) {
-    if (!left) return false;
-    CauseFound* of = WhoLeaves(*left, noise_um, &diagnosis->causes);
-    if (of != nullptr) TellAsRemainder(left->size_um, left->covariate, of);
+  const auto matters = [&](const UnknownFound& left) {
+    CauseFound* of = WhoLeaves(left, noise_um, &diagnosis->causes);
+    if (of != nullptr) TellAsRemainder(left.size_um, left.covariate, of);
     return of == nullptr;
   };
-  std::optional<UnknownFound> left;
-  if (auto structure = FindStructure(*fit, options.family_wise, options.seed))
-    left = std::move(structure->told);
-  const bool seen = tell(left);
-  if (options.patch && (seen || !diagnosis->unknown.empty()))
-    TakeSeen(PatchStructures({.family_wise = options.family_wise, .seed = options.seed},
-                             &diagnosis->unknown, fit),
-             &diagnosis->unknown);
-  else if (seen)
-    TakeSeen({std::move(*left)}, &diagnosis->unknown);
+  std::vector<UnknownFound> seen;
+  if (options.patch) {
+    seen = PatchStructures(
+        {.family_wise = options.family_wise, .seed = options.seed, .matters = matters},
+        &diagnosis->unknown, fit);
+  } else if (auto structure = FindStructure(*fit, options.family_wise, options.seed)) {
+    if (matters(structure->told)) seen.push_back(std::move(structure->told));
+  }
+  TakeSeen(std::move(seen), &diagnosis->unknown);
   if (!diagnosis->unknown.empty()) return;
-  left = FindFineStructure(*fit, options.family_wise);
-  if (tell(left)) diagnosis->unknown.push_back(std::move(*left));
+  auto fine = FindFineStructure(*fit, options.family_wise);
+  if (fine && matters(*fine)) diagnosis->unknown.push_back(std::move(*fine));
 }
 
 std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
@@ -322,27 +320,37 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
 }
 
 // The same by the temperatures as they were told and, where sensors are suspect, by those around
-// them: whoever explains the moves better.
+// them: whoever explains the moves better. Where neither does, a whole rail's sensors are told as
+// what they may be; a single unit may well be warmer.
 Selection FindModelBySensors(const Templates& templates, const DiagnoseOptions& options,
                              const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
                              Diagnosis* diagnosis) {
   if (truth == nullptr) return FindModel(templates, options, rule, fit, diagnosis);
   Diagnosis corrected = *diagnosis;
-  Fit by_others = StartFit(truth->facts, diagnosis->model, fit->aside, options.parallel);
   Selection selection = FindModel(templates, options, rule, fit, diagnosis);
-  if (!ReadsTemperature(fit->model)) {
+  const auto cannot = [&](const char* why) {
     diagnosis->not_testable.push_back(
-        {std::string(kSensorBias), "sensors are suspect, but nothing goes with the temperature"});
+        {std::string(kSensorBias), std::string("sensors are suspect, ") + why});
     return selection;
-  }
+  };
+  if (!ReadsTemperature(fit->model)) return cannot("but nothing goes with the temperature");
+  Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
   Selection again = FindModel(templates, options, rule, &by_others, &corrected);
   const double better = Merit(by_others) - Merit(*fit);
   if (better < -kUndecided || !ReadsTemperature(by_others.model)) return selection;
-  const CampaignFacts& as_told = *fit->facts;
-  *fit = std::move(by_others);
-  *diagnosis = std::move(corrected);
-  diagnosis->causes.push_back(SensorCause(*fit, *truth, as_told, better > kUndecided));
-  return again;
+  const bool is_better = better > kUndecided;
+  if (!is_better && truth->owner == Owner::kUnit) return cannot("and these moves do not decide");
+  CauseFound cause = SensorCause(by_others, *truth, *fit->facts, is_better && !truth->are_half);
+  const double rms_um = RmsOf(by_others);
+  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+  if (is_better) {
+    cause.delta_log_likelihood = better / 2;
+    *fit = std::move(by_others);
+    *diagnosis = std::move(corrected);
+    selection = std::move(again);
+  }
+  diagnosis->causes.push_back(std::move(cause));
+  return selection;
 }
 
 // The causes of the model's terms. What a distortion of a stronger one explains as well is told as
@@ -470,7 +478,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     return diagnosis;
   }
   diagnosis.x_before_um = fit.x_um, diagnosis.y_before_um = fit.y_um;
-  const Templates templates = ListLibrary(facts, options, &diagnosis.not_testable);
+  Templates templates = ListLibrary(facts, options, &diagnosis.not_testable);
   SelectionRule rule{.family_wise = options.family_wise, .seed = options.seed};
   double share = 0.1;
   rule.progress = [&](std::string_view stage) {
@@ -481,7 +489,10 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   if (const std::string why = WhyNoSensorIsTested(facts); !why.empty())
     diagnosis.not_testable.push_back({std::string(kSensorBias), why});
   else if (!IsLeftOut(options, kSensorBias))
-    truth = FindSuspectSensors(campaign, facts);
+    truth = FindSuspectSensors(facts);
+  // Without the wrong sensors a column may be gone that they alone made.
+  if (truth != nullptr)
+    std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   const Selection selection =
       FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
   FindNotExcited(templates, selection, &diagnosis.not_testable);

@@ -55,7 +55,7 @@ enum class ChangeKind { kWholeMove, kSlip };
 
 // A command that was lost, or made twice; or whole turns of a rotor, against its motion.
 std::vector<Change> ChangesIn(const UnitTrack& track, std::size_t move, ChangeKind kind) {
-  constexpr int kTurnsAtOnce = 2;
+  constexpr int kTurnsAtOnce = 4;
   const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
   std::vector<Change> changes;
   if (kind == ChangeKind::kWholeMove) {

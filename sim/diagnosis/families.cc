@@ -75,10 +75,16 @@ void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of
 
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes) {
   constexpr double kOfCause = 0.1, kOfNoise = 0.16;
+  // These have an amplitude of their own at each exposure, and leave nothing.
+  constexpr std::string_view kFree[] = {"camera_similarity", "air_turbulence"};
   if (left.size_um >= kOfNoise * noise_um) return nullptr;
+  const std::string_view axis = left.channel.starts_with("theta") ? "theta"
+                                : left.channel.starts_with("phi") ? "phi"
+                                                                  : "none";
   CauseFound* largest = nullptr;
   for (CauseFound& cause : *causes)
-    if (!Has(kElsewhere, cause.cause) && left.size_um < kOfCause * cause.size_um &&
+    if (cause.all_units && AxesMeet(axis, cause.axis) && !Has(kElsewhere, cause.cause) &&
+        !Has(kFree, cause.cause) && left.size_um < kOfCause * cause.size_um &&
         (largest == nullptr || cause.size_um > largest->size_um))
       largest = &cause;
   return largest;
@@ -181,7 +187,8 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
   for (CauseFound& cause : *causes)
     for (const NotTestable& other : not_testable)
       for (const auto& pair : kAlikeWithoutColumn)
-        if (Has(pair, cause.cause) && Has(pair, other.cause) && !IsCandidate(cause, other.cause))
+        if (other.why.starts_with("column ") && Has(pair, cause.cause) && Has(pair, other.cause) &&
+            !IsCandidate(cause, other.cause))
           cause.candidates.push_back(other.cause);
 }
 

@@ -18,9 +18,9 @@ bool AxesMeet(std::string_view a, std::string_view b);
 /// Tells what the shape of `of` leaves and what that looks like, by name: a cause or a column.
 void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of);
 
-/// Whose shape leaves so little structure: a cause ten times its size, where it is also far below
-/// the noise; pooled over many rows the least becomes significant. `noise_um`: rms of the
-/// residuals. nullptr: nobody's, it is worth telling.
+/// Whose shape leaves so little structure: a cause of all units on the same axis, ten times its
+/// size, where it is also far below the noise; pooled over many rows the least is significant.
+/// `noise_um`: rms of the residuals. nullptr: nobody's, it is worth telling.
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong

@@ -20,7 +20,6 @@ constexpr std::size_t kNext = 8;   // partners of a row, by rank
 constexpr std::size_t kApart = 4;  // exposures; nearer ones may share the air
 constexpr double kClip = 3;        // an outlier is one row
 constexpr double kPairsMin = 100;
-constexpr double kShareMin = 0.08;    // of the channel's variance
 constexpr double kShareOfRate = 0.3;  // the family-wise one
 // How near is nearly, as a share of the column's range.
 constexpr std::array kNear = {1.0 / 20000, 1.0 / 5000, 1.0 / 1250, 1.0 / 300, 1.0 / 80};
@@ -42,7 +41,7 @@ struct Row {
 struct Column {
   std::string name;
   std::vector<double> values;
-  std::vector<double> sign;  // of the residuals; empty: all +1
+  std::vector<double> sign;  // of the residuals, 0: the row has none of it; empty: all +1
   std::vector<Channel> channels;
 };
 
@@ -74,7 +73,7 @@ std::vector<Row> RowsOf(const Fit& fit) {
   return rows;
 }
 
-// What is left along a column that a named cause reads is left by that cause's shape.
+// What is left along a column that a named cause reads by name, as a pixel's, is left by its shape.
 bool IsNamed(const CampaignModel& model, std::string_view column) {
   return std::ranges::any_of(model.terms, [&](const ModelTerm& term) {
     return std::ranges::find(term.form.effect->needs, column) != term.form.effect->needs.end();
@@ -122,7 +121,9 @@ struct Alike {
 std::vector<std::size_t> OrderOf(const Column& column, const Fit& fit) {
   std::vector<std::size_t> order;
   for (std::size_t row = 0; row < fit.weight.size(); ++row)
-    if (fit.aside[row] == 0 && std::isfinite(fit.x_um[row])) order.push_back(row);
+    if (fit.aside[row] == 0 && std::isfinite(fit.x_um[row]) &&
+        (column.sign.empty() || column.sign[row] != 0))
+      order.push_back(row);
   Rng rng = Rng::Stream(1, column.name);
   for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[rng.Below(k)]);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -162,8 +163,13 @@ class Clearest {
 // Of a normal deviate, one-sided.
 double LogTail(double z) { return z > 0 ? LogChiSquareTail(z * z, 1) - std::numbers::ln2 : 0; }
 
+// Of ln L, where a share of the rows' variance is.
+double Explained(double share, std::size_t rows) {
+  return -static_cast<double>(rows) / 2 * std::log1p(-std::min(share, 0.99));
+}
+
 void LookAtRepeats(const Fit& fit, const std::vector<Row>& rows, const Column& column,
-                   Clearest* clearest) {
+                   double share_min, Clearest* clearest) {
   const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
   const std::vector<std::size_t> order = OrderOf(column, fit);
   if (order.empty()) return;
@@ -185,12 +191,12 @@ void LookAtRepeats(const Fit& fit, const std::vector<Row>& rows, const Column& c
     Alike sum;
     for (const auto& at_scale : alike) {
       sum += at_scale[c];
-      if (sum.pairs < kPairsMin || sum.share() < kShareMin) continue;
+      if (sum.pairs < kPairsMin || sum.share() < share_min) continue;
       const double z = sum.deviations();
       clearest->Look(LogTail(z), {.covariate = column.name,
                                   .channel = std::string(kChannelName[c]),
                                   .size_um = std::sqrt(sum.share()) * SpreadOf(rows, c),
-                                  .delta_log_likelihood = z * z / 2});
+                                  .delta_log_likelihood = Explained(sum.share(), order.size())});
     }
   }
 }
@@ -200,7 +206,7 @@ bool Arrives(const CampaignFacts& facts, std::size_t axis, std::size_t row) {
   return facts.restarts[row] != 0 || facts.step_deg[axis][row] != 0;
 }
 
-void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axis,
+void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axis, double share_min,
                    Clearest* clearest) {
   const CampaignFacts& facts = *fit.facts;
   const Channel c = axis == kTheta ? kAlongTheta : kAlongPhi;
@@ -236,25 +242,29 @@ void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axi
   double apart = 0;
   for (const std::complex<double>& one : of_exposure) apart += std::norm(one);
   const double share = 2 * std::norm(sum) / (static_cast<double>(arrivals.size()) * squares);
-  if (share < kShareMin) return;
+  if (share < share_min) return;
+  // Waves may all be real, as at one angle: one degree of freedom is the worst.
   const double z2 = std::norm(sum) / std::max(apart, squares);
-  clearest->Look(LogChiSquareTail(z2, 1), {.covariate = std::string(kCommand[axis]),
-                                           .channel = std::string(kChannelName[c]),
-                                           .size_um = std::sqrt(share) * SpreadOf(rows, c),
-                                           .delta_log_likelihood = z2 / 2});
+  clearest->Look(LogChiSquareTail(z2, 1),
+                 {.covariate = std::string(kCommand[axis]),
+                  .channel = std::string(kChannelName[c]),
+                  .size_um = std::sqrt(share) * SpreadOf(rows, c),
+                  .delta_log_likelihood = Explained(share, arrivals.size())});
 }
 
 }  // namespace
 
-std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise) {
+std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise,
+                                              double share_min) {
   const std::vector<Row> rows = RowsOf(fit);
   const std::vector<Column> columns = ColumnsOf(*fit.facts, fit.model);
   double looks = 2 * kOrders;
   for (const Column& column : columns)
     looks += static_cast<double>(column.channels.size() * kNear.size());
   Clearest clearest(family_wise, looks);
-  for (const Column& column : columns) LookAtRepeats(fit, rows, column, &clearest);
-  for (const std::size_t axis : {kTheta, kPhi}) LookAtRipples(fit, rows, axis, &clearest);
+  for (const Column& column : columns) LookAtRepeats(fit, rows, column, share_min, &clearest);
+  for (const std::size_t axis : {kTheta, kPhi})
+    LookAtRipples(fit, rows, axis, share_min, &clearest);
   return clearest.Take();
 }
 

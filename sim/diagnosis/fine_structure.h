@@ -18,8 +18,9 @@
 
 namespace focalfleet::sim {
 
-/// The clearest. None: chance explains it, at a share of the family-wise rate, or it is a small
-/// part of the noise.
-std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise);
+/// The clearest. None: chance explains it, at a share of the family-wise rate, or it is less than
+/// `share_min` of the variance along an angle or direction.
+std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise,
+                                              double share_min = 0.08);
 
 }  // namespace focalfleet::sim

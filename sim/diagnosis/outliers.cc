@@ -90,11 +90,15 @@ struct Visit {
 std::vector<Visit> VisitsOf(const Fit& fit, const FilledColumn& column,
                             const std::vector<char>& is_far) {
   const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
+  // No arm is near: no gap.
+  const FilledColumn* side =
+      &column == fit.facts->Find(kArmGap) ? fit.facts->Find(kArmGapSide) : nullptr;
   std::vector<Visit> visits;
   for (std::size_t unit = 0; unit + 1 < first_row.size(); ++unit) {
     bool begins = true;
     for (std::size_t row = first_row[unit]; row < first_row[unit + 1]; ++row) {
       if (fit.aside[row] != 0 || !std::isfinite(fit.x_um[row])) continue;
+      if (side != nullptr && side->values[row] == 0) continue;
       if (begins || column.values[row] != visits.back().value)
         visits.push_back({.value = column.values[row], .row = row, .unit = unit});
       begins = false;
@@ -121,6 +125,15 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
     if (visits[k].far) far.push_back(k);
     rows_before.push_back(rows_before.back() + visits[k].rows);
   }
+  // Whole ties: in what order equal ones stand means nothing.
+  const auto begin_of = [&](std::size_t k) {
+    const auto first = std::ranges::lower_bound(visits, visits[k].value, {}, &Visit::value);
+    return static_cast<std::size_t>(first - visits.begin());
+  };
+  const auto end_of = [&](std::size_t k) {
+    const auto past = std::ranges::upper_bound(visits, visits[k].value, {}, &Visit::value);
+    return static_cast<std::size_t>(past - visits.begin());
+  };
   const auto all = static_cast<double>(far.size());
   Crowd densest;
   std::size_t begin = 0, end = 0;
@@ -133,11 +146,12 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
       const auto k = static_cast<double>(std::min(units.size(), together.size()));
       if (k < kCrowdLeast) continue;
       // A longer visit has more rows that can be far.
-      const double share = static_cast<double>(rows_before[far[j] + 1] - rows_before[far[i]]) /
-                           static_cast<double>(rows_before.back());
-      // At most the expected number of sets of k in the window, of all windows.
+      const double share =
+          static_cast<double>(rows_before[end_of(far[j])] - rows_before[begin_of(far[i])]) /
+          static_cast<double>(rows_before.back());
+      // The expected number of sets of k that lie so close; of any k.
       const double log_p = std::lgamma(all + 1) - std::lgamma(k + 1) - std::lgamma(all - k + 1) +
-                           k * std::log(share) + 2 * std::log(all);
+                           std::log(k) + (k - 1) * std::log(share) + std::log(all);
       if (log_p < densest.log_p) densest.log_p = log_p, begin = i, end = j + 1;
     }
   }

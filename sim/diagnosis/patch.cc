@@ -76,6 +76,7 @@ std::vector<UnknownFound> PatchStructures(const PatchRule& rule, std::vector<Unk
       added += 2;
   std::vector<UnknownFound> seen;
   while (auto structure = FindStructure(*fit, rule.family_wise, rule.seed)) {
+    if (!rule.matters(structure->told)) break;
     seen.push_back(structure->told);
     const bool again =
         std::any_of(fit->model.terms.begin(), fit->model.terms.end(),

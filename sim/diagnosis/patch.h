@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
@@ -17,11 +18,12 @@ inline constexpr std::size_t kPatchTermsMax = 4;
 struct PatchRule {
   double family_wise = 0.01;
   std::uint64_t seed = 1;
+  std::function<bool(const UnknownFound&)> matters = [](const UnknownFound&) { return true; };
 };
 
-/// Adds terms to the fit's model. Where the image's shifts follow a column (`told`, marked as
-/// patched then), curves in x and y take their place. Returns what the screen saw, each entry
-/// marked where a term was added for it.
+/// Adds terms to the fit's model, for what matters. Where the image's shifts follow a column
+/// (`told`, marked as patched then), curves in x and y take their place. Returns what the screen
+/// saw, each entry marked where a term was added for it.
 std::vector<UnknownFound> PatchStructures(const PatchRule& rule, std::vector<UnknownFound>* told,
                                           Fit* fit);
 

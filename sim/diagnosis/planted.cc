@@ -8,6 +8,7 @@
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/model.h"
+#include "sim/diagnosis/planted_faults.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -150,14 +151,20 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
   if (effect == nullptr)
     return Fail(ErrorCode::kInvalid, "there is no effect '" + planted.cause + "'");
   ModelTerm term;
-  int at = 0;
-  for (const Template& candidate : ListTemplates(*effect, facts)) {
-    if (!planted.axis.empty() && Name(candidate.axis) != planted.axis) continue;
-    if (term.form.effect == nullptr) term.form = candidate;
-    if (at++ == planted.form) term.form = candidate;
-  }
-  if (term.form.effect == nullptr)
+  Templates templates = ListTemplates(*effect, facts);
+  if (!planted.axis.empty())
+    std::erase_if(templates, [&](const Template& one) { return Name(one.axis) != planted.axis; });
+  if (templates.empty())
     return Fail(ErrorCode::kInvalid, planted.cause + ": not on axis '" + planted.axis + "' here");
+  if (planted.form >= std::ssize(templates)) {
+    std::string shapes;
+    for (std::size_t k = 0; k < templates.size(); ++k)
+      shapes += "\n  " + std::to_string(k) + "  " + std::string(Name(templates[k].axis)) + ": " +
+                templates[k].label;
+    return Fail(ErrorCode::kInvalid, planted.cause + ": no shape " + std::to_string(planted.form) +
+                                         "; there are" + shapes);
+  }
+  term.form = templates[static_cast<std::size_t>(std::max(planted.form, 0))];
   const std::size_t units = facts.campaign->units.size();
   Rng rng = Rng::Stream(seed, planted.cause);
   term.sharing = Sharing::kUnit;
@@ -224,6 +231,35 @@ void Measure(const PlantedOptions& options, const CampaignFacts& facts, const Pl
   }
 }
 
+bool IsByPixel(const PlantedEffect& planted) { return planted.cause == "centroid_bias"; }
+
+// What a camera makes of the places that it sees.
+Status PlantByPixel(const PlantedOptions& options, Campaign* campaign) {
+  constexpr double kPixel_mm = 0.06, kMiddle = 1000;
+  for (const auto& [name, place_mm] :
+       {std::pair("pixel_x", &campaign->x_mm), {"pixel_y", &campaign->y_mm}}) {
+    campaign->covariates.push_back({name, {}});
+    for (const double at_mm : *place_mm)
+      campaign->covariates.back().values.push_back(kMiddle + at_mm / kPixel_mm);
+  }
+  const CampaignFacts facts = MakeFacts(*campaign);
+  CampaignModel plain;
+  plain.units = campaign->units;
+  CampaignModel model = plain;
+  for (const PlantedEffect& planted : options.effects) {
+    if (!IsByPixel(planted)) continue;
+    FOCALFLEET_TRY_ASSIGN(ModelTerm term, TermOf(planted, facts, options.seed));
+    model.terms.push_back(std::move(term));
+  }
+  const Places with = Predict(model, facts, OneAfterTheOther());
+  const Places without = Predict(plain, facts, OneAfterTheOther());
+  for (std::size_t row = 0; row < campaign->rows(); ++row) {
+    campaign->x_mm[row] += with.x_mm[row] - without.x_mm[row];
+    campaign->y_mm[row] += with.y_mm[row] - without.y_mm[row];
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Campaign> PlantCampaign(const PlantedOptions& options) {
@@ -236,10 +272,16 @@ Result<Campaign> PlantCampaign(const PlantedOptions& options) {
   const CampaignFacts facts = MakeFacts(campaign);
   CampaignModel model = TrueModel(options, campaign);
   for (const PlantedEffect& planted : options.effects) {
+    if (IsByPixel(planted) || !UnitOfPlantedFault(planted.cause).empty()) continue;
     FOCALFLEET_TRY_ASSIGN(ModelTerm term, TermOf(planted, facts, options.seed));
     model.terms.push_back(std::move(term));
   }
   Measure(options, facts, Predict(model, facts, OneAfterTheOther()), &campaign);
+  for (const PlantedEffect& planted : options.effects)
+    if (!UnitOfPlantedFault(planted.cause).empty())
+      FOCALFLEET_TRY(PlantFault(planted, facts, options.seed, &campaign));
+  if (std::ranges::any_of(options.effects, IsByPixel))
+    FOCALFLEET_TRY(PlantByPixel(options, &campaign));
   return campaign;
 }
 

@@ -39,7 +39,8 @@ struct PlantedOptions {
   std::vector<PlantedEffect> effects;
 };
 
-/// Errors: kInvalid: an effect or axis that the library does not have.
+/// Of the causes that no effect is, those of planted_faults.h, too; camera pixels are told where
+/// centroid_bias is planted. Errors: kInvalid: an effect, axis or shape that there is not.
 Result<Campaign> PlantCampaign(const PlantedOptions& options);
 
 }  // namespace focalfleet::sim

@@ -168,6 +168,7 @@ class BlockScorer {
   // What bends the plate or its image shifts each unit far more than it bends what the unit sees;
   // the shift is its base's. The first two columns of the basis are those of the base.
   void LeaveOutShifts() {
+    constexpr double kRounding = 1e-9;  // of a signature that is all shift
     raw_ = whole_;
     for (const Placed& placed : plan_.blocks[block_].forms) {
       const Template& form = plan_.templates[placed.form];
@@ -176,6 +177,8 @@ class BlockScorer {
       for (std::size_t lane = placed.lane; lane < placed.lane + form.columns; ++lane)
         for (std::size_t base = 0; base < std::min<std::size_t>(2, scratch_.parts.size()); ++base)
           raw_.at[lane] -= scratch_.parts[base].at[lane] * scratch_.parts[base].at[lane];
+      for (std::size_t lane = placed.lane; lane < placed.lane + form.columns; ++lane)
+        raw_.at[lane] = std::max(raw_.at[lane], kRounding * whole_.at[lane]);
     }
   }
 

@@ -251,6 +251,8 @@ double Merit(const Fit& fit) {
     parameters += std::max(homings - 2, 0.0);
   }
   parameters += 2 * static_cast<double>(fit.model.events.size());
+  constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
+  parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
   for (const ModelTerm& term : fit.model.terms)
     for (std::size_t k = 0; k < term.amplitude.size(); ++k)
       if (term.sigma[k] > 0) parameters += 1;

@@ -3,20 +3,23 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <map>
+#include <limits>
 #include <optional>
+#include <span>
 
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/fleet_groups.h"
 
 namespace focalfleet::sim {
 namespace {
 
 constexpr std::string_view kTemperature = "temp_C";
 constexpr std::size_t kUnitsMin = 8;
-constexpr double kRange_K = 2;     // less tells no gain
-constexpr double kGainMin = 0.05;  // off, to be suspect
-constexpr double kSpreads = 6;     // of the units' gains
-constexpr double kOfGroup = 0.8;   // of a rail's units, for it to be the rail's
+constexpr double kReadingsMin = 8;  // of a unit
+constexpr double kRange_K = 2;      // less tells no gain
+constexpr double kGainMin = 0.05;   // off, to be suspect
+constexpr double kSpreads = 6;      // of the units' gains
+constexpr double kOfGroup = 0.8;    // of a rail's units, for it to be the rail's
 
 bool ReadsTemperature(const ModelTerm& term) {
   return std::ranges::find(term.form.effect->needs, kTemperature) != term.form.effect->needs.end();
@@ -50,45 +53,46 @@ class Plane {
 };
 
 // The plane's temperature at every row, of the units that are not suspect. NaN: nobody is left.
-std::vector<double> PlaneTemperatures(const Campaign& campaign, const CampaignFacts& facts,
+std::vector<double> PlaneTemperatures(const CampaignFacts& facts,
                                       const std::vector<char>& suspect) {
-  const std::vector<double>& told = facts.Find(kTemperature)->values;
+  const Campaign& campaign = *facts.campaign;
+  const std::span<const double> told = campaign.Find(kTemperature);
   std::vector<Plane> planes(facts.exposures.size());
   const auto each = [&](const auto& visit) {
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
       for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-        visit(unit, row);
+        visit(row, suspect[unit] != 0, campaign.units[unit].base_x_mm / facts.radius_mm,
+              campaign.units[unit].base_y_mm / facts.radius_mm);
   };
-  each([&](std::size_t unit, std::size_t row) {
-    if (suspect[unit] == 0)
-      planes[facts.exposures.of_row[row]].Add(campaign.units[unit].base_x_mm,
-                                              campaign.units[unit].base_y_mm, told[row]);
+  each([&](std::size_t row, bool is_suspect, double x, double y) {
+    if (!is_suspect && std::isfinite(told[row]))
+      planes[facts.exposures.of_row[row]].Add(x, y, told[row]);
   });
   std::vector<std::optional<Eigen::Vector3d>> solved;
   for (const Plane& plane : planes) solved.push_back(plane.Solve());
   std::vector<double> at(told.size(), std::nan(""));
-  each([&](std::size_t unit, std::size_t row) {
+  each([&](std::size_t row, bool, double x, double y) {
     if (const auto& plane = solved[facts.exposures.of_row[row]])
-      at[row] = plane->dot(
-          Eigen::Vector3d(1, campaign.units[unit].base_x_mm, campaign.units[unit].base_y_mm));
+      at[row] = plane->dot(Eigen::Vector3d(1, x, y));
   });
   return at;
 }
 
-// What each unit tells a kelvin of the plane. NaN: the plane's temperature hardly changes.
-std::vector<double> Gains(const Campaign& campaign, const std::vector<double>& told,
-                          const std::vector<double>& plane) {
+// What each unit tells a kelvin of the plane. NaN: it tells too little, or too little changes.
+std::vector<double> Gains(const Campaign& campaign, const std::vector<double>& plane) {
+  const std::span<const double> told = campaign.Find(kTemperature);
   std::vector<double> gains;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     double n = 0, x = 0, y = 0, xx = 0, xy = 0, low = 1e300, high = -1e300;
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
-      if (!std::isfinite(plane[row])) continue;
+      if (!std::isfinite(plane[row]) || !std::isfinite(told[row])) continue;
       n += 1, x += plane[row], y += told[row];
       xx += plane[row] * plane[row], xy += plane[row] * told[row];
       low = std::min(low, plane[row]), high = std::max(high, plane[row]);
     }
-    gains.push_back(high - low < kRange_K ? std::nan("")
-                                          : (xy - x * y / n) / std::max(xx - x * x / n, 1e-12));
+    gains.push_back(n < kReadingsMin || high - low < kRange_K
+                        ? std::nan("")
+                        : (xy - x * y / n) / std::max(xx - x * x / n, 1e-12));
   }
   return gains;
 }
@@ -107,36 +111,84 @@ Usual UsualOf(const std::vector<double>& gains, const std::vector<char>& suspect
   return usual;
 }
 
-// To begin with somebody: sensors of one rail may be wrong together.
-std::vector<char> NotOfTheLargestRail(const Campaign& campaign) {
-  std::map<double, std::size_t> rails;
-  for (const CampaignUnit& unit : campaign.units)
-    if (std::isfinite(unit.rail)) ++rails[unit.rail];
-  std::vector<char> others(campaign.units.size(), 0);
-  if (rails.empty()) return others;
-  const double largest =
-      std::ranges::max_element(rails, {}, [](const auto& one) { return one.second; })->first;
-  for (std::size_t unit = 0; unit < others.size(); ++unit)
-    others[unit] = campaign.units[unit].rail != largest;
-  return others;
+// Who tells another gain than `usual`.
+std::vector<char> Beside(const Usual& usual, const std::vector<double>& gains) {
+  std::vector<char> beside;
+  for (const double gain : gains)
+    beside.push_back(std::abs(gain - usual.middle) > std::max(kGainMin, kSpreads * usual.spread));
+  return beside;
+}
+
+// The exposures' medians, which a few wrong ones do not move.
+std::vector<double> MedianTemperatures(const CampaignFacts& facts) {
+  const std::span<const double> told = facts.campaign->Find(kTemperature);
+  std::vector<std::vector<double>> of(facts.exposures.size());
+  for (std::size_t row = 0; row < told.size(); ++row)
+    if (std::isfinite(told[row])) of[facts.exposures.of_row[row]].push_back(told[row]);
+  std::vector<double> at(told.size(), std::nan(""));
+  std::vector<double> median;
+  for (std::vector<double>& values : of)
+    median.push_back(values.empty() ? std::nan("") : Median(std::move(values)));
+  for (std::size_t row = 0; row < told.size(); ++row) at[row] = median[facts.exposures.of_row[row]];
+  return at;
+}
+
+// Whom to suspect to begin with. A rail's sensors may be wrong together: one rail is believed, or
+// else the median.
+std::vector<std::vector<char>> Beginnings(const FleetGroups& groups, const CampaignFacts& facts) {
+  constexpr std::uint32_t kRailsMost = 12;
+  const std::size_t units = facts.campaign->units.size();
+  const std::vector<double> gains = Gains(*facts.campaign, MedianTemperatures(facts));
+  std::vector<std::vector<char>> begin = {
+      Beside(UsualOf(gains, std::vector<char>(units, 0), 0), gains)};
+  for (std::uint32_t believed = 0; believed < std::min<std::size_t>(groups.rails, kRailsMost);
+       ++believed) {
+    begin.emplace_back();
+    for (const std::uint32_t rail : groups.rail) begin.back().push_back(rail != believed);
+  }
+  return begin;
+}
+
+// The suspects, and what the plane of the others and all gains are then.
+struct Settled {
+  std::vector<char> suspect;
+  std::vector<double> plane, gains;
+  [[nodiscard]] std::ptrdiff_t suspects() const { return std::ranges::count(suspect, char{1}); }
+  [[nodiscard]] std::ptrdiff_t tell() const {
+    return std::ranges::count_if(gains, [](double gain) { return std::isfinite(gain); });
+  }
+  // The many are believed.
+  [[nodiscard]] bool can_be() const { return tell() > 0 && 2 * suspects() <= tell(); }
+};
+
+// Wrong ones bend the plane: by who is left, until it rests.
+Settled Settle(const CampaignFacts& facts, std::vector<char> suspect) {
+  constexpr int kRounds = 8;
+  Settled now{.suspect = std::move(suspect), .plane = {}, .gains = {}};
+  for (int round = 0;; ++round) {
+    now.plane = PlaneTemperatures(facts, now.suspect);
+    now.gains = Gains(*facts.campaign, now.plane);
+    std::vector<char> next = Beside(UsualOf(now.gains, now.suspect, 0), now.gains);
+    if (next == now.suspect || round == kRounds) return now;
+    now.suspect = std::move(next);
+  }
 }
 
 // Whose the suspects are.
-Owner OwnerOf(const Campaign& campaign, const std::vector<char>& suspect) {
-  const auto whole = [&](double CampaignUnit::*group) {
-    for (std::size_t unit = 0; unit < suspect.size(); ++unit) {
-      if (!std::isfinite(campaign.units[unit].*group)) return false;
-      double all = 0, have = 0;
-      for (std::size_t other = 0; other < suspect.size(); ++other)
-        if (campaign.units[other].*group == campaign.units[unit].*group)
-          all += 1, have += suspect[other];
-      if (suspect[unit] != 0 && have < kOfGroup * all) return false;
+Owner OwnerOf(const FleetGroups& groups, const std::vector<char>& suspect) {
+  const auto whole = [&](const std::vector<std::uint32_t>& group, std::size_t count) {
+    std::vector<double> all(count, 0), have(count, 0);
+    for (std::size_t unit = 0; count > 0 && unit < suspect.size(); ++unit) {
+      if (group[unit] == kNoGroup) return false;
+      all[group[unit]] += 1, have[group[unit]] += suspect[unit];
     }
-    return true;
+    for (std::size_t k = 0; k < count; ++k)
+      if (have[k] > 0 && have[k] < kOfGroup * all[k]) return false;
+    return count > 0;
   };
-  return whole(&CampaignUnit::rail)  ? Owner::kRail
-         : whole(&CampaignUnit::bus) ? Owner::kBus
-                                     : Owner::kUnit;
+  return whole(groups.rail, groups.rails)  ? Owner::kRail
+         : whole(groups.bus, groups.buses) ? Owner::kBus
+                                           : Owner::kUnit;
 }
 
 }  // namespace
@@ -154,47 +206,35 @@ bool ReadsTemperature(const CampaignModel& model) {
                              [](const ModelTerm& term) { return ReadsTemperature(term); });
 }
 
-std::unique_ptr<TrueTemperatures> FindSuspectSensors(const Campaign& campaign,
-                                                     const CampaignFacts& facts) {
-  const FilledColumn* told = facts.Find(kTemperature);
-  std::vector<char> suspect = NotOfTheLargestRail(campaign);
-  std::vector<double> plane, gains;
-  const auto settle = [&] {
-    // Wrong ones bend the plane: by who is left, until it rests.
-    constexpr int kRounds = 5;
-    for (int round = 0; round < kRounds; ++round) {
-      plane = PlaneTemperatures(campaign, facts, suspect);
-      gains = Gains(campaign, told->values, plane);
-      const Usual usual = UsualOf(gains, suspect, 0);
-      std::vector<char> now(suspect.size(), 0);
-      for (std::size_t unit = 0; unit < now.size(); ++unit)
-        now[unit] =
-            std::abs(gains[unit] - usual.middle) > std::max(kGainMin, kSpreads * usual.spread);
-      if (now == suspect) break;
-      suspect = std::move(now);
-    }
-  };
-  settle();
-  // The many are believed.
-  if (2 * std::ranges::count(suspect, char{1}) > std::ssize(suspect)) {
-    for (char& one : suspect) one = one == 0;
-    settle();
+std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts) {
+  const Campaign& campaign = *facts.campaign;
+  const FleetGroups groups = GroupsOf(facts);
+  // Of those who can be right, who agree best with each other.
+  Settled best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::vector<char>& begin : Beginnings(groups, facts)) {
+    Settled one = Settle(facts, std::move(begin));
+    const double spread = UsualOf(one.gains, one.suspect, 0).spread;
+    if (!one.can_be() || spread >= least) continue;
+    least = spread;
+    best = std::move(one);
   }
-  if (2 * std::ranges::count(suspect, char{1}) > std::ssize(suspect)) return nullptr;
+  if (best.suspects() == 0) return nullptr;
   auto truth = std::make_unique<TrueTemperatures>();
-  for (std::size_t unit = 0; unit < suspect.size(); ++unit)
-    if (suspect[unit] != 0) truth->units.push_back(unit);
-  if (truth->units.empty()) return nullptr;
-  truth->owner = OwnerOf(campaign, suspect);
-  const Usual theirs = UsualOf(gains, suspect, 1);
+  for (std::size_t unit = 0; unit < best.suspect.size(); ++unit)
+    if (best.suspect[unit] != 0) truth->units.push_back(unit);
+  truth->are_half = 2 * best.suspects() == best.tell();
+  truth->owner = OwnerOf(groups, best.suspect);
+  const Usual theirs = UsualOf(best.gains, best.suspect, 1);
   truth->gain = theirs.middle;
-  truth->gain_sigma = theirs.spread;
+  // Of one suspect nothing scatters: as right ones do.
+  truth->gain_sigma = std::max(theirs.spread, UsualOf(best.gains, best.suspect, 0).spread);
   truth->campaign = campaign;
   for (Covariate& column : truth->campaign.covariates)
     if (column.name == kTemperature)
       for (const std::size_t unit : truth->units)
         for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-          column.values[row] = plane[row];
+          if (std::isfinite(best.plane[row])) column.values[row] = best.plane[row];
   truth->facts = MakeFacts(truth->campaign);
   return truth;
 }
@@ -232,11 +272,8 @@ CauseFound SensorCause(const Fit& fit, const TrueTemperatures& truth, const Camp
   cause.ci95[0] = cause.amplitude - 1.96 * sigma;
   cause.ci95[1] = cause.amplitude + 1.96 * sigma;
   cause.size_um = count > 0 ? 1e3 * std::sqrt(square / count) : 0;
-  Fit misled = fit;
-  misled.facts = &as_told;
-  UpdateResiduals(&misled);
-  cause.delta_log_likelihood = std::max(0.0, (Merit(fit) - Merit(misled)) / 2);
   cause.shape = "tells " + std::to_string(truth.gain).substr(0, 5) + " K a kelvin of those around";
+  if (truth.are_half) cause.shape += ", or these tell too much or too little";
   cause.paragraph =
       "These boards tell a temperature that runs with another gain than all around them, and arms "
       "and gears go with that of the others: calibrate the sensors. The model goes by the plane "

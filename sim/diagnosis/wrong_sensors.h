@@ -23,6 +23,7 @@ struct TrueTemperatures {
   Owner owner = Owner::kUnit;  // kRail, kBus: its units, and hardly any other
   double gain = 1;             // median of the suspects': what they tell a kelvin
   double gain_sigma = 0;       // of one of them
+  bool are_half = false;       // of those who tell temperatures: as well the other half
 };
 
 inline constexpr std::string_view kSensorBias = "sensor_bias";
@@ -30,15 +31,14 @@ inline constexpr std::string_view kSensorBias = "sensor_bias";
 /// Why nothing can be said of sensors; empty: they are tested.
 std::string WhyNoSensorIsTested(const CampaignFacts& facts);
 
-/// nullptr: nobody is suspect, or too many are. Pre: they are tested.
-std::unique_ptr<TrueTemperatures> FindSuspectSensors(const Campaign& campaign,
-                                                     const CampaignFacts& facts);
+/// nullptr: nobody is suspect. Pre: they are tested.
+std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts);
 
 /// Whether the model has a cause that goes with the temperature.
 bool ReadsTemperature(const CampaignModel& model);
 
-/// The cause. `fit` is of the plane's temperatures; `as_told`: facts of the campaign as it was.
-/// Where both explain the moves alike, what goes with the temperature is a candidate, too.
+/// The cause, without its evidence. `fit` is of the plane's temperatures; `as_told`: facts of the
+/// campaign as it was. Not `decided`: what goes with the temperature is a candidate, too.
 CauseFound SensorCause(const Fit& fit, const TrueTemperatures& truth, const CampaignFacts& as_told,
                        bool decided);
 

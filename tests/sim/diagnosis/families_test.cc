@@ -85,13 +85,18 @@ TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
                                     Cause("gravity_sag", "none", 5000), Cause("wear", "theta", 90)};
   causes[0].size_um = 50;
   causes[1].size_um = 20;
-  const auto who = [&](double size_um, double noise_um) {
-    const CauseFound* of = WhoLeaves({.size_um = size_um}, noise_um, &causes);
+  const auto who = [&](const char* channel, double size_um, double noise_um) {
+    const CauseFound* of = WhoLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
     return of == nullptr ? "nobody" : of->cause;
   };
-  EXPECT_EQ(who(0.8, 6), "gravity_sag");
-  EXPECT_EQ(who(0.8, 4), "nobody");   // near the noise
-  EXPECT_EQ(who(2.5, 60), "nobody");  // a large part of the strongest
+  EXPECT_EQ(who("y", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(who("y", 0.8, 4), "nobody");   // near the noise
+  EXPECT_EQ(who("y", 2.5, 60), "nobody");  // a large part of the strongest
+  causes[1].axis = "theta";
+  EXPECT_EQ(who("theta angle", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
+  causes[1].all_units = false;
+  EXPECT_EQ(who("theta angle", 0.8, 6), "nobody");
   TellAsRemainder(0.8, "move order", &causes[1]);
   EXPECT_THAT(causes[1].shape, HasSubstr("0.8 um, looks like move order"));
 }

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 #include <vector>
 
+#include "sim/diagnosis/outliers.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -64,21 +66,43 @@ TEST(FineStructure, ArmsThatLeanOnEachOtherAreSeenByTheirGap) {
   EXPECT_EQ(unknown.channel, "phi angle");
 }
 
+Fit NothingButNoise(const Campaign& campaign, CampaignFacts* facts) {
+  *facts = MakeFacts(campaign);
+  CampaignModel model;
+  model.units = campaign.units;
+  return StartFit(*facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+}
+
 TEST(FineStructure, ChanceShowsItNoMoreOftenThanItSays) {
   constexpr int kCampaigns = 60;
-  constexpr double kRate = 1;
-  constexpr double kShare = 0.3;  // of which are this look's
+  constexpr double kRate = 1, kShareOfRate = 0.3;
   int shown = 0;
   for (std::uint64_t seed = 1; seed <= kCampaigns; ++seed) {
     const Campaign campaign = Planted({}, {.moves = 40, .seed = seed});
-    const CampaignFacts facts = MakeFacts(campaign);
-    CampaignModel model;
-    model.units = campaign.units;
-    const Fit fit =
-        StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
-    if (FindFineStructure(fit, kRate)) ++shown;
+    CampaignFacts facts;
+    // However small a share of the noise it is.
+    if (FindFineStructure(NothingButNoise(campaign, &facts), kRate, 0)) ++shown;
   }
-  EXPECT_LE(shown, kShare * kRate * kCampaigns);
+  EXPECT_LE(shown, kShareOfRate * kRate * kCampaigns);
+}
+
+TEST(Crowd, ChanceShowsItNoMoreOftenThanItSays) {
+  const Campaign campaign = Planted({}, {.moves = 80, .seed = 2});
+  CampaignFacts facts;
+  const Fit fit = NothingButNoise(campaign, &facts);
+  constexpr int kDraws = 400;
+  constexpr double kRate = 0.2, kShareOfRate = 0.3;
+  for (const std::size_t count : {5u, 12u, 40u, 120u}) {
+    int shown = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      Rng rng = Rng::Stream(count, "far", static_cast<std::uint64_t>(draw));
+      std::vector<std::size_t> far;
+      while (far.size() < count) far.push_back(rng.Below(campaign.rows()));
+      if (FindCrowd(fit, far, kRate)) ++shown;
+    }
+    EXPECT_LE(shown, kShareOfRate * kRate * kDraws) << count;
+    RecordProperty("shown_of_" + std::to_string(count), shown);
+  }
 }
 
 // Rows up to 2 mm off: anywhere, or only where theta stands between 40 and 48 degrees.

@@ -106,8 +106,6 @@ TEST(Effects, AScaleErrorIsTheDistanceFromTheHoming) {
   }
 }
 
-// A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
-// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
 TEST(Effects, AToothThatTheAxisNeverReachesDoesNotShow) {
   Campaign campaign = Made();
   const auto shown = [&](double low_deg, double high_deg, EffectAxis axis, double place_deg) {
@@ -127,6 +125,8 @@ TEST(Effects, AToothThatTheAxisNeverReachesDoesNotShow) {
   EXPECT_TRUE(shown(-190, 190, EffectAxis::kTheta, 345));
 }
 
+// A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
+// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);

@@ -1,4 +1,4 @@
-#include "sim/diagnosis/standing.h"
+#include "sim/diagnosis/fleet_groups.h"
 
 #include <gtest/gtest.h>
 
