@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <set>
 
@@ -266,21 +264,12 @@ CauseFound HomingCause(const Fit& fit) {
   cause.paragraph =
       "The zero is not the same after each homing: measure it after every homing, and look at the "
       "hard stop.";
-  double size_um2 = 0, most = 0;
-  const CampaignUnit& first = fit.model.units.front();
-  const double lever_mm[2] = {std::hypot(first.arm_mm[0], first.arm_mm[1]), first.arm_mm[1]};
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    double square = 0;
-    for (const double zero : fit.model.homing_zero_deg[axis]) square += zero * zero;
-    const double rms = std::sqrt(square / static_cast<double>(fit.weight.size()));
-    const double um = rms * std::numbers::pi / 180 * lever_mm[axis] * 1e3;
-    size_um2 += um * um;
-    if (um > most)
-      most = um, cause.amplitude = rms,
-      cause.axis = Name(axis == kTheta ? EffectAxis::kTheta : EffectAxis::kPhi);
-  }
+  const HomingScatter scatter = ScatterOfHomings(fit);
+  const std::size_t larger = scatter.um[kTheta] >= scatter.um[kPhi] ? kTheta : kPhi;
+  cause.amplitude = scatter.rms_deg[larger];
+  cause.axis = Name(larger == kTheta ? EffectAxis::kTheta : EffectAxis::kPhi);
   cause.ci95[0] = 0.7 * cause.amplitude, cause.ci95[1] = 1.4 * cause.amplitude;
-  cause.size_um = std::sqrt(size_um2);
+  cause.size_um = scatter.both_um();
   cause.delta_log_likelihood = static_cast<double>(fit.weight.size());
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit)
     cause.units.push_back(fit.model.units[unit].id);
@@ -333,11 +322,11 @@ Selection FindModelBySensors(const Templates& templates, const DiagnoseOptions& 
         {std::string(kSensorBias), std::string("sensors are suspect, ") + why});
     return selection;
   };
-  if (!ReadsTemperature(fit->model)) return cannot("but nothing goes with the temperature");
   Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
   Selection again = FindModel(templates, options, rule, &by_others, &corrected);
+  if (!ReadsTemperature(by_others.model)) return cannot("but nothing goes with the temperature");
   const double better = Merit(by_others) - Merit(*fit);
-  if (better < -kUndecided || !ReadsTemperature(by_others.model)) return selection;
+  if (better < -kUndecided) return selection;
   const bool is_better = better > kUndecided;
   if (!is_better && truth->owner == Owner::kUnit) return cannot("and these moves do not decide");
   CauseFound cause = SensorCause(by_others, *truth, *fit->facts, is_better && !truth->are_half);

@@ -74,20 +74,21 @@ void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of
 }
 
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes) {
-  constexpr double kOfCause = 0.1, kOfNoise = 0.16;
-  // These have an amplitude of their own at each exposure, and leave nothing.
-  constexpr std::string_view kFree[] = {"camera_similarity", "air_turbulence"};
+  constexpr double kOfNoise = 0.16;
+  // Air is known from the neighbours only; the image's shifts are fitted at each exposure.
+  constexpr double kOfCause = 0.1, kOfAir = 0.25;
   if (left.size_um >= kOfNoise * noise_um) return nullptr;
   const std::string_view axis = left.channel.starts_with("theta") ? "theta"
                                 : left.channel.starts_with("phi") ? "phi"
                                                                   : "none";
-  CauseFound* largest = nullptr;
-  for (CauseFound& cause : *causes)
-    if (cause.all_units && AxesMeet(axis, cause.axis) && !Has(kElsewhere, cause.cause) &&
-        !Has(kFree, cause.cause) && left.size_um < kOfCause * cause.size_um &&
-        (largest == nullptr || cause.size_um > largest->size_um))
-      largest = &cause;
-  return largest;
+  const auto leaves_um = [&](const CauseFound& cause) {
+    if (!cause.all_units || Has(kElsewhere, cause.cause) || cause.cause == "camera_similarity")
+      return 0.0;
+    if (cause.cause == "air_turbulence") return axis == "none" ? kOfAir * cause.size_um : 0.0;
+    return AxesMeet(axis, cause.axis) ? kOfCause * cause.size_um : 0.0;
+  };
+  const auto most = std::ranges::max_element(*causes, {}, leaves_um);
+  return most != causes->end() && left.size_um < leaves_um(*most) ? &*most : nullptr;
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {

@@ -19,8 +19,9 @@ bool AxesMeet(std::string_view a, std::string_view b);
 void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of);
 
 /// Whose shape leaves so little structure: a cause of all units on the same axis, ten times its
-/// size, where it is also far below the noise; pooled over many rows the least is significant.
-/// `noise_um`: rms of the residuals. nullptr: nobody's, it is worth telling.
+/// size, or of the image the air, four times, where it is also far below the noise; pooled over
+/// many rows the least is significant. `noise_um`: rms of the residuals. nullptr: nobody's, it is
+/// worth telling.
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong

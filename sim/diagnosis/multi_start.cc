@@ -1,5 +1,7 @@
 #include "sim/diagnosis/multi_start.h"
 
+#include <numbers>
+
 #include "sim/diagnosis/events.h"
 
 namespace focalfleet::sim {
@@ -31,6 +33,10 @@ void TryHomings(const Templates& templates, const SelectionRule& rule, Selection
   Fit freed = *fit;
   FreeHomings(&freed);
   if (Merit(freed) < Merit(*fit) + kBetterBy) return;
+  // Many homings of a few moves each follow what noise does to these.
+  constexpr double kOfNoise = 0.25;
+  if (ScatterOfHomings(freed).both_um() < kOfNoise * std::numbers::sqrt2 * freed.noise.typical_um)
+    return;
   freed.model.terms.clear();
   freed.model.events.clear();
   UpdateResiduals(&freed);
@@ -42,6 +48,20 @@ void TryHomings(const Templates& templates, const SelectionRule& rule, Selection
 }
 
 }  // namespace
+
+HomingScatter ScatterOfHomings(const Fit& fit) {
+  constexpr double kMicrons = 1e3 * std::numbers::pi / 180;  // of a degree at a millimetre
+  const CampaignUnit& first = fit.model.units.front();
+  const double lever_mm[2] = {std::hypot(first.arm_mm[0], first.arm_mm[1]), first.arm_mm[1]};
+  HomingScatter scatter;
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    double square = 0;
+    for (const double zero : fit.model.homing_zero_deg[axis]) square += zero * zero;
+    scatter.rms_deg[axis] = std::sqrt(square / static_cast<double>(fit.weight.size()));
+    scatter.um[axis] = scatter.rms_deg[axis] * kMicrons * lever_mm[axis];
+  }
+  return scatter;
+}
 
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);

@@ -16,7 +16,7 @@ namespace {
 constexpr std::string_view kTemperature = "temp_C";
 constexpr std::size_t kUnitsMin = 8;
 constexpr double kReadingsMin = 8;  // of a unit
-constexpr double kRange_K = 2;      // less tells no gain
+constexpr double kRange_K = 0.5;    // less tells no gain
 constexpr double kGainMin = 0.05;   // off, to be suspect
 constexpr double kSpreads = 6;      // of the units' gains
 constexpr double kOfGroup = 0.8;    // of a rail's units, for it to be the rail's

@@ -1,4 +1,5 @@
-// diagnose as a process: two models held against each other, and the patch.
+// diagnose and simulate campaign as processes: two models held against each other, the patch, what
+// can be planted.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -116,6 +117,28 @@ TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
       {"diagnose", scratch / "night", "--against", scratch / "report/model.toml", "--json"});
   ASSERT_EQ(again.exit, 0) << again.err;
   EXPECT_EQ(Json::parse(again.out)["verdict"], "B is better");
+}
+
+TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {
+  const ScratchDirectory scratch;
+  const auto made = [&](const std::string& effect) {
+    return Focalfleet({"simulate", "campaign", "--units", "3", "--moves", "8", "--effect", effect,
+                       "--out", scratch / "made"});
+  };
+  for (const char* effect : {"backlash=0.1", "backlash:phi=-1e-1", "stiction:theta#24=1",
+                             "lost_command=2", "centroid_bias=8"})
+    EXPECT_EQ(made(effect).exit, 0) << effect << made(effect).err;
+  EXPECT_THAT(Slurp(scratch / "made/moves.csv"), HasSubstr("pixel_x"));
+  const auto listed = made("stiction:theta#999=1");
+  EXPECT_EQ(listed.exit, 2);
+  EXPECT_THAT(listed.err, HasSubstr("24  theta: until the next move; jumps from, deg, 0.4"));
+  for (const char* effect :
+       {"backlash", "backlash=", "backlash=x", "backlash:=1", "backlash#=1", "backlash#-1=1",
+        "backlash=1=2", "Backlash=1", "backlash:z=1", "nothing=1", "backlash=1e999"}) {
+    const auto refused = made(effect);
+    EXPECT_EQ(refused.exit, 2) << effect;
+    EXPECT_THAT(refused.err, HasSubstr("error: ")) << effect;
+  }
 }
 
 }  // namespace

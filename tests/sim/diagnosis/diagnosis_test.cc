@@ -235,5 +235,31 @@ TEST(Diagnosis, SwappedFibresAreFound) {
   EXPECT_THAT(diagnosis.causes[0].units, UnorderedElementsAre(4u, 10u));
 }
 
+// Each homing finds another zero, by `sigma_deg`.
+Campaign Homed(double sigma_deg, std::uint64_t seed) {
+  Campaign campaign =
+      Planted({}, {.moves = 100, .seed = seed, .outlier_share = 0.01, .homing_share = 0.05});
+  const std::span<const double> rehomed = campaign.Find("rehomed");
+  Rng rng = Rng::Stream(seed, "zeros");
+  std::vector<double> zero_deg(campaign.rows(), 0);
+  for (std::size_t row = 1; row < campaign.rows(); ++row)
+    zero_deg[row] = rehomed[row] > 0.5 ? sigma_deg * rng.Normal() : zero_deg[row - 1];
+  TurnTheta([&](std::size_t row) { return zero_deg[row]; }, &campaign);
+  return campaign;
+}
+
+TEST(Diagnosis, ZerosThatDifferFromHomingToHomingAreNamedWhereTheyMatter) {
+  const Diagnosis diagnosis = Verdicts(Homed(0.05, 4));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "zero_offset");
+  EXPECT_FALSE(diagnosis.model.homing_zero_deg[kTheta].empty());
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.05, 0.015);
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Diagnosis none = Verdicts(Homed(0, seed));
+    EXPECT_TRUE(none.model.homing_zero_deg[kTheta].empty()) << "seed " << seed;
+    EXPECT_EQ(none.verdict, Verdict::kConsistent) << "seed " << seed << ": " << Told(none);
+  }
+}
+
 }  // namespace
 }  // namespace focalfleet::sim

@@ -97,6 +97,10 @@ TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
   EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
   causes[1].all_units = false;
   EXPECT_EQ(who("theta angle", 0.8, 6), "nobody");
+  causes.push_back(Cause("air_turbulence", "none", 900));
+  causes.back().size_um = 4;
+  EXPECT_EQ(who("x", 0.8, 6), "air_turbulence");
+  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
   TellAsRemainder(0.8, "move order", &causes[1]);
   EXPECT_THAT(causes[1].shape, HasSubstr("0.8 um, looks like move order"));
 }
