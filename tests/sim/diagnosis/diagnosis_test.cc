@@ -9,6 +9,7 @@
 #include <string>
 #include <thread>
 
+#include "sim/diagnosis/multi_start.h"
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -248,16 +249,20 @@ Campaign Homed(double sigma_deg, std::uint64_t seed) {
   return campaign;
 }
 
-TEST(Diagnosis, ZerosThatDifferFromHomingToHomingAreNamedWhereTheyMatter) {
-  const Diagnosis diagnosis = Verdicts(Homed(0.05, 4));
-  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
-  EXPECT_EQ(diagnosis.causes[0].cause, "zero_offset");
-  EXPECT_FALSE(diagnosis.model.homing_zero_deg[kTheta].empty());
-  EXPECT_NEAR(diagnosis.causes[0].amplitude, 0.05, 0.015);
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const Diagnosis none = Verdicts(Homed(0, seed));
-    EXPECT_TRUE(none.model.homing_zero_deg[kTheta].empty()) << "seed " << seed;
-    EXPECT_EQ(none.verdict, Verdict::kConsistent) << "seed " << seed << ": " << Told(none);
+TEST(Diagnosis, TheScatterOfHomingsIsWhatTheirZerosDoAtTheFibre) {
+  for (const double sigma_deg : {0.0, 0.05}) {
+    const Campaign campaign = Homed(sigma_deg, 4);
+    const CampaignFacts facts = MakeFacts(campaign);
+    CampaignModel model;
+    model.units = campaign.units;
+    Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+    FreeHomings(&fit);
+    const HomingScatter scatter = ScatterOfHomings(fit);
+    // Of what is planted each unit's own zero takes a part; noise alone makes below 2 um.
+    const double planted_um = 1e3 * 16.5 * sigma_deg * std::numbers::pi / 180;
+    EXPECT_LT(scatter.both_um(), planted_um + 2.5);
+    EXPECT_GT(scatter.both_um(), 0.5 * planted_um);
+    EXPECT_NEAR(scatter.rms_deg[kPhi], 0, 0.01);
   }
 }
 
