@@ -171,7 +171,7 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
   std::size_t far = 0;
   for (std::size_t i = 0; i < rows.track.moves; ++i)
     if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
-  if (far < 3) return {};
+  if (far == 0) return {};
   const double before = TotalCost(rows);
   std::optional<Explained> best;
   for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {

@@ -181,9 +181,11 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
   // Over a night the supply sinks, for one, and the air cools, for the other; at one drive level a
-  // lag of the load is play, and what phases do is what the rotor's poles do.
+  // lag of the load is play, and what phases do is what the rotor's poles do; at one delay so is
+  // what has not yet relaxed.
   constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
                                                          {"backlash", "load_angle_lag"},
+                                                         {"backlash", "relaxation"},
                                                          {"phase_imbalance", "cogging"}};
   for (CauseFound& cause : *causes)
     for (const NotTestable& other : not_testable)

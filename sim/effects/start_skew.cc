@@ -24,6 +24,9 @@ void List(const CampaignFacts& facts, Templates* out) {
              out);
 }
 
+// Slots are shares from 0 to 1. From below 0 on, a skew is a play for all, and two of them cancel.
+bool Shows(const Template& form, const CampaignFacts&) { return form.shape >= 0 && form.shape < 1; }
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   constexpr double kEarly_s = 1;
@@ -57,7 +60,8 @@ Effect MakeStartSkew() {
               "the start order. Wait for the last one.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .shows = Shows};
 }
 
 }  // namespace focalfleet::sim

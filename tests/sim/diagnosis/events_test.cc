@@ -82,6 +82,26 @@ TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
   EXPECT_NEAR(diagnosis.model.events[1].step_deg, turn_deg, 1e-9);
 }
 
+TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  std::vector<std::uint32_t> stayed;
+  for (const std::size_t unit : {3u, 11u}) {
+    const std::size_t last = campaign.first_row[unit + 1] - 1;
+    // A long way, from where it was measured before.
+    campaign.from_deg[kTheta][last] = campaign.cmd_deg[kTheta][last - 1];
+    campaign.cmd_deg[kTheta][last] =
+        campaign.from_deg[kTheta][last] + (campaign.from_deg[kTheta][last] > 0 ? -70 : 70);
+    campaign.from_deg[kPhi][last] = campaign.cmd_deg[kPhi][last] = campaign.cmd_deg[kPhi][last - 1];
+    campaign.x_mm[last] = campaign.x_mm[last - 1], campaign.y_mm[last] = campaign.y_mm[last - 1];
+    stayed.push_back(campaign.units[unit].id);
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
+  EXPECT_EQ(diagnosis.causes[0].units, stayed);
+  EXPECT_EQ(diagnosis.outliers.rows, 0u);
+}
+
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;

@@ -113,6 +113,10 @@ TEST(Families, WhereAColumnIsMissingItsCauseIsACandidate) {
   EXPECT_THAT(causes[1].candidates, ElementsAre("backlash"));
   JudgeUntested({{"load_angle_lag", "column drive_amplitude is missing"}}, &causes);
   EXPECT_THAT(causes[1].candidates, ElementsAre("backlash", "load_angle_lag"));
+  JudgeUntested({{"relaxation", "the moves never excite it"}}, &causes);
+  EXPECT_THAT(causes[1].candidates, ElementsAre("backlash", "load_angle_lag"));
+  JudgeUntested({{"relaxation", "column delay_s is missing"}}, &causes);
+  EXPECT_THAT(causes[1].candidates, ElementsAre("backlash", "load_angle_lag", "relaxation"));
 }
 
 TEST(Families, TheOtherAxisIsAnotherMatter) {

@@ -125,6 +125,17 @@ TEST(Effects, AToothThatTheAxisNeverReachesDoesNotShow) {
   EXPECT_TRUE(shown(-190, 190, EffectAxis::kTheta, 345));
 }
 
+TEST(Effects, AStartSkewBeginsAtAShareOfTheSlots) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  Template form = ListTemplates(*FindEffect("start_skew"), facts).front();
+  for (const auto& [share, shows] :
+       {std::pair(-0.01, false), {0.0, true}, {0.99, true}, {1.0, false}}) {
+    form.shape = share;
+    EXPECT_EQ(Shows(facts, form), shows) << share;
+  }
+}
+
 // A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
 // voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
