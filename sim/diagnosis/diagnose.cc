@@ -13,6 +13,7 @@
 #include "sim/diagnosis/fine_structure.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
+#include "sim/diagnosis/homings.h"
 #include "sim/diagnosis/image.h"
 #include "sim/diagnosis/multi_start.h"
 #include "sim/diagnosis/outliers.h"
@@ -227,54 +228,6 @@ double MedianMiss(const Fit& fit) {
   for (std::size_t row = 0; row < fit.weight.size(); ++row)
     if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
   return misses.empty() ? 0 : Median(std::move(misses));
-}
-
-CauseFound SwapCause(const Campaign& campaign,
-                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
-  CauseFound cause;
-  cause.cause = "identity_swap";
-  cause.candidates = {cause.cause};
-  cause.axis = "none";
-  cause.scope = "unit";
-  cause.amplitude_unit = "pairs";
-  cause.amplitude = static_cast<double>(swaps.size());
-  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
-  double square = 0;
-  for (const auto& [a, b] : swaps) {
-    cause.units.push_back(campaign.units[a].id);
-    cause.units.push_back(campaign.units[b].id);
-    square += std::pow(1e3 * std::hypot(campaign.units[a].base_x_mm - campaign.units[b].base_x_mm,
-                                        campaign.units[a].base_y_mm - campaign.units[b].base_y_mm),
-                       2);
-  }
-  cause.size_um = std::sqrt(square / static_cast<double>(swaps.size()));
-  cause.predicted_gain_um = cause.size_um;
-  cause.delta_log_likelihood = 1e6;
-  cause.paragraph = "Two fibres are known under each other's name: exchange the names.";
-  return cause;
-}
-
-CauseFound HomingCause(const Fit& fit) {
-  CauseFound cause;
-  cause.cause = "zero_offset";
-  cause.candidates = {cause.cause};
-  cause.scope = "unit";
-  cause.amplitude_unit = "deg";
-  cause.shape = "differs from homing to homing; the amplitude is the rms of the larger axis";
-  cause.paragraph =
-      "The zero is not the same after each homing: measure it after every homing, and look at the "
-      "hard stop.";
-  const HomingScatter scatter = ScatterOfHomings(fit);
-  const std::size_t larger = scatter.um[kTheta] >= scatter.um[kPhi] ? kTheta : kPhi;
-  cause.amplitude = scatter.rms_deg[larger];
-  cause.axis = Name(larger == kTheta ? EffectAxis::kTheta : EffectAxis::kPhi);
-  cause.ci95[0] = 0.7 * cause.amplitude, cause.ci95[1] = 1.4 * cause.amplitude;
-  cause.size_um = scatter.both_um();
-  cause.delta_log_likelihood = static_cast<double>(fit.weight.size());
-  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit)
-    cause.units.push_back(fit.model.units[unit].id);
-  cause.all_units = true;
-  return cause;
 }
 
 // What the model that is there already explains is no misfit of it: its effects are taken off the

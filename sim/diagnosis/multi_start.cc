@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include "sim/diagnosis/events.h"
+#include "sim/diagnosis/homings.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -48,20 +49,6 @@ void TryHomings(const Templates& templates, const SelectionRule& rule, Selection
 }
 
 }  // namespace
-
-HomingScatter ScatterOfHomings(const Fit& fit) {
-  constexpr double kMicrons = 1e3 * std::numbers::pi / 180;  // of a degree at a millimetre
-  const CampaignUnit& first = fit.model.units.front();
-  const double lever_mm[2] = {std::hypot(first.arm_mm[0], first.arm_mm[1]), first.arm_mm[1]};
-  HomingScatter scatter;
-  for (const std::size_t axis : {kTheta, kPhi}) {
-    double square = 0;
-    for (const double zero : fit.model.homing_zero_deg[axis]) square += zero * zero;
-    scatter.rms_deg[axis] = std::sqrt(square / static_cast<double>(fit.weight.size()));
-    scatter.um[axis] = scatter.rms_deg[axis] * kMicrons * lever_mm[axis];
-  }
-  return scatter;
-}
 
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);

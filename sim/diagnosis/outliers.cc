@@ -13,11 +13,11 @@ namespace {
 constexpr double kFar = 6;  // whitened length
 constexpr double kStuckTravel_deg = 5;
 constexpr double kStuckSpread_mm = 0.03;
-constexpr double kBadUnit_mm = 0.3;  // median miss after the static fit
-constexpr double kSwapBetter = 0.2;  // of the miss that is left once names are exchanged
-constexpr double kCrowdShare = 0.3;  // of the family-wise rate
-constexpr double kCrowdLeast = 4;    // units and exposures
-constexpr std::size_t kCrowdMost = 200;
+constexpr double kBadUnit_mm = 0.3;      // median miss after the static fit
+constexpr double kSwapBetter = 0.2;      // of the miss that is left once names are exchanged
+constexpr double kCrowdShare = 0.3;      // of the family-wise rate
+constexpr double kCrowdLeast = 4;        // units and exposures
+constexpr std::size_t kCrowdMost = 200;  // far visits in a window
 constexpr std::string_view kCrowdColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 
@@ -209,6 +209,31 @@ std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit) {
       taken.insert({a, b});
     }
   return swaps;
+}
+
+CauseFound SwapCause(const Campaign& campaign,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
+  CauseFound cause;
+  cause.cause = "identity_swap";
+  cause.candidates = {cause.cause};
+  cause.axis = "none";
+  cause.scope = "unit";
+  cause.amplitude_unit = "pairs";
+  cause.amplitude = static_cast<double>(swaps.size());
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  double square = 0;
+  for (const auto& [a, b] : swaps) {
+    cause.units.push_back(campaign.units[a].id);
+    cause.units.push_back(campaign.units[b].id);
+    square += std::pow(1e3 * std::hypot(campaign.units[a].base_x_mm - campaign.units[b].base_x_mm,
+                                        campaign.units[a].base_y_mm - campaign.units[b].base_y_mm),
+                       2);
+  }
+  cause.size_um = std::sqrt(square / static_cast<double>(swaps.size()));
+  cause.predicted_gain_um = cause.size_um;
+  cause.delta_log_likelihood = 1e6;
+  cause.paragraph = "Two fibres are known under each other's name: exchange the names.";
+  return cause;
 }
 
 void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign) {

@@ -18,6 +18,10 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
 /// Pairs of units whose measured places belong to each other, for all of the campaign.
 std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit);
 
+/// The exchanged names as a cause. Pre: not empty.
+CauseFound SwapCause(const Campaign& campaign,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps);
+
 /// Exchanges the measured places of two units where both were measured in one exposure; rows of
 /// only one become missing.
 void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign);

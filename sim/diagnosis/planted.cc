@@ -272,13 +272,13 @@ Result<Campaign> PlantCampaign(const PlantedOptions& options) {
   const CampaignFacts facts = MakeFacts(campaign);
   CampaignModel model = TrueModel(options, campaign);
   for (const PlantedEffect& planted : options.effects) {
-    if (IsByPixel(planted) || !UnitOfPlantedFault(planted.cause).empty()) continue;
+    if (IsByPixel(planted) || IsPlantedFault(planted.cause)) continue;
     FOCALFLEET_TRY_ASSIGN(ModelTerm term, TermOf(planted, facts, options.seed));
     model.terms.push_back(std::move(term));
   }
   Measure(options, facts, Predict(model, facts, OneAfterTheOther()), &campaign);
   for (const PlantedEffect& planted : options.effects)
-    if (!UnitOfPlantedFault(planted.cause).empty())
+    if (IsPlantedFault(planted.cause))
       FOCALFLEET_TRY(PlantFault(planted, facts, options.seed, &campaign));
   if (std::ranges::any_of(options.effects, IsByPixel))
     FOCALFLEET_TRY(PlantByPixel(options, &campaign));

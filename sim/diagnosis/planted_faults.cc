@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/outliers.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -18,14 +19,13 @@ using Plane = std::complex<double>;  // x + i y, mm
 
 constexpr double kRadians = std::numbers::pi / 180;
 
-struct Fault {
-  std::string_view cause, unit;
-};
-constexpr Fault kFaults[] = {{"lost_command", "moves"},
-                             {"step_loss", "motor turns"},
-                             {"identity_swap", "pairs"},
-                             {"sensor_bias", "gain"},
-                             {"air_turbulence", "um"}};
+constexpr std::string_view kFaults[] = {"lost_command", "step_loss", "identity_swap", "sensor_bias",
+                                        "air_turbulence"};
+constexpr std::string_view kCounted[] = {"lost_command", "step_loss", "identity_swap"};
+
+bool IsOf(std::span<const std::string_view> causes, std::string_view cause) {
+  return std::ranges::find(causes, cause) != causes.end();
+}
 
 // The fibre as it is where the axis stands `off_deg` beside its command.
 void Turn(std::size_t unit, std::size_t row, std::size_t axis, double off_deg, Campaign* campaign) {
@@ -83,32 +83,28 @@ void LoseMoves(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rn
   const std::size_t axis = planted.axis == "phi" ? kPhi : kTheta;
   Loss loss{.axes = kBoth};
   if (planted.cause == "step_loss")
-    loss.axes = std::span(&kBoth[axis], 1),
-    loss.turns = std::max(std::round(planted.amplitude), 1.0);
+    loss.axes = std::span(&kBoth[axis], 1), loss.turns = planted.amplitude;
   else
-    loss.moves = static_cast<std::size_t>(std::max(planted.amplitude, 1.0));
+    loss.moves = static_cast<std::size_t>(planted.amplitude);
   for (const std::size_t unit : Drawn(campaign->units.size(), planted.unit_share, rng))
     LoseAt(unit, loss, facts, rng, campaign);
 }
 
-Status ExchangeNames(const PlantedEffect& planted, Rng* rng, Campaign* campaign) {
+Status ExchangeNames(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
+                     Campaign* campaign) {
   std::vector<std::size_t> free(campaign->units.size());
   for (std::size_t unit = 0; unit < free.size(); ++unit) free[unit] = unit;
-  const auto pairs = static_cast<std::size_t>(std::max(planted.amplitude, 1.0));
+  const auto pairs = static_cast<std::size_t>(planted.amplitude);
   if (2 * pairs > free.size())
     return Fail(ErrorCode::kInvalid, "identity_swap: there are not so many pairs of units");
   const auto take = [&] {
     const std::size_t at = rng->Below(free.size()), unit = free[at];
     free.erase(free.begin() + static_cast<std::ptrdiff_t>(at));
-    return campaign->first_row[unit];
+    return unit;
   };
-  const std::size_t moves = campaign->first_row[1];
   for (std::size_t k = 0; k < pairs; ++k) {
     const std::size_t a = take(), b = take();
-    for (std::size_t i = 0; i < moves; ++i) {
-      std::swap(campaign->x_mm[a + i], campaign->x_mm[b + i]);
-      std::swap(campaign->y_mm[a + i], campaign->y_mm[b + i]);
-    }
+    UndoSwap(facts.exposures, a, b, campaign);  // it exchanges either way
   }
   return {};
 }
@@ -167,10 +163,7 @@ void MoveAir(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
 
 }  // namespace
 
-std::string_view UnitOfPlantedFault(std::string_view cause) {
-  const auto* fault = std::ranges::find(kFaults, cause, &Fault::cause);
-  return fault == std::end(kFaults) ? std::string_view() : fault->unit;
-}
+bool IsPlantedFault(std::string_view cause) { return IsOf(kFaults, cause); }
 
 Status PlantFault(const PlantedEffect& planted, const CampaignFacts& facts, std::uint64_t seed,
                   Campaign* campaign) {
@@ -179,11 +172,15 @@ Status PlantFault(const PlantedEffect& planted, const CampaignFacts& facts, std:
   if (!planted.axis.empty() && !(of_an_axis && is_axis))
     return Fail(ErrorCode::kInvalid, planted.cause + ": not on axis '" + planted.axis + "' here");
   if (planted.form >= 0) return Fail(ErrorCode::kInvalid, planted.cause + ": it has no shapes");
+  constexpr double kMost = 1e6;
+  if (IsOf(kCounted, planted.cause) && !(planted.amplitude >= 1 && planted.amplitude <= kMost &&
+                                         planted.amplitude == std::floor(planted.amplitude)))
+    return Fail(ErrorCode::kInvalid, planted.cause + ": a whole number from 1 on is expected");
   Rng rng = Rng::Stream(seed, planted.cause);
   if (planted.cause == "lost_command" || planted.cause == "step_loss")
     LoseMoves(planted, facts, &rng, campaign);
   else if (planted.cause == "identity_swap")
-    return ExchangeNames(planted, &rng, campaign);
+    return ExchangeNames(planted, facts, &rng, campaign);
   else if (planted.cause == "sensor_bias")
     MistellTemperatures(planted, facts, &rng, campaign);
   else

@@ -9,7 +9,7 @@
 #include <string>
 #include <thread>
 
-#include "sim/diagnosis/multi_start.h"
+#include "sim/diagnosis/homings.h"
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -253,9 +253,7 @@ TEST(Diagnosis, TheScatterOfHomingsIsWhatTheirZerosDoAtTheFibre) {
   for (const double sigma_deg : {0.0, 0.05}) {
     const Campaign campaign = Homed(sigma_deg, 4);
     const CampaignFacts facts = MakeFacts(campaign);
-    CampaignModel model;
-    model.units = campaign.units;
-    Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+    Fit fit = StaticFit(facts);
     FreeHomings(&fit);
     const HomingScatter scatter = ScatterOfHomings(fit);
     // Of what is planted each unit's own zero takes a part; noise alone makes below 2 um.

@@ -15,9 +15,7 @@ namespace {
 
 std::vector<Undistorted> Judged(const Campaign& campaign, const Templates& templates) {
   const CampaignFacts facts = MakeFacts(campaign);
-  CampaignModel model;
-  model.units = campaign.units;
-  Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+  Fit fit = StaticFit(facts);
   const Selection selection = Select(templates, {}, &fit);
   EXPECT_EQ(fit.model.terms.size(), templates.size());
   return BesideDistortions(fit, selection.accepted);

@@ -18,9 +18,7 @@ TEST(HeldOutGain, OutliersOfAHomingThatNoFitHasSeenDoNotMoveItsZeros) {
   const Campaign campaign =
       Planted({}, {.moves = 100, .seed = 12, .outlier_share = 0.05, .homing_share = 0.1});
   const CampaignFacts facts = MakeFacts(campaign);
-  CampaignModel model;
-  model.units = campaign.units;
-  Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+  Fit fit = StaticFit(facts);
   FreeHomings(&fit);
   const HeldOutGain gain = MeasureGain(fit);
   ASSERT_THAT(gain.held_out,

@@ -12,9 +12,7 @@ namespace {
 TEST(Lanes, EachIsWhitenedAsIfItWereAlone) {
   const Campaign campaign = Planted({}, {.units = 7, .rest_noise_deg = 0.03});
   const CampaignFacts facts = MakeFacts(campaign);
-  CampaignModel model;
-  model.units = campaign.units;
-  const Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+  const Fit fit = StaticFit(facts);
   const WhiteUnit white = Whiten(fit, 2);
   // Of one angle, of arms, of the place.
   for (const char* cause : {"backlash", "thermal_arm_growth", "axis_tilt"}) {

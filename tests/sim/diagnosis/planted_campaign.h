@@ -12,6 +12,7 @@
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/fit.h"
 #include "sim/diagnosis/planted.h"
 
 namespace focalfleet::sim {
@@ -62,6 +63,13 @@ inline Campaign Damp(std::uint64_t seed) {
             &campaign);
   campaign.covariates.push_back(std::move(column));
   return campaign;
+}
+
+/// Geometry alone, as a diagnosis starts. The facts outlive the fit.
+inline Fit StaticFit(const CampaignFacts& facts) {
+  CampaignModel model;
+  model.units = facts.campaign->units;
+  return StartFit(facts, model, std::vector<char>(facts.campaign->rows(), 0), OneAfterTheOther());
 }
 
 inline Diagnosis Verdicts(const Campaign& campaign, DiagnoseOptions options = {}) {

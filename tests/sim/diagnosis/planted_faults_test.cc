@@ -71,6 +71,9 @@ TEST(PlantedFaults, WhatThereIsNotIsRefused) {
               HasSubstr("not on axis 'phi'"));
   EXPECT_THAT(why({.cause = "step_loss", .amplitude = 1, .form = 2}), HasSubstr("no shapes"));
   EXPECT_THAT(why({.cause = "identity_swap", .amplitude = 2}), HasSubstr("not so many pairs"));
+  for (const char* counted : {"lost_command", "step_loss", "identity_swap"})
+    for (const double amplitude : {0.0, -1.0, 1.5, 1e30})
+      EXPECT_THAT(why({.cause = counted, .amplitude = amplitude}), HasSubstr("whole number"));
   EXPECT_THAT(why({.cause = "stiction", .amplitude = 1, .axis = "theta", .form = 99}),
               HasSubstr("24  theta: until the next move; jumps from, deg, 0.4"));
 }

@@ -10,12 +10,6 @@
 namespace focalfleet::sim {
 namespace {
 
-Fit Started(const CampaignFacts& facts) {
-  CampaignModel model;
-  model.units = facts.campaign->units;
-  return StartFit(facts, model, std::vector<char>(facts.campaign->rows(), 0), OneAfterTheOther());
-}
-
 Template Of(const char* cause, const CampaignFacts& facts) {
   return ListTemplates(*FindEffect(cause), facts).front();
 }
@@ -30,7 +24,7 @@ ModelTerm OfTheFleet(const Template& form, std::size_t units) {
 TEST(Score, WhatTheModelHasAlreadySaysNothingNew) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
   const CampaignFacts facts = MakeFacts(campaign);
-  Fit fit = Started(facts);
+  Fit fit = StaticFit(facts);
   const Template form = Of("backlash", facts);
   ASSERT_GT(ScoreTemplates(fit, {form}).scores[0].fleet_g(0, 0), 0);
   for (const char* cause : {"friction_windup", "eccentricity", "gear_scale", "backlash"})
@@ -46,7 +40,7 @@ TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
   const Campaign campaign =
       Planted({{.cause = "gear_scale", .amplitude = 0.01, .axis = "theta", .unit_share = 0.2}});
   const CampaignFacts facts = MakeFacts(campaign);
-  const Fit fit = Started(facts);
+  const Fit fit = StaticFit(facts);
   Templates templates = ListTemplates(*FindEffect("stiction"), facts);
   const ScorePass pass = ScoreTemplates(fit, templates);
   std::size_t impossible = 0;
@@ -65,7 +59,7 @@ TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
 TEST(Score, LooksTogetherAreWhatTheyAreAlone) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
   const CampaignFacts facts = MakeFacts(campaign);
-  Fit fit = Started(facts);
+  Fit fit = StaticFit(facts);
   fit.model.terms.push_back(OfTheFleet(Of("backlash", facts), campaign.units.size()));
   ModelTerm own = OfTheFleet(Of("eccentricity", facts), campaign.units.size());
   own.sharing = Sharing::kUnit;

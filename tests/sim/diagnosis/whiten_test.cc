@@ -35,9 +35,7 @@ TEST(Whiten, HeldRestErrorsBecomeIndependentNumbersOfUnitVariance) {
   const Campaign campaign =
       Planted({}, {.units = 40, .moves = 120, .seed = 11, .noise_um = 1, .rest_noise_deg = 0.03});
   const CampaignFacts facts = MakeFacts(campaign);
-  CampaignModel model;
-  model.units = campaign.units;
-  const Fit fit = StartFit(facts, model, std::vector<char>(campaign.rows(), 0), OneAfterTheOther());
+  const Fit fit = StaticFit(facts);
   const Moments plain = MomentsOf(fit, false), white = MomentsOf(fit, true);
   EXPECT_GT(plain.next / plain.square, 0.1) << "the planted noise does not keep";
   EXPECT_NEAR(white.next / white.square, 0, 4 / std::sqrt(white.count));
