@@ -124,6 +124,17 @@ TEST(WrongSensors, WhoTellsNoTemperatureIsNotSuspect) {
   EXPECT_EQ(FindSuspectSensors(MakeFacts(board.campaign)), nullptr);
 }
 
+TEST(WrongSensors, AMissingReadingIsNoReading) {
+  Board board = Plain();
+  TellWithGain(board.units, 0.6, &board.campaign);
+  std::vector<double>& told = Temperatures(&board.campaign);
+  for (std::size_t row = 0; row < told.size(); row += 3) told[row] = std::nan("");
+  const auto truth = FindSuspectSensors(MakeFacts(board.campaign));
+  ASSERT_NE(truth, nullptr);
+  EXPECT_EQ(truth->units, board.units);
+  EXPECT_NEAR(truth->gain, 0.6, 0.01);
+}
+
 // All others tell one temperature, so that the only gradient is the wrong rail's.
 TEST(WrongSensors, AColumnThatTheWrongOnesMadeGoesWithThem) {
   Board board = Plain();
