@@ -201,6 +201,9 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
 struct AngleRow {
   std::size_t move = 0;
   double error_deg = 0;
+  double lever_mm = 0;  // by which a place tells the angle
+
+  double sigma_deg(double noise_mm) const { return noise_mm / lever_mm / kRadians; }
 };
 
 // What each seen place says about the axis' angle, where the arms' pose tells the axes apart.
@@ -217,43 +220,53 @@ std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::s
     if (std::abs(det) < kApart * std::hypot(ax, ay) * std::hypot(bx, by)) continue;
     const double x = 1e-3 * fit.x_um[row], y = 1e-3 * fit.y_um[row];
     const double error = axis == kTheta ? (by * x - bx * y) / det : (ax * y - ay * x) / det;
-    rows.push_back({i, error / kRadians});
+    // Near the folded pose an angle of theta moves next to nothing.
+    const double lever = std::abs(det) / (axis == kTheta ? std::hypot(bx, by) : std::hypot(ax, ay));
+    rows.push_back({i, error / kRadians, lever});
   }
   return rows;
 }
 
-// Errors of the rows about a jump that belong to its history, the nearest first.
-std::vector<double> ErrorsFrom(const std::vector<AngleRow>& rows, const UnitTrack& track,
+// Rows about a jump that belong to its history, the nearest first.
+std::vector<AngleRow> RowsFrom(const std::vector<AngleRow>& rows, const UnitTrack& track,
                                std::size_t at, int step) {
   constexpr std::size_t kRows = 8;
-  std::vector<double> errors;
-  for (std::size_t k = at; k < rows.size() && errors.size() < kRows;
+  std::vector<AngleRow> near;
+  for (std::size_t k = at; k < rows.size() && near.size() < kRows;
        k += static_cast<std::size_t>(step)) {
-    errors.push_back(rows[k].error_deg);
+    near.push_back(rows[k]);
     if (step < 0 && (k == 0 || track.restarts[rows[k].move] != 0)) break;
     if (step > 0 && k + 1 < rows.size() && EndOfHistory(track, rows[k].move) <= rows[k + 1].move)
       break;
   }
-  return errors;
+  return near;
+}
+
+double MedianError(const std::vector<AngleRow>& rows) {
+  std::vector<double> errors;
+  for (const AngleRow& row : rows) errors.push_back(row.error_deg);
+  return Median(std::move(errors));
 }
 
 // What a step of `size_deg` before row k explains of the rows on its poorer side, in squares of
-// `sigma_deg`. A row pays for at most kMost: a place that comes back at once was an outlier, and
+// their noise. A row pays for at most kMost: a place that comes back at once was an outlier, and
 // pays nothing, on whichever side it lies.
 double GainOfStep(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t k,
-                  double size_deg, double sigma_deg) {
+                  double size_deg, double noise_mm) {
   constexpr double kMost = 25;
-  const std::vector<double> before = ErrorsFrom(rows, track, k - 1, -1);
-  const std::vector<double> behind = ErrorsFrom(rows, track, k, 1);
-  const auto cost = [&](double error) {
-    return std::min(error * error / (sigma_deg * sigma_deg), kMost);
+  const std::vector<AngleRow> before = RowsFrom(rows, track, k - 1, -1);
+  const std::vector<AngleRow> behind = RowsFrom(rows, track, k, 1);
+  const auto cost = [&](const AngleRow& row, double level) {
+    const double off = (row.error_deg - level) / row.sigma_deg(noise_mm);
+    return std::min(off * off, kMost);
   };
-  const auto gain = [&](const std::vector<double>& side, double level, double step) {
+  const auto gain = [&](const std::vector<AngleRow>& side, double level, double step) {
     double sum = 0;
-    for (const double error : side) sum += cost(error - level) - cost(error - level - step);
+    for (const AngleRow& row : side) sum += cost(row, level) - cost(row, level + step);
     return sum;
   };
-  return std::min(gain(behind, Median(before), size_deg), gain(before, Median(behind), -size_deg));
+  return std::min(gain(behind, MedianError(before), size_deg),
+                  gain(before, MedianError(behind), -size_deg));
 }
 
 struct Jump {
@@ -276,7 +289,7 @@ std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t fr
 }
 
 std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& track,
-                          std::size_t axis, double turn, double jump_deg) {
+                          std::size_t axis, double turn, double noise_mm) {
   constexpr double kGainMin = 60;  // three rows at least
   std::vector<Jump> jumps;
   for (std::size_t k = 1; k < rows.size(); ++k) {
@@ -289,33 +302,37 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
     jump.move = MoveAgainst(track, axis, from, to, jump.turns);
     jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&
                  std::abs(size - jump.turns * turn) < 0.25 * turn;
-    jump.holds =
-        GainOfStep(rows, track, k, jump.turns * turn, jump_deg / std::numbers::sqrt2) > kGainMin;
+    jump.holds = GainOfStep(rows, track, k, jump.turns * turn, noise_mm) > kGainMin;
     jumps.push_back(jump);
   }
   return jumps;
 }
 
-// Of the difference of two rows, as most of the unit's rows have it; negative: too few rows.
-double UsualJump_deg(const Fit& fit, std::size_t unit, std::size_t axis) {
+// Of a place across the arm, as the differences of most of the unit's rows have it; negative: too
+// few rows.
+double UsualNoise_mm(const Fit& fit, std::size_t unit, std::size_t axis) {
   constexpr std::size_t kJumpsMin = 8;
   const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
   const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
   std::vector<double> jumps;
   for (std::size_t k = 1; k < rows.size(); ++k)
-    jumps.push_back(std::abs(rows[k].error_deg - rows[k - 1].error_deg));
+    jumps.push_back(std::abs(rows[k].error_deg - rows[k - 1].error_deg) /
+                    std::hypot(rows[k].sigma_deg(1), rows[k - 1].sigma_deg(1)));
   return jumps.size() < kJumpsMin ? -1 : Median(std::move(jumps)) / 0.6745;
 }
 
-// `jump_deg`: standard deviation of a difference without slips.
-std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis, double jump_deg) {
-  constexpr double kNoiseMax = 1.0 / 6;  // of a turn: else turns cannot be counted
+// `noise_mm`: of a place, without slips.
+std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis, double noise_mm) {
+  constexpr double kNoiseMax = 1.0 / 8;  // of a turn: else turns cannot be counted
   std::vector<EventTerm> events;
+  if (noise_mm < 0) return events;
   const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
   const double turn = 360 / track.unit->gear[axis];
-  if (jump_deg < 0 || jump_deg > kNoiseMax * turn) return events;
-  const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
-  std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn, jump_deg);
+  std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
+  std::erase_if(rows, [&](const AngleRow& row) {
+    return row.sigma_deg(noise_mm) > kNoiseMax * turn;
+  });
+  std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn, noise_mm);
   // Many jumps that are whole turns against the motion: slips, however close they follow. There and
   // back again counts once: so does an outlier.
   double whole = 0, all = 0;
@@ -340,12 +357,12 @@ bool IsLostCommand(const Fit& fit, const EventTerm& event) {
   return std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9;
 }
 
-double FleetJump_deg(const Fit& fit, std::size_t axis) {
+double FleetNoise_mm(const Fit& fit, std::size_t axis) {
   constexpr std::size_t kUnits = 64;  // are enough for a median
   const std::size_t units = fit.model.units.size();
   std::vector<double> usual;
   for (std::size_t unit = 0; unit < units; unit += std::max<std::size_t>(1, units / kUnits))
-    if (const double jump = UsualJump_deg(fit, unit, axis); jump >= 0) usual.push_back(jump);
+    if (const double noise = UsualNoise_mm(fit, unit, axis); noise >= 0) usual.push_back(noise);
   return usual.empty() ? -1 : Median(std::move(usual));
 }
 
@@ -375,7 +392,7 @@ std::size_t AddEvents(Fit* fit) {
   std::size_t added = take();
   for (int round = 0; round < 2; ++round) {
     geometry = fit->model.units;
-    const std::array<double, 2> usual = {FleetJump_deg(*fit, kTheta), FleetJump_deg(*fit, kPhi)};
+    const std::array<double, 2> usual = {FleetNoise_mm(*fit, kTheta), FleetNoise_mm(*fit, kPhi)};
     fit->parallel(chunks.size(), [&](std::size_t chunk) {
       for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
         for (const std::size_t axis : {kTheta, kPhi})

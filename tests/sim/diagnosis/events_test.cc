@@ -82,6 +82,28 @@ TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
   EXPECT_NEAR(diagnosis.model.events[1].step_deg, turn_deg, 1e-9);
 }
 
+TEST(Events, NoiseOfAFoldedArmIsNoSlip) {
+  // Folded, theta moves the fibre next to nothing: noise of places is whole turns of its angle.
+  Campaign campaign = Planted({}, {.units = 100, .moves = 240, .seed = 4});
+  Rng rng = Rng::Stream(4, "folded");
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const CampaignUnit& u = campaign.units[unit];
+    for (std::size_t i = 30; i < 240; ++i) {
+      const std::size_t row = campaign.first_row[unit] + i;
+      if (i % 35 < 7) campaign.cmd_deg[kPhi][row] = rng.Uniform(177, 178) - u.zero_deg[kPhi];
+      for (const std::size_t axis : {kTheta, kPhi})
+        campaign.from_deg[axis][row] = campaign.cmd_deg[axis][row - 1];
+      const PlacePoint at =
+          PlaceOf(u, campaign.cmd_deg[kTheta][row], campaign.cmd_deg[kPhi][row]);
+      campaign.x_mm[row] = at.x_mm + 0.003 * rng.Normal();
+      campaign.y_mm[row] = at.y_mm + 0.003 * rng.Normal();
+    }
+  }
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = StaticFit(facts);
+  EXPECT_EQ(AddEvents(&fit), 0u);
+}
+
 TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   std::vector<std::uint32_t> stayed;
