@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <set>
 
@@ -115,8 +116,14 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   cause.amplitude = amplitude.value;
   cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
   cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
-  cause.size_um = SizeOf(fit, term);
+  const TermTrace trace = TraceOf(fit, term);
+  cause.size_um = trace.rms_um;
   cause.delta_log_likelihood = accepted.standing.chi_square / 2;
+  const double square = std::accumulate(trace.square_um2.begin(), trace.square_um2.end(), 0.0);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    if (trace.square_um2[unit] > 0)
+      cause.evidence_of_unit[campaign.units[unit].id] =
+          cause.delta_log_likelihood * trace.square_um2[unit] / square;
   cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
   cause.shape = term.form.label;
   cause.paragraph = effect.paragraph;
@@ -152,6 +159,8 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     same->all_units = same->all_units || cause.all_units;
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
+    for (const auto& [unit, evidence] : cause.evidence_of_unit)
+      same->evidence_of_unit[unit] += evidence;
     same->predicted_gain_um += cause.predicted_gain_um;
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/plain_geometry.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -26,7 +27,7 @@ constexpr double kCap_mm = 0.5;  // what an outlier costs at most
 struct UnitRows {
   CampaignUnit geometry;
   UnitTrack track;
-  std::span<const double> x_mm, y_mm;
+  std::vector<double> x_mm, y_mm;  // less what the model's effects do
   std::vector<double> added_deg[2];
 };
 
@@ -110,9 +111,21 @@ Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
   return best;
 }
 
+// Once a change is known, so is the geometry: by the rows before and behind it.
+void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
+  constexpr int kRounds = 20;
+  std::vector<PlainRow> plain;
+  for (std::size_t i = 0; i < rows->track.moves; ++i)
+    if (std::isfinite(rows->x_mm[i]))
+      plain.push_back({rows->track.cmd_deg[kTheta][i] + rows->added_deg[kTheta][i],
+                       rows->track.cmd_deg[kPhi][i] + rows->added_deg[kPhi][i], rows->x_mm[i],
+                       rows->y_mm[i]});
+  rows->geometry = FitPlain(plain, table, rows->geometry, kRounds);
+}
+
 // Changes that explain the rows, from one geometry to begin at.
 std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
-                                UnitRows* rows) {
+                                const CampaignUnit& table, UnitRows* rows) {
   const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
   std::vector<Change> found;
   while (found.size() < at_most) {
@@ -121,18 +134,23 @@ std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far
     const std::size_t end = EndOfHistory(rows->track, best.move);
     for (std::size_t i = best.move; i < end; ++i)
       for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += best.by_deg[axis];
+    FitGeometry(table, rows);
     found.push_back(best);
   }
   return found;
 }
 
 UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) {
-  const Campaign& campaign = *fit.facts->campaign;
   UnitRows rows;
   rows.geometry = geometry;
   rows.track = MakeTrack(*fit.facts, unit, geometry);
-  rows.x_mm = std::span(campaign.x_mm).subspan(rows.track.first_row, rows.track.moves);
-  rows.y_mm = std::span(campaign.y_mm).subspan(rows.track.first_row, rows.track.moves);
+  const CampaignUnit& fitted = fit.model.units[unit];
+  for (std::size_t i = 0; i < rows.track.moves; ++i) {
+    const PlacePoint at =
+        PlaceOf(fitted, rows.track.cmd_deg[kTheta][i], rows.track.cmd_deg[kPhi][i]);
+    rows.x_mm.push_back(at.x_mm + 1e-3 * fit.x_um[rows.track.first_row + i]);
+    rows.y_mm.push_back(at.y_mm + 1e-3 * fit.y_um[rows.track.first_row + i]);
+  }
   for (const std::size_t axis : {kTheta, kPhi}) rows.added_deg[axis].assign(rows.track.moves, 0);
   return rows;
 }
@@ -148,7 +166,9 @@ struct Explained {
 Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
                       const CampaignUnit& geometry, double far_mm) {
   UnitRows rows = RowsOf(fit, unit, geometry);
-  Explained out{.changes = FindChanges(kind, at_most, far_mm, &rows), .geometry = geometry};
+  Explained out{
+      .changes = FindChanges(kind, at_most, far_mm, fit.facts->campaign->units[unit], &rows),
+      .geometry = rows.geometry};
   out.cost = TotalCost(rows);
   for (std::size_t i = 0; i < rows.track.moves; ++i)
     if (fit.aside[rows.track.first_row + i] == 0 &&

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <map>
 #include <span>
 
@@ -53,6 +54,26 @@ bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause) {
          });
 }
 
+// What the units of `other` contribute to the cause's evidence.
+double EvidenceAmong(const CauseFound& cause, const CauseFound& other) {
+  if (cause.evidence_of_unit.empty() || other.evidence_of_unit.empty())
+    return cause.delta_log_likelihood;
+  double sum = 0;
+  for (const auto& [unit, evidence] : cause.evidence_of_unit)
+    if (other.evidence_of_unit.contains(unit)) sum += evidence;
+  return sum;
+}
+
+// Of the other's evidence, where both are. Infinite where the other is not: a shape leaves nothing
+// in units that do not have it.
+double ShareBeside(const CauseFound& other, const CauseFound& cause) {
+  constexpr double kTogether = 0.5;  // of the weaker one's evidence, at least
+  const double weak = EvidenceAmong(cause, other), strong = EvidenceAmong(other, cause);
+  if (weak < kTogether * cause.delta_log_likelihood || !(strong > 0))
+    return std::numeric_limits<double>::infinity();
+  return weak / strong;
+}
+
 }  // namespace
 
 bool AxesMeet(std::string_view a, std::string_view b) {
@@ -92,7 +113,7 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
-  // Of the stronger one's evidence.
+  // Of the stronger one's evidence in the same units.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
   // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
   // stronger one's evidence.
@@ -100,10 +121,11 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
+    double share = 0;
     bool related = false, same = false;
     for (CauseFound& other : kept) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
-      const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
+      share = ShareBeside(other, cause);
       // Of whatever kind: so little of what axes do may be the strong one's shape.
       related = (share < kShape && other.axis != "none" && cause.axis != "none") ||
                 (share < kCandidate && AreRelated(other.cause, cause.cause) &&
@@ -126,7 +148,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       kept.push_back(std::move(cause));
       continue;
     }
-    if (same || (related && cause.delta_log_likelihood < kShape * relative->delta_log_likelihood)) {
+    if (same || (related && share < kShape)) {
       TellAsRemainder(cause.size_um, cause.cause, relative);
       continue;
     }

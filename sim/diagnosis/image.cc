@@ -184,6 +184,17 @@ double ShareOfSine(const std::vector<Vector4>& shifts, const std::vector<double>
   return most;
 }
 
+// The largest share that one step takes.
+double ShareOfStep(const std::vector<Vector4>& shifts) {
+  std::vector<double> behind(shifts.size(), 1);
+  double most = 0;
+  for (std::size_t e = 0; e + 1 < shifts.size(); ++e) {
+    behind[e] = 0;
+    most = std::max(most, ShareTaken(shifts, behind, 1, false));
+  }
+  return most;
+}
+
 // The column that the image's shifts follow best, if it is no chance and more than time does.
 // `signal`: share of the shifts' variance that is no noise.
 std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
@@ -201,7 +212,8 @@ std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
   const double by_time =
       EvidenceOf(ShareTaken(shifts, order, kTimeCurves, false), kTimeCurves, exposures);
   std::optional<UnknownFound> best;
-  double most = std::max(by_time, 0.0) + kClearly;
+  const double by_step = EvidenceOf(ShareOfStep(shifts), 2, exposures);
+  double most = std::max({by_time, by_step, 0.0}) + kClearly;
   const auto look = [&](const std::string& name, const std::vector<double>& values, int curves) {
     const double share = std::max(ShareTaken(shifts, values, curves, false),
                                   ShareTaken(shifts, values, curves, true));
@@ -309,21 +321,37 @@ Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
   return whole;
 }
 
+bool IsMore(const Motion& motion, double family_wise) {
+  // The noise estimate's own error grows with the number of exposures.
+  constexpr double kNoiseOfNoise = 1.15;
+  return motion.dof > 0 && LogChiSquareTail(motion.chi_square / kNoiseOfNoise, motion.dof) <
+                               std::log(family_wise / 10);
+}
+
+// One step of the image explains what follows a column slowly: without it the column shows.
+bool HidesAColumn(const Fit& fit, double family_wise) {
+  Fit bare = fit;
+  DropImageSteps(&bare);
+  const Motion motion = FindMotion(bare);
+  if (!IsMore(motion, family_wise)) return false;
+  const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
+  return FollowedColumn(*fit.facts, motion.found, signal, 1).has_value();
+}
+
 }  // namespace
 
 ImageFound AddImageTerms(Fit* fit, double family_wise) {
   ImageFound image;
   if (fit->model.units.size() < kUnitsMin) return image;
   Motion motion = FindMotion(*fit);
-  // The noise estimate's own error grows with the number of exposures.
-  constexpr double kNoiseOfNoise = 1.15;
   double turbulence_um = 0;
   const double before = NeighboursAgree(*fit, &turbulence_um);
-  const bool moves = motion.dof > 0 && LogChiSquareTail(motion.chi_square / kNoiseOfNoise,
-                                                        motion.dof) < std::log(family_wise / 10);
+  const bool moves = IsMore(motion, family_wise);
   // Several steps are no touch of the camera, but a staircase for something else.
   const auto steps = std::count_if(fit->model.terms.begin(), fit->model.terms.end(), IsImageStep);
-  if (!moves && before < kNeighboursAgree && steps < 2) return image;
+  if (!moves && before < kNeighboursAgree && steps < 2 &&
+      (steps == 0 || !HidesAColumn(*fit, family_wise)))
+    return image;
   if (DropImageSteps(fit)) motion = FindMotion(*fit);
   image.moves = true;
   double size_um = 0;

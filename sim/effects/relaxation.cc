@@ -34,6 +34,15 @@ void List(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = times_s, .shape_name = "as time passes; time constant, s,", .form = 2}, out);
 }
 
+// A creep that is over before the exposures is play to whoever looks at them.
+bool Shows(const Template& form, const CampaignFacts& facts) {
+  constexpr double kLeftMin = 0.1;  // of the creep, on the mean
+  const std::vector<double>& delay_s = facts.Find("delay_s")->values;
+  double left = 0;
+  for (const double delay : delay_s) left += std::exp(-std::max(delay, 0.0) / form.shape);
+  return left >= kLeftMin * static_cast<double>(delay_s.size());
+}
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
@@ -73,7 +82,8 @@ Effect MakeRelaxation() {
               "the same delay.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .shows = Shows};
 }
 
 }  // namespace focalfleet::sim

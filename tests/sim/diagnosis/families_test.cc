@@ -55,6 +55,31 @@ TEST(Families, WhatTheSameFewUnitsHaveBesideIsNotSure) {
   EXPECT_THAT(causes[2].candidates, ElementsAre("stage_ripple"));
 }
 
+TEST(Families, AShapeLeavesNothingWhereItIsNot) {
+  const auto split = [](CauseFound cause, std::map<std::uint32_t, double> evidence) {
+    cause.all_units = false;
+    for (const auto& [unit, part] : evidence) cause.units.push_back(unit);
+    cause.evidence_of_unit = std::move(evidence);
+    return cause;
+  };
+  const auto beside = [&](std::map<std::uint32_t, double> strong,
+                          std::map<std::uint32_t, double> weak) {
+    std::vector<CauseFound> causes = {split(Cause("gear_scale", "phi", 7000), std::move(strong)),
+                                      split(Cause("phase_imbalance", "phi", 180), std::move(weak))};
+    JudgeRemainders(&causes);
+    return causes;
+  };
+  const std::map<std::uint32_t, double> two = {{1, 3500}, {2, 3500}};
+  EXPECT_THAT(beside(two, {{1, 100}, {2, 80}}), SizeIs(1));
+  EXPECT_THAT(beside(two, {{1, 90}, {2, 60}, {3, 30}}), SizeIs(1));
+  for (const auto& causes : {beside(two, {{8, 100}, {9, 80}}), beside(two, {{1, 80}, {8, 100}}),
+                             // Where the weak one is, the strong one is not much stronger.
+                             beside({{1, 6400}, {2, 600}}, {{2, 180}})}) {
+    ASSERT_THAT(causes, SizeIs(2));
+    EXPECT_THAT(causes[1].candidates[0], "phase_imbalance");
+  }
+}
+
 TEST(Families, WhatIsFaintBesideTheStrongestIsNoName) {
   std::vector<CauseFound> causes = {Cause("axis_crosstalk", "theta", 2500),
                                     Cause("self_heating", "phi", 22)};
