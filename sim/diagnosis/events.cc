@@ -183,9 +183,11 @@ Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std:
 std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
   constexpr double kStillFarMax = 0.2;      // what changes do not explain is something else
   constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
-  // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
-  const double noise_um = fit.noise.place_um * std::min(fit.noise.unit_factor[unit], 1.5);
-  const double far_mm = std::clamp(10e-3 * noise_um, 0.04, 0.4);
+  // A row is worth a look that noise does not put there, of places nor of rests. What is sought
+  // here makes a unit noisy.
+  const double noise_um = std::max(10 * fit.noise.place_um, 8 * fit.noise.typical_um) *
+                          std::min(fit.noise.unit_factor[unit], 1.5);
+  const double far_mm = std::clamp(1e-3 * noise_um, 0.04, 0.4);
   const CampaignUnit& fitted = fit.model.units[unit];
   const UnitRows rows = RowsOf(fit, unit, fitted);
   std::size_t far = 0;
@@ -349,9 +351,8 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
   const double turn = 360 / track.unit->gear[axis];
   std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
-  std::erase_if(rows, [&](const AngleRow& row) {
-    return row.sigma_deg(noise_mm) > kNoiseMax * turn;
-  });
+  std::erase_if(rows,
+                [&](const AngleRow& row) { return row.sigma_deg(noise_mm) > kNoiseMax * turn; });
   std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn, noise_mm);
   // Many jumps that are whole turns against the motion: slips, however close they follow. There and
   // back again counts once: so does an outlier.

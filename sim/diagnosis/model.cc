@@ -116,6 +116,12 @@ std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& t
   return homings;
 }
 
+std::size_t MovesWithEvents(const CampaignModel& model) {
+  std::set<std::size_t> rows;
+  for (const EventTerm& event : model.events) rows.insert(event.row);
+  return rows.size();
+}
+
 void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors) {
   errors->Reset(track.moves);
   for (std::size_t i = homing.begin; i < homing.end; ++i) errors->angle_deg[homing.axis][i] = 1;

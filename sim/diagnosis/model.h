@@ -77,6 +77,9 @@ struct CampaignModel {
   double homing_spread_deg[2] = {0, 0};  // their standard deviation, a prior
 };
 
+/// Moves that an event happened in: one that was lost has an event of each axis.
+std::size_t MovesWithEvents(const CampaignModel& model);
+
 /// One axis from a homing to the next.
 struct Homing {
   std::size_t axis = kTheta;

@@ -8,20 +8,27 @@
 namespace focalfleet::sim {
 namespace {
 
+// By the noise of another fit: factors of units and exposures wander by more than a step is worth.
+double MeritByNoise(Fit fit, const Noise& noise) {
+  fit.noise = noise;
+  UpdateWeights(&fit);
+  return Merit(fit);
+}
+
 // With and without steps in single units' angles; the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
-  const std::size_t events = AddEvents(&stepped);
+  const bool has_events = AddEvents(&stepped) > 0;
   Selection selection = Select(templates, rule, fit);
-  if (events == 0) return selection;
+  if (!has_events) return selection;
   // What a cause does to a few moves looks like steps until the cause is known.
   Fit explained = *fit;
   if (AddEvents(&explained) == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
   // A step is a large claim about one move: it has to be worth more than its price.
   constexpr double kClearly = 20, kEach = 10;
-  if (Merit(stepped) <= Merit(*fit) + kClearly + kEach * static_cast<double>(events))
-    return selection;
+  const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model));
+  if (MeritByNoise(stepped, fit->noise) <= MeritByNoise(*fit, fit->noise) + price) return selection;
   *fit = std::move(stepped);
   return again;
 }

@@ -86,11 +86,10 @@ std::vector<NoiseUnit> Sample(const Fit& fit) {
   return sample;
 }
 
-// Of one unit: Student's t of 5 degrees of freedom in two dimensions for each place given those
-// before it, and what the unit's own unknowns have absorbed (restricted likelihood; the unknowns to
-// second order about the residuals). Source: Patterson and Thompson, Biometrika 58 (1971) 545.
+// Of one unit: the density of each place given those before it, and what the unit's own unknowns
+// have absorbed (restricted likelihood; the unknowns to second order about the residuals).
+// Source: Patterson and Thompson, Biometrika 58 (1971) 545.
 double CostOf(const NoiseUnit& unit, const Noise& noise) {
-  constexpr double kFreedom = 5;
   constexpr double kLoose = 1e-12;  // of an unknown that the rows do not show
   double cost = 0;
   RestFilter filter(noise, unit.factor);
@@ -101,8 +100,8 @@ double CostOf(const NoiseUnit& unit, const Noise& noise) {
     if (!move.seen) continue;
     filter.See(move.turn_um, move.exposure_factor);
     const double square = filter.SquareLength(move.x_um, move.y_um);
-    cost += std::log(filter.determinant()) / 2 + (kFreedom + 2) / 2 * std::log1p(square / kFreedom);
-    rows.push_back(filter.Take(std::min(1.0, (kFreedom + 2) / (kFreedom + square))));
+    cost += std::log(filter.determinant()) / 2 + MinusLogDensity(square);
+    rows.push_back(filter.Take(std::min(1.0, (kPlaceFreedom + 2) / (kPlaceFreedom + square))));
     filter.Whiten(rows.back(), move.turn_um, move.x_um, move.y_um,
                   &y[static_cast<Eigen::Index>(2 * rows.size() - 2)]);
   }

@@ -240,17 +240,15 @@ double Merit(const Fit& fit) {
       const double* w = white.filter[k].w;
       const double weight = fit.weight[white.track.first_row + white.moves[k]];
       const double square = white.y.segment(at, 2).squaredNorm() / weight;
-      // Huber's density: beyond the knee the logarithm falls linearly.
-      const double knee = weight < 1 ? std::sqrt(weight * square) : std::sqrt(square);
-      const double cost = weight < 1 ? 2 * knee * std::sqrt(square) - knee * knee : square;
-      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) - cost / 2;
+      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) -
+                     MinusLogDensity(square);
       values += 2;
     }
     // One zero of each axis is the geometry's.
     const auto homings = static_cast<double>(FreeHomingsOf(fit.model, white.track).size());
     parameters += std::max(homings - 2, 0.0);
   }
-  parameters += 2 * static_cast<double>(fit.model.events.size());
+  parameters += 2 * static_cast<double>(MovesWithEvents(fit.model));
   constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
   parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
   for (const ModelTerm& term : fit.model.terms)

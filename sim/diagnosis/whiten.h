@@ -12,6 +12,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -54,6 +55,14 @@ struct WhiteUnit {
 /// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
 void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
                  double* xy_um);
+
+/// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
+/// place: an outlier costs the logarithm of its distance, so that its noise does not decide.
+inline constexpr double kPlaceFreedom = 5;
+/// Less what all places have in common.
+inline double MinusLogDensity(double square) {
+  return (kPlaceFreedom + 2) / 2 * std::log1p(square / kPlaceFreedom);
+}
 
 /// Rows with the weights that the fit has.
 WhiteUnit Whiten(const Fit& fit, std::size_t unit);

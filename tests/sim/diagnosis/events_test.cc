@@ -93,8 +93,7 @@ TEST(Events, NoiseOfAFoldedArmIsNoSlip) {
       if (i % 35 < 7) campaign.cmd_deg[kPhi][row] = rng.Uniform(177, 178) - u.zero_deg[kPhi];
       for (const std::size_t axis : {kTheta, kPhi})
         campaign.from_deg[axis][row] = campaign.cmd_deg[axis][row - 1];
-      const PlacePoint at =
-          PlaceOf(u, campaign.cmd_deg[kTheta][row], campaign.cmd_deg[kPhi][row]);
+      const PlacePoint at = PlaceOf(u, campaign.cmd_deg[kTheta][row], campaign.cmd_deg[kPhi][row]);
       campaign.x_mm[row] = at.x_mm + 0.003 * rng.Normal();
       campaign.y_mm[row] = at.y_mm + 0.003 * rng.Normal();
     }
