@@ -27,7 +27,7 @@ constexpr double kCap_mm = 0.5;  // what an outlier costs at most
 struct UnitRows {
   CampaignUnit geometry;
   UnitTrack track;
-  std::vector<double> x_mm, y_mm;  // less what the model's effects do
+  std::span<const double> x_mm, y_mm;
   std::vector<double> added_deg[2];
 };
 
@@ -141,16 +141,12 @@ std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far
 }
 
 UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) {
+  const Campaign& campaign = *fit.facts->campaign;
   UnitRows rows;
   rows.geometry = geometry;
   rows.track = MakeTrack(*fit.facts, unit, geometry);
-  const CampaignUnit& fitted = fit.model.units[unit];
-  for (std::size_t i = 0; i < rows.track.moves; ++i) {
-    const PlacePoint at =
-        PlaceOf(fitted, rows.track.cmd_deg[kTheta][i], rows.track.cmd_deg[kPhi][i]);
-    rows.x_mm.push_back(at.x_mm + 1e-3 * fit.x_um[rows.track.first_row + i]);
-    rows.y_mm.push_back(at.y_mm + 1e-3 * fit.y_um[rows.track.first_row + i]);
-  }
+  rows.x_mm = std::span(campaign.x_mm).subspan(rows.track.first_row, rows.track.moves);
+  rows.y_mm = std::span(campaign.y_mm).subspan(rows.track.first_row, rows.track.moves);
   for (const std::size_t axis : {kTheta, kPhi}) rows.added_deg[axis].assign(rows.track.moves, 0);
   return rows;
 }

@@ -36,11 +36,11 @@ void List(const CampaignFacts&, Templates* out) {
 
 // A creep that is over before the exposures is play to whoever looks at them.
 bool Shows(const Template& form, const CampaignFacts& facts) {
-  constexpr double kLeftMin = 0.1;  // of the creep, on the mean
+  constexpr double kLeftMin = 0.15;  // of the creep, root mean square
   const std::vector<double>& delay_s = facts.Find("delay_s")->values;
-  double left = 0;
-  for (const double delay : delay_s) left += std::exp(-std::max(delay, 0.0) / form.shape);
-  return left >= kLeftMin * static_cast<double>(delay_s.size());
+  double square = 0;
+  for (const double delay : delay_s) square += std::exp(-2 * std::max(delay, 0.0) / form.shape);
+  return square >= kLeftMin * kLeftMin * static_cast<double>(delay_s.size());
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
