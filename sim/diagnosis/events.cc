@@ -197,7 +197,7 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
         kind == ChangeKind::kSlip ? std::min(far / kRowsForASlip, kEventsMax) : kEventsMax;
     for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
       Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
-      if (one.changes.empty() || one.cost > 0.5 * before ||
+      if (one.changes.empty() || one.cost >= before ||
           static_cast<double>(one.far) > kStillFarMax * static_cast<double>(far))
         continue;
       if (!best || one.cost < best->cost) best = std::move(one);

@@ -123,6 +123,53 @@ TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
   EXPECT_EQ(diagnosis.outliers.rows, 0u);
 }
 
+TEST(Events, ACommandLostNearTheBeginningIsFoundWhateverTheTableSays) {
+  // A few places before it, and a table that is off by more than noise: neither the fitted geometry
+  // nor the table's is that of the rows before and behind.
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 5});
+  constexpr std::size_t kUnit = 7;
+  const std::size_t first = campaign.first_row[kUnit];
+  const auto step_deg = [&](std::size_t axis, std::size_t move) {
+    return campaign.cmd_deg[axis][first + move] - campaign.from_deg[axis][first + move];
+  };
+  std::size_t lost = 3;
+  while (std::abs(step_deg(kTheta, lost)) < 2) ++lost;
+  ASSERT_LT(lost, 8u);
+  const CampaignUnit unit = campaign.units[kUnit];
+  const double theta_deg = step_deg(kTheta, lost), phi_deg = step_deg(kPhi, lost);
+  for (std::size_t row = first + lost; row < campaign.first_row[kUnit + 1]; ++row) {
+    const double theta = campaign.cmd_deg[kTheta][row], phi = campaign.cmd_deg[kPhi][row];
+    const PlacePoint told = PlaceOf(unit, theta, phi);
+    const PlacePoint stands = PlaceOf(unit, theta - theta_deg, phi - phi_deg);
+    campaign.x_mm[row] += stands.x_mm - told.x_mm;
+    campaign.y_mm[row] += stands.y_mm - told.y_mm;
+  }
+  for (CampaignUnit& told : campaign.units) {
+    for (const std::size_t axis : {kTheta, kPhi}) told.zero_deg[axis] += 0.2;
+    told.base_x_mm += 0.05;
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  const auto named = std::ranges::find(diagnosis.causes, "lost_command", &CauseFound::cause);
+  ASSERT_NE(named, diagnosis.causes.end()) << Told(diagnosis);
+  EXPECT_THAT(named->units, ElementsAre(unit.id));
+  EXPECT_EQ(diagnosis.outliers.rows, 0u);
+}
+
+TEST(Events, SlipsAreFoundAmongManyOutliers) {
+  Campaign campaign = Planted({}, {.moves = 120, .seed = 6, .outlier_share = 0.02});
+  std::vector<std::uint32_t> slipped;
+  for (const std::size_t unit : {5u, 9u}) {
+    const std::size_t move = MoveTo(campaign, unit, 90, 1);
+    ASSERT_NE(move, 0u);
+    TurnTheta(unit, move, 1000, -360 / campaign.units[unit].gear[kTheta], &campaign);
+    slipped.push_back(campaign.units[unit].id);
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "step_loss");
+  EXPECT_EQ(diagnosis.causes[0].units, slipped);
+}
+
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;

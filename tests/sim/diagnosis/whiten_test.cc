@@ -42,5 +42,21 @@ TEST(Whiten, HeldRestErrorsBecomeIndependentNumbersOfUnitVariance) {
   EXPECT_NEAR(white.square / white.count, 1, 0.1);
 }
 
+TEST(Merit, IsNotDecidedByOutliers) {
+  // Noise that is two per cent smaller explains the others about as well; what is anywhere costs
+  // next to nothing more.
+  const Campaign campaign = Planted({}, {.moves = 80, .seed = 6, .outlier_share = 0.02});
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = StaticFit(facts);
+  Fit smaller = fit;
+  smaller.noise.place_um *= 0.98;
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    smaller.noise.rest_deg[axis] *= 0.98;
+    smaller.noise.angle_deg[axis] *= 0.98;
+  }
+  UpdateWeights(&smaller);
+  EXPECT_NEAR(Merit(smaller), Merit(fit), 50);
+}
+
 }  // namespace
 }  // namespace focalfleet::sim

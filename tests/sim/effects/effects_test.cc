@@ -136,6 +136,52 @@ TEST(Effects, AStartSkewBeginsAtAShareOfTheSlots) {
   }
 }
 
+// A rotor that holds a load x of its pull-out at nominal drive rests asin(x / drive) behind its
+// field.
+TEST(Effects, ALagIsTheArcsineOfTheLoadUpToThePullOut) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  const auto drive = track.Column("drive_amplitude"), volts = track.Column("v_bus_V");
+  const double usual_V = facts.Find("v_bus_V")->mean;
+  Template form{.effect = FindEffect("load_angle_lag"), .axis = EffectAxis::kTheta, .shape = 0.9};
+  for (const bool by_supply : {false, true}) {
+    form.form = by_supply ? 3 : 2;
+    const auto errors = Applied(track, form, 0.1);
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      const double step = track.step_deg[kTheta][i];
+      if (step == 0) continue;
+      ++moved;
+      const double level = drive[i] * (by_supply ? volts[i] / usual_V : 1);
+      EXPECT_NEAR(errors[i],
+                  -std::copysign(0.1 * std::asin(std::min(0.9 / level, 1.0)) / 0.9, step), 1e-12);
+    }
+    EXPECT_GT(moved, 10u);
+  }
+  for (const auto& [load, shows] : {std::pair(0.5, true), {0.99, true}, {1.0, false}}) {
+    form.shape = load;
+    EXPECT_EQ(Shows(facts, form), shows) << load;
+  }
+}
+
+TEST(Effects, ARelaxationThatIsOverBeforeTheExposuresDoesNotShow) {
+  Campaign campaign = Made();
+  const auto column = std::ranges::find(campaign.covariates, "delay_s", &Covariate::name);
+  ASSERT_NE(column, campaign.covariates.end());
+  const auto shown = [&](double delay_s, double now_and_then_s, double constant_s) {
+    for (std::size_t row = 0; row < campaign.rows(); ++row)
+      column->values[row] = row % 10 == 0 ? now_and_then_s : delay_s;
+    return Shows(
+        MakeFacts(campaign),
+        {.effect = FindEffect("relaxation"), .axis = EffectAxis::kPhi, .shape = constant_s});
+  };
+  EXPECT_FALSE(shown(1, 1, 0.3));
+  EXPECT_TRUE(shown(1, 1, 1));
+  EXPECT_TRUE(shown(1, 0.1, 0.3));  // an early exposure sees it
+  EXPECT_FALSE(shown(1, 0.5, 0.2));
+}
+
 // A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
 // voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
