@@ -233,7 +233,8 @@ std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
   const FilledColumn* clock = facts.Find("t_s");
   const std::vector<double> time = clock == nullptr ? order : OfExposures(facts, *clock);
   const double sine = ShareOfSine(shifts, time.empty() ? order : time);
-  if (sine > kSineMin * signal && EvidenceOf(sine, 3, exposures) > kClearly)
+  if (sine > kSineMin * signal &&
+      EvidenceOf(sine, 3, exposures) > std::max(by_step, 0.0) + kClearly)
     best = UnknownFound{"t_s", std::string(kImageShift) + ", one slow wave",
                         std::exp(-EvidenceOf(sine, 3, exposures) / 2), size_um * std::sqrt(sine)};
   return best;
