@@ -349,7 +349,14 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
     std::erase_if(causes,
                   [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
   JudgeRemainders(&causes);
-  JudgeNames(&causes, &diagnosis->unknown);
+  std::vector<UnknownFound> nameless;
+  JudgeNames(&causes, &nameless);
+  for (UnknownFound& one : nameless) {
+    if (CauseFound* of = WhoLeaves(one, rms_um, &causes))
+      TellAsRemainder(one.size_um, one.covariate, of);
+    else
+      diagnosis->unknown.push_back(std::move(one));
+  }
   JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
   JudgeSeries(&causes, &diagnosis->unknown);
 }

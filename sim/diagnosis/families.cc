@@ -64,8 +64,8 @@ double EvidenceAmong(const CauseFound& cause, const CauseFound& other) {
   return sum;
 }
 
-// Of the other's evidence, where both are. Infinite where the other is not: a shape leaves nothing
-// in units that do not have it.
+// Of the other's evidence where both are, unit by unit. Infinite where the other is not: a shape
+// leaves nothing in units that do not have it.
 double ShareBeside(const CauseFound& other, const CauseFound& cause) {
   constexpr double kTogether = 0.5;  // of the weaker one's evidence, at least
   const double weak = EvidenceAmong(cause, other), strong = EvidenceAmong(other, cause);
@@ -113,24 +113,27 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 }
 
 void JudgeRemainders(std::vector<CauseFound>* causes) {
-  // Of the stronger one's evidence in the same units.
+  // Of the stronger one's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
+  // The same in the weak one's units, which are where it happens to be largest.
+  constexpr double kShapeThere = 0.2, kCandidateThere = 0.3;
   // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
   // stronger one's evidence.
   constexpr double kFaint = 20, kBesideFaint = 0.3;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
-    double share = 0;
-    bool related = false, same = false;
+    bool shape = false, related = false, same = false;
     for (CauseFound& other : kept) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
-      share = ShareBeside(other, cause);
+      const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
+      const double there = ShareBeside(other, cause);
+      shape = share < kShape && there < kShapeThere;
       // Of whatever kind: so little of what axes do may be the strong one's shape.
-      related = (share < kShape && other.axis != "none" && cause.axis != "none") ||
-                (share < kCandidate && AreRelated(other.cause, cause.cause) &&
-                 AxesMeet(other.axis, cause.axis));
-      const bool faint = cause.delta_log_likelihood < kFaint && share < kBesideFaint &&
+      related = (shape && other.axis != "none" && cause.axis != "none") ||
+                (share < kCandidate && there < kCandidateThere &&
+                 AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis));
+      const bool faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
                          AxesMeet(other.axis, cause.axis);
       if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
       relative = &other;
@@ -148,7 +151,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       kept.push_back(std::move(cause));
       continue;
     }
-    if (same || (related && share < kShape)) {
+    if (same || (related && shape)) {
       TellAsRemainder(cause.size_um, cause.cause, relative);
       continue;
     }
@@ -161,7 +164,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
 
 void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
   constexpr std::size_t kAnything = 8;  // candidates
-  constexpr double kRemainder = 0.03;   // of the strongest cause's evidence
+  constexpr double kRemainder = 0.1;    // of the strongest cause's evidence
   if (causes->empty()) return;
   const double strongest = causes->front().delta_log_likelihood;
   std::vector<CauseFound> kept;
