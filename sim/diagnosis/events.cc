@@ -177,13 +177,11 @@ Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std:
 // its geometry is set to the one that they belong to, as a fit that did not know of them may have
 // been dragged along.
 std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  constexpr double kStillFarMax = 0.2;      // what changes do not explain is something else
+  constexpr double kLeftMax = 0.2;          // what changes do not explain is something else
   constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
-  // A row is worth a look that noise does not put there, of places nor of rests. What is sought
-  // here makes a unit noisy.
-  const double noise_um = std::max(10 * fit.noise.place_um, 8 * fit.noise.typical_um) *
-                          std::min(fit.noise.unit_factor[unit], 1.5);
-  const double far_mm = std::clamp(1e-3 * noise_um, 0.04, 0.4);
+  // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
+  const double factor = std::min(fit.noise.unit_factor[unit], 1.5);
+  const double far_mm = std::clamp(10e-3 * fit.noise.place_um * factor, 0.04, 0.4);
   const CampaignUnit& fitted = fit.model.units[unit];
   const UnitRows rows = RowsOf(fit, unit, fitted);
   std::size_t far = 0;
@@ -191,15 +189,20 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
     if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
   if (far == 0) return {};
   const double before = TotalCost(rows);
+  // Far rows may still be noise's, of rests that all units have; then what all rows cost tells.
+  const double of_noise =
+      2 * static_cast<double>(rows.track.moves) * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
+  const auto explains = [&](const Explained& one) {
+    return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
+           one.cost - of_noise <= kLeftMax * (before - of_noise);
+  };
   std::optional<Explained> best;
   for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {
     const std::size_t at_most =
         kind == ChangeKind::kSlip ? std::min(far / kRowsForASlip, kEventsMax) : kEventsMax;
     for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
       Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
-      if (one.changes.empty() || one.cost >= before ||
-          static_cast<double>(one.far) > kStillFarMax * static_cast<double>(far))
-        continue;
+      if (one.changes.empty() || one.cost >= before || !explains(one)) continue;
       if (!best || one.cost < best->cost) best = std::move(one);
     }
   }
