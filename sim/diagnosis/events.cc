@@ -194,7 +194,7 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
       2 * static_cast<double>(rows.track.moves) * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
   const auto explains = [&](const Explained& one) {
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
-           one.cost - of_noise <= kLeftMax * (before - of_noise);
+           (before > of_noise && one.cost - of_noise <= kLeftMax * (before - of_noise));
   };
   std::optional<Explained> best;
   for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {

@@ -238,6 +238,9 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
 
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
   constexpr std::size_t kSeries = 3;
+  const auto add = [](const CauseFound& other, CauseFound* one) {
+    if (!IsCandidate(*one, other.cause)) one->candidates.push_back(other.cause);
+  };
   for (const char* axis : {"theta", "phi"}) {
     std::vector<CauseFound*> members;
     double square = 0;
@@ -246,12 +249,15 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
         members.push_back(&cause);
         square += cause.size_um * cause.size_um;
       }
+    // A tooth that is damaged at another place in each unit looks like a ripple and a tooth of all.
+    const auto tooth = std::ranges::find(members, "tooth_damage", &CauseFound::cause);
+    if (tooth != members.end() && (*tooth)->all_units)
+      for (CauseFound* other : members)
+        if (other != *tooth) add(**tooth, other), add(*other, *tooth);
     if (members.size() < kSeries) continue;
     for (CauseFound* one : members)
       for (const CauseFound* other : members)
-        if (std::find(one->candidates.begin(), one->candidates.end(), other->cause) ==
-            one->candidates.end())
-          one->candidates.push_back(other->cause);
+        if (other != one) add(*other, one);
     unknown->push_back(
         {std::string(axis) + "_cmd_deg", std::string(axis) + " angle", 0, std::sqrt(square)});
   }

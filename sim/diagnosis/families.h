@@ -25,9 +25,9 @@ void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
-/// one's shape leaves: a relative on the same axis, what only units of the strong one have, or what
-/// is faint by itself. It gets the strong one as a candidate. What is faint beside any cause of an
-/// axis is told as that one's shape. Pre: strongest first.
+/// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
+/// strong one have, or what is faint by itself. It gets the strong one as a candidate. What is
+/// faint beside any cause of an axis is told as that one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
@@ -44,7 +44,9 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Three causes or more that depend on where one axis stands are a series of shapes rather than
-/// causes: each gets the others as candidates, and the axis is told as not understood.
+/// causes: each gets the others as candidates, and the axis is told as not understood. Beside a
+/// tooth_damage of all units even one other is a candidate, and has it as one: teeth may be damaged
+/// at a place of each unit's own.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Where the column is missing that would tell two causes apart, who could not be tested is a

@@ -322,7 +322,7 @@ Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
   return whole;
 }
 
-bool IsMore(const Motion& motion, double family_wise) {
+bool MovesForSure(const Motion& motion, double family_wise) {
   // The noise estimate's own error grows with the number of exposures.
   constexpr double kNoiseOfNoise = 1.15;
   return motion.dof > 0 && LogChiSquareTail(motion.chi_square / kNoiseOfNoise, motion.dof) <
@@ -334,7 +334,7 @@ bool HidesAColumn(const Fit& fit, double family_wise) {
   Fit bare = fit;
   DropImageSteps(&bare);
   const Motion motion = FindMotion(bare);
-  if (!IsMore(motion, family_wise)) return false;
+  if (!MovesForSure(motion, family_wise)) return false;
   const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
   return FollowedColumn(*fit.facts, motion.found, signal, 1).has_value();
 }
@@ -347,7 +347,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   Motion motion = FindMotion(*fit);
   double turbulence_um = 0;
   const double before = NeighboursAgree(*fit, &turbulence_um);
-  const bool moves = IsMore(motion, family_wise);
+  const bool moves = MovesForSure(motion, family_wise);
   // Several steps are no touch of the camera, but a staircase for something else.
   const auto steps = std::count_if(fit->model.terms.begin(), fit->model.terms.end(), IsImageStep);
   if (!moves && before < kNeighboursAgree && steps < 2 &&

@@ -1,6 +1,7 @@
 #include "sim/diagnosis/unit_scorer.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 namespace focalfleet::sim {
@@ -8,6 +9,19 @@ namespace focalfleet::sim {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+namespace {
+
+// What adds up from a homing on is for the most part a zero, which geometry has anyway: counted
+// with it, little of the signature would seem to be its own.
+void TakeOffZeros(PoseErrors* errors) {
+  for (std::vector<double>& angle : errors->angle_deg) {
+    const double sum = std::accumulate(angle.begin(), angle.end(), 0.0);
+    for (double& error : angle) error -= sum / static_cast<double>(angle.size());
+  }
+}
+
+}  // namespace
 
 std::vector<Block> PlaceInLanes(const Templates& templates) {
   std::vector<Block> blocks;
@@ -72,6 +86,7 @@ void UnitScorer::MakeSignatures(const Templates& templates, const Block& block,
     const Template& form = templates[placed.form];
     for (std::size_t c = 0; c < form.columns; ++c) {
       ApplyColumn(white_.track, form, c, 1, &errors_);
+      if (form.memory == Memory::kChain) TakeOffZeros(&errors_);
       PutDisplacement(white_, errors_, placed.lane + c, rows->data());
     }
   }

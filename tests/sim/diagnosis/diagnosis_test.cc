@@ -264,5 +264,32 @@ TEST(Diagnosis, TheScatterOfHomingsIsWhatTheirZerosDoAtTheFibre) {
   }
 }
 
+TEST(Diagnosis, WhatAddsUpFromAFarHomingIsNotTakenForItsZero) {
+  // A survey: whole moves of both axes, of which geometry explains most of a cross-talk.
+  constexpr double kPerDeg = 3e-4, kHome_deg = 182;
+  Campaign campaign = Planted({}, {.seed = 12});
+  Rng rng = Rng::Stream(12, "survey");
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    const std::size_t first = campaign.first_row[unit];
+    for (std::size_t row = first; row < campaign.first_row[unit + 1]; ++row) {
+      double* cmd[2] = {&campaign.cmd_deg[kTheta][row], &campaign.cmd_deg[kPhi][row]};
+      *cmd[kTheta] = rng.Uniform(-170, 170), *cmd[kPhi] = rng.Uniform(5, 175);
+      for (const std::size_t axis : {kTheta, kPhi})
+        campaign.from_deg[axis][row] = row > first      ? campaign.cmd_deg[axis][row - 1]
+                                       : axis == kTheta ? -170
+                                                        : kHome_deg;
+      const PlacePoint at = PlaceOf(campaign.units[unit],
+                                    *cmd[kTheta] + kPerDeg * (*cmd[kPhi] - kHome_deg), *cmd[kPhi]);
+      campaign.x_mm[row] = at.x_mm + 0.002 * rng.Normal();
+      campaign.y_mm[row] = at.y_mm + 0.002 * rng.Normal();
+    }
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  const auto named = std::ranges::find(diagnosis.causes, "axis_crosstalk", &CauseFound::cause);
+  ASSERT_NE(named, diagnosis.causes.end()) << Told(diagnosis);
+  EXPECT_THAT(named->candidates, testing::SizeIs(1)) << Told(diagnosis);
+  EXPECT_NEAR(named->amplitude, kPerDeg, 0.2 * kPerDeg);
+}
+
 }  // namespace
 }  // namespace focalfleet::sim

@@ -80,6 +80,23 @@ TEST(Families, AShapeLeavesNothingWhereItIsNot) {
   }
 }
 
+TEST(Families, AToothOfAllUnitsAndARippleMayBeTeethAtPlacesOfTheirOwn) {
+  std::vector<UnknownFound> unknown;
+  std::vector<CauseFound> causes = {Cause("tooth_damage", "theta", 600),
+                                    Cause("pinion_runout", "theta", 230),
+                                    Cause("eccentricity", "phi", 100)};
+  JudgeSeries(&causes, &unknown);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("tooth_damage", "pinion_runout"));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("pinion_runout", "tooth_damage"));
+  EXPECT_THAT(causes[2].candidates, ElementsAre("eccentricity"));
+  EXPECT_THAT(unknown, SizeIs(0));
+
+  causes = {Cause("tooth_damage", "theta", 600), Cause("pinion_runout", "theta", 230)};
+  causes[0].all_units = false;
+  JudgeSeries(&causes, &unknown);
+  EXPECT_THAT(causes[1].candidates, ElementsAre("pinion_runout"));
+}
+
 TEST(Families, WhatIsFaintBesideTheStrongestIsNoName) {
   std::vector<CauseFound> causes = {Cause("axis_crosstalk", "theta", 2500),
                                     Cause("self_heating", "phi", 22)};
