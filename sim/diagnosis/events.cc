@@ -189,12 +189,15 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
     if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
   if (far == 0) return {};
   const double before = TotalCost(rows);
-  // Far rows may still be noise's, of rests that all units have; then what all rows cost tells.
+  // Far rows may still be noise's, of rests that all units have; beside changes by millimetres what
+  // all rows cost tells.
   const double of_noise =
       2 * static_cast<double>(rows.track.moves) * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
   const auto explains = [&](const Explained& one) {
+    const bool large = std::ranges::all_of(
+        one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
-           (before > of_noise && one.cost - of_noise <= kLeftMax * (before - of_noise));
+           (large && one.cost - of_noise <= kLeftMax * (before - of_noise));
   };
   std::optional<Explained> best;
   for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {
@@ -269,6 +272,15 @@ double MedianError(const std::vector<AngleRow>& rows) {
   return Median(std::move(errors));
 }
 
+// Where the nearest rows stand.
+double LevelFrom(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t at,
+                 int step) {
+  constexpr std::size_t kNearest = 3;
+  std::vector<AngleRow> near = RowsFrom(rows, track, at, step);
+  near.resize(std::min(near.size(), kNearest));
+  return MedianError(near);
+}
+
 // What a step of `size_deg` before row k explains of the rows on its poorer side, in squares of
 // their noise. A row pays for at most kMost: a place that comes back at once was an outlier, and
 // pays nothing, on whichever side it lies.
@@ -318,11 +330,16 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
     const double size = rows[k].error_deg - rows[k - 1].error_deg;
     if (EndOfHistory(track, from) <= to || std::abs(size) < 0.6 * turn) continue;
     Jump jump;
-    jump.size_deg = size;
-    jump.turns = std::round(size / turn);
-    jump.move = MoveAgainst(track, axis, from, to, jump.turns);
-    jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&
-                 std::abs(size - jump.turns * turn) < 0.25 * turn;
+    // Of the two rows, or of what stands on either side where these two are noisy.
+    for (const double tried :
+         {size, LevelFrom(rows, track, k, 1) - LevelFrom(rows, track, k - 1, -1)}) {
+      jump.size_deg = tried;
+      jump.turns = std::round(tried / turn);
+      jump.move = MoveAgainst(track, axis, from, to, jump.turns);
+      jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&
+                   std::abs(tried - jump.turns * turn) < 0.25 * turn;
+      if (jump.whole) break;
+    }
     jump.holds = GainOfStep(rows, track, k, jump.turns * turn, noise_mm) > kGainMin;
     jumps.push_back(jump);
   }
@@ -410,7 +427,8 @@ std::size_t AddEvents(Fit* fit) {
       of_unit[unit] = ExactEvents(*fit, unit, &geometry[unit]);
   });
   std::size_t added = take();
-  for (int round = 0; round < 2; ++round) {
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
     geometry = fit->model.units;
     const std::array<double, 2> usual = {FleetNoise_mm(*fit, kTheta), FleetNoise_mm(*fit, kPhi)};
     fit->parallel(chunks.size(), [&](std::size_t chunk) {

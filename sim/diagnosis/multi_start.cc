@@ -8,11 +8,19 @@
 namespace focalfleet::sim {
 namespace {
 
-// By the noise of another fit: factors of units and exposures wander by more than a step is worth.
 double MeritByNoise(Fit fit, const Noise& noise) {
   fit.noise = noise;
   UpdateWeights(&fit);
   return Merit(fit);
+}
+
+// How much better, by one noise for both: factors of units and exposures wander by more than a step
+// is worth. Each noise favours the fit that it comes from, so that it is the mean of the two.
+double BetterBy(const Fit& fit, const Fit& than) {
+  double sum = 0;
+  for (const Noise* noise : {&fit.noise, &than.noise})
+    sum += MeritByNoise(fit, *noise) - MeritByNoise(than, *noise);
+  return sum / 2;
 }
 
 // With and without steps in single units' angles; the better fit for its price.
@@ -28,7 +36,7 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   // A step is a large claim about one move: it has to be worth more than its price.
   constexpr double kClearly = 20, kEach = 10;
   const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model));
-  if (MeritByNoise(stepped, fit->noise) <= MeritByNoise(*fit, fit->noise) + price) return selection;
+  if (BetterBy(stepped, *fit) <= price) return selection;
   *fit = std::move(stepped);
   return again;
 }

@@ -170,6 +170,22 @@ TEST(Events, SlipsAreFoundAmongManyOutliers) {
   EXPECT_EQ(diagnosis.causes[0].units, slipped);
 }
 
+TEST(Events, AUnitThatSlipsAgainAndAgainIsNoNoisyUnit) {
+  Campaign campaign = Planted({}, {.moves = 120, .seed = 6});
+  constexpr std::size_t kUnit = 5, kSlips = 9;
+  const double turn_deg = 360 / campaign.units[kUnit].gear[kTheta];
+  for (std::size_t k = 0; k < kSlips; ++k) {
+    const int side = k % 3 == 0 ? -1 : 1;
+    const std::size_t move = MoveTo(campaign, kUnit, 6 + 12 * k, side);
+    ASSERT_NE(move, 0u);
+    TurnTheta(kUnit, move, 1000, -side * turn_deg, &campaign);
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "step_loss");
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, kSlips, 2);  // where poses do not tell, none is seen
+}
+
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;
