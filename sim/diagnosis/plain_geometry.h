@@ -1,5 +1,4 @@
-// One unit's geometry by its places alone: no effects, no noise model, and a minority of rows may be
-// anywhere.
+// A unit's geometry by its places alone: no effects, no noise, a minority of rows anywhere.
 #pragma once
 
 #include <vector>

@@ -10,22 +10,20 @@ namespace {
 constexpr double kWinding_s = 15;  // the winding's own time constant
 
 void List(const CampaignFacts&, Templates* out) {
-  // A motor and its housing: one to ten minutes. What never cools within a campaign is wear.
-  const std::vector<double> times_s = {60, 180, 600};
-  ListGrid({.shapes = times_s, .shape_name = "time constant, s,"}, out);
+  ListGrid({.shapes = {60, 180, 600, 1800}, .shape_name = "time constant, s,"}, out);
   // The housing, and the winding that heats it.
-  ListGrid({.shapes = times_s,
+  ListGrid({.shapes = {60, 180, 600, 1800},
             .shape_name = "housing and winding; time constant, s,",
             .form = 3,
             .columns = 2},
            out);
-  ListGrid({.shapes = times_s,
+  ListGrid({.shapes = {60, 180, 600, 1800},
             .shape_name = "against the direction; time constant, s,",
             .form = 1},
            out);
   // The warm unit's arms grow.
   ListGrid({.axes = {EffectAxis::kBoth},
-            .shapes = times_s,
+            .shapes = {60, 180, 600, 1800},
             .shape_name = "arms; time constant, s,",
             .form = 2},
            out);
