@@ -159,8 +159,10 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     same->all_units = same->all_units || cause.all_units;
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
+    if (same->evidence_of_unit.empty() || cause.evidence_of_unit.empty())
+      same->evidence_of_unit.clear();
     for (const auto& [unit, evidence] : cause.evidence_of_unit)
-      same->evidence_of_unit[unit] += evidence;
+      if (!same->evidence_of_unit.empty()) same->evidence_of_unit[unit] += evidence;
     same->predicted_gain_um += cause.predicted_gain_um;
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
@@ -353,7 +355,7 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   JudgeNames(&causes, &nameless);
   for (UnknownFound& one : nameless) {
     if (CauseFound* of = WhoLeaves(one, rms_um, &causes))
-      TellAsRemainder(one.size_um, one.covariate, of);
+      TellAsRemainder(one.size_um, one.channel, of);
     else
       diagnosis->unknown.push_back(std::move(one));
   }

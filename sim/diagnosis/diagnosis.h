@@ -31,7 +31,9 @@ struct CauseFound {
   double ci95[2] = {0, 0};
   double size_um = 0;  // rms at the fibre
   double delta_log_likelihood = 0;
-  std::map<std::uint32_t, double> evidence_of_unit;  // parts of it, by unit id; empty: not split
+  // The same shared out, by unit id, by the squares of what it does to each fibre; empty: it is
+  // not.
+  std::map<std::uint32_t, double> evidence_of_unit;
   double predicted_gain_um = 0;
   std::string shape;      // of the template, in words
   std::string paragraph;  // for the operator

@@ -14,7 +14,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr std::size_t kEventsMax = 40;  // of a unit
+constexpr std::size_t kEventsMax = 40;  // of a unit at once
 constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
 constexpr int kTurnsMax = 20;
 constexpr double kEventEvidence = 25;  // at least, of an event that was taken
@@ -189,15 +189,16 @@ std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUni
     if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
   if (far == 0) return {};
   const double before = TotalCost(rows);
-  // Far rows may still be noise's, of rests that all units have; beside changes by millimetres what
-  // all rows cost tells.
-  const double of_noise =
-      2 * static_cast<double>(rows.track.moves) * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
+  // Far rows may still be noise's, of rests that all units have; beside changes that explain far
+  // more than noise does, what all rows cost tells.
+  const auto seen = static_cast<double>(
+      std::ranges::count_if(rows.x_mm, [](double x) { return std::isfinite(x); }));
+  const double of_noise = 2 * seen * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
   const auto explains = [&](const Explained& one) {
     const bool large = std::ranges::all_of(
         one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
-           (large && one.cost - of_noise <= kLeftMax * (before - of_noise));
+           (large && before > of_noise && one.cost - of_noise <= kLeftMax * (before - of_noise));
   };
   std::optional<Explained> best;
   for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {
@@ -241,7 +242,7 @@ std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::s
     const double ay = track.elbow_x_mm[i] + track.reach_x_mm[i];
     const double bx = -track.reach_y_mm[i], by = track.reach_x_mm[i];
     const double det = ax * by - ay * bx;
-    if (std::abs(det) < kApart * std::hypot(ax, ay) * std::hypot(bx, by)) continue;
+    if (!(std::abs(det) > kApart * std::hypot(ax, ay) * std::hypot(bx, by))) continue;
     const double x = 1e-3 * fit.x_um[row], y = 1e-3 * fit.y_um[row];
     const double error = axis == kTheta ? (by * x - bx * y) / det : (ax * y - ay * x) / det;
     // Near the folded pose an angle of theta moves next to nothing.
@@ -330,10 +331,10 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
     const double size = rows[k].error_deg - rows[k - 1].error_deg;
     if (EndOfHistory(track, from) <= to || std::abs(size) < 0.6 * turn) continue;
     Jump jump;
+    jump.size_deg = size;
     // Of the two rows, or of what stands on either side where these two are noisy.
     for (const double tried :
          {size, LevelFrom(rows, track, k, 1) - LevelFrom(rows, track, k - 1, -1)}) {
-      jump.size_deg = tried;
       jump.turns = std::round(tried / turn);
       jump.move = MoveAgainst(track, axis, from, to, jump.turns);
       jump.whole = jump.move != 0 && jump.turns != 0 && std::abs(jump.turns) <= kTurnsMax &&

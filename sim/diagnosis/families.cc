@@ -174,7 +174,8 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
     } else if (cause.delta_log_likelihood >= kRemainder * strongest) {
       const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
       unknown->push_back({of_an_axis ? cause.axis + "_cmd_deg" : "t_s",
-                          "what " + std::to_string(cause.candidates.size()) + " causes could be",
+                          (of_an_axis ? cause.axis + ": what " : "what ") +
+                              std::to_string(cause.candidates.size()) + " causes could be",
                           std::exp(-cause.delta_log_likelihood), cause.size_um});
     }
   }

@@ -12,7 +12,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-// What adds up from a homing on is for the most part a zero, which geometry has anyway: counted
+// What adds up is for the most part a zero, one for all moves, which geometry has anyway: counted
 // with it, little of the signature would seem to be its own.
 void TakeOffZeros(PoseErrors* errors) {
   for (std::vector<double>& angle : errors->angle_deg) {
