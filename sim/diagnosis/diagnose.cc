@@ -20,6 +20,7 @@
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/term_trace.h"
 #include "sim/diagnosis/wrong_sensors.h"
 #include "sim/effects/registry.h"
 
@@ -92,10 +93,8 @@ std::string ScopeOf(const ModelTerm& term, std::size_t units) {
 }
 
 CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
-  CauseFound cause;
   const Effect& effect = *term.form.effect;
-  cause.cause = effect.cause;
-  cause.candidates = {cause.cause};
+  CauseFound cause = CauseNamed(effect.cause);
   for (const Rival& rival : accepted.rivals)
     (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
   cause.axis = Name(term.form.axis);
@@ -159,10 +158,10 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     same->all_units = same->all_units || cause.all_units;
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
-    if (same->evidence_of_unit.empty() || cause.evidence_of_unit.empty())
-      same->evidence_of_unit.clear();
+    if (same->evidence_of_unit.empty()) cause.evidence_of_unit.clear();
+    if (cause.evidence_of_unit.empty()) same->evidence_of_unit.clear();
     for (const auto& [unit, evidence] : cause.evidence_of_unit)
-      if (!same->evidence_of_unit.empty()) same->evidence_of_unit[unit] += evidence;
+      same->evidence_of_unit[unit] += evidence;
     same->predicted_gain_um += cause.predicted_gain_um;
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
@@ -193,13 +192,19 @@ void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* told) {
   }
 }
 
+// Whether so little is told with the cause whose shape leaves it.
+bool IsToldAsRemainder(const UnknownFound& left, std::string_view looks_like, double noise_um,
+                       std::vector<CauseFound>* causes) {
+  CauseFound* of = WhoLeaves(left, noise_um, causes);
+  if (of != nullptr) TellAsRemainder(left.size_um, looks_like, of);
+  return of != nullptr;
+}
+
 // What is left that no cause explains; with `patch`, terms for it.
 void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
   const double noise_um = RmsOf(*fit);
   const auto matters = [&](const UnknownFound& left) {
-    CauseFound* of = WhoLeaves(left, noise_um, &diagnosis->causes);
-    if (of != nullptr) TellAsRemainder(left.size_um, left.covariate, of);
-    return of == nullptr;
+    return !IsToldAsRemainder(left, left.covariate, noise_um, &diagnosis->causes);
   };
   std::vector<UnknownFound> seen;
   if (options.patch) {
@@ -353,12 +358,9 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   JudgeRemainders(&causes);
   std::vector<UnknownFound> nameless;
   JudgeNames(&causes, &nameless);
-  for (UnknownFound& one : nameless) {
-    if (CauseFound* of = WhoLeaves(one, rms_um, &causes))
-      TellAsRemainder(one.size_um, one.channel, of);
-    else
+  for (UnknownFound& one : nameless)
+    if (!IsToldAsRemainder(one, one.channel, rms_um, &causes))
       diagnosis->unknown.push_back(std::move(one));
-  }
   JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
   JudgeSeries(&causes, &diagnosis->unknown);
 }

@@ -39,6 +39,11 @@ struct CauseFound {
   std::string paragraph;  // for the operator
 };
 
+/// By its name, which is its only candidate so far.
+inline CauseFound CauseNamed(std::string_view name) {
+  return {.cause = std::string(name), .candidates = {std::string(name)}};
+}
+
 /// An empirical term that the model has for what no cause explains (patch.h).
 struct Patched {
   std::string term;    // "empirical_curve" or "empirical_ripple"

@@ -448,17 +448,16 @@ std::size_t AddEvents(Fit* fit) {
 std::vector<CauseFound> EventCauses(const Fit& fit) {
   std::vector<CauseFound> causes;
   for (const bool lost_command : {false, true}) {
-    CauseFound cause;
-    cause.cause = lost_command ? "lost_command" : "step_loss";
-    cause.candidates = {cause.cause};
+    CauseFound cause = CauseNamed(lost_command ? "lost_command" : "step_loss");
     cause.scope = "unit";
     cause.amplitude_unit = "events";
     std::set<std::uint32_t> units;
     std::set<std::size_t> axes;
+    std::set<std::size_t> moves;  // a lost one has an event of each axis
     double square = 0;
     for (const EventTerm& event : fit.model.events) {
       if (IsLostCommand(fit, event) != lost_command) continue;
-      cause.amplitude += 1;
+      moves.insert(event.row);
       const CampaignUnit& unit = fit.model.units[event.unit];
       units.insert(unit.id);
       axes.insert(event.axis);
@@ -466,7 +465,8 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
           event.axis == kPhi ? unit.arm_mm[kPhi] : std::hypot(unit.arm_mm[0], unit.arm_mm[1]);
       square += std::pow(1e3 * lever_mm * event.step_deg * std::numbers::pi / 180, 2);
     }
-    if (cause.amplitude == 0) continue;
+    if (moves.empty()) continue;
+    cause.amplitude = static_cast<double>(moves.size());
     cause.axis = axes.size() > 1 ? "both" : *axes.begin() == kTheta ? "theta" : "phi";
     cause.units.assign(units.begin(), units.end());
     cause.all_units = units.size() == fit.model.units.size();

@@ -19,9 +19,7 @@ HomingScatter ScatterOfHomings(const Fit& fit) {
 }
 
 CauseFound HomingCause(const Fit& fit) {
-  CauseFound cause;
-  cause.cause = "zero_offset";
-  cause.candidates = {cause.cause};
+  CauseFound cause = CauseNamed("zero_offset");
   cause.scope = "unit";
   cause.amplitude_unit = "deg";
   cause.shape = "differs from homing to homing; the amplitude is the rms of the larger axis";

@@ -85,9 +85,7 @@ double NeighboursAgree(const Fit& fit, double* size_um) {
 }
 
 CauseFound ImageCause(const Fit& fit, double chi_square, double size_um) {
-  CauseFound cause;
-  cause.cause = kCameraSimilarity;
-  cause.candidates = {cause.cause};
+  CauseFound cause = CauseNamed(kCameraSimilarity);
   cause.axis = "none";
   cause.scope = "camera";
   cause.all_units = true;
@@ -350,15 +348,20 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   const bool moves = MovesForSure(motion, family_wise);
   // Several steps are no touch of the camera, but a staircase for something else.
   const auto steps = std::count_if(fit->model.terms.begin(), fit->model.terms.end(), IsImageStep);
-  if (!moves && before < kNeighboursAgree && steps < 2 &&
-      (steps == 0 || !HidesAColumn(*fit, family_wise)))
-    return image;
+  const bool one_step_alone = !moves && before < kNeighboursAgree && steps < 2;
+  if (one_step_alone && (steps == 0 || !HidesAColumn(*fit, family_wise))) return image;
+  const Fit with_step = one_step_alone ? *fit : Fit{};
   if (DropImageSteps(fit)) motion = FindMotion(*fit);
   image.moves = true;
   double size_um = 0;
   motion = TakeMotion(std::move(motion), fit, &size_um);
   const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
   image.followed = FollowedColumn(*fit->facts, motion.found, signal, size_um);
+  // With the whole motion taken no column shows: it was one step after all.
+  if (one_step_alone && !image.followed) {
+    *fit = with_step;
+    return {};
+  }
   const double after = NeighboursAgree(*fit, &turbulence_um);
   CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.

@@ -213,9 +213,7 @@ std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit) {
 
 CauseFound SwapCause(const Campaign& campaign,
                      const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
-  CauseFound cause;
-  cause.cause = "identity_swap";
-  cause.candidates = {cause.cause};
+  CauseFound cause = CauseNamed("identity_swap");
   cause.axis = "none";
   cause.scope = "unit";
   cause.amplitude_unit = "pairs";

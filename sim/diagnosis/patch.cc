@@ -7,6 +7,7 @@
 #include "sim/diagnosis/image.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/select.h"
+#include "sim/diagnosis/term_trace.h"
 #include "sim/effects/empirical.h"
 
 namespace focalfleet::sim {

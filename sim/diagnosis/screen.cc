@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "sim/diagnosis/select.h"
+#include "sim/diagnosis/term_trace.h"
 #include "sim/effects/empirical.h"
 
 namespace focalfleet::sim {

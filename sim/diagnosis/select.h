@@ -58,13 +58,4 @@ struct Best {
 Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGroups& groups,
               const ParallelFor& parallel, double tests, double family_wise, double kept_min);
 
-/// What a term does to its units' fibres.
-struct TermTrace {
-  double rms_um = 0;
-  std::vector<double> square_um2;  // summed over each unit's rows; [unit index]
-};
-TermTrace TraceOf(const Fit& fit, const ModelTerm& term);
-/// Its root mean square alone, in um.
-double SizeOf(const Fit& fit, const ModelTerm& term);
-
 }  // namespace focalfleet::sim

@@ -241,9 +241,7 @@ std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts)
 
 CauseFound SensorCause(const Fit& fit, const TrueTemperatures& truth, const CampaignFacts& as_told,
                        bool decided) {
-  CauseFound cause;
-  cause.cause = kSensorBias;
-  cause.candidates = {cause.cause};
+  CauseFound cause = CauseNamed(kSensorBias);
   CampaignModel thermal;
   thermal.units = fit.model.units;
   for (const ModelTerm& term : fit.model.terms) {

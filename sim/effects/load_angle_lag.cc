@@ -9,6 +9,7 @@ namespace {
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Forms 0 and 1: a light load; 2 and 3: a heavy one, by the arcsine. 1 and 3: with the supply.
+  // The amplitude is the lag at nominal drive.
   const std::vector<double> loads = {0.5, 0.8, 0.95};
   constexpr std::string_view kName = "load, of the pull-out at nominal drive,";
   ListGrid({}, out);
@@ -36,7 +37,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         double level = std::max(drive[i], 0.05);
         if (by_supply && usual_V > 0) level *= std::max(volts[i] / usual_V, 0.05);
         const double lag =
-            form.form >= 2 ? std::asin(std::min(form.shape / level, 1.0)) / form.shape : 1 / level;
+            form.form >= 2 ? std::asin(std::min(form.shape / level, 1.0)) / std::asin(form.shape)
+                           : 1 / level;
         return -amplitude[0] * Direction(step[i]) * lag;
       },
       &errors->angle_deg[axis]);

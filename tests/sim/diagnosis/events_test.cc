@@ -120,6 +120,7 @@ TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
   EXPECT_EQ(diagnosis.causes[0].units, stayed);
+  EXPECT_EQ(diagnosis.causes[0].amplitude, 2);  // moves, of whichever axes
   EXPECT_EQ(diagnosis.outliers.rows, 0u);
 }
 

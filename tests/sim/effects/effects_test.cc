@@ -154,8 +154,10 @@ TEST(Effects, ALagIsTheArcsineOfTheLoadUpToThePullOut) {
       if (step == 0) continue;
       ++moved;
       const double level = drive[i] * (by_supply ? volts[i] / usual_V : 1);
-      EXPECT_NEAR(errors[i],
-                  -std::copysign(0.1 * std::asin(std::min(0.9 / level, 1.0)) / 0.9, step), 1e-12);
+      EXPECT_NEAR(
+          errors[i],
+          -std::copysign(0.1 * std::asin(std::min(0.9 / level, 1.0)) / std::asin(0.9), step),
+          1e-12);
     }
     EXPECT_GT(moved, 10u);
   }
