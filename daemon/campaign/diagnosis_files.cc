@@ -101,17 +101,22 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
       text += "]\n";
       break;
     }
-  std::vector<double> units, amplitude, sigma;
+  std::vector<double> units, amplitude, sigma, shapes;
   for (std::size_t u = 0; u < term.group_of_unit.size(); ++u) {
     const auto own = term.AmplitudeOf(u);
     if (own.empty()) continue;
-    units.push_back(diagnosis.model.units[u].id);
+    const std::uint32_t id = diagnosis.model.units[u].id;
+    units.push_back(id);
+    if (const auto own_shape = term.form.shape_of_unit.find(id); !term.form.shape_of_unit.empty())
+      shapes.push_back(own_shape == term.form.shape_of_unit.end() ? term.form.shape
+                                                                  : own_shape->second);
     amplitude.insert(amplitude.end(), own.begin(), own.end());
     const std::size_t at = term.group_of_unit[u] * term.form.columns;
     for (std::size_t c = 0; c < term.form.columns; ++c) sigma.push_back(term.sigma[at + c]);
   }
   text += fmt::format("columns = {}\n", term.form.columns);
   text += "units = " + NumberList(units) + "\n";
+  if (!shapes.empty()) text += "shapes = " + NumberList(shapes) + "\n";
   text += "amplitude = " + NumberList(amplitude) + "\n";
   text += "sigma = " + NumberList(sigma) + "\n";
   return text;

@@ -227,6 +227,23 @@ class ModelReader {
     term->sigma.insert(term->sigma.end(), sigma.begin(), sigma.end());
   }
 
+  /// Where each unit has a shape of its own.
+  Status ReadShapes(const toml::table& table, const std::vector<double>& ids,
+                    sim::Template* form) const {
+    if (!table.contains("shapes")) return {};
+    if (!form->effect->own_shape)
+      return Wrong(table, "shapes: units have none of their own of this effect");
+    FOCALFLEET_TRY_ASSIGN(const std::vector<double> shapes, Numbers(table, "shapes"));
+    if (shapes.size() != ids.size())
+      return Wrong(table, "shapes: " + std::to_string(shapes.size()) + " numbers for " +
+                              std::to_string(ids.size()) + " units");
+    for (std::size_t k = 0; k < ids.size(); ++k) {
+      if (!std::isfinite(shapes[k])) return Wrong(table, "shapes: one is no number");
+      form->shape_of_unit[static_cast<std::uint32_t>(ids[k])] = shapes[k];
+    }
+    return {};
+  }
+
   Status ReadEffect(const toml::table& table) {
     sim::ModelTerm term;
     FOCALFLEET_TRY_ASSIGN(term.form, ReadForm(table));
@@ -243,6 +260,7 @@ class ModelReader {
       for (double& one : sigma)
         if (!std::isfinite(one)) one = 0;  // not known
     }
+    FOCALFLEET_TRY(ReadShapes(table, ids, &term.form));
     term.sharing = SharingOf(table);
     term.group_of_unit.assign(model_.units.size(), sim::kNoGroup);
     GroupNumbers groups;

@@ -20,7 +20,9 @@ struct PlantedEffect {
   std::string axis;         // empty: the first that the effect has
   double unit_share = 1;    // of the units that have it
   double unit_scatter = 0;  // relative, of the units' own amplitudes
-  int form = -1;            // index among the effect's templates on that axis; -1: the first
+  // Index among the effect's templates on that axis. -1: the first, or where shapes are units' own
+  // (as damaged teeth are), one of the first's kind for each.
+  int form = -1;
 };
 
 struct PlantedOptions {

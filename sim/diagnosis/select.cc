@@ -11,6 +11,7 @@
 
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/contenders.h"
 #include "sim/diagnosis/term_trace.h"
 
 namespace focalfleet::sim {
@@ -47,7 +48,7 @@ std::vector<Standing> AssessAll(const ScorePass& pass, const Templates& template
 bool ComesFirst(const Template& a, const Template& b) {
   const auto key = [](const Template& t) {
     return std::make_tuple(t.effect->cause, t.axis, t.memory, t.form, t.shape,
-                           std::string_view(t.covariate));
+                           std::string_view(t.covariate), std::cref(t.shape_of_unit));
   };
   return key(a) < key(b);
 }
@@ -77,7 +78,7 @@ Best BestOf(const ScorePass& pass, const Templates& templates,
 
 bool SameForm(const Template& a, const Template& b) {
   return a.effect == b.effect && a.axis == b.axis && a.memory == b.memory && a.form == b.form &&
-         a.shape == b.shape && a.covariate == b.covariate;
+         a.shape == b.shape && a.shape_of_unit == b.shape_of_unit && a.covariate == b.covariate;
 }
 
 std::size_t IndexOf(const Templates& templates, const Template& form) {
@@ -127,74 +128,6 @@ class LookBook {
   bool one_by_one_;
   std::map<std::size_t, Look> looks_;
 };
-
-// A template whose shape is being refined.
-struct Contender {
-  Template form;
-  double gap = 0;  // to the shapes that are tried beside it
-};
-
-// The best templates of the causes that come near the best of all: who is how good is settled once
-// each has the shape that suits it.
-std::vector<Contender> ContendersOf(const Look& look, const Templates& templates,
-                                    const Best& best) {
-  constexpr double kNear = 15, kNearShare = 0.15;  // of the best one's chi-square
-  constexpr std::size_t kMost = 6;
-  const double far = std::max(kNear, kNearShare * best.standing.chi_square);
-  std::map<std::pair<std::string_view, EffectAxis>, std::size_t> at_of;
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    if (look.standings[k].evidence < best.standing.evidence - far) continue;
-    if (!(look.pass.scores[k].kept > kKeptMin * look.pass.scores[k].raw)) continue;
-    const auto [it, fresh] =
-        at_of.emplace(std::pair(templates[k].effect->cause, templates[k].axis), k);
-    if (!fresh && look.standings[k].evidence > look.standings[it->second].evidence) it->second = k;
-  }
-  std::vector<std::size_t> order;
-  for (const auto& [key, k] : at_of) order.push_back(k);
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return look.standings[a].evidence > look.standings[b].evidence;
-  });
-  if (order.size() > kMost) order.resize(kMost);
-  std::vector<Contender> contenders;
-  for (const std::size_t k : order) {
-    const Template& form = templates[k];
-    double gap = std::numeric_limits<double>::infinity();
-    for (const Template& other : templates)
-      if (other.effect == form.effect && other.axis == form.axis && other.memory == form.memory &&
-          other.form == form.form && other.shape != form.shape)
-        gap = std::min(gap, std::abs(other.shape - form.shape));
-    if (form.effect->continuous_shape && std::isfinite(gap)) contenders.push_back({form, gap});
-  }
-  return contenders;
-}
-
-// Takes each contender to the shape between the listed ones that the data like best, and adds it to
-// the templates.
-void RefineContenders(const Fit& fit, const FleetGroups& groups, std::vector<Contender> contenders,
-                      Templates* templates) {
-  constexpr int kHalvings = 4;
-  for (int halving = 0; halving < kHalvings && !contenders.empty(); ++halving) {
-    Templates tried;
-    for (Contender& one : contenders) {
-      one.gap /= 2;
-      tried.push_back(one.form);
-      tried.push_back(WithShape(one.form, one.form.shape - one.gap));
-      tried.push_back(WithShape(one.form, one.form.shape + one.gap));
-    }
-    const ScorePass pass = ScoreTemplates(fit, tried);
-    for (std::size_t c = 0; c < contenders.size(); ++c) {
-      double most = -std::numeric_limits<double>::infinity();
-      for (std::size_t k = 3 * c; k < 3 * c + 3; ++k) {
-        if (tried[k].shape <= 0 && tried[3 * c].shape > 0) continue;
-        if (!Shows(*fit.facts, tried[k])) continue;
-        const double evidence = Assess(pass.scores[k], tried[k], groups).evidence;
-        if (evidence > most) most = evidence, contenders[c].form = tried[k];
-      }
-    }
-  }
-  for (const Contender& one : contenders)
-    if (IndexOf(*templates, one.form) == kNoTerm) templates->push_back(one.form);
-}
 
 // The best of the templates from `begin` on and of what was best before.
 Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& groups,
@@ -350,14 +283,20 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
     for (const Score& score : look.pass.scores)
       selection->kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
   }
+  if (fit->model.terms.size() >= rule.terms_max) return false;
   Best best = BestOf(look.pass, *templates, look.standings, selection->tests, rule.family_wise);
-  if (best.at == kNoTerm || fit->model.terms.size() >= rule.terms_max) return false;
   const std::size_t listed = templates->size();
-  std::vector<Contender> contenders = ContendersOf(look, *templates, best);
+  std::vector<Contender> contenders =
+      ContendersOf(look.pass, look.standings, *templates, best.at, kKeptMin);
+  for (Contender& own : OwnShapes(look.pass, *templates, *fit->facts))
+    contenders.push_back(std::move(own));
   looks->Forget();
-  RefineContenders(*fit, groups, std::move(contenders), templates);
+  RefineContenders(*fit, groups, &contenders);
+  for (Contender& one : contenders)
+    if (IndexOf(*templates, one.form) == kNoTerm) templates->push_back(std::move(one.form));
   if (templates->size() > listed)
     best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
+  if (best.at == kNoTerm) return false;
   const CampaignModel before = fit->model;
   fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.standing, groups));
   StepFit(fit);
@@ -431,6 +370,22 @@ void SpreadToAll(const Fit& some, ModelTerm* term) {
   }
 }
 
+// Units that were not looked at get shapes of their own, too.
+void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t t, Fit* fit) {
+  const auto at = fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t);
+  ModelTerm term = std::move(*at);
+  fit->model.terms.erase(at);
+  UpdateResiduals(fit);
+  const Templates kind = KindOf(term.form, library);
+  std::vector<Contender> found = OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts);
+  RefineContenders(*fit, groups, &found);
+  // What units have that were looked at stays.
+  for (Contender& one : found) term.form.shape_of_unit.merge(one.form.shape_of_unit);
+  fit->model.terms.insert(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t),
+                          std::move(term));
+  UpdateResiduals(fit);
+}
+
 // The model's own templates, and those of their rivals' causes.
 Templates NearTemplates(const Templates& library, const std::vector<Accepted>& accepted,
                         const Fit& fit) {
@@ -457,10 +412,12 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
   Selection selection = SelectByAll(library, rule, &some);
   fit->model.terms = some.model.terms;
   for (ModelTerm& term : fit->model.terms) SpreadToAll(some, &term);
+  const FleetGroups groups = GroupsOf(*fit->facts);
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
+    if (!fit->model.terms[t].form.shape_of_unit.empty()) GiveShapes(library, groups, t, fit);
   StepFit(fit);
   Refit(fit);
   // What only units have that were not looked at.
-  const FleetGroups groups = GroupsOf(*fit->facts);
   rule.progress("all units");
   Templates templates = library;
   LookBook of_library(groups, true);

@@ -37,8 +37,14 @@ struct GroupScore {
   }
   [[nodiscard]] bool empty() const { return count_ == 0; }
   void Add(const Direction2& direction) { along_[count_++] = direction; }
+  /// For what was chosen to fit: so much less evidence.
+  void Charge(double price) {
+    if (empty()) return;
+    price_ += price;
+    chi_square = std::max(chi_square - 2 * price, 0.0);
+  }
   [[nodiscard]] double Evidence(double size) const {
-    double sum = 0;
+    double sum = -price_;
     const double a2 = size * size;
     for (const Direction2& d : along())
       sum += 0.5 * d.b2 * a2 / (1 + a2 * d.g) - 0.5 * std::log1p(a2 * d.g);
@@ -48,6 +54,7 @@ struct GroupScore {
  private:
   std::array<Direction2, kColumnsMax> along_;
   std::size_t count_ = 0;
+  double price_ = 0;
 };
 
 GroupScore Decompose(const Vector& b, const Square& g, double dispersion) {
@@ -125,9 +132,11 @@ Level UnitLevel(const Score& score, const Template& form, double dispersion) {
   const std::size_t c = form.columns, units = score.b.size() / c;
   Level level{Sharing::kUnit, {}, Each(units)};
   level.groups.reserve(units);
-  for (std::size_t unit = 0; unit < units; ++unit)
+  for (std::size_t unit = 0; unit < units; ++unit) {
     level.groups.push_back(
         DecomposePossible(form, UnitB(score.b, unit, c), UnitG(score, unit, c), dispersion));
+    level.groups.back().Charge(std::log(form.choices));
+  }
   return level;
 }
 
@@ -228,11 +237,12 @@ MixtureFit Mix(const Level& level, double prior_size) {
 }
 
 // Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
+// `price`: of each unit.
 struct ScatterFit {
   double evidence = -std::numeric_limits<double>::infinity();
   double spread = 0;
 };
-ScatterFit Scatter(const Score& score, double prior_size, double dispersion) {
+ScatterFit Scatter(const Score& score, double prior_size, double dispersion, double price) {
   ScatterFit best;
   std::vector<double> terms;
   double most = -std::numeric_limits<double>::infinity();
@@ -254,7 +264,7 @@ ScatterFit Scatter(const Score& score, double prior_size, double dispersion) {
       if (!(g > 0)) continue;
       const double own = score.b[u] / score.g[u];
       sum += -0.5 * std::log1p(s2 * g) + 0.5 * own * own * g -
-             0.5 * (own - mean) * (own - mean) * g / (1 + s2 * g);
+             0.5 * (own - mean) * (own - mean) * g / (1 + s2 * g) - price;
     }
     // The mean is free: it pays for its own size.
     const double size = std::max(std::abs(mean), prior_size);
@@ -338,7 +348,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     levels.push_back(UnitLevel(score, form, best.dispersion));
     levels.back().together = Together(form.effect->owner, groups, units);
   }
-  if (units > 1) {
+  if (units > 1 && form.shape_of_unit.empty()) {
     // Noise that units share makes chance of what they share; the levels themselves are compared
     // with one dispersion.
     const double fleet = std::max(best.dispersion, FleetDispersion(score, c));
@@ -378,7 +388,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
   }
   if (units > 2 && c == 1 && !of_the_whole) {
-    const ScatterFit scatter = Scatter(score, prior, best.dispersion);
+    const ScatterFit scatter = Scatter(score, prior, best.dispersion, std::log(form.choices));
     // Only as a refinement of what is shared by all: a scatter that pays for itself.
     if (scatter.evidence > best.evidence + 3) {
       best.sharing = Sharing::kUnit;

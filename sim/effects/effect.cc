@@ -142,4 +142,18 @@ Template WithShape(const Template& form, double shape) {
   return other;
 }
 
+Template WithShapes(const Template& form, std::map<std::uint32_t, double> shape_of_unit) {
+  Template other = form;
+  other.shape = 0;
+  other.shape_of_unit = std::move(shape_of_unit);
+  other.label = form.label.substr(0, form.label.rfind(' ')) + " of each unit's own";
+  return other;
+}
+
+double ShapeOf(const Template& form, const UnitTrack& track) {
+  if (form.shape_of_unit.empty()) return form.shape;
+  const auto own = form.shape_of_unit.find(track.unit->id);
+  return own == form.shape_of_unit.end() ? form.shape : own->second;
+}
+
 }  // namespace focalfleet::sim

@@ -13,6 +13,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -65,9 +67,12 @@ struct Template {
   EffectAxis axis = EffectAxis::kNone;
   std::size_t columns = 1;
   Memory memory = Memory::kHold;
-  int form = 0;       // of the effect's own forms
-  double shape = 0;   // of the effect's own shape parameter
-  std::string label;  // the shape in words
+  int form = 0;      // of the effect's own forms
+  double shape = 0;  // of the effect's own shape parameter
+  // Where each unit has a shape of its own: by unit_id. Others have `shape`.
+  std::map<std::uint32_t, double> shape_of_unit;
+  double choices = 1;  // shapes that each unit's was chosen from
+  std::string label;   // the shape in words
   // Of an empirical term (empirical.h): the column it looks at, and a curve's knots, ascending;
   // none: it goes by the campaign's own ranks.
   std::string covariate;
@@ -88,6 +93,7 @@ struct Effect {
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
+  bool own_shape = false;  // each unit may have its own, as it has its own teeth
   // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;
@@ -141,6 +147,10 @@ struct Grid {
 void ListGrid(const Grid& grid, Templates* out);
 /// The same template at another shape; its label says so. Pre: the label ends in the shape.
 Template WithShape(const Template& form, double shape);
+/// The same with a shape of each unit. Pre: the label ends in the shape.
+Template WithShapes(const Template& form, std::map<std::uint32_t, double> shape_of_unit);
+/// The shape that this unit has.
+double ShapeOf(const Template& form, const UnitTrack& track);
 
 /// Adds to angle_deg[axis] what `made(i)` makes at each move of the axis, remembered as `memory`
 /// says.

@@ -32,8 +32,9 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const double order = form.form == 0 ? PinionRatio(*track.unit, axis) : 1.0;
   constexpr double kWidth_deg = 12;  // of the damaged gear, standard deviation
   constexpr double kFar = 9;         // widths: what is left there is lost in rounding
+  const double place_deg = ShapeOf(form, track);
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const double away_deg = WithoutTurns(order * track.cmd_deg[axis][i] - form.shape);
+    const double away_deg = WithoutTurns(order * track.cmd_deg[axis][i] - place_deg);
     const double in_widths = away_deg / kWidth_deg;
     if (std::abs(in_widths) > kFar) continue;
     errors->angle_deg[axis][i] += amplitude[0] * std::exp(-in_widths * in_widths / 2);
@@ -54,6 +55,7 @@ Effect MakeToothDamage() {
           .list = List,
           .apply = Apply,
           .continuous_shape = true,
+          .own_shape = true,
           .shows = Shows};
 }
 

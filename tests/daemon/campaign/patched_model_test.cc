@@ -1,4 +1,4 @@
-// A model with empirical terms, through its file and back.
+// A model through its file and back: empirical terms, and shapes of units' own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -55,6 +55,30 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
   sim::CampaignModel plain = read->model;
   plain.terms.clear();
   EXPECT_GT(FarthestApart_mm(plain, read->model, wetter), 5e-3);  // or the terms did nothing
+}
+
+TEST(ModelFile, KeepsTheShapeOfEachUnit) {
+  const sim::Campaign campaign =
+      sim::Planted({{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.moves = 80});
+  const sim::Diagnosis diagnosis = sim::Verdicts(campaign);
+  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Told(diagnosis);
+  ASSERT_EQ(diagnosis.model.terms[0].form.shape_of_unit.size(), campaign.units.size());
+  const std::string text = WriteModel(diagnosis, kNames, campaign);
+  const auto read = ReadModelFile(text, "model.toml", campaign.units);
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, campaign), 1e-6);
+  // What is no shape of each unit.
+  const auto error_of = [&](std::string_view what, std::string_view instead) {
+    std::string other = text;
+    other.replace(other.find(what), what.size(), instead);
+    const auto refused = ReadModelFile(other, "model.toml", campaign.units);
+    return refused ? std::string() : refused.error().text;
+  };
+  EXPECT_THAT(error_of("shapes = [", "shapes = [1, "), HasSubstr("25 numbers for 24 units"));
+  EXPECT_THAT(error_of("shapes = [", "shapes = [nan, #"), HasSubstr("model.toml:"));
+  EXPECT_THAT(error_of("\nshapes = [", "\nshapes = 3 # ["), HasSubstr("not a list"));
+  EXPECT_THAT(error_of("cause = \"tooth_damage\"", "cause = \"hard_stop\""),
+              HasSubstr("model.toml:"));
 }
 
 TEST(PatchedModel, KeepsWhoSharesAnAmplitude) {

@@ -1,0 +1,172 @@
+#include "sim/diagnosis/contenders.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <tuple>
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+bool DifferInShapeAlone(const Template& a, const Template& b) {
+  const auto key = [](const Template& t) {
+    return std::make_tuple(t.effect, t.axis, t.memory, t.form, t.columns);
+  };
+  return key(a) == key(b);
+}
+
+bool IsListed(const Template& form) { return form.shape_of_unit.empty(); }
+
+// To the nearest listed shape of its kind.
+double GapTo(const Template& form, double shape, const Templates& templates) {
+  double gap = kInfinity;
+  for (const Template& other : templates)
+    if (IsListed(other) && DifferInShapeAlone(form, other) && other.shape != shape)
+      gap = std::min(gap, std::abs(other.shape - shape));
+  return gap;
+}
+
+Template Moved(const Template& form, double by) {
+  if (IsListed(form)) return WithShape(form, form.shape + by);
+  Template moved = form;
+  for (auto& [unit, shape] : moved.shape_of_unit) shape += by;
+  return moved;
+}
+
+// What the unit's residuals gain by it; 0: nothing that can be.
+double ChiSquare(const Score& score, const Template& form, std::size_t unit) {
+  const std::size_t c = form.columns;
+  const auto size = static_cast<Eigen::Index>(c);
+  const Eigen::Map<const Eigen::VectorXd> b(score.b.data() + unit * c, size);
+  const Eigen::Map<const Eigen::MatrixXd> g(score.g.data() + unit * c * c, size, size);
+  if (!(g.trace() > 0) || IsImpossible(form, b, g)) return 0;
+  return b.dot(g.completeOrthogonalDecomposition().solve(b));
+}
+
+Template BestOfAll(std::span<const Score> scores, std::span<const Template> tried,
+                   const CampaignFacts& facts, const FleetGroups& groups) {
+  double most = -kInfinity;
+  std::size_t best = 0;
+  for (std::size_t k = 0; k < tried.size(); ++k) {
+    if (tried[k].shape <= 0 && tried[0].shape > 0) continue;
+    if (!Shows(facts, tried[k])) continue;
+    const double evidence = Assess(scores[k], tried[k], groups).evidence;
+    if (evidence > most) most = evidence, best = k;
+  }
+  return tried[best];
+}
+
+Template BestOfEach(std::span<const Score> scores, std::span<const Template> tried,
+                    const CampaignFacts& facts) {
+  Template best = tried[0], one = tried[0];
+  one.shape_of_unit.clear();
+  const std::vector<CampaignUnit>& units = facts.campaign->units;
+  for (std::size_t unit = 0; unit < units.size(); ++unit) {
+    const auto own = best.shape_of_unit.find(units[unit].id);
+    if (own == best.shape_of_unit.end()) continue;
+    double most = 0;
+    for (std::size_t k = 0; k < tried.size(); ++k) {
+      const double chi_square = ChiSquare(scores[k], tried[k], unit);
+      one.shape = tried[k].shape_of_unit.at(own->first);
+      if (chi_square > most && Shows(facts, one)) most = chi_square, own->second = one.shape;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+Templates KindOf(const Template& form, const Templates& library) {
+  Templates kind;
+  for (const Template& one : library)
+    if (DifferInShapeAlone(form, one)) kind.push_back(one);
+  return kind;
+}
+
+std::vector<Contender> ContendersOf(const ScorePass& pass, const std::vector<Standing>& standings,
+                                    const Templates& templates, std::size_t best, double kept_min) {
+  constexpr double kNear = 15, kNearShare = 0.15;  // of the best one's chi-square
+  constexpr std::size_t kMost = 6;
+  if (best == kNoTerm) return {};
+  const double far = std::max(kNear, kNearShare * standings[best].chi_square);
+  std::map<std::pair<std::string_view, EffectAxis>, std::size_t> at_of;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    if (standings[k].evidence < standings[best].evidence - far) continue;
+    if (!(pass.scores[k].kept > kept_min * pass.scores[k].raw)) continue;
+    const auto [it, fresh] =
+        at_of.emplace(std::pair(templates[k].effect->cause, templates[k].axis), k);
+    if (!fresh && standings[k].evidence > standings[it->second].evidence) it->second = k;
+  }
+  std::vector<std::size_t> order;
+  for (const auto& [key, k] : at_of) order.push_back(k);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return standings[a].evidence > standings[b].evidence;
+  });
+  if (order.size() > kMost) order.resize(kMost);
+  std::vector<Contender> contenders;
+  for (const std::size_t k : order) {
+    const Template& form = templates[k];
+    const double gap = GapTo(form, form.shape, templates);
+    if (form.effect->continuous_shape && IsListed(form) && std::isfinite(gap))
+      contenders.push_back({form, gap});
+  }
+  return contenders;
+}
+
+std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templates,
+                                 const CampaignFacts& facts) {
+  constexpr double kSpeaks = 12;  // chi-square
+  const std::vector<CampaignUnit>& units = facts.campaign->units;
+  std::vector<Contender> contenders;
+  std::vector<char> seen(templates.size(), 0);
+  for (std::size_t first = 0; first < templates.size(); ++first) {
+    if (!templates[first].effect->own_shape || seen[first] != 0) continue;
+    std::vector<std::size_t> listed;
+    for (std::size_t k = first; k < templates.size(); ++k) {
+      if (!DifferInShapeAlone(templates[first], templates[k])) continue;
+      seen[k] = 1;
+      if (IsListed(templates[k])) listed.push_back(k);
+    }
+    std::map<std::uint32_t, double> shapes;
+    double speaks = 0;
+    for (std::size_t unit = 0; unit < units.size(); ++unit) {
+      double most = 0;
+      for (const std::size_t k : listed) {
+        const double chi_square = ChiSquare(pass.scores[k], templates[k], unit);
+        if (chi_square > most) most = chi_square, shapes[units[unit].id] = templates[k].shape;
+      }
+      speaks = std::max(speaks, most);
+    }
+    if (speaks < kSpeaks || listed.size() < 2) continue;
+    const Template& kind = templates[listed.front()];
+    contenders.push_back({WithShapes(kind, std::move(shapes)), GapTo(kind, kind.shape, templates)});
+    contenders.back().form.choices = static_cast<double>(listed.size());
+  }
+  return contenders;
+}
+
+void RefineContenders(const Fit& fit, const FleetGroups& groups,
+                      std::vector<Contender>* contenders) {
+  constexpr int kHalvings = 4;
+  constexpr std::size_t kTried = 3;
+  for (int halving = 0; halving < kHalvings && !contenders->empty(); ++halving) {
+    Templates tried;
+    for (Contender& one : *contenders) {
+      one.gap /= 2;
+      for (const double by : {0.0, -one.gap, one.gap}) tried.push_back(Moved(one.form, by));
+    }
+    const ScorePass pass = ScoreTemplates(fit, tried);
+    for (std::size_t c = 0; c < contenders->size(); ++c) {
+      const auto scores = std::span(pass.scores).subspan(kTried * c, kTried);
+      const auto forms = std::span(std::as_const(tried)).subspan(kTried * c, kTried);
+      Template& form = (*contenders)[c].form;
+      form = IsListed(form) ? BestOfAll(scores, forms, *fit.facts, groups)
+                            : BestOfEach(scores, forms, *fit.facts);
+    }
+  }
+}
+
+}  // namespace focalfleet::sim
