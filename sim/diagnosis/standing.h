@@ -4,8 +4,8 @@
 // Evidence is the marginal likelihood over amplitudes of any size near the effect's prior size,
 // ln Z = 1/2 b' (G + 1/a^2)^-1 b - 1/2 ln|1 + a^2 G|, against no effect at all: a free amplitude
 // for every unit pays for itself or loses to one amplitude for all. Units that have it among units
-// that have not are a mixture with unknown share. A shape of the unit's own costs it the logarithm
-// of the number of shapes that there were to choose from. Chance is the tail of chi-square, with the
+// that have not are a mixture with unknown share. A shape of the unit's own costs the logarithm of
+// the number of shapes that there were to choose from. Chance is the tail of chi-square, with the
 // dispersion that the residuals really have, for the best of the levels looked at.
 #pragma once
 
