@@ -132,6 +132,8 @@ std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templat
     }
     std::map<std::uint32_t, double> shapes;
     double speaks = 0;
+    auto choices = static_cast<double>(listed.size());
+    for (const std::size_t k : listed) choices = std::max(choices, templates[k].choices);
     for (std::size_t unit = 0; unit < units.size(); ++unit) {
       double most = 0;
       for (const std::size_t k : listed) {
@@ -142,8 +144,9 @@ std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templat
     }
     if (speaks < kSpeaks || listed.size() < 2) continue;
     const Template& kind = templates[listed.front()];
-    contenders.push_back({WithShapes(kind, std::move(shapes)), GapTo(kind, kind.shape, templates)});
-    contenders.back().form.choices = static_cast<double>(listed.size());
+    const double gap = kind.effect->continuous_shape ? GapTo(kind, kind.shape, templates) : 0;
+    contenders.push_back({WithShapes(kind, std::move(shapes)), gap});
+    contenders.back().form.choices = choices;
   }
   return contenders;
 }
@@ -152,17 +155,20 @@ void RefineContenders(const Fit& fit, const FleetGroups& groups,
                       std::vector<Contender>* contenders) {
   constexpr int kHalvings = 4;
   constexpr std::size_t kTried = 3;
-  for (int halving = 0; halving < kHalvings && !contenders->empty(); ++halving) {
+  std::vector<Contender*> refined;
+  for (Contender& one : *contenders)
+    if (one.gap > 0) refined.push_back(&one);
+  for (int halving = 0; halving < kHalvings && !refined.empty(); ++halving) {
     Templates tried;
-    for (Contender& one : *contenders) {
-      one.gap /= 2;
-      for (const double by : {0.0, -one.gap, one.gap}) tried.push_back(Moved(one.form, by));
+    for (Contender* one : refined) {
+      one->gap /= 2;
+      for (const double by : {0.0, -one->gap, one->gap}) tried.push_back(Moved(one->form, by));
     }
     const ScorePass pass = ScoreTemplates(fit, tried);
-    for (std::size_t c = 0; c < contenders->size(); ++c) {
+    for (std::size_t c = 0; c < refined.size(); ++c) {
       const auto scores = std::span(pass.scores).subspan(kTried * c, kTried);
       const auto forms = std::span(std::as_const(tried)).subspan(kTried * c, kTried);
-      Template& form = (*contenders)[c].form;
+      Template& form = refined[c]->form;
       form = IsListed(form) ? BestOfAll(scores, forms, *fit.facts, groups)
                             : BestOfEach(scores, forms, *fit.facts);
     }

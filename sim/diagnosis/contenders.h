@@ -14,7 +14,7 @@ namespace focalfleet::sim {
 /// A template whose shape is being refined.
 struct Contender {
   Template form;
-  double gap = 0;  // to the shapes that are tried beside it
+  double gap = 0;  // to the shapes that are tried beside it; 0: none are
 };
 
 /// The best templates of the causes that come near the best of all, `best`: an index, or kNoTerm.

@@ -171,6 +171,8 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
   const std::size_t c = term.form.columns;
   const bool of_all = effect->owner == Owner::kPlate || effect->owner == Owner::kCamera;
   double phase = 0;
+  // A step of rounding is the controller's; where shapes go on between, they are units' own.
+  const bool own = effect->own_shape && effect->continuous_shape && planted.form < 0;
   std::map<std::uint32_t, double> shapes;
   std::erase_if(templates, [&](const Template& one) { return one.form != term.form.form; });
   for (std::size_t u = 0; u < units; ++u) {
@@ -182,15 +184,14 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
     const double size = planted.amplitude * (1 + planted.unit_scatter * rng.Normal());
     const double drawn = rng.Uniform(0, 2 * std::numbers::pi);
     if (!of_all || u == 0) phase = drawn;  // a plate bends one way for all
-    if (effect->own_shape)
-      shapes[facts.campaign->units[u].id] = templates[rng.Below(templates.size())].shape;
+    if (own) shapes[facts.campaign->units[u].id] = templates[rng.Below(templates.size())].shape;
     for (std::size_t k = 0; k < c; ++k)
       term.amplitude.push_back(c == 1   ? size
                                : k == 0 ? size * std::cos(phase)
                                         : size * std::sin(phase));
   }
   term.sigma.assign(term.amplitude.size(), 0);
-  if (effect->own_shape && planted.form < 0) term.form = WithShapes(term.form, std::move(shapes));
+  if (own) term.form = WithShapes(term.form, std::move(shapes));
   return term;
 }
 

@@ -12,6 +12,7 @@
 #include "protocol/base/rng.h"
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/contenders.h"
+#include "sim/diagnosis/quick_look.h"
 #include "sim/diagnosis/term_trace.h"
 
 namespace focalfleet::sim {
@@ -277,6 +278,9 @@ namespace {
 bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates,
              LookBook* looks, Fit* fit, Selection* selection) {
   rule.progress("signatures");
+  for (Template& form : WorthAScore(*fit, *templates))
+    if (IndexOf(*templates, form) == kNoTerm)
+      templates->push_back(std::move(form)), looks->Forget();
   const Look& look = looks->At(*fit, *templates, kNoTerm);
   if (selection->kept_share.empty()) {
     selection->tests = EffectiveTests(look.pass.scores, *templates, rule.seed);

@@ -135,7 +135,7 @@ Level UnitLevel(const Score& score, const Template& form, double dispersion) {
   for (std::size_t unit = 0; unit < units; ++unit) {
     level.groups.push_back(
         DecomposePossible(form, UnitB(score.b, unit, c), UnitG(score, unit, c), dispersion));
-    level.groups.back().Charge(std::log(form.choices));
+    level.groups.back().Charge(form.shape_of_unit.empty() ? 0 : std::log(form.choices));
   }
   return level;
 }
@@ -376,6 +376,9 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
   for (const Level& level : levels)
     if (level.sharing == Sharing::kUnit) best.log_p = std::min(best.log_p, LevelLogP(level));
   best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
+  // Units' own shapes have been paid for by each unit.
+  const double price = form.shape_of_unit.empty() ? std::log(form.choices) : 0;
+  best.log_p = std::min(0.0, best.log_p + price);
   // Chance explains it: no need to know who has it.
   constexpr double kWorthALook = -3;
   if (best.log_p > kWorthALook) {
@@ -388,7 +391,8 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
   }
   if (units > 2 && c == 1 && !of_the_whole) {
-    const ScatterFit scatter = Scatter(score, prior, best.dispersion, std::log(form.choices));
+    const ScatterFit scatter = Scatter(score, prior, best.dispersion,
+                                       form.shape_of_unit.empty() ? 0 : std::log(form.choices));
     // Only as a refinement of what is shared by all: a scatter that pays for itself.
     if (scatter.evidence > best.evidence + 3) {
       best.sharing = Sharing::kUnit;
@@ -400,6 +404,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
       for (const GroupScore& group : levels.front().groups) best.chi_square += group.chi_square;
     }
   }
+  best.evidence -= price;
   return best;
 }
 

@@ -44,11 +44,26 @@ void List(const CampaignFacts&, Templates* out) {
              out);
 }
 
+// Any whole number of hundredths, and bits beyond the usual.
+void Glance(Templates* out) {
+  constexpr int kHundredthsMax = 200;
+  std::vector<double> hundredths, bits;
+  for (int k = 1; k <= kHundredthsMax; ++k) hundredths.push_back(k / 100.0);
+  for (const double k : {7, 8, 15, 16, 17}) bits.push_back(k);
+  for (std::size_t k = 0; k < kForms.size(); ++k) {
+    if (kForms[k].rounding == Rounding::kCutMove || kForms[k].step == Step::kMotorTurns) continue;
+    ListGrid({.shapes = kForms[k].step == Step::kBits ? bits : hundredths,
+              .shape_name = kForms[k].name,
+              .form = static_cast<int>(k)},
+             out);
+  }
+}
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const Form& kind = kForms[static_cast<std::size_t>(form.form)];
-  const double step_deg = Step_deg(kind, form.shape, track.unit->gear[axis]);
+  const double step_deg = Step_deg(kind, ShapeOf(form, track), track.unit->gear[axis]);
   double behind_deg = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
     if (track.restarts[i]) behind_deg = 0;
@@ -76,6 +91,8 @@ Effect MakeCommandQuantisation() {
               "by itself.",
           .list = List,
           .apply = Apply,
+          .glance = Glance,
+          .own_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.5,
           .amplitude_least = 0.5};

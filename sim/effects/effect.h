@@ -71,7 +71,7 @@ struct Template {
   double shape = 0;  // of the effect's own shape parameter
   // Where each unit has a shape of its own: by unit_id. Others have `shape`.
   std::map<std::uint32_t, double> shape_of_unit;
-  double choices = 1;  // shapes that each unit's was chosen from
+  double choices = 1;  // shapes that it (or each unit's) was chosen from at a glance
   std::string label;   // the shape in words
   // Of an empirical term (empirical.h): the column it looks at, and a curve's knots, ascending;
   // none: it goes by the campaign's own ranks.
@@ -91,6 +91,8 @@ struct Effect {
   std::string_view paragraph;           // for the operator
   void (*list)(const CampaignFacts&, Templates*);
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
+  // Shapes beside the listed ones, too many to score each (quick_look.h); none: there are no more.
+  void (*glance)(Templates*) = nullptr;
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
   bool own_shape = false;  // each unit may have its own, as it has its own teeth

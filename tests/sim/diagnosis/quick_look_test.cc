@@ -1,0 +1,76 @@
+// Roundings to steps that no list has.
+#include "sim/diagnosis/quick_look.h"
+
+#include <gmock/gmock.h>
+
+#include <map>
+
+#include "sim/diagnosis/select.h"
+#include "sim/effects/registry.h"
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Theta commands of these units rounded, each to a step of its own.
+Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+  std::vector<double> step_of_row(campaign.rows(), 0);
+  for (const auto& [unit, step] : step_deg)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      step_of_row[row] = step;
+  TurnTheta(
+      [&](std::size_t row) {
+        const double commanded = campaign.cmd_deg[kTheta][row], step = step_of_row[row];
+        return step == 0 ? 0 : std::round(commanded / step) * step - commanded;
+      },
+      &campaign);
+  return campaign;
+}
+
+Templates Worth(const Campaign& campaign) {
+  const CampaignFacts facts = MakeFacts(campaign);
+  return WorthAScore(StaticFit(facts), ListTemplates(*FindEffect("command_quantisation"), facts));
+}
+
+TEST(QuickLook, SeesAStepThatIsNotListed) {
+  const Templates worth = Worth(Rounded({{7, 0.37}}, 3));
+  ASSERT_FALSE(worth.empty());
+  EXPECT_EQ(worth[0].axis, EffectAxis::kTheta);
+  EXPECT_DOUBLE_EQ(worth[0].shape, 0.37);
+  EXPECT_GT(worth[0].choices, 400);
+}
+
+TEST(QuickLook, SeesAStepOfAllUnitsThatIsTooSmallInEach) {
+  std::map<std::size_t, double> all;
+  for (std::size_t unit = 0; unit < 24; ++unit) all[unit] = 0.03;
+  const Templates worth = Worth(Rounded(all, 5));
+  ASSERT_FALSE(worth.empty());
+  EXPECT_DOUBLE_EQ(worth[0].shape, 0.03);
+}
+
+TEST(QuickLook, SeesLittleInNoise) {
+  std::size_t seen = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) seen += Worth(Rounded({}, seed)).size();
+  EXPECT_LE(seen, 2u);
+}
+
+TEST(QuickLook, StepsOfUnitsOwnAreOneCause) {
+  const std::map<std::size_t, double> steps = {{2, 0.31}, {9, 0.37}, {17, 0.53}};
+  const Campaign campaign = Rounded(steps, 6);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "command_quantisation");
+  ASSERT_EQ(diagnosis.model.terms.size(), 1u);
+  const ModelTerm& term = diagnosis.model.terms[0];
+  std::vector<std::uint32_t> rounded;
+  for (const auto& [unit, step] : steps) {
+    rounded.push_back(campaign.units[unit].id);
+    EXPECT_DOUBLE_EQ(term.form.shape_of_unit.at(campaign.units[unit].id), step);
+  }
+  EXPECT_EQ(diagnosis.causes[0].units, rounded);
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
