@@ -136,6 +136,36 @@ TEST(Effects, AStartSkewBeginsAtAShareOfTheSlots) {
   }
 }
 
+// Grease that follows Andrade's law stiffens ever faster as it cools; its slope at the reference is
+// that of the proportion.
+TEST(Effects, GreaseStiffensFasterTheColderItIs) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  const auto temperature = track.Column("temp_C");
+  constexpr double kFrom_C = 12, kSize = 0.02;
+  Template form{
+      .effect = FindEffect("thermal_backlash"), .axis = EffectAxis::kTheta, .shape = kFrom_C};
+  for (const auto& [kind, andrade_K] : {std::pair(0, 0.0), {1, 1750.0}, {2, 2750.0}}) {
+    form.form = kind;
+    const auto errors = Applied(track, form, kSize);
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      const double step = track.step_deg[kTheta][i], warmer = temperature[i] - kFrom_C;
+      if (step == 0) continue;
+      ++moved;
+      const double own_K = temperature[i] + 273.15, from_K = kFrom_C + 273.15;
+      const double stiff = std::exp(andrade_K * (1 / own_K - 1 / from_K));
+      const double error = kind == 0 ? warmer : from_K * from_K / andrade_K * (1 - stiff);
+      EXPECT_NEAR(errors[i], -std::copysign(kSize / 2, step) * error, 1e-12);
+      if (kind != 0 && warmer < -0.1) {
+        EXPECT_GT(-error, -warmer);
+      }
+    }
+    EXPECT_GT(moved, 10u);
+  }
+}
+
 // A rotor that holds a load x of its pull-out at nominal drive rests asin(x / drive) behind its
 // field.
 TEST(Effects, ALagIsTheArcsineOfTheLoadUpToThePullOut) {
