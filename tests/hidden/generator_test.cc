@@ -283,6 +283,28 @@ TEST(HiddenRivals, EquivalenceDependsOnWhatTheMovesExcite) {
   EXPECT_LT(cosine("diagnostic"), 0.99);
 }
 
+// A detent of order one bends the rotor's angle just as an offset of one phase does, at any size; a
+// detent of order two falls with the drive, and the ellipse of unequal gains does not.
+TEST(HiddenRivals, ADetentOfOrderOneIsAnOffset) {
+  const auto cosine = [](double order, double size) {
+    const Campaign campaign = SmallCampaign("diagnostic", 8, 120, TestSeed(8));
+    const Scene scene = MakeScene(campaign);
+    Effect effect = OfAll("cogging", campaign, kTheta, size);
+    effect.owner = Owner::kUnit;
+    effect.shape[0] = order;
+    for (std::size_t u = 0; u < effect.phase_rad.size(); ++u)
+      effect.phase_rad[u] = 0.7 * static_cast<double>(u);
+    for (const Rival& rival : FindRivals(scene, NoiseOf(campaign), AllSeen(campaign), effect))
+      if (rival.cause == "phase_imbalance") return rival.cosine;
+    return 0.0;
+  };
+  constexpr double kOne = 0.1, kTwo = 0.4;
+  for (const double size : {0.5, 3.0}) {
+    EXPECT_GT(cosine(kOne, size), 0.995) << size;
+    EXPECT_LT(cosine(kTwo, size), 0.99) << size;
+  }
+}
+
 Spec SpecAt(std::uint64_t suite, std::uint64_t index, const Wishes& wishes = {}) {
   const auto spec = DrawSpec(suite, index, wishes);
   EXPECT_TRUE(spec.has_value());

@@ -98,6 +98,32 @@ Effect Probe(const EffectKind& kind, const Effect& of, std::size_t axis, double 
   return probe;
 }
 
+// What turns with the rotor bends where it is large, and two phases no longer span it: the rival is
+// tried as large as the effect, at phases all around, each unit's best for itself.
+double ExplainedAtItsSize(const Scene& scene, const Data& data, const EffectKind& kind,
+                          const Effect& of, std::size_t axis, double shape) {
+  constexpr int kPhases = 48;  // 1 - cosine of half a step: 0.002
+  std::vector<double> best(data.units.size(), 0);
+  for (int p = 0; p < kPhases; ++p) {
+    Effect probe = Probe(kind, of, axis, shape, 2 * kPi * p / kPhases);
+    probe.size = of.size * of.kind->typical / kind.typical;
+    probe.weight = of.weight;
+    const std::vector<Column> signature = Signature(scene, data, probe);
+    for (std::size_t i = 0; i < data.units.size(); ++i) {
+      const double square = Dot(signature[i], signature[i]);
+      if (square > 0)
+        best[i] = std::max(best[i], std::pow(Dot(signature[i], data.target[i]), 2) / square);
+    }
+  }
+  double explained = 0;
+  for (const double one : best) explained += one;
+  return explained / data.norm;
+}
+
+bool TurnsWithTheRotor(const EffectKind& kind) {
+  return kind.cause == "cogging" || kind.cause == "phase_imbalance";
+}
+
 }  // namespace
 
 std::vector<Rival> FindRivals(const Scene& scene, const NoiseModel& noise,
@@ -119,6 +145,8 @@ std::vector<Rival> FindRivals(const Scene& scene, const NoiseModel& noise,
           signatures.push_back(
               Signature(scene, data, Probe(kind, effect, axis, shape, p * kPi / 2)));
         best = std::max(best, Explained(data, signatures, by_unit));
+        if (by_unit && TurnsWithTheRotor(kind) && TurnsWithTheRotor(*effect.kind))
+          best = std::max(best, ExplainedAtItsSize(scene, data, kind, effect, axis, shape));
       }
     const double cosine = std::sqrt(std::clamp(best, 0.0, 1.0));
     if (cosine >= 0.5) rivals.push_back({std::string(kind.cause), cosine});
