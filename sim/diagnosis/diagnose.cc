@@ -20,6 +20,7 @@
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/series.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/diagnosis/wrong_sensors.h"
 #include "sim/effects/registry.h"
@@ -455,8 +456,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   // Without the wrong sensors a column may be gone that they alone made.
   if (truth != nullptr)
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
-  const Selection selection =
-      FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
+  Selection selection = FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
+  DropSeries(options.family_wise, options.seed, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);

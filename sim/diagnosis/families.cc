@@ -81,6 +81,8 @@ bool AxesMeet(std::string_view a, std::string_view b) {
   return a == b || open(a) || open(b);
 }
 
+bool IsOfAngle(std::string_view cause) { return Has(kAngles, cause); }
+
 bool AreRelated(std::string_view a, std::string_view b) {
   const std::span<const std::string_view> families[] = {kMoves, kAngles, kNight, kImage, kRotor};
   return std::any_of(std::begin(families), std::end(families),
@@ -119,11 +121,11 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
   constexpr double kShapeThere = 0.2, kCandidateThere = 0.3;
   // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
   // stronger one's evidence.
-  constexpr double kFaint = 20, kBesideFaint = 0.3;
+  constexpr double kFaint = 30, kBesideFaint = 0.3;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
-    bool shape = false, related = false, same = false;
+    bool shape = false, related = false, same = false, faint = false;
     for (CauseFound& other : kept) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
       const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
@@ -133,8 +135,8 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       related = (shape && other.axis != "none" && cause.axis != "none") ||
                 (share < kCandidate && there < kCandidateThere &&
                  AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis));
-      const bool faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
-                         AxesMeet(other.axis, cause.axis);
+      faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
+              AxesMeet(other.axis, cause.axis) && (other.axis != "none" || cause.axis == "none");
       if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
       relative = &other;
       break;
@@ -151,7 +153,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       kept.push_back(std::move(cause));
       continue;
     }
-    if (same || (related && shape)) {
+    if (same || faint || (related && shape)) {
       TellAsRemainder(cause.size_um, cause.cause, relative);
       continue;
     }
@@ -250,11 +252,6 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
         members.push_back(&cause);
         square += cause.size_um * cause.size_um;
       }
-    // A tooth that is damaged at another place in each unit looks like a ripple and a tooth of all.
-    const auto tooth = std::ranges::find(members, "tooth_damage", &CauseFound::cause);
-    if (tooth != members.end() && (*tooth)->all_units)
-      for (CauseFound* other : members)
-        if (other != *tooth) add(**tooth, other), add(*other, *tooth);
     if (members.size() < kSeries) continue;
     for (CauseFound* one : members)
       for (const CauseFound* other : members)

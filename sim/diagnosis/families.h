@@ -12,6 +12,9 @@ namespace focalfleet::sim {
 /// Have the two causes a family in common?
 bool AreRelated(std::string_view a, std::string_view b);
 
+/// Does it depend on where an axis stands?
+bool IsOfAngle(std::string_view cause);
+
 /// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
@@ -26,8 +29,8 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
-/// strong one have, or what is faint by itself. It gets the strong one as a candidate. What is
-/// faint beside any cause of an axis is told as that one's shape. Pre: strongest first.
+/// strong one have. It gets the strong one as a candidate. What is faint by itself, or beside a
+/// cause of an axis, is told as that one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
@@ -44,9 +47,7 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Three causes or more that depend on where one axis stands are a series of shapes rather than
-/// causes: each gets the others as candidates, and the axis is told as not understood. Beside a
-/// tooth_damage of all units even one other is a candidate, and has it as one: teeth may be damaged
-/// at a place of each unit's own.
+/// causes: each gets the others as candidates, and the axis is told as not understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Where the column is missing that would tell two causes apart, who could not be tested is a

@@ -14,15 +14,6 @@ double MeritByNoise(Fit fit, const Noise& noise) {
   return Merit(fit);
 }
 
-// How much better, by one noise for both: factors of units and exposures wander by more than a step
-// is worth. Each noise favours the fit that it comes from, so that it is the mean of the two.
-double BetterBy(const Fit& fit, const Fit& than) {
-  double sum = 0;
-  for (const Noise* noise : {&fit.noise, &than.noise})
-    sum += MeritByNoise(fit, *noise) - MeritByNoise(than, *noise);
-  return sum / 2;
-}
-
 // With and without steps in single units' angles; the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
@@ -64,6 +55,13 @@ void TryHomings(const Templates& templates, const SelectionRule& rule, Selection
 }
 
 }  // namespace
+
+double BetterBy(const Fit& fit, const Fit& than) {
+  double sum = 0;
+  for (const Noise* noise : {&fit.noise, &than.noise})
+    sum += MeritByNoise(fit, *noise) - MeritByNoise(than, *noise);
+  return sum / 2;
+}
 
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Selection selection = SelectWithEvents(templates, rule, fit);

@@ -10,4 +10,9 @@ namespace focalfleet::sim {
 /// Post: the model's homing_zero_deg are empty where zeros are the same after each homing.
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit);
 
+/// How much Merit the fit has more, by one noise for both: factors of units and exposures wander by
+/// more than a step is worth. Each noise favours the fit that it comes from, so that it is the mean
+/// of the two.
+double BetterBy(const Fit& fit, const Fit& than);
+
 }  // namespace focalfleet::sim

@@ -9,7 +9,9 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kUnknownShare = 0.3;  // of the family-wise rate: the screen's
+// Of the family-wise rate: the screen's. That physics is missing is a larger claim than a name, and
+// what names leave by their shapes is never quite nothing.
+constexpr double kUnknownShare = 0.01;
 // Of a look beside the model: a name is often nearly what is there, and the screen looks for what
 // little it leaves.
 constexpr double kKeptMin = 0.012;
@@ -21,6 +23,24 @@ void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<do
   for (const CampaignUnit& unit : units)
     if (unit.gear[axis] != gear) return;
   for (const double harmonic : {1.0, 2.0, 6.0}) orders->push_back(harmonic * gear);
+}
+
+// A ripple of the order between the listed ones that explains most.
+Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template& ripple) {
+  constexpr int kEitherSide = 4;
+  constexpr double kStep = 0.1;
+  Templates tried;
+  for (int k = -kEitherSide; k <= kEitherSide; ++k) {
+    tried.push_back(ripple);
+    tried.back().shape += k * kStep;
+  }
+  const ScorePass pass = ScoreTemplates(fit, tried);
+  std::size_t best = kEitherSide;
+  double most = Assess(pass.scores[best], tried[best], groups).evidence;
+  for (std::size_t k = 0; k < tried.size(); ++k)
+    if (const double evidence = Assess(pass.scores[k], tried[k], groups).evidence; evidence > most)
+      most = evidence, best = k;
+  return tried[best];
 }
 
 }  // namespace
@@ -66,7 +86,9 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   const Best best =
       FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise, kKeptMin);
   if (best.at == kNoTerm) return std::nullopt;
-  const Template& look = looks[best.at];
+  const Template look = looks[best.at].effect == &EmpiricalRipple()
+                            ? WithFineOrder(fit, groups, looks[best.at])
+                            : looks[best.at];
   Fit stepped = fit;
   stepped.model.terms.push_back(MakeTerm(look, best.standing, groups));
   StepFit(&stepped);

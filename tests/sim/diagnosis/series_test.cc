@@ -1,0 +1,50 @@
+// Several parts at one angle, or one ripple that no part makes.
+#include "sim/diagnosis/series.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Of some units; no gear has it.
+Campaign Rippled(double order, double size_deg, std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+  std::vector<double> size_of_row(campaign.rows(), 0);
+  for (const std::size_t unit : {4u, 13u})
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      size_of_row[row] = size_deg;
+  TurnTheta(
+      [&](std::size_t row) {
+        const double wave = order * campaign.cmd_deg[kTheta][row] * std::numbers::pi / 180;
+        return size_of_row[row] * std::sin(wave + 0.3 * std::sin(wave));
+      },
+      &campaign);
+  return campaign;
+}
+
+TEST(Series, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
+  for (const double order : {5.0, 3.7}) {
+    const Diagnosis diagnosis = Verdicts(Rippled(order, 0.1, 3));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << order << Told(diagnosis);
+    for (const CauseFound& cause : diagnosis.causes)  // half a wave is a zero that is off
+      EXPECT_EQ(cause.cause, "zero_offset") << order << Told(diagnosis);
+    ASSERT_EQ(diagnosis.unknown.size(), 1u);
+    EXPECT_EQ(diagnosis.unknown[0].channel, "theta angle");
+  }
+}
+
+TEST(Series, TwoPartsThatAreThereKeepTheirNames) {
+  const Diagnosis diagnosis = Verdicts(
+      Planted({{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"},
+               {.cause = "tooth_damage", .amplitude = 0.15, .axis = "theta", .unit_share = 0.3}},
+              {.moves = 120, .seed = 4}));
+  ASSERT_EQ(diagnosis.causes.size(), 2u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "eccentricity");
+  EXPECT_EQ(diagnosis.causes[1].cause, "tooth_damage");
+  EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
