@@ -106,10 +106,10 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
     const auto own = term.AmplitudeOf(u);
     if (own.empty()) continue;
     const std::uint32_t id = diagnosis.model.units[u].id;
+    const std::optional<double> shape = sim::ShapeOf(term.form, id);
+    if (!shape) continue;
     units.push_back(id);
-    if (const auto own_shape = term.form.shape_of_unit.find(id); !term.form.shape_of_unit.empty())
-      shapes.push_back(own_shape == term.form.shape_of_unit.end() ? term.form.shape
-                                                                  : own_shape->second);
+    if (!term.form.shape_of_unit.empty()) shapes.push_back(*shape);
     amplitude.insert(amplitude.end(), own.begin(), own.end());
     const std::size_t at = term.group_of_unit[u] * term.form.columns;
     for (std::size_t c = 0; c < term.form.columns; ++c) sigma.push_back(term.sigma[at + c]);

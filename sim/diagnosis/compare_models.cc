@@ -99,7 +99,7 @@ bool IsSameKind(const Template& a, const Template& b) {
 // Do amplitudes of both mean the same?
 bool IsSameShape(const Template& a, const Template& b) {
   return a.form == b.form && a.memory == b.memory && a.columns == b.columns &&
-         (a.shape == b.shape || a.effect->continuous_shape);
+         (a.effect->continuous_shape || (a.shape == b.shape && a.shape_of_unit == b.shape_of_unit));
 }
 
 // The normal deviate that is as unlikely as the chi-square.

@@ -18,20 +18,21 @@ bool DifferInShapeAlone(const Template& a, const Template& b) {
   return key(a) == key(b);
 }
 
-bool IsListed(const Template& form) { return form.shape_of_unit.empty(); }
+bool IsOfAll(const Template& form) { return form.shape_of_unit.empty(); }
 
-// To the nearest listed shape of its kind.
-double GapTo(const Template& form, double shape, const Templates& templates) {
+// To the nearest shape of its kind.
+double GapTo(const Template& form, const Templates& templates) {
   double gap = kInfinity;
   for (const Template& other : templates)
-    if (IsListed(other) && DifferInShapeAlone(form, other) && other.shape != shape)
-      gap = std::min(gap, std::abs(other.shape - shape));
+    if (IsOfAll(other) && DifferInShapeAlone(form, other) && other.shape != form.shape)
+      gap = std::min(gap, std::abs(other.shape - form.shape));
   return gap;
 }
 
 Template Moved(const Template& form, double by) {
-  if (IsListed(form)) return WithShape(form, form.shape + by);
   Template moved = form;
+  if (IsOfAll(form)) moved = WithShape(form, form.shape + by);
+  moved.between = true;
   for (auto& [unit, shape] : moved.shape_of_unit) shape += by;
   return moved;
 }
@@ -109,8 +110,8 @@ std::vector<Contender> ContendersOf(const ScorePass& pass, const std::vector<Sta
   std::vector<Contender> contenders;
   for (const std::size_t k : order) {
     const Template& form = templates[k];
-    const double gap = GapTo(form, form.shape, templates);
-    if (form.effect->continuous_shape && IsListed(form) && std::isfinite(gap))
+    const double gap = GapTo(form, templates);
+    if (form.effect->continuous_shape && IsOfAll(form) && std::isfinite(gap))
       contenders.push_back({form, gap});
   }
   return contenders;
@@ -128,7 +129,7 @@ std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templat
     for (std::size_t k = first; k < templates.size(); ++k) {
       if (!DifferInShapeAlone(templates[first], templates[k])) continue;
       seen[k] = 1;
-      if (IsListed(templates[k])) listed.push_back(k);
+      if (IsOfAll(templates[k]) && !templates[k].between) listed.push_back(k);
     }
     std::map<std::uint32_t, double> shapes;
     double speaks = 0;
@@ -144,7 +145,9 @@ std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templat
     }
     if (speaks < kSpeaks || listed.size() < 2) continue;
     const Template& kind = templates[listed.front()];
-    const double gap = kind.effect->continuous_shape ? GapTo(kind, kind.shape, templates) : 0;
+    double gap = kind.effect->continuous_shape ? kInfinity : 0;
+    for (std::size_t k = 1; k < listed.size(); ++k)
+      gap = std::min(gap, std::abs(templates[listed[k]].shape - kind.shape));
     contenders.push_back({WithShapes(kind, std::move(shapes)), gap});
     contenders.back().form.choices = choices;
   }
@@ -169,8 +172,8 @@ void RefineContenders(const Fit& fit, const FleetGroups& groups,
       const auto scores = std::span(pass.scores).subspan(kTried * c, kTried);
       const auto forms = std::span(std::as_const(tried)).subspan(kTried * c, kTried);
       Template& form = refined[c]->form;
-      form = IsListed(form) ? BestOfAll(scores, forms, *fit.facts, groups)
-                            : BestOfEach(scores, forms, *fit.facts);
+      form = IsOfAll(form) ? BestOfAll(scores, forms, *fit.facts, groups)
+                           : BestOfEach(scores, forms, *fit.facts);
     }
   }
 }

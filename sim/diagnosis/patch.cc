@@ -17,8 +17,10 @@ constexpr double kSizeMinUm = 0.05;    // less is no misfit worth a term, howeve
 constexpr double kSpreadMaxDeg = 0.3;  // of units' own amplitudes, where nothing else holds them
 
 bool IsSame(const Template& a, const Template& b) {
+  constexpr double kApart = 0.3;  // orders that are nearer are one ripple, found again
   return a.effect == b.effect && a.axis == b.axis && a.form == b.form &&
-         a.covariate == b.covariate && (a.effect == &EmpiricalCurve() || a.shape == b.shape);
+         a.covariate == b.covariate &&
+         (a.effect == &EmpiricalCurve() || std::abs(a.shape - b.shape) < kApart);
 }
 
 // The look, with amplitudes for all of its curve.

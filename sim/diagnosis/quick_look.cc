@@ -113,6 +113,7 @@ Templates WorthAScore(const Fit& fit, const Templates& library) {
     Templates forms;
     effect->glance(&forms);
     std::erase_if(forms, [&, axis = of_axis](const Template& form) { return form.axis != axis; });
+    if (forms.empty()) continue;
     for (Template& form : forms)
       form.effect = effect, form.choices = static_cast<double>(forms.size());
     const Glances seen = GlanceAt(fit, forms, AxisIndex(forms.front()));

@@ -25,8 +25,9 @@ void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<do
   for (const double harmonic : {1.0, 2.0, 6.0}) orders->push_back(harmonic * gear);
 }
 
-// A ripple of the order between the listed ones that explains most.
-Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template& ripple) {
+// The ripple's order between the listed ones that explains most, and how it stands then.
+Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template& ripple,
+                       Standing* standing) {
   constexpr int kEitherSide = 4;
   constexpr double kStep = 0.1;
   Templates tried;
@@ -35,12 +36,12 @@ Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template
     tried.back().shape += k * kStep;
   }
   const ScorePass pass = ScoreTemplates(fit, tried);
-  std::size_t best = kEitherSide;
-  double most = Assess(pass.scores[best], tried[best], groups).evidence;
-  for (std::size_t k = 0; k < tried.size(); ++k)
-    if (const double evidence = Assess(pass.scores[k], tried[k], groups).evidence; evidence > most)
-      most = evidence, best = k;
-  return tried[best];
+  Template best = ripple;
+  for (std::size_t k = 0; k < tried.size(); ++k) {
+    Standing one = Assess(pass.scores[k], tried[k], groups);
+    if (one.evidence > standing->evidence) *standing = std::move(one), best = tried[k];
+  }
+  return best;
 }
 
 }  // namespace
@@ -86,17 +87,18 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   const Best best =
       FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise, kKeptMin);
   if (best.at == kNoTerm) return std::nullopt;
+  Standing standing = best.standing;
   const Template look = looks[best.at].effect == &EmpiricalRipple()
-                            ? WithFineOrder(fit, groups, looks[best.at])
+                            ? WithFineOrder(fit, groups, looks[best.at], &standing)
                             : looks[best.at];
   Fit stepped = fit;
-  stepped.model.terms.push_back(MakeTerm(look, best.standing, groups));
+  stepped.model.terms.push_back(MakeTerm(look, standing, groups));
   StepFit(&stepped);
   return StructureLeft{{.covariate = look.covariate,
                         .channel = std::string(ChannelOf(look)),
                         .p_value = std::exp(best.log_p_family),
                         .size_um = SizeOf(stepped, stepped.model.terms.back()),
-                        .delta_log_likelihood = best.standing.chi_square / 2},
+                        .delta_log_likelihood = standing.chi_square / 2},
                        stepped.model.terms.back()};
 }
 

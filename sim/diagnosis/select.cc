@@ -142,6 +142,15 @@ Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& gr
   return best;
 }
 
+// Who found no shape among those that each unit may have does not have it.
+ModelTerm TermOf(const Template& form, const Standing& standing, const FleetGroups& groups,
+                 const CampaignFacts& facts) {
+  ModelTerm term = MakeTerm(form, standing, groups);
+  for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
+    if (!ShapeOf(form, facts.campaign->units[unit].id)) term.group_of_unit[unit] = kNoGroup;
+  return term;
+}
+
 void DropTerm(std::size_t at, Fit* fit) {
   fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(at));
   StepFit(fit);
@@ -202,7 +211,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
       continue;
     }
     looks->Forget();
-    fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
+    fit->model.terms[t] = TermOf(templates[best.at], best.standing, groups, *fit->facts);
     StepFit(fit);
     Refit(fit);
     changed = true;
@@ -302,7 +311,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
     best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
   if (best.at == kNoTerm) return false;
   const CampaignModel before = fit->model;
-  fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.standing, groups));
+  fit->model.terms.push_back(TermOf((*templates)[best.at], best.standing, groups, *fit->facts));
   StepFit(fit);
   Refit(fit);
   if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
@@ -313,7 +322,9 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
 }
 
 Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* fit) {
-  Templates templates = library;  // and refined ones
+  Templates templates = library;  // and refined ones, and what the model has already
+  for (const ModelTerm& term : fit->model.terms)
+    if (IndexOf(templates, term.form) == kNoTerm) templates.push_back(term.form);
   const FleetGroups groups = GroupsOf(*fit->facts);
   LookBook looks(groups, false);
   Selection selection;
@@ -380,11 +391,15 @@ void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t
   ModelTerm term = std::move(*at);
   fit->model.terms.erase(at);
   UpdateResiduals(fit);
-  const Templates kind = KindOf(term.form, library);
+  Templates kind = KindOf(term.form, library);
+  for (Template& more : KindOf(term.form, WorthAScore(*fit, library)))
+    kind.push_back(std::move(more));
   std::vector<Contender> found = OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts);
   RefineContenders(*fit, groups, &found);
   // What units have that were looked at stays.
   for (Contender& one : found) term.form.shape_of_unit.merge(one.form.shape_of_unit);
+  for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
+    if (!ShapeOf(term.form, fit->model.units[unit].id)) term.group_of_unit[unit] = kNoGroup;
   fit->model.terms.insert(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t),
                           std::move(term));
   UpdateResiduals(fit);

@@ -39,7 +39,7 @@ struct SelectionRule {
 struct Selection {
   std::vector<Accepted> accepted;  // Shape: (terms of the model)
   double tests = 1;                // independent tests that the library is worth
-  std::vector<double> kept_share;  // Shape: (templates): of the signature beside the geometry
+  std::vector<double> kept_share;  // of a signature beside the geometry; templates first
 };
 
 /// Adds terms to the fit's model.

@@ -251,9 +251,14 @@ double Merit(const Fit& fit) {
   parameters += 2 * static_cast<double>(MovesWithEvents(fit.model));
   constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
   parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
-  for (const ModelTerm& term : fit.model.terms)
+  for (const ModelTerm& term : fit.model.terms) {
     for (std::size_t k = 0; k < term.amplitude.size(); ++k)
       if (term.sigma[k] > 0) parameters += 1;
+    for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
+      if (term.group_of_unit[unit] != kNoGroup &&
+          term.form.shape_of_unit.contains(fit.model.units[unit].id))
+        parameters += 1;
+  }
   return 2 * log_density - parameters * std::log(std::max(values, 2.0));
 }
 

@@ -63,7 +63,9 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
   const Form& kind = kForms[static_cast<std::size_t>(form.form)];
-  const double step_deg = Step_deg(kind, ShapeOf(form, track), track.unit->gear[axis]);
+  const std::optional<double> shape = ShapeOf(form, track.unit->id);
+  if (!shape || !(*shape > 0)) return;
+  const double step_deg = Step_deg(kind, *shape, track.unit->gear[axis]);
   double behind_deg = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
     if (track.restarts[i]) behind_deg = 0;

@@ -150,10 +150,11 @@ Template WithShapes(const Template& form, std::map<std::uint32_t, double> shape_
   return other;
 }
 
-double ShapeOf(const Template& form, const UnitTrack& track) {
+std::optional<double> ShapeOf(const Template& form, std::uint32_t unit_id) {
   if (form.shape_of_unit.empty()) return form.shape;
-  const auto own = form.shape_of_unit.find(track.unit->id);
-  return own == form.shape_of_unit.end() ? form.shape : own->second;
+  const auto own = form.shape_of_unit.find(unit_id);
+  if (own == form.shape_of_unit.end()) return std::nullopt;
+  return own->second;
 }
 
 }  // namespace focalfleet::sim

@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -69,10 +70,11 @@ struct Template {
   Memory memory = Memory::kHold;
   int form = 0;      // of the effect's own forms
   double shape = 0;  // of the effect's own shape parameter
-  // Where each unit has a shape of its own: by unit_id. Others have `shape`.
+  // Where each unit has a shape of its own: by unit_id. Others do not have the effect.
   std::map<std::uint32_t, double> shape_of_unit;
-  double choices = 1;  // shapes that it (or each unit's) was chosen from at a glance
-  std::string label;   // the shape in words
+  double choices = 1;    // shapes that it, or each unit's, was chosen from
+  bool between = false;  // of listed shapes: refined
+  std::string label;     // the shape in words
   // Of an empirical term (empirical.h): the column it looks at, and a curve's knots, ascending;
   // none: it goes by the campaign's own ranks.
   std::string covariate;
@@ -91,11 +93,13 @@ struct Effect {
   std::string_view paragraph;           // for the operator
   void (*list)(const CampaignFacts&, Templates*);
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
-  // Shapes beside the listed ones, too many to score each (quick_look.h); none: there are no more.
+  // Shapes beside the listed ones, too many to score each (quick_look.h), of one column, on each
+  // axis that `list` has; none: there are no more.
   void (*glance)(Templates*) = nullptr;
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
-  bool own_shape = false;  // each unit may have its own, as it has its own teeth
+  // Each unit may have its own, as it has its own teeth. Pre: a unit is the owner.
+  bool own_shape = false;
   // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;
@@ -151,8 +155,8 @@ void ListGrid(const Grid& grid, Templates* out);
 Template WithShape(const Template& form, double shape);
 /// The same with a shape of each unit. Pre: the label ends in the shape.
 Template WithShapes(const Template& form, std::map<std::uint32_t, double> shape_of_unit);
-/// The shape that this unit has.
-double ShapeOf(const Template& form, const UnitTrack& track);
+/// The shape that this unit has; none: it has not got the effect.
+std::optional<double> ShapeOf(const Template& form, std::uint32_t unit_id);
 
 /// Adds to angle_deg[axis] what `made(i)` makes at each move of the axis, remembered as `memory`
 /// says.

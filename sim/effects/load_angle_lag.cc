@@ -36,9 +36,9 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
       [&](std::size_t i) {
         double level = std::max(drive[i], 0.05);
         if (by_supply && usual_V > 0) level *= std::max(volts[i] / usual_V, 0.05);
-        const double lag =
-            form.form >= 2 ? std::asin(std::min(form.shape / level, 1.0)) / std::asin(form.shape)
-                           : 1 / level;
+        const double lag = form.form >= 2 ? std::asin(std::min(form.shape / level, 1.0)) /
+                                                std::asin(std::min(form.shape, 1.0))
+                                          : 1 / level;
         return -amplitude[0] * Direction(step[i]) * lag;
       },
       &errors->angle_deg[axis]);

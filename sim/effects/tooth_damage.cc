@@ -40,9 +40,10 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const double order = IsOfPinion(form.form) ? PinionRatio(*track.unit, axis) : 1.0;
   const double width_deg = IsWide(form.form) ? 20 : 12;  // of the damaged gear, standard deviation
   constexpr double kFar = 9;  // widths: what is left there is lost in rounding
-  const double place_deg = ShapeOf(form, track);
+  const std::optional<double> place_deg = ShapeOf(form, track.unit->id);
+  if (!place_deg) return;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    const double away_deg = WithoutTurns(order * track.cmd_deg[axis][i] - place_deg);
+    const double away_deg = WithoutTurns(order * track.cmd_deg[axis][i] - *place_deg);
     const double in_widths = away_deg / width_deg;
     if (std::abs(in_widths) > kFar) continue;
     errors->angle_deg[axis][i] += amplitude[0] * std::exp(-in_widths * in_widths / 2);

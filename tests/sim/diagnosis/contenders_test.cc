@@ -65,6 +65,34 @@ TEST(OwnShapes, FewUnitsAmongManyHaveTheirs) {
   EXPECT_EQ(diagnosis.causes[0].units, damaged);
 }
 
+// The model is sought once more where the image moves.
+TEST(OwnShapes, StayWhereTheImageMoves) {
+  Campaign campaign =
+      Planted({{.cause = "air_turbulence", .amplitude = 4}}, {.moves = 80, .seed = 8});
+  DamageTeeth([](std::uint32_t) { return true; }, &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  const auto teeth = std::ranges::find(diagnosis.causes, "tooth_damage", &CauseFound::cause);
+  ASSERT_NE(teeth, diagnosis.causes.end()) << Told(diagnosis);
+  EXPECT_TRUE(teeth->all_units) << Told(diagnosis);
+  EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+}
+
+TEST(OwnShapes, AUnitWithoutAShapeHasNoEffect) {
+  const Campaign campaign = Planted({});
+  const CampaignFacts facts = MakeFacts(campaign);
+  for (const char* cause : {"tooth_damage", "command_quantisation"}) {
+    Template form{.effect = FindEffect(cause), .axis = EffectAxis::kTheta};
+    form.shape_of_unit[campaign.units[1].id] = 1;
+    PoseErrors errors;
+    for (const std::size_t unit : {0u, 1u}) {
+      ApplyColumn(MakeTrack(facts, unit, campaign.units[unit]), form, 0, 1, &errors);
+      const bool has =
+          std::ranges::any_of(errors.angle_deg[kTheta], [](double e) { return e != 0; });
+      EXPECT_EQ(has, unit == 1) << cause;
+    }
+  }
+}
+
 TEST(OwnShapes, WhoHasAChoiceOfShapesPaysForIt) {
   const Campaign campaign =
       Planted({{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta", .form = 5}});

@@ -55,8 +55,10 @@ TEST(QuickLook, SeesLittleInNoise) {
   EXPECT_LE(seen, 2u);
 }
 
-TEST(QuickLook, StepsOfUnitsOwnAreOneCause) {
-  const std::map<std::size_t, double> steps = {{2, 0.31}, {9, 0.37}, {17, 0.53}};
+class StepsOfUnitsOwn : public testing::TestWithParam<std::map<std::size_t, double>> {};
+
+TEST_P(StepsOfUnitsOwn, AreOneCause) {
+  const std::map<std::size_t, double>& steps = GetParam();
   const Campaign campaign = Rounded(steps, 6);
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
@@ -67,10 +69,17 @@ TEST(QuickLook, StepsOfUnitsOwnAreOneCause) {
   std::vector<std::uint32_t> rounded;
   for (const auto& [unit, step] : steps) {
     rounded.push_back(campaign.units[unit].id);
-    EXPECT_DOUBLE_EQ(term.form.shape_of_unit.at(campaign.units[unit].id), step);
+    const double shape = term.form.shape_of_unit.at(campaign.units[unit].id);
+    EXPECT_NEAR(shape < 5 ? shape : 360 / std::exp2(shape), step, 1e-9);  // degrees, or bits
   }
   EXPECT_EQ(diagnosis.causes[0].units, rounded);
 }
+
+using Steps = std::map<std::size_t, double>;
+INSTANTIATE_TEST_SUITE_P(
+    QuickLook, StepsOfUnitsOwn,
+    testing::Values(Steps{{2, 0.31}, {9, 0.37}, {17, 0.53}},
+                    Steps{{2, 360.0 / 256}, {9, 360.0 / 512}, {17, 360.0 / 1024}}));
 
 }  // namespace
 }  // namespace focalfleet::sim
