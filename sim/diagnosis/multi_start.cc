@@ -1,5 +1,6 @@
 #include "sim/diagnosis/multi_start.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include "sim/diagnosis/events.h"
@@ -24,9 +25,11 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   Fit explained = *fit;
   if (AddEvents(&explained) == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
-  // A step is a large claim about one move: it has to be worth more than its price.
-  constexpr double kClearly = 20, kEach = 10;
-  const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model));
+  // A step is a large claim about one move: it has to be worth more than its price. So is a cause.
+  constexpr double kClearly = 20, kEach = 10, kCause = 20;
+  const auto terms = [](const Fit& one) { return static_cast<double>(one.model.terms.size()); };
+  const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model)) -
+                       kCause * std::max(terms(*fit) - terms(stepped), 0.0);
   if (BetterBy(stepped, *fit) <= price) return selection;
   *fit = std::move(stepped);
   return again;

@@ -9,9 +9,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// Of the family-wise rate: the screen's. That physics is missing is a larger claim than a name, and
-// what names leave by their shapes is never quite nothing.
-constexpr double kUnknownShare = 0.01;
+// Of the family-wise rate: the screen's; and where what is left is little, of the residuals: what
+// names leave by their shapes is never quite nothing.
+constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
 // Of a look beside the model: a name is often nearly what is there, and the screen looks for what
 // little it leaves.
 constexpr double kKeptMin = 0.012;
@@ -94,10 +94,14 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   Fit stepped = fit;
   stepped.model.terms.push_back(MakeTerm(look, standing, groups));
   StepFit(&stepped);
+  const double size_um = SizeOf(stepped, stepped.model.terms.back());
+  if (size_um < kLittle * fit.noise.typical_um &&
+      best.log_p_family > std::log(kShareOfLittle * family_wise))
+    return std::nullopt;
   return StructureLeft{{.covariate = look.covariate,
                         .channel = std::string(ChannelOf(look)),
                         .p_value = std::exp(best.log_p_family),
-                        .size_um = SizeOf(stepped, stepped.model.terms.back()),
+                        .size_um = size_um,
                         .delta_log_likelihood = standing.chi_square / 2},
                        stepped.model.terms.back()};
 }
