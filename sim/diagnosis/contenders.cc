@@ -20,13 +20,13 @@ bool DifferInShapeAlone(const Template& a, const Template& b) {
 
 bool IsOfAll(const Template& form) { return form.shape_of_unit.empty(); }
 
-// To the nearest shape of its kind.
-double GapTo(const Template& form, const Templates& templates) {
+// To the nearest of other shapes of its kind; 0: it has none, or none between them.
+double GapTo(const Template& form, const Templates& kind) {
   double gap = kInfinity;
-  for (const Template& other : templates)
-    if (IsOfAll(other) && DifferInShapeAlone(form, other) && other.shape != form.shape)
+  for (const Template& other : kind)
+    if (IsOfAll(other) && other.shape != form.shape)
       gap = std::min(gap, std::abs(other.shape - form.shape));
-  return gap;
+  return form.effect->continuous_shape && std::isfinite(gap) ? gap : 0;
 }
 
 Template Moved(const Template& form, double by) {
@@ -110,46 +110,56 @@ std::vector<Contender> ContendersOf(const ScorePass& pass, const std::vector<Sta
   std::vector<Contender> contenders;
   for (const std::size_t k : order) {
     const Template& form = templates[k];
-    const double gap = GapTo(form, templates);
-    if (form.effect->continuous_shape && IsOfAll(form) && std::isfinite(gap))
+    if (!IsOfAll(form)) continue;
+    if (const double gap = GapTo(form, KindOf(form, templates)); gap > 0)
       contenders.push_back({form, gap});
   }
   return contenders;
 }
 
 std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templates,
-                                 const CampaignFacts& facts) {
-  constexpr double kSpeaks = 12;  // chi-square
+                                 const CampaignFacts& facts, const FleetGroups& groups,
+                                 double evidence_min) {
   const std::vector<CampaignUnit>& units = facts.campaign->units;
   std::vector<Contender> contenders;
   std::vector<char> seen(templates.size(), 0);
   for (std::size_t first = 0; first < templates.size(); ++first) {
     if (!templates[first].effect->own_shape || seen[first] != 0) continue;
-    std::vector<std::size_t> listed;
+    Templates kind;
+    std::vector<const Score*> scores;
     for (std::size_t k = first; k < templates.size(); ++k) {
       if (!DifferInShapeAlone(templates[first], templates[k])) continue;
       seen[k] = 1;
-      if (IsOfAll(templates[k]) && !templates[k].between) listed.push_back(k);
+      if (!IsOfAll(templates[k]) || templates[k].between) continue;
+      kind.push_back(templates[k]);
+      scores.push_back(&pass.scores[k]);
     }
+    if (kind.size() < 2) continue;
     std::map<std::uint32_t, double> shapes;
-    double speaks = 0;
-    auto choices = static_cast<double>(listed.size());
-    for (const std::size_t k : listed) choices = std::max(choices, templates[k].choices);
+    Score own = *scores.front();  // each unit's by its own shape
+    const std::size_t c = kind.front().columns;
     for (std::size_t unit = 0; unit < units.size(); ++unit) {
+      const auto at_b = static_cast<std::ptrdiff_t>(unit * c);
+      const auto at_g = static_cast<std::ptrdiff_t>(unit * c * c);
+      std::fill_n(own.b.begin() + at_b, c, 0.0);
+      std::fill_n(own.g.begin() + at_g, c * c, 0.0);
       double most = 0;
-      for (const std::size_t k : listed) {
-        const double chi_square = ChiSquare(pass.scores[k], templates[k], unit);
-        if (chi_square > most) most = chi_square, shapes[units[unit].id] = templates[k].shape;
+      for (std::size_t k = 0; k < kind.size(); ++k) {
+        const double chi_square = ChiSquare(*scores[k], kind[k], unit);
+        if (chi_square <= most) continue;
+        most = chi_square;
+        shapes[units[unit].id] = kind[k].shape;
+        std::copy_n(scores[k]->b.begin() + at_b, c, own.b.begin() + at_b);
+        std::copy_n(scores[k]->g.begin() + at_g, c * c, own.g.begin() + at_g);
       }
-      speaks = std::max(speaks, most);
     }
-    if (speaks < kSpeaks || listed.size() < 2) continue;
-    const Template& kind = templates[listed.front()];
-    double gap = kind.effect->continuous_shape ? kInfinity : 0;
-    for (std::size_t k = 1; k < listed.size(); ++k)
-      gap = std::min(gap, std::abs(templates[listed[k]].shape - kind.shape));
-    contenders.push_back({WithShapes(kind, std::move(shapes)), gap});
-    contenders.back().form.choices = choices;
+    if (shapes.empty()) continue;
+    auto choices = static_cast<double>(kind.size());
+    for (const Template& one : kind) choices = std::max(choices, one.choices);
+    Template form = WithShapes(kind.front(), std::move(shapes));
+    form.choices = choices;
+    if (Assess(own, form, groups).evidence > evidence_min)
+      contenders.push_back({std::move(form), GapTo(kind.front(), kind)});
   }
   return contenders;
 }

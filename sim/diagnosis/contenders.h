@@ -24,9 +24,11 @@ std::vector<Contender> ContendersOf(const ScorePass& pass, const std::vector<Sta
                                     const Templates& templates, std::size_t best, double kept_min);
 
 /// The effects that have own shapes, with the best of the listed ones for each unit, one for each
-/// axis, memory and form; none where no unit's residuals speak for any.
+/// axis, memory and form, where the evidence for them, each unit's choice paid for, is more than
+/// `evidence_min`.
 std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templates,
-                                 const CampaignFacts& facts);
+                                 const CampaignFacts& facts, const FleetGroups& groups,
+                                 double evidence_min);
 
 /// Those that differ from `form` in their shapes alone.
 Templates KindOf(const Template& form, const Templates& library);

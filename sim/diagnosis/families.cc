@@ -125,20 +125,23 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
     CauseFound* relative = nullptr;
-    bool shape = false, related = false, same = false, faint = false;
+    bool of_its_shape = false;
     for (CauseFound& other : kept) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
       const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
       const double there = ShareBeside(other, cause);
-      shape = share < kShape && there < kShapeThere;
+      const bool shape = share < kShape && there < kShapeThere;
       // Of whatever kind: so little of what axes do may be the strong one's shape.
-      related = (shape && other.axis != "none" && cause.axis != "none") ||
-                (share < kCandidate && there < kCandidateThere &&
-                 AreRelated(other.cause, cause.cause) && AxesMeet(other.axis, cause.axis));
-      faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
-              AxesMeet(other.axis, cause.axis) && (other.axis != "none" || cause.axis == "none");
+      const bool related =
+          (shape && other.axis != "none" && cause.axis != "none") ||
+          (share < kCandidate && there < kCandidateThere && AreRelated(other.cause, cause.cause) &&
+           AxesMeet(other.axis, cause.axis));
+      const bool faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
+                         AxesMeet(other.axis, cause.axis) &&
+                         (other.axis != "none" || cause.axis == "none");
       if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
       relative = &other;
+      of_its_shape = faint || (related && shape);
       break;
     }
     // What could as well be the relative by another name, and is weak beside it, is its remainder.
@@ -146,14 +149,14 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       for (CauseFound& other : kept)
         if (cause.delta_log_likelihood < kSameName * other.delta_log_likelihood &&
             AxesMeet(other.axis, cause.axis) && IsCandidate(other, cause.cause)) {
-          relative = &other, same = true;
+          relative = &other, of_its_shape = true;
           break;
         }
     if (relative == nullptr) {
       kept.push_back(std::move(cause));
       continue;
     }
-    if (same || faint || (related && shape)) {
+    if (of_its_shape) {
       TellAsRemainder(cause.size_um, cause.cause, relative);
       continue;
     }

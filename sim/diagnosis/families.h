@@ -29,8 +29,8 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
-/// strong one have. It gets the strong one as a candidate. What is faint by itself, or beside a
-/// cause of an axis, is told as that one's shape. Pre: strongest first.
+/// strong one have. It gets the strong one as a candidate. What is faint, in ln L or beside a cause
+/// of an axis, is told as that one's shape. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as

@@ -142,15 +142,6 @@ Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& gr
   return best;
 }
 
-// Who found no shape among those that each unit may have does not have it.
-ModelTerm TermOf(const Template& form, const Standing& standing, const FleetGroups& groups,
-                 const CampaignFacts& facts) {
-  ModelTerm term = MakeTerm(form, standing, groups);
-  for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
-    if (!ShapeOf(form, facts.campaign->units[unit].id)) term.group_of_unit[unit] = kNoGroup;
-  return term;
-}
-
 void DropTerm(std::size_t at, Fit* fit) {
   fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(at));
   StepFit(fit);
@@ -211,7 +202,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
       continue;
     }
     looks->Forget();
-    fit->model.terms[t] = TermOf(templates[best.at], best.standing, groups, *fit->facts);
+    fit->model.terms[t] = MakeTerm(templates[best.at], best.standing, groups);
     StepFit(fit);
     Refit(fit);
     changed = true;
@@ -287,21 +278,26 @@ namespace {
 bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* templates,
              LookBook* looks, Fit* fit, Selection* selection) {
   rule.progress("signatures");
-  for (Template& form : WorthAScore(*fit, *templates))
-    if (IndexOf(*templates, form) == kNoTerm)
-      templates->push_back(std::move(form)), looks->Forget();
+  const bool full = fit->model.terms.size() >= rule.terms_max;
+  if (!full)
+    for (Template& form : WorthAScore(*fit, *templates))
+      if (IndexOf(*templates, form) == kNoTerm)
+        templates->push_back(std::move(form)), looks->Forget();
   const Look& look = looks->At(*fit, *templates, kNoTerm);
   if (selection->kept_share.empty()) {
     selection->tests = EffectiveTests(look.pass.scores, *templates, rule.seed);
     for (const Score& score : look.pass.scores)
       selection->kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
   }
-  if (fit->model.terms.size() >= rule.terms_max) return false;
+  if (full) return false;
   Best best = BestOf(look.pass, *templates, look.standings, selection->tests, rule.family_wise);
   const std::size_t listed = templates->size();
   std::vector<Contender> contenders =
       ContendersOf(look.pass, look.standings, *templates, best.at, kKeptMin);
-  for (Contender& own : OwnShapes(look.pass, *templates, *fit->facts))
+  // Their evidence grows where each unit's shape is refined, too.
+  constexpr double kOfBest = 0.3;
+  const double least = best.at == kNoTerm ? 0 : kOfBest * best.standing.evidence;
+  for (Contender& own : OwnShapes(look.pass, *templates, *fit->facts, groups, least))
     contenders.push_back(std::move(own));
   looks->Forget();
   RefineContenders(*fit, groups, &contenders);
@@ -311,7 +307,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
     best = BestAmong(*fit, *templates, groups, listed, best, selection->tests, rule.family_wise);
   if (best.at == kNoTerm) return false;
   const CampaignModel before = fit->model;
-  fit->model.terms.push_back(TermOf((*templates)[best.at], best.standing, groups, *fit->facts));
+  fit->model.terms.push_back(MakeTerm((*templates)[best.at], best.standing, groups));
   StepFit(fit);
   Refit(fit);
   if (SizeOf(*fit, fit->model.terms.back()) >= rule.size_min_um) return true;
@@ -394,7 +390,9 @@ void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t
   Templates kind = KindOf(term.form, library);
   for (Template& more : KindOf(term.form, WorthAScore(*fit, library)))
     kind.push_back(std::move(more));
-  std::vector<Contender> found = OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts);
+  constexpr double kAny = -std::numeric_limits<double>::infinity();
+  std::vector<Contender> found =
+      OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts, groups, kAny);
   RefineContenders(*fit, groups, &found);
   // What units have that were looked at stays.
   for (Contender& one : found) term.form.shape_of_unit.merge(one.form.shape_of_unit);

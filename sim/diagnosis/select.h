@@ -39,7 +39,8 @@ struct SelectionRule {
 struct Selection {
   std::vector<Accepted> accepted;  // Shape: (terms of the model)
   double tests = 1;                // independent tests that the library is worth
-  std::vector<double> kept_share;  // of a signature beside the geometry; templates first
+  // Of a signature beside the geometry. Shape: (templates), then those found at a glance.
+  std::vector<double> kept_share;
 };
 
 /// Adds terms to the fit's model.

@@ -399,9 +399,13 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
       best.evidence = scatter.evidence;
       best.spread = 0;
       best.scattered = true;
-      best.has.assign(units, 1);
       best.chi_square = 0;
-      for (const GroupScore& group : levels.front().groups) best.chi_square += group.chi_square;
+      for (std::size_t unit = 0; unit < units; ++unit) {
+        const GroupScore& own = levels.front().groups[unit];
+        best.chi_square += own.chi_square;
+        // Who found no shape among those that each unit may have does not have it.
+        best.has[unit] = form.shape_of_unit.empty() || !own.empty() ? 1 : 0;
+      }
     }
   }
   best.evidence -= price;

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <limits>
+
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
@@ -10,6 +12,7 @@
 namespace focalfleet::sim {
 namespace {
 
+constexpr double kAnyEvidence = -std::numeric_limits<double>::infinity();
 constexpr double kHeight_deg = 0.2;
 
 double PlaceOf_deg(std::uint32_t unit) { return std::fmod(222.5 * (unit + 1), 360); }
@@ -100,7 +103,7 @@ TEST(OwnShapes, WhoHasAChoiceOfShapesPaysForIt) {
   const Fit fit = StaticFit(facts);
   const FleetGroups groups = GroupsOf(facts);
   const Templates listed = ListTemplates(*FindEffect("tooth_damage"), facts);
-  std::vector<Contender> own = OwnShapes(ScoreTemplates(fit, listed), listed, facts);
+  std::vector<Contender> own = OwnShapes(ScoreTemplates(fit, listed), listed, facts, groups, 0);
   ASSERT_FALSE(own.empty());
   const Template& chosen = own[0].form;
   EXPECT_EQ(chosen.choices, 24);
@@ -125,11 +128,15 @@ TEST(OwnShapes, NoiseHasNone) {
     const CampaignFacts facts = MakeFacts(campaign);
     const Fit fit = StaticFit(facts);
     const Templates listed = ListTemplates(*FindEffect("tooth_damage"), facts);
-    std::vector<Contender> own = OwnShapes(ScoreTemplates(fit, listed), listed, facts);
-    RefineContenders(fit, GroupsOf(facts), &own);
+    const FleetGroups groups = GroupsOf(facts);
+    const ScorePass listed_pass = ScoreTemplates(fit, listed);
+    EXPECT_TRUE(OwnShapes(listed_pass, listed, facts, groups, 0).empty());
+    std::vector<Contender> own = OwnShapes(listed_pass, listed, facts, groups, kAnyEvidence);
+    EXPECT_FALSE(own.empty());
+    RefineContenders(fit, groups, &own);
     for (const Contender& one : own) {
       const ScorePass pass = ScoreTemplates(fit, {one.form});
-      EXPECT_LE(Assess(pass.scores[0], one.form, GroupsOf(facts)).evidence, 0);
+      EXPECT_LE(Assess(pass.scores[0], one.form, groups).evidence, 0);
     }
   }
 }

@@ -106,6 +106,14 @@ TEST(Families, WhatIsFaintByItselfIsNoNameBesideAStrongerOne) {
   EXPECT_THAT(beside("both", 22)[0].shape, testing::HasSubstr("thermal_arm_growth"));
   EXPECT_THAT(beside("both", 32), SizeIs(2));
   EXPECT_THAT(beside("theta", 14), SizeIs(2));  // on another axis
+
+  // What moves the whole fibre leaves nothing that looks like an axis.
+  std::vector<CauseFound> causes = {Cause("gravity_sag", "none", 92), Cause("wear", "phi", 22)};
+  JudgeRemainders(&causes);
+  EXPECT_THAT(causes, SizeIs(2));
+  causes[1].axis = "none";
+  JudgeRemainders(&causes);
+  EXPECT_THAT(causes, SizeIs(1));
 }
 
 TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
