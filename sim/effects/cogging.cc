@@ -1,11 +1,14 @@
 // Cogging: the motor's detent.
-#include <algorithm>
-
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
+
+// Forms 1 and 2: a ripple that falls with the drive or with its square. Form 3: a rotor that the
+// detent turns so far that it meets another detent there; where sin(lag) = t/U sin(n (angle - lag))
+// the k-th harmonic of the lag falls with U^k.
+constexpr int kBent = 3;
 
 void List(const CampaignFacts&, Templates* out) {
   for (const int power : {1, 2})
@@ -15,19 +18,19 @@ void List(const CampaignFacts&, Templates* out) {
               .form = power,
               .columns = 2},
              out);
+  ListGrid({.shapes = {1, 2, 6},
+            .shape_name = "bent, falls with the drive; motor harmonic",
+            .form = kBent,
+            .columns = 6},
+           out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  const std::span<const double> drive = track.Column("drive_amplitude");
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const double level = std::max(drive[i], 0.05);
-    const double strength = form.form == 1 ? 1 / level : 1 / (level * level);
-    const double phase = HarmonicPhase(track, axis, i, form.shape * track.unit->gear[axis]);
-    errors->angle_deg[axis][i] +=
-        strength * (amplitude[0] * SineOfTurns(phase) + amplitude[1] * CosineOfTurns(phase));
-  }
+  const FallsWithDrive falls =
+      form.form == kBent ? FallsWithDrive{1, 1} : FallsWithDrive{static_cast<double>(form.form), 0};
+  AddMotorWave(track, axis, form.shape * track.unit->gear[axis], falls, amplitude, errors);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "sim/effects/harmonic.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace focalfleet::sim {
@@ -33,6 +34,28 @@ void AddHarmonic(const UnitTrack& track, std::size_t axis, double order,
     const double ahead = part == 0 ? 0 : 0.25;  // a cosine is a sine a quarter ahead
     for (std::size_t i = 0; i < track.moves; ++i)
       angle_deg[i] += amplitude[part] * SineOfTurns(WithoutTurns(order * cmd_deg[i]) / 360 + ahead);
+  }
+}
+
+void AddMotorWave(const UnitTrack& track, std::size_t axis, double order,
+                  const FallsWithDrive& falls, std::span<const double> amplitude,
+                  PoseErrors* errors) {
+  constexpr double kLevelLeast = 0.05;
+  for (std::size_t k = 0; 2 * k < amplitude.size(); ++k) {
+    const double sine = amplitude[2 * k], cosine = amplitude[2 * k + 1];
+    if (sine == 0 && cosine == 0) continue;
+    const double own_order = order * static_cast<double>(k + 1);
+    const double power = falls.power + falls.more * static_cast<double>(k);
+    std::span<const double> drive;
+    if (power != 0) drive = track.Column("drive_amplitude");
+    AddRemembered(
+        track, axis, Memory::kHold,
+        [&](std::size_t i) {
+          const double phase = HarmonicPhase(track, axis, i, own_order);
+          const double wave = sine * SineOfTurns(phase) + cosine * CosineOfTurns(phase);
+          return power == 0 ? wave : wave / std::pow(std::max(drive[i], kLevelLeast), power);
+        },
+        &errors->angle_deg[axis]);
   }
 }
 

@@ -32,4 +32,18 @@ inline double HarmonicPhase(const UnitTrack& track, std::size_t axis, std::size_
 void AddHarmonic(const UnitTrack& track, std::size_t axis, double order,
                  std::span<const double> amplitude, PoseErrors* errors);
 
+/// How a ripple of the motor falls with the drive level: as a power of it, and each further
+/// harmonic by so many powers more.
+struct FallsWithDrive {
+  double power = 0;
+  double more = 0;
+};
+
+/// sin, cos of the order and of as many of its harmonics as there are amplitudes for, on the axis'
+/// angle; what a rotor came to rest with stays until the axis moves again. Pre: column
+/// drive_amplitude, unless both powers are 0.
+void AddMotorWave(const UnitTrack& track, std::size_t axis, double order,
+                  const FallsWithDrive& falls, std::span<const double> amplitude,
+                  PoseErrors* errors);
+
 }  // namespace focalfleet::sim

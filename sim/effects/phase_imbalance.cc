@@ -1,5 +1,6 @@
 // Phase imbalance: unequal phases or dead time of the bridge.
-#include <algorithm>
+#include <utility>
+#include <vector>
 
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
@@ -7,30 +8,39 @@
 namespace focalfleet::sim {
 namespace {
 
+// By form. 0: gains; 1: volts, an offset or dead time. Bent, where the field is turned so far that
+// its angle is no sine: 2: gains, an ellipse; 3: an offset, whose k-th harmonic falls with U^k;
+// 4: dead time, which has corners.
+constexpr FallsWithDrive kFalls[] = {{0, 0}, {1, 0}, {0, 0}, {1, 1}, {1, 0}};
+constexpr bool IsBent(int form) { return form >= 2; }
+
 void List(const CampaignFacts& facts, Templates* out) {
+  const auto list = [&](int form, std::vector<double> harmonics, const char* name) {
+    ListGrid({.shapes = std::move(harmonics),
+              .shape_name = name,
+              .form = form,
+              .columns = IsBent(form) ? 6u : 2u},
+             out);
+  };
   // Unequal gains grow with the drive, so that the angle does not know it; an offset (order 1) and
   // the bridge's dead time (order 6) are volts of their own.
-  ListGrid({.shapes = {2}, .shape_name = "unequal gains; motor harmonic", .columns = 2}, out);
-  const bool levels = facts.Has("drive_amplitude");
-  ListGrid({.shapes = {1, 6},
-            .shape_name = levels ? "falls with the drive; motor harmonic" : "motor harmonic",
-            .form = levels ? 1 : 0,
-            .columns = 2},
-           out);
+  list(0, {2}, "unequal gains; motor harmonic");
+  list(2, {2}, "bent, unequal gains; motor harmonic");
+  if (!facts.Has("drive_amplitude")) {
+    list(0, {1, 6}, "motor harmonic");
+    list(2, {1, 6}, "bent; motor harmonic");
+    return;
+  }
+  list(1, {1, 6}, "falls with the drive; motor harmonic");
+  list(3, {1}, "bent, falls with the drive; motor harmonic");
+  list(4, {6}, "bent, falls with the drive; motor harmonic");
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  const double order = form.shape * track.unit->gear[axis];
-  if (form.form == 0) return AddHarmonic(track, axis, order, amplitude, errors);
-  const std::span<const double> drive = track.Column("drive_amplitude");
-  for (std::size_t i = 0; i < track.moves; ++i) {
-    const double phase = HarmonicPhase(track, axis, i, order);
-    errors->angle_deg[axis][i] +=
-        (amplitude[0] * SineOfTurns(phase) + amplitude[1] * CosineOfTurns(phase)) /
-        std::max(drive[i], 0.05);
-  }
+  AddMotorWave(track, axis, form.shape * track.unit->gear[axis], kFalls[form.form], amplitude,
+               errors);
 }
 
 }  // namespace

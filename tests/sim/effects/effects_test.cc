@@ -197,6 +197,26 @@ TEST(Effects, ALagIsTheArcsineOfTheLoadUpToThePullOut) {
   }
 }
 
+// Where no axis moves nothing turns the rotor, whatever the drive level is by then.
+TEST(Effects, ARotorStaysWhereItCameToRest) {
+  Campaign campaign = Made();
+  const auto drive = std::ranges::find(campaign.covariates, "drive_amplitude", &Covariate::name);
+  const std::size_t row = campaign.first_row[5] + 7;
+  campaign.cmd_deg[kTheta][row] = campaign.cmd_deg[kTheta][row - 1];
+  drive->values[row - 1] = 0.6, drive->values[row] = 1.5;
+  const CampaignFacts facts = MakeFacts(campaign);
+  const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+  ASSERT_EQ(track.step_deg[kTheta][7], 0);
+  const Template form{.effect = FindEffect("cogging"),
+                      .axis = EffectAxis::kTheta,
+                      .columns = 2,
+                      .form = 1,
+                      .shape = 2};
+  const auto errors = Applied(track, form, 0.01);
+  EXPECT_NE(errors[6], 0);
+  EXPECT_EQ(errors[7], errors[6]);
+}
+
 TEST(Effects, ARelaxationThatIsOverBeforeTheExposuresDoesNotShow) {
   Campaign campaign = Made();
   const auto column = std::ranges::find(campaign.covariates, "delay_s", &Covariate::name);
