@@ -17,10 +17,14 @@ constexpr double kSizeMin_um = 0.2;
 
 using Vector4 = Eigen::Matrix<double, 4, 1>;
 using Matrix4 = Eigen::Matrix<double, 4, 4>;
+using Vector6 = Eigen::Matrix<double, 6, 1>;
+using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
+// Shift (2), turn, scale, and the two shears, which no camera has.
 struct Image {
-  Matrix4 normal = Matrix4::Zero();
-  Vector4 right = Vector4::Zero();
+  Matrix6 normal = Matrix6::Zero();
+  Vector6 right = Vector6::Zero();
+  double square = 0;  // of the whitened residuals
   double rows = 0;
 };
 
@@ -31,17 +35,19 @@ std::vector<Image> Normals(const Fit& fit) {
     for (std::size_t k = 0; k < white.moves.size(); ++k) {
       const std::size_t i = white.moves[k];
       Image& image = images[fit.facts->exposures.of_row[white.track.first_row + i]];
-      // Per um of shift, and per um at the plate's edge of turn and scale.
+      // Per um of shift, and per um at the plate's edge of turn, scale and shears.
       const double x = white.track.fibre_x_mm[i] / fit.facts->radius_mm;
       const double y = white.track.fibre_y_mm[i] / fit.facts->radius_mm;
       const double* w = white.filter[k].w;
-      Eigen::Matrix<double, 2, 4> plain, j;
-      plain << 1, 0, -y, x, 0, 1, x, y;
+      Eigen::Matrix<double, 2, 6> plain, j;
+      plain << 1, 0, -y, x, x, y, 0, 1, x, y, -y, x;
       Eigen::Matrix2d root;
       root << w[0], w[1], w[1], w[2];
       j = root * plain;
       image.normal += j.transpose() * j;
-      image.right += j.transpose() * white.y.segment<2>(static_cast<Eigen::Index>(2 * k));
+      const Eigen::Vector2d residual = white.y.segment<2>(static_cast<Eigen::Index>(2 * k));
+      image.right += j.transpose() * residual;
+      image.square += residual.squaredNorm();
       image.rows += 1;
     }
   }
@@ -267,14 +273,68 @@ Motion FindMotion(const Fit& fit) {
   motion.found.assign(images.size(), Vector4::Zero());
   for (std::size_t e = 0; e < images.size(); ++e) {
     if (images[e].rows < 6) continue;
-    const Matrix4 covariance = images[e].normal.ldlt().solve(Matrix4::Identity());
-    motion.found[e] = covariance * images[e].right;
+    const Matrix4 normal = images[e].normal.topLeftCorner<4, 4>();
+    const Matrix4 covariance = normal.ldlt().solve(Matrix4::Identity());
+    motion.found[e] = covariance * images[e].right.head<4>();
     motion.square += motion.found[e].cwiseAbs2();
     motion.noise += covariance.diagonal();
-    motion.chi_square += motion.found[e].dot(images[e].right);
+    motion.chi_square += motion.found[e].dot(images[e].right.head<4>());
     motion.dof += 4;
   }
   return motion;
+}
+
+// A variance, summed over the images, without the noise's; its own variance, and what that is
+// where there is nothing but noise.
+struct Power {
+  double power = 0, variance = 0, variance_of_noise = 0;
+};
+
+// How images are deformed, anew at each exposure. Air has no preferred direction: a field whose
+// components vary alike in both directions shears as much as it turns and scales.
+struct Deformation {
+  Power rigid;  // turn and scale
+  Power shear;
+  [[nodiscard]] bool IsCamera() const {
+    constexpr double kSure = 3;  // standard deviations
+    const double more = rigid.power - 2 * std::max(shear.power, 0.0);
+    return more > kSure * std::sqrt(rigid.variance + 4 * shear.variance);
+  }
+  [[nodiscard]] bool IsAir() const {
+    constexpr double kSure = 5;
+    return shear.power > kSure * std::sqrt(shear.variance_of_noise) &&
+           shear.power > 0.5 * rigid.power;
+  }
+};
+
+Deformation FindDeformation(const Fit& fit) {
+  constexpr double kRowsMin = 8;
+  Vector6 square = Vector6::Zero(), noise = Vector6::Zero();
+  double count = 0, left = 0, freedom = 0;
+  for (const Image& image : Normals(fit)) {
+    if (image.rows < kRowsMin) continue;
+    const Eigen::LDLT<Matrix6> solver(image.normal);
+    const Vector6 variance = solver.solve(Matrix6::Identity()).diagonal();
+    if (!variance.allFinite() || !(variance.minCoeff() > 0)) continue;
+    const Vector6 found = solver.solve(image.right);
+    square += found.cwiseAbs2();
+    noise += variance;
+    count += 1;
+    left += image.square - found.dot(image.right);
+    freedom += 2 * image.rows - 6;
+  }
+  if (count == 0) return {};
+  // The fit took the images' motion for noise; what is left beside it is the noise.
+  noise *= left / freedom;
+  const auto power = [&](Eigen::Index k) {
+    // Of a normal variable's square: twice its mean's square.
+    const auto variance = [&](const Vector6& of) {
+      return 2 * (of[k] * of[k] + of[k + 1] * of[k + 1]) / count;
+    };
+    return Power{square[k] + square[k + 1] - noise[k] - noise[k + 1], variance(square),
+                 variance(noise)};
+  };
+  return {power(2), power(4)};
 }
 
 bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
@@ -352,6 +412,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   if (one_step_alone && (steps == 0 || !HidesAColumn(*fit, family_wise))) return image;
   const Fit with_step = one_step_alone ? *fit : Fit{};
   if (DropImageSteps(fit)) motion = FindMotion(*fit);
+  const Deformation deformed = FindDeformation(*fit);
   image.moves = true;
   double size_um = 0;
   motion = TakeMotion(std::move(motion), fit, &size_um);
@@ -366,8 +427,9 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
   constexpr double kRemembers = 4;
-  if (Carryover(motion.found) < kRemembers) cause.candidates.emplace_back("air_turbulence");
-  if (after > kNeighboursAgree) {
+  if (Carryover(motion.found) < kRemembers && !deformed.IsCamera())
+    cause.candidates.emplace_back("air_turbulence");
+  if (after > kNeighboursAgree || deformed.IsAir()) {
     cause.cause = "air_turbulence";
     cause.candidates = {cause.cause};
     cause.size_um = std::hypot(size_um, turbulence_um);

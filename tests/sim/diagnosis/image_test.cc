@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -51,6 +52,43 @@ TEST(Image, OneThatForgetsMayBeAir) {
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
   EXPECT_THAT(diagnosis.causes[0].candidates,
               testing::UnorderedElementsAre("camera_similarity", "air_turbulence"));
+}
+
+// Shifted, and deformed, anew at each exposure: um at the plate's edge.
+Campaign Deformed(std::size_t units, double turn_and_scale_um, double shear_um) {
+  Campaign campaign = Planted({}, {.units = units, .moves = 80, .seed = 8});
+  const Exposures exposures = FindExposures(campaign);
+  Rng rng = Rng::Stream(4, "deformed");
+  std::vector<std::array<double, 6>> of(exposures.size());
+  for (auto& one : of)
+    for (double& draw : one) draw = rng.Normal();
+  double edge_mm = 0;
+  for (const CampaignUnit& unit : campaign.units)
+    edge_mm = std::max(edge_mm, std::hypot(unit.base_x_mm, unit.base_y_mm));
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const auto& d = of[exposures.of_row[row]];
+    const double x = campaign.x_mm[row] / edge_mm, y = campaign.y_mm[row] / edge_mm;
+    const double turn = turn_and_scale_um * d[2], scale = turn_and_scale_um * d[3];
+    const double one = shear_um * d[4], other = shear_um * d[5];
+    campaign.x_mm[row] += 1e-3 * (4 * d[0] - turn * y + scale * x + one * x + other * y);
+    campaign.y_mm[row] += 1e-3 * (4 * d[1] + turn * x + scale * y - one * y + other * x);
+  }
+  return campaign;
+}
+
+TEST(Image, OneThatTurnsAndScalesWithoutShearsIsTheCameras) {
+  const Diagnosis diagnosis = Verdicts(Deformed(24, 4, 0));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity"));
+}
+
+TEST(Image, OneThatShearsAsMuchIsAir) {
+  for (const std::size_t units : {8u, 24u}) {
+    const Diagnosis diagnosis = Verdicts(Deformed(units, 3, 3));
+    ASSERT_FALSE(diagnosis.causes.empty()) << units;
+    EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("air_turbulence"))
+        << units << Told(diagnosis);
+  }
 }
 
 TEST(Image, OneThatSwingsSlowlyIsUnknown) {
