@@ -320,21 +320,25 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
   std::vector<CauseFound> all, kept;
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
     all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
+  std::vector<char> is_remainder;
+  for (std::size_t t = 0; t < all.size(); ++t)
+    is_remainder.push_back(beside[t].is_remainder() && CanLeave(all[beside[t].of], all[t].size_um));
   // Whose remainder a remainder is: of is stronger each time, so that this ends.
   const auto named = [&](std::size_t of) {
-    while (beside[of].is_remainder()) of = beside[of].of;
+    while (is_remainder[of] != 0) of = beside[of].of;
     return of;
   };
   for (std::size_t t = 0; t < all.size(); ++t) {
     if (!beside[t].is_doubtful()) continue;
     CauseFound& strong = all[named(beside[t].of)];
-    if (beside[t].is_remainder())
+    if (is_remainder[t] != 0)
       TellAsRemainder(all[t].size_um, all[t].cause, &strong);
-    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
+    else if (all[t].size_um < strong.size_um &&
+             std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
       all[t].candidates.push_back(strong.cause);
   }
   for (std::size_t t = 0; t < all.size(); ++t)
-    if (!beside[t].is_remainder()) kept.push_back(std::move(all[t]));
+    if (is_remainder[t] == 0) kept.push_back(std::move(all[t]));
   return kept;
 }
 

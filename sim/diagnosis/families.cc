@@ -89,6 +89,11 @@ bool AreRelated(std::string_view a, std::string_view b) {
                      [&](const auto& family) { return Has(family, a) && Has(family, b); });
 }
 
+bool CanLeave(const CauseFound& of, double size_um) {
+  constexpr double kOfSize = 0.5;
+  return size_um < kOfSize * of.size_um;
+}
+
 void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of) {
   char size[32];
   std::snprintf(size, sizeof size, "%.2g", size_um);
@@ -130,13 +135,14 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
       const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
       const double there = ShareBeside(other, cause);
-      const bool shape = share < kShape && there < kShapeThere;
+      const bool smaller = CanLeave(other, cause.size_um);
+      const bool shape = smaller && share < kShape && there < kShapeThere;
       // Of whatever kind: so little of what axes do may be the strong one's shape.
       const bool related =
           (shape && other.axis != "none" && cause.axis != "none") ||
           (share < kCandidate && there < kCandidateThere && AreRelated(other.cause, cause.cause) &&
            AxesMeet(other.axis, cause.axis));
-      const bool faint = cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
+      const bool faint = smaller && cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
                          AxesMeet(other.axis, cause.axis) &&
                          (other.axis != "none" || cause.axis == "none");
       if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;

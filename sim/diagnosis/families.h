@@ -18,6 +18,9 @@ bool IsOfAngle(std::string_view cause);
 /// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
+/// No shape leaves more than half of what it is.
+bool CanLeave(const CauseFound& of, double size_um);
+
 /// Tells what the shape of `of` leaves and what that looks like, by name: a cause or a column.
 void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of);
 
@@ -30,7 +33,7 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
 /// strong one have. It gets the strong one as a candidate. What is faint, in ln L or beside a cause
-/// of an axis, is told as that one's shape. Pre: strongest first.
+/// of an axis, and less than that one's shape can leave is told so. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as

@@ -62,5 +62,22 @@ TEST(Distortion, AWeakCauseBesideAStrongOneIsKept) {
   EXPECT_FALSE(judged[1].is_doubtful()) << judged[1].kept;
 }
 
+// The stop's angle in one unit is twice what the torque turns them all by.
+TEST(Distortion, WhatIsLargerThanTheStrongOneIsNotWhatItsShapeLeaves) {
+  for (const auto& [form, size] : {std::pair(11, 0.05), {13, 0.02}}) {
+    const Diagnosis diagnosis =
+        Verdicts(Planted({{.cause = "fibre_torque", .amplitude = 0.06, .axis = "phi"},
+                          {.cause = "hard_stop",
+                           .amplitude = size,
+                           .axis = "phi",
+                           .unit_share = 0.05,
+                           .form = form}},
+                         {.moves = 150}));
+    ASSERT_EQ(diagnosis.causes.size(), 2u) << Told(diagnosis);
+    EXPECT_EQ(diagnosis.causes[1].cause, "hard_stop") << Told(diagnosis);
+    EXPECT_EQ(diagnosis.causes[1].candidates.size(), 1u) << Told(diagnosis);
+  }
+}
+
 }  // namespace
 }  // namespace focalfleet::sim

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 namespace focalfleet::sim {
 namespace {
 
@@ -20,7 +22,7 @@ CauseFound Cause(const char* name, const char* axis, double delta_log_likelihood
   cause.axis = axis;
   cause.all_units = true;
   cause.delta_log_likelihood = delta_log_likelihood;
-  cause.size_um = 1;
+  cause.size_um = std::sqrt(delta_log_likelihood);  // as where all have the same noise
   return cause;
 }
 
@@ -116,11 +118,25 @@ TEST(Families, WhatIsFaintByItselfIsNoNameBesideAStrongerOne) {
   EXPECT_THAT(causes, SizeIs(1));
 }
 
+// One unit's stop among all units' fibres explains little in sum.
+TEST(Families, NoShapeLeavesMoreThanItIs) {
+  const auto beside = [](double size_um) {
+    std::vector<CauseFound> causes = {Cause("fibre_torque", "phi", 1000),
+                                      Cause("hard_stop", "phi", 28)};
+    causes[0].size_um = 7, causes[1].size_um = size_um;
+    JudgeRemainders(&causes);
+    return causes;
+  };
+  EXPECT_THAT(beside(3), SizeIs(1));
+  EXPECT_THAT(beside(9), SizeIs(2));
+}
+
 TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
   std::vector<CauseFound> causes = {Cause("base_offset", "none", 9000),
                                     Cause("gravity_sag", "none", 5000), Cause("wear", "theta", 90)};
   causes[0].size_um = 50;
   causes[1].size_um = 20;
+  causes[2].size_um = 1;
   const auto who = [&](const char* channel, double size_um, double noise_um) {
     const CauseFound* of = WhoLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
     return of == nullptr ? "nobody" : of->cause;
@@ -220,7 +236,7 @@ TEST(Families, WhatExplainsLessThanIsLeftOnItsAxisIsPartOfTheUnknown) {
   ASSERT_THAT(causes, SizeIs(2));
   EXPECT_EQ(causes[0].cause, "backlash");
   EXPECT_EQ(causes[1].cause, "stiction");
-  EXPECT_DOUBLE_EQ(unknown[0].size_um, std::hypot(2, 1));
+  EXPECT_DOUBLE_EQ(unknown[0].size_um, std::hypot(2, std::sqrt(60.0)));
 }
 
 TEST(Families, ASeriesOfAngleCausesOnOneAxisIsUnknown) {
