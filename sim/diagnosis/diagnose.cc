@@ -19,6 +19,7 @@
 #include "sim/diagnosis/multi_start.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
+#include "sim/diagnosis/polished.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/series.h"
 #include "sim/diagnosis/term_trace.h"
@@ -464,6 +465,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   DropSeries(options.family_wise, options.seed, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
+  AskWithoutRemainders(templates, rule, fit, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);

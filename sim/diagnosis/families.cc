@@ -99,6 +99,7 @@ void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of
   std::snprintf(size, sizeof size, "%.2g", size_um);
   of->shape += "; what its shape leaves, " + std::string(size) + " um, looks like ";
   of->shape += looks_like;
+  of->remainders.emplace_back(looks_like);
 }
 
 CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes) {

@@ -272,6 +272,16 @@ Best FindBest(const ScorePass& pass, const Templates& templates, const FleetGrou
                 family_wise, kept_min);
 }
 
+std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& rule, const Fit& fit,
+                              std::size_t term) {
+  Templates tried = templates;
+  const Template& form = fit.model.terms[term].form;
+  if (IndexOf(tried, form) == kNoTerm) tried.push_back(form);
+  const FleetGroups groups = GroupsOf(*fit.facts);
+  LookBook looks(groups, true);
+  return RivalsOf(looks.At(fit, tried, term), tried, groups, IndexOf(tried, form), rule);
+}
+
 namespace {
 
 // Adds the best template, with the shape that suits it. False: chance explains what is left.

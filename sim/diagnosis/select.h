@@ -46,6 +46,10 @@ struct Selection {
 /// Adds terms to the fit's model.
 Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit);
 
+/// Who else could be the term, as the fit stands.
+std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& rule, const Fit& fit,
+                              std::size_t term);
+
 /// The term that a standing calls for, with amplitudes 0.
 ModelTerm MakeTerm(const Template& form, const Standing& standing, const FleetGroups& groups);
 

@@ -32,6 +32,7 @@ TEST(Families, AFaintRelativeIsTheShapeOfTheStrongOne) {
   JudgeRemainders(&causes);
   ASSERT_THAT(causes, SizeIs(1));
   EXPECT_THAT(causes[0].shape, HasSubstr("friction_windup"));
+  EXPECT_THAT(causes[0].remainders, ElementsAre("friction_windup"));
 }
 
 TEST(Families, AWeakRelativeIsNotSure) {
