@@ -420,7 +420,7 @@ std::size_t AddEvents(Fit* fit) {
 std::vector<CauseFound> EventCauses(const Fit& fit) {
   std::vector<CauseFound> causes;
   for (const bool lost_command : {false, true}) {
-    CauseFound cause = CauseNamed(lost_command ? "lost_command" : "step_loss");
+    CauseFound cause = CauseNamed(lost_command ? kLostCommand : kStepLoss);
     cause.scope = "unit";
     cause.amplitude_unit = "events";
     std::set<std::uint32_t> units;

@@ -3,12 +3,15 @@
 // (step_loss), a whole command lost or done twice (lost_command).
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/fit.h"
 
 namespace focalfleet::sim {
+
+inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_command";
 
 /// Adds the steps that stand out from the residuals to the model. Returns how many.
 std::size_t AddEvents(Fit* fit);
