@@ -20,7 +20,8 @@ double PlaceOf_deg(std::uint32_t unit) { return std::fmod(222.5 * (unit + 1), 36
 double Apart_deg(double a, double b) { return std::abs(std::remainder(a - b, 360)); }
 
 // A tooth elsewhere in each unit's pinion, broader than the library's.
-void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* campaign) {
+void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* campaign,
+                 double width_deg = 15) {
   std::vector<std::size_t> unit_of(campaign->rows());
   for (std::size_t u = 0; u < campaign->units.size(); ++u)
     for (std::size_t row = campaign->first_row[u]; row < campaign->first_row[u + 1]; ++row)
@@ -30,7 +31,8 @@ void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* c
         const CampaignUnit& unit = campaign->units[unit_of[row]];
         if (!has(unit.id)) return 0.0;
         const double at = PinionRatio(unit, kTheta) * campaign->cmd_deg[kTheta][row];
-        return kHeight_deg * std::exp(-std::pow(Apart_deg(at, PlaceOf_deg(unit.id)) / 15, 2) / 2);
+        return kHeight_deg *
+               std::exp(-std::pow(Apart_deg(at, PlaceOf_deg(unit.id)) / width_deg, 2) / 2);
       },
       campaign);
 }
@@ -52,6 +54,17 @@ TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
                 shapes,
                 [](const auto& own) { return Apart_deg(own.second, PlaceOf_deg(own.first)) < 8; }),
             20);
+}
+
+TEST(OwnShapes, ATeethsLongMeshIsNothingElse) {
+  for (const double width_deg : {10.0, 32.0}) {
+    Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+    DamageTeeth([](std::uint32_t) { return true; }, &campaign, width_deg);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    ASSERT_EQ(diagnosis.causes.size(), 1u) << width_deg << Told(diagnosis);
+    EXPECT_EQ(diagnosis.causes[0].cause, "tooth_damage");
+    EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << width_deg << Told(diagnosis);
+  }
 }
 
 TEST(OwnShapes, FewUnitsAmongManyHaveTheirs) {
