@@ -83,6 +83,8 @@ bool AxesMeet(std::string_view a, std::string_view b) {
 
 bool IsOfAngle(std::string_view cause) { return Has(kAngles, cause); }
 
+bool IsOfNight(std::string_view cause) { return Has(kNight, cause); }
+
 bool AreRelated(std::string_view a, std::string_view b) {
   const std::span<const std::string_view> families[] = {kMoves, kAngles, kNight, kImage, kRotor};
   return std::any_of(std::begin(families), std::end(families),
@@ -220,11 +222,12 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
   // Over a night the supply sinks, for one, and the air cools, for the other; at one drive level a
   // lag of the load is play, and what phases do is what the rotor's poles do; at one delay so is
-  // what has not yet relaxed.
+  // what has not yet relaxed. A plate that grows is a camera that scales.
   constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
                                                          {"backlash", "load_angle_lag"},
                                                          {"backlash", "relaxation"},
-                                                         {"phase_imbalance", "cogging"}};
+                                                         {"phase_imbalance", "cogging"},
+                                                         {"camera_similarity", "plate_expansion"}};
   for (CauseFound& cause : *causes)
     for (const NotTestable& other : not_testable)
       for (const auto& pair : kAlikeWithoutColumn)

@@ -15,6 +15,9 @@ bool AreRelated(std::string_view a, std::string_view b);
 /// Does it depend on where an axis stands?
 bool IsOfAngle(std::string_view cause);
 
+/// Does it drift as a night goes on?
+bool IsOfNight(std::string_view cause);
+
 /// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 

@@ -229,6 +229,14 @@ TEST(Families, WhoCannotBeTestedIsACandidateBesideItsLikeOverTheNight) {
   EXPECT_THAT(causes[1].candidates, SizeIs(1));
 }
 
+TEST(Families, AScaleMayBeThePlatesWhereNoTemperatureIsTold) {
+  std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
+  JudgeUntested({{"plate_expansion", "the temperature does not vary"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, SizeIs(1));
+  JudgeUntested({{"plate_expansion", "column temp_C is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("camera_similarity", "plate_expansion"));
+}
+
 TEST(Families, WhatExplainsLessThanIsLeftOnItsAxisIsPartOfTheUnknown) {
   std::vector<CauseFound> causes = {Cause("backlash", "theta", 900), Cause("stiction", "phi", 90),
                                     Cause("tooth_damage", "theta", 60)};

@@ -1,5 +1,5 @@
-// Several parts at one angle, or one ripple that no part makes.
-#include "sim/diagnosis/series.h"
+// Names against an empirical term that does better.
+#include "sim/diagnosis/beaten.h"
 
 #include <gmock/gmock.h>
 
@@ -24,7 +24,7 @@ Campaign Rippled(double order, double size_deg, std::uint64_t seed) {
   return campaign;
 }
 
-TEST(Series, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
+TEST(Beaten, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
   for (const double order : {5.0, 3.7}) {
     const Diagnosis diagnosis = Verdicts(Rippled(order, 0.1, 3));
     EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << order << Told(diagnosis);
@@ -35,7 +35,7 @@ TEST(Series, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
   }
 }
 
-TEST(Series, TwoPartsThatAreThereKeepTheirNames) {
+TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
   const Diagnosis diagnosis = Verdicts(
       Planted({{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"},
                {.cause = "tooth_damage", .amplitude = 0.15, .axis = "theta", .unit_share = 0.3}},
@@ -44,6 +44,29 @@ TEST(Series, TwoPartsThatAreThereKeepTheirNames) {
   EXPECT_EQ(diagnosis.causes[0].cause, "eccentricity");
   EXPECT_EQ(diagnosis.causes[1].cause, "tooth_damage");
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+}
+
+// A theta angle that follows the square of a temperature that rises from session to session.
+TEST(Beaten, WhatFollowsTheSquareOfTheTemperatureIsNotWear) {
+  for (const std::uint64_t seed : {3u, 4u}) {
+    SCOPED_TRACE(seed);
+    Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+    const auto temperature = std::ranges::find(campaign.covariates, "temp_C", &Covariate::name);
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+        const auto move = static_cast<double>(row - campaign.first_row[unit]);
+        temperature->values[row] = (move < 40   ? 2
+                                    : move < 80 ? 12
+                                                : 22) +
+                                   5 * std::sin(0.35 * move);
+      }
+    TurnTheta([&](std::size_t row) { return 1e-4 * std::pow(temperature->values[row], 2); },
+              &campaign);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Told(diagnosis);
+    for (const CauseFound& cause : diagnosis.causes)
+      EXPECT_EQ(cause.cause, "zero_offset") << Told(diagnosis);
+  }
 }
 
 }  // namespace

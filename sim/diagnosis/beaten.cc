@@ -1,0 +1,82 @@
+#include "sim/diagnosis/beaten.h"
+
+#include <algorithm>
+
+#include "sim/diagnosis/families.h"
+#include "sim/diagnosis/multi_start.h"
+#include "sim/diagnosis/screen.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Indices of terms, from the last to the first, which is how they can be erased.
+using LastFirst = std::vector<std::size_t>;
+
+LastFirst SeriesOf(const CampaignModel& model, EffectAxis axis) {
+  LastFirst series;
+  for (std::size_t t = model.terms.size(); t-- > 0;)
+    if (model.terms[t].form.axis == axis && IsOfAngle(model.terms[t].form.effect->cause))
+      series.push_back(t);
+  return series;
+}
+
+template <class Members>
+void Erase(const LastFirst& last_first, Members* members) {
+  for (const std::size_t at : last_first)
+    members->erase(members->begin() + static_cast<std::ptrdiff_t>(at));
+}
+
+void FitAnew(Fit* fit) {
+  constexpr int kRounds = 2;
+  UpdateResiduals(fit);
+  StepFit(fit);
+  SettleFit(fit, kRounds);
+}
+
+// How sure a name must be beaten, and by what.
+struct Beaten {
+  double family_wise;
+  std::uint64_t seed;
+  Fit* fit;
+  Selection* selection;
+
+  /// True: they were, and are out. `counts`: whether a structure could be what they are.
+  template <class Counts>
+  bool DropIf(const LastFirst& terms, double better_by, const Counts& counts) const {
+    Fit without = *fit;
+    Erase(terms, &without.model.terms);
+    FitAnew(&without);
+    const auto left = FindStructure(without, family_wise, seed);
+    if (!left || !counts(left->told)) return false;
+    Fit curved = without, named = *fit;
+    curved.model.terms.push_back(left->term);
+    FitAnew(&curved);
+    FitAnew(&named);
+    if (BetterBy(curved, named) <= better_by) return false;
+    *fit = std::move(without);
+    Erase(terms, &selection->accepted);
+    return true;
+  }
+};
+
+}  // namespace
+
+void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* selection) {
+  // Names of 400 hidden campaigns that were right were beaten by 10 at most, by the shape of their
+  // own column; wrong ones by 35 and more, but for two.
+  constexpr double kClearly = 20;
+  const Beaten beaten{family_wise, seed, fit, selection};
+  for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi}) {
+    const LastFirst series = SeriesOf(fit->model, axis);
+    if (series.size() < 2) continue;
+    beaten.DropIf(series, 0, [&](const UnknownFound& told) {
+      return told.channel.starts_with(Name(axis)) &&
+             told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
+    });
+  }
+  for (std::size_t t = fit->model.terms.size(); t-- > 0;)
+    if (IsOfNight(fit->model.terms[t].form.effect->cause))
+      beaten.DropIf({t}, kClearly, [](const UnknownFound&) { return true; });
+}
+
+}  // namespace focalfleet::sim
