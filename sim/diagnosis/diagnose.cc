@@ -466,6 +466,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   AskWithoutRemainders(templates, rule, fit, &diagnosis.causes);
+  JudgeRotors(fit.model, options.leave_out, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);

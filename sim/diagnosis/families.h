@@ -56,6 +56,11 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
 /// causes: each gets the others as candidates, and the axis is told as not understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
+/// Where the rotor is turned far out of its field, what phases do bends as what the rotor's poles
+/// do: each is the other's candidate, unless it is left out of the library. By the model's gears.
+void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
+                 std::vector<CauseFound>* causes);
+
 /// Where the column is missing that would tell two causes apart, who could not be tested is a
 /// candidate, too.
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);

@@ -55,7 +55,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Plant{"friction_windup", "phi", 0.05}, Plant{"eccentricity", "theta", 0.1},
                     Plant{"pinion_runout", "theta", 0.03}, Plant{"stage_ripple", "theta", 0.03},
                     Plant{"tooth_mesh", "theta", 0.03}, Plant{"tooth_damage", "theta", 0.1},
-                    Plant{"cogging", "theta", 0.02}, Plant{"phase_imbalance", "theta", 0.03},
+                    Plant{"cogging", "theta", 0.015}, Plant{"phase_imbalance", "theta", 0.016},
                     Plant{"load_angle_lag", "theta", 0.03}, Plant{"supply_droop", "theta", 0.05},
                     Plant{"supply_drift", "theta", 0.4}, Plant{"thermal_backlash", "theta", 0.006},
                     Plant{"thermal_arm_growth", "both", 6e-5}, Plant{"self_heating", "theta", 0.1},

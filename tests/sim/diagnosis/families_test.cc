@@ -229,6 +229,25 @@ TEST(Families, WhoCannotBeTestedIsACandidateBesideItsLikeOverTheNight) {
   EXPECT_THAT(causes[1].candidates, SizeIs(1));
 }
 
+TEST(Families, ARotorThatIsTurnedFarIsEithersOfTwo) {
+  CampaignModel model;
+  model.units.resize(3);
+  for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 337, unit.gear[kPhi] = 893;
+  std::vector<std::string> left_out;
+  const auto judged = [&](const char* name, double rotor_deg) {
+    std::vector<CauseFound> causes = {Cause(name, "phi", 300)};
+    causes[0].amplitude = -rotor_deg / 893;
+    JudgeRotors(model, left_out, &causes);
+    return causes[0].candidates;
+  };
+  EXPECT_THAT(judged("cogging", 14), ElementsAre("cogging"));
+  EXPECT_THAT(judged("cogging", 16), ElementsAre("cogging", "phase_imbalance"));
+  EXPECT_THAT(judged("phase_imbalance", 30), ElementsAre("phase_imbalance", "cogging"));
+  EXPECT_THAT(judged("stage_ripple", 30), ElementsAre("stage_ripple"));
+  left_out = {"cogging"};
+  EXPECT_THAT(judged("phase_imbalance", 30), ElementsAre("phase_imbalance"));
+}
+
 TEST(Families, AScaleMayBeThePlatesWhereNoTemperatureIsTold) {
   std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
   JudgeUntested({{"plate_expansion", "the temperature does not vary"}}, &causes);
