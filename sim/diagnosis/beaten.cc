@@ -53,6 +53,13 @@ struct Beaten {
     FitAnew(&curved);
     FitAnew(&named);
     if (BetterBy(curved, named) <= better_by) return false;
+    // What has nothing to do with the structure explains beside it what it explains alone.
+    constexpr double kOfItsOwn = 0.5;
+    Fit both = named;
+    both.model.terms.push_back(left->term);
+    FitAnew(&both);
+    const double alone = BetterBy(named, without);
+    if (alone > 0 && BetterBy(both, curved) > kOfItsOwn * alone) return false;
     *fit = std::move(without);
     Erase(terms, &selection->accepted);
     return true;

@@ -137,6 +137,10 @@ std::vector<Contender> OwnShapes(const ScorePass& pass, const Templates& templat
     if (kind.size() < 2) continue;
     std::map<std::uint32_t, double> shapes;
     Score own = *scores.front();  // each unit's by its own shape
+    // About a wrong shape the right one's trace is spread: the least is the noise's.
+    for (const Score* one : scores)
+      if (one->spread_sum * own.spread_count < own.spread_sum * one->spread_count)
+        own.spread_sum = one->spread_sum, own.spread_count = one->spread_count;
     const std::size_t c = kind.front().columns;
     for (std::size_t unit = 0; unit < units.size(); ++unit) {
       const auto at_b = static_cast<std::ptrdiff_t>(unit * c);

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/beaten.h"
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/distortion.h"
@@ -21,7 +22,6 @@
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
 #include "sim/diagnosis/screen.h"
-#include "sim/diagnosis/beaten.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/diagnosis/wrong_sensors.h"
 #include "sim/effects/registry.h"
@@ -164,6 +164,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     if (cause.evidence_of_unit.empty()) same->evidence_of_unit.clear();
     for (const auto& [unit, evidence] : cause.evidence_of_unit)
       same->evidence_of_unit[unit] += evidence;
+    for (std::string& name : cause.remainders) same->remainders.push_back(std::move(name));
     same->predicted_gain_um += cause.predicted_gain_um;
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
@@ -323,7 +324,7 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
     all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
   std::vector<char> is_remainder;
   for (std::size_t t = 0; t < all.size(); ++t)
-    is_remainder.push_back(beside[t].is_remainder() && CanLeave(all[beside[t].of], all[t].size_um));
+    is_remainder.push_back(beside[t].is_remainder() && CanLeave(all[beside[t].of], all[t]));
   // Whose remainder a remainder is: of is stronger each time, so that this ends.
   const auto named = [&](std::size_t of) {
     while (is_remainder[of] != 0) of = beside[of].of;
@@ -334,8 +335,7 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
     CauseFound& strong = all[named(beside[t].of)];
     if (is_remainder[t] != 0)
       TellAsRemainder(all[t].size_um, all[t].cause, &strong);
-    else if (all[t].size_um < strong.size_um &&
-             std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
+    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
       all[t].candidates.push_back(strong.cause);
   }
   for (std::size_t t = 0; t < all.size(); ++t)

@@ -21,8 +21,8 @@ bool IsOfNight(std::string_view cause);
 /// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
-/// No shape leaves more than half of what it is.
-bool CanLeave(const CauseFound& of, double size_um);
+/// No shape leaves more than half of what it is, in the units where it leaves it.
+bool CanLeave(const CauseFound& of, const CauseFound& remainder);
 
 /// Tells what the shape of `of` leaves and what that looks like, by name: a cause or a column.
 void TellAsRemainder(double size_um, std::string_view looks_like, CauseFound* of);

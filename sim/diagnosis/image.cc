@@ -14,6 +14,7 @@ constexpr std::size_t kUnitsMin = 6;
 constexpr double kNeighbourReach = 1.3;  // of the pitch
 constexpr double kNeighboursAgree = 6;   // standard deviations
 constexpr double kSizeMin_um = 0.1;
+constexpr double kRemembers = 4;  // standard deviations of chance
 
 using Vector4 = Eigen::Matrix<double, 4, 1>;
 using Matrix4 = Eigen::Matrix<double, 4, 4>;
@@ -299,6 +300,7 @@ struct Power {
 struct Deformation {
   Power rigid;  // turn and scale
   Power shear;
+  bool is_anew = true;  // the shears do not go on from one exposure to the next
   [[nodiscard]] bool IsCamera() const {
     constexpr double kSure = 3;  // standard deviations
     const double more = rigid.power - 2 * std::max(shear.power, 0.0);
@@ -306,39 +308,40 @@ struct Deformation {
   }
   [[nodiscard]] bool IsAir() const {
     constexpr double kSure = 5;
-    return shear.power > kSure * std::sqrt(shear.variance_of_noise) &&
+    return is_anew && shear.power > kSure * std::sqrt(shear.variance_of_noise) &&
            shear.power > 0.5 * rigid.power;
   }
 };
 
 Deformation FindDeformation(const Fit& fit) {
   constexpr double kRowsMin = 8;
-  Vector6 square = Vector6::Zero(), noise = Vector6::Zero();
-  double count = 0, left = 0, freedom = 0;
+  Vector6 square = Vector6::Zero(), fourth = Vector6::Zero();
+  Vector6 noise = Vector6::Zero(), noise_fourth = Vector6::Zero();
+  std::vector<Vector4> shears;
+  double left = 0, freedom = 0;
   for (const Image& image : Normals(fit)) {
     if (image.rows < kRowsMin) continue;
     const Eigen::LDLT<Matrix6> solver(image.normal);
     const Vector6 variance = solver.solve(Matrix6::Identity()).diagonal();
     if (!variance.allFinite() || !(variance.minCoeff() > 0)) continue;
     const Vector6 found = solver.solve(image.right);
-    square += found.cwiseAbs2();
-    noise += variance;
-    count += 1;
+    square += found.cwiseAbs2(), fourth += found.cwiseAbs2().cwiseAbs2();
+    noise += variance, noise_fourth += variance.cwiseAbs2();
+    shears.push_back({found[4], found[5], 0, 0});
     left += image.square - found.dot(image.right);
     freedom += 2 * image.rows - 6;
   }
-  if (count == 0) return {};
+  if (shears.empty()) return {};
   // The fit took the images' motion for noise; what is left beside it is the noise.
-  noise *= left / freedom;
+  const double dispersion = left / freedom;
   const auto power = [&](Eigen::Index k) {
-    // Of a normal variable's square: twice its mean's square.
-    const auto variance = [&](const Vector6& of) {
-      return 2 * (of[k] * of[k] + of[k + 1] * of[k + 1]) / count;
-    };
-    return Power{square[k] + square[k + 1] - noise[k] - noise[k + 1], variance(square),
-                 variance(noise)};
+    // The square of a normal variable of variance v has the variance 2 v^2, its fourth power the
+    // mean 3 v^2.
+    return Power{square[k] + square[k + 1] - dispersion * (noise[k] + noise[k + 1]),
+                 2 * (fourth[k] + fourth[k + 1]) / 3,
+                 2 * dispersion * dispersion * (noise_fourth[k] + noise_fourth[k + 1])};
   };
-  return {power(2), power(4)};
+  return {power(2), power(4), Carryover(shears) < kRemembers};
 }
 
 bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
@@ -432,7 +435,6 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   const double after = NeighboursAgree(*fit, &turbulence_um);
   CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
-  constexpr double kRemembers = 4;
   if (Carryover(motion.found) < kRemembers && !deformed.IsCamera())
     cause.candidates.emplace_back("air_turbulence");
   if (after > kNeighboursAgree || deformed.IsAir()) {

@@ -52,7 +52,7 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
                        kCause * std::max(terms(*fit) - terms(stepped), 0.0);
   const double better = BetterBy(stepped, *fit);
   if (better <= price) {
-    if (better > -kClearly) AddStepsAsRivals(stepped, *fit, -2 * better, &selection);
+    if (better > -kClearly) AddStepsAsRivals(stepped, *fit, -better, &selection);
     return selection;
   }
   *fit = std::move(stepped);

@@ -1,8 +1,10 @@
 #include "sim/diagnosis/polished.h"
 
 #include <algorithm>
+#include <span>
 
 #include "sim/diagnosis/families.h"
+#include "sim/diagnosis/term_trace.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -11,9 +13,26 @@ bool IsNamed(const ModelTerm& term, std::string_view cause, std::string_view axi
   return term.form.effect->cause == cause && AxesMeet(Name(term.form.axis), axis);
 }
 
-bool IsRemainder(const ModelTerm& term, const CauseFound& of) {
+// Somebody else's cause by the same name is none.
+bool IsRemainder(const ModelTerm& term, const CauseFound& of, std::span<const CauseFound> named) {
   return std::ranges::any_of(
-      of.remainders, [&](const std::string& name) { return IsNamed(term, name, of.axis); });
+             of.remainders,
+             [&](const std::string& name) { return IsNamed(term, name, of.axis); }) &&
+         std::ranges::none_of(named, [&](const CauseFound& cause) {
+           return IsNamed(term, cause.cause, cause.axis);
+         });
+}
+
+// The part of a name of several that does most; kNoTerm: none is left.
+std::size_t StrongestOf(const Fit& fit, const CauseFound& cause) {
+  std::size_t strongest = kNoTerm;
+  double most_um = 0;
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    if (!IsNamed(fit.model.terms[t], cause.cause, cause.axis)) continue;
+    const double size_um = SizeOf(fit, fit.model.terms[t]);
+    if (strongest == kNoTerm || size_um > most_um) strongest = t, most_um = size_um;
+  }
+  return strongest;
 }
 
 }  // namespace
@@ -23,19 +42,19 @@ void AskWithoutRemainders(const Templates& templates, const SelectionRule& rule,
   constexpr int kRounds = 2;
   for (CauseFound& cause : *causes) {
     Fit bare = fit;
-    if (std::erase_if(bare.model.terms,
-                      [&](const ModelTerm& term) { return IsRemainder(term, cause); }) == 0)
+    if (std::erase_if(bare.model.terms, [&](const ModelTerm& term) {
+          return IsRemainder(term, cause, *causes);
+        }) == 0)
       continue;
     UpdateResiduals(&bare);
     StepFit(&bare);
     SettleFit(&bare, kRounds);
-    for (std::size_t t = 0; t < bare.model.terms.size(); ++t) {
-      if (!IsNamed(bare.model.terms[t], cause.cause, cause.axis)) continue;
-      for (const Rival& rival : FindRivals(templates, rule, bare, t))
-        if (!rival.behind_by_likelihood &&
-            std::ranges::find(cause.candidates, rival.cause) == cause.candidates.end())
-          cause.candidates.emplace_back(rival.cause);
-    }
+    const std::size_t strongest = StrongestOf(bare, cause);
+    if (strongest == kNoTerm) continue;
+    for (const Rival& rival : FindRivals(templates, rule, bare, strongest))
+      if (!rival.behind_by_likelihood &&
+          std::ranges::find(cause.candidates, rival.cause) == cause.candidates.end())
+        cause.candidates.emplace_back(rival.cause);
   }
 }
 

@@ -53,8 +53,8 @@ Effect MakePhaseImbalance() {
           .needs = {},
           .paragraph =
               "The three phases differ in offset or gain, or the bridge's dead time bends the "
-              "voltages: a ripple of one, two or six periods a motor turn, whatever the drive "
-              "level.",
+              "voltages: a ripple of one, two or six periods a motor turn. That of gains does not "
+              "know the drive level, the others fall with it.",
           .list = List,
           .apply = Apply};
 }

@@ -1,6 +1,7 @@
 // Rotors that are turned so far that their ripple is no sine, by physics of this file's own.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
