@@ -46,6 +46,22 @@ TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
 }
 
+TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
+  Campaign campaign = Planted({{.cause = "thermal_arm_growth", .amplitude = 6e-5}},
+                              {.units = 12, .moves = 80, .seed = 3});
+  TurnTheta(
+      [&](std::size_t row) {
+        const double turn = campaign.cmd_deg[kTheta][row] * std::numbers::pi / 180;
+        return 0.3 * std::sin(3.7 * turn);
+      },
+      &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_FALSE(diagnosis.unknown.empty());
+  EXPECT_THAT(diagnosis.causes, testing::Contains(testing::Field(
+                                    &CauseFound::cause, testing::Eq("thermal_arm_growth"))))
+      << Told(diagnosis);
+}
+
 // A theta angle that follows the square of a temperature that rises from session to session.
 TEST(Beaten, WhatFollowsTheSquareOfTheTemperatureIsNotWear) {
   for (const std::uint64_t seed : {3u, 4u}) {
