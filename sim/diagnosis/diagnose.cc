@@ -22,6 +22,7 @@
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
 #include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/steps_instead.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/diagnosis/wrong_sensors.h"
 #include "sim/effects/registry.h"
@@ -463,6 +464,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   Selection selection = FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
+  AskStepsInstead(fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   AskWithoutRemainders(templates, rule, fit, &diagnosis.causes);

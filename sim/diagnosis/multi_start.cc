@@ -5,7 +5,6 @@
 
 #include "sim/diagnosis/events.h"
 #include "sim/diagnosis/homings.h"
-#include "sim/diagnosis/term_trace.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -14,25 +13,6 @@ double MeritByNoise(Fit fit, const Noise& noise) {
   fit.noise = noise;
   UpdateWeights(&fit);
   return Merit(fit);
-}
-
-// Steps that explain the rows as well, though not for their price, could be what is in their units
-// alone, or all but alone.
-void AddStepsAsRivals(const Fit& stepped, const Fit& fit, double behind, Selection* selection) {
-  constexpr double kAllButAlone = 0.9;  // of the squares of what the term does
-  for (const CauseFound& steps : EventCauses(stepped))
-    for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
-      double theirs = 0, all = 0;
-      const TermTrace trace = TraceOf(fit, fit.model.terms[t]);
-      for (std::size_t unit = 0; unit < trace.square_um2.size(); ++unit) {
-        all += trace.square_um2[unit];
-        if (std::ranges::count(steps.units, fit.model.units[unit].id) != 0)
-          theirs += trace.square_um2[unit];
-      }
-      if (theirs > kAllButAlone * all)
-        selection->accepted[t].rivals.push_back(
-            {steps.cause == kStepLoss ? kStepLoss : kLostCommand, behind, 1, false});
-    }
 }
 
 // With and without steps in single units' angles; the better fit for its price.
@@ -51,10 +31,7 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model)) -
                        kCause * std::max(terms(*fit) - terms(stepped), 0.0);
   const double better = BetterBy(stepped, *fit);
-  if (better <= price) {
-    if (better > -kClearly) AddStepsAsRivals(stepped, *fit, -better, &selection);
-    return selection;
-  }
+  if (better <= price) return selection;
   *fit = std::move(stepped);
   return again;
 }

@@ -198,37 +198,6 @@ TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
   EXPECT_GE(diagnosis.outliers.rows, 1u);
 }
 
-// A unit that slips at its first short move: all of its short moves, and no other, stand a turn
-// off.
-TEST(Events, ASlipThatIsAsGoodAsAnotherNameIsACandidate) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 4});
-  constexpr std::size_t kUnit = 5, kHomedAt = 40, kSlipAt = 41;
-  const CampaignUnit& u = campaign.units[kUnit];
-  const double turn_deg = 360 / u.gear[kTheta];
-  campaign.covariates.push_back({"rehomed", std::vector<double>(campaign.rows(), 0)});
-  campaign.covariates.back().values[campaign.first_row[kUnit] + kHomedAt] = 1;
-  Rng rng = Rng::Stream(4, "short moves");
-  for (std::size_t i = 0; i < 60; ++i) {
-    const std::size_t row = campaign.first_row[kUnit] + i;
-    const auto k = static_cast<double>(i);
-    const double theta =
-        i < kHomedAt ? (i % 2 == 0 ? 60 : -60) + 30 * std::cos(2.3 * k) : -40 + 4 * (k - kHomedAt);
-    const double phi = i < kHomedAt ? 90 + 50 * std::sin(1.7 * k) : 80;
-    campaign.from_deg[kTheta][row] =
-        i == 0 || i == kHomedAt ? u.min_deg[kTheta] : campaign.cmd_deg[kTheta][row - 1];
-    campaign.from_deg[kPhi][row] =
-        i == 0 || i == kHomedAt ? u.min_deg[kPhi] : campaign.cmd_deg[kPhi][row - 1];
-    campaign.cmd_deg[kTheta][row] = theta, campaign.cmd_deg[kPhi][row] = phi;
-    const PlacePoint at = PlaceOf(u, theta - (i >= kSlipAt ? turn_deg : 0), phi);
-    campaign.x_mm[row] = at.x_mm + 0.003 * rng.Normal();
-    campaign.y_mm[row] = at.y_mm + 0.003 * rng.Normal();
-  }
-  const Diagnosis diagnosis = Verdicts(campaign);
-  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
-  EXPECT_THAT(diagnosis.causes[0].units, testing::Contains(u.id));
-  EXPECT_THAT(diagnosis.causes[0].candidates, testing::Contains("step_loss")) << Told(diagnosis);
-}
-
 TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 7;

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -10,44 +12,51 @@ namespace focalfleet::sim {
 namespace {
 
 using testing::Contains;
+using testing::Each;
 using testing::ElementsAre;
+using testing::Field;
+using testing::Ne;
 using testing::Not;
 
-ModelTerm OfAllUnits(const char* cause, EffectAxis axis, std::size_t columns, std::size_t units) {
+// Theta's first form of a cause, one amplitude for all units.
+ModelTerm OfAllUnits(const char* cause, const CampaignFacts& facts) {
+  const Templates forms = ListTemplates(*FindEffect(cause), facts);
   ModelTerm term;
-  term.form = {.effect = FindEffect(cause), .axis = axis, .columns = columns};
+  term.form = *std::ranges::find(forms, EffectAxis::kTheta, &Template::axis);
   term.sharing = Sharing::kFleet;
-  term.group_of_unit.assign(units, 0);
-  term.amplitude.assign(columns, 0);
-  term.sigma.assign(columns, 0);
+  term.group_of_unit.assign(facts.campaign->units.size(), 0);
+  term.amplitude.assign(term.form.columns, 0);
+  term.sigma.assign(term.form.columns, 0);
   return term;
 }
 
-// A scale error fitted by an eccentricity and a tilt.
+// A scale error fitted by an eccentricity and a fibre's torque.
 TEST(Polished, WithoutItsRemaindersWhoIsNearComesForward) {
   const Campaign campaign = Planted({{.cause = "gear_scale", .amplitude = 0.004, .axis = "theta"}},
                                     {.moves = 80, .seed = 5});
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);
-  for (const char* cause : {"eccentricity", "axis_tilt"})
-    fit.model.terms.push_back(OfAllUnits(cause, EffectAxis::kTheta, 2, campaign.units.size()));
+  for (const char* cause : {"eccentricity", "fibre_torque"})
+    fit.model.terms.push_back(OfAllUnits(cause, facts));
   StepFit(&fit);
   SettleFit(&fit, 2);
   Templates library;
-  for (const char* cause : {"eccentricity", "axis_tilt", "gear_scale", "gravity_sag"})
+  for (const char* cause : {"eccentricity", "fibre_torque", "gear_scale", "gravity_sag"})
     for (Template& form : ListTemplates(*FindEffect(cause), facts))
       library.push_back(std::move(form));
+  EXPECT_THAT(FindRivals(library, {}, fit, 0),
+              Each(Field(&Rival::cause, Ne("gear_scale"))));  // with what polishes the name
   std::vector<CauseFound> causes = {CauseNamed("eccentricity")};
   causes[0].axis = "theta";
   AskWithoutRemainders(library, {}, fit, &causes);
   EXPECT_THAT(causes[0].candidates, ElementsAre("eccentricity"));  // nobody said it has any
-  causes[0].remainders = {"axis_tilt"};
+  causes[0].remainders = {"fibre_torque"};
   AskWithoutRemainders(library, {}, fit, &causes);
   EXPECT_THAT(causes[0].candidates, Contains("gear_scale"));
   EXPECT_THAT(causes[0].candidates, Not(Contains("gravity_sag")));
   // Of another axis.
   causes[0] = CauseNamed("eccentricity");
-  causes[0].axis = "phi", causes[0].remainders = {"axis_tilt"};
+  causes[0].axis = "phi", causes[0].remainders = {"fibre_torque"};
   AskWithoutRemainders(library, {}, fit, &causes);
   EXPECT_THAT(causes[0].candidates, ElementsAre("eccentricity"));
 }

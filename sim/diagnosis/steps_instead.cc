@@ -1,0 +1,71 @@
+#include "sim/diagnosis/steps_instead.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "sim/diagnosis/events.h"
+#include "sim/diagnosis/multi_start.h"
+#include "sim/diagnosis/term_trace.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kAllButAlone = 0.9;  // of the squares of what the term does
+
+double ShareOf(const TermTrace& trace, const std::vector<std::size_t>& units) {
+  double theirs = 0;
+  for (const std::size_t unit : units) theirs += trace.square_um2[unit];
+  const double all = std::accumulate(trace.square_um2.begin(), trace.square_um2.end(), 0.0);
+  return all > 0 ? theirs / all : 0;
+}
+
+bool LivesInFewUnits(const TermTrace& trace) {
+  constexpr std::size_t kFew = 4;
+  std::vector<std::size_t> units(trace.square_um2.size());
+  std::iota(units.begin(), units.end(), 0);
+  if (units.size() <= kFew) return true;
+  std::ranges::partial_sort(units, units.begin() + kFew, std::ranges::greater{},
+                            [&](std::size_t unit) { return trace.square_um2[unit]; });
+  units.resize(kFew);
+  return ShareOf(trace, units) > kAllButAlone;
+}
+
+// All shapes of a cause on its axis: what one of them leaves another would take.
+Fit WithoutCauseOf(const Fit& fit, const ModelTerm& term) {
+  constexpr int kRounds = 2;
+  Fit without = fit;
+  std::erase_if(without.model.terms, [&](const ModelTerm& other) {
+    return other.form.effect == term.form.effect && other.form.axis == term.form.axis;
+  });
+  UpdateResiduals(&without);
+  StepFit(&without);
+  SettleFit(&without, kRounds);
+  return without;
+}
+
+}  // namespace
+
+void AskStepsInstead(const Fit& fit, Selection* selection) {
+  constexpr double kClearly = 20;  // what a step is to be better by: else none is named
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    const TermTrace trace = TraceOf(fit, fit.model.terms[t]);
+    if (!LivesInFewUnits(trace)) continue;
+    Fit stepped = WithoutCauseOf(fit, fit.model.terms[t]);
+    const std::size_t before = stepped.model.events.size();
+    if (AddEvents(&stepped) == 0) continue;
+    const double behind = BetterBy(fit, stepped);
+    if (behind >= kClearly) continue;
+    std::vector<EventTerm>& events = stepped.model.events;
+    events.erase(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(before));
+    std::vector<std::size_t> units;
+    for (const EventTerm& event : events) units.push_back(event.unit);
+    std::ranges::sort(units);
+    units.erase(std::unique(units.begin(), units.end()), units.end());
+    if (ShareOf(trace, units) <= kAllButAlone) continue;
+    for (const CauseFound& steps : EventCauses(stepped))
+      selection->accepted[t].rivals.push_back(
+          {steps.cause == kStepLoss ? kStepLoss : kLostCommand, behind, 1, false});
+  }
+}
+
+}  // namespace focalfleet::sim
