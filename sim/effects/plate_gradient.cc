@@ -58,7 +58,10 @@ Effect MakePlateGradient() {
               "grow with the square of the place on the plate, or stretch it one way. Even "
               "the temperature out, or correct by fiducials.",
           .list = List,
-          .apply = Apply};
+          .apply = Apply,
+          // Far more than any metal's: sensors at the units see a part of the plate's gradient.
+          .amplitude_low = -0.01,
+          .amplitude_high = 0.01};
 }
 
 }  // namespace focalfleet::sim

@@ -73,6 +73,32 @@ TEST(Diagnosis, APlateThatBendsOneWayForAllIsNamed) {
   EXPECT_EQ(diagnosis.causes[0].cause, "plate_gradient");
 }
 
+// The sensors at the units see a hundredth of the gradient that bends the plate.
+TEST(Diagnosis, AGradientThatSensorsSeeLittleOfIsNamed) {
+  constexpr double kPerKelvin = 1.5e-3, kGradient_C_per_mm = 0.01;
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  const Exposures exposures = FindExposures(campaign);
+  const auto temperature =
+      std::ranges::find(campaign.covariates, std::string("temp_C"), &Covariate::name);
+  ASSERT_NE(temperature, campaign.covariates.end());
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      const double turned = 0.05 * static_cast<double>(exposures.of_row[row]);
+      const double a = kGradient_C_per_mm * std::cos(turned);
+      const double b = kGradient_C_per_mm * std::sin(turned);
+      const double x = campaign.x_mm[row], y = campaign.y_mm[row];
+      temperature->values[row] +=
+          a * campaign.units[unit].base_x_mm + b * campaign.units[unit].base_y_mm;
+      campaign.x_mm[row] += kPerKelvin * (a * (x * x - y * y) / 2 + b * x * y);
+      campaign.y_mm[row] += kPerKelvin * (b * (y * y - x * x) / 2 + a * x * y);
+    }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty());
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, testing::ElementsAre("plate_gradient"));
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, kPerKelvin, 0.2 * kPerKelvin);
+}
+
 // On a wide plate a lens shifts each unit far more than it bends what the unit sees.
 TEST(Diagnosis, ALensOverAWidePlateIsNoTiltOfEachUnit) {
   const Diagnosis diagnosis =
