@@ -237,6 +237,7 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
                  std::vector<CauseFound>* causes) {
   // In 1200 hidden campaigns all of the sure names below it were right, and of twelve above two.
   constexpr double kFar_deg = 15;
+  constexpr double kSecond = 0.3;  // of the stronger one's evidence
   constexpr std::string_view kPair[] = {"cogging", "phase_imbalance"};
   if (model.units.empty()) return;
   const auto gear = [&](std::size_t axis) {
@@ -254,6 +255,19 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
       if (!IsCandidate(cause, name) && std::ranges::find(left_out, name) == left_out.end())
         cause.candidates.emplace_back(name);
   }
+  std::vector<CauseFound> kept;
+  for (CauseFound& cause : *causes) {
+    const auto stronger = std::ranges::find_if(kept, [&](const CauseFound& other) {
+      return cause.cause != other.cause && Has(kPair, cause.cause) && Has(kPair, other.cause) &&
+             AxesMeet(cause.axis, other.axis) && IsCandidate(cause, other.cause) &&
+             cause.delta_log_likelihood < kSecond * other.delta_log_likelihood;
+    });
+    if (stronger == kept.end())
+      kept.push_back(std::move(cause));
+    else
+      TellAsRemainder(cause.size_um, cause.cause, &*stronger);
+  }
+  *causes = std::move(kept);
 }
 
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {

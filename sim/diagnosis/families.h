@@ -58,6 +58,7 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
 
 /// Where the rotor is turned far out of its field, what phases do bends as what the rotor's poles
 /// do: each is the other's candidate, unless it is left out of the library. By the model's gears.
+/// Beside the stronger of the two the other, where it could be it, is what its shape leaves.
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
                  std::vector<CauseFound>* causes);
 

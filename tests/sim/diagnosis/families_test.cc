@@ -248,6 +248,25 @@ TEST(Families, ARotorThatIsTurnedFarIsEithersOfTwo) {
   EXPECT_THAT(judged("phase_imbalance", 30), ElementsAre("phase_imbalance"));
 }
 
+TEST(Families, TheSecondOfTwoNamesOfARotorIsWhatTheFirstLeaves) {
+  CampaignModel model;
+  model.units.resize(3);
+  for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 893, unit.gear[kPhi] = 893;
+  const auto judged = [&](double second_deg, double evidence, const char* axis) {
+    std::vector<CauseFound> causes = {Cause("cogging", "phi", 2000),
+                                      Cause("phase_imbalance", axis, evidence)};
+    causes[0].amplitude = 10.0 / 893, causes[1].amplitude = second_deg / 893;
+    JudgeRotors(model, {}, &causes);
+    return causes;
+  };
+  const std::vector<CauseFound> one = judged(20, 300, "phi");
+  ASSERT_THAT(one, SizeIs(1));
+  EXPECT_THAT(one[0].remainders, ElementsAre("phase_imbalance"));
+  EXPECT_THAT(judged(10, 300, "phi"), SizeIs(2));  // surely not the first
+  EXPECT_THAT(judged(20, 1000, "phi"), SizeIs(2));
+  EXPECT_THAT(judged(20, 300, "theta"), SizeIs(2));
+}
+
 TEST(Families, AScaleMayBeThePlatesWhereNoTemperatureIsTold) {
   std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
   JudgeUntested({{"plate_expansion", "the temperature does not vary"}}, &causes);
