@@ -33,6 +33,14 @@ void FitAnew(Fit* fit) {
   SettleFit(fit, kRounds);
 }
 
+// A bend of what the cause does with its own column is its shape, not another structure.
+bool IsOwnShape(const Effect& effect, const UnknownFound& told) {
+  constexpr std::string_view kOfDirection[] = {"thermal_backlash", "supply_drift"};
+  return std::ranges::count(kOfDirection, effect.cause) != 0 &&
+         std::ranges::count(effect.needs, told.covariate) != 0 &&
+         told.channel.find("against its direction") != std::string::npos;
+}
+
 // How sure a name must be beaten, and by what.
 struct Beaten {
   double family_wise;
@@ -81,9 +89,12 @@ void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* sel
              told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
     });
   }
-  for (std::size_t t = fit->model.terms.size(); t-- > 0;)
-    if (IsOfNight(fit->model.terms[t].form.effect->cause))
-      beaten.DropIf({t}, kClearly, [](const UnknownFound&) { return true; });
+  for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
+    const Effect& effect = *fit->model.terms[t].form.effect;
+    if (IsOfNight(effect.cause))
+      beaten.DropIf({t}, kClearly,
+                    [&](const UnknownFound& told) { return !IsOwnShape(effect, told); });
+  }
 }
 
 }  // namespace focalfleet::sim

@@ -1,4 +1,7 @@
 // Supply drift: the voltage falls over the campaign.
+#include <algorithm>
+
+#include "sim/effects/load_angle.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -7,6 +10,11 @@ namespace {
 void List(const CampaignFacts& facts, Templates* out) {
   const FilledColumn* volts = facts.Find("v_bus_V");
   ListGrid({.shapes = {volts->high, volts->mean}, .shape_name = "below, V,"}, out);
+  // A rotor under load: bent, and by the drive. What it lags at the usual voltage is known.
+  ListGrid({.shapes = {0.2, 0.4, 0.6, 0.75, 0.85, 0.92},
+            .shape_name = "load, of the pull-out,",
+            .form = 1},
+           out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -14,9 +22,19 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> volts = track.Column("v_bus_V");
+  const double usual_V = track.facts->Find("v_bus_V")->mean;
+  std::span<const double> drive;
+  if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
+  const auto missing_V = [&](std::size_t i) {
+    if (form.form == 0) return form.shape - volts[i];
+    const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
+    // As many volts of a light load at nominal drive.
+    const double per_volt = form.shape / usual_V;
+    return AddedLoadAngle(form.shape, level, 1 - volts[i] / usual_V) / per_volt;
+  };
   AddRemembered(
       track, axis, form.memory,
-      [&](std::size_t i) { return -amplitude[0] * Direction(step[i]) * (form.shape - volts[i]); },
+      [&](std::size_t i) { return -amplitude[0] * Direction(step[i]) * missing_V(i); },
       &errors->angle_deg[axis]);
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/effects/load_angle.h"
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
@@ -70,15 +71,6 @@ std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
   return droop;
 }
 
-// What a missing share adds to the angle of a rotor that holds a load.
-double LagOf(double load, double level, double missing) {
-  constexpr double kPullOut = 0.985;  // beyond it the rotor slips, which is another cause
-  const auto angle = [&](double drive) {
-    return std::asin(std::clamp(load / drive, 0.0, kPullOut));
-  };
-  return angle(level * (1 - missing)) - angle(level);
-}
-
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const bool loaded = form.form >= kLoaded;
@@ -95,8 +87,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         [&](std::size_t i) {
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
           // The load angle grows with what the drive lacks.
-          const double lag =
-              loaded ? LagOf(form.shape, level, depth * droop[i]) / depth : droop[i] / level;
+          const double lag = loaded ? AddedLoadAngle(form.shape, level, depth * droop[i]) / depth
+                                    : droop[i] / level;
           return -amplitude[0] * Direction(step[i]) * lag;
         },
         &errors->angle_deg[axis]);

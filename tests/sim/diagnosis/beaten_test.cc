@@ -62,6 +62,30 @@ TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
       << Told(diagnosis);
 }
 
+// Play that opens all at once as it grows cold, which no form of the library does.
+TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
+  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  const std::vector<double>& temperature =
+      std::ranges::find(campaign.covariates, "temp_C", &Covariate::name)->values;
+  std::vector<double> sorted = temperature;
+  std::ranges::sort(sorted);
+  const double cold_C = sorted[sorted.size() / 3];
+  std::vector<double> side(campaign.rows(), 0);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      const double step = campaign.cmd_deg[kTheta][row] - campaign.from_deg[kTheta][row];
+      side[row] = step > 0 ? 1 : step < 0 ? -1 : row > 0 ? side[row - 1] : 0;
+    }
+  TurnTheta(
+      [&](std::size_t row) {
+        return -0.04 * side[row] / (1 + std::exp(4 * (temperature[row] - cold_C)));
+      },
+      &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "thermal_backlash") << Told(diagnosis);
+}
+
 // A theta angle that follows the square of a temperature that rises from session to session.
 TEST(Beaten, WhatFollowsTheSquareOfTheTemperatureIsNotWear) {
   for (const std::uint64_t seed : {3u, 4u}) {

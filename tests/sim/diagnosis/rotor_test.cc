@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <numeric>
 
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -13,34 +14,58 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-// What turns the rotor away from where its field should hold it, in radians: at a rotor's angle
-// and a drive level, for a unit.
-using Turned = std::function<double(double rotor, double drive, std::uint32_t unit)>;
+struct Motion {
+  double rotor;      // angle that it should have, radians
+  double direction;  // 1 or -1
+  double drive;      // of the nominal one
+  double supply;     // of the usual voltage
+  std::uint32_t unit;
+};
+
+// What turns the rotor away from where its field should hold it, in radians.
+using Turned = std::function<double(const Motion&)>;
 
 double Phase(std::uint32_t unit) { return 2.4 * unit; }
 
 // sin(lag) = torque / drive, where the torque is that of the place to which the lag leads.
-double DetentLag(double detent, double order, double rotor, double drive, std::uint32_t unit) {
+double DetentLag(double detent, double order, const Motion& motion) {
   double lag = 0;
   for (int i = 0; i < 200; ++i) {
-    const double torque = detent * std::sin(order * (rotor + lag) + Phase(unit)) / drive;
+    const double at = motion.rotor + lag;
+    const double torque = detent * std::sin(order * at + Phase(motion.unit)) / motion.drive;
     lag = 0.5 * lag + 0.5 * std::asin(std::clamp(-torque, -1.0, 1.0));
   }
   return lag;
 }
 
 // Of a field whose phases are unequal: an ellipse.
-double EllipseTurn(double unequal, double rotor, double, std::uint32_t unit) {
-  const double x = std::cos(rotor) + unequal * std::cos(Phase(unit) - rotor);
-  const double y = std::sin(rotor) + unequal * std::sin(Phase(unit) - rotor);
+double EllipseTurn(double unequal, const Motion& motion) {
+  const double rotor = motion.rotor, back = Phase(motion.unit) - rotor;
+  const double x = std::cos(rotor) + unequal * std::cos(back);
+  const double y = std::sin(rotor) + unequal * std::sin(back);
   return std::remainder(std::atan2(y, x) - rotor, 2 * std::numbers::pi);
+}
+
+// A load that the tuning knows, at a voltage that it does not.
+double SinkingLag(double load, const Motion& motion) {
+  const auto lag = [&](double supply) {
+    return std::asin(std::min(load / (motion.drive * supply), 0.98));
+  };
+  return -motion.direction * (lag(motion.supply) - lag(1));
 }
 
 Campaign RotorsTurned(const Turned& turned, std::uint64_t seed) {
   Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
   std::vector<double> off_deg(campaign.rows(), 0);
-  const std::vector<double>& drive =
-      std::ranges::find(campaign.covariates, "drive_amplitude", &Covariate::name)->values;
+  const auto column = [&](const char* name) -> std::vector<double>& {
+    return std::ranges::find(campaign.covariates, name, &Covariate::name)->values;
+  };
+  const std::vector<double>& drive = column("drive_amplitude");
+  std::vector<double>& volts = column("v_bus_V");
+  const double usual_V =
+      std::accumulate(volts.begin(), volts.end(), 0.0) / static_cast<double>(volts.size());
+  constexpr double kDeeper = 3;  // than where it does little
+  for (double& one : volts) one = usual_V + kDeeper * (one - usual_V);
   for (std::size_t u = 0; u < campaign.units.size(); ++u) {
     const CampaignUnit& unit = campaign.units[u];
     double held_deg = 0;
@@ -50,7 +75,13 @@ Campaign RotorsTurned(const Turned& turned, std::uint64_t seed) {
           row == campaign.first_row[u] || angle_deg != campaign.cmd_deg[kTheta][row - 1];
       if (moved) {
         const double rotor = std::remainder(angle_deg * unit.gear[kTheta], 360) * kDegree;
-        held_deg = turned(rotor, drive[row], unit.id) / kDegree / unit.gear[kTheta];
+        const double step_deg = angle_deg - campaign.from_deg[kTheta][row];
+        held_deg = turned({.rotor = rotor,
+                           .direction = step_deg < 0 ? -1.0 : 1.0,
+                           .drive = drive[row],
+                           .supply = volts[row] / usual_V,
+                           .unit = unit.id}) /
+                   kDegree / unit.gear[kTheta];
       }
       off_deg[row] = held_deg;
     }
@@ -76,6 +107,11 @@ TEST(Rotor, ADetentThatBendsTheRippleIsCogging) {
 TEST(Rotor, AFieldThatTurnsInAnEllipseIsPhaseImbalance) {
   for (const double unequal : {0.2, 0.5, 0.7})
     ExpectNamed("phase_imbalance", std::bind_front(EllipseTurn, unequal), 3);
+}
+
+TEST(Rotor, ALoadedRotorOfASinkingSupplyIsSupplyDrift) {
+  for (const double load : {0.7, 0.9})
+    ExpectNamed("supply_drift", std::bind_front(SinkingLag, load), 3);
 }
 
 }  // namespace
