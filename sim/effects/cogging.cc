@@ -12,13 +12,13 @@ constexpr int kBent = 3;
 
 void List(const CampaignFacts&, Templates* out) {
   for (const int power : {1, 2})
-    ListGrid({.shapes = {1, 2, 6},
+    ListGrid({.shapes = {1, 2, 4, 6},
               .shape_name = power == 1 ? "falls with the drive; motor harmonic"
                                        : "falls with its square; motor harmonic",
               .form = power,
               .columns = 2},
              out);
-  ListGrid({.shapes = {1, 2, 6},
+  ListGrid({.shapes = {1, 2, 4, 6},
             .shape_name = "bent, falls with the drive; motor harmonic",
             .form = kBent,
             .columns = 6},

@@ -98,6 +98,7 @@ struct Effect {
   void (*glance)(Templates*) = nullptr;
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
+  bool one_is_enough = false;  // of the covariates, each of which is one axis' own
   // Each unit may have its own, as it has its own teeth. Pre: a unit is the owner.
   bool own_shape = false;
   // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.

@@ -1,5 +1,6 @@
 // Mode threshold: short moves run in another mode.
 #include <cmath>
+#include <vector>
 
 #include "sim/effects/registry.h"
 
@@ -7,12 +8,14 @@ namespace focalfleet::sim {
 namespace {
 
 void List(const CampaignFacts&, Templates* out) {
+  const std::vector<double> lengths_deg = {1, 2, 3, 5, 10, 20, 40};
   ListGrid({.memories = {Memory::kHold, Memory::kNow},
-            .shapes = {1, 2, 3, 5, 10, 20},
+            .shapes = lengths_deg,
             .shape_name = "below, deg,"},
            out);
-  ListGrid({.memories = {Memory::kHold, Memory::kNow},
-            .shapes = {1, 2, 3, 5, 10, 20},
+  // What a move falls short of in the other mode adds up.
+  ListGrid({.memories = {Memory::kHold, Memory::kNow, Memory::kChain},
+            .shapes = lengths_deg,
             .shape_name = "along the motion; below, deg,",
             .form = 1},
            out);

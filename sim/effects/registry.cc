@@ -54,9 +54,12 @@ const Effect* FindEffect(std::string_view cause) {
 }
 
 std::string_view MissingCovariate(const Effect& effect, const CampaignFacts& facts) {
-  for (const std::string_view name : effect.needs)
-    if (!facts.Has(name)) return name;
-  return {};
+  const auto missing =
+      std::ranges::find_if(effect.needs, [&](std::string_view name) { return !facts.Has(name); });
+  if (missing == effect.needs.end()) return {};
+  const bool has_one =
+      std::ranges::any_of(effect.needs, [&](std::string_view name) { return facts.Has(name); });
+  return effect.one_is_enough && has_one ? std::string_view{} : *missing;
 }
 
 Templates ListTemplates(const Effect& effect, const CampaignFacts& facts) {

@@ -1,27 +1,53 @@
 // Wear: a parameter drifts with the turns made.
+#include <algorithm>
+#include <cmath>
 #include <string_view>
+#include <vector>
 
 #include "sim/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts&, Templates* out) {
-  ListGrid({}, out);
-  ListGrid({.shape_name = "the clearance opens", .form = 1}, out);
-  ListGrid({.shape_name = "the scale drifts", .form = 2}, out);
+constexpr double kTurns = 100;  // of a campaign; a life test makes thousands
+
+constexpr std::string_view kColumns[] = {"cycles_theta", "cycles_phi"};  // of theta, of phi
+
+// The power of ten that the campaign's turns come next to: amplitudes are errors of its size.
+double SpanOf(const CampaignFacts& facts) {
+  double most = kTurns;
+  const Campaign& campaign = *facts.campaign;
+  for (const std::string_view column : kColumns) {
+    if (!facts.Has(column)) continue;
+    const std::span<const double> cycles = facts.Find(column)->values;
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      const std::size_t begin = campaign.first_row[unit], end = campaign.first_row[unit + 1];
+      if (begin < end) most = std::max(most, cycles[end - 1] - cycles[begin]);
+    }
+  }
+  return std::pow(10, std::round(std::log10(most)));
+}
+
+void List(const CampaignFacts& facts, Templates* out) {
+  std::vector<EffectAxis> axes;
+  if (facts.Has(kColumns[kTheta])) axes.push_back(EffectAxis::kTheta);
+  if (facts.Has(kColumns[kPhi])) axes.push_back(EffectAxis::kPhi);
+  const std::vector<double> span = {SpanOf(facts)};
+  constexpr std::string_view kNames[] = {"over turns,", "the clearance opens; over turns,",
+                                         "the scale drifts; over turns,"};
+  for (int form = 0; form < 3; ++form)
+    ListGrid({.axes = axes, .shapes = span, .shape_name = kNames[form], .form = form}, out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
-  const std::string_view column = axis == kTheta ? "cycles_theta" : "cycles_phi";
-  const std::span<const double> cycles = track.Column(column);
-  constexpr double kTurns = 100;
+  const std::span<const double> cycles = track.Column(kColumns[axis]);
+  const double span = form.shape > 0 ? form.shape : kTurns;
   double direction = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
     // Since the campaign began: what was worn before it is backlash or scale already.
-    const double worn = (cycles[i] - cycles[0]) / kTurns;
+    const double worn = (cycles[i] - cycles[0]) / span;
     if (track.restarts[i]) direction = 0;
     if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
     double error = worn;
@@ -35,16 +61,17 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
 
 Effect MakeWear() {
   return {.cause = "wear",
-          .amplitude_unit = "deg per 100 turns",
+          .amplitude_unit = "deg over its span of turns",
           .prior_size = 1,
           .owner = Owner::kUnit,
-          .needs = {"cycles_theta", "cycles_phi"},
+          .needs = {kColumns[kTheta], kColumns[kPhi]},
           .paragraph =
               "The unit changes with the turns it has made, slowly and without return: its "
               "zero creeps, its clearance opens, or its scale drifts. Re-calibrate by turns, "
               "not by the calendar.",
           .list = List,
           .apply = Apply,
+          .one_is_enough = true,
           .amplitude_low = -20,  // a gear that falls apart
           .amplitude_high = 20};
 }
