@@ -11,6 +11,7 @@
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/distortion.h"
 #include "sim/diagnosis/events.h"
+#include "sim/diagnosis/exchanged.h"
 #include "sim/diagnosis/families.h"
 #include "sim/diagnosis/fine_structure.h"
 #include "sim/diagnosis/gain.h"
@@ -431,14 +432,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   if (!diagnosis.insufficient.empty()) return diagnosis;
   options.progress(0.02, "static geometry");
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
-  const auto swaps = FindSwaps(fit);
   std::optional<Campaign> as_named;  // under the table's names, where some of these are wrong
-  if (!swaps.empty()) {
-    as_named = campaign;
-    for (const auto& [a, b] : swaps) UndoSwap(facts.exposures, a, b, &campaign);
-    diagnosis.causes.push_back(SwapCause(campaign, swaps));
-    fit = StartFit(facts, diagnosis.model, aside, options.parallel);
-  }
+  diagnosis.causes = UndoExchanges(fit, &campaign, &facts, &as_named);
+  if (as_named) fit = StartFit(facts, diagnosis.model, aside, options.parallel);
   if (MedianMiss(fit) > kMissMax_mm) {
     diagnosis.insufficient =
         "the places do not belong to these units: half of them are more than " +

@@ -13,8 +13,6 @@ namespace {
 constexpr double kFar = 6;  // whitened length
 constexpr double kStuckTravel_deg = 5;
 constexpr double kStuckSpread_mm = 0.03;
-constexpr double kBadUnit_mm = 0.3;      // median miss after the static fit
-constexpr double kSwapBetter = 0.2;      // of the miss that is left once names are exchanged
 constexpr double kCrowdShare = 0.3;      // of the family-wise rate
 constexpr double kCrowdLeast = 4;        // units and exposures
 constexpr std::size_t kCrowdMost = 200;  // far visits in a window
@@ -40,31 +38,6 @@ bool IsStuck(const Campaign& campaign, std::size_t unit) {
   }
   return x.size() >= 4 && std::max(high[0] - low[0], high[1] - low[1]) > kStuckTravel_deg &&
          SpreadOf(x) < kStuckSpread_mm && SpreadOf(y) < kStuckSpread_mm;
-}
-
-double MissOf(const Fit& fit, std::size_t unit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<double> misses;
-  for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-    if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
-  return misses.empty() ? 0 : Median(std::move(misses));
-}
-
-// Median miss of a's measured places from b's commands with the table's geometry of b.
-double CrossMiss(const Fit& fit, std::size_t a, std::size_t b) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<std::size_t> row_of(fit.facts->exposures.size(), SIZE_MAX);
-  for (std::size_t row = campaign.first_row[b]; row < campaign.first_row[b + 1]; ++row)
-    row_of[fit.facts->exposures.of_row[row]] = row;
-  std::vector<double> misses;
-  for (std::size_t row = campaign.first_row[a]; row < campaign.first_row[a + 1]; ++row) {
-    const std::size_t other = row_of[fit.facts->exposures.of_row[row]];
-    if (other == SIZE_MAX || !std::isfinite(campaign.x_mm[row])) continue;
-    const PlacePoint at =
-        PlaceOf(campaign.units[b], campaign.cmd_deg[0][other], campaign.cmd_deg[1][other]);
-    misses.push_back(std::hypot(campaign.x_mm[row] - at.x_mm, campaign.y_mm[row] - at.y_mm));
-  }
-  return misses.size() < 3 ? std::numeric_limits<double>::infinity() : Median(std::move(misses));
 }
 
 // Did the fibre stay where the move began?
@@ -183,75 +156,6 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
     }
   }
   return found;
-}
-
-std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<std::size_t> bad;
-  std::vector<double> miss_mm;
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    const double miss = MissOf(fit, unit);
-    // A wrong name also drags the fitted base away.
-    const double dragged =
-        std::hypot(fit.model.units[unit].base_x_mm - campaign.units[unit].base_x_mm,
-                   fit.model.units[unit].base_y_mm - campaign.units[unit].base_y_mm);
-    if (miss > kBadUnit_mm || dragged > 1) bad.push_back(unit), miss_mm.push_back(miss);
-  }
-  std::vector<std::pair<std::size_t, std::size_t>> swaps;
-  std::set<std::size_t> taken;
-  for (const std::size_t a : bad)
-    for (const std::size_t b : bad) {
-      if (b <= a || taken.count(a) != 0 || taken.count(b) != 0) continue;
-      const double own = CrossMiss(fit, a, a) + CrossMiss(fit, b, b);
-      const double crossed = CrossMiss(fit, a, b) + CrossMiss(fit, b, a);
-      if (crossed >= kSwapBetter * own) continue;
-      swaps.emplace_back(a, b);
-      taken.insert({a, b});
-    }
-  return swaps;
-}
-
-CauseFound SwapCause(const Campaign& campaign,
-                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
-  CauseFound cause = CauseNamed("identity_swap");
-  cause.axis = "none";
-  cause.scope = "unit";
-  cause.amplitude_unit = "pairs";
-  cause.amplitude = static_cast<double>(swaps.size());
-  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
-  double square = 0;
-  for (const auto& [a, b] : swaps) {
-    cause.units.push_back(campaign.units[a].id);
-    cause.units.push_back(campaign.units[b].id);
-    square += std::pow(1e3 * std::hypot(campaign.units[a].base_x_mm - campaign.units[b].base_x_mm,
-                                        campaign.units[a].base_y_mm - campaign.units[b].base_y_mm),
-                       2);
-  }
-  cause.size_um = std::sqrt(square / static_cast<double>(swaps.size()));
-  cause.predicted_gain_um = cause.size_um;
-  cause.delta_log_likelihood = 1e6;
-  cause.paragraph = "Two fibres are known under each other's name: exchange the names.";
-  return cause;
-}
-
-void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign) {
-  constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-  std::vector<std::size_t> row_of(exposures.size(), SIZE_MAX);
-  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
-    row_of[exposures.of_row[row]] = row;
-  std::set<std::size_t> met;
-  for (std::size_t row = campaign->first_row[a]; row < campaign->first_row[a + 1]; ++row) {
-    const std::size_t other = row_of[exposures.of_row[row]];
-    if (other == SIZE_MAX) {
-      campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
-      continue;
-    }
-    met.insert(other);
-    std::swap(campaign->x_mm[row], campaign->x_mm[other]);
-    std::swap(campaign->y_mm[row], campaign->y_mm[other]);
-  }
-  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
-    if (met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
 }
 
 std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {

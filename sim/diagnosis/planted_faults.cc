@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
-#include "sim/diagnosis/outliers.h"
+#include "sim/diagnosis/exchanged.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -1,0 +1,86 @@
+// Units that make each other's moves.
+#include "sim/diagnosis/exchanged.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+// The table has one unit's moves under the other's name from this move on: what was measured is
+// what the other's moves did. Pre: both have as many rows; none is homed after it.
+void ExchangeMoves(std::size_t a, std::size_t b, std::size_t since, Campaign* campaign) {
+  const std::size_t end = campaign->first_row[a + 1] - campaign->first_row[a];
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    std::vector<double>&from = campaign->from_deg[axis], &cmd = campaign->cmd_deg[axis];
+    const auto row = [&](std::size_t unit, std::size_t move) {
+      return campaign->first_row[unit] + move;
+    };
+    const double apart = from[row(a, since)] - from[row(b, since)];
+    for (std::size_t i = since; i < end; ++i)
+      for (std::vector<double>* angle : {&from, &cmd}) {
+        std::swap((*angle)[row(a, i)], (*angle)[row(b, i)]);
+        (*angle)[row(a, i)] += apart, (*angle)[row(b, i)] -= apart;
+      }
+  }
+}
+
+TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
+  for (const std::size_t since : {0u, 17u, 40u}) {
+    SCOPED_TRACE(since);
+    Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.05, .axis = "theta"}},
+                                {.moves = 60, .seed = 5});
+    ExchangeMoves(3, 11, since, &campaign);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    ASSERT_THAT(diagnosis.causes, SizeIs(2)) << Told(diagnosis);
+    const CauseFound& swap = diagnosis.causes[0];
+    EXPECT_EQ(swap.cause, "identity_swap");
+    EXPECT_THAT(swap.units, ElementsAre(campaign.units[3].id, campaign.units[11].id));
+    const std::size_t first = campaign.first_row[3] + since;
+    EXPECT_EQ(swap.shape, "each makes the other's moves, since move " +
+                              std::to_string(campaign.move_id[first]));
+    EXPECT_THAT(diagnosis.causes[1].candidates, Contains("backlash"));
+    EXPECT_EQ(diagnosis.outliers.rows, 0u);
+  }
+}
+
+TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
+  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  Rng rng = Rng::Stream(5, "where they go");
+  for (const std::size_t unit : {3u, 11u})
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      const PlacePoint at =
+          PlaceOf(campaign.units[unit], rng.Uniform(-180, 180), rng.Uniform(0, 180));
+      campaign.x_mm[row] = at.x_mm, campaign.y_mm[row] = at.y_mm;
+    }
+  EXPECT_THAT(FindCommandSwaps(MakeFacts(campaign)), IsEmpty());
+  const Diagnosis diagnosis = Verdicts(campaign);
+  for (const CauseFound& cause : diagnosis.causes)
+    EXPECT_NE(cause.cause, "identity_swap") << Told(diagnosis);
+}
+
+TEST(Exchanged, WhatTheOtherHasNoRowOfIsMissing) {
+  Campaign campaign = Planted({}, {.moves = 20, .seed = 5});
+  ExchangeMoves(3, 11, 5, &campaign);
+  const std::size_t gone = campaign.first_row[11] + 12;  // of the other: as if of another exposure
+  campaign.move_id[gone] = 1'000'000;
+  const CampaignFacts facts = MakeFacts(campaign);
+  const std::vector<CommandSwap> swaps = FindCommandSwaps(facts);
+  ASSERT_THAT(swaps, SizeIs(1));
+  Campaign undone = campaign;
+  UndoCommandSwap(facts, swaps[0], &undone);
+  EXPECT_TRUE(std::isnan(undone.x_mm[gone]));
+  EXPECT_TRUE(std::isnan(undone.x_mm[campaign.first_row[3] + 12]));
+  EXPECT_TRUE(std::isfinite(undone.x_mm[campaign.first_row[3] + 13]));
+  EXPECT_TRUE(std::isfinite(undone.x_mm[campaign.first_row[3] + 4]));
+  EXPECT_THAT(FindCommandSwaps(MakeFacts(undone)), IsEmpty());
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
