@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/both_axes.h"
 #include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/contenders.h"
 #include "sim/diagnosis/quick_look.h"
@@ -177,6 +178,32 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
   return rivals;
 }
 
+// A cause of both axes gives way to one that has its own amplitude on each, if that is better.
+bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGroups& groups,
+                     const SelectionRule& rule, double tests, std::size_t at, Fit* fit) {
+  if (fit->model.terms.size() >= rule.terms_max) return false;
+  std::vector<PairTrial> trials =
+      TryPairs(*fit, at, look.pass, templates, look.standings, groups, kKeptMin);
+  std::erase_if(trials, [&](const PairTrial& trial) {
+    return LogLeastOf(trial.log_p, tests) > std::log(rule.family_wise);
+  });
+  const auto best = std::ranges::min_element(trials, {}, &PairTrial::behind);
+  if (best == trials.end() || best->behind >= -2 * kBetterBy) return false;
+  *fit = std::move(best->fit);
+  return true;
+}
+
+// Who does as well as a term of both axes with a cause on each.
+void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetGroups& groups,
+                      const SelectionRule& rule, const Fit& fit, std::size_t at,
+                      std::vector<Rival>* rivals) {
+  for (const PairTrial& trial :
+       TryPairs(fit, at, look.pass, templates, look.standings, groups, kKeptMin))
+    if (trial.behind < rule.rival_behind &&
+        std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
+      rivals->push_back({trial.cause, trial.behind, 0, false});
+}
+
 // One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if
 // anything changed.
 bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
@@ -197,6 +224,10 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
         (own == kNoTerm || best.standing.evidence > look.standings[own].evidence + kBetterBy);
     const bool other_level =
         best.at == own && (best.standing.sharing != fit->model.terms[t].sharing);
+    if (!better && ExchangeForPair(look, templates, groups, rule, tests, t, fit)) {
+      looks->Forget();
+      return true;
+    }
     if (!better && !other_level) {
       accepted->push_back({look.standings[own], RivalsOf(look, templates, groups, own, rule)});
       continue;
@@ -349,6 +380,10 @@ Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* 
     rests = !SwapSweep(templates, groups, rule, selection.tests, &looks, fit, &selection.accepted);
   if (!rests) TakeRivals(templates, groups, rule, *fit, &looks, &selection.accepted);
   DropTheNeedless(templates, groups, rule, selection.tests, &looks, fit, &selection.accepted);
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
+    if (fit->model.terms[t].form.axis == EffectAxis::kBoth)
+      AddPairsAsRivals(looks.At(*fit, templates, t), templates, groups, rule, *fit, t,
+                       &selection.accepted[t].rivals);
   return selection;
 }
 

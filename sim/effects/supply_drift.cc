@@ -9,9 +9,11 @@ namespace {
 
 void List(const CampaignFacts& facts, Templates* out) {
   const FilledColumn* volts = facts.Find("v_bus_V");
-  ListGrid({.shapes = {volts->high, volts->mean}, .shape_name = "below, V,"}, out);
+  const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
+  ListGrid({.axes = axes, .shapes = {volts->high, volts->mean}, .shape_name = "below, V,"}, out);
   // A rotor under load: bent, and by the drive. What it lags at the usual voltage is known.
-  ListGrid({.shapes = {0.2, 0.4, 0.6, 0.75, 0.85, 0.92},
+  ListGrid({.axes = axes,
+            .shapes = {0.2, 0.4, 0.6, 0.75, 0.85, 0.92},
             .shape_name = "load, of the pull-out,",
             .form = 1},
            out);
@@ -19,8 +21,6 @@ void List(const CampaignFacts& facts, Templates* out) {
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  const std::size_t axis = AxisIndex(form);
-  const std::span<const double> step = track.step_deg[axis];
   const std::span<const double> volts = track.Column("v_bus_V");
   const double usual_V = track.facts->Find("v_bus_V")->mean;
   std::span<const double> drive;
@@ -32,10 +32,13 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     const double per_volt = form.shape / usual_V;
     return AddedLoadAngle(form.shape, level, 1 - volts[i] / usual_V) / per_volt;
   };
-  AddRemembered(
-      track, axis, form.memory,
-      [&](std::size_t i) { return -amplitude[0] * Direction(step[i]) * missing_V(i); },
-      &errors->angle_deg[axis]);
+  for (const std::size_t axis : AxesOf(form)) {
+    const std::span<const double> step = track.step_deg[axis];
+    AddRemembered(
+        track, axis, form.memory,
+        [&](std::size_t i) { return -amplitude[0] * Direction(step[i]) * missing_V(i); },
+        &errors->angle_deg[axis]);
+  }
 }
 
 }  // namespace

@@ -1,0 +1,98 @@
+#include "sim/diagnosis/both_axes.h"
+
+#include <algorithm>
+#include <map>
+
+#include "sim/diagnosis/multi_start.h"
+#include "sim/diagnosis/select.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// The best of a cause's templates on each axis.
+struct AxisPair {
+  std::size_t theta = kNoTerm, phi = kNoTerm;
+  double evidence = 0;  // of both; what they share counts twice
+};
+
+void TakeBetter(std::size_t k, const std::vector<Standing>& standings, std::size_t* best) {
+  if (*best == kNoTerm || standings[k].evidence > standings[*best].evidence) *best = k;
+}
+
+// The best first, of other causes.
+std::vector<AxisPair> PairsOf(const ScorePass& pass, const Templates& templates,
+                              const std::vector<Standing>& standings, const Effect* own,
+                              double kept_min) {
+  std::map<std::string_view, AxisPair> by_cause;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    if (templates[k].effect == own || !(pass.scores[k].kept > kept_min * pass.scores[k].raw))
+      continue;
+    AxisPair& pair = by_cause[templates[k].effect->cause];
+    if (templates[k].axis == EffectAxis::kTheta) TakeBetter(k, standings, &pair.theta);
+    if (templates[k].axis == EffectAxis::kPhi) TakeBetter(k, standings, &pair.phi);
+  }
+  std::vector<AxisPair> pairs;
+  for (auto& [cause, pair] : by_cause) {
+    if (pair.theta == kNoTerm || pair.phi == kNoTerm) continue;
+    pair.evidence = standings[pair.theta].evidence + standings[pair.phi].evidence;
+    pairs.push_back(pair);
+  }
+  std::ranges::stable_sort(pairs, std::ranges::greater{}, &AxisPair::evidence);
+  return pairs;
+}
+
+// In place of the shapes that `without` has not.
+PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
+  constexpr int kRounds = 3;
+  PairTrial trial{.cause = theta.form.effect->cause, .fit = without};
+  trial.fit.model.terms.push_back(theta);
+  trial.fit.model.terms.push_back(phi);
+  StepFit(&trial.fit);
+  SettleFit(&trial.fit, kRounds);
+  trial.behind = BetterBy(fit, trial.fit);
+  return trial;
+}
+
+std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Effect* own,
+                                  const ScorePass& pass, const Templates& templates,
+                                  const std::vector<Standing>& standings, const FleetGroups& groups,
+                                  double kept_min) {
+  constexpr std::size_t kMost = 4;
+  constexpr double kNear = 0.5;  // of the term's evidence
+  double evidence = 0;
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    if (templates[k].effect == own) evidence = std::max(evidence, standings[k].evidence);
+  std::vector<PairTrial> trials;
+  for (const AxisPair& pair : PairsOf(pass, templates, standings, own, kept_min)) {
+    if (trials.size() == kMost || pair.evidence < kNear * evidence) break;
+    const Standing &theta = standings[pair.theta], &phi = standings[pair.phi];
+    trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], theta, groups),
+                           MakeTerm(templates[pair.phi], phi, groups)));
+    trials.back().log_p = std::max(theta.log_p, phi.log_p);
+  }
+  return trials;
+}
+
+}  // namespace
+
+std::vector<PairTrial> TryPairs(const Fit& fit, std::size_t term, const ScorePass& pass,
+                                const Templates& templates, const std::vector<Standing>& standings,
+                                const FleetGroups& groups, double kept_min) {
+  const Template& form = fit.model.terms[term].form;
+  if (form.axis != EffectAxis::kBoth) return {};
+  // Two shapes of one cause may stand for what another does plainly.
+  Fit without = fit;
+  const bool was_alone = std::erase_if(without.model.terms, [&](const ModelTerm& other) {
+                           return other.form.effect == form.effect && other.form.axis == form.axis;
+                         }) == 1;
+  UpdateResiduals(&without);
+  if (was_alone)
+    return TryAgainst(fit, without, form.effect, pass, templates, standings, groups, kept_min);
+  const ScorePass anew = ScoreTemplates(without, templates);
+  std::vector<Standing> assessed(templates.size());
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    assessed[k] = Assess(anew.scores[k], templates[k], groups);
+  return TryAgainst(fit, without, form.effect, anew, templates, assessed, groups, kept_min);
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,47 @@
+// Causes that have one amplitude for both axes, against those that have one on each.
+#include "sim/diagnosis/both_axes.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/sim/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// As many move at once in all moves.
+Campaign PlayOfBothAxes(double play_deg, std::uint64_t seed) {
+  Campaign campaign = Planted({{.cause = "backlash", .amplitude = play_deg, .axis = "theta"},
+                               {.cause = "backlash", .amplitude = play_deg, .axis = "phi"}},
+                              {.moves = 80, .seed = seed});
+  std::ranges::fill(
+      std::ranges::find(campaign.covariates, "movers_on_rail", &Covariate::name)->values, 12);
+  return campaign;
+}
+
+// Each axis alone explains half of what a droop of both does.
+TEST(BothAxes, PlayOfBothIsNoDroop) {
+  for (const double play_deg : {0.004, 0.008, 0.02})
+    for (const std::uint64_t seed : {3u, 4u}) {
+      SCOPED_TRACE(testing::Message() << play_deg << " deg, seed " << seed);
+      const Diagnosis diagnosis = Verdicts(PlayOfBothAxes(play_deg, seed));
+      for (const CauseFound& cause : diagnosis.causes) {
+        if (play_deg > 0.01) {
+          EXPECT_THAT(cause.candidates, testing::Contains("backlash")) << Told(diagnosis);
+        } else {  // too faint for a name
+          EXPECT_TRUE(cause.cause != "supply_droop" || cause.candidates.size() > 1)
+              << Told(diagnosis);
+        }
+      }
+    }
+}
+
+TEST(BothAxes, ADroopOfBothKeepsItsName) {
+  const Diagnosis diagnosis = Verdicts(Planted(
+      {{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = 3}));
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "supply_droop");
+  EXPECT_EQ(diagnosis.causes[0].axis, "both");
+}
+
+}  // namespace
+}  // namespace focalfleet::sim
