@@ -279,6 +279,7 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
   std::vector<double> kept = std::move(selection.kept_share);
   selection = Select(templates, rule, fit);
   selection.kept_share = std::move(kept);
+  AddDriftAsRival(image.drift_um, *fit, &selection);
   return selection;
 }
 
@@ -360,7 +361,7 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   MergeCauses(&causes);
   // Where the image's motion follows a column, steps of it are what is left of that.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
-                  [](const UnknownFound& told) { return told.channel.starts_with(kImageShift); }))
+                  [](const UnknownFound& told) { return told.channel == kImageShift; }))
     std::erase_if(causes,
                   [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
   JudgeRemainders(&causes);

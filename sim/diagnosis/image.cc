@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/term_trace.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -433,10 +434,11 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
     return {};
   }
   const double after = NeighboursAgree(*fit, &turbulence_um);
+  const bool goes_on = Carryover(motion.found) >= kRemembers;
+  if (goes_on) image.drift_um = size_um;
   CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
-  if (Carryover(motion.found) < kRemembers && !deformed.IsCamera())
-    cause.candidates.emplace_back("air_turbulence");
+  if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back("air_turbulence");
   if (after > kNeighboursAgree || deformed.IsAir()) {
     cause.cause = "air_turbulence";
     cause.candidates = {cause.cause};
@@ -447,9 +449,21 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
         "Air bends the light on its way to the camera: neighbours move alike, anew at each "
         "exposure. Stack exposures, or calm the air.";
   }
+  const bool swings = image.followed && image.followed->channel != kImageShift;
+  if (swings && deformed.IsCamera()) image.followed.reset();
   // What follows a column is not the image's own unrest.
-  if (!image.followed && cause.size_um >= kSizeMin_um) image.cause = std::move(cause);
+  if ((!image.followed || swings) && cause.size_um >= kSizeMin_um) image.cause = std::move(cause);
   return image;
+}
+
+void AddDriftAsRival(double drift_um, const Fit& fit, Selection* selection) {
+  constexpr std::string_view kOfImage[] = {"plate_expansion", "gravity_sag"};
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    const ModelTerm& term = fit.model.terms[t];
+    if (std::ranges::count(kOfImage, term.form.effect->cause) != 0 &&
+        2 * drift_um > SizeOf(fit, term))
+      selection->accepted[t].rivals.push_back({kCameraSimilarity, 0, 0, false});
+  }
 }
 
 }  // namespace focalfleet::sim

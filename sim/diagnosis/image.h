@@ -8,10 +8,11 @@
 
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/fit.h"
+#include "sim/diagnosis/select.h"
 
 namespace focalfleet::sim {
 
-/// How the channel of what the image's shifts follow begins.
+/// The channel of a column that the image's shifts follow.
 inline constexpr std::string_view kImageShift = "the image's shift";
 
 struct ImageFound {
@@ -19,12 +20,17 @@ struct ImageFound {
   /// camera_similarity, or air_turbulence where neighbours agree beyond the image's motion; the
   /// latter as a candidate where the image forgets from exposure to exposure.
   std::optional<CauseFound> cause;
-  std::optional<UnknownFound>
-      followed;  // the column that the shifts follow: then there is no cause
+  /// The column that the shifts follow: then there is no cause. One slow wave of time that only
+  /// shifts is the camera's and unknown: something moves the camera, or what it looks at.
+  std::optional<UnknownFound> followed;
+  double drift_um = 0;  // of an image that goes on from one exposure to the next
 };
 
 /// Fits shift, turn and scale of each exposure to the residuals where chance does not explain them,
 /// and adds them to the model in place of steps of the whole image.
 ImageFound AddImageTerms(Fit* fit, double family_wise);
+
+/// An image that drifts on may do what a column that drifts as well seems to do to it.
+void AddDriftAsRival(double drift_um, const Fit& fit, Selection* selection);
 
 }  // namespace focalfleet::sim

@@ -9,6 +9,8 @@
 #include <numbers>
 
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/term_trace.h"
+#include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -91,23 +93,66 @@ TEST(Image, OneThatShearsAsMuchIsAir) {
   }
 }
 
-TEST(Image, OneThatSwingsSlowlyIsUnknown) {
-  const Campaign plain = Planted({}, {.moves = 80, .seed = 8});
-  const Exposures exposures = FindExposures(plain);
+// Three half turns in the course of the campaign. Shape: (exposures)
+std::vector<double> SlowPhase(const Campaign& campaign) {
+  const Exposures exposures = FindExposures(campaign);
+  const std::span<const double> time_s = campaign.Find("t_s");
+  const double last_s = *std::ranges::max_element(time_s);
   std::vector<double> phase(exposures.size());
-  double last_s = 0;
-  for (std::size_t row = 0; row < plain.rows(); ++row)
-    last_s = std::max(last_s, plain.Find("t_s")[row]);
-  for (std::size_t row = 0; row < plain.rows(); ++row)
-    phase[exposures.of_row[row]] = 3 * std::numbers::pi * plain.Find("t_s")[row] / last_s;
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    phase[exposures.of_row[row]] = 3 * std::numbers::pi * time_s[row] / last_s;
+  return phase;
+}
+
+TEST(Image, OneThatSwingsSlowlyIsTheCamerasAndUnknown) {
+  const std::vector<double> phase = SlowPhase(Shifted([](std::size_t) { return Shift{0, 0}; }));
   const Diagnosis diagnosis = Verdicts(Shifted([&](std::size_t e) {
     return Shift{6 * std::sin(phase[e]), 3 * std::cos(phase[e])};
   }));
   EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Told(diagnosis);
-  for (const CauseFound& cause : diagnosis.causes)
-    EXPECT_NE(cause.cause, "camera_similarity") << Told(diagnosis);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "camera_similarity") << Told(diagnosis);
   ASSERT_FALSE(diagnosis.unknown.empty()) << Told(diagnosis);
   EXPECT_EQ(diagnosis.unknown[0].covariate, "t_s");
+}
+
+TEST(Image, OneThatAlsoTurnsAndScalesAsItSwingsIsTheCameras) {
+  Campaign campaign = Shifted([](std::size_t) { return Shift{0, 0}; });
+  const Exposures exposures = FindExposures(campaign);
+  const std::vector<double> phase = SlowPhase(campaign);
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const double at = phase[exposures.of_row[row]];
+    const double turn = 1e-4 * std::sin(at + 1), scale = 1e-4 * std::sin(at + 2);
+    const double x = campaign.x_mm[row], y = campaign.y_mm[row];
+    campaign.x_mm[row] += 0.006 * std::sin(at) - turn * y + scale * x;
+    campaign.y_mm[row] += 0.003 * std::cos(at) + turn * x + scale * y;
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity"));
+  for (const UnknownFound& unknown : diagnosis.unknown)
+    EXPECT_FALSE(unknown.channel.starts_with(kImageShift)) << Told(diagnosis);
+}
+
+TEST(Image, ADriftIsAsGoodAsWhatGravitySeemsToDo) {
+  const Campaign campaign = Planted({{.cause = "gravity_sag", .amplitude = 6}}, {.moves = 60});
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = StaticFit(facts);
+  ModelTerm sag;
+  sag.form = ListTemplates(*FindEffect("gravity_sag"), facts).front();
+  sag.group_of_unit.assign(campaign.units.size(), 0);
+  sag.amplitude.assign(sag.form.columns, 0), sag.sigma = sag.amplitude;
+  fit.model.terms.push_back(sag);
+  StepFit(&fit);
+  const double size_um = SizeOf(fit, fit.model.terms[0]);
+  ASSERT_GT(size_um, 1);
+  Selection selection;
+  selection.accepted.resize(1);
+  AddDriftAsRival(0.4 * size_um, fit, &selection);
+  EXPECT_THAT(selection.accepted[0].rivals, IsEmpty());
+  AddDriftAsRival(0.6 * size_um, fit, &selection);
+  ASSERT_EQ(selection.accepted[0].rivals.size(), 1u);
+  EXPECT_EQ(selection.accepted[0].rivals[0].cause, "camera_similarity");
 }
 
 // The image shifts along x by so much a metre per second of wind.
