@@ -23,6 +23,7 @@
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
 #include "sim/diagnosis/screen.h"
+#include "sim/diagnosis/shared_walk.h"
 #include "sim/diagnosis/steps_instead.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/diagnosis/wrong_sensors.h"
@@ -221,6 +222,10 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
   }
   TakeSeen(std::move(seen), &diagnosis->unknown);
   if (!diagnosis->unknown.empty()) return;
+  if (auto walk = FindSharedWalk(*fit, options.family_wise, options.seed); walk && matters(*walk)) {
+    diagnosis->unknown.push_back(std::move(*walk));
+    return;
+  }
   auto fine = FindFineStructure(*fit, options.family_wise);
   if (fine && matters(*fine)) diagnosis->unknown.push_back(std::move(*fine));
 }

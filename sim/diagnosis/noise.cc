@@ -215,7 +215,7 @@ Noise SearchAnew(const std::vector<NoiseUnit>& sample, bool with_axes, double ty
   }
   NoiseSearch search(sample, best);
   search.Leaps();
-  search.Axes(2, true);
+  search.Axes(2, noise.may_carry);
   return search.best();
 }
 
@@ -236,7 +236,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
     NoiseSearch search(sample, *noise);
     if (with_axes) {
       search.Leaps();
-      search.Axes(1.2, true);
+      search.Axes(1.2, noise->may_carry);
     } else {
       search.Place(1.2);
     }

@@ -25,6 +25,7 @@ struct Noise {
   double angle_deg[2] = {0, 0};         // anew at each exposure
   double rest_deg[2] = {0, 0};          // anew at each move of the axis, held until the next
   double carry[2] = {0, 0};             // share of it that the next move takes along, 0..1
+  bool may_carry = true;                // whether that is sought
   std::vector<double> unit_factor;      // Shape: (units)
   std::vector<double> exposure_factor;  // Shape: (exposures), or empty: all 1; of place_um
   bool fitted = false;                  // where a new search begins near

@@ -1,0 +1,32 @@
+#include "sim/diagnosis/shared_walk.h"
+
+#include <algorithm>
+
+#include "sim/diagnosis/screen.h"
+
+namespace focalfleet::sim {
+
+std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, std::uint64_t seed) {
+  constexpr double kRemembers = 0.3, kClearly = 20;
+  constexpr int kCurves = 3, kRounds = 2;  // curves: a step is no smooth one
+  if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembers) return std::nullopt;
+  Fit forgetful = fit;
+  forgetful.noise = {.may_carry = false, .unit_factor = fit.noise.unit_factor};
+  UpdateNoise(&forgetful);
+  UpdateWeights(&forgetful);
+  SettleFit(&forgetful, kRounds);
+  std::optional<UnknownFound> clearest;
+  for (int k = 0; k < kCurves; ++k) {
+    const auto left = FindStructure(forgetful, family_wise, seed);
+    if (!left || left->term.sharing != Sharing::kFleet) break;
+    if (!clearest) clearest = left->told;
+    forgetful.model.terms.push_back(left->term);
+    StepFit(&forgetful);
+    SettleFit(&forgetful, kRounds);
+    // Each by its own noise: that is what differs.
+    if (Merit(forgetful) > Merit(fit) + kClearly) return clearest;
+  }
+  return std::nullopt;
+}
+
+}  // namespace focalfleet::sim
