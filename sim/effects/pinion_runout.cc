@@ -5,13 +5,14 @@
 namespace focalfleet::sim {
 namespace {
 
-void List(const CampaignFacts& facts, Templates* out) {
-  if (HasPinion(facts)) ListGrid({.columns = 2}, out);
-}
+void List(const CampaignFacts&, Templates* out) { ListGrid({.columns = 2}, out); }
 
+// Without an output stage the last pinion is the sun of the last planetary stage.
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  AddHarmonic(track, AxisIndex(form), PinionRatio(*track.unit, AxisIndex(form)), amplitude, errors);
+  const std::size_t axis = AxisIndex(form);
+  const double ratio = PinionRatio(*track.unit, axis);
+  AddHarmonic(track, axis, ratio > 1 ? ratio : kStageRatio, amplitude, errors);
 }
 
 }  // namespace
@@ -23,9 +24,9 @@ Effect MakePinionRunout() {
           .owner = Owner::kUnit,
           .needs = {},
           .paragraph =
-              "The pinion of the output stage, or the carrier that it sits on, is off centre: "
-              "a ripple of 2.65 periods a turn. The two turn together, so that nothing but a "
-              "gear of its own tells them apart.",
+              "The last pinion, or the carrier that it sits on, is off centre: a ripple of 2.65 "
+              "periods a turn with an output stage, of 4.29 without. The two turn together, so "
+              "that nothing but a gear of its own tells them apart.",
           .list = List,
           .apply = Apply};
 }

@@ -73,6 +73,22 @@ TEST(Diagnosis, APlateThatBendsOneWayForAllIsNamed) {
   EXPECT_EQ(diagnosis.causes[0].cause, "plate_gradient");
 }
 
+TEST(Diagnosis, WithoutAnOutputStageTheLastPinionSitsOnAStagesCarrier) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  for (CampaignUnit& unit : campaign.units)
+    unit.gear[kTheta] = unit.gear[kPhi] = std::pow(60.0 / 14, 4);
+  TurnTheta(
+      [&](std::size_t row) {
+        const double turn = campaign.cmd_deg[kTheta][row] * std::numbers::pi / 180;
+        return 0.05 * std::sin(60.0 / 14 * turn + 1);
+      },
+      &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates,
+              testing::UnorderedElementsAre("pinion_runout", "stage_ripple"));
+}
+
 // A stiffening spring that is at rest a fifth of the way beside the middle of the range.
 TEST(Diagnosis, AFibreThatRestsAsideIsNamed) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
