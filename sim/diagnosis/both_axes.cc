@@ -1,6 +1,7 @@
 #include "sim/diagnosis/both_axes.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "sim/diagnosis/multi_start.h"
@@ -41,6 +42,14 @@ std::vector<AxisPair> PairsOf(const ScorePass& pass, const Templates& templates,
   return pairs;
 }
 
+// Of the terms' amplitudes, by BIC.
+double PriceOf(const Fit& fit) {
+  double amplitudes = 0;
+  for (const ModelTerm& term : fit.model.terms)
+    amplitudes += static_cast<double>(term.amplitude.size());
+  return amplitudes * std::log(2 * static_cast<double>(fit.facts->campaign->rows()));
+}
+
 // In place of the shapes that `without` has not.
 PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
   constexpr int kRounds = 3;
@@ -50,25 +59,43 @@ PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, cons
   StepFit(&trial.fit);
   SettleFit(&trial.fit, kRounds);
   trial.behind = BetterBy(fit, trial.fit);
+  trial.behind_unpriced = trial.behind - (PriceOf(trial.fit) - PriceOf(fit));
   return trial;
 }
 
-std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Effect* own,
+// As the term has it: an amplitude of each unit, where the units' may differ.
+Standing OfEachUnit(Standing standing, const ModelTerm& as) {
+  standing.sharing = Sharing::kUnit;
+  standing.scattered = false, standing.spread = 0;
+  for (std::size_t unit = 0; unit < standing.has.size(); ++unit)
+    standing.has[unit] = as.group_of_unit[unit] == kNoGroup ? 0 : 1;
+  return standing;
+}
+
+std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const ModelTerm& term,
                                   const ScorePass& pass, const Templates& templates,
                                   const std::vector<Standing>& standings, const FleetGroups& groups,
                                   double kept_min) {
-  constexpr std::size_t kMost = 4;
+  constexpr std::size_t kMost = 6;
   constexpr double kNear = 0.5;  // of the term's evidence
+  const Effect* own = term.form.effect;
   double evidence = 0;
   for (std::size_t k = 0; k < templates.size(); ++k)
     if (templates[k].effect == own) evidence = std::max(evidence, standings[k].evidence);
   std::vector<PairTrial> trials;
   for (const AxisPair& pair : PairsOf(pass, templates, standings, own, kept_min)) {
-    if (trials.size() == kMost || pair.evidence < kNear * evidence) break;
+    if (trials.size() >= kMost || pair.evidence < kNear * evidence) break;
     const Standing &theta = standings[pair.theta], &phi = standings[pair.phi];
-    trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], theta, groups),
-                           MakeTerm(templates[pair.phi], phi, groups)));
-    trials.back().log_p = std::max(theta.log_p, phi.log_p);
+    const auto take = [&](const Standing& on_theta, const Standing& on_phi) {
+      trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], on_theta, groups),
+                             MakeTerm(templates[pair.phi], on_phi, groups)));
+      trials.back().log_p = std::max(theta.log_p, phi.log_p);
+    };
+    take(theta, phi);
+    // Either axis alone may show too little of its units to be of each.
+    if (term.sharing == Sharing::kUnit &&
+        (theta.sharing != Sharing::kUnit || phi.sharing != Sharing::kUnit))
+      take(OfEachUnit(theta, term), OfEachUnit(phi, term));
   }
   return trials;
 }
@@ -78,21 +105,21 @@ std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Effe
 std::vector<PairTrial> TryPairs(const Fit& fit, std::size_t term, const ScorePass& pass,
                                 const Templates& templates, const std::vector<Standing>& standings,
                                 const FleetGroups& groups, double kept_min) {
-  const Template& form = fit.model.terms[term].form;
-  if (form.axis != EffectAxis::kBoth) return {};
+  const ModelTerm& own = fit.model.terms[term];
+  if (own.form.axis != EffectAxis::kBoth) return {};
   // Two shapes of one cause may stand for what another does plainly.
   Fit without = fit;
-  const bool was_alone = std::erase_if(without.model.terms, [&](const ModelTerm& other) {
-                           return other.form.effect == form.effect && other.form.axis == form.axis;
-                         }) == 1;
+  const bool was_alone =
+      std::erase_if(without.model.terms, [&](const ModelTerm& other) {
+        return other.form.effect == own.form.effect && other.form.axis == own.form.axis;
+      }) == 1;
   UpdateResiduals(&without);
-  if (was_alone)
-    return TryAgainst(fit, without, form.effect, pass, templates, standings, groups, kept_min);
+  if (was_alone) return TryAgainst(fit, without, own, pass, templates, standings, groups, kept_min);
   const ScorePass anew = ScoreTemplates(without, templates);
   std::vector<Standing> assessed(templates.size());
   for (std::size_t k = 0; k < templates.size(); ++k)
     assessed[k] = Assess(anew.scores[k], templates[k], groups);
-  return TryAgainst(fit, without, form.effect, anew, templates, assessed, groups, kept_min);
+  return TryAgainst(fit, without, own, anew, templates, assessed, groups, kept_min);
 }
 
 }  // namespace focalfleet::sim

@@ -17,6 +17,7 @@ struct PairTrial {
   std::string_view cause;
   double log_p = 0;   // of the axis that chance explains better
   double behind = 0;  // twice the difference of the logarithms of likelihood, at their price
+  double behind_unpriced = 0;  // the same, however many amplitudes it takes
   Fit fit;
 };
 

@@ -457,7 +457,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
 }
 
 void AddDriftAsRival(double drift_um, const Fit& fit, Selection* selection) {
-  constexpr std::string_view kOfImage[] = {"plate_expansion", "gravity_sag"};
+  constexpr std::string_view kOfImage[] = {"plate_expansion", "plate_gradient", "gravity_sag"};
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const ModelTerm& term = fit.model.terms[t];
     if (std::ranges::count(kOfImage, term.form.effect->cause) != 0 &&

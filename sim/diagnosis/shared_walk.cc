@@ -5,9 +5,20 @@
 #include "sim/diagnosis/screen.h"
 
 namespace focalfleet::sim {
+namespace {
+
+constexpr double kRemembers = 0.3;  // of a rest error
+
+// Of an axis whose noise remembers: that hides what this axis does, and nothing else.
+bool IsOfSuchAxis(const UnknownFound& told, const Noise& noise) {
+  return (told.channel.starts_with("theta") && noise.carry[kTheta] >= kRemembers) ||
+         (told.channel.starts_with("phi") && noise.carry[kPhi] >= kRemembers);
+}
+
+}  // namespace
 
 std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, std::uint64_t seed) {
-  constexpr double kRemembers = 0.3, kClearly = 20;
+  constexpr double kClearly = 20;
   constexpr int kCurves = 3, kRounds = 2;  // curves: a step is no smooth one
   if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembers) return std::nullopt;
   Fit forgetful = fit;
@@ -18,7 +29,8 @@ std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, s
   std::optional<UnknownFound> clearest;
   for (int k = 0; k < kCurves; ++k) {
     const auto left = FindStructure(forgetful, family_wise, seed);
-    if (!left || left->term.sharing != Sharing::kFleet) break;
+    if (!left || left->term.sharing != Sharing::kFleet || !IsOfSuchAxis(left->told, fit.noise))
+      break;
     if (!clearest) clearest = left->told;
     forgetful.model.terms.push_back(left->term);
     StepFit(&forgetful);
