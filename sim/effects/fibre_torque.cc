@@ -16,10 +16,6 @@ void List(const CampaignFacts&, Templates* out) {
   // A stiffening spring, and the bundle's own friction over a travel.
   ListGrid({.shapes = {6, 18, 50}, .shape_name = "with a loop over a travel of, deg,", .form = 3},
            out);
-  // A spring that rests beside the middle of the range: with a square of its own size.
-  ListGrid(
-      {.shapes = {0.2, 0.6}, .shape_name = "rests aside; linear share,", .form = 4, .columns = 2},
-      out);
 }
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
@@ -41,10 +37,6 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     if (form.form == 1) pull = turned * std::abs(turned);
     if (form.form == 2) pull = std::abs(turned) * direction;
     if (form.form == 3) pull += kLinear * turned + kFriction * loop;
-    if (form.form == 4) {
-      pull += form.shape * turned;
-      errors->angle_deg[axis][i] -= amplitude[1] * turned * turned;
-    }
     errors->angle_deg[axis][i] -= amplitude[0] * pull;
   }
 }

@@ -21,6 +21,18 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
+// What adds up in all moves is another cause's: some have to be longer.
+bool Shows(const Template& form, const CampaignFacts& facts) {
+  constexpr double kLonger = 0.25;  // of the axis' moves
+  if (form.memory != Memory::kChain) return true;
+  double moves = 0, longer = 0;
+  for (const double step : facts.step_deg[AxisIndex(form)]) {
+    moves += step != 0 ? 1 : 0;
+    longer += std::abs(step) >= form.shape ? 1 : 0;
+  }
+  return longer >= kLonger * moves;
+}
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
@@ -48,7 +60,8 @@ Effect MakeModeThreshold() {
               "cruise), which ends a little elsewhere: the error steps at that length.",
           .list = List,
           .apply = Apply,
-          .continuous_shape = true};
+          .continuous_shape = true,
+          .shows = Shows};
 }
 
 }  // namespace focalfleet::sim

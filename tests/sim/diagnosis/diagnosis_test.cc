@@ -89,24 +89,6 @@ TEST(Diagnosis, WithoutAnOutputStageTheLastPinionSitsOnAStagesCarrier) {
               testing::UnorderedElementsAre("pinion_runout", "stage_ripple"));
 }
 
-// A stiffening spring that is at rest a fifth of the way beside the middle of the range.
-TEST(Diagnosis, AFibreThatRestsAsideIsNamed) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
-  const CampaignUnit& unit = campaign.units[0];
-  const double middle_deg = (unit.min_deg[kTheta] + unit.max_deg[kTheta]) / 2;
-  const double half_deg = (unit.max_deg[kTheta] - unit.min_deg[kTheta]) / 2;
-  TurnTheta(
-      [&](std::size_t row) {
-        const double turned = (campaign.cmd_deg[kTheta][row] - middle_deg) / half_deg - 0.2;
-        return -0.4 * (turned + 2 * std::pow(turned, 3)) / 3;
-      },
-      &campaign);
-  const Diagnosis diagnosis = Verdicts(campaign);
-  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << Told(diagnosis);  // one shape does it
-  EXPECT_EQ(diagnosis.model.terms[0].form.effect->cause, "fibre_torque");
-  EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
-}
-
 // The sensors at the units see a hundredth of the gradient that bends the plate.
 TEST(Diagnosis, AGradientThatSensorsSeeLittleOfIsNamed) {
   constexpr double kPerKelvin = 1.5e-3, kGradient_C_per_mm = 0.01;
