@@ -21,9 +21,9 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-// What adds up in all moves is another cause's: some have to be longer.
+// What adds up in nearly all moves is another cause's: most have to be longer.
 bool Shows(const Template& form, const CampaignFacts& facts) {
-  constexpr double kLonger = 0.25;  // of the axis' moves
+  constexpr double kLonger = 0.7;  // of the axis' moves
   if (form.memory != Memory::kChain) return true;
   double moves = 0, longer = 0;
   for (const double step : facts.step_deg[AxisIndex(form)]) {
