@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "daemon/report/page.h"
-#include "fleet/files/csv.h"
+#include "sim/diagnosis/next_moves.h"
 
 namespace focalfleet {
 namespace {
@@ -120,8 +120,35 @@ void AddResiduals(const Campaign& campaign, const Diagnosis& diagnosis, report::
     }
 }
 
-void AddRest(const Diagnosis& diagnosis, const std::vector<sim::ProposedMove>& moves,
-             report::Page* page) {
+std::string PercentOf(double share) {
+  return share < 0.001 ? "below 0.1 %" : fmt::format("{:.1f} %", 100 * share);
+}
+
+// What is to be had from further moves, pair by pair.
+void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
+  page->Heading("Moves to make next");
+  if (next.prospects.empty() && next.untold.empty()) {
+    page->Paragraph(
+        "Nothing is confusable: no further moves are needed to tell causes apart.");
+    return;
+  }
+  page->Paragraph(next.moves.empty()
+                      ? "No moves of the units tell these apart."
+                      : fmt::format("next_moves.csv has {} moves; focalfleet campaign run makes "
+                                    "them, under the conditions that they ask for.",
+                                    next.moves.size()));
+  std::vector<std::vector<std::string>> rows;
+  for (const sim::Prospect& one : next.prospects)
+    rows.push_back({one.cause, one.rival, fmt::format("{:.1f}", one.d_now),
+                    fmt::format("{:.1f}", one.d_then),
+                    PercentOf(sim::ConfusionAt(one.d_then))});
+  for (const auto& [cause, rival] : next.untold)
+    rows.push_back({cause, rival, "-", "-", "no move tells"});
+  page->Table({"cause", "or", "chi-square apart now", "with the moves", "still confused"}, rows,
+              {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight, Align::kRight});
+}
+
+void AddRest(const Diagnosis& diagnosis, report::Page* page) {
   if (!diagnosis.unknown.empty()) {
     page->Heading("What no candidate explains");
     std::vector<std::vector<std::string>> rows;
@@ -136,11 +163,7 @@ void AddRest(const Diagnosis& diagnosis, const std::vector<sim::ProposedMove>& m
         "A patch is a smooth curve or a ripple that follows the data: it corrects, and explains "
         "nothing.");
   }
-  page->Heading("Moves to make next");
-  page->Paragraph(moves.empty()
-                      ? "Nothing is confusable: no further moves are needed to tell causes apart."
-                      : fmt::format("next_moves.csv has {} moves that would separate {}.",
-                                    moves.size(), moves.front().separates));
+  AddNextMoves(diagnosis.next, page);
   if (!diagnosis.outliers.why.empty()) {
     page->Heading("Rows left out or far off");
     std::vector<std::vector<std::string>> rows;
@@ -169,20 +192,8 @@ std::string DiagnosisPage(const Campaign& campaign, const Diagnosis& diagnosis,
   AddCauses(diagnosis, &page);
   AddGain(diagnosis, &page);
   AddResiduals(campaign, diagnosis, &page);
-  AddRest(diagnosis, ProposeMoves(campaign, diagnosis), &page);
+  AddRest(diagnosis, &page);
   return page.Html();
-}
-
-std::string WriteNextMoves(const std::vector<sim::ProposedMove>& moves) {
-  CsvWriter csv({"move_id", "theta_from_middle_deg", "phi_from_middle_deg", "drive_amplitude",
-                 "delay_s", "movers_share", "rehomed", "separates"});
-  std::int64_t id = 1;
-  for (const sim::ProposedMove& move : moves) {
-    csv.Integer(id++).Number(move.theta_deg).Number(move.phi_deg).Number(move.drive_amplitude);
-    csv.Number(move.delay_s).Number(move.movers_share).Integer(move.home_first ? 1 : 0);
-    csv.Text(move.separates).EndRow();
-  }
-  return csv.Take();
 }
 
 }  // namespace focalfleet

@@ -4,17 +4,12 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "daemon/campaign/diagnosis_files.h"
-#include "sim/diagnosis/next_moves.h"
 
 namespace focalfleet {
 
 std::string DiagnosisPage(const sim::Campaign& campaign, const sim::Diagnosis& diagnosis,
                           const ReportNames& names);
-
-/// next_moves.csv.
-std::string WriteNextMoves(const std::vector<sim::ProposedMove>& moves);
 
 }  // namespace focalfleet

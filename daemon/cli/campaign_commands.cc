@@ -11,6 +11,7 @@
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/campaign_log.h"
 #include "daemon/campaign/move_list.h"
+#include "daemon/campaign/next_moves_file.h"
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
@@ -171,6 +172,10 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (!text) return Report(context, text.error());
   const auto moves = ReadMoveList(*text, options.list, fleet->layout);
   if (!moves) return Report(context, moves.error());
+  const auto asked = ConditionsAsked(*text, options.list);
+  if (!asked) return Report(context, asked.error());
+  for (const std::string& condition : *asked)
+    Say(context, options.list + " asks for " + condition + ": not set by this command");
   std::error_code failed;
   std::filesystem::create_directories(options.out, failed);
   if (failed)

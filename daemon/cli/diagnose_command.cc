@@ -12,13 +12,13 @@
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
+#include "daemon/campaign/next_moves_file.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/compare_models_command.h"
 #include "daemon/cli/measured_campaign.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
-#include "sim/diagnosis/next_moves.h"
 #include "sim/diagnosis/planted.h"
 #include "sim/effects/registry.h"
 
@@ -53,7 +53,7 @@ Status WriteReport(const std::filesystem::path& out, const MeasuredCampaign& in,
   FOCALFLEET_TRY(
       WriteFileAtomically(out / "model.toml", WriteModel(diagnosis, in.names, in.campaign)));
   FOCALFLEET_TRY(WriteFileAtomically(out / "next_moves.csv",
-                                     WriteNextMoves(sim::ProposeMoves(in.campaign, diagnosis))));
+                                     WriteNextMoves(in.campaign.units, diagnosis.next.moves)));
   FOCALFLEET_TRY(
       WriteFileAtomically(out / "report.html", DiagnosisPage(in.campaign, diagnosis, in.names)));
   // Last: where it is, all is.
@@ -151,8 +151,18 @@ struct SimulateCampaignOptions {
   sim::PlantedOptions planted;
   std::vector<std::string> effects;
   double unit_share = 1;
+  std::string next;
   std::string out;
 };
+
+// The campaign, and with `next` the moves of that list after it.
+Result<sim::Campaign> Simulate(sim::PlantedOptions planted, const std::string& next) {
+  FOCALFLEET_TRY_ASSIGN(sim::Campaign campaign, sim::PlantCampaign(planted));
+  if (next.empty()) return campaign;
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(next));
+  FOCALFLEET_TRY_ASSIGN(planted.next, ReadNextMoves(text, next, campaign.units));
+  return sim::PlantCampaign(planted);
+}
 
 Result<sim::PlantedEffect> EffectOf(const std::string& text) {
   static const std::regex kForm("([a-z_]+)(:([a-z]+))?(#([0-9]{1,3}))?=([-+.0-9eE]+)");
@@ -181,7 +191,7 @@ ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptio
     planted.effects.push_back(*effect);
     planted.effects.back().unit_share = options.unit_share;
   }
-  const auto campaign = sim::PlantCampaign(planted);
+  const auto campaign = Simulate(planted, options.next);
   if (!campaign) return Report(context, campaign.error(), ExitCode::kUsage);
   std::error_code failed;
   std::filesystem::create_directories(options.out, failed);
@@ -273,6 +283,8 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
   command->add_option("--outliers", planted.outlier_share, "Share of places that are anywhere")
       ->check(NumberBetween(0, 0.5))
       ->capture_default_str();
+  AddFile(command, "--next", &options->next,
+          "next_moves.csv of a diagnosis of this campaign: its moves are made after the others");
   command->add_option("--out", options->out, "Folder for units.csv and moves.csv; made if missing")
       ->required()
       ->type_name("DIR");

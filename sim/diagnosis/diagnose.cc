@@ -19,6 +19,7 @@
 #include "sim/diagnosis/homings.h"
 #include "sim/diagnosis/image.h"
 #include "sim/diagnosis/multi_start.h"
+#include "sim/diagnosis/next_moves.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
@@ -270,6 +271,28 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
   }
 }
 
+// What units do all alike moves the image, and its motion passes for what they do: found first, it
+// may need fewer causes beside it. True: the fit is that one now.
+bool TryImageFirst(const Templates& templates, const DiagnoseOptions& options,
+                   const SelectionRule& rule, Fit* fit, ImageFound* image, Selection* selection) {
+  Fit anew = *fit;
+  anew.model.terms.clear();
+  anew.model.events.clear();
+  anew.model.exposures.clear();
+  UpdateResiduals(&anew);
+  StepFit(&anew);
+  SettleFit(&anew, 3);
+  ImageFound first = AddImageTerms(&anew, options.family_wise);
+  if (!first.moves) return false;
+  Selection again = SelectMultiStart(templates, rule, &anew);
+  if (BetterBy(anew, *fit) <= 0) return false;
+  again.kept_share = std::move(selection->kept_share);
+  *fit = std::move(anew);
+  *image = std::move(first);
+  *selection = std::move(again);
+  return true;
+}
+
 // The terms, steps, zeros of homings and motion of the image that explain the data.
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
@@ -277,13 +300,15 @@ Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
   if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
   ImageFound image = AddImageTerms(fit, options.family_wise);
   if (!image.moves) return selection;
+  // What the image's motion hid, or what stood in for it.
+  std::vector<double> kept = std::move(selection.kept_share);
+  const bool has_terms = !fit->model.terms.empty();
+  selection = Select(templates, rule, fit);
+  selection.kept_share = std::move(kept);
+  if (has_terms) TryImageFirst(templates, options, rule, fit, &image, &selection);
   if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
   if (image.cause && !IsLeftOut(options, image.cause->cause))
     diagnosis->causes.push_back(std::move(*image.cause));
-  // What the image's motion hid, or what stood in for it.
-  std::vector<double> kept = std::move(selection.kept_share);
-  selection = Select(templates, rule, fit);
-  selection.kept_share = std::move(kept);
   AddDriftAsRival(image.drift_um, *fit, &selection);
   return selection;
 }
@@ -488,6 +513,10 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   if (options.with_gain) {
     options.progress(0.9, "held-out moves");
     diagnosis.gain = GainOf(fit, as_named, options);
+  }
+  if (options.with_next_moves) {
+    options.progress(0.95, "moves to make next");
+    diagnosis.next = ProposeMoves(fit, diagnosis.causes);
   }
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
+#include "sim/diagnosis/ahead.h"
 #include "sim/diagnosis/model.h"
 
 namespace focalfleet::sim {
@@ -74,6 +75,20 @@ struct HeldOutGain {
   std::string held_out;
 };
 
+/// How far a cause and its rival stand apart: chi-square that is left between them (next_moves.h).
+struct Prospect {
+  std::string cause, rival;
+  double d_now = 0;
+  double d_then = 0;  // with the proposed moves
+};
+
+/// The moves to make next, and what is to be had from them.
+struct NextMoves {
+  std::vector<ProposedMove> moves;
+  std::vector<Prospect> prospects;
+  std::vector<std::pair<std::string, std::string>> untold;  // cause and rival that moves do not tell
+};
+
 enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };
 std::string_view Name(Verdict verdict);
 
@@ -87,6 +102,7 @@ struct Diagnosis {
   HeldOutGain gain;
   std::size_t rows = 0, units = 0, moves = 0;
   CampaignModel model;  // the extended one
+  NextMoves next;
   // Residuals in um, for pictures. Shape: (rows); NaN where nothing was measured.
   std::vector<double> x_before_um, y_before_um, x_after_um, y_after_um;
 };
@@ -100,6 +116,7 @@ struct DiagnoseOptions {
   const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
   bool patch = false;                     // empirical terms for what is unknown
   bool with_gain = true;
+  bool with_next_moves = true;
   ParallelFor parallel = OneAfterTheOther();
   std::function<void(double share, std::string_view stage)> progress = [](double,
                                                                           std::string_view) {};

@@ -11,6 +11,7 @@
 
 #include "protocol/base/result.h"
 #include "sim/campaign/campaign.h"
+#include "sim/diagnosis/ahead.h"
 
 namespace focalfleet::sim {
 
@@ -39,6 +40,7 @@ struct PlantedOptions {
   double homing_share = 0;   // of a unit's moves that begin with a homing
   bool pinion = true;        // gears of 337.36 x 45/17, else 337.36
   std::vector<PlantedEffect> effects;
+  std::vector<PlateMove> next;  // made after the others, by the same units
 };
 
 /// Of the causes that no effect is, those of planted_faults.h, too; camera pixels are told where

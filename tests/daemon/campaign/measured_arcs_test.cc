@@ -8,7 +8,6 @@
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/files/text_file.h"
 #include "sim/diagnosis/diagnosis.h"
-#include "sim/diagnosis/next_moves.h"
 
 namespace focalfleet {
 namespace {
@@ -45,7 +44,7 @@ TEST_P(MeasuredArcs, TheStrongCauseIsFoundWithTheRivalThatMovesOfOneLengthLeaveI
   EXPECT_THAT(diagnosis.gain.held_out, testing::HasSubstr("whole homings"));
 
   std::vector<std::string> separates;
-  for (const sim::ProposedMove& move : sim::ProposeMoves(campaign, diagnosis))
+  for (const sim::ProposedMove& move : diagnosis.next.moves)
     separates.push_back(move.separates);
   EXPECT_THAT(separates,
               Contains(testing::AnyOf("gear_scale | ramp_travel", "ramp_travel | gear_scale")));
