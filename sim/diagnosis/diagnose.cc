@@ -380,7 +380,9 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
 void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOptions& options,
                 Diagnosis* diagnosis) {
   std::vector<CauseFound>& causes = diagnosis->causes;
-  for (CauseFound& cause : EventCauses(fit)) causes.push_back(std::move(cause));
+  for (CauseFound& cause : EventCauses(fit))
+    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
+  for (UnknownFound& step : StandOff(fit)) diagnosis->unknown.push_back(std::move(step));
   for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
   options.progress(0.8, "geometry against the table");
   const double rms_um = RmsOf(fit);

@@ -4,223 +4,18 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <set>
 
 #include "sim/diagnosis/angle_errors.h"
 #include "sim/diagnosis/chances.h"
-#include "sim/diagnosis/plain_geometry.h"
+#include "sim/diagnosis/exact_steps.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::size_t kEventsMax = 40;  // of a unit at once
-constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
 constexpr int kTurnsMax = 20;
 constexpr double kEventEvidence = 25;  // at least, of an event that was taken
-
-// ---- lost and doubled commands, and slips: so large that only the exact place tells
-
-constexpr double kCap_mm = 0.5;  // what an outlier costs at most
-
-// One unit's rows, and what has been added to each angle so far.
-struct UnitRows {
-  CampaignUnit geometry;
-  UnitTrack track;
-  std::span<const double> x_mm, y_mm;
-  std::vector<double> added_deg[2];
-};
-
-double RowCost(const UnitRows& rows, std::size_t i, double theta_deg, double phi_deg) {
-  if (!std::isfinite(rows.x_mm[i])) return 0;
-  const PlacePoint at = PlaceOf(rows.geometry, rows.track.cmd_deg[kTheta][i] + theta_deg,
-                                rows.track.cmd_deg[kPhi][i] + phi_deg);
-  const double x = rows.x_mm[i] - at.x_mm, y = rows.y_mm[i] - at.y_mm;
-  return std::min(x * x + y * y, kCap_mm * kCap_mm);
-}
-
-double TotalCost(const UnitRows& rows) {
-  double sum = 0;
-  for (std::size_t i = 0; i < rows.track.moves; ++i)
-    sum += RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]);
-  return sum;
-}
-
-// What may have happened in a move: what it added to the angles.
-struct Change {
-  std::size_t move = 0;
-  double by_deg[2] = {0, 0};
-  double gained = 0;
-};
-enum class ChangeKind { kWholeMove, kSlip };
-
-// A command that was lost, or made twice; or whole turns of a rotor, against its motion.
-std::vector<Change> ChangesIn(const UnitTrack& track, std::size_t move, ChangeKind kind) {
-  constexpr int kTurnsAtOnce = 4;
-  const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
-  std::vector<Change> changes;
-  if (kind == ChangeKind::kWholeMove) {
-    if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) return changes;
-    for (const double sign : {-1.0, 1.0})
-      changes.push_back({move, {sign * steps[0], sign * steps[1]}});
-    return changes;
-  }
-  for (const std::size_t axis : {kTheta, kPhi})
-    for (int turns = 1; steps[axis] != 0 && turns <= kTurnsAtOnce; ++turns) {
-      Change slip{.move = move};
-      slip.by_deg[axis] = std::copysign(turns * 360 / track.unit->gear[axis], -steps[axis]);
-      changes.push_back(slip);
-    }
-  return changes;
-}
-
-// What every row costs now, and all from a row on.
-struct Costs {
-  std::vector<double> of_row, from;
-};
-Costs CostsOf(const UnitRows& rows) {
-  const std::size_t moves = rows.track.moves;
-  Costs costs{std::vector<double>(moves), std::vector<double>(moves + 1, 0)};
-  for (std::size_t i = moves; i-- > 0;) {
-    costs.of_row[i] = RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]);
-    costs.from[i] = costs.from[i + 1] + costs.of_row[i];
-  }
-  return costs;
-}
-
-// The one that gains most, if it gains `gain_min`.
-Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
-  constexpr double kRounding = 1e-9;  // of sums of squares, mm^2
-  const Costs costs = CostsOf(rows);
-  Change best;
-  for (std::size_t move = 0; move < rows.track.moves; ++move) {
-    const std::size_t end = EndOfHistory(rows.track, move);
-    for (Change& change : ChangesIn(rows.track, move, kind)) {
-      const double enough = std::max(best.gained, gain_min) - kRounding;
-      double gained = 0;
-      // No more can be gained than what the rows to come cost: most moves are out after a few.
-      for (std::size_t i = move; i < end && gained + costs.from[i] - costs.from[end] >= enough; ++i)
-        gained +=
-            costs.of_row[i] - RowCost(rows, i, rows.added_deg[kTheta][i] + change.by_deg[kTheta],
-                                      rows.added_deg[kPhi][i] + change.by_deg[kPhi]);
-      if (gained <= best.gained || gained < enough) continue;
-      best = change;
-      best.gained = gained;
-    }
-  }
-  return best;
-}
-
-// Once a change is known, so is the geometry: by the rows before and behind it.
-void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
-  constexpr int kRounds = 20;
-  std::vector<PlainRow> plain;
-  for (std::size_t i = 0; i < rows->track.moves; ++i)
-    if (std::isfinite(rows->x_mm[i]))
-      plain.push_back({rows->track.cmd_deg[kTheta][i] + rows->added_deg[kTheta][i],
-                       rows->track.cmd_deg[kPhi][i] + rows->added_deg[kPhi][i], rows->x_mm[i],
-                       rows->y_mm[i]});
-  rows->geometry = FitPlain(plain, table, rows->geometry, kRounds);
-}
-
-// Changes that explain the rows, from one geometry to begin at.
-std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
-                                const CampaignUnit& table, UnitRows* rows) {
-  const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
-  std::vector<Change> found;
-  while (found.size() < at_most) {
-    const Change best = BestChange(*rows, kind, gain_min);
-    if (best.gained < gain_min) break;
-    const std::size_t end = EndOfHistory(rows->track, best.move);
-    for (std::size_t i = best.move; i < end; ++i)
-      for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += best.by_deg[axis];
-    FitGeometry(table, rows);
-    found.push_back(best);
-  }
-  return found;
-}
-
-UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) {
-  const Campaign& campaign = *fit.facts->campaign;
-  UnitRows rows;
-  rows.geometry = geometry;
-  rows.track = MakeTrack(*fit.facts, unit, geometry);
-  rows.x_mm = std::span(campaign.x_mm).subspan(rows.track.first_row, rows.track.moves);
-  rows.y_mm = std::span(campaign.y_mm).subspan(rows.track.first_row, rows.track.moves);
-  for (const std::size_t axis : {kTheta, kPhi}) rows.added_deg[axis].assign(rows.track.moves, 0);
-  return rows;
-}
-
-// One way to explain a unit's rows that lie far off.
-struct Explained {
-  std::vector<Change> changes;
-  CampaignUnit geometry;  // that they belong to
-  double cost = 0;        // that is left
-  std::size_t far = 0;    // rows that are
-};
-
-Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
-                      const CampaignUnit& geometry, double far_mm) {
-  UnitRows rows = RowsOf(fit, unit, geometry);
-  Explained out{
-      .changes = FindChanges(kind, at_most, far_mm, fit.facts->campaign->units[unit], &rows),
-      .geometry = rows.geometry};
-  out.cost = TotalCost(rows);
-  for (std::size_t i = 0; i < rows.track.moves; ++i)
-    if (fit.aside[rows.track.first_row + i] == 0 &&
-        RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]) > far_mm * far_mm)
-      ++out.far;
-  return out;
-}
-
-// The unit's lost and doubled commands, or else its slips, where these are far larger than noise;
-// its geometry is set to the one that they belong to, as a fit that did not know of them may have
-// been dragged along.
-std::vector<EventTerm> ExactEvents(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  constexpr double kLeftMax = 0.2;          // what changes do not explain is something else
-  constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
-  // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
-  const double factor = std::min(fit.noise.unit_factor[unit], 1.5);
-  const double far_mm = std::clamp(10e-3 * fit.noise.place_um * factor, 0.04, 0.4);
-  const CampaignUnit& fitted = fit.model.units[unit];
-  const UnitRows rows = RowsOf(fit, unit, fitted);
-  std::size_t far = 0;
-  for (std::size_t i = 0; i < rows.track.moves; ++i)
-    if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
-  if (far == 0) return {};
-  const double before = TotalCost(rows);
-  // Far rows may still be noise's, of rests that all units have; beside changes that explain far
-  // more than noise does, what all rows cost tells.
-  const auto seen = static_cast<double>(
-      std::ranges::count_if(rows.x_mm, [](double x) { return std::isfinite(x); }));
-  const double of_noise = 2 * seen * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
-  const auto explains = [&](const Explained& one) {
-    const bool large = std::ranges::all_of(
-        one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
-    return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
-           (large && before > of_noise && one.cost - of_noise <= kLeftMax * (before - of_noise));
-  };
-  std::optional<Explained> best;
-  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip}) {
-    const std::size_t at_most =
-        kind == ChangeKind::kSlip ? std::min(far / kRowsForASlip, kEventsMax) : kEventsMax;
-    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
-      Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
-      if (one.changes.empty() || one.cost >= before || !explains(one)) continue;
-      if (!best || one.cost < best->cost) best = std::move(one);
-    }
-  }
-  if (!best) return {};
-  *geometry = best->geometry;
-  std::vector<EventTerm> events;
-  for (const Change& change : best->changes)
-    for (const std::size_t axis : {kTheta, kPhi})
-      if (change.by_deg[axis] != 0)
-        events.push_back(
-            {unit, rows.track.first_row + change.move, axis, true, change.by_deg[axis]});
-  return events;
-}
 
 // ---- slips near the noise: whole turns of the rotor, against the motion
 
@@ -362,9 +157,13 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   return events;
 }
 
-bool IsLostCommand(const Fit& fit, const EventTerm& event) {
+enum class StepKind { kTurns, kCommand, kBlocked };
+
+StepKind KindOf(const Fit& fit, const EventTerm& event) {
   const double step = fit.facts->step_deg[event.axis][event.row];
-  return std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9;
+  if (std::abs(std::abs(event.step_deg) - std::abs(step)) < 1e-9) return StepKind::kCommand;
+  const double turns = event.step_deg * fit.model.units[event.unit].gear[event.axis] / 360;
+  return std::abs(turns - std::round(turns)) < 1e-6 ? StepKind::kTurns : StepKind::kBlocked;
 }
 
 double FleetNoise_mm(const Fit& fit, std::size_t axis) {
@@ -397,7 +196,7 @@ std::size_t AddEvents(Fit* fit) {
   };
   fit->parallel(chunks.size(), [&](std::size_t chunk) {
     for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit)
-      of_unit[unit] = ExactEvents(*fit, unit, &geometry[unit]);
+      of_unit[unit] = ExactSteps(*fit, unit, &geometry[unit]);
   });
   std::size_t added = take();
   constexpr int kRounds = 4;
@@ -417,42 +216,107 @@ std::size_t AddEvents(Fit* fit) {
   return added;
 }
 
-std::vector<CauseFound> EventCauses(const Fit& fit) {
-  std::vector<CauseFound> causes;
-  for (const bool lost_command : {false, true}) {
-    CauseFound cause = CauseNamed(lost_command ? kLostCommand : kStepLoss);
-    cause.scope = "unit";
-    cause.amplitude_unit = "events";
-    std::set<std::uint32_t> units;
-    std::set<std::size_t> axes;
-    std::set<std::size_t> moves;  // a lost one has an event of each axis
-    double square = 0;
-    for (const EventTerm& event : fit.model.events) {
-      if (IsLostCommand(fit, event) != lost_command) continue;
-      moves.insert(event.row);
-      const CampaignUnit& unit = fit.model.units[event.unit];
-      units.insert(unit.id);
-      axes.insert(event.axis);
-      const double lever_mm =
-          event.axis == kPhi ? unit.arm_mm[kPhi] : std::hypot(unit.arm_mm[0], unit.arm_mm[1]);
-      square += std::pow(1e3 * lever_mm * event.step_deg * std::numbers::pi / 180, 2);
-    }
-    if (moves.empty()) continue;
-    cause.amplitude = static_cast<double>(moves.size());
-    cause.axis = axes.size() > 1 ? "both" : *axes.begin() == kTheta ? "theta" : "phi";
-    cause.units.assign(units.begin(), units.end());
-    cause.all_units = units.size() == fit.model.units.size();
-    cause.ci95[0] = cause.ci95[1] = cause.amplitude;
-    cause.size_um = std::sqrt(square / cause.amplitude);
-    cause.delta_log_likelihood = kEventEvidence * cause.amplitude;
-    cause.paragraph = lost_command
-                          ? "A whole move was not made, or made twice: look at the bus and its "
-                            "error counters."
-                          : "The rotor lost its field for whole motor turns: raise the drive, "
-                            "slow down, or look for what blocks the axis; home the unit.";
-    causes.push_back(std::move(cause));
+namespace {
+
+// Units that stopped short in the same move, near enough to have met. Where some have, a unit that
+// did so alone has pushed its neighbour too little to be seen.
+bool HasMet(const Fit& fit, const EventTerm& event) {
+  const auto reach = [](const CampaignUnit& unit) {
+    return unit.arm_mm[kTheta] + unit.arm_mm[kPhi];
+  };
+  const CampaignUnit& own = fit.model.units[event.unit];
+  const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
+  return std::ranges::any_of(fit.model.events, [&](const EventTerm& other) {
+    const CampaignUnit& unit = fit.model.units[other.unit];
+    return other.unit != event.unit && exposure[other.row] == exposure[event.row] &&
+           KindOf(fit, other) == StepKind::kBlocked &&
+           std::hypot(unit.base_x_mm - own.base_x_mm, unit.base_y_mm - own.base_y_mm) <
+               reach(unit) + reach(own);
+  });
+}
+
+bool AnyHasMet(const Fit& fit) {
+  return std::ranges::any_of(fit.model.events, [&](const EventTerm& event) {
+    return KindOf(fit, event) == StepKind::kBlocked && HasMet(fit, event);
+  });
+}
+
+double SizeOf_um(const Fit& fit, const EventTerm& event) {
+  const CampaignUnit& unit = fit.model.units[event.unit];
+  const double lever_mm =
+      event.axis == kPhi ? unit.arm_mm[kPhi] : std::hypot(unit.arm_mm[0], unit.arm_mm[1]);
+  return 1e3 * lever_mm * std::abs(event.step_deg) * std::numbers::pi / 180;
+}
+
+CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view paragraph,
+                   const std::vector<EventTerm>& events) {
+  CauseFound cause = CauseNamed(name);
+  cause.scope = "unit";
+  cause.amplitude_unit = "events";
+  std::set<std::uint32_t> units;
+  std::set<std::size_t> axes, moves;  // a lost one has an event of each axis
+  double square = 0;
+  for (const EventTerm& event : events) {
+    moves.insert(event.row);
+    units.insert(fit.model.units[event.unit].id);
+    axes.insert(event.axis);
+    square += std::pow(SizeOf_um(fit, event), 2);
   }
+  cause.amplitude = static_cast<double>(moves.size());
+  cause.axis = axes.size() > 1 ? "both" : *axes.begin() == kTheta ? "theta" : "phi";
+  cause.units.assign(units.begin(), units.end());
+  cause.all_units = units.size() == fit.model.units.size();
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  cause.size_um = std::sqrt(square / cause.amplitude);
+  cause.delta_log_likelihood = kEventEvidence * cause.amplitude;
+  cause.paragraph = paragraph;
+  return cause;
+}
+
+}  // namespace
+
+std::vector<CauseFound> EventCauses(const Fit& fit) {
+  struct Named {
+    std::string_view name, paragraph;
+    std::vector<EventTerm> events;
+  };
+  Named turns{kStepLoss,
+              "The rotor lost its field for whole motor turns: raise the drive, slow down, or look "
+              "for what blocks the axis; home the unit.",
+              {}};
+  Named commands{kLostCommand,
+                 "A whole move was not made, or made twice: look at the bus and its error "
+                 "counters.",
+                 {}};
+  Named contacts{kContact,
+                 "Two neighbours stopped short of their way in the same move, and stand off since: "
+                 "they have touched. Home both, and look at the plan of that move.",
+                 {}};
+  const bool has_met = AnyHasMet(fit);
+  for (const EventTerm& event : fit.model.events) {
+    const StepKind kind = KindOf(fit, event);
+    if (kind == StepKind::kTurns) turns.events.push_back(event);
+    if (kind == StepKind::kCommand) commands.events.push_back(event);
+    if (kind == StepKind::kBlocked && has_met) contacts.events.push_back(event);
+  }
+  std::vector<CauseFound> causes;
+  for (const Named* one : {&turns, &commands, &contacts})
+    if (!one->events.empty())
+      causes.push_back(CauseOf(fit, one->name, one->paragraph, one->events));
   return causes;
+}
+
+std::vector<UnknownFound> StandOff(const Fit& fit) {
+  std::vector<UnknownFound> told;
+  if (AnyHasMet(fit)) return told;
+  for (const EventTerm& event : fit.model.events)
+    if (KindOf(fit, event) == StepKind::kBlocked)
+      told.push_back({"unit_id",
+                      "unit " + std::to_string(fit.model.units[event.unit].id) +
+                          " stands elsewhere since move " +
+                          std::to_string(fit.facts->campaign->move_id[event.row]),
+                      0, SizeOf_um(fit, event)});
+  return told;
 }
 
 }  // namespace focalfleet::sim

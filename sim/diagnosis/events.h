@@ -1,6 +1,7 @@
-// Steps: an axis that from one move on stands by a fixed angle elsewhere, until it is homed. Only
-// steps that physics has a size for are taken: whole motor turns lost against the motion
-// (step_loss), a whole command lost or done twice (lost_command).
+// Steps: an axis that from one move on stands by a fixed angle elsewhere, until it is homed. What
+// physics has a size for comes first: whole motor turns lost against the motion (step_loss), a whole
+// command lost or done twice (lost_command). What stops short by any angle has touched a neighbour
+// where one did so in the same move (collision_contact); else nobody knows.
 #pragma once
 
 #include <string_view>
@@ -11,12 +12,16 @@
 
 namespace focalfleet::sim {
 
-inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_command";
+inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_command",
+                                  kContact = "collision_contact";
 
 /// Adds the steps that stand out from the residuals to the model. Returns how many.
 std::size_t AddEvents(Fit* fit);
 
-/// step_loss and lost_command as causes, of the model's events.
+/// The model's steps by their causes.
 std::vector<CauseFound> EventCauses(const Fit& fit);
+
+/// The steps that nobody has a cause for.
+std::vector<UnknownFound> StandOff(const Fit& fit);
 
 }  // namespace focalfleet::sim

@@ -37,7 +37,7 @@ constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_
 // Found by their exact places, not by signatures.
 constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
                                            "identity_swap", "lost_command", "step_loss",
-                                           "sensor_bias"};
+                                           "sensor_bias",   "collision_contact"};
 
 bool Has(std::span<const std::string_view> family, std::string_view cause) {
   return std::find(family.begin(), family.end(), cause) != family.end();

@@ -63,8 +63,9 @@ void AskStepsInstead(const Fit& fit, Selection* selection) {
     units.erase(std::unique(units.begin(), units.end()), units.end());
     if (ShareOf(trace, units) <= kAllButAlone) continue;
     for (const CauseFound& steps : EventCauses(stepped))
-      selection->accepted[t].rivals.push_back(
-          {steps.cause == kStepLoss ? kStepLoss : kLostCommand, behind, 1, false});
+      for (const std::string_view name : {kStepLoss, kLostCommand, kContact})
+        if (steps.cause == name)
+          selection->accepted[t].rivals.push_back({name, behind, 1, false});
   }
 }
 
