@@ -128,8 +128,7 @@ std::string PercentOf(double share) {
 void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
   page->Heading("Moves to make next");
   if (next.prospects.empty() && next.untold.empty()) {
-    page->Paragraph(
-        "Nothing is confusable: no further moves are needed to tell causes apart.");
+    page->Paragraph("Nothing is confusable: no further moves are needed to tell causes apart.");
     return;
   }
   page->Paragraph(next.moves.empty()
@@ -139,13 +138,12 @@ void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
                                     next.moves.size()));
   std::vector<std::vector<std::string>> rows;
   for (const sim::Prospect& one : next.prospects)
-    rows.push_back({one.cause, one.rival, fmt::format("{:.1f}", one.d_now),
-                    fmt::format("{:.1f}", one.d_then),
-                    PercentOf(sim::ConfusionAt(one.d_then))});
+    rows.push_back({one.cause, one.rival, fmt::format("{:.1f}", one.d),
+                    PercentOf(sim::ConfusionAt(one.d))});
   for (const auto& [cause, rival] : next.untold)
-    rows.push_back({cause, rival, "-", "-", "no move tells"});
-  page->Table({"cause", "or", "chi-square apart now", "with the moves", "still confused"}, rows,
-              {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight, Align::kRight});
+    rows.push_back({cause, rival, "-", "no move tells"});
+  page->Table({"cause", "or", "set apart by (chi-square)", "still confused"}, rows,
+              {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight});
 }
 
 void AddRest(const Diagnosis& diagnosis, report::Page* page) {

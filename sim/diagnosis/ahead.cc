@@ -41,8 +41,7 @@ double RailOf(const CampaignUnit& unit) { return std::isfinite(unit.rail) ? unit
 // Of each rail, how many make the move.
 std::map<double, double> MoversOf(const std::vector<CampaignUnit>& units, const PlateMove& move) {
   std::map<double, double> movers;
-  for (std::size_t u = 0; u < units.size(); ++u)
-    movers[RailOf(units[u])] += move.to_deg[u] ? 1 : 0;
+  for (std::size_t u = 0; u < units.size(); ++u) movers[RailOf(units[u])] += move.to_deg[u] ? 1 : 0;
   return movers;
 }
 
@@ -81,8 +80,7 @@ std::array<double, 2> AnglesAt(const CampaignUnit& unit, const ProposedMove& mov
     const double own = wanted[axis] - unit.zero_deg[axis];
     const double low = std::min(unit.min_deg[axis] + kMargin_deg, middle);
     const double high = std::max(unit.max_deg[axis] - kMargin_deg, middle);
-    angles[axis] =
-        std::clamp(own - kTurn_deg * std::round((own - middle) / kTurn_deg), low, high);
+    angles[axis] = std::clamp(own - kTurn_deg * std::round((own - middle) / kTurn_deg), low, high);
   }
   return angles;
 }
@@ -159,9 +157,9 @@ Campaign Ahead(const Campaign& made, const std::vector<PlateMove>& moves) {
       }
       walker.time_s += kBetweenExposures_s + moves[m].conditions.delay_s;
       for (std::size_t c = 0; c < told.covariates.size(); ++c)
-        ahead.covariates[c].values.push_back(
-            ValueOf(told.covariates[c].name, moves[m].conditions, walker,
-                    movers[m].at(RailOf(told.units[u])), last[c]));
+        ahead.covariates[c].values.push_back(ValueOf(told.covariates[c].name, moves[m].conditions,
+                                                     walker, movers[m].at(RailOf(told.units[u])),
+                                                     last[c]));
       for (WordColumn& column : ahead.word_columns)
         column.values.push_back(column.values.empty() ? -1 : column.values.back());
     }

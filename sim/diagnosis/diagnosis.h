@@ -75,18 +75,18 @@ struct HeldOutGain {
   std::string held_out;
 };
 
-/// How far a cause and its rival stand apart: chi-square that is left between them (next_moves.h).
+/// How far the proposed moves set a cause and its rival apart: chi-square (next_moves.h).
 struct Prospect {
   std::string cause, rival;
-  double d_now = 0;
-  double d_then = 0;  // with the proposed moves
+  double d = 0;
 };
 
 /// The moves to make next, and what is to be had from them.
 struct NextMoves {
   std::vector<ProposedMove> moves;
   std::vector<Prospect> prospects;
-  std::vector<std::pair<std::string, std::string>> untold;  // cause and rival that moves do not tell
+  std::vector<std::pair<std::string, std::string>>
+      untold;  // cause and rival that moves do not tell
 };
 
 enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };

@@ -1,7 +1,7 @@
 // Steps: an axis that from one move on stands by a fixed angle elsewhere, until it is homed. What
-// physics has a size for comes first: whole motor turns lost against the motion (step_loss), a whole
-// command lost or done twice (lost_command). What stops short by any angle has touched a neighbour
-// where one did so in the same move (collision_contact); else nobody knows.
+// physics has a size for comes first: whole motor turns lost against the motion (step_loss), a
+// whole command lost or done twice (lost_command). What stops short by any angle has touched a
+// neighbour where one did so in the same move (collision_contact); else nobody knows.
 #pragma once
 
 #include <string_view>

@@ -16,7 +16,7 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::size_t kEventsMax = 40;  // of a unit at once
 constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
-constexpr double kCap_mm = 0.5;  // what an outlier costs at most
+constexpr double kCap_mm = 0.5;         // what an outlier costs at most
 
 // One unit's rows, and what has been added to each angle so far.
 struct UnitRows {
@@ -49,7 +49,8 @@ struct Change {
 };
 enum class ChangeKind { kWholeMove, kSlip, kBlocked };
 
-// How far both axes stand from where they were told to, by the place alone. NaN: it is out of reach.
+// How far both axes stand from where they were told to, by the place alone. NaN: it is out of
+// reach.
 struct AnglesOff {
   double deg[2];
 };
@@ -64,8 +65,7 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
   double least = std::numeric_limits<double>::infinity();
   for (const double side : {1.0, -1.0}) {
     const double phi = side * std::acos(std::clamp(cosine, -1.0, 1.0));
-    const double theta =
-        std::atan2(y, x) - std::atan2(b * std::sin(phi), a + b * std::cos(phi));
+    const double theta = std::atan2(y, x) - std::atan2(b * std::sin(phi), a + b * std::cos(phi));
     const double off[2] = {
         std::remainder(theta / kRadians - unit.zero_deg[kTheta] - rows.track.cmd_deg[kTheta][i],
                        360),
@@ -256,13 +256,11 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
   };
   std::optional<Explained> best;
   ChangeKind best_kind = ChangeKind::kWholeMove;
-  for (const ChangeKind kind :
-       {ChangeKind::kWholeMove, ChangeKind::kSlip, ChangeKind::kBlocked}) {
+  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip, ChangeKind::kBlocked}) {
     // What has a size by itself goes before what has any, unless it leaves far more.
     const double far_better = kind == ChangeKind::kBlocked ? 0.5 : 1;
-    const std::size_t at_most = kind == ChangeKind::kWholeMove
-                                    ? kEventsMax
-                                    : std::min(far / kRowsForASlip, kEventsMax);
+    const std::size_t at_most =
+        kind == ChangeKind::kWholeMove ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);
     for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
       Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
       if (one.changes.empty() || one.cost >= before || !explains(one)) continue;

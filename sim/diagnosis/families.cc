@@ -35,8 +35,8 @@ constexpr std::string_view kImage[] = {"camera_similarity", "air_turbulence", "c
 constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_coupling"};
 
 // Found by their exact places, not by signatures.
-constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
-                                           "identity_swap", "lost_command", "step_loss",
+constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",      "arm_length",
+                                           "identity_swap", "lost_command",     "step_loss",
                                            "sensor_bias",   "collision_contact"};
 
 bool Has(std::span<const std::string_view> family, std::string_view cause) {
@@ -136,6 +136,14 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
   return most != causes->end() && left.size_um < leaves_um(*most) ? &*most : nullptr;
 }
 
+// Air moves neighbours alike, in the rows of an exposure and for no reason that moves have: what
+// whole rails or the plate seem to do a little of beside it, is its.
+bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
+  constexpr double kFaintBeside = 40, kOfAir = 0.4;  // ln L; size
+  return air.cause == "air_turbulence" && cause.scope != "unit" && cause.axis != "none" &&
+         cause.delta_log_likelihood < kFaintBeside && cause.size_um < kOfAir * air.size_um;
+}
+
 void JudgeRemainders(std::vector<CauseFound>* causes) {
   // Of the stronger one's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
@@ -162,9 +170,11 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
       const bool faint = smaller && cause.delta_log_likelihood < kFaint && there < kBesideFaint &&
                          AxesMeet(other.axis, cause.axis) &&
                          (other.axis != "none" || cause.axis == "none");
-      if (!related && !faint && !(share < kSameUnits && IsAmongUnitsOf(other, cause))) continue;
+      const bool of_air = IsOfTheAir(other, cause);
+      if (!related && !faint && !of_air && !(share < kSameUnits && IsAmongUnitsOf(other, cause)))
+        continue;
       relative = &other;
-      of_its_shape = faint || (related && shape);
+      of_its_shape = faint || of_air || (related && shape);
       break;
     }
     // What could as well be the relative by another name, and is weak beside it, is its remainder.
@@ -273,10 +283,13 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
   // Over a night the supply sinks, for one, and the air cools, for the other; at one drive level a
   // lag of the load is play, and what phases do is what the rotor's poles do; at one delay so is
-  // what has not yet relaxed. A plate that grows is a camera that scales.
+  // what has not yet relaxed, and so are starts and sags by places that nobody tells. A plate that
+  // grows is a camera that scales.
   constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
                                                          {"backlash", "load_angle_lag"},
                                                          {"backlash", "relaxation"},
+                                                         {"backlash", "start_skew"},
+                                                         {"backlash", "supply_droop"},
                                                          {"phase_imbalance", "cogging"},
                                                          {"camera_similarity", "plate_expansion"}};
   for (CauseFound& cause : *causes)

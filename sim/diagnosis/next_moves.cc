@@ -19,13 +19,13 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kPairsMax = 12;
-constexpr std::size_t kUnitsOfCause = 8;       // that a cause is looked at in
-constexpr std::size_t kUnitsOfGroup = 40;      // where units act on each other
-constexpr std::size_t kRowsMax = 4000;         // of moves that were made
-constexpr std::size_t kFormsOfRival = 6;       // its shapes that are nearest
-constexpr double kSure = 38;                   // D at which nothing is left to do
-constexpr double kWorthALook = 0.002;          // probability of confusion, summed over the pairs
-constexpr double kTurn_s = 33;                 // of an axis
+constexpr std::size_t kUnitsOfCause = 8;   // that a cause is looked at in
+constexpr std::size_t kUnitsOfGroup = 40;  // where units act on each other
+constexpr std::size_t kRowsMax = 4000;     // of moves that were made
+constexpr std::size_t kFormsOfRival = 6;   // its shapes that are nearest
+constexpr double kSure = 38;               // D at which nothing is left to do
+constexpr double kWorthALook = 0.002;      // probability of confusion, summed over the pairs
+constexpr double kTurn_s = 33;             // of an axis
 constexpr double kExposure_s = 10, kHoming_s = 60;
 constexpr double kLever_s = 20, kTelescope_s = 40;  // to change the drive; the elevation
 constexpr double kDelayMin_s = 3;                   // a shorter one saves nothing
@@ -36,7 +36,7 @@ constexpr double kDelayMin_s = 3;                   // a shorter one saves nothi
 struct Pair {
   std::size_t term = 0;
   std::string cause, rival;
-  Templates forms;  // of the rival
+  Templates forms;   // of the rival
   double scale = 1;  // of D in all units to D in those looked at
 };
 
@@ -46,8 +46,7 @@ std::optional<std::size_t> TermOf(const Fit& fit, const CauseFound& cause) {
   double most_um = 0;
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const ModelTerm& term = fit.model.terms[t];
-    if (term.form.effect->cause != cause.cause ||
-        !AxesMeet(Name(term.form.axis), cause.axis))
+    if (term.form.effect->cause != cause.cause || !AxesMeet(Name(term.form.axis), cause.axis))
       continue;
     const double size_um = SizeOf(fit, term);
     if (!strongest || size_um > most_um) strongest = t, most_um = size_um;
@@ -77,8 +76,8 @@ std::vector<std::size_t> UnitsOf(const Fit& fit, const ModelTerm& term, bool in_
     const CampaignUnit& first = units[order.front()];
     const auto far_mm = [&](std::size_t u) {
       const bool elsewhere = std::isfinite(first.rail) && units[u].rail != first.rail;
-      return (elsewhere ? 1e6 : 0) + std::hypot(units[u].base_x_mm - first.base_x_mm,
-                                                units[u].base_y_mm - first.base_y_mm);
+      return (elsewhere ? 1e6 : 0) +
+             std::hypot(units[u].base_x_mm - first.base_x_mm, units[u].base_y_mm - first.base_y_mm);
     };
     std::ranges::stable_sort(order, {}, far_mm);
     most = kUnitsOfGroup;
@@ -237,7 +236,8 @@ std::vector<ProposedMove> LeversOf(const CampaignFacts& facts) {
     for (const double elevation_deg : {20.0, 80.0})
       levers.push_back({.conditions = {.elevation_deg = elevation_deg}});
   if (facts.Has("movers_on_rail"))
-    for (const std::size_t every : {std::size_t{4}, std::size_t{20}}) levers.push_back({.every = every});
+    for (const std::size_t every : {std::size_t{4}, std::size_t{20}})
+      levers.push_back({.every = every});
   return levers;
 }
 
@@ -291,8 +291,8 @@ class Chooser {
       : fit_(fit), ground_(ground), groups_(GroupsOf(*fit.facts)), pairs_(pairs) {
     blocks_ = ListBlocks(*fit.facts);
     worth_.assign(blocks_.size(), 0);
-    d_ = With({});
-    now_ = d_;
+    made_ = Apart(LookAhead(fit_, ground_, {})->fit, groups_, pairs_);
+    d_.assign(pairs_.size(), 0);
   }
 
   NextMoves Choose() {
@@ -316,7 +316,7 @@ class Chooser {
       next.moves = std::move(moves);
     }
     for (std::size_t p = 0; p < pairs_.size(); ++p)
-      next.prospects.push_back({pairs_[p].cause, pairs_[p].rival, now_[p], d_[p]});
+      next.prospects.push_back({pairs_[p].cause, pairs_[p].rival, d_[p]});
     return next;
   }
 
@@ -326,8 +326,11 @@ class Chooser {
     return moves;
   }
 
+  // What these moves add. Those that were made have had their say, and it was for nobody.
   [[nodiscard]] std::vector<double> With(const std::vector<ProposedMove>& moves) const {
-    return Apart(LookAhead(fit_, ground_, moves)->fit, groups_, pairs_);
+    std::vector<double> d = Apart(LookAhead(fit_, ground_, moves)->fit, groups_, pairs_);
+    for (std::size_t p = 0; p < d.size(); ++p) d[p] = std::max(d[p] - made_[p], 0.0);
+    return d;
   }
 
   [[nodiscard]] bool AllSure() const {
@@ -382,7 +385,7 @@ class Chooser {
   const std::vector<Pair>& pairs_;
   std::vector<Block> blocks_;
   std::vector<double> worth_;
-  std::vector<double> d_, now_;  // with the moves so far; with none
+  std::vector<double> d_, made_;  // what the moves so far add; in those that were made
 };
 
 }  // namespace
@@ -409,16 +412,14 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
   for (const Pair& pair : pairs) {
     const ModelTerm& term = fit.model.terms[pair.term];
     traces.push_back(TraceOf(fit, term));
-    const bool in_groups =
-        ActsOnOthers(*term.form.effect) || ActsOnOthers(*FindEffect(pair.rival));
+    const bool in_groups = ActsOnOthers(*term.form.effect) || ActsOnOthers(*FindEffect(pair.rival));
     for (const std::size_t u : UnitsOf(fit, term, in_groups, traces.back())) units.insert(u);
   }
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const std::vector<double>& square = traces[p].square_um2;
     double chosen = 0;
     for (const std::size_t u : units) chosen += square[u];
-    if (chosen > 0)
-      pairs[p].scale = std::accumulate(square.begin(), square.end(), 0.0) / chosen;
+    if (chosen > 0) pairs[p].scale = std::accumulate(square.begin(), square.end(), 0.0) / chosen;
   }
   if (pairs.empty()) return none;
   const Ground ground = GroundOf(fit, units);

@@ -273,9 +273,9 @@ Result<Campaign> PlantCampaign(const PlantedOptions& options) {
   campaign.name = "planted";
   LayHexagon(options, &campaign);
   DrawMoves(options, &campaign);
-  if (!options.next.empty()) campaign = Ahead(campaign, options.next);
   campaign.x_mm.assign(campaign.rows(), 0);
   campaign.y_mm.assign(campaign.rows(), 0);
+  if (!options.next.empty()) campaign = Ahead(campaign, options.next);
   const CampaignFacts facts = MakeFacts(campaign);
   CampaignModel model = TrueModel(options, campaign);
   for (const PlantedEffect& planted : options.effects) {

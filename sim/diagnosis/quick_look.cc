@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <set>
+#include <unsupported/Eigen/FFT>
 
 #include "sim/diagnosis/angle_errors.h"
 #include "sim/diagnosis/chances.h"
@@ -100,6 +102,61 @@ Glances GlanceAt(const Fit& fit, const Templates& forms, std::size_t axis) {
   return all;
 }
 
+// ---- periods along the commanded angle
+
+constexpr std::size_t kBins = 131072;  // of the angle's circle, which is longer than any axis goes
+constexpr double kCircle_deg = 720;
+constexpr double kPeriodMin_deg = 0.02, kPeriodMax_deg = 2.5;
+constexpr double kPeriods = kCircle_deg / kPeriodMin_deg;  // that can be told apart, about
+
+// The power of what all units do alike, by whole periods in the circle: of noise, chi-square with
+// two degrees of freedom, halved.
+std::vector<double> PowerOf(const Fit& fit, std::size_t axis) {
+  std::vector<double> sums(kBins, 0);
+  double square = 0;
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    const Series series = SeriesOf(fit, unit, axis);
+    if (series.rows.size() < kRowsMin || !(series.square > 0)) continue;
+    const double n = static_cast<double>(series.rows.size());
+    for (std::size_t k = 0; k < series.rows.size(); ++k) {
+      const double turns = series.track.cmd_deg[axis][series.rows[k].move] / kCircle_deg;
+      const double value = series.weight[k] * series.rows[k].error_deg * n / series.square;
+      const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * kBins) % kBins;
+      sums[bin] += value, square += value * value;
+    }
+  }
+  Eigen::FFT<double> transform;
+  std::vector<std::complex<double>> spectrum;
+  transform.fwd(spectrum, sums);
+  std::vector<double> power;
+  for (const std::complex<double>& one : spectrum)
+    power.push_back(square > 0 ? std::norm(one) / square : 0);
+  return power;
+}
+
+// Shapes of the periods that stand out, and near them.
+void AddPeriods(const Fit& fit, const Effect& effect, EffectAxis of_axis, Templates* forms) {
+  constexpr std::size_t kPeaksMax = 3;
+  constexpr int kEitherSide = 5;  // tenths of a period in the circle
+  constexpr double kStandsOut = 18;
+  const std::size_t axis = of_axis == EffectAxis::kTheta ? kTheta : kPhi;
+  std::vector<double> power = PowerOf(fit, axis);
+  const auto least = static_cast<std::size_t>(kCircle_deg / kPeriodMax_deg);
+  const auto most = std::min(power.size() / 2, static_cast<std::size_t>(kPeriods));
+  for (std::size_t peak = 0; peak < kPeaksMax; ++peak) {
+    const auto at = std::max_element(power.begin() + static_cast<std::ptrdiff_t>(least),
+                                     power.begin() + static_cast<std::ptrdiff_t>(most));
+    if (*at < kStandsOut) return;
+    const double periods = static_cast<double>(at - power.begin());
+    for (int tenth = -kEitherSide; tenth <= kEitherSide; ++tenth) {
+      const std::size_t listed = forms->size();
+      effect.of_period(kCircle_deg / (periods + 0.1 * tenth), forms);
+      for (std::size_t k = listed; k < forms->size(); ++k) (*forms)[k].choices = kPeriods;
+    }
+    std::fill(at - 2, at + 3, 0.0);
+  }
+}
+
 }  // namespace
 
 Templates WorthAScore(const Fit& fit, const Templates& library) {
@@ -112,17 +169,18 @@ Templates WorthAScore(const Fit& fit, const Templates& library) {
   for (const auto& [effect, of_axis] : offered) {
     Templates forms;
     effect->glance(&forms);
+    for (Template& form : forms) form.choices = static_cast<double>(forms.size());
+    if (effect->of_period != nullptr) AddPeriods(fit, *effect, of_axis, &forms);
     std::erase_if(forms, [&, axis = of_axis](const Template& form) { return form.axis != axis; });
     if (forms.empty()) continue;
-    for (Template& form : forms)
-      form.effect = effect, form.choices = static_cast<double>(forms.size());
+    for (Template& form : forms) form.effect = effect;
     const Glances seen = GlanceAt(fit, forms, AxisIndex(forms.front()));
     std::vector<std::pair<double, std::size_t>> order;
     for (std::size_t k = 0; k < forms.size(); ++k) {
       const Products& sum = seen.fleet[k];
       const double fleet = CanBeOf(forms[k], sum) ? sum.rs * sum.rs / sum.ss : 0;
       if (seen.most[k] > kOfUnit || fleet > kOfFleet)
-        order.emplace_back(-std::max(seen.most[k], fleet), k);
+        order.emplace_back(2 * std::log(forms[k].choices) - std::max(seen.most[k], fleet), k);
     }
     std::ranges::sort(order);
     if (order.size() > kMost) order.resize(kMost);

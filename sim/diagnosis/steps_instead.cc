@@ -64,8 +64,7 @@ void AskStepsInstead(const Fit& fit, Selection* selection) {
     if (ShareOf(trace, units) <= kAllButAlone) continue;
     for (const CauseFound& steps : EventCauses(stepped))
       for (const std::string_view name : {kStepLoss, kLostCommand, kContact})
-        if (steps.cause == name)
-          selection->accepted[t].rivals.push_back({name, behind, 1, false});
+        if (steps.cause == name) selection->accepted[t].rivals.push_back({name, behind, 1, false});
   }
 }
 

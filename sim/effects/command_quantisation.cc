@@ -59,6 +59,14 @@ void Glance(Templates* out) {
   }
 }
 
+// A step of any size.
+void OfPeriod(double period_deg, Templates* out) {
+  for (std::size_t k = 0; k < kForms.size(); ++k)
+    if (kForms[k].step == Step::kDegrees && kForms[k].rounding != Rounding::kCutMove)
+      ListGrid({.shapes = {period_deg}, .shape_name = kForms[k].name, .form = static_cast<int>(k)},
+               out);
+}
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
   const std::size_t axis = AxisIndex(form);
@@ -94,6 +102,7 @@ Effect MakeCommandQuantisation() {
           .list = List,
           .apply = Apply,
           .glance = Glance,
+          .of_period = OfPeriod,
           .own_shape = true,
           .amplitude_low = 0,
           .amplitude_high = 1.5,

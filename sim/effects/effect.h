@@ -96,6 +96,8 @@ struct Effect {
   // Shapes beside the listed ones, too many to score each (quick_look.h), of one column, on each
   // axis that `list` has; none: there are no more.
   void (*glance)(Templates*) = nullptr;
+  // The same for shapes of this period along the commanded angle; none: it has no period.
+  void (*of_period)(double period_deg, Templates*) = nullptr;
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
   bool one_is_enough = false;  // of the covariates, each of which is one axis' own

@@ -21,6 +21,8 @@ struct Named {
 };
 constexpr Named kFeeds[] = {{0, "harness"}, {0.5, "harness and feed"}, {1, "feed"}};
 constexpr Named kDepths[] = {{0.05, ""}, {0.3, ", deep"}, {0.55, ", deeper"}};
+// From here on by the feed's share alone, for an axis whose lag does not know its drive.
+constexpr int kUndriven = kLoaded + static_cast<int>(std::size(kFeeds) * std::size(kDepths));
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
@@ -39,6 +41,12 @@ void List(const CampaignFacts& facts, Templates* out) {
       const std::string name = std::string(feed.name) + depth.name + "; load, of the pull-out,";
       ListGrid({.axes = axes, .shapes = {0.2, 0.4, 0.6}, .shape_name = name, .form = form++}, out);
     }
+  for (const Named& feed : kFeeds) {
+    const std::size_t listed = out->size();
+    ListGrid({.axes = axes, .form = form++}, out);
+    for (std::size_t k = listed; k < out->size(); ++k)
+      (*out)[k].label += std::string(", ") + feed.name + ", at any drive";
+  }
 }
 
 // Share of the largest droop, by the place along the harness.
@@ -73,13 +81,16 @@ std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
 
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  const bool loaded = form.form >= kLoaded;
+  const bool undriven = form.form >= kUndriven;
+  const bool loaded = form.form >= kLoaded && !undriven;
   const auto k = static_cast<std::size_t>(std::max(form.form - kLoaded, 0));
   const double depth = kDepths[k % std::size(kDepths)].value;
-  const std::vector<double> droop =
-      loaded ? ByCurrent(track, kFeeds[k / std::size(kDepths)].value) : ByPlace(track, form.form);
+  const std::vector<double> droop = undriven ? ByCurrent(track, kFeeds[form.form - kUndriven].value)
+                                    : loaded
+                                        ? ByCurrent(track, kFeeds[k / std::size(kDepths)].value)
+                                        : ByPlace(track, form.form);
   std::span<const double> drive;
-  if (track.facts->Has("drive_amplitude")) drive = track.Column("drive_amplitude");
+  if (track.facts->Has("drive_amplitude") && !undriven) drive = track.Column("drive_amplitude");
   for (const std::size_t axis : AxesOf(form)) {
     const std::span<const double> step = track.step_deg[axis];
     AddRemembered(

@@ -44,8 +44,7 @@ TEST_P(MeasuredArcs, TheStrongCauseIsFoundWithTheRivalThatMovesOfOneLengthLeaveI
   EXPECT_THAT(diagnosis.gain.held_out, testing::HasSubstr("whole homings"));
 
   std::vector<std::string> separates;
-  for (const sim::ProposedMove& move : diagnosis.next.moves)
-    separates.push_back(move.separates);
+  for (const sim::ProposedMove& move : diagnosis.next.moves) separates.push_back(move.separates);
   EXPECT_THAT(separates,
               Contains(testing::AnyOf("gear_scale | ramp_travel", "ramp_travel | gear_scale")));
 }

@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "tests/sim/diagnosis/planted_campaign.h"
 
@@ -215,6 +217,80 @@ TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
   EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[kUnit].id));
+}
+
+// Moves the fibre as if both axes stood off from the unit's row `from` on.
+void StandElsewhere(std::size_t unit, std::size_t from, double theta_deg, double phi_deg,
+                    Campaign* campaign) {
+  CampaignUnit off = campaign->units[unit];
+  off.zero_deg[kTheta] += theta_deg, off.zero_deg[kPhi] += phi_deg;
+  for (std::size_t row = campaign->first_row[unit] + from; row < campaign->first_row[unit + 1];
+       ++row) {
+    const double theta = campaign->cmd_deg[kTheta][row], phi = campaign->cmd_deg[kPhi][row];
+    const PlacePoint told = PlaceOf(campaign->units[unit], theta, phi);
+    const PlacePoint stands = PlaceOf(off, theta, phi);
+    campaign->x_mm[row] += stands.x_mm - told.x_mm;
+    campaign->y_mm[row] += stands.y_mm - told.y_mm;
+  }
+}
+
+double StepAt(const Campaign& campaign, std::size_t unit, std::size_t move, std::size_t axis) {
+  const std::size_t row = campaign.first_row[unit] + move;
+  return campaign.cmd_deg[axis][row] - campaign.from_deg[axis][row];
+}
+
+// The first move from `from` on in which all of the units turn both axes far.
+std::size_t MoveOfAll(const Campaign& campaign, std::vector<std::size_t> units, std::size_t from) {
+  for (std::size_t move = from; move < campaign.first_row[1]; ++move)
+    if (std::ranges::all_of(units, [&](std::size_t unit) {
+          return std::abs(StepAt(campaign, unit, move, kTheta)) > 15 &&
+                 std::abs(StepAt(campaign, unit, move, kPhi)) > 5;
+        }))
+      return move;
+  return 0;
+}
+
+TEST(Events, ACommandOfOneAxisMayBeLost) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
+  constexpr std::size_t kUnit = 7;
+  const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
+  ASSERT_NE(move, 0u);
+  StandElsewhere(kUnit, move, -StepAt(campaign, kUnit, move, kTheta), 0, &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
+  EXPECT_EQ(diagnosis.causes[0].axis, "theta");
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[kUnit].id));
+  EXPECT_THAT(diagnosis.unknown, testing::IsEmpty());
+}
+
+// Units 0 and 1 of the lattice are next to each other.
+TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
+  const std::size_t move = MoveOfAll(campaign, {0, 1}, 30);
+  ASSERT_NE(move, 0u);
+  for (const std::size_t unit : {std::size_t{0}, std::size_t{1}})
+    StandElsewhere(unit, move, -0.31 * StepAt(campaign, unit, move, kTheta),
+                   -0.12 * StepAt(campaign, unit, move, kPhi), &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[0].id, campaign.units[1].id));
+  EXPECT_THAT(diagnosis.unknown, testing::IsEmpty());
+  EXPECT_LT(diagnosis.gain.rms_after_um, 20);
+}
+
+TEST(Events, AUnitThatStopsShortAloneIsUnknown) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
+  constexpr std::size_t kUnit = 3;
+  const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
+  ASSERT_NE(move, 0u);
+  StandElsewhere(kUnit, move, -0.31 * StepAt(campaign, kUnit, move, kTheta),
+                 -0.12 * StepAt(campaign, kUnit, move, kPhi), &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_THAT(diagnosis.causes, testing::IsEmpty()) << Told(diagnosis);
+  ASSERT_FALSE(diagnosis.unknown.empty());
+  EXPECT_THAT(diagnosis.unknown[0].channel, testing::HasSubstr("stands elsewhere since move"));
 }
 
 }  // namespace

@@ -46,6 +46,19 @@ TEST(Image, AWanderingImageIsTheCameras) {
   EXPECT_THAT(diagnosis.unknown, IsEmpty()) << Told(diagnosis);
 }
 
+// What units do all alike shifts the image, and a wander takes a part in it.
+TEST(Image, AWanderThatIsFarLargerThanAnyCauseStandsAlone) {
+  for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {
+    Rng rng = Rng::Stream(seed, "wander far");
+    std::vector<Shift> walk(80);
+    for (std::size_t e = 1; e < walk.size(); ++e)
+      walk[e] = {walk[e - 1].x_um + 6 * rng.Normal(), walk[e - 1].y_um + 6 * rng.Normal()};
+    const Diagnosis diagnosis = Verdicts(Shifted([&](std::size_t e) { return walk[e]; }));
+    ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+    EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity"));
+  }
+}
+
 TEST(Image, OneThatForgetsMayBeAir) {
   Rng rng = Rng::Stream(2, "forgets");
   std::vector<Shift> anew(80);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <set>
 
+#include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -14,23 +15,19 @@ namespace {
 
 using testing::Each;
 using testing::Field;
-using testing::Gt;
-using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::SizeIs;
 
-// Theta there and back in steps of one length, by all units at once: what an arc over the range
-// shows, and nothing else.
+// Theta in steps of one length from the stop, again and again, by all units at once: what arcs over
+// the range show, and nothing else.
 Campaign Arcs(double step_deg, std::vector<PlantedEffect> effects, std::uint64_t seed) {
-  PlantedOptions options{.units = 6, .moves = 2, .seed = seed, .noise_um = 2};
+  PlantedOptions options{.units = 6, .moves = 1, .seed = seed, .noise_um = 2};
   const Campaign first = Planted({}, options);
   std::vector<ProposedMove> moves;
-  for (int k = 0; k < 48; ++k) {
-    const int of_arc = k % 16;
-    const int at = of_arc < 8 ? of_arc : 16 - of_arc;
-    moves.push_back({.theta_fp_deg = -60 + step_deg * at, .phi_fp_deg = 80});
-  }
+  for (int k = 0; k < 48; ++k)
+    moves.push_back({.theta_fp_deg = -60 + step_deg * (k % 8),
+                     .phi_fp_deg = 80,
+                     .conditions = {.home_first = k % 8 == 0}});
   options.next = SpreadOver(first.units, moves);
   return Planted(std::move(effects), options);
 }
@@ -41,10 +38,6 @@ const CauseFound* Find(const Diagnosis& diagnosis, std::string_view cause) {
 }
 
 bool AsksForADrive(const ProposedMove& move) { return move.conditions.drive_amplitude != 1; }
-bool IsShort(const ProposedMove& a, const ProposedMove& b) {
-  const double theta = std::abs(a.theta_fp_deg - b.theta_fp_deg);
-  return theta > 0 && theta < 5;
-}
 
 TEST(NextMoves, ConfusionIsHowFarTwoTracesStandApart) {
   EXPECT_DOUBLE_EQ(ConfusionAt(0), 0.5);
@@ -53,20 +46,47 @@ TEST(NextMoves, ConfusionIsHowFarTwoTracesStandApart) {
   EXPECT_NEAR(ConfusionAt(38), 0.001, 1e-4);
 }
 
+// The first form of a cause on theta, one amplitude for all units, fitted.
+Fit FittedWith(const char* cause, Memory memory, const CampaignFacts& facts) {
+  Fit fit = StaticFit(facts);
+  ModelTerm term;
+  for (const Template& form : ListTemplates(*FindEffect(cause), facts))
+    if (form.axis == EffectAxis::kTheta && form.memory == memory) {
+      term.form = form;
+      break;
+    }
+  term.group_of_unit.assign(facts.campaign->units.size(), 0);
+  term.amplitude = term.sigma = {0};
+  fit.model.terms.push_back(std::move(term));
+  StepFit(&fit);
+  SettleFit(&fit, 2);
+  return fit;
+}
+
+CauseFound Ambiguous(const char* cause, const char* rival) {
+  CauseFound told = CauseNamed(cause);
+  told.axis = "theta";
+  told.candidates.emplace_back(rival);
+  return told;
+}
+
 // A travel that is lost at each move is a share of the travel as long as all moves are alike.
 TEST(NextMoves, ShortMovesTellAConstantTravelFromAScale) {
   const Campaign campaign =
-      Arcs(15, {{.cause = "ramp_travel", .amplitude = 0.05, .axis = "theta"}}, 3);
-  const Diagnosis before = Diagnose(campaign, {.with_gain = false});
-  ASSERT_THAT(before.next.prospects, Not(IsEmpty()));
-  ASSERT_THAT(before.next.moves, Not(IsEmpty()));
-  EXPECT_LE(before.next.moves.size(), kNextMovesMax);
-  EXPECT_THAT(before.next.prospects, Each(Field(&Prospect::d_then, Gt(20.0))));
-  bool has_short = false;
-  for (std::size_t m = 1; m < before.next.moves.size(); ++m)
-    has_short = has_short || IsShort(before.next.moves[m], before.next.moves[m - 1]);
-  EXPECT_TRUE(has_short);
-  EXPECT_THAT(before.next.moves, Each(Field(&ProposedMove::separates, HasSubstr(" | "))));
+      Arcs(15, {{.cause = "gear_scale", .amplitude = 0.003, .axis = "theta"}}, 3);
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = FittedWith("gear_scale", Memory::kChain, facts);
+  const NextMoves next = ProposeMoves(fit, {Ambiguous("gear_scale", "ramp_travel")});
+  ASSERT_THAT(next.prospects, SizeIs(1));
+  EXPECT_GT(next.prospects[0].d, 30);
+  EXPECT_LE(next.moves.size(), kNextMovesMax);
+  std::set<double> lengths;
+  for (std::size_t m = 1; m < next.moves.size(); ++m)
+    lengths.insert(std::abs(next.moves[m].theta_fp_deg - next.moves[m - 1].theta_fp_deg));
+  EXPECT_TRUE(
+      std::ranges::any_of(lengths, [](double length) { return length < 5 || length > 30; }));
+  EXPECT_THAT(next.moves,
+              Each(Field(&ProposedMove::separates, testing::StrEq("gear_scale | ramp_travel"))));
 }
 
 TEST(NextMoves, MadeAndMeasuredTheyDecide) {
@@ -89,15 +109,17 @@ TEST(NextMoves, MadeAndMeasuredTheyDecide) {
 
 // Play and the lag of a loaded rotor are one at one drive.
 TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
-  Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.2, .axis = "theta"}},
+  Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
                               {.units = 6, .moves = 60, .seed = 5});
   std::erase_if(campaign.covariates,
                 [](const Covariate& column) { return column.name == "drive_amplitude"; });
-  const Diagnosis diagnosis = Diagnose(campaign, {.with_gain = false});
-  const CauseFound* play = Find(diagnosis, "backlash");
-  ASSERT_NE(play, nullptr);
-  ASSERT_THAT(play->candidates, testing::Contains("load_angle_lag"));
-  EXPECT_TRUE(std::ranges::any_of(diagnosis.next.moves, AsksForADrive));
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Fit fit = FittedWith("backlash", Memory::kHold, facts);
+  EXPECT_THAT(ProposeMoves(fit, {CauseNamed("backlash")}).moves, IsEmpty());
+  const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "load_angle_lag")});
+  EXPECT_TRUE(std::ranges::any_of(next.moves, AsksForADrive));
+  ASSERT_THAT(next.prospects, SizeIs(1));
+  EXPECT_GT(next.prospects[0].d, 30);
 }
 
 TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
@@ -126,7 +148,7 @@ TEST(Ahead, AUnitGoesWhereItIsSentAndStaysWhereItIsNot) {
       EXPECT_EQ(ahead.from_deg[kTheta][row], ahead.cmd_deg[kTheta][row - 1]);
       EXPECT_EQ(ahead.from_deg[kPhi][row], ahead.cmd_deg[kPhi][row - 1]);
     }
-    sent += ahead.cmd_deg[kTheta][end - 2] == 30 ? 1 : 0;
+    sent += ahead.cmd_deg[kTheta][end - 2] == 30 ? 1u : 0u;
     EXPECT_EQ(ahead.Find("drive_amplitude")[end - 2], 0.6);
     EXPECT_EQ(ahead.Find("movers_on_rail")[end - 2], 2);
     EXPECT_EQ(ahead.Find("movers_on_rail")[end - 1], 8);

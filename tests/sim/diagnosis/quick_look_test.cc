@@ -49,6 +49,20 @@ TEST(QuickLook, SeesAStepOfAllUnitsThatIsTooSmallInEach) {
   EXPECT_DOUBLE_EQ(worth[0].shape, 0.03);
 }
 
+TEST(QuickLook, SeesAnyStepOfAllUnitsByItsPeriod) {
+  constexpr double kStep_deg = 0.2194580153;
+  std::map<std::size_t, double> all;
+  for (std::size_t unit = 0; unit < 24; ++unit) all[unit] = kStep_deg;
+  const Campaign campaign = Rounded(all, 5);
+  const Templates worth = Worth(campaign);
+  ASSERT_FALSE(worth.empty());
+  EXPECT_NEAR(worth[0].shape, kStep_deg, 1e-5);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "command_quantisation");
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+}
+
 TEST(QuickLook, SeesLittleInNoise) {
   std::size_t seen = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) seen += Worth(Rounded({}, seed)).size();
