@@ -252,7 +252,7 @@ CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view parag
                    const std::vector<EventTerm>& events) {
   CauseFound cause = CauseNamed(name);
   cause.scope = "unit";
-  cause.amplitude_unit = "events";
+  cause.amplitude_unit = kEvents;
   std::set<std::uint32_t> units;
   std::set<std::size_t> axes, moves;  // a lost one has an event of each axis
   double square = 0;

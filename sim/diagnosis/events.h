@@ -15,6 +15,9 @@ namespace focalfleet::sim {
 inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_command",
                                   kContact = "collision_contact";
 
+/// The amplitude's unit of a cause that is made of steps.
+inline constexpr std::string_view kEvents = "events";
+
 /// Adds the steps that stand out from the residuals to the model. Returns how many.
 std::size_t AddEvents(Fit* fit);
 

@@ -59,9 +59,9 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
   const double a = unit.arm_mm[kTheta], b = unit.arm_mm[kPhi];
   const double x = rows.x_mm[i] - unit.base_x_mm, y = rows.y_mm[i] - unit.base_y_mm;
   const double cosine = (x * x + y * y - a * a - b * b) / (2 * a * b);
-  constexpr double kOutOfReach = 1.02;
+  constexpr double kFlat = 0.9;  // nearly stretched or folded: the place does not tell the axes
   AnglesOff best{{std::nan(""), std::nan("")}};
-  if (!(std::abs(cosine) < kOutOfReach)) return best;
+  if (!(std::abs(cosine) < kFlat)) return best;
   double least = std::numeric_limits<double>::infinity();
   for (const double side : {1.0, -1.0}) {
     const double phi = side * std::acos(std::clamp(cosine, -1.0, 1.0));
@@ -79,7 +79,7 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
 // What the rows from the move on stand off by, one and all: something kept the axes from their way.
 // An axis that was on its way stands short of it; one that was not may have been pushed.
 std::vector<Change> StandsOff(const UnitRows& rows, std::size_t move) {
-  constexpr std::size_t kRowsMin = 4, kRowsMax = 15;
+  constexpr std::size_t kRowsMin = 4, kRowsMax = 60;
   constexpr double kLeast_deg = 0.1;
   std::vector<double> off[2];
   const std::size_t end = EndOfHistory(rows.track, move);

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/events.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -35,12 +36,17 @@ constexpr std::string_view kImage[] = {"camera_similarity", "air_turbulence", "c
 constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_coupling"};
 
 // Found by their exact places, not by signatures.
-constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",      "arm_length",
-                                           "identity_swap", "lost_command",     "step_loss",
-                                           "sensor_bias",   "collision_contact"};
+constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
+                                           "identity_swap", "lost_command", "step_loss",
+                                           "sensor_bias"};
 
 bool Has(std::span<const std::string_view> family, std::string_view cause) {
   return std::find(family.begin(), family.end(), cause) != family.end();
+}
+
+// By its exact places: what it explains is no shape of anything.
+bool IsFoundElsewhere(const CauseFound& cause) {
+  return Has(kElsewhere, cause.cause) || cause.amplitude_unit == kEvents;
 }
 
 bool IsCandidate(const CauseFound& cause, std::string_view name) {
@@ -127,7 +133,7 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
                                 : left.channel.starts_with("phi") ? "phi"
                                                                   : "none";
   const auto leaves_um = [&](const CauseFound& cause) {
-    if (!cause.all_units || Has(kElsewhere, cause.cause) || cause.cause == "camera_similarity")
+    if (!cause.all_units || IsFoundElsewhere(cause) || cause.cause == "camera_similarity")
       return 0.0;
     if (cause.cause == "air_turbulence") return axis == "none" ? kOfAir * cause.size_um : 0.0;
     return AxesMeet(axis, cause.axis) ? kOfCause * cause.size_um : 0.0;
@@ -157,7 +163,7 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
     CauseFound* relative = nullptr;
     bool of_its_shape = false;
     for (CauseFound& other : kept) {
-      if (Has(kElsewhere, other.cause) || Has(kElsewhere, cause.cause)) continue;
+      if (IsFoundElsewhere(other) || IsFoundElsewhere(cause)) continue;
       const double share = cause.delta_log_likelihood / other.delta_log_likelihood;
       const double there = ShareBeside(other, cause);
       const bool smaller = CanLeave(other, cause);
@@ -227,7 +233,7 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
   std::map<std::uint32_t, std::size_t> names;
   std::map<std::uint32_t, double> square;
   const auto of_one = [&](const CauseFound& cause) {
-    return !cause.all_units && cause.units.size() == 1 && !Has(kElsewhere, cause.cause);
+    return !cause.all_units && cause.units.size() == 1 && !IsFoundElsewhere(cause);
   };
   for (const CauseFound& cause : *causes)
     if (of_one(cause))
@@ -307,7 +313,7 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
                                                                : "";
     if (axis.empty()) continue;
     std::erase_if(*causes, [&](const CauseFound& cause) {
-      if (cause.axis != axis || Has(kElsewhere, cause.cause) ||
+      if (cause.axis != axis || IsFoundElsewhere(cause) ||
           cause.delta_log_likelihood >= left.delta_log_likelihood)
         return false;
       left.size_um = std::hypot(left.size_um, cause.size_um);

@@ -235,13 +235,14 @@ TEST(Effects, ARelaxationThatIsOverBeforeTheExposuresDoesNotShow) {
 }
 
 // A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
-// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths.
+// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths; the
+// same shares at any drive come after them.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
   std::size_t loaded = 0, bent = 0;
   for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
-    if (form.form < 4 || form.axis != EffectAxis::kTheta) continue;
+    if (form.form < 4 || form.form > 12 || form.axis != EffectAxis::kTheta) continue;
     ++loaded;
     const int feed = (form.form - 4) / 3, deep = (form.form - 4) % 3;
     const double of_feed = feed == 0 ? 0 : feed == 1 ? 0.5 : 1;
@@ -264,6 +265,28 @@ TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   }
   EXPECT_EQ(loaded, 27u);
   EXPECT_GT(bent, 100u);  // or one depth would do
+}
+
+// The load alone, where the lag does not know the drive.
+TEST(Effects, ADroopAtAnyDriveIsTheShareOfTheLoad) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  std::size_t undriven = 0;
+  for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
+    if (form.form < 13 || form.axis != EffectAxis::kTheta) continue;
+    const double of_feed = 0.5 * static_cast<double>(undriven++);
+    const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+    const auto motors = track.Column(kRailMotors), shared = track.Column(kSharedMotors);
+    const double most = facts.Find(kRailMotors)->high, furthest = facts.Find(kSharedMotors)->high;
+    const auto errors = Applied(track, form, 0.02);
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      const double step = track.step_deg[kTheta][i];
+      if (step == 0) continue;
+      const double droop = of_feed * motors[i] / most + (1 - of_feed) * shared[i] / furthest;
+      EXPECT_NEAR(errors[i], (step > 0 ? -0.02 : 0.02) * droop, 1e-12) << form.label;
+    }
+  }
+  EXPECT_EQ(undriven, 3u);
 }
 
 TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
