@@ -13,12 +13,11 @@
 #include "sim/diagnosis/events.h"
 #include "sim/diagnosis/exchanged.h"
 #include "sim/diagnosis/families.h"
+#include "sim/diagnosis/find_model.h"
 #include "sim/diagnosis/fine_structure.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
-#include "sim/diagnosis/homings.h"
 #include "sim/diagnosis/image.h"
-#include "sim/diagnosis/multi_start.h"
 #include "sim/diagnosis/next_moves.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
@@ -36,12 +35,6 @@ namespace {
 constexpr std::size_t kMovesMin = 8;  // of a unit, seen
 constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
 constexpr double kKeptMin = 0.03;
-constexpr double kUndecided = 6;  // 2 d ln L between two ways to read the temperatures
-
-bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
-  return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
-         options.leave_out.end();
-}
 
 // Templates that the data can test; why the others cannot.
 Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
@@ -177,14 +170,6 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   *causes = std::move(merged);
 }
 
-double RmsOf(const Fit& fit) {
-  double sum = 0, count = 0;
-  for (std::size_t row = 0; row < fit.weight.size(); ++row)
-    if (fit.weight[row] > 0.5)
-      sum += fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row], count += 1;
-  return count > 0 ? std::sqrt(sum / count) : 0;
-}
-
 // What the screen sees joins what is told: a column once, but for each term that patches it.
 void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* told) {
   for (UnknownFound& one : seen) {
@@ -269,82 +254,6 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
     campaign->x_mm[row] -= with.x_mm[row] - without.x_mm[row];
     campaign->y_mm[row] -= with.y_mm[row] - without.y_mm[row];
   }
-}
-
-// What units do all alike moves the image, and its motion passes for what they do: found first, it
-// may need fewer causes beside it. True: the fit is that one now.
-bool TryImageFirst(const Templates& templates, const DiagnoseOptions& options,
-                   const SelectionRule& rule, Fit* fit, ImageFound* image, Selection* selection) {
-  Fit anew = *fit;
-  anew.model.terms.clear();
-  anew.model.events.clear();
-  anew.model.exposures.clear();
-  UpdateResiduals(&anew);
-  StepFit(&anew);
-  SettleFit(&anew, 3);
-  ImageFound first = AddImageTerms(&anew, options.family_wise);
-  if (!first.moves) return false;
-  Selection again = SelectMultiStart(templates, rule, &anew);
-  if (BetterBy(anew, *fit) <= 0) return false;
-  again.kept_share = std::move(selection->kept_share);
-  *fit = std::move(anew);
-  *image = std::move(first);
-  *selection = std::move(again);
-  return true;
-}
-
-// The terms, steps, zeros of homings and motion of the image that explain the data.
-Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
-                    const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
-  Selection selection = SelectMultiStart(templates, rule, fit);
-  if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
-  ImageFound image = AddImageTerms(fit, options.family_wise);
-  if (!image.moves) return selection;
-  // What the image's motion hid, or what stood in for it.
-  std::vector<double> kept = std::move(selection.kept_share);
-  const bool has_terms = !fit->model.terms.empty();
-  selection = Select(templates, rule, fit);
-  selection.kept_share = std::move(kept);
-  if (has_terms) TryImageFirst(templates, options, rule, fit, &image, &selection);
-  if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
-  if (image.cause && !IsLeftOut(options, image.cause->cause))
-    diagnosis->causes.push_back(std::move(*image.cause));
-  AddDriftAsRival(image.drift_um, *fit, &selection);
-  return selection;
-}
-
-// The same by the temperatures as they were told and, where sensors are suspect, by those around
-// them: whoever explains the moves better. Where neither does, a whole rail's sensors are told as
-// what they may be; a single unit may well be warmer.
-Selection FindModelBySensors(const Templates& templates, const DiagnoseOptions& options,
-                             const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
-                             Diagnosis* diagnosis) {
-  if (truth == nullptr) return FindModel(templates, options, rule, fit, diagnosis);
-  Diagnosis corrected = *diagnosis;
-  Selection selection = FindModel(templates, options, rule, fit, diagnosis);
-  const auto cannot = [&](const char* why) {
-    diagnosis->not_testable.push_back(
-        {std::string(kSensorBias), std::string("sensors are suspect, ") + why});
-    return selection;
-  };
-  Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
-  Selection again = FindModel(templates, options, rule, &by_others, &corrected);
-  if (!ReadsTemperature(by_others.model)) return cannot("but nothing goes with the temperature");
-  const double better = Merit(by_others) - Merit(*fit);
-  if (better < -kUndecided) return selection;
-  const bool is_better = better > kUndecided;
-  if (!is_better && truth->owner == Owner::kUnit) return cannot("and these moves do not decide");
-  CauseFound cause = SensorCause(by_others, *truth, *fit->facts, is_better && !truth->are_half);
-  const double rms_um = RmsOf(by_others);
-  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
-  if (is_better) {
-    cause.delta_log_likelihood = better / 2;
-    *fit = std::move(by_others);
-    *diagnosis = std::move(corrected);
-    selection = std::move(again);
-  }
-  diagnosis->causes.push_back(std::move(cause));
-  return selection;
 }
 
 // The causes of the model's terms. What a distortion of a stronger one explains as well is told as
@@ -491,7 +400,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   // Without the wrong sensors a column may be gone that they alone made.
   if (truth != nullptr)
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
-  Selection selection = FindModelBySensors(templates, options, rule, truth.get(), &fit, &diagnosis);
+  Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
   AskStepsInstead(fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
