@@ -30,6 +30,12 @@ constexpr double kExposure_s = 10, kHoming_s = 60;
 constexpr double kLever_s = 20, kTelescope_s = 40;  // to change the drive; the elevation
 constexpr double kDelayMin_s = 3;                   // a shorter one saves nothing
 
+// Where all blocks of moves begin and end.
+const ProposedMove& Home() {
+  static const ProposedMove home{.theta_fp_deg = 0, .phi_fp_deg = 90};
+  return home;
+}
+
 // ---- who is to be told from whom
 
 // A cause of the model and one who could be it.
@@ -90,7 +96,8 @@ std::vector<std::size_t> UnitsOf(const Fit& fit, const ModelTerm& term, bool in_
 
 struct Ground {
   Campaign made;
-  std::vector<double> weight;  // Shape: (rows of made)
+  std::vector<ModelTerm> terms;  // of the model: those that these units and columns can have
+  std::vector<double> weight;    // Shape: (rows of made)
 };
 
 Ground GroundOf(const Fit& fit, const std::set<std::size_t>& units) {
@@ -109,6 +116,23 @@ Ground GroundOf(const Fit& fit, const std::set<std::size_t>& units) {
   return ground;
 }
 
+// Few units may have no gradient between them, or no neighbours: terms of such columns stay out.
+void TakeTerms(const Fit& fit, Ground* ground, std::vector<Pair>* pairs, NextMoves* out) {
+  const Campaign campaign = Ahead(ground->made, SpreadOver(ground->made.units, {Home()}));
+  const CampaignFacts facts = MakeFacts(campaign);
+  std::vector<std::size_t> place(fit.model.terms.size(), kNoTerm);
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    if (IsOffered(fit.model.terms[t].form, facts)) {
+      place[t] = ground->terms.size();
+      ground->terms.push_back(fit.model.terms[t]);
+    }
+  for (Pair& pair : *pairs) {
+    pair.term = place[pair.term];
+    if (pair.term == kNoTerm) out->untold.push_back({pair.cause, pair.rival});
+  }
+  std::erase_if(*pairs, [](const Pair& pair) { return pair.term == kNoTerm; });
+}
+
 // Owns what a fit refers to.
 struct FitAhead {
   Campaign campaign;
@@ -124,7 +148,7 @@ std::unique_ptr<FitAhead> LookAhead(const Fit& fit, const Ground& ground,
   ahead->facts = MakeFacts(ahead->campaign);
   ahead->fit.facts = &ahead->facts;
   ahead->fit.model.units = fit.model.units;
-  ahead->fit.model.terms = fit.model.terms;
+  ahead->fit.model.terms = ground.terms;
   ahead->fit.noise = fit.noise;
   ahead->fit.noise.exposure_factor.clear();
   ahead->fit.parallel = OneAfterTheOther();
@@ -191,11 +215,6 @@ struct Block {
   std::vector<ProposedMove> moves;
   double seconds = 0;
 };
-
-const ProposedMove& Home() {
-  static const ProposedMove home{.theta_fp_deg = 0, .phi_fp_deg = 90};
-  return home;
-}
 
 double SecondsOf(const std::vector<ProposedMove>& moves) {
   ProposedMove at = Home();
@@ -422,7 +441,9 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
     if (chosen > 0) pairs[p].scale = std::accumulate(square.begin(), square.end(), 0.0) / chosen;
   }
   if (pairs.empty()) return none;
-  const Ground ground = GroundOf(fit, units);
+  Ground ground = GroundOf(fit, units);
+  TakeTerms(fit, &ground, &pairs, &none);
+  if (pairs.empty()) return none;
   const std::unique_ptr<FitAhead> start = LookAhead(fit, ground, {Home()});
   const FleetGroups groups = GroupsOf(*fit.facts);
   for (Pair& pair : pairs) pair.forms = NearestForms(start->fit, groups, pair.term, pair.rival);

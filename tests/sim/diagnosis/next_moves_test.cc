@@ -122,6 +122,27 @@ TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
   EXPECT_GT(next.prospects[0].d, 30);
 }
 
+// Two units have no gradient between them: a term of the plate's cannot be asked in their rows.
+TEST(NextMoves, TermsWhoseColumnsFewUnitsLackStayOut) {
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
+                                    {.units = 20, .moves = 60, .seed = 5});
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = FittedWith("backlash", Memory::kHold, facts);
+  std::vector<std::uint32_t>& has = fit.model.terms[0].group_of_unit;
+  std::fill(has.begin() + 2, has.end(), kNoGroup);
+  ModelTerm bend;
+  bend.form = ListTemplates(*FindEffect("plate_gradient"), facts).front();
+  bend.group_of_unit.assign(campaign.units.size(), 0);
+  bend.amplitude.assign(bend.form.columns, 1e-6);
+  bend.sigma.assign(bend.form.columns, 1e-7);
+  fit.model.terms.insert(fit.model.terms.begin(), bend);
+  const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "load_angle_lag")});
+  EXPECT_THAT(next.prospects, SizeIs(1));
+  CauseFound plate = Ambiguous("plate_gradient", "camera_similarity");
+  plate.axis = "none";
+  EXPECT_THAT(ProposeMoves(fit, {plate}).moves, testing::SizeIs(testing::Le(kNextMovesMax)));
+}
+
 TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
   const Diagnosis diagnosis =
       Diagnose(Planted({{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"}},
