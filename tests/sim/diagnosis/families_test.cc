@@ -58,6 +58,22 @@ TEST(Families, WhatTheSameFewUnitsHaveBesideIsNotSure) {
   EXPECT_THAT(causes[2].candidates, ElementsAre("stage_ripple"));
 }
 
+TEST(Families, AFaintCauseOfThePlateBesideAirIsTheAirs) {
+  const auto beside_air = [](const char* scope, double evidence, double size_um) {
+    std::vector<CauseFound> causes = {Cause("air_turbulence", "none", 2000),
+                                      Cause("relaxation", "phi", evidence)};
+    causes[0].size_um = 5;
+    causes[1].scope = scope, causes[1].size_um = size_um;
+    JudgeRemainders(&causes);
+    return causes.size();
+  };
+  EXPECT_EQ(beside_air("plate", 35, 0.5), 1u);
+  EXPECT_EQ(beside_air("rail", 35, 0.5), 1u);
+  EXPECT_EQ(beside_air("unit", 35, 0.5), 2u);
+  EXPECT_EQ(beside_air("plate", 80, 0.5), 2u);
+  EXPECT_EQ(beside_air("plate", 35, 3), 2u);
+}
+
 TEST(Families, AShapeLeavesNothingWhereItIsNot) {
   const auto split = [](CauseFound cause, std::map<std::uint32_t, double> evidence) {
     cause.all_units = false;
