@@ -136,6 +136,41 @@ TEST(Effects, AStartSkewBeginsAtAShareOfTheSlots) {
   }
 }
 
+// What is missing of a move that is cut while it brakes: the square of the time, as the speed falls
+// evenly, and straight on before the braking begins.
+TEST(Effects, AMoveThatIsCutWhileItBrakesMissesLittle) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const Templates forms = ListTemplates(*FindEffect("start_skew"), facts);
+  const double slots = facts.Find("bus_slot")->high + 1;
+  for (const double braking : {0.25, 0.5, 1.0}) {
+    const auto form = std::ranges::find_if(forms, [&](const Template& one) {
+      return one.axis == EffectAxis::kTheta && one.memory == Memory::kNow && one.shape == braking &&
+             one.label.find("braking") != std::string::npos;
+    });
+    ASSERT_NE(form, forms.end());
+    EXPECT_TRUE(Shows(facts, *form));
+    for (const std::size_t unit : {2u, 5u}) {
+      const UnitTrack track = MakeTrack(facts, unit, campaign.units[unit]);
+      const auto errors = Applied(track, *form, 0.02);
+      for (std::size_t i = 0; i < track.moves; ++i) {
+        const double step = track.step_deg[kTheta][i];
+        const double late = (track.Column("bus_slot")[i] + 1) / slots;
+        // Distance by speed, which rises from 0 at the end to 1 at `braking` before it.
+        double missing = 0, last = 0;
+        constexpr int kSteps = 2000;
+        for (int k = 0; k < kSteps; ++k) {
+          const double at = (k + 0.5) / kSteps, speed = std::min(at / braking, 1.0);
+          if (at < late) missing += speed / kSteps;
+          last += speed / kSteps;
+        }
+        const double expected = step == 0 ? 0 : -std::copysign(0.02, step) * missing / last;
+        EXPECT_NEAR(errors[i], expected, 1e-4 * 0.02 + 1e-5) << braking << ' ' << i;
+      }
+    }
+  }
+}
+
 // Grease that follows Andrade's law stiffens ever faster as it cools; its slope at the reference is
 // that of the proportion.
 TEST(Effects, GreaseStiffensFasterTheColderItIs) {
