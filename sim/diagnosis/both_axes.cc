@@ -42,14 +42,6 @@ std::vector<AxisPair> PairsOf(const ScorePass& pass, const Templates& templates,
   return pairs;
 }
 
-// Of the terms' amplitudes, by BIC.
-double PriceOf(const Fit& fit) {
-  double amplitudes = 0;
-  for (const ModelTerm& term : fit.model.terms)
-    amplitudes += static_cast<double>(term.amplitude.size());
-  return amplitudes * std::log(2 * static_cast<double>(fit.facts->campaign->rows()));
-}
-
 // In place of the shapes that `without` has not.
 PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
   constexpr int kRounds = 3;
@@ -59,7 +51,11 @@ PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, cons
   StepFit(&trial.fit);
   SettleFit(&trial.fit, kRounds);
   trial.behind = BetterBy(fit, trial.fit);
-  trial.behind_unpriced = trial.behind - (PriceOf(trial.fit) - PriceOf(fit));
+  // What it explains more at no price, and what chance gives to the parameters that it has more.
+  constexpr double kSigmas = 3;
+  const double more = std::max(CountParameters(trial.fit) - CountParameters(fit), 0.0);
+  const double explains = PriceOf(trial.fit) - PriceOf(fit) - trial.behind;
+  trial.beyond_chance = explains > more + kSigmas * std::sqrt(2 * more);
   return trial;
 }
 

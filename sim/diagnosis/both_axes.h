@@ -17,7 +17,8 @@ struct PairTrial {
   std::string_view cause;
   double log_p = 0;   // of the axis that chance explains better
   double behind = 0;  // twice the difference of the logarithms of likelihood, at their price
-  double behind_unpriced = 0;  // the same, however many amplitudes it takes
+  /// Whether it explains more than chance gives to as many amplitudes as it has more.
+  bool beyond_chance = false;
   Fit fit;
 };
 

@@ -56,6 +56,9 @@ void FreeHomings(Fit* fit);
 /// 2 ln L of the fit less a price for its parameters (BIC); comparable between fits of one
 /// campaign.
 double Merit(const Fit& fit);
+/// The parameters that have been fitted beside the static geometry, and BIC's price for them.
+double CountParameters(const Fit& fit);
+double PriceOf(const Fit& fit);
 
 /// Static geometry's covariance in mm and degrees, with the unit's own terms beside it.
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit);

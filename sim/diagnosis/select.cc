@@ -199,9 +199,9 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
                       std::vector<Rival>* rivals) {
   for (const PairTrial& trial :
        TryPairs(fit, at, look.pass, templates, look.standings, groups, kKeptMin))
-    if (trial.behind_unpriced < rule.rival_behind &&
+    if ((trial.behind < rule.rival_behind || trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
-      rivals->push_back({trial.cause, trial.behind_unpriced, 0, false});
+      rivals->push_back({trial.cause, trial.behind, 0, false});
 }
 
 // One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if

@@ -230,27 +230,17 @@ void FreeHomings(Fit* fit) {
   SettleFit(fit, 3);
 }
 
-double Merit(const Fit& fit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  double values = 0, log_density = 0, parameters = 0;
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    const WhiteUnit white = Whiten(fit, unit);
-    for (std::size_t k = 0; k < white.moves.size(); ++k) {
-      const auto at = static_cast<Index>(2 * k);
-      const double* w = white.filter[k].w;
-      const double weight = fit.weight[white.track.first_row + white.moves[k]];
-      const double square = white.y.segment(at, 2).squaredNorm() / weight;
-      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) -
-                     MinusLogDensity(square);
-      values += 2;
-    }
-    // One zero of each axis is the geometry's.
-    const auto homings = static_cast<double>(FreeHomingsOf(fit.model, white.track).size());
-    parameters += std::max(homings - 2, 0.0);
-  }
-  parameters += 2 * static_cast<double>(MovesWithEvents(fit.model));
+double CountParameters(const Fit& fit) {
+  double parameters = 2 * static_cast<double>(MovesWithEvents(fit.model));
   constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
   parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    if (fit.model.homing_zero_deg[kTheta].empty()) break;
+    // One zero of each axis is the geometry's.
+    const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+    const auto homings = static_cast<double>(FreeHomingsOf(fit.model, track).size());
+    parameters += std::max(homings - 2, 0.0);
+  }
   for (const ModelTerm& term : fit.model.terms) {
     for (std::size_t k = 0; k < term.amplitude.size(); ++k)
       if (term.sigma[k] > 0) parameters += 1;
@@ -259,7 +249,30 @@ double Merit(const Fit& fit) {
           term.form.shape_of_unit.contains(fit.model.units[unit].id))
         parameters += 1;
   }
-  return 2 * log_density - parameters * std::log(std::max(values, 2.0));
+  return parameters;
+}
+
+double PriceOf(const Fit& fit) {
+  double values = 0;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.Used(row)) values += 2;
+  return CountParameters(fit) * std::log(std::max(values, 2.0));
+}
+
+double Merit(const Fit& fit) {
+  double log_density = 0;
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const auto at = static_cast<Index>(2 * k);
+      const double* w = white.filter[k].w;
+      const double weight = fit.weight[white.track.first_row + white.moves[k]];
+      const double square = white.y.segment(at, 2).squaredNorm() / weight;
+      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) -
+                     MinusLogDensity(square);
+    }
+  }
+  return 2 * log_density - PriceOf(fit);
 }
 
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit) {

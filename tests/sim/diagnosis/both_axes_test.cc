@@ -43,5 +43,17 @@ TEST(BothAxes, ADroopOfBothKeepsItsName) {
   EXPECT_EQ(diagnosis.causes[0].axis, "both");
 }
 
+// Units' own amplitudes on each axis follow whatever the skew does to a unit, for many more
+// parameters and no better than chance.
+TEST(BothAxes, AStartSkewIsNoPlayOfEachUnit) {
+  for (const std::uint64_t seed : {3u, 4u}) {
+    const Diagnosis diagnosis = Verdicts(Planted(
+        {{.cause = "start_skew", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = seed}));
+    ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+    EXPECT_THAT(diagnosis.causes[0].candidates, testing::ElementsAre("start_skew"))
+        << Told(diagnosis);
+  }
+}
+
 }  // namespace
 }  // namespace focalfleet::sim
