@@ -13,7 +13,7 @@ constexpr double kWeakShare = 0.5;  // of the strong one's chi-square
 constexpr double kSpread = 0.3;     // of the cause: a prior that keeps the fit determined
 
 PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
-  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
   PoseErrors errors;
   errors.Reset(track.moves);
   const std::span<const double> amplitude = term.AmplitudeOf(unit);

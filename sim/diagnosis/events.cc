@@ -118,7 +118,7 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
 // few rows.
 double UsualNoise_mm(const Fit& fit, std::size_t unit, std::size_t axis) {
   constexpr std::size_t kJumpsMin = 8;
-  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
   const std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
   std::vector<double> jumps;
   for (std::size_t k = 1; k < rows.size(); ++k)
@@ -132,7 +132,7 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   constexpr double kNoiseMax = 1.0 / 8;  // of a turn: else turns cannot be counted
   std::vector<EventTerm> events;
   if (noise_mm < 0) return events;
-  const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
   const double turn = 360 / track.unit->gear[axis];
   std::vector<AngleRow> rows = AngleErrors(fit, track, axis);
   std::erase_if(rows,

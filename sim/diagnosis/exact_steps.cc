@@ -178,6 +178,59 @@ void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
   rows->geometry = FitPlain(plain, table, rows->geometry, kRounds);
 }
 
+void Take(const Change& change, UnitRows* rows) {
+  const std::size_t end = EndOfHistory(rows->track, change.move);
+  for (std::size_t i = change.move; i < end; ++i)
+    for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += change.by_deg[axis];
+}
+
+bool IsFar(const UnitRows& rows, std::size_t i, const double by_deg[2], double far_mm) {
+  return RowCost(rows, i, rows.added_deg[kTheta][i] + by_deg[kTheta],
+                 rows.added_deg[kPhi][i] + by_deg[kPhi]) > far_mm * far_mm;
+}
+
+// The change before row `at` that brings the most rows near from there on, one after the other.
+Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, double far_mm) {
+  Change best;
+  std::size_t longest = 0;
+  const std::size_t end = EndOfHistory(rows.track, at);
+  for (std::size_t move = since; move <= at; ++move) {
+    if (EndOfHistory(rows.track, move) != end) continue;  // a homing has undone it
+    for (Change& change : ChangesIn(rows, move, ChangeKind::kWholeMove)) {
+      std::size_t run = 0;
+      double gained = 0;
+      for (std::size_t i = at; i < end; ++i) {
+        if (!std::isfinite(rows.x_mm[i])) continue;
+        if (IsFar(rows, i, change.by_deg, far_mm)) break;
+        ++run, gained += kCap_mm * kCap_mm;
+      }
+      if (run > longest) longest = run, best = change, best.gained = gained;
+    }
+  }
+  return best;
+}
+
+// Whole moves in the order of time: after many that were lost no single one explains what comes
+// later, but each explains what comes next.
+std::vector<Change> FindInOrder(std::size_t at_most, double far_mm, const CampaignUnit& table,
+                                UnitRows* rows) {
+  constexpr double kNothing[2] = {0, 0};
+  std::vector<Change> found;
+  std::size_t since = 0;  // after the last row that stood where it should
+  for (std::size_t i = 0; i < rows->track.moves && found.size() < at_most; ++i) {
+    if (!std::isfinite(rows->x_mm[i])) continue;
+    if (IsFar(*rows, i, kNothing, far_mm)) {
+      const Change best = LongestRun(*rows, since, i, far_mm);
+      if (best.gained <= 0) continue;  // somewhere else for this once
+      Take(best, rows);
+      found.push_back(best);
+    }
+    since = i + 1;
+  }
+  if (!found.empty()) FitGeometry(table, rows);  // not before: most rows may be to come
+  return found;
+}
+
 // Changes that explain the rows, from one geometry to begin at.
 std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
                                 const CampaignUnit& table, UnitRows* rows) {
@@ -186,9 +239,7 @@ std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far
   while (found.size() < at_most) {
     const Change best = BestChange(*rows, kind, gain_min);
     if (best.gained < gain_min) break;
-    const std::size_t end = EndOfHistory(rows->track, best.move);
-    for (std::size_t i = best.move; i < end; ++i)
-      for (const std::size_t axis : {kTheta, kPhi}) rows->added_deg[axis][i] += best.by_deg[axis];
+    Take(best, rows);
     FitGeometry(table, rows);
     found.push_back(best);
   }
@@ -214,12 +265,13 @@ struct Explained {
   std::size_t far = 0;    // rows that are
 };
 
-Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
-                      const CampaignUnit& geometry, double far_mm) {
+Explained ExplainedBy(ChangeKind kind, bool in_order, std::size_t at_most, const Fit& fit,
+                      std::size_t unit, const CampaignUnit& geometry, double far_mm) {
+  const CampaignUnit& table = fit.facts->campaign->units[unit];
   UnitRows rows = RowsOf(fit, unit, geometry);
-  Explained out{
-      .changes = FindChanges(kind, at_most, far_mm, fit.facts->campaign->units[unit], &rows),
-      .geometry = rows.geometry};
+  Explained out{.changes = in_order ? FindInOrder(at_most, far_mm, table, &rows)
+                                    : FindChanges(kind, at_most, far_mm, table, &rows),
+                .geometry = rows.geometry};
   out.cost = TotalCost(rows);
   for (std::size_t i = 0; i < rows.track.moves; ++i)
     if (fit.aside[rows.track.first_row + i] == 0 &&
@@ -232,6 +284,7 @@ Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std:
 
 std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
   constexpr double kLeftMax = 0.2;          // what changes do not explain is something else
+  constexpr double kLeftOfAny = 0.05;       // by changes of any size: a drift is not made of steps
   constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
   // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
   const double factor = std::min(fit.noise.unit_factor[unit], 1.5);
@@ -248,11 +301,13 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
   const auto seen = static_cast<double>(
       std::ranges::count_if(rows.x_mm, [](double x) { return std::isfinite(x); }));
   const double of_noise = 2 * seen * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
-  const auto explains = [&](const Explained& one) {
+  const auto explains = [&](const Explained& one, ChangeKind kind) {
     const bool large = std::ranges::all_of(
         one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
+    const double left = before > of_noise ? (one.cost - of_noise) / (before - of_noise) : 1;
+    if (kind == ChangeKind::kBlocked && left > kLeftOfAny) return false;
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
-           (large && before > of_noise && one.cost - of_noise <= kLeftMax * (before - of_noise));
+           (large && left <= kLeftMax);
   };
   std::optional<Explained> best;
   ChangeKind best_kind = ChangeKind::kWholeMove;
@@ -261,12 +316,16 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     const double far_better = kind == ChangeKind::kBlocked ? 0.5 : 1;
     const std::size_t at_most =
         kind == ChangeKind::kWholeMove ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);
-    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
-      Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
-      if (one.changes.empty() || one.cost >= before || !explains(one)) continue;
+    const auto take = [&](bool in_order, const CampaignUnit& from) {
+      Explained one = ExplainedBy(kind, in_order, at_most, fit, unit, from, far_mm);
+      if (one.changes.empty() || one.cost >= before || !explains(one, kind)) return;
       const double least = best ? (best_kind == kind ? 1 : far_better) * (best->cost + of_noise)
                                 : std::numeric_limits<double>::infinity();
       if (one.cost + of_noise < least) best = std::move(one), best_kind = kind;
+    };
+    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
+      take(false, from);
+      if (kind == ChangeKind::kWholeMove) take(true, from);
     }
   }
   if (!best) return {};

@@ -49,7 +49,7 @@ void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& j
   const Campaign& campaign = *fit->facts->campaign;
   for (int round = 0; round < kRounds; ++round) {
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-      const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
+      const UnitTrack track = TrackOf(fit->model, *fit->facts, unit);
       for (std::size_t begin = 0; begin < track.moves;) {
         const std::size_t end = EndOfHistory(track, begin);
         Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
@@ -127,7 +127,7 @@ double NoiseFloor(const Fit& fit) {
   double sum = 0, count = 0;
   constexpr double kRadians = std::numbers::pi / 180;
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
-    const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+    const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
     const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];
     for (std::size_t i = 0; i < track.moves; ++i) {
       if (!fit.Used(track.first_row + i)) continue;

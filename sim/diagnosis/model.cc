@@ -141,6 +141,16 @@ void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack
   AddEvents(model, unit, track, errors);
 }
 
+UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit) {
+  UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
+  if (std::ranges::find(model.events, unit, &EventTerm::unit) == model.events.end()) return track;
+  PoseErrors stands;
+  stands.Reset(track.moves);
+  AddEvents(model, unit, track, &stands);
+  TurnPoses({stands.angle_deg[kTheta], stands.angle_deg[kPhi]}, &track);
+  return track;
+}
+
 Places Predict(const CampaignModel& model, const CampaignFacts& facts,
                const ParallelFor& parallel) {
   const std::size_t rows = facts.campaign->rows();
@@ -149,7 +159,7 @@ Places Predict(const CampaignModel& model, const CampaignFacts& facts,
   parallel(chunks.size(), [&](std::size_t chunk) {
     PoseErrors errors;
     for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
-      const UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
+      const UnitTrack track = TrackOf(model, facts, unit);
       errors.Reset(track.moves);
       AddPoseErrors(model, unit, track, &errors);
       CampaignUnit bent = model.units[unit];

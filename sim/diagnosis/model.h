@@ -110,6 +110,10 @@ struct Places {
   std::vector<double> y_mm;
 };
 
+/// A unit's moves at the poses that its steps have put it in: a lost command may be half a turn,
+/// and what a place says of the geometry is another thing there.
+UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit);
+
 /// Where the model says that every fibre stands after every move.
 Places Predict(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel);
 

@@ -25,7 +25,7 @@ constexpr std::size_t kRowsMin = 12;
 
 Series SeriesOf(const Fit& fit, std::size_t unit, std::size_t axis) {
   constexpr double kFar = 4, kOfNormal = 0.6745;
-  Series series{MakeTrack(*fit.facts, unit, fit.model.units[unit]), {}, {}};
+  Series series{TrackOf(fit.model, *fit.facts, unit), {}, {}};
   series.rows = AngleErrors(fit, series.track, axis);
   if (series.rows.size() < kRowsMin) return series;
   std::vector<double> errors;

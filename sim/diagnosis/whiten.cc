@@ -24,7 +24,7 @@ double WeightOf(double square) {
 // The used rows and what an axis' turn does at each.
 WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
   WhiteUnit white;
-  white.track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+  white.track = TrackOf(fit.model, *fit.facts, unit);
   const UnitTrack& track = white.track;
   for (std::size_t i = 0; i < track.moves; ++i) {
     const std::size_t row = track.first_row + i;

@@ -366,20 +366,22 @@ std::size_t EndOfHistory(const UnitTrack& track, std::size_t move) {
 
 namespace {
 
-void TakePoses(const CampaignUnit& geometry, UnitTrack* track) {
+void SizePoses(UnitTrack* track) {
   for (std::vector<double>* place : {&track->elbow_x_mm, &track->elbow_y_mm, &track->reach_x_mm,
                                      &track->reach_y_mm, &track->fibre_x_mm, &track->fibre_y_mm})
     place->resize(track->moves);
-  for (std::size_t i = 0; i < track->moves; ++i) {
-    const double theta = (track->cmd_deg[kTheta][i] + geometry.zero_deg[kTheta]) * kRadians;
-    const double both = theta + (track->cmd_deg[kPhi][i] + geometry.zero_deg[kPhi]) * kRadians;
-    track->elbow_x_mm[i] = geometry.arm_mm[kTheta] * std::cos(theta);
-    track->elbow_y_mm[i] = geometry.arm_mm[kTheta] * std::sin(theta);
-    track->reach_x_mm[i] = geometry.arm_mm[kPhi] * std::cos(both);
-    track->reach_y_mm[i] = geometry.arm_mm[kPhi] * std::sin(both);
-    track->fibre_x_mm[i] = geometry.base_x_mm + track->elbow_x_mm[i] + track->reach_x_mm[i];
-    track->fibre_y_mm[i] = geometry.base_y_mm + track->elbow_y_mm[i] + track->reach_y_mm[i];
-  }
+}
+
+void TakePose(double theta_deg, double phi_deg, std::size_t i, UnitTrack* track) {
+  const CampaignUnit& geometry = *track->unit;
+  const double theta = (theta_deg + geometry.zero_deg[kTheta]) * kRadians;
+  const double both = theta + (phi_deg + geometry.zero_deg[kPhi]) * kRadians;
+  track->elbow_x_mm[i] = geometry.arm_mm[kTheta] * std::cos(theta);
+  track->elbow_y_mm[i] = geometry.arm_mm[kTheta] * std::sin(theta);
+  track->reach_x_mm[i] = geometry.arm_mm[kPhi] * std::cos(both);
+  track->reach_y_mm[i] = geometry.arm_mm[kPhi] * std::sin(both);
+  track->fibre_x_mm[i] = geometry.base_x_mm + track->elbow_x_mm[i] + track->reach_x_mm[i];
+  track->fibre_y_mm[i] = geometry.base_y_mm + track->elbow_y_mm[i] + track->reach_y_mm[i];
 }
 
 }  // namespace
@@ -397,8 +399,17 @@ UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const Campaign
     track.step_deg[axis] = std::span(facts.step_deg[axis]).subspan(track.first_row, track.moves);
   }
   track.restarts = std::span(facts.restarts).subspan(track.first_row, track.moves);
-  TakePoses(geometry, &track);
+  SizePoses(&track);
+  for (std::size_t i = 0; i < track.moves; ++i)
+    TakePose(track.cmd_deg[kTheta][i], track.cmd_deg[kPhi][i], i, &track);
   return track;
+}
+
+void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track) {
+  for (std::size_t i = 0; i < track->moves; ++i)
+    if (off_deg[kTheta][i] != 0 || off_deg[kPhi][i] != 0)
+      TakePose(track->cmd_deg[kTheta][i] + off_deg[kTheta][i],
+               track->cmd_deg[kPhi][i] + off_deg[kPhi][i], i, track);
 }
 
 }  // namespace focalfleet::sim

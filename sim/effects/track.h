@@ -70,7 +70,8 @@ struct UnitTrack {
   std::span<const double> from_deg[2];
   std::span<const double> step_deg[2];
   std::span<const char> restarts;
-  // At the commanded pose, relative to the base: the elbow, and the fibre relative to the elbow.
+  // At the commanded pose, or where TurnPoses says that the axes stand, relative to the base: the
+  // elbow, and the fibre relative to the elbow.
   std::vector<double> elbow_x_mm, elbow_y_mm, reach_x_mm, reach_y_mm;
   std::vector<double> fibre_x_mm, fibre_y_mm;  // on the plate
 
@@ -83,5 +84,8 @@ std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
 
 /// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);
+
+/// The poses of axes that stand off from what they were commanded by these. Shapes: (moves).
+void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track);
 
 }  // namespace focalfleet::sim
