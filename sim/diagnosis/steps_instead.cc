@@ -1,7 +1,10 @@
 #include "sim/diagnosis/steps_instead.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "sim/diagnosis/events.h"
 #include "sim/diagnosis/multi_start.h"
@@ -43,6 +46,19 @@ Fit WithoutCauseOf(const Fit& fit, const ModelTerm& term) {
   return without;
 }
 
+// Units that have few steps, all of them small.
+std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
+  constexpr std::size_t kUnitsMost = 8, kFew = 4;
+  constexpr double kSmall_deg = 3;
+  std::map<std::size_t, std::size_t> count;
+  for (const EventTerm& event : fit.model.events)
+    count[event.unit] += std::abs(event.step_deg) < kSmall_deg ? 1 : kFew + 1;
+  std::vector<std::size_t> units;
+  for (const auto& [unit, steps] : count)
+    if (steps <= kFew && units.size() < kUnitsMost) units.push_back(unit);
+  return units;
+}
+
 }  // namespace
 
 void AskStepsInstead(const Fit& fit, Selection* selection) {
@@ -65,6 +81,20 @@ void AskStepsInstead(const Fit& fit, Selection* selection) {
     for (const CauseFound& steps : EventCauses(stepped))
       for (const std::string_view name : {kStepLoss, kLostCommand, kContact})
         if (steps.cause == name) selection->accepted[t].rivals.push_back({name, behind, 1, false});
+  }
+}
+
+void DropNeedlessSteps(Fit* fit) {
+  constexpr double kClearly = 20;  // as when steps are taken
+  constexpr int kRounds = 2;
+  if (fit->model.terms.empty()) return;
+  for (const std::size_t unit : UnitsWithSmallSteps(*fit)) {
+    Fit without = *fit;
+    std::erase_if(without.model.events, [&](const EventTerm& event) { return event.unit == unit; });
+    UpdateResiduals(&without);
+    StepFit(&without);
+    SettleFit(&without, kRounds);
+    if (BetterBy(*fit, without) < kClearly) *fit = std::move(without);
   }
 }
 

@@ -90,5 +90,32 @@ TEST(StepsInstead, ASlipAtTheFirstShortMoveHasItAmongItsCandidates) {
   EXPECT_THAT(diagnosis.causes[0].candidates, Contains("step_loss")) << Told(diagnosis);
 }
 
+// A step that was taken before the causes were known, and one that is there.
+TEST(StepsInstead, WhatTheModelDoesAsWellWithoutIsNone) {
+  const auto steps_left = [](double planted_deg) {
+    Campaign campaign = Planted({}, {.moves = kMoves, .seed = 4});
+    const std::size_t from = campaign.first_row[kUnit] + 20;
+    TurnTheta(
+        [&](std::size_t row) {
+          return row >= from && row < campaign.first_row[kUnit + 1] ? planted_deg : 0;
+        },
+        &campaign);
+    const CampaignFacts facts = MakeFacts(campaign);
+    Fit fit = StaticFit(facts);
+    ModelTerm term;
+    term.form = {.effect = FindEffect("backlash"), .axis = EffectAxis::kPhi};
+    term.group_of_unit.assign(campaign.units.size(), 0);
+    term.amplitude = {0}, term.sigma = {0};
+    fit.model.terms.push_back(term);
+    fit.model.events.push_back({kUnit, from, kTheta, true, 0.3});
+    StepFit(&fit);
+    SettleFit(&fit, 3);
+    DropNeedlessSteps(&fit);
+    return fit.model.events.size();
+  };
+  EXPECT_EQ(steps_left(0), 0u);
+  EXPECT_EQ(steps_left(0.3), 1u);
+}
+
 }  // namespace
 }  // namespace focalfleet::sim
