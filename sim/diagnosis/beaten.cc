@@ -41,6 +41,37 @@ bool IsOwnShape(const Effect& effect, const UnknownFound& told) {
          told.channel.find("against its direction") != std::string::npos;
 }
 
+// Without what is not of the structure: beside a curve for it, such a term explains as much as it
+// does alone, whatever its many amplitudes cost.
+LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm& curve) {
+  constexpr double kOfItsOwn = 0.5, kOfChance = 2;
+  Fit without = fit;
+  Erase(series, &without.model.terms);
+  FitAnew(&without);
+  Fit curved = without;
+  curved.model.terms.push_back(curve);
+  FitAnew(&curved);
+  struct Explains {
+    double by = 0, chance = 0;  // 2 d ln L at no price; what its parameters give
+  };
+  const auto explains = [&](std::size_t term, const Fit& beside) {
+    Fit with = beside;
+    with.model.terms.push_back(fit.model.terms[term]);
+    FitAnew(&with);
+    return Explains{BetterBy(with, beside) + PriceOf(with) - PriceOf(beside),
+                    CountParameters(with) - CountParameters(beside)};
+  };
+  const auto is_own = [&](std::size_t term) {
+    const Explains beside = explains(term, curved);
+    return beside.by > kOfChance * beside.chance &&
+           beside.by > kOfItsOwn * explains(term, without).by;
+  };
+  LastFirst left;
+  for (const std::size_t term : series)
+    if (!is_own(term)) left.push_back(term);
+  return left;
+}
+
 // How sure a name must be beaten, and by what.
 struct Beaten {
   double family_wise;
@@ -68,6 +99,11 @@ struct Beaten {
     FitAnew(&both);
     const double alone = BetterBy(named, without);
     if (alone > 0 && BetterBy(both, curved) > kOfItsOwn * alone) return false;
+    if (terms.size() > 1) {
+      const LastFirst of_structure = WithoutItsOwn(named, terms, left->term);
+      if (of_structure.size() < 2) return false;
+      if (of_structure.size() < terms.size()) return DropIf(of_structure, better_by, counts);
+    }
     *fit = std::move(without);
     Erase(terms, &selection->accepted);
     return true;

@@ -46,6 +46,19 @@ TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
 }
 
+// A curve does for the scale of all units; the ripple, whose many amplitudes cost what they
+// explain, is no part of it.
+TEST(Beaten, ARippleBesideAScaleOfAllUnitsIsNoSeries) {
+  const Diagnosis diagnosis = Verdicts(
+      Planted({{.cause = "gear_scale", .amplitude = 3e-4, .axis = "theta"},
+               {.cause = "stage_ripple", .amplitude = 0.008, .axis = "theta", .unit_scatter = 0.3}},
+              {.moves = 120, .seed = 4}));
+  ASSERT_EQ(diagnosis.causes.size(), 2u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "gear_scale");
+  EXPECT_EQ(diagnosis.causes[1].cause, "stage_ripple");
+  EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+}
+
 TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
   Campaign campaign = Planted({{.cause = "thermal_arm_growth", .amplitude = 6e-5}},
                               {.units = 12, .moves = 80, .seed = 3});
