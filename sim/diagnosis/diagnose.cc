@@ -22,6 +22,7 @@
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
+#include "sim/diagnosis/rotors.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/shared_walk.h"
 #include "sim/diagnosis/steps_instead.h"
@@ -299,6 +300,7 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
     cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
   }
+  JudgeStrays(*fit.facts->campaign, fit.noise.typical_um, &causes, &diagnosis->outliers);
   MergeCauses(&causes);
   // Where the image's motion follows a column, steps of it are what is left of that.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
@@ -402,11 +404,13 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
+  DropNeedlessSteps(&fit);
   AskStepsInstead(fit, &selection);
+  const RotorsToldBy rotors = SettleRotors(options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   AskWithoutRemainders(templates, rule, fit, &diagnosis.causes);
-  JudgeRotors(fit.model, options.leave_out, &diagnosis.causes);
+  JudgeRotors(fit.model, options.leave_out, rotors, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/rotors.h"
 
 namespace focalfleet::sim {
 
@@ -39,17 +40,22 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 /// of an axis, and less than that one's shape can leave is told so. Pre: strongest first.
 void JudgeRemainders(std::vector<CauseFound>* causes);
 
+/// Single units that a cause moves by far more than noise, and explains next to none of their rows
+/// for it, do what no cause does: they are outliers. `noise_um`: of a measured place.
+void JudgeStrays(const Campaign& campaign, double noise_um, std::vector<CauseFound>* causes,
+                 OutliersFound* outliers);
+
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
 /// a unit, among the outliers, and what it does is unknown.
 void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
                 std::vector<UnknownFound>* unknown);
 
 /// What half of the library could be is no name: a weak remainder of a strong cause goes, anything
-/// else is unknown. Pre: strongest first.
+/// else is unknown. So is a broken tooth that many units have and none shows. Pre: strongest first.
 void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// On an axis with something unknown a cause that explains less than what is left is a name for a
-/// part of it: it goes into the unknown.
+/// On an axis with something unknown, or of the angle that this follows, a cause that explains less
+/// than what is left is a name for a part of it: it goes into the unknown.
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Three causes or more that depend on where one axis stands are a series of shapes rather than
@@ -58,9 +64,10 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
 
 /// Where the rotor is turned far out of its field, what phases do bends as what the rotor's poles
 /// do: each is the other's candidate, unless it is left out of the library. By the model's gears.
-/// Beside the stronger of the two the other, where it could be it, is what its shape leaves.
+/// Where exact waves have told whose they are, it is that one's. Beside the stronger of the two the
+/// other, where it could be it, is what its shape leaves.
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
-                 std::vector<CauseFound>* causes);
+                 const RotorsToldBy& told, std::vector<CauseFound>* causes);
 
 /// Where the column is missing that would tell two causes apart, who could not be tested is a
 /// candidate, too.

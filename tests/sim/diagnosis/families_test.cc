@@ -219,6 +219,92 @@ TEST(Families, WhatAnythingCouldBeIsUnknownUnlessItIsARemainder) {
   EXPECT_TRUE(unknown.empty());
 }
 
+TEST(Families, ABrokenToothShowsInItsUnit) {
+  std::vector<UnknownFound> unknown;
+  const auto judged = [&](std::size_t units, double evidence, bool all) {
+    std::vector<CauseFound> causes = {Cause("tooth_damage", "theta", evidence)};
+    causes[0].all_units = all;
+    for (std::size_t unit = 0; unit < units; ++unit)
+      causes[0].units.push_back(static_cast<std::uint32_t>(unit));
+    unknown.clear();
+    JudgeNames(&causes, &unknown);
+    return causes.size();
+  };
+  EXPECT_EQ(judged(25, 44, false), 0u);
+  ASSERT_THAT(unknown, SizeIs(1));
+  EXPECT_EQ(unknown[0].covariate, "theta_cmd_deg");
+  EXPECT_EQ(judged(25, 120, false), 1u);
+  EXPECT_EQ(judged(3, 11, false), 1u);
+  EXPECT_EQ(judged(25, 44, true), 1u);
+  EXPECT_TRUE(unknown.empty());
+}
+
+TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
+  constexpr double kNoise_um = 3;
+  Campaign campaign;
+  campaign.units.resize(2);
+  campaign.units[0].id = 1, campaign.units[1].id = 37;
+  campaign.first_row = {0, 100, 200};
+  OutliersFound outliers;
+  const auto judged = [&](const char* name, double size_um, double evidence,
+                          std::vector<std::uint32_t> units) {
+    std::vector<CauseFound> causes = {Cause(name, "phi", evidence)};
+    causes[0].size_um = size_um, causes[0].units = std::move(units);
+    outliers.units.clear();
+    JudgeStrays(campaign, kNoise_um, &causes, &outliers);
+    return causes.size();
+  };
+  EXPECT_EQ(judged("scale_asymmetry", 6000, 23, {37}), 0u);
+  EXPECT_THAT(outliers.units, ElementsAre(37u));
+  EXPECT_EQ(judged("zero_offset", 6000, 100, {37}), 0u);
+  // One that puts its rows right; one that is no larger than what is left; what is found by its
+  // exact places.
+  EXPECT_EQ(judged("scale_asymmetry", 6000, 1e8, {37}), 1u);
+  EXPECT_EQ(judged("scale_asymmetry", 40, 23, {37}), 1u);
+  EXPECT_EQ(judged("lost_command", 6000, 25, {37}), 1u);
+  EXPECT_TRUE(outliers.units.empty());
+}
+
+TEST(Families, WhatIsFaintBesideAMovingImageMayBeTheImages) {
+  std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 7000),
+                                    Cause("self_heating", "both", 160),
+                                    Cause("relaxation", "theta", 150)};
+  causes[0].size_um = 17, causes[1].size_um = 0.5, causes[2].size_um = 2;
+  causes[1].scope = causes[2].scope = "unit";
+  JudgeRemainders(&causes);
+  ASSERT_THAT(causes, SizeIs(3));
+  EXPECT_THAT(causes[1].candidates, ElementsAre("self_heating", "camera_similarity"));
+  EXPECT_THAT(causes[2].candidates, ElementsAre("relaxation"));
+}
+
+TEST(Families, WhatFollowsAnAngleTakesThatAnglesNames) {
+  std::vector<CauseFound> causes = {Cause("eccentricity", "theta", 90),
+                                    Cause("backlash", "theta", 80)};
+  std::vector<UnknownFound> unknown = {{"theta_cmd_deg", "phi angle", 0, 2, 300}};
+  JudgeBesideUnknown(&causes, &unknown);
+  ASSERT_THAT(causes, SizeIs(1));
+  EXPECT_EQ(causes[0].cause, "backlash");
+}
+
+TEST(Families, WhereNoElevationIsToldTheImageMayShiftByThePlate) {
+  std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
+  JudgeUntested({{"gravity_sag", "column elevation_deg is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("camera_similarity", "gravity_sag"));
+}
+
+TEST(Families, WhatNearlyTheSameUnitsHaveBesideIsNotSure) {
+  const auto judged = [](std::vector<std::uint32_t> units) {
+    std::vector<CauseFound> causes = {Cause("gravity_torque", "theta", 500),
+                                      Cause("camera_distortion", "none", 100)};
+    causes[0].all_units = causes[1].all_units = false;
+    causes[0].units = {1, 2, 3, 4, 5, 6}, causes[1].units = std::move(units);
+    JudgeRemainders(&causes);
+    return causes.back().candidates.size();
+  };
+  EXPECT_EQ(judged({1, 2, 3, 4, 9}), 2u);
+  EXPECT_EQ(judged({1, 2, 3, 8, 9}), 1u);
+}
+
 TEST(Families, AUnitWithManyCausesIsNamedAsAUnit) {
   std::vector<CauseFound> causes = {Cause("backlash", "theta", 1000)};
   for (const char* name : {"ramp_travel", "fibre_torque", "command_quantisation", "zero_offset"}) {
@@ -250,16 +336,20 @@ TEST(Families, ARotorThatIsTurnedFarIsEithersOfTwo) {
   model.units.resize(3);
   for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 337, unit.gear[kPhi] = 893;
   std::vector<std::string> left_out;
+  RotorsToldBy told;
   const auto judged = [&](const char* name, double rotor_deg) {
     std::vector<CauseFound> causes = {Cause(name, "phi", 300)};
     causes[0].amplitude = -rotor_deg / 893;
-    JudgeRotors(model, left_out, &causes);
+    JudgeRotors(model, left_out, told, &causes);
     return causes[0].candidates;
   };
-  EXPECT_THAT(judged("cogging", 14), ElementsAre("cogging"));
-  EXPECT_THAT(judged("cogging", 16), ElementsAre("cogging", "phase_imbalance"));
+  EXPECT_THAT(judged("cogging", 11), ElementsAre("cogging"));
+  EXPECT_THAT(judged("cogging", 13), ElementsAre("cogging", "phase_imbalance"));
   EXPECT_THAT(judged("phase_imbalance", 30), ElementsAre("phase_imbalance", "cogging"));
   EXPECT_THAT(judged("stage_ripple", 30), ElementsAre("stage_ripple"));
+  told[kPhi] = "cogging";
+  EXPECT_THAT(judged("cogging", 30), ElementsAre("cogging"));
+  told = {};
   left_out = {"cogging"};
   EXPECT_THAT(judged("phase_imbalance", 30), ElementsAre("phase_imbalance"));
 }
@@ -272,7 +362,7 @@ TEST(Families, TheSecondOfTwoNamesOfARotorIsWhatTheFirstLeaves) {
     std::vector<CauseFound> causes = {Cause("cogging", "phi", 2000),
                                       Cause("phase_imbalance", axis, evidence)};
     causes[0].amplitude = 10.0 / 893, causes[1].amplitude = second_deg / 893;
-    JudgeRotors(model, {}, &causes);
+    JudgeRotors(model, {}, {}, &causes);
     return causes;
   };
   const std::vector<CauseFound> one = judged(20, 300, "phi");

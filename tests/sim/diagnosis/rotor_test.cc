@@ -7,6 +7,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "sim/diagnosis/rotors.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -94,9 +95,26 @@ void ExpectNamed(const char* cause, const Turned& turned, std::uint64_t seed) {
   SCOPED_TRACE(testing::Message() << cause << ", seed " << seed);
   const Diagnosis diagnosis = Verdicts(RotorsTurned(turned, seed));
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].candidates.size(), 1u) << Told(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, cause);
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
   EXPECT_TRUE(diagnosis.causes[0].all_units);
+}
+
+// Where the rotor rests, its field holds against the detent, and nothing between there and the
+// field does.
+TEST(Rotor, ADetentHoldsItWhereTheFieldDoes) {
+  for (const double harmonic : {1.0, 2.0, 4.0, 6.0})
+    for (const double detent : {0.05, 0.3, 0.6})
+      for (double wave_deg = -175; wave_deg < 180; wave_deg += 10) {
+        const double lag = -kDegree * DetentError(harmonic, wave_deg, detent);
+        const auto pull = [&](double at) {
+          return std::sin(at) - detent * std::sin(wave_deg * kDegree - harmonic * at);
+        };
+        EXPECT_NEAR(pull(lag), 0, 1e-6) << harmonic << ' ' << detent << ' ' << wave_deg;
+        for (const double share : {0.1, 0.5, 0.9})
+          EXPECT_LT(pull(share * lag) * lag, 0) << harmonic << ' ' << detent << ' ' << wave_deg;
+      }
 }
 
 TEST(Rotor, ADetentThatBendsTheRippleIsCogging) {

@@ -1,0 +1,36 @@
+// What turned a rotor far. While the angle between rotor and field is small, a detent of the motor
+// and a field that points elsewhere are both a sine of the motor's angle; where it is large, each
+// bends in its own way, and the templates' few harmonics follow either. So the waves are held
+// against each other as physics has them:
+//   detent:           U sin(lag) = t sin(n (angle - lag) + phase), the rest that is nearest;
+//   unequal gains:    the field goes round an ellipse;
+//   an offset:        round a circle beside the origin, the more so the smaller U is;
+//   the bridge's dead time: the same off the voltage against each phase's current, which turns in
+//                     steps of 60 degrees;
+// with a strength and a phase of each unit, and U the level of the drive.
+// Source of the equilibrium: Hanselman, Brushless Permanent Magnet Motor Design, chapter 4 (cogging
+// torque against mutual torque); of dead time: Holmes and Lipo, Pulse Width Modulation for Power
+// Converters, chapter 3.
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/diagnosis/select.h"
+
+namespace focalfleet::sim {
+
+/// Of each axis the cause of its rotors' waves, where they are large enough to tell; else empty.
+using RotorsToldBy = std::array<std::string_view, 2>;
+
+/// Asks it of the axes that have a term of either. Where the other one it is, the term is exchanged
+/// for a template of that one. `left_out`: causes that may not be named.
+RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit, Selection* selection);
+
+/// Where the rotor comes to rest beside the commanded angle. Unit: degrees, electrical.
+/// `detent`: of the pull-out torque at this drive. `wave_deg`: n times the angle, and a phase.
+double DetentError(double harmonic, double wave_deg, double detent);
+
+}  // namespace focalfleet::sim
