@@ -1,6 +1,7 @@
 #include "sim/diagnosis/beaten.h"
 
 #include <algorithm>
+#include <string_view>
 
 #include "sim/diagnosis/families.h"
 #include "sim/diagnosis/multi_start.h"
@@ -41,8 +42,11 @@ bool IsOwnShape(const Effect& effect, const UnknownFound& told) {
          told.channel.find("against its direction") != std::string::npos;
 }
 
-// Without what is not of the structure: beside a curve for it, such a term explains as much as it
-// does alone, whatever its many amplitudes cost.
+// Ripples of the gears, which come round too fast to be the shape of a curve.
+bool IsRipple(std::string_view cause) { return cause == "stage_ripple" || cause == "tooth_mesh"; }
+
+// Without what is not of the structure: beside a curve for it, a ripple that is there explains as
+// much as it does alone, whatever its many amplitudes cost.
 LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm& curve) {
   constexpr double kOfItsOwn = 0.5, kOfChance = 2;
   Fit without = fit;
@@ -68,7 +72,7 @@ LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm
   };
   LastFirst left;
   for (const std::size_t term : series)
-    if (!is_own(term)) left.push_back(term);
+    if (!IsRipple(fit.model.terms[term].form.effect->cause) || !is_own(term)) left.push_back(term);
   return left;
 }
 

@@ -236,26 +236,17 @@ MixtureFit Mix(const Level& level, double prior_size) {
   return best;
 }
 
-// The units' b, with none where the amplitude cannot be.
-std::vector<double> PossibleB(const Score& score, const Template& form) {
-  std::vector<double> b = score.b;
-  for (std::size_t unit = 0; unit < b.size(); ++unit)
-    if (IsImpossible(form, UnitB(score.b, unit, 1), UnitG(score, unit, 1))) b[unit] = 0;
-  return b;
-}
-
 // Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
 // `price`: of each unit.
 struct ScatterFit {
   double evidence = -std::numeric_limits<double>::infinity();
   double spread = 0;
 };
-ScatterFit Scatter(const Score& score, const std::vector<double>& b, double prior_size,
-                   double dispersion, double price) {
+ScatterFit Scatter(const Score& score, double prior_size, double dispersion, double price) {
   ScatterFit best;
   std::vector<double> terms;
   double most = -std::numeric_limits<double>::infinity();
-  const std::size_t units = b.size();
+  const std::size_t units = score.b.size();
   for (const double relative : {0.01, 0.03, 0.1, 0.3, 1.0, 3.0}) {
     const double spread = relative * prior_size, s2 = spread * spread;
     double weight = 0, mean = 0, sum = 0;
@@ -264,14 +255,14 @@ ScatterFit Scatter(const Score& score, const std::vector<double>& b, double prio
       if (!(g > 0)) continue;
       const double w = g / (1 + s2 * g);
       weight += w;
-      mean += w * b[u] / score.g[u];
+      mean += w * score.b[u] / score.g[u];
     }
     if (!(weight > 0)) return best;
     mean /= weight;
     for (std::size_t u = 0; u < units; ++u) {
       const double g = score.g[u] / dispersion;
       if (!(g > 0)) continue;
-      const double own = b[u] / score.g[u];
+      const double own = score.b[u] / score.g[u];
       sum += -0.5 * std::log1p(s2 * g) + 0.5 * own * own * g -
              0.5 * (own - mean) * (own - mean) * g / (1 + s2 * g) - price;
     }
@@ -400,7 +391,7 @@ Standing Assess(const Score& score, const Template& form, const FleetGroups& gro
     if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
   }
   if (units > 2 && c == 1 && !of_the_whole) {
-    const ScatterFit scatter = Scatter(score, PossibleB(score, form), prior, best.dispersion,
+    const ScatterFit scatter = Scatter(score, prior, best.dispersion,
                                        form.shape_of_unit.empty() ? 0 : std::log(form.choices));
     // Only as a refinement of what is shared by all: a scatter that pays for itself.
     if (scatter.evidence > best.evidence + 3) {

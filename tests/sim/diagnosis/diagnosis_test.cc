@@ -73,16 +73,6 @@ TEST(Diagnosis, APlateThatBendsOneWayForAllIsNamed) {
   EXPECT_EQ(diagnosis.causes[0].cause, "plate_gradient");
 }
 
-// A play of some hundredths of a degree in every unit: stiction of that size could hold a few.
-TEST(Diagnosis, AmplitudesThatCannotBeDoNotScatter) {
-  const Diagnosis diagnosis = Verdicts(
-      Planted({{.cause = "backlash", .amplitude = 0.04, .axis = "phi", .unit_scatter = 0.4}},
-              {.units = 50, .moves = 120, .seed = 3}));
-  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
-  EXPECT_EQ(diagnosis.causes[0].cause, "backlash") << Told(diagnosis);
-  EXPECT_TRUE(diagnosis.causes[0].all_units);
-}
-
 TEST(Diagnosis, WithoutAnOutputStageTheLastPinionSitsOnAStagesCarrier) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
   for (CampaignUnit& unit : campaign.units)
