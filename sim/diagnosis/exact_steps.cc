@@ -283,7 +283,8 @@ Explained ExplainedBy(ChangeKind kind, bool in_order, std::size_t at_most, const
 }  // namespace
 
 std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  constexpr double kLeftMax = 0.2;          // what changes do not explain is something else
+  constexpr double kLeftMax = 0.2;  // what changes do not explain is something else
+  constexpr std::size_t kUnitsForNoise = 4;
   constexpr double kLeftOfAny = 0.05;       // by changes of any size: a drift is not made of steps
   constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
   // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
@@ -305,7 +306,9 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     const bool large = std::ranges::all_of(
         one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
     const double left = before > of_noise ? (one.cost - of_noise) / (before - of_noise) : 1;
-    if (kind == ChangeKind::kBlocked && left > kLeftOfAny) return false;
+    // Noise that the other units tell: of one unit alone it may be the drift itself.
+    const bool others_tell = fit.model.units.size() >= kUnitsForNoise;
+    if (kind == ChangeKind::kBlocked && others_tell && left > kLeftOfAny) return false;
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
            (large && left <= kLeftMax);
   };

@@ -258,7 +258,7 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
 
 void JudgeStrays(const Campaign& campaign, double noise_um, std::vector<CauseFound>* causes,
                  OutliersFound* outliers) {
-  constexpr std::size_t kUnitsMax = 4;
+  constexpr std::size_t kUnitsMax = 4, kOneIn = 5;  // else there are no others to stray from
   constexpr double kFar = 20, kExplains = 0.02;
   std::map<std::uint32_t, double> rows_of;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
@@ -268,7 +268,8 @@ void JudgeStrays(const Campaign& campaign, double noise_um, std::vector<CauseFou
   std::erase_if(*causes, [&](const CauseFound& cause) {
     constexpr std::string_view kStatic[] = {"zero_offset", "base_offset", "arm_length"};
     if (IsFoundElsewhere(cause) && !Has(kStatic, cause.cause)) return false;
-    if (cause.units.empty() || cause.units.size() > kUnitsMax || cause.size_um < kFar * noise_um)
+    if (cause.units.empty() || cause.units.size() > kUnitsMax ||
+        cause.units.size() * kOneIn > campaign.units.size() || cause.size_um < kFar * noise_um)
       return false;
     double rows = 0;
     for (const std::uint32_t unit : cause.units) rows += rows_of[unit];

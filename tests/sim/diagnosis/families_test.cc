@@ -242,9 +242,9 @@ TEST(Families, ABrokenToothShowsInItsUnit) {
 TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
   constexpr double kNoise_um = 3;
   Campaign campaign;
-  campaign.units.resize(2);
-  campaign.units[0].id = 1, campaign.units[1].id = 37;
-  campaign.first_row = {0, 100, 200};
+  campaign.units.resize(6);
+  for (std::uint32_t unit = 0; unit < 6; ++unit) campaign.units[unit].id = 32 + unit;
+  campaign.first_row = {0, 100, 200, 300, 400, 500, 600};
   OutliersFound outliers;
   const auto judged = [&](const char* name, double size_um, double evidence,
                           std::vector<std::uint32_t> units) {
@@ -262,6 +262,7 @@ TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
   EXPECT_EQ(judged("scale_asymmetry", 6000, 1e8, {37}), 1u);
   EXPECT_EQ(judged("scale_asymmetry", 40, 23, {37}), 1u);
   EXPECT_EQ(judged("lost_command", 6000, 25, {37}), 1u);
+  EXPECT_EQ(judged("gear_scale", 6000, 23, {36, 37}), 1u);  // of six
   EXPECT_TRUE(outliers.units.empty());
 }
 
