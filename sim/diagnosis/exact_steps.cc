@@ -47,7 +47,8 @@ struct Change {
   double by_deg[2] = {0, 0};
   double gained = 0;
 };
-enum class ChangeKind { kWholeMove, kSlip, kBlocked };
+// kInOrder: whole moves, each by what comes next rather than by all that is to come.
+enum class ChangeKind { kWholeMove, kInOrder, kSlip, kBlocked };
 
 // How far both axes stand from where they were told to, by the place alone. NaN: it is out of
 // reach.
@@ -110,7 +111,7 @@ std::vector<Change> ChangesIn(const UnitRows& rows, std::size_t move, ChangeKind
   const UnitTrack& track = rows.track;
   const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
   std::vector<Change> changes;
-  if (kind == ChangeKind::kWholeMove) {
+  if (kind == ChangeKind::kWholeMove || kind == ChangeKind::kInOrder) {
     if (std::abs(steps[0]) + std::abs(steps[1]) < kStepMin_deg) return changes;
     for (const double sign : {-1.0, 1.0}) {
       changes.push_back({move, {sign * steps[0], sign * steps[1]}});
@@ -178,6 +179,7 @@ void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
   rows->geometry = FitPlain(plain, table, rows->geometry, kRounds);
 }
 
+// From its move on, until the unit is homed.
 void Take(const Change& change, UnitRows* rows) {
   const std::size_t end = EndOfHistory(rows->track, change.move);
   for (std::size_t i = change.move; i < end; ++i)
@@ -196,17 +198,17 @@ Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, doubl
   const std::size_t end = EndOfHistory(rows.track, at);
   for (std::size_t move = since; move <= at; ++move) {
     if (EndOfHistory(rows.track, move) != end) continue;  // a homing has undone it
-    for (Change& change : ChangesIn(rows, move, ChangeKind::kWholeMove)) {
+    for (const Change& change : ChangesIn(rows, move, ChangeKind::kInOrder)) {
       std::size_t run = 0;
-      double gained = 0;
       for (std::size_t i = at; i < end; ++i) {
         if (!std::isfinite(rows.x_mm[i])) continue;
         if (IsFar(rows, i, change.by_deg, far_mm)) break;
-        ++run, gained += kCap_mm * kCap_mm;
+        ++run;
       }
-      if (run > longest) longest = run, best = change, best.gained = gained;
+      if (run > longest) longest = run, best = change;
     }
   }
+  best.gained = static_cast<double>(longest) * kCap_mm * kCap_mm;  // they were anywhere
   return best;
 }
 
@@ -265,12 +267,13 @@ struct Explained {
   std::size_t far = 0;    // rows that are
 };
 
-Explained ExplainedBy(ChangeKind kind, bool in_order, std::size_t at_most, const Fit& fit,
-                      std::size_t unit, const CampaignUnit& geometry, double far_mm) {
+Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
+                      const CampaignUnit& geometry, double far_mm) {
   const CampaignUnit& table = fit.facts->campaign->units[unit];
   UnitRows rows = RowsOf(fit, unit, geometry);
-  Explained out{.changes = in_order ? FindInOrder(at_most, far_mm, table, &rows)
-                                    : FindChanges(kind, at_most, far_mm, table, &rows),
+  Explained out{.changes = kind == ChangeKind::kInOrder
+                               ? FindInOrder(at_most, far_mm, table, &rows)
+                               : FindChanges(kind, at_most, far_mm, table, &rows),
                 .geometry = rows.geometry};
   out.cost = TotalCost(rows);
   for (std::size_t i = 0; i < rows.track.moves; ++i)
@@ -283,10 +286,10 @@ Explained ExplainedBy(ChangeKind kind, bool in_order, std::size_t at_most, const
 }  // namespace
 
 std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  constexpr double kLeftMax = 0.2;  // what changes do not explain is something else
-  constexpr std::size_t kUnitsForNoise = 4;
-  constexpr double kLeftOfAny = 0.05;       // by changes of any size: a drift is not made of steps
-  constexpr std::size_t kRowsForASlip = 4;  // that were far, at least: slips fit anything
+  constexpr double kLeftMax = 0.2;           // what changes do not explain is something else
+  constexpr double kLeftOfAny = 0.05;        // by changes of any size: a drift is not made of steps
+  constexpr std::size_t kUnitsForNoise = 4;  // of one unit alone noise may be the drift itself
+  constexpr std::size_t kRowsForASlip = 4;   // that were far, at least: slips fit anything
   // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
   const double factor = std::min(fit.noise.unit_factor[unit], 1.5);
   const double far_mm = std::clamp(10e-3 * fit.noise.place_um * factor, 0.04, 0.4);
@@ -306,7 +309,6 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     const bool large = std::ranges::all_of(
         one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
     const double left = before > of_noise ? (one.cost - of_noise) / (before - of_noise) : 1;
-    // Noise that the other units tell: of one unit alone it may be the drift itself.
     const bool others_tell = fit.model.units.size() >= kUnitsForNoise;
     if (kind == ChangeKind::kBlocked && others_tell && left > kLeftOfAny) return false;
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
@@ -314,21 +316,18 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
   };
   std::optional<Explained> best;
   ChangeKind best_kind = ChangeKind::kWholeMove;
-  for (const ChangeKind kind : {ChangeKind::kWholeMove, ChangeKind::kSlip, ChangeKind::kBlocked}) {
+  for (const ChangeKind kind :
+       {ChangeKind::kWholeMove, ChangeKind::kInOrder, ChangeKind::kSlip, ChangeKind::kBlocked}) {
     // What has a size by itself goes before what has any, unless it leaves far more.
     const double far_better = kind == ChangeKind::kBlocked ? 0.5 : 1;
-    const std::size_t at_most =
-        kind == ChangeKind::kWholeMove ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);
-    const auto take = [&](bool in_order, const CampaignUnit& from) {
-      Explained one = ExplainedBy(kind, in_order, at_most, fit, unit, from, far_mm);
-      if (one.changes.empty() || one.cost >= before || !explains(one, kind)) return;
+    const bool is_whole = kind == ChangeKind::kWholeMove || kind == ChangeKind::kInOrder;
+    const std::size_t at_most = is_whole ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);
+    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
+      Explained one = ExplainedBy(kind, at_most, fit, unit, from, far_mm);
+      if (one.changes.empty() || one.cost >= before || !explains(one, kind)) continue;
       const double least = best ? (best_kind == kind ? 1 : far_better) * (best->cost + of_noise)
                                 : std::numeric_limits<double>::infinity();
       if (one.cost + of_noise < least) best = std::move(one), best_kind = kind;
-    };
-    for (const CampaignUnit& from : {fitted, fit.facts->campaign->units[unit]}) {
-      take(false, from);
-      if (kind == ChangeKind::kWholeMove) take(true, from);
     }
   }
   if (!best) return {};

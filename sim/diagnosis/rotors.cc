@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "sim/diagnosis/angle_errors.h"
+#include "sim/diagnosis/chances.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/effects/harmonic.h"
 #include "sim/effects/registry.h"
@@ -152,6 +153,12 @@ std::size_t StrongestOf(const Fit& fit, std::size_t axis, std::vector<double>* s
   return strongest;
 }
 
+// Whether it turns rotors by so much, electrically.
+bool IsFar(const Fit& fit, std::size_t term, double far_deg) {
+  const ModelTerm& of = fit.model.terms[term];
+  return std::abs(Summarise(of).value) * MedianGear(fit.model, AxisIndex(of.form)) >= far_deg;
+}
+
 // The way of a cause that suits best, all units by the same, and its cost.
 struct BestWay {
   const Way* way = nullptr;
@@ -194,8 +201,8 @@ double DispersionOf(const BestWay& a, const BestWay& b, const std::vector<Rotor>
   return std::max(1.0, std::min(a.cost, b.cost) / (kOfNormal * rows));
 }
 
-// The same units with the bent wave of another cause.
-void Exchange(const Way& way, std::size_t at, Fit* fit) {
+// The same units with the bent wave of another cause. False: it has none in these data.
+bool Exchange(const Way& way, std::size_t at, Fit* fit) {
   constexpr int kRounds = 2;
   ModelTerm& term = fit->model.terms[at];
   const EffectAxis axis = term.form.axis;
@@ -205,7 +212,7 @@ void Exchange(const Way& way, std::size_t at, Fit* fit) {
     if (form.axis == axis && form.shape == way.harmonic &&
         (bent == nullptr || form.columns > bent->columns))
       bent = &form;
-  if (bent == nullptr) return;
+  if (bent == nullptr) return false;
   const std::size_t groups = term.groups();
   term.form = *bent;
   term.amplitude.assign(groups * bent->columns, 0);
@@ -213,9 +220,16 @@ void Exchange(const Way& way, std::size_t at, Fit* fit) {
   UpdateResiduals(fit);
   StepFit(fit);
   SettleFit(fit, kRounds);
+  return true;
 }
 
 }  // namespace
+
+double MedianGear(const CampaignModel& model, std::size_t axis) {
+  std::vector<double> gears;
+  for (const CampaignUnit& unit : model.units) gears.push_back(unit.gear[axis]);
+  return Median(std::move(gears));
+}
 
 double DetentError(double harmonic, double wave_deg, double detent) {
   // The lag that is nearest to none: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to
@@ -238,8 +252,9 @@ double DetentError(double harmonic, double wave_deg, double detent) {
 
 RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit,
                           Selection* selection) {
-  constexpr double kFar_deg = 8;   // electrical: less is a sine by either
-  constexpr double kClearly = 20;  // -2 ln L
+  constexpr double kFar_deg = 8;        // electrical: less is a sine by either
+  constexpr double kClearly = 20;       // -2 ln L
+  constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
   RotorsToldBy told;
   if (!fit->facts->Has("drive_amplitude")) return told;
   for (const std::string_view name : {kCogging, kImbalance})
@@ -247,16 +262,15 @@ RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit,
   for (const std::size_t axis : {std::size_t{kTheta}, std::size_t{kPhi}}) {
     std::vector<double> square_um2;
     const std::size_t at = StrongestOf(*fit, axis, &square_um2);
-    if (at == kNoTerm) continue;
+    if (at == kNoTerm || !IsFar(*fit, at, kFar_deg)) continue;
     const std::vector<Rotor> rotors = TakeRotors(*fit, axis, square_um2);
-    const ModelTerm& term = fit->model.terms[at];
-    if (rotors.empty() || std::abs(Summarise(term).value) * rotors[0].gear < kFar_deg) continue;
     const BestWay cogging = BestWayOf(kCogging, rotors), field = BestWayOf(kImbalance, rotors);
-    if (std::abs(cogging.cost - field.cost) < kClearly * DispersionOf(cogging, field, rotors))
+    const double dispersion = DispersionOf(cogging, field, rotors);
+    if (dispersion > kDispersionMax || std::abs(cogging.cost - field.cost) < kClearly * dispersion)
       continue;
     const Way& way = cogging.cost < field.cost ? *cogging.way : *field.way;
+    if (fit->model.terms[at].form.effect->cause != way.cause && !Exchange(way, at, fit)) continue;
     told[axis] = way.cause;
-    if (term.form.effect->cause != way.cause) Exchange(way, at, fit);
     std::erase_if(selection->accepted[at].rivals, [](const Rival& rival) {
       return rival.cause == kCogging || rival.cause == kImbalance;
     });

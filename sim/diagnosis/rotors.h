@@ -7,13 +7,13 @@
 //   an offset:        round a circle beside the origin, the more so the smaller U is;
 //   the bridge's dead time: the same off the voltage against each phase's current, which turns in
 //                     steps of 60 degrees;
-// with a strength and a phase of each unit, and U the level of the drive.
-// Source of the equilibrium: Hanselman, Brushless Permanent Magnet Motor Design, chapter 4 (cogging
-// torque against mutual torque); of dead time: Holmes and Lipo, Pulse Width Modulation for Power
-// Converters, chapter 3.
+// with a strength and a phase of each unit, and U the level of the drive. A rotor in its field is
+// pulled back by the sine of the angle between them (load_angle.h); the field is the sum of what
+// the three phases make.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,8 +26,12 @@ namespace focalfleet::sim {
 using RotorsToldBy = std::array<std::string_view, 2>;
 
 /// Asks it of the axes that have a term of either. Where the other one it is, the term is exchanged
-/// for a template of that one. `left_out`: causes that may not be named.
+/// for a template of that one. What is far from either is left as it is. `left_out`: causes that
+/// may not be named.
 RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit, Selection* selection);
+
+/// Turns of the motor per turn of the axis, of the units in the middle. Pre: there are units.
+double MedianGear(const CampaignModel& model, std::size_t axis);
 
 /// Where the rotor comes to rest beside the commanded angle. Unit: degrees, electrical.
 /// `detent`: of the pull-out torque at this drive. `wave_deg`: n times the angle, and a phase.

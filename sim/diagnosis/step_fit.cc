@@ -234,8 +234,8 @@ double CountParameters(const Fit& fit) {
   double parameters = 2 * static_cast<double>(MovesWithEvents(fit.model));
   constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
   parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
-  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
-    if (fit.model.homing_zero_deg[kTheta].empty()) break;
+  const std::size_t freed = fit.model.homing_zero_deg[kTheta].empty() ? 0 : fit.model.units.size();
+  for (std::size_t unit = 0; unit < freed; ++unit) {
     // One zero of each axis is the geometry's.
     const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
     const auto homings = static_cast<double>(FreeHomingsOf(fit.model, track).size());

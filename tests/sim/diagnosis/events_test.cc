@@ -297,8 +297,7 @@ std::size_t MoveOfAll(const Campaign& campaign, std::vector<std::size_t> units, 
 }
 
 TEST(Events, ACommandOfOneAxisMayBeLost) {
-  Campaign campaign =
-      Planted({}, {.moves = 80, .seed = std::getenv("SEED") ? std::stoul(std::getenv("SEED")) : 6});
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
   constexpr std::size_t kUnit = 7;
   const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
   ASSERT_NE(move, 0u);
@@ -331,8 +330,7 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
 }
 
 TEST(Events, AUnitThatStopsShortAloneIsUnknown) {
-  Campaign campaign =
-      Planted({}, {.moves = 80, .seed = std::getenv("SEED") ? std::stoul(std::getenv("SEED")) : 6});
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
   constexpr std::size_t kUnit = 3;
   const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
   ASSERT_NE(move, 0u);

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "sim/diagnosis/rotors.h"
+#include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -120,6 +121,39 @@ TEST(Rotor, ADetentHoldsItWhereTheFieldDoes) {
 TEST(Rotor, ADetentThatBendsTheRippleIsCogging) {
   for (const double detent : {0.3, 0.5})
     ExpectNamed("cogging", std::bind_front(DetentLag, detent, 2.0), 3);
+}
+
+// `noise_share`: of the noise that there is, what the fit believes.
+std::string_view SettledBy(const Turned& turned, double noise_share) {
+  const Campaign campaign = RotorsTurned(turned, 3);
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = StaticFit(facts);
+  const Templates forms = ListTemplates(*FindEffect("phase_imbalance"), facts);
+  const auto form = std::ranges::find_if(forms, [](const Template& one) {
+    return one.axis == EffectAxis::kTheta && one.shape == 2 && one.columns == 6;
+  });
+  ModelTerm term{.form = *form, .sharing = Sharing::kUnit};
+  term.group_of_unit.resize(campaign.units.size());
+  std::iota(term.group_of_unit.begin(), term.group_of_unit.end(), 0u);
+  term.amplitude.assign(form->columns * campaign.units.size(), 0);
+  term.sigma = term.amplitude;
+  fit.model.terms.push_back(term);
+  StepFit(&fit);
+  SettleFit(&fit, 3);
+  fit.noise.place_um *= noise_share;
+  for (const std::size_t axis : {kTheta, kPhi})
+    fit.noise.angle_deg[axis] *= noise_share, fit.noise.rest_deg[axis] *= noise_share;
+  Selection selection;
+  selection.accepted.resize(1);
+  const RotorsToldBy told = SettleRotors({}, &fit, &selection);
+  EXPECT_TRUE(told[kTheta].empty() || told[kTheta] == fit.model.terms[0].form.effect->cause);
+  return told[kTheta];
+}
+
+TEST(Rotor, WhatIsFarFromEitherWaveIsNeithers) {
+  const Turned turned = std::bind_front(DetentLag, 0.5, 2.0);
+  EXPECT_EQ(SettledBy(turned, 1), "cogging");
+  EXPECT_EQ(SettledBy(turned, 0.3), "");
 }
 
 TEST(Rotor, AFieldThatTurnsInAnEllipseIsPhaseImbalance) {
