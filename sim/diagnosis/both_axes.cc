@@ -52,10 +52,12 @@ PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, cons
   SettleFit(&trial.fit, kRounds);
   trial.behind = BetterBy(fit, trial.fit);
   // What it explains more at no price, and what chance gives to the parameters that it has more.
-  constexpr double kSigmas = 3;
+  constexpr double kSigmas = 3, kNoiseOfNoise = 1.2;  // of many, as of each: tails are heavy
+  constexpr double kFew = 2;
   const double more = std::max(CountParameters(trial.fit) - CountParameters(fit), 0.0);
   const double explains = PriceOf(trial.fit) - PriceOf(fit) - trial.behind;
-  trial.beyond_chance = explains > more + kSigmas * std::sqrt(2 * more);
+  trial.beyond_chance = explains > kNoiseOfNoise * (more + kSigmas * std::sqrt(2 * more));
+  trial.behind_by_likelihood = more <= kFew ? -explains : trial.behind;
   return trial;
 }
 

@@ -19,6 +19,9 @@ struct PairTrial {
   double behind = 0;  // twice the difference of the logarithms of likelihood, at their price
   /// Whether it explains more than chance gives to as many amplitudes as it has more.
   bool beyond_chance = false;
+  /// The same as `behind` at no price, where the pair has few amplitudes more: that there are two
+  /// of them decides nothing.
+  double behind_by_likelihood = 0;
   Fit fit;
 };
 

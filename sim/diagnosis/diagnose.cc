@@ -300,14 +300,14 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
     cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
     if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
   }
-  JudgeStrays(*fit.facts->campaign, fit.noise.typical_um, &causes, &diagnosis->outliers);
+  JudgeStrays(fit, &causes, &diagnosis->outliers);
   MergeCauses(&causes);
   // Where the image's motion follows a column, steps of it are what is left of that.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
                   [](const UnknownFound& told) { return told.channel == kImageShift; }))
     std::erase_if(causes,
                   [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
-  JudgeRemainders(&causes);
+  JudgeRemainders(fit.model.units.size(), &causes);
   std::vector<UnknownFound> nameless;
   JudgeNames(&causes, &nameless);
   for (UnknownFound& one : nameless)
@@ -406,7 +406,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
   DropNeedlessSteps(&fit);
   AskStepsInstead(fit, &selection);
-  const RotorsToldBy rotors = SettleRotors(options.leave_out, &fit, &selection);
+  const RotorsToldBy rotors = SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
   AskWithoutRemainders(templates, rule, fit, &diagnosis.causes);

@@ -236,9 +236,8 @@ bool HasMet(const Fit& fit, const EventTerm& event) {
 }
 
 bool AnyHasMet(const Fit& fit) {
-  return std::ranges::any_of(fit.model.events, [&](const EventTerm& event) {
-    return KindOf(fit, event) == StepKind::kBlocked && HasMet(fit, event);
-  });
+  return std::ranges::any_of(fit.model.events,
+                             [&](const EventTerm& event) { return IsOfContact(fit, event); });
 }
 
 double SizeOf_um(const Fit& fit, const EventTerm& event) {
@@ -274,6 +273,10 @@ CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view parag
 }
 
 }  // namespace
+
+bool IsOfContact(const Fit& fit, const EventTerm& event) {
+  return KindOf(fit, event) == StepKind::kBlocked && HasMet(fit, event);
+}
 
 std::vector<CauseFound> EventCauses(const Fit& fit) {
   struct Named {

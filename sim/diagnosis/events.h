@@ -21,6 +21,9 @@ inline constexpr std::string_view kEvents = "events";
 /// Adds the steps that stand out from the residuals to the model. Returns how many.
 std::size_t AddEvents(Fit* fit);
 
+/// Whether it stopped short in a move in which a neighbour did so, too.
+bool IsOfContact(const Fit& fit, const EventTerm& event);
+
 /// The model's steps by their causes.
 std::vector<CauseFound> EventCauses(const Fit& fit);
 

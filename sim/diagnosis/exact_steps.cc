@@ -16,6 +16,7 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::size_t kEventsMax = 40;  // of a unit at once
 constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
+constexpr double kRowsWorth = 3;        // far ones, that a change puts right at least
 constexpr double kCap_mm = 0.5;         // what an outlier costs at most
 
 // One unit's rows, and what has been added to each angle so far.
@@ -208,7 +209,14 @@ Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, doubl
       if (run > longest) longest = run, best = change;
     }
   }
-  best.gained = static_cast<double>(longest) * kCap_mm * kCap_mm;  // they were anywhere
+  std::size_t left = longest;
+  for (std::size_t i = at; left > 0; ++i) {
+    if (!std::isfinite(rows.x_mm[i])) continue;
+    best.gained += RowCost(rows, i, rows.added_deg[kTheta][i], rows.added_deg[kPhi][i]) -
+                   RowCost(rows, i, rows.added_deg[kTheta][i] + best.by_deg[kTheta],
+                           rows.added_deg[kPhi][i] + best.by_deg[kPhi]);
+    --left;
+  }
   return best;
 }
 
@@ -217,13 +225,14 @@ Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, doubl
 std::vector<Change> FindInOrder(std::size_t at_most, double far_mm, const CampaignUnit& table,
                                 UnitRows* rows) {
   constexpr double kNothing[2] = {0, 0};
+  const double gain_min = kRowsWorth * far_mm * far_mm;
   std::vector<Change> found;
   std::size_t since = 0;  // after the last row that stood where it should
   for (std::size_t i = 0; i < rows->track.moves && found.size() < at_most; ++i) {
     if (!std::isfinite(rows->x_mm[i])) continue;
     if (IsFar(*rows, i, kNothing, far_mm)) {
       const Change best = LongestRun(*rows, since, i, far_mm);
-      if (best.gained <= 0) continue;  // somewhere else for this once
+      if (best.gained < gain_min) continue;  // somewhere else for this once
       Take(best, rows);
       found.push_back(best);
     }
@@ -236,7 +245,7 @@ std::vector<Change> FindInOrder(std::size_t at_most, double far_mm, const Campai
 // Changes that explain the rows, from one geometry to begin at.
 std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
                                 const CampaignUnit& table, UnitRows* rows) {
-  const double gain_min = 3 * far_mm * far_mm;  // some rows' worth
+  const double gain_min = kRowsWorth * far_mm * far_mm;
   std::vector<Change> found;
   while (found.size() < at_most) {
     const Change best = BestChange(*rows, kind, gain_min);

@@ -55,14 +55,30 @@ bool IsCandidate(const CauseFound& cause, std::string_view name) {
          cause.candidates.end();
 }
 
-// Some units have it, and nearly all of these have the other, too: hardly by accident.
-bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause) {
-  constexpr double kNearlyAll = 0.8;
+// P(at least `hits` of `tries`), each by `share`.
+double BinomialTail(std::size_t hits, std::size_t tries, double share) {
+  double tail = 0;
+  const auto n = static_cast<double>(tries);
+  for (std::size_t at = hits; at <= tries; ++at) {
+    const auto k = static_cast<double>(at);
+    tail += std::exp(std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1)) *
+            std::pow(share, k) * std::pow(1 - share, n - k);
+  }
+  return tail;
+}
+
+// Some units have it, and nearly all of these have the other, too: hardly by accident, unless
+// nearly all units have the other.
+bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause, std::size_t units) {
+  constexpr double kNearlyAll = 0.8, kByAccident = 0.3;
   if (cause.all_units || other.all_units) return false;
-  const auto both = std::ranges::count_if(cause.units, [&](std::uint32_t unit) {
-    return std::ranges::find(other.units, unit) != other.units.end();
-  });
-  return static_cast<double>(both) >= kNearlyAll * static_cast<double>(cause.units.size());
+  const auto both =
+      static_cast<std::size_t>(std::ranges::count_if(cause.units, [&](std::uint32_t unit) {
+        return std::ranges::find(other.units, unit) != other.units.end();
+      }));
+  const double share = static_cast<double>(other.units.size()) / static_cast<double>(units);
+  return static_cast<double>(both) >= kNearlyAll * static_cast<double>(cause.units.size()) &&
+         BinomialTail(both, cause.units.size(), std::min(share, 1.0)) < kByAccident;
 }
 
 // What the units of `other` contribute to the cause's evidence.
@@ -96,18 +112,22 @@ bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
 // An image that moves by far more leaves as much where it is not quite a similarity, and units' own
 // amplitudes take it.
 bool MayBeOfTheCamera(const CauseFound& camera, const CauseFound& cause) {
-  constexpr double kOfCamera = 0.05;  // size
+  constexpr double kOfSize = 0.05, kOfEvidence = 0.1;
   return camera.cause == "camera_similarity" && cause.axis != "none" && cause.scope == "unit" &&
-         cause.size_um < kOfCamera * camera.size_um;
+         cause.size_um < kOfSize * camera.size_um &&
+         cause.delta_log_likelihood < kOfEvidence * camera.delta_log_likelihood;
 }
 
 // A tooth breaks in a unit, and shows there. The same one in many units, hardly seen in any, is no
 // tooth.
 bool IsFaintInMany(const CauseFound& cause) {
   constexpr std::size_t kMany = 5;
-  constexpr double kEach = 4;  // ln L of a unit
+  constexpr double kMean = 4, kMost = 10;  // ln L of a unit
+  const auto most = std::ranges::max_element(cause.evidence_of_unit, {},
+                                             [](const auto& of_unit) { return of_unit.second; });
   return cause.cause == "tooth_damage" && !cause.all_units && cause.units.size() >= kMany &&
-         cause.delta_log_likelihood < kEach * static_cast<double>(cause.units.size());
+         cause.delta_log_likelihood < kMean * static_cast<double>(cause.units.size()) &&
+         (most == cause.evidence_of_unit.end() || most->second < kMost);
 }
 
 }  // namespace
@@ -170,7 +190,7 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
   return most != causes->end() && left.size_um < leaves_um(*most) ? &*most : nullptr;
 }
 
-void JudgeRemainders(std::vector<CauseFound>* causes) {
+void JudgeRemainders(std::size_t units, std::vector<CauseFound>* causes) {
   // Of the stronger one's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
   // The same in the weak one's units, which are where it happens to be largest.
@@ -197,8 +217,8 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
                          AxesMeet(other.axis, cause.axis) &&
                          (other.axis != "none" || cause.axis == "none");
       const bool of_air = IsOfTheAir(other, cause);
-      if (!related && !faint && !of_air && !MayBeOfTheCamera(other, cause) &&
-          !(share < kSameUnits && IsAmongUnitsOf(other, cause)))
+      if (!related && !faint && !of_air &&
+          !(share < kSameUnits && IsAmongUnitsOf(other, cause, units)))
         continue;
       relative = &other;
       of_its_shape = faint || of_air || (related && shape);
@@ -212,6 +232,11 @@ void JudgeRemainders(std::vector<CauseFound>* causes) {
           relative = &other, of_its_shape = true;
           break;
         }
+    if (relative == nullptr)
+      if (const auto camera = std::ranges::find_if(
+              kept, [&](const CauseFound& other) { return MayBeOfTheCamera(other, cause); });
+          camera != kept.end())
+        relative = &*camera;
     if (relative == nullptr) {
       kept.push_back(std::move(cause));
       continue;
@@ -234,16 +259,17 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
   const double strongest = causes->front().delta_log_likelihood;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
+    const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
+    const std::string column = of_an_axis ? cause.axis + "_cmd_deg" : "t_s";
     if (IsFaintInMany(cause)) {
-      unknown->push_back({cause.axis + "_cmd_deg",
+      unknown->push_back({column,
                           cause.axis + ": a little of " + cause.cause + " in " +
                               std::to_string(cause.units.size()) + " units",
                           std::exp(-cause.delta_log_likelihood), cause.size_um});
     } else if (cause.candidates.size() < kAnything) {
       kept.push_back(std::move(cause));
     } else if (cause.delta_log_likelihood >= kRemainder * strongest) {
-      const bool of_an_axis = cause.axis == "theta" || cause.axis == "phi";
-      unknown->push_back({of_an_axis ? cause.axis + "_cmd_deg" : "t_s",
+      unknown->push_back({column,
                           (of_an_axis ? cause.axis + ": what " : "what ") +
                               std::to_string(cause.candidates.size()) + " causes could be",
                           std::exp(-cause.delta_log_likelihood), cause.size_um});
@@ -252,25 +278,33 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
   *causes = std::move(kept);
 }
 
-void JudgeStrays(const Campaign& campaign, double noise_um, std::vector<CauseFound>* causes,
-                 OutliersFound* outliers) {
+void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers) {
   constexpr std::size_t kUnitsMax = 4, kOneIn = 5;  // else there are no others to stray from
-  constexpr double kFar = 20, kExplains = 0.02;
-  std::map<std::uint32_t, double> rows_of;
+  constexpr double kFar = 20, kLeft = 0.3;          // of noise; of the cause's size
+  const Campaign& campaign = *fit.facts->campaign;
+  std::map<std::uint32_t, std::size_t> index_of;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
-    rows_of[campaign.units[unit].id] =
-        static_cast<double>(campaign.first_row[unit + 1] - campaign.first_row[unit]);
+    index_of[campaign.units[unit].id] = unit;
+  // Of the unit's rows, in the middle.
+  const auto left_um = [&](std::uint32_t id) {
+    std::vector<double> left;
+    const std::size_t unit = index_of.at(id);
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      if (fit.aside[row] == 0 && std::isfinite(fit.x_um[row]))
+        left.push_back(std::hypot(fit.x_um[row], fit.y_um[row]));
+    return left.empty() ? 0 : Median(std::move(left));
+  };
   std::set<std::uint32_t> strays;
   std::erase_if(*causes, [&](const CauseFound& cause) {
     constexpr std::string_view kStatic[] = {"zero_offset", "base_offset", "arm_length"};
     if (IsFoundElsewhere(cause) && !Has(kStatic, cause.cause)) return false;
-    if (cause.units.empty() || cause.units.size() > kUnitsMax ||
-        cause.units.size() * kOneIn > campaign.units.size() || cause.size_um < kFar * noise_um)
+    if (cause.scope != "unit" || cause.units.empty() || cause.units.size() > kUnitsMax ||
+        cause.units.size() * kOneIn > campaign.units.size() ||
+        cause.size_um < kFar * fit.noise.typical_um)
       return false;
-    double rows = 0;
-    for (const std::uint32_t unit : cause.units) rows += rows_of[unit];
-    const double moves_by = cause.size_um / noise_um;  // d ln L of a row that it puts right
-    if (cause.delta_log_likelihood >= kExplains * rows * moves_by * moves_by / 2) return false;
+    if (!std::ranges::all_of(cause.units,
+                             [&](std::uint32_t id) { return left_um(id) > kLeft * cause.size_um; }))
+      return false;
     strays.insert(cause.units.begin(), cause.units.end());
     return true;
   });
@@ -330,7 +364,8 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
     const auto stronger = std::ranges::find_if(kept, [&](const CauseFound& other) {
       return cause.cause != other.cause && Has(kPair, cause.cause) && Has(kPair, other.cause) &&
              AxesMeet(cause.axis, other.axis) &&
-             (IsCandidate(cause, other.cause) || is_told_by(cause, other.cause)) &&
+             (IsCandidate(cause, other.cause) ||
+              (is_told_by(cause, other.cause) && std::isfinite(ShareBeside(other, cause)))) &&
              cause.delta_log_likelihood < kSecond * other.delta_log_likelihood;
     });
     if (stronger == kept.end())
@@ -363,6 +398,8 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
 }
 
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
+  // Slow waves of an angle, as what follows it may have.
+  constexpr std::string_view kOfFollowed[] = {"eccentricity", "axis_tilt", "axis_crosstalk"};
   for (UnknownFound& left : *unknown) {
     const std::string axis = left.channel.starts_with("theta") ? "theta"
                              : left.channel.starts_with("phi") ? "phi"
@@ -374,7 +411,7 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
                                                                     : "";
     std::erase_if(*causes, [&](const CauseFound& cause) {
       const bool meets =
-          cause.axis == axis || (cause.axis == followed && Has(kAngles, cause.cause));
+          cause.axis == axis || (cause.axis == followed && Has(kOfFollowed, cause.cause));
       if (!meets || IsFoundElsewhere(cause) ||
           cause.delta_log_likelihood >= left.delta_log_likelihood)
         return false;

@@ -38,12 +38,12 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
 /// strong one have. It gets the strong one as a candidate. What is faint, in ln L or beside a cause
 /// of an axis, and less than that one's shape can leave is told so. Pre: strongest first.
-void JudgeRemainders(std::vector<CauseFound>* causes);
+/// `units`: of the campaign.
+void JudgeRemainders(std::size_t units, std::vector<CauseFound>* causes);
 
-/// Single units that a cause moves by far more than noise, and explains next to none of their rows
-/// for it, do what no cause does: they are outliers. `noise_um`: of a measured place.
-void JudgeStrays(const Campaign& campaign, double noise_um, std::vector<CauseFound>* causes,
-                 OutliersFound* outliers);
+/// Single units that a cause moves by far more than noise, and whose rows it leaves nearly as far
+/// off, do what no cause does: they are outliers.
+void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers);
 
 /// A unit that would need three causes of its own or more behaves like none of them: it is named as
 /// a unit, among the outliers, and what it does is unknown.

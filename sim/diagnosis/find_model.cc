@@ -57,8 +57,11 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
   if (has_terms) TryImageFirst(templates, options, rule, fit, &image, &selection);
   tell_homings();
   if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
-  if (image.cause && !IsLeftOut(options, image.cause->cause))
+  if (image.cause && !IsLeftOut(options, image.cause->cause)) {
+    std::erase_if(image.cause->candidates,
+                  [&](const std::string& name) { return IsLeftOut(options, name); });
     diagnosis->causes.push_back(std::move(*image.cause));
+  }
   AddDriftAsRival(image.drift_um, *fit, &selection);
   return selection;
 }

@@ -92,14 +92,14 @@ double NeighboursAgree(const Fit& fit, double* size_um) {
   return sum / std::sqrt(variance);
 }
 
-CauseFound ImageCause(const Fit& fit, double chi_square, double size_um) {
+CauseFound ImageCause(double chi_square, double size_um, std::size_t exposures) {
   CauseFound cause = CauseNamed(kCameraSimilarity);
   cause.axis = "none";
   cause.scope = "camera";
   cause.all_units = true;
   cause.amplitude = size_um;
   cause.amplitude_unit = "um";
-  const double sigma = size_um / std::sqrt(2 * static_cast<double>(fit.model.exposures.size()));
+  const double sigma = size_um / std::sqrt(2 * static_cast<double>(exposures));
   cause.ci95[0] = size_um - 1.96 * sigma, cause.ci95[1] = size_um + 1.96 * sigma;
   cause.size_um = size_um;
   cause.delta_log_likelihood = chi_square / 2;
@@ -112,8 +112,10 @@ CauseFound ImageCause(const Fit& fit, double chi_square, double size_um) {
 
 // ---- does the image move with something that the table knows?
 
-// Mean of a column at each exposure; empty where units differ, or where it does not vary.
-std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& column) {
+// Mean of a column at each exposure that was seen; empty where units differ, or where it does not
+// vary.
+std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& column,
+                                const std::vector<std::size_t>& seen) {
   constexpr double kOwnShareMax = 0.1;  // of the variance: what units have of their own
   const std::size_t exposures = facts.exposures.size();
   std::vector<double> mean(exposures, 0), count(exposures, 0);
@@ -128,8 +130,10 @@ std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& 
     mean[e] /= std::max(count[e], 1.0);
     between += count[e] * (mean[e] - column.mean) * (mean[e] - column.mean);
   }
-  if (!(square > 0) || between < (1 - kOwnShareMax) * square) mean.clear();
-  return mean;
+  if (!(square > 0) || between < (1 - kOwnShareMax) * square) return {};
+  std::vector<double> of_seen;
+  for (const std::size_t e : seen) of_seen.push_back(mean[e]);
+  return of_seen;
 }
 
 // Share of the shifts' variance that curves over the ranks of `values` take, or with `by_value` the
@@ -202,19 +206,20 @@ double ShareOfStep(const std::vector<Vector4>& shifts) {
 }
 
 // The column that the image's shifts follow best, if it is no chance and more than time does.
-// `signal`: share of the shifts' variance that is no noise.
+// `shifts`: of the exposures `seen`. `signal`: share of their variance that is no noise.
 std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
+                                           const std::vector<std::size_t>& seen,
                                            const std::vector<Vector4>& shifts, double signal,
                                            double size_um) {
   constexpr int kCurves = 3, kTimeCurves = 6;
   constexpr double kShareMin = 0.25;  // of the signal
   constexpr double kSineMin = 0.85;   // a wandering image has less of one sine
   constexpr double kClearly = 15;
-  const std::size_t exposures = facts.exposures.size();
+  const std::size_t exposures = seen.size();
   if (exposures < 20) return std::nullopt;
-  std::vector<double> order(exposures), parity(exposures);
-  for (std::size_t e = 0; e < exposures; ++e)
-    order[e] = static_cast<double>(e), parity[e] = static_cast<double>(e % 2);
+  std::vector<double> order, parity;
+  for (const std::size_t e : seen)
+    order.push_back(static_cast<double>(e)), parity.push_back(static_cast<double>(e % 2));
   const double by_time =
       EvidenceOf(ShareTaken(shifts, order, kTimeCurves, false), kTimeCurves, exposures);
   std::optional<UnknownFound> best;
@@ -232,12 +237,12 @@ std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
   look("move parity", parity, 1);
   for (const auto& [name, column] : facts.columns) {
     if (!column.varies() || name == kOrder || name == "t_s" || name.starts_with("pixel_")) continue;
-    const std::vector<double> values = OfExposures(facts, column);
+    const std::vector<double> values = OfExposures(facts, column, seen);
     if (!values.empty()) look(name, values, kCurves);
   }
   if (best) return best;
   const FilledColumn* clock = facts.Find("t_s");
-  const std::vector<double> time = clock == nullptr ? order : OfExposures(facts, *clock);
+  const std::vector<double> time = clock == nullptr ? order : OfExposures(facts, *clock, seen);
   const double sine = ShareOfSine(shifts, time.empty() ? order : time);
   if (sine > kSineMin * signal &&
       EvidenceOf(sine, 3, exposures) > std::max(by_step, 0.0) + kClearly)
@@ -260,13 +265,19 @@ double Carryover(const std::vector<Vector4>& shifts) {
 
 // Shift, turn and scale of each image, um at the plate's edge, and what they explain.
 struct Motion {
-  std::vector<Vector4> found;  // Shape: (exposures)
+  std::vector<Vector4> found;     // Shape: (exposures); 0 where none was seen
+  std::vector<std::size_t> seen;  // exposures
   double chi_square = 0, dof = 0;
   double left = 0, left_dof = 0;                              // of the residuals beside it
   Vector4 square = Vector4::Zero(), noise = Vector4::Zero();  // summed over exposures
   /// Share of what was found of each that is no noise: shifts may be large and turns nothing.
   [[nodiscard]] Vector4 Kept() const {
     return (1 - noise.array() / square.array().max(1e-12)).max(0.0).min(1.0);
+  }
+  [[nodiscard]] std::vector<Vector4> OfSeen() const {
+    std::vector<Vector4> of_seen;
+    for (const std::size_t e : seen) of_seen.push_back(found[e]);
+    return of_seen;
   }
 };
 
@@ -276,6 +287,7 @@ Motion FindMotion(const Fit& fit) {
   motion.found.assign(images.size(), Vector4::Zero());
   for (std::size_t e = 0; e < images.size(); ++e) {
     if (images[e].rows < 6) continue;
+    motion.seen.push_back(e);
     const Matrix4 normal = images[e].normal.topLeftCorner<4, 4>();
     const Matrix4 covariance = normal.ldlt().solve(Matrix4::Identity());
     motion.found[e] = covariance * images[e].right.head<4>();
@@ -345,6 +357,18 @@ Deformation FindDeformation(const Fit& fit) {
   return {power(2), power(4), Carryover(shears) < kRemembers};
 }
 
+// Scale that goes on from exposure to exposure, and next to nothing else: plate or camera, who
+// knows.
+bool OnlyGrows(const Motion& motion) {
+  constexpr double kMore = 2;
+  const Vector4 power = (motion.square - motion.noise).cwiseMax(0.0);
+  // In um at the edge, of which the fibres have half the square.
+  if (0.5 * power[3] < kMore * (power[0] + power[1] + 0.5 * power[2])) return false;
+  std::vector<Vector4> scales;
+  for (const Vector4& shift : motion.OfSeen()) scales.push_back({shift[3], 0, 0, 0});
+  return Carryover(scales) >= kRemembers;
+}
+
 bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
 
 // Steps of the whole image were a first guess at its motion.
@@ -384,7 +408,7 @@ Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
     square += v[0] * v[0] + v[1] * v[1] + 0.5 * (v[2] * v[2] + v[3] * v[3]);
     whole.square += whole.found[e].cwiseAbs2();
   }
-  *size_um = std::sqrt(square / static_cast<double>(exposures));
+  *size_um = std::sqrt(square / static_cast<double>(std::max(whole.seen.size(), std::size_t{1})));
   return whole;
 }
 
@@ -404,7 +428,7 @@ bool HidesAColumn(const Fit& fit, double family_wise) {
   const Motion motion = FindMotion(bare);
   if (!MovesForSure(motion, family_wise)) return false;
   const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
-  return FollowedColumn(*fit.facts, motion.found, signal, 1).has_value();
+  return FollowedColumn(*fit.facts, motion.seen, motion.OfSeen(), signal, 1).has_value();
 }
 
 }  // namespace
@@ -427,18 +451,21 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   double size_um = 0;
   motion = TakeMotion(std::move(motion), fit, &size_um);
   const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
-  image.followed = FollowedColumn(*fit->facts, motion.found, signal, size_um);
+  const std::vector<Vector4> shifts = motion.OfSeen();
+  image.followed = FollowedColumn(*fit->facts, motion.seen, shifts, signal, size_um);
   // With the whole motion taken no column shows: it was one step after all.
   if (one_step_alone && !image.followed) {
     *fit = with_step;
     return {};
   }
   const double after = NeighboursAgree(*fit, &turbulence_um);
-  const bool goes_on = Carryover(motion.found) >= kRemembers;
+  const bool goes_on = Carryover(shifts) >= kRemembers;
   if (goes_on) image.drift_um = size_um;
-  CauseFound cause = ImageCause(*fit, motion.chi_square, std::max(size_um, turbulence_um));
+  CauseFound cause =
+      ImageCause(motion.chi_square, std::max(size_um, turbulence_um), motion.seen.size());
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
   if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back("air_turbulence");
+  if (OnlyGrows(motion)) cause.candidates.emplace_back("plate_expansion");
   if (after > kNeighboursAgree || deformed.IsAir()) {
     cause.cause = "air_turbulence";
     cause.candidates = {cause.cause};

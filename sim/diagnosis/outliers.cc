@@ -178,6 +178,7 @@ std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
       found->units.push_back(campaign.units[unit].id);
   }
   std::sort(found->units.begin(), found->units.end());
+  found->units.erase(std::unique(found->units.begin(), found->units.end()), found->units.end());
   return far_rows;
 }
 

@@ -78,12 +78,13 @@ Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
     moved[i] = last;
   }
   Rotor rotor{.gear = track.unit->gear[axis]};
+  const double noise_deg = std::hypot(fit.noise.angle_deg[axis], fit.noise.rest_deg[axis]);
+  const double factor = std::max(fit.noise.unit_factor[unit], 1.0);
   for (const AngleRow& row : AngleErrors(fit, track, axis)) {
     const std::size_t at = moved[row.move];
     if (at == kNever) continue;
-    const double noise_deg = std::hypot(fit.noise.angle_deg[axis], fit.noise.rest_deg[axis]);
     rotor.rows.push_back(
-        {row.error_deg, std::hypot(row.sigma_deg(1e-3 * fit.noise.place_um), noise_deg),
+        {row.error_deg, factor * std::hypot(row.sigma_deg(1e-3 * fit.noise.place_um), noise_deg),
          360 * HarmonicPhase(track, axis, at, rotor.gear), std::max(drive[at], kDriveLeast)});
   }
   return rotor;
@@ -164,13 +165,19 @@ struct BestWay {
   const Way* way = nullptr;
   double cost = std::numeric_limits<double>::infinity();
 };
-BestWay BestWayOf(std::string_view cause, const std::vector<Rotor>& rotors) {
+BestWay BestWayOf(std::string_view cause, const std::vector<Rotor>& rotors,
+                  const ParallelFor& parallel) {
+  const std::size_t count = rotors.size();
+  std::vector<double> cost(std::size(kWays) * count);
+  parallel(cost.size(), [&](std::size_t k) {
+    if (kWays[k / count].cause == cause) cost[k] = LeastCost(rotors[k % count], kWays[k / count]);
+  });
   BestWay best;
-  for (const Way& way : kWays) {
-    if (way.cause != cause) continue;
-    double cost = 0;
-    for (const Rotor& rotor : rotors) cost += LeastCost(rotor, way);
-    if (cost < best.cost) best = {&way, cost};
+  for (std::size_t k = 0; k < std::size(kWays); ++k) {
+    if (kWays[k].cause != cause) continue;
+    const auto from = cost.begin() + static_cast<std::ptrdiff_t>(k * count);
+    const double sum = std::accumulate(from, from + static_cast<std::ptrdiff_t>(count), 0.0);
+    if (sum < best.cost) best = {&kWays[k], sum};
   }
   return best;
 }
@@ -193,19 +200,41 @@ std::vector<Rotor> TakeRotors(const Fit& fit, std::size_t axis,
   return rotors;
 }
 
-// How much more than noise the better way leaves.
-double DispersionOf(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
-  constexpr double kOfNormal = 1.15;  // mean of 2 MinusLogDensity of a normal number's square
+// Whether one way is better for sure: beyond chance, and by more than half of what it leaves itself
+// above noise, for that is no scatter but a misfit.
+bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
+  constexpr double kOfNormal = 1.15;    // mean of 2 MinusLogDensity of a normal number's square
+  constexpr double kClearly = 20;       // -2 ln L
+  constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
+  constexpr double kOfMisfit = 0.5;
   double rows = 0;
   for (const Rotor& rotor : rotors) rows += static_cast<double>(rotor.rows.size());
-  return std::max(1.0, std::min(a.cost, b.cost) / (kOfNormal * rows));
+  const double of_noise = kOfNormal * rows, least = std::min(a.cost, b.cost);
+  const double dispersion = std::max(1.0, least / of_noise);
+  const double misfit = std::max(least - of_noise, 0.0);
+  return dispersion <= kDispersionMax &&
+         std::abs(a.cost - b.cost) >= std::max(kClearly * dispersion, kOfMisfit * misfit);
 }
 
-// The same units with the bent wave of another cause. False: it has none in these data.
-bool Exchange(const Way& way, std::size_t at, Fit* fit) {
+// Beside the term at `at` the axis' other waves of either cause go: they are what its shape left.
+// Returns where the term is then.
+std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
+  const std::size_t axis = AxisIndex(fit->model.terms[at].form);
+  for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
+    if (t == at || !IsOfRotor(fit->model.terms[t], axis)) continue;
+    fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    selection->accepted.erase(selection->accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    if (t < at) --at;
+  }
+  return at;
+}
+
+// The same units with the bent wave of another cause, which has its own rivals. False: it has none
+// in these data.
+bool Exchange(const Templates& templates, const SelectionRule& rule, const Way& way, std::size_t at,
+              Fit* fit, Selection* selection) {
   constexpr int kRounds = 2;
-  ModelTerm& term = fit->model.terms[at];
-  const EffectAxis axis = term.form.axis;
+  const EffectAxis axis = fit->model.terms[at].form.axis;
   const Templates forms = ListTemplates(*FindEffect(way.cause), *fit->facts);
   const Template* bent = nullptr;
   for (const Template& form : forms)
@@ -213,6 +242,8 @@ bool Exchange(const Way& way, std::size_t at, Fit* fit) {
         (bent == nullptr || form.columns > bent->columns))
       bent = &form;
   if (bent == nullptr) return false;
+  at = LeaveAlone(at, fit, selection);
+  ModelTerm& term = fit->model.terms[at];
   const std::size_t groups = term.groups();
   term.form = *bent;
   term.amplitude.assign(groups * bent->columns, 0);
@@ -220,6 +251,7 @@ bool Exchange(const Way& way, std::size_t at, Fit* fit) {
   UpdateResiduals(fit);
   StepFit(fit);
   SettleFit(fit, kRounds);
+  selection->accepted[at].rivals = FindRivals(templates, rule, *fit, at);
   return true;
 }
 
@@ -250,11 +282,10 @@ double DetentError(double harmonic, double wave_deg, double detent) {
   return -sign * (low + high) / 2 / kRadians;
 }
 
-RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit,
+RotorsToldBy SettleRotors(const Templates& templates, const SelectionRule& rule,
+                          const std::vector<std::string>& left_out, Fit* fit,
                           Selection* selection) {
-  constexpr double kFar_deg = 8;        // electrical: less is a sine by either
-  constexpr double kClearly = 20;       // -2 ln L
-  constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
+  constexpr double kFar_deg = 8;  // electrical: less is a sine by either
   RotorsToldBy told;
   if (!fit->facts->Has("drive_amplitude")) return told;
   for (const std::string_view name : {kCogging, kImbalance})
@@ -264,16 +295,20 @@ RotorsToldBy SettleRotors(const std::vector<std::string>& left_out, Fit* fit,
     const std::size_t at = StrongestOf(*fit, axis, &square_um2);
     if (at == kNoTerm || !IsFar(*fit, at, kFar_deg)) continue;
     const std::vector<Rotor> rotors = TakeRotors(*fit, axis, square_um2);
-    const BestWay cogging = BestWayOf(kCogging, rotors), field = BestWayOf(kImbalance, rotors);
-    const double dispersion = DispersionOf(cogging, field, rotors);
-    if (dispersion > kDispersionMax || std::abs(cogging.cost - field.cost) < kClearly * dispersion)
-      continue;
+    const BestWay cogging = BestWayOf(kCogging, rotors, fit->parallel);
+    const BestWay field = BestWayOf(kImbalance, rotors, fit->parallel);
+    if (!IsClear(cogging, field, rotors)) continue;
     const Way& way = cogging.cost < field.cost ? *cogging.way : *field.way;
-    if (fit->model.terms[at].form.effect->cause != way.cause && !Exchange(way, at, fit)) continue;
+    if (fit->model.terms[at].form.effect->cause != way.cause &&
+        !Exchange(templates, rule, way, at, fit, selection))
+      continue;
     told[axis] = way.cause;
-    std::erase_if(selection->accepted[at].rivals, [](const Rival& rival) {
-      return rival.cause == kCogging || rival.cause == kImbalance;
-    });
+    for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
+      if (IsOfRotor(fit->model.terms[t], axis) &&
+          fit->model.terms[t].form.effect->cause == way.cause)
+        std::erase_if(selection->accepted[t].rivals, [](const Rival& rival) {
+          return rival.cause == kCogging || rival.cause == kImbalance;
+        });
   }
   return told;
 }

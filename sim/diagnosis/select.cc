@@ -199,7 +199,8 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
                       std::vector<Rival>* rivals) {
   for (const PairTrial& trial :
        TryPairs(fit, at, look.pass, templates, look.standings, groups, kKeptMin))
-    if ((trial.behind < rule.rival_behind || trial.beyond_chance) &&
+    if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
+         trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
       rivals->push_back({trial.cause, trial.behind, 0, false});
 }

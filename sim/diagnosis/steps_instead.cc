@@ -46,16 +46,30 @@ Fit WithoutCauseOf(const Fit& fit, const ModelTerm& term) {
   return without;
 }
 
-// Units that have few steps, all of them small.
+// Units that have few steps, all of them small: those that stand off least first. A unit that has
+// met its neighbour is half of a contact, and is not asked alone.
 std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
   constexpr std::size_t kUnitsMost = 8, kFew = 4;
   constexpr double kSmall_deg = 3;
-  std::map<std::size_t, std::size_t> count;
-  for (const EventTerm& event : fit.model.events)
-    count[event.unit] += std::abs(event.step_deg) < kSmall_deg ? 1 : kFew + 1;
+  struct Steps {
+    std::size_t count = 0;
+    double sum_deg = 0;
+    bool small = true;
+  };
+  std::map<std::size_t, Steps> of_unit;
+  for (const EventTerm& event : fit.model.events) {
+    Steps& steps = of_unit[event.unit];
+    ++steps.count;
+    steps.sum_deg += std::abs(event.step_deg);
+    steps.small = steps.small && std::abs(event.step_deg) < kSmall_deg && !IsOfContact(fit, event);
+  }
+  std::vector<std::pair<double, std::size_t>> least;
+  for (const auto& [unit, steps] : of_unit)
+    if (steps.small && steps.count <= kFew) least.emplace_back(steps.sum_deg, unit);
+  std::ranges::sort(least);
+  least.resize(std::min(least.size(), kUnitsMost));
   std::vector<std::size_t> units;
-  for (const auto& [unit, steps] : count)
-    if (steps <= kFew && units.size() < kUnitsMost) units.push_back(unit);
+  for (const auto& [sum_deg, unit] : least) units.push_back(unit);
   return units;
 }
 

@@ -12,7 +12,7 @@ namespace focalfleet::sim {
 inline double AddedLoadAngle(double load, double level, double missing) {
   constexpr double kPullOut = 0.985;  // beyond it the rotor slips, which is another cause
   const auto angle = [&](double drive) {
-    return std::asin(std::clamp(load / drive, 0.0, kPullOut));
+    return std::asin(std::min(load / std::max(drive, 1e-9), kPullOut));
   };
   return angle(level * (1 - missing)) - angle(level);
 }

@@ -23,6 +23,10 @@ constexpr Named kFeeds[] = {{0, "harness"}, {0.5, "harness and feed"}, {1, "feed
 constexpr Named kDepths[] = {{0.05, ""}, {0.3, ", deep"}, {0.55, ", deeper"}};
 // From here on by the feed's share alone, for an axis whose lag does not know its drive.
 constexpr int kUndriven = kLoaded + static_cast<int>(std::size(kFeeds) * std::size(kDepths));
+// And from here on by the feed's share under load again, so deep that a part of those in motion is
+// enough for the pull-out; more of them add nothing.
+constexpr int kToPullOut = kUndriven + static_cast<int>(std::size(kFeeds));
+constexpr double kDepthToPullOut = 2.5;
 
 void List(const CampaignFacts& facts, Templates* out) {
   // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
@@ -36,17 +40,19 @@ void List(const CampaignFacts& facts, Templates* out) {
   // of what the drive has left, and a deep droop bends.
   if (!facts.Has("drive_amplitude") || !facts.Has(kSharedMotors)) return;
   int form = kLoaded;
+  const auto list_loaded = [&](const Named& feed, const char* depth) {
+    const std::string name = std::string(feed.name) + depth + "; load, of the pull-out,";
+    ListGrid({.axes = axes, .shapes = {0.2, 0.4, 0.6}, .shape_name = name, .form = form++}, out);
+  };
   for (const Named& feed : kFeeds)
-    for (const Named& depth : kDepths) {
-      const std::string name = std::string(feed.name) + depth.name + "; load, of the pull-out,";
-      ListGrid({.axes = axes, .shapes = {0.2, 0.4, 0.6}, .shape_name = name, .form = form++}, out);
-    }
+    for (const Named& depth : kDepths) list_loaded(feed, depth.name);
   for (const Named& feed : kFeeds) {
     const std::size_t listed = out->size();
     ListGrid({.axes = axes, .form = form++}, out);
     for (std::size_t k = listed; k < out->size(); ++k)
       (*out)[k].label += std::string(", ") + feed.name + ", at any drive";
   }
+  for (const Named& feed : kFeeds) list_loaded(feed, ", to the pull-out");
 }
 
 // Share of the largest droop, by the place along the harness.
@@ -79,18 +85,31 @@ std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
   return droop;
 }
 
+// How a form has the droop.
+struct Way {
+  bool loaded = false, driven = true;
+  double feed_share = 0;  // below 0: by the place
+  double depth = 0;
+};
+Way WayOf(int form) {
+  if (form < kLoaded) return {.feed_share = -1};
+  if (form >= kToPullOut)
+    return {
+        .loaded = true, .feed_share = kFeeds[form - kToPullOut].value, .depth = kDepthToPullOut};
+  if (form >= kUndriven) return {.driven = false, .feed_share = kFeeds[form - kUndriven].value};
+  const auto k = static_cast<std::size_t>(form - kLoaded);
+  return {.loaded = true,
+          .feed_share = kFeeds[k / std::size(kDepths)].value,
+          .depth = kDepths[k % std::size(kDepths)].value};
+}
+
 void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
            PoseErrors* errors) {
-  const bool undriven = form.form >= kUndriven;
-  const bool loaded = form.form >= kLoaded && !undriven;
-  const auto k = static_cast<std::size_t>(std::max(form.form - kLoaded, 0));
-  const double depth = kDepths[k % std::size(kDepths)].value;
-  const std::vector<double> droop = undriven ? ByCurrent(track, kFeeds[form.form - kUndriven].value)
-                                    : loaded
-                                        ? ByCurrent(track, kFeeds[k / std::size(kDepths)].value)
-                                        : ByPlace(track, form.form);
+  const Way way = WayOf(form.form);
+  const std::vector<double> droop =
+      way.feed_share < 0 ? ByPlace(track, form.form) : ByCurrent(track, way.feed_share);
   std::span<const double> drive;
-  if (track.facts->Has("drive_amplitude") && !undriven) drive = track.Column("drive_amplitude");
+  if (track.facts->Has("drive_amplitude") && way.driven) drive = track.Column("drive_amplitude");
   for (const std::size_t axis : AxesOf(form)) {
     const std::span<const double> step = track.step_deg[axis];
     AddRemembered(
@@ -98,8 +117,9 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         [&](std::size_t i) {
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
           // The load angle grows with what the drive lacks.
-          const double lag = loaded ? AddedLoadAngle(form.shape, level, depth * droop[i]) / depth
-                                    : droop[i] / level;
+          const double lag =
+              way.loaded ? AddedLoadAngle(form.shape, level, way.depth * droop[i]) / way.depth
+                         : droop[i] / level;
           return -amplitude[0] * Direction(step[i]) * lag;
         },
         &errors->angle_deg[axis]);

@@ -160,6 +160,43 @@ TEST(Image, OneThatSwingsSlowlyIsTheCamerasAndUnknown) {
   EXPECT_EQ(diagnosis.unknown[0].covariate, "t_s");
 }
 
+// Moves that nobody photographs say nothing of the image.
+TEST(Image, OneThatSwingsIsSeenToThoughEverySecondMoveIsNot) {
+  const std::vector<double> phase = SlowPhase(Shifted([](std::size_t) { return Shift{0, 0}; }));
+  Campaign campaign = Shifted([&](std::size_t e) {
+    return Shift{6 * std::sin(phase[e]), 3 * std::cos(phase[e])};
+  });
+  const Exposures exposures = FindExposures(campaign);
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    if (exposures.of_row[row] % 2 == 0) campaign.x_mm[row] = campaign.y_mm[row] = std::nan("");
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity")) << Told(diagnosis);
+  EXPECT_GT(diagnosis.causes[0].size_um, 0.7 * std::sqrt(0.5 * (36 + 9)));  // geometry takes some
+  ASSERT_FALSE(diagnosis.unknown.empty()) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.unknown[0].covariate, "t_s");
+}
+
+// A camera that goes out of focus scales, and so does a plate that grows by a law of its own.
+TEST(Image, OneThatOnlyScalesAndGoesOnMayBeThePlate) {
+  Rng rng = Rng::Stream(7, "grows");
+  std::vector<double> scale(80, 0);
+  for (std::size_t e = 1; e < scale.size(); ++e) scale[e] = scale[e - 1] + 4e-5 * rng.Normal();
+  Campaign campaign = Shifted([](std::size_t) { return Shift{0, 0}; });
+  const Exposures exposures = FindExposures(campaign);
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    const double by = scale[exposures.of_row[row]];
+    campaign.x_mm[row] *= 1 + by, campaign.y_mm[row] *= 1 + by;
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty()) << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].candidates, ElementsAre("camera_similarity", "plate_expansion"))
+      << Told(diagnosis);
+  DiagnoseOptions options;
+  options.leave_out = {"plate_expansion"};
+  EXPECT_THAT(Diagnose(campaign, options).causes[0].candidates, ElementsAre("camera_similarity"));
+}
+
 TEST(Image, OneThatAlsoTurnsAndScalesAsItSwingsIsTheCameras) {
   Campaign campaign = Shifted([](std::size_t) { return Shift{0, 0}; });
   const Exposures exposures = FindExposures(campaign);

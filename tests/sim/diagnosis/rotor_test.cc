@@ -145,7 +145,7 @@ std::string_view SettledBy(const Turned& turned, double noise_share) {
     fit.noise.angle_deg[axis] *= noise_share, fit.noise.rest_deg[axis] *= noise_share;
   Selection selection;
   selection.accepted.resize(1);
-  const RotorsToldBy told = SettleRotors({}, &fit, &selection);
+  const RotorsToldBy told = SettleRotors(forms, {}, {}, &fit, &selection);
   EXPECT_TRUE(told[kTheta].empty() || told[kTheta] == fit.model.terms[0].form.effect->cause);
   return told[kTheta];
 }

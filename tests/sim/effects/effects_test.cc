@@ -308,7 +308,7 @@ TEST(Effects, ADroopAtAnyDriveIsTheShareOfTheLoad) {
   const CampaignFacts facts = MakeFacts(campaign);
   std::size_t undriven = 0;
   for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
-    if (form.form < 13 || form.axis != EffectAxis::kTheta) continue;
+    if (form.form < 13 || form.form > 15 || form.axis != EffectAxis::kTheta) continue;
     const double of_feed = 0.5 * static_cast<double>(undriven++);
     const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
     const auto motors = track.Column(kRailMotors), shared = track.Column(kSharedMotors);
@@ -322,6 +322,30 @@ TEST(Effects, ADroopAtAnyDriveIsTheShareOfTheLoad) {
     }
   }
   EXPECT_EQ(undriven, 3u);
+}
+
+// Where a part of those in motion takes the drive away, the rotor hangs at the pull-out, and more
+// of them do no more.
+TEST(Effects, ADroopToThePullOutGoesNoFurther) {
+  const Campaign campaign = Made();
+  const CampaignFacts facts = MakeFacts(campaign);
+  std::size_t forms = 0, at_pull_out = 0, before = 0;
+  for (const Template& form : ListTemplates(*FindEffect("supply_droop"), facts)) {
+    if (form.form < 16 || form.axis != EffectAxis::kTheta) continue;
+    ++forms;
+    const UnitTrack track = MakeTrack(facts, 5, campaign.units[5]);
+    const auto drive = track.Column("drive_amplitude");
+    const auto errors = Applied(track, form, 2.5);
+    for (std::size_t i = 0; i < track.moves; ++i) {
+      if (track.step_deg[kTheta][i] == 0) continue;
+      const double most = std::asin(0.985) - std::asin(std::min(form.shape / drive[i], 0.985));
+      EXPECT_LE(std::abs(errors[i]), most + 1e-12) << form.label;
+      ++(std::abs(errors[i]) > most - 1e-12 ? at_pull_out : before);
+    }
+  }
+  EXPECT_EQ(forms, 9u);
+  EXPECT_GT(at_pull_out, 50u);
+  EXPECT_GT(before, 20u);
 }
 
 TEST(Effects, AnAmplitudeIsWhatPhysicsAllows) {
