@@ -471,6 +471,23 @@ TEST(HiddenKey, TellsTheTruthAboutACampaign) {
               effect["rms_um"].get<double>(), 0.01 * effect["rms_um"].get<double>());
 }
 
+TEST(HiddenKey, WhatAStuckUnitHasIsNotVisible) {
+  Wishes wishes;
+  wishes.cause = "backlash";
+  wishes.lambda = 2000;
+  wishes.units = 12;
+  wishes.moves = 120;
+  Spec spec = SpecAt(10, 0, wishes);
+  const auto lambda_of = [&](int stuck_units) {
+    spec.nuisances.stuck_units = stuck_units;
+    const auto json = nlohmann::json::parse(MakeKey(Plant(spec)).json);
+    return json["effects"][0]["lambda"].get<double>();
+  };
+  EXPECT_GT(lambda_of(0), 1000);
+  EXPECT_LT(lambda_of(2), lambda_of(0));
+  EXPECT_EQ(lambda_of(500), 0);  // all of them
+}
+
 TEST(HiddenKey, MissingColumnsAreTold) {
   Wishes wishes;
   wishes.cause = "gravity_sag";
