@@ -200,13 +200,15 @@ std::vector<Rotor> TakeRotors(const Fit& fit, std::size_t axis,
   return rotors;
 }
 
-// Whether one way is better for sure: beyond chance, and by more than half of what it leaves itself
-// above noise, for that is no scatter but a misfit.
+// Whether one way is better for sure: beyond chance, and by a quarter of what it leaves itself
+// above noise, for that is no scatter but a misfit. A detent of order 1 and a circle beside the
+// origin are one curve.
 bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
   constexpr double kOfNormal = 1.15;    // mean of 2 MinusLogDensity of a normal number's square
-  constexpr double kClearly = 20;       // -2 ln L
+  constexpr double kClearly = 15;       // -2 ln L
   constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
-  constexpr double kOfMisfit = 0.5;
+  constexpr double kOfMisfit = 0.25;
+  if (a.way->harmonic == 1 && b.way->harmonic == 1) return false;
   double rows = 0;
   for (const Rotor& rotor : rotors) rows += static_cast<double>(rotor.rows.size());
   const double of_noise = kOfNormal * rows, least = std::min(a.cost, b.cost);
