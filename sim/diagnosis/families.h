@@ -37,8 +37,8 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
 /// strong one have. It gets the strong one as a candidate. What is faint, in ln L or beside a cause
-/// of an axis, and less than that one's shape can leave is told so. Pre: strongest first.
-/// `units`: of the campaign.
+/// of an axis, and less than that one's shape can leave is told so, and what is hardly there beside
+/// a strong cause of any axis. Pre: strongest first. `units`: of the campaign.
 void JudgeRemainders(std::size_t units, std::vector<CauseFound>* causes);
 
 /// Single units that a cause moves by far more than noise, and whose rows it leaves nearly as far

@@ -126,7 +126,7 @@ TEST(Families, WhatIsFaintByItselfIsNoNameBesideAStrongerOne) {
   ASSERT_THAT(beside("both", 22), SizeIs(1));
   EXPECT_THAT(beside("both", 22)[0].shape, testing::HasSubstr("thermal_arm_growth"));
   EXPECT_THAT(beside("both", 32), SizeIs(2));
-  EXPECT_THAT(beside("theta", 14), SizeIs(2));  // on another axis
+  EXPECT_THAT(beside("theta", 20), SizeIs(2));  // on another axis, and more than hardly there
 
   // What moves the whole fibre leaves nothing that looks like an axis.
   std::vector<CauseFound> causes = {Cause("gravity_sag", "none", 92), Cause("wear", "phi", 22)};
@@ -316,6 +316,19 @@ TEST(Families, WhereNoElevationIsToldTheImageMayShiftByThePlate) {
   std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
   JudgeUntested({{"gravity_sag", "column elevation_deg is missing"}}, &causes);
   EXPECT_THAT(causes[0].candidates, ElementsAre("camera_similarity", "gravity_sag"));
+}
+
+TEST(Families, WhatIsHardlyThereBesideAStrongCauseOfAnyAxisIsItsRemainder) {
+  const auto judged = [](double evidence, const char* strong_axis) {
+    std::vector<CauseFound> causes = {Cause("load_angle_lag", strong_axis, 130),
+                                      Cause("start_skew", "phi", evidence)};
+    causes[1].units = {1, 2, 3}, causes[1].all_units = false;
+    JudgeRemainders(kUnits, &causes);
+    return causes.size();
+  };
+  EXPECT_EQ(judged(21, "theta"), 1u);
+  EXPECT_EQ(judged(24, "theta"), 2u);
+  EXPECT_EQ(judged(21, "none"), 2u);
 }
 
 TEST(Families, WhatNearlyTheSameUnitsHaveBesideIsNotSure) {
