@@ -134,12 +134,13 @@ void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
   page->Paragraph(next.moves.empty()
                       ? "No moves of the units tell these apart."
                       : fmt::format("next_moves.csv has {} moves; focalfleet campaign run makes "
-                                    "them, under the conditions that they ask for.",
+                                    "them; it tells the conditions that they ask for, and "
+                                    "leaves it to you to set them.",
                                     next.moves.size()));
   std::vector<std::vector<std::string>> rows;
   for (const sim::Prospect& one : next.prospects)
-    rows.push_back({one.cause, one.rival, fmt::format("{:.1f}", one.d),
-                    PercentOf(sim::ConfusionAt(one.d))});
+    rows.push_back(
+        {one.cause, one.rival, fmt::format("{:.1f}", one.d), PercentOf(sim::ConfusionAt(one.d))});
   for (const auto& [cause, rival] : next.untold)
     rows.push_back({cause, rival, "-", "no move tells"});
   page->Table({"cause", "or", "set apart by (chi-square)", "still confused"}, rows,

@@ -177,6 +177,11 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   for (const std::string& condition : *asked)
     Say(context, options.list + " asks for " + condition + ": not set by this command");
   std::error_code failed;
+  const std::filesystem::path measured_before = std::filesystem::path(options.out) / "moves.csv";
+  if (std::filesystem::exists(measured_before, failed))
+    return Report(context, {ErrorCode::kInvalid, measured_before.string() +
+                                                     ": is there already; what was measured is "
+                                                     "not written over"});
   std::filesystem::create_directories(options.out, failed);
   if (failed)
     return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <regex>
@@ -19,6 +20,7 @@
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
+#include "protocol/base/rng.h"
 #include "sim/diagnosis/planted.h"
 #include "sim/effects/registry.h"
 
@@ -140,6 +142,8 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
   if (context.json) PrintJson(report);
   Say(context, VerdictSentence(diagnosis));
   if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
+  for (const auto& [why, rows] : diagnosis.outliers.why)
+    Say(context, fmt::format("{} of {} rows: {}", rows, diagnosis.rows, why));
   if (const std::string patches = PatchTable(diagnosis); !patches.empty()) Say(context, patches);
   Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv}");
   return ExitCode::kOk;
@@ -152,8 +156,29 @@ struct SimulateCampaignOptions {
   std::vector<std::string> effects;
   double unit_share = 1;
   std::string next;
+  std::string of;
+  std::string model;
   std::string out;
 };
+
+// The moves of a measured campaign, with the places where the model says that they end. What was
+// not seen stays so.
+Result<sim::Campaign> Predicted(const SimulateCampaignOptions& options) {
+  FOCALFLEET_TRY_ASSIGN(MeasuredCampaign measured, ReadMeasuredCampaign(options.of));
+  sim::Campaign& campaign = measured.campaign;
+  FOCALFLEET_TRY_ASSIGN(const ModelFile file, ReadModelFor(campaign, options.model));
+  const sim::Places places = sim::Predict(file.model, sim::MakeFacts(campaign), OnThreads(0));
+  Rng rng = Rng::Stream(options.planted.seed, "predicted");
+  const auto measure = [&](double place_mm) {
+    return place_mm + 1e-3 * options.planted.noise_um * rng.Normal();
+  };
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    if (!std::isfinite(campaign.x_mm[row])) continue;
+    campaign.x_mm[row] = measure(places.x_mm[row]);
+    campaign.y_mm[row] = measure(places.y_mm[row]);
+  }
+  return campaign;
+}
 
 // The campaign, and with `next` the moves of that list after it.
 Result<sim::Campaign> Simulate(sim::PlantedOptions planted, const std::string& next) {
@@ -191,8 +216,14 @@ ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptio
     planted.effects.push_back(*effect);
     planted.effects.back().unit_share = options.unit_share;
   }
-  const auto campaign = Simulate(planted, options.next);
-  if (!campaign) return Report(context, campaign.error(), ExitCode::kUsage);
+  if (options.of.empty() != options.model.empty())
+    return Report(context, Error{ErrorCode::kInvalid, "--of and --model go together"},
+                  ExitCode::kUsage);
+  const auto campaign = options.of.empty() ? Simulate(planted, options.next) : Predicted(options);
+  if (!campaign)
+    return options.of.empty() && options.next.empty()
+               ? Report(context, campaign.error(), ExitCode::kUsage)
+               : Report(context, campaign.error());
   std::error_code failed;
   std::filesystem::create_directories(options.out, failed);
   if (failed)
@@ -260,7 +291,9 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
                                  "  focalfleet simulate campaign --effect gravity_sag=5 --effect "
                                  "eccentricity:phi=0.2 --out two\n"
                                  "  focalfleet simulate campaign --effect stiction:theta#24=1 "
-                                 "--effect lost_command=2 --unit-share 0.1 --out jumps");
+                                 "--effect lost_command=2 --unit-share 0.1 --out jumps\n"
+                                 "  focalfleet simulate campaign --of night-12 --model "
+                                 "night-12-report/model.toml --noise-um 0 --out predicted");
   auto options = std::make_shared<SimulateCampaignOptions>();
   sim::PlantedOptions& planted = options->planted;
   command->add_option(
@@ -285,6 +318,15 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
       ->capture_default_str();
   AddFile(command, "--next", &options->next,
           "next_moves.csv of a diagnosis of this campaign: its moves are made after the others");
+  command
+      ->add_option("--of", options->of,
+                   "Folder of a measured campaign: its moves, where --model says that they end")
+      ->type_name("DIR")
+      ->excludes("--effect")
+      ->excludes("--units")
+      ->excludes("--moves")
+      ->excludes("--next");
+  AddFile(command, "--model", &options->model, "model.toml of a diagnosis, that is to predict it");
   command->add_option("--out", options->out, "Folder for units.csv and moves.csv; made if missing")
       ->required()
       ->type_name("DIR");

@@ -32,7 +32,7 @@ std::string EffectTable(const Json& model) {
                     fmt::format("{:.2g}", NumberIn(effect, "sigma_median")),
                     TextIn(effect, "amplitude_unit"), rivals.empty() ? "-" : rivals});
   }
-  return rows.size() == 1 ? "geometry of the units alone\n" : AlignColumns(rows);
+  return (rows.size() == 1 ? "geometry of the units alone" : AlignColumns(rows)) + "\n";
 }
 
 std::string ChangeTable(const Json& answer) {
@@ -47,7 +47,15 @@ std::string ChangeTable(const Json& answer) {
                     Micrometres(change, "rms_after_um"),
                     restores == 0 ? "-" : std::to_string(restores)});
   }
-  return AlignColumns(rows);
+  return AlignColumns(rows) + "\n";
+}
+
+// The model's causes that commands cannot make good for; empty: none.
+std::string NotCompensated(const Json& in_force) {
+  std::string left_out;
+  for (const Json& cause : ListIn(in_force, "left_out"))
+    if (cause.is_string()) left_out += (left_out.empty() ? "" : ", ") + cause.get<std::string>();
+  return left_out.empty() ? "" : "not compensated: " + left_out;
 }
 
 struct NoOptions {};
@@ -68,10 +76,8 @@ ExitCode RunShow(const Context& context, const NoOptions&) {
                           TextIn(*in_force, "campaign"), Micrometres(*in_force, "rms_after_um"),
                           Micrometres(*in_force, "rms_before_um"), CountIn(*in_force, "units")));
     PrintText(EffectTable(*in_force));
-    std::string left_out;
-    for (const Json& cause : ListIn(*in_force, "left_out"))
-      if (cause.is_string()) left_out += (left_out.empty() ? "" : ", ") + cause.get<std::string>();
-    if (!left_out.empty()) PrintText("not compensated: " + left_out + "\n");
+    if (const std::string left_out = NotCompensated(*in_force); !left_out.empty())
+      PrintText(left_out + "\n");
   }
   if (!ListIn(*answer, "changes").empty()) PrintText(ChangeTable(*answer));
   return ExitCode::kOk;
@@ -85,9 +91,11 @@ ExitCode Change(const Context& context, const char* verb, const Json& args) {
   if (context.json) PrintJson(*answer);
   const auto in_force = answer->find("in_force");
   const bool any = in_force != answer->end() && in_force->is_object();
-  Say(context, any ? fmt::format("{} ({}) is in force", TextIn(*in_force, "name"),
-                                 Short(TextIn(*in_force, "sha256")))
+  Say(context, any ? fmt::format("{} ({}) is in force, of {} units", TextIn(*in_force, "name"),
+                                 Short(TextIn(*in_force, "sha256")), CountIn(*in_force, "units"))
                    : std::string("no model is in force"));
+  if (const std::string left_out = any ? NotCompensated(*in_force) : ""; !left_out.empty())
+    Say(context, left_out);
   return ExitCode::kOk;
 }
 

@@ -75,14 +75,11 @@ std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Mode
                                   const std::vector<Standing>& standings, const FleetGroups& groups,
                                   double kept_min) {
   constexpr std::size_t kMost = 6;
-  constexpr double kNear = 0.5;  // of the term's evidence
   const Effect* own = term.form.effect;
-  double evidence = 0;
-  for (std::size_t k = 0; k < templates.size(); ++k)
-    if (templates[k].effect == own) evidence = std::max(evidence, standings[k].evidence);
+  // Beside what the other axis does, which is noise to either, evidence may be next to none.
   std::vector<PairTrial> trials;
   for (const AxisPair& pair : PairsOf(pass, templates, standings, own, kept_min)) {
-    if (trials.size() >= kMost || pair.evidence < kNear * evidence) break;
+    if (trials.size() >= kMost || pair.evidence <= 0) break;
     const Standing &theta = standings[pair.theta], &phi = standings[pair.phi];
     const auto take = [&](const Standing& on_theta, const Standing& on_phi) {
       trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], on_theta, groups),

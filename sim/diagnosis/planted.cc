@@ -145,11 +145,19 @@ void DrawMoves(const PlantedOptions& options, Campaign* campaign) {
   for (const auto& k : key) columns.movers->push_back(movers[k]);
 }
 
+std::string LibrarysCauses() {
+  std::string names;
+  for (const Effect& effect : EffectLibrary())
+    names += (names.empty() ? "" : ", ") + std::string(effect.cause);
+  return names;
+}
+
 Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& facts,
                          std::uint64_t seed) {
   const Effect* effect = FindEffect(planted.cause);
   if (effect == nullptr)
-    return Fail(ErrorCode::kInvalid, "there is no effect '" + planted.cause + "'");
+    return Fail(ErrorCode::kInvalid,
+                "there is no effect '" + planted.cause + "'; there are " + LibrarysCauses());
   ModelTerm term;
   Templates templates = ListTemplates(*effect, facts);
   if (!planted.axis.empty())

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
@@ -117,6 +118,58 @@ TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
       {"diagnose", scratch / "night", "--against", scratch / "report/model.toml", "--json"});
   ASSERT_EQ(again.exit, 0) << again.err;
   EXPECT_EQ(Json::parse(again.out)["verdict"], "B is better");
+}
+
+// The places of moves.csv, which stand in its columns 7 and 8, in mm.
+std::vector<double> PlacesIn(const std::string& file) {
+  std::vector<double> places;
+  std::istringstream lines(Slurp(file));
+  std::string line;
+  std::getline(lines, line);
+  while (std::getline(lines, line)) {
+    std::istringstream cells(line);
+    std::string cell;
+    for (int k = 0; std::getline(cells, cell, ','); ++k)
+      if (k == 6 || k == 7) places.push_back(std::stod(cell));
+  }
+  return places;
+}
+
+// The extended model predicts the campaign that it was found in.
+TEST(SimulateCampaign, AModelPredictsTheCampaign) {
+  const ScratchDirectory scratch;
+  const std::string night = scratch / "night", report = scratch / "report";
+  const auto made =
+      Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "60", "--noise-um", "2",
+                  "--effect", "backlash:theta=0.2", "--outliers", "0", "--out", night});
+  ASSERT_EQ(made.exit, 0) << made.err;
+  ASSERT_EQ(Focalfleet({"diagnose", night, "--out", report}).exit, 0);
+  const auto predicted = [&](const std::string& model, const char* noise_um) {
+    const auto result = Focalfleet({"simulate", "campaign", "--of", night, "--model", model,
+                                    "--noise-um", noise_um, "--out", scratch / "predicted"});
+    EXPECT_EQ(result.exit, 0) << result.err;
+    const std::vector<double> then = PlacesIn(night + "/moves.csv");
+    const std::vector<double> now = PlacesIn(scratch / "predicted/moves.csv");
+    EXPECT_EQ(then.size(), 2 * 12 * 60u);
+    EXPECT_EQ(then.size(), now.size());
+    double square = 0;
+    for (std::size_t k = 0; k < std::min(then.size(), now.size()); ++k)
+      square += std::pow(then[k] - now[k], 2);
+    return 1e3 * std::sqrt(2 * square / static_cast<double>(then.size()));
+  };
+  const double left_um = predicted(report + "/model.toml", "0");
+  EXPECT_LT(left_um, 5);  // camera and rests
+  EXPECT_GT(predicted(report + "/model.toml", "20"), 25);
+  const auto exit_of = [&](std::vector<std::string> more) {
+    std::vector<std::string> words = {"simulate", "campaign", "--out", scratch / "none"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Focalfleet(words).exit;
+  };
+  EXPECT_EQ(exit_of({"--of", night}), 2);
+  EXPECT_EQ(exit_of({"--of", night, "--model", report + "/model.toml", "--units", "3"}), 2);
+  EXPECT_EQ(exit_of({"--of", night, "--model", scratch / "no.toml"}), 1);
+  EXPECT_EQ(exit_of({"--of", scratch / "no", "--model", report + "/model.toml"}), 1);
+  EXPECT_EQ(exit_of({"--next", scratch / "no.csv"}), 1);
 }
 
 TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {

@@ -35,6 +35,16 @@ TEST(BothAxes, PlayOfBothIsNoDroop) {
     }
 }
 
+// Of a large play each axis by itself explains next to nothing: the other's is noise to it.
+TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
+  const Diagnosis diagnosis = Verdicts(PlayOfBothAxes(0.4, 3));
+  ASSERT_FALSE(diagnosis.causes.empty());
+  for (const CauseFound& cause : diagnosis.causes)
+    if (cause.cause == "supply_droop") {
+      EXPECT_THAT(cause.candidates, testing::Contains("backlash")) << Told(diagnosis);
+    }
+}
+
 TEST(BothAxes, ADroopOfBothKeepsItsName) {
   const Diagnosis diagnosis = Verdicts(Planted(
       {{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = 3}));
