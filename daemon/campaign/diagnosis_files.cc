@@ -83,7 +83,17 @@ std::string EmpiricalText(const sim::Template& form) {
          "\nknot_ranks = " + NumberList(ranks) + "\n";
 }
 
-std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis) {
+// What the term could be, as found now or, if it was not, as the model before says; else none.
+std::vector<std::string> CandidatesOf(const std::string& name, const sim::Diagnosis& diagnosis,
+                                      const ReportNames& names) {
+  const auto found = std::ranges::find(diagnosis.causes, name, &sim::CauseFound::cause);
+  if (found != diagnosis.causes.end()) return found->candidates;
+  const auto before = names.candidates_before.find(name);
+  return before != names.candidates_before.end() ? before->second : std::vector<std::string>();
+}
+
+std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis,
+                     const ReportNames& names) {
   std::string text = "\n[[effect]]\n";
   text += "cause = " + Quoted(term.form.effect->cause) + "\n";
   text += "axis = " + Quoted(sim::Name(term.form.axis)) + "\n";
@@ -93,14 +103,11 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
   if (sim::FindEmpirical(term.form.effect->cause) != nullptr) text += EmpiricalText(term.form);
   text += "amplitude_unit = " + Quoted(term.form.effect->amplitude_unit) + "\n";
   text += "shared_by = " + Quoted(sim::Name(term.sharing)) + "\n";
-  for (const sim::CauseFound& cause : diagnosis.causes)
-    if (cause.cause == term.form.effect->cause) {
-      text += "candidates = [";
-      for (std::size_t i = 0; i < cause.candidates.size(); ++i)
-        text += (i == 0 ? "" : ", ") + Quoted(cause.candidates[i]);
-      text += "]\n";
-      break;
-    }
+  const std::vector<std::string> candidates =
+      CandidatesOf(std::string(term.form.effect->cause), diagnosis, names);
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    text += (i == 0 ? "candidates = [" : ", ") + Quoted(candidates[i]);
+  if (!candidates.empty()) text += "]\n";
   std::vector<double> units, amplitude, sigma, shapes;
   for (std::size_t u = 0; u < term.group_of_unit.size(); ++u) {
     const auto own = term.AmplitudeOf(u);
@@ -160,7 +167,7 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
   text += "verdict = " + Quoted(sim::Name(diagnosis.verdict)) + "\n";
   text += fmt::format("rms_before_um = {:.9g}\nrms_after_um = {:.9g}\n",
                       diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
-  for (const sim::ModelTerm& term : diagnosis.model.terms) text += TermText(term, diagnosis);
+  for (const sim::ModelTerm& term : diagnosis.model.terms) text += TermText(term, diagnosis, names);
   const std::vector<sim::UnitLeft> left = sim::LeftByCampaign(diagnosis.model, campaign);
   for (std::size_t u = 0; u < diagnosis.model.units.size(); ++u) {
     const sim::CampaignUnit& unit = diagnosis.model.units[u];

@@ -3,6 +3,7 @@
 // effect with its amplitudes, their uncertainty and the campaign they came from).
 #pragma once
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
@@ -17,6 +18,8 @@ struct ReportNames {
   std::string model_before = "nominal";
   std::string model_after = "extended";
   std::string campaign;
+  /// What causes of the model before could be, too, by cause: what it explains is not asked again.
+  std::map<std::string, std::vector<std::string>> candidates_before;
 };
 
 nlohmann::json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names);

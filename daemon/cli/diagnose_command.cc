@@ -120,6 +120,9 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
     auto read = ReadModelFor(in->campaign, options.model);
     if (!read) return Report(context, read.error());
     in->names.model_before = read->model.name;
+    for (std::size_t t = 0; t < read->candidates.size(); ++t)
+      in->names.candidates_before[std::string(read->model.terms[t].form.effect->cause)] =
+          read->candidates[t];
     before = std::move(read->model);
   }
   sim::Diagnosis diagnosis;

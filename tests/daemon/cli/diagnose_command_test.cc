@@ -100,6 +100,22 @@ TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreTold) {
   EXPECT_THAT(scratch.List(), ::testing::ElementsAre("bad.toml", "night"));
 }
 
+// What the model before could be is not asked again, and is not sure for that.
+TEST(DiagnoseModel, WhatIsTakenOverKeepsItsCandidates) {
+  const ScratchDirectory scratch;
+  const std::string first = FittedModel(MadeCampaign(scratch, "night", "8e-4", "1"));
+  std::string text = Slurp(first);
+  const std::string own = "candidates = [\"gear_scale\"]";
+  ASSERT_THAT(text, HasSubstr(own));
+  text.replace(text.find(own), own.size(), "candidates = [\"gear_scale\", \"ramp_travel\"]");
+  const std::string doubted = scratch.Put("doubted.toml", text);
+  const auto again = Focalfleet(
+      {"diagnose", scratch / "night", "--model", doubted, "--out", scratch / "again", "-q"});
+  ASSERT_EQ(again.exit, 0) << again.err;
+  EXPECT_THAT(Slurp(scratch / "again/model.toml"),
+              HasSubstr("candidates = [\"gear_scale\", \"ramp_travel\"]"));
+}
+
 TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
   const ScratchDirectory scratch;
   const auto made = Focalfleet({"simulate", "campaign", "--units", "24", "--moves", "60",
