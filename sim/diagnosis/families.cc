@@ -104,7 +104,7 @@ double ShareBeside(const CauseFound& other, const CauseFound& cause) {
 // Air moves neighbours alike, in the rows of an exposure and for no reason that moves have: what
 // whole rails or the plate seem to do a little of beside it, is its.
 bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
-  constexpr double kFaintBeside = 40, kOfAir = 0.4;  // ln L; size
+  constexpr double kFaintBeside = 50, kOfAir = 0.4;  // ln L; size
   return air.cause == "air_turbulence" && cause.scope != "unit" && cause.axis != "none" &&
          cause.delta_log_likelihood < kFaintBeside && cause.size_um < kOfAir * air.size_um;
 }
