@@ -42,6 +42,23 @@ std::vector<AxisPair> PairsOf(const ScorePass& pass, const Templates& templates,
   return pairs;
 }
 
+// What a pair of the term's own cause would have, where it has shapes of one axis: beside what the
+// other axis does, which is noise to either, that may be next to nothing. Else all of its evidence.
+double EvidenceAsPair(const Templates& templates, const std::vector<Standing>& standings,
+                      const Effect* own) {
+  AxisPair pair;
+  double both = 0;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    if (templates[k].effect != own) continue;
+    if (templates[k].axis == EffectAxis::kTheta) TakeBetter(k, standings, &pair.theta);
+    if (templates[k].axis == EffectAxis::kPhi) TakeBetter(k, standings, &pair.phi);
+    both = std::max(both, standings[k].evidence);
+  }
+  return pair.theta == kNoTerm || pair.phi == kNoTerm
+             ? both
+             : standings[pair.theta].evidence + standings[pair.phi].evidence;
+}
+
 // In place of the shapes that `without` has not.
 PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
   constexpr int kRounds = 3;
@@ -75,11 +92,12 @@ std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Mode
                                   const std::vector<Standing>& standings, const FleetGroups& groups,
                                   double kept_min) {
   constexpr std::size_t kMost = 6;
+  constexpr double kNear = 0.5;  // of the own pair's evidence
   const Effect* own = term.form.effect;
-  // Beside what the other axis does, which is noise to either, evidence may be next to none.
+  const double least = std::max(kNear * EvidenceAsPair(templates, standings, own), 0.0);
   std::vector<PairTrial> trials;
   for (const AxisPair& pair : PairsOf(pass, templates, standings, own, kept_min)) {
-    if (trials.size() >= kMost || pair.evidence <= 0) break;
+    if (trials.size() >= kMost || pair.evidence <= least) break;
     const Standing &theta = standings[pair.theta], &phi = standings[pair.phi];
     const auto take = [&](const Standing& on_theta, const Standing& on_phi) {
       trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], on_theta, groups),
