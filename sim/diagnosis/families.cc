@@ -198,9 +198,8 @@ void JudgeRemainders(std::size_t units, std::vector<CauseFound>* causes) {
   // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
   // stronger one's evidence.
   constexpr double kFaint = 30, kBesideFaint = 0.3;
-  // So little beside a strong cause of whatever axis was wrong four times out of five in two hidden
-  // suites: what one axis does reaches the other through geometry and noise that are fitted to
-  // both.
+  // So little beside a strong cause of whatever axis was not there in six of eight cases of two
+  // hidden suites: what one axis does reaches the other through geometry and noise of both.
   constexpr double kVeryFaint = 22, kBesideVeryFaint = 0.2;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
