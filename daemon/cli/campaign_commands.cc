@@ -176,20 +176,20 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (!asked) return Report(context, asked.error());
   for (const std::string& condition : *asked)
     Say(context, options.list + " asks for " + condition + ": not set by this command");
+  const std::filesystem::path folder(options.out);
   std::error_code failed;
-  const std::filesystem::path measured_before = std::filesystem::path(options.out) / "moves.csv";
-  if (std::filesystem::exists(measured_before, failed))
-    return Report(context, {ErrorCode::kInvalid, measured_before.string() +
-                                                     ": is there already; what was measured is "
-                                                     "not written over"});
-  std::filesystem::create_directories(options.out, failed);
-  if (failed)
-    return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});
+  if (const auto there = folder / "moves.csv"; std::filesystem::exists(there, failed))
+    return Report(context, {ErrorCode::kInvalid, there.string() +
+                                                     ": is there already, and what was measured is "
+                                                     "not written over; name another folder"});
   CampaignLog log(&fleet->layout);
   ProgressBar bar(context);
   const auto began = std::chrono::steady_clock::now();
   auto before = AskBelieved(context);
   if (!before) return Report(context, before.error());
+  std::filesystem::create_directories(folder, failed);
+  if (failed)
+    return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});
   std::size_t unmeasured = 0;
   int in_a_row = 0;
   for (std::size_t m = 0; m < moves->size(); ++m) {

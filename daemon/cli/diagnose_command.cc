@@ -180,6 +180,9 @@ Result<sim::Campaign> Predicted(const SimulateCampaignOptions& options) {
     campaign.x_mm[row] = measure(places.x_mm[row]);
     campaign.y_mm[row] = measure(places.y_mm[row]);
   }
+  // What the camera said of its own places is not true of these.
+  std::erase_if(campaign.covariates,
+                [](const sim::Covariate& column) { return column.name == "sigma_um"; });
   return campaign;
 }
 
@@ -219,15 +222,16 @@ ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptio
     planted.effects.push_back(*effect);
     planted.effects.back().unit_share = options.unit_share;
   }
-  if (options.of.empty() != options.model.empty())
-    return Report(context, Error{ErrorCode::kInvalid, "--of and --model go together"},
+  std::error_code failed;
+  if (!options.of.empty() && std::filesystem::equivalent(options.of, options.out, failed))
+    return Report(context,
+                  Error{ErrorCode::kInvalid, options.out + ": is what was measured; name another "
+                                                           "folder for what is predicted"},
                   ExitCode::kUsage);
+  const bool reads_files = !options.of.empty() || !options.next.empty();
   const auto campaign = options.of.empty() ? Simulate(planted, options.next) : Predicted(options);
   if (!campaign)
-    return options.of.empty() && options.next.empty()
-               ? Report(context, campaign.error(), ExitCode::kUsage)
-               : Report(context, campaign.error());
-  std::error_code failed;
+    return Report(context, campaign.error(), reads_files ? ExitCode::kRefused : ExitCode::kUsage);
   std::filesystem::create_directories(options.out, failed);
   if (failed)
     return Report(context, Error{ErrorCode::kUnavailable, options.out + ": " + failed.message()});
@@ -321,15 +325,17 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
       ->capture_default_str();
   AddFile(command, "--next", &options->next,
           "next_moves.csv of a diagnosis of this campaign: its moves are made after the others");
-  command
-      ->add_option("--of", options->of,
-                   "Folder of a measured campaign: its moves, where --model says that they end")
-      ->type_name("DIR")
-      ->excludes("--effect")
-      ->excludes("--units")
-      ->excludes("--moves")
-      ->excludes("--next");
-  AddFile(command, "--model", &options->model, "model.toml of a diagnosis, that is to predict it");
+  CLI::Option* of = command->add_option(
+      "--of", options->of,
+      "Folder of a measured campaign: its moves, where --model says that they end");
+  of->type_name("DIR");
+  for (const char* made :
+       {"--effect", "--unit-share", "--units", "--moves", "--outliers", "--next"})
+    of->excludes(made);
+  CLI::Option* model = AddFile(command, "--model", &options->model,
+                               "model.toml of a diagnosis, that is to predict it");
+  of->needs(model);
+  model->needs(of);
   command->add_option("--out", options->out, "Folder for units.csv and moves.csv; made if missing")
       ->required()
       ->type_name("DIR");

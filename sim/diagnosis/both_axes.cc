@@ -20,43 +20,44 @@ void TakeBetter(std::size_t k, const std::vector<Standing>& standings, std::size
   if (*best == kNoTerm || standings[k].evidence > standings[*best].evidence) *best = k;
 }
 
-// The best first, of other causes.
-std::vector<AxisPair> PairsOf(const ScorePass& pass, const Templates& templates,
-                              const std::vector<Standing>& standings, const Effect* own,
-                              double kept_min) {
-  std::map<std::string_view, AxisPair> by_cause;
+using PairsByCause = std::map<std::string_view, AxisPair>;
+
+// Of the causes that have one on each axis.
+PairsByCause AllPairs(const ScorePass& pass, const Templates& templates,
+                      const std::vector<Standing>& standings, double kept_min) {
+  PairsByCause by_cause;
   for (std::size_t k = 0; k < templates.size(); ++k) {
-    if (templates[k].effect == own || !(pass.scores[k].kept > kept_min * pass.scores[k].raw))
-      continue;
+    if (!(pass.scores[k].kept > kept_min * pass.scores[k].raw)) continue;
     AxisPair& pair = by_cause[templates[k].effect->cause];
     if (templates[k].axis == EffectAxis::kTheta) TakeBetter(k, standings, &pair.theta);
     if (templates[k].axis == EffectAxis::kPhi) TakeBetter(k, standings, &pair.phi);
   }
-  std::vector<AxisPair> pairs;
-  for (auto& [cause, pair] : by_cause) {
-    if (pair.theta == kNoTerm || pair.phi == kNoTerm) continue;
+  std::erase_if(by_cause, [](const auto& of_cause) {
+    return of_cause.second.theta == kNoTerm || of_cause.second.phi == kNoTerm;
+  });
+  for (auto& [cause, pair] : by_cause)
     pair.evidence = standings[pair.theta].evidence + standings[pair.phi].evidence;
-    pairs.push_back(pair);
-  }
-  std::ranges::stable_sort(pairs, std::ranges::greater{}, &AxisPair::evidence);
-  return pairs;
+  return by_cause;
 }
 
-// What a pair of the term's own cause would have, where it has shapes of one axis: beside what the
-// other axis does, which is noise to either, that may be next to nothing. Else all of its evidence.
-double EvidenceAsPair(const Templates& templates, const std::vector<Standing>& standings,
-                      const Effect* own) {
-  AxisPair pair;
-  double both = 0;
-  for (std::size_t k = 0; k < templates.size(); ++k) {
-    if (templates[k].effect != own) continue;
-    if (templates[k].axis == EffectAxis::kTheta) TakeBetter(k, standings, &pair.theta);
-    if (templates[k].axis == EffectAxis::kPhi) TakeBetter(k, standings, &pair.phi);
-    both = std::max(both, standings[k].evidence);
-  }
-  return pair.theta == kNoTerm || pair.phi == kNoTerm
-             ? both
-             : standings[pair.theta].evidence + standings[pair.phi].evidence;
+// Of other causes those that are worth a trial, the best first. Beside what the other axis does,
+// which is noise to either, a pair's evidence may be next to nothing: the own cause's pair says how
+// much it can be, or where it has none, the term itself.
+std::vector<AxisPair> PromisingPairs(const PairsByCause& pairs, const Templates& templates,
+                                     const std::vector<Standing>& standings, const Effect* own) {
+  constexpr double kNear = 0.5;  // of the own one's evidence
+  double evidence = 0;
+  if (const auto of_own = pairs.find(own->cause); of_own != pairs.end())
+    evidence = of_own->second.evidence;
+  else
+    for (std::size_t k = 0; k < templates.size(); ++k)
+      if (templates[k].effect == own) evidence = std::max(evidence, standings[k].evidence);
+  std::vector<AxisPair> promising;
+  for (const auto& [cause, pair] : pairs)
+    if (cause != own->cause && pair.evidence > std::max(kNear * evidence, 0.0))
+      promising.push_back(pair);
+  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::evidence);
+  return promising;
 }
 
 // In place of the shapes that `without` has not.
@@ -92,12 +93,10 @@ std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Mode
                                   const std::vector<Standing>& standings, const FleetGroups& groups,
                                   double kept_min) {
   constexpr std::size_t kMost = 6;
-  constexpr double kNear = 0.5;  // of the own pair's evidence
-  const Effect* own = term.form.effect;
-  const double least = std::max(kNear * EvidenceAsPair(templates, standings, own), 0.0);
   std::vector<PairTrial> trials;
-  for (const AxisPair& pair : PairsOf(pass, templates, standings, own, kept_min)) {
-    if (trials.size() >= kMost || pair.evidence <= least) break;
+  for (const AxisPair& pair : PromisingPairs(AllPairs(pass, templates, standings, kept_min),
+                                             templates, standings, term.form.effect)) {
+    if (trials.size() >= kMost) break;
     const Standing &theta = standings[pair.theta], &phi = standings[pair.phi];
     const auto take = [&](const Standing& on_theta, const Standing& on_phi) {
       trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], on_theta, groups),

@@ -19,8 +19,8 @@ struct PairTrial {
   double behind = 0;  // twice the difference of the logarithms of likelihood, at their price
   /// Whether it explains more than chance gives to as many amplitudes as it has more.
   bool beyond_chance = false;
-  /// The same as `behind` at no price, where the pair has few amplitudes more: that there are two
-  /// of them decides nothing.
+  /// `behind` without the price of the amplitudes that it has more, where they are two at most:
+  /// that there are as many decides nothing. Else `behind`.
   double behind_by_likelihood = 0;
   Fit fit;
 };

@@ -14,6 +14,12 @@ double LogChiSquareTail(double x, double dof);
 /// ln of the probability that the least of `tests` independent p-values is below exp(log_p).
 double LogLeastOf(double log_p, double tests);
 
+/// ln of the number of ways to take k of n. Pre: 0 <= k <= n.
+double LogChoose(double n, double k);
+
+/// P(at least `hits` of `tries`), each with probability `share`. Pre: 0 <= share <= 1.
+double BinomialTail(std::size_t hits, std::size_t tries, double share);
+
 /// ln(sum exp(terms)); -infinity for none.
 double LogSum(std::span<const double> terms);
 

@@ -55,18 +55,6 @@ bool IsCandidate(const CauseFound& cause, std::string_view name) {
          cause.candidates.end();
 }
 
-// P(at least `hits` of `tries`), each by `share`.
-double BinomialTail(std::size_t hits, std::size_t tries, double share) {
-  double tail = 0;
-  const auto n = static_cast<double>(tries);
-  for (std::size_t at = hits; at <= tries; ++at) {
-    const auto k = static_cast<double>(at);
-    tail += std::exp(std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1)) *
-            std::pow(share, k) * std::pow(1 - share, n - k);
-  }
-  return tail;
-}
-
 // Some units have it, and nearly all of these have the other, too: hardly by accident, unless
 // nearly all units have the other.
 bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause, std::size_t units) {

@@ -123,8 +123,8 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
           static_cast<double>(rows_before[end_of(far[j])] - rows_before[begin_of(far[i])]) /
           static_cast<double>(rows_before.back());
       // The expected number of sets of k that lie so close; of any k.
-      const double log_p = std::lgamma(all + 1) - std::lgamma(k + 1) - std::lgamma(all - k + 1) +
-                           std::log(k) + (k - 1) * std::log(share) + std::log(all);
+      const double log_p =
+          LogChoose(all, k) + std::log(k) + (k - 1) * std::log(share) + std::log(all);
       if (log_p < densest.log_p) densest.log_p = log_p, begin = i, end = j + 1;
     }
   }

@@ -182,10 +182,33 @@ TEST(SimulateCampaign, AModelPredictsTheCampaign) {
     return Focalfleet(words).exit;
   };
   EXPECT_EQ(exit_of({"--of", night}), 2);
+  EXPECT_EQ(exit_of({"--model", report + "/model.toml"}), 2);
+  EXPECT_EQ(exit_of({"--of", night, "--model", report + "/model.toml", "--outliers", "0.1"}), 2);
   EXPECT_EQ(exit_of({"--of", night, "--model", report + "/model.toml", "--units", "3"}), 2);
   EXPECT_EQ(exit_of({"--of", night, "--model", scratch / "no.toml"}), 1);
   EXPECT_EQ(exit_of({"--of", scratch / "no", "--model", report + "/model.toml"}), 1);
   EXPECT_EQ(exit_of({"--next", scratch / "no.csv"}), 1);
+  // What was measured stays.
+  const std::string measured = Slurp(night + "/moves.csv");
+  EXPECT_EQ(Focalfleet({"simulate", "campaign", "--of", night, "--model", report + "/model.toml",
+                        "--out", night + "/."})
+                .exit,
+            2);
+  EXPECT_EQ(Slurp(night + "/moves.csv"), measured);
+}
+
+TEST(Diagnose, SaysHowManyRowsAreSetAside) {
+  const ScratchDirectory scratch;
+  ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--outliers",
+                        "0.05", "--out", scratch / "night"})
+                .exit,
+            0);
+  const auto result = Focalfleet({"diagnose", scratch / "night", "--out", scratch / "report"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  const Json outliers = Json::parse(Slurp(scratch / "report/report.json"))["outliers"];
+  const int far = outliers["why"]["far from every prediction"];
+  EXPECT_GT(far, 10);
+  EXPECT_THAT(result.out, HasSubstr(std::to_string(far) + " of 480 rows: far from every"));
 }
 
 TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {
