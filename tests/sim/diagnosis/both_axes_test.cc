@@ -35,14 +35,20 @@ TEST(BothAxes, PlayOfBothIsNoDroop) {
     }
 }
 
-// Of a large play each axis by itself explains next to nothing: the other's is noise to it.
+// Of a large play each axis by itself explains next to nothing: the other's is noise to it. In
+// moves of one drive, with nobody's place on the rail, a droop is the same step of both axes.
 TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
-  const Diagnosis diagnosis = Verdicts(PlayOfBothAxes(0.4, 3));
+  Campaign campaign = PlayOfBothAxes(0.4, 3);
+  std::erase_if(campaign.covariates,
+                [](const Covariate& column) { return column.name == "rail_slot"; });
+  std::ranges::fill(
+      std::ranges::find(campaign.covariates, "drive_amplitude", &Covariate::name)->values, 1);
+  const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_FALSE(diagnosis.causes.empty());
   for (const CauseFound& cause : diagnosis.causes)
-    if (cause.cause == "supply_droop") {
-      EXPECT_THAT(cause.candidates, testing::Contains("backlash")) << Told(diagnosis);
-    }
+    EXPECT_TRUE(cause.cause != "supply_droop" ||
+                std::ranges::find(cause.candidates, "backlash") != cause.candidates.end())
+        << Told(diagnosis);
 }
 
 TEST(BothAxes, ADroopOfBothKeepsItsName) {

@@ -304,12 +304,15 @@ TEST(Families, AMovingImageHidesNeitherARelativeNorWhatIsPlain) {
 }
 
 TEST(Families, WhatFollowsAnAngleTakesThatAnglesNames) {
+  // Slow waves; the teeth of the other axis are its own.
   std::vector<CauseFound> causes = {Cause("eccentricity", "theta", 90),
-                                    Cause("backlash", "theta", 80)};
+                                    Cause("backlash", "theta", 80),
+                                    Cause("stage_ripple", "theta", 70)};
   std::vector<UnknownFound> unknown = {{"theta_cmd_deg", "phi angle", 0, 2, 300}};
   JudgeBesideUnknown(&causes, &unknown);
-  ASSERT_THAT(causes, SizeIs(1));
+  ASSERT_THAT(causes, SizeIs(2));
   EXPECT_EQ(causes[0].cause, "backlash");
+  EXPECT_EQ(causes[1].cause, "stage_ripple");
 }
 
 TEST(Families, WhereNoElevationIsToldTheImageMayShiftByThePlate) {
@@ -411,6 +414,25 @@ TEST(Families, TheSecondOfTwoNamesOfARotorIsWhatTheFirstLeaves) {
   EXPECT_THAT(judged(10, 300, "phi"), SizeIs(2));  // surely not the first
   EXPECT_THAT(judged(20, 1000, "phi"), SizeIs(2));
   EXPECT_THAT(judged(20, 300, "theta"), SizeIs(2));
+}
+
+// Exact waves of some units' rotors say nothing of what others do.
+TEST(Families, ARotorsSecondNameInOtherUnitsIsNoRemainder) {
+  CampaignModel model;
+  model.units.resize(3);
+  for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 893, unit.gear[kPhi] = 893;
+  RotorsToldBy told;
+  told[kPhi] = "cogging";
+  const auto judged = [&](std::uint32_t unit) {
+    std::vector<CauseFound> causes = {Cause("cogging", "phi", 2000),
+                                      Cause("phase_imbalance", "phi", 300)};
+    causes[0].amplitude = causes[1].amplitude = 10.0 / 893;
+    causes[0].evidence_of_unit = {{1, 2000}}, causes[1].evidence_of_unit = {{unit, 300}};
+    JudgeRotors(model, {}, told, &causes);
+    return causes.size();
+  };
+  EXPECT_EQ(judged(1), 1u);
+  EXPECT_EQ(judged(2), 2u);
 }
 
 TEST(Families, AScaleMayBeThePlatesWhereNoTemperatureIsTold) {

@@ -123,37 +123,67 @@ TEST(Rotor, ADetentThatBendsTheRippleIsCogging) {
     ExpectNamed("cogging", std::bind_front(DetentLag, detent, 2.0), 3);
 }
 
-// `noise_share`: of the noise that there is, what the fit believes.
-std::string_view SettledBy(const Turned& turned, double noise_share) {
+ModelTerm OfEachUnit(const Template& form, std::size_t units) {
+  ModelTerm term{.form = form, .sharing = Sharing::kUnit};
+  term.group_of_unit.resize(units);
+  std::iota(term.group_of_unit.begin(), term.group_of_unit.end(), 0u);
+  term.amplitude.assign(form.columns * units, 0), term.sigma = term.amplitude;
+  return term;
+}
+
+struct Settled {
+  RotorsToldBy told;
+  std::size_t terms = 0;
+  std::vector<std::string> rivals;
+};
+
+// A model that has phase_imbalance bent by order 2, and what that leaves of order 4.
+// `noise_share`: of the noise that there is, what the fit believes. `also`: in the library, too.
+Settled Settle(const Turned& turned, double noise_share, const Effect* also = nullptr) {
   const Campaign campaign = RotorsTurned(turned, 3);
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);
-  const Templates forms = ListTemplates(*FindEffect("phase_imbalance"), facts);
-  const auto form = std::ranges::find_if(forms, [](const Template& one) {
-    return one.axis == EffectAxis::kTheta && one.shape == 2 && one.columns == 6;
-  });
-  ModelTerm term{.form = *form, .sharing = Sharing::kUnit};
-  term.group_of_unit.resize(campaign.units.size());
-  std::iota(term.group_of_unit.begin(), term.group_of_unit.end(), 0u);
-  term.amplitude.assign(form->columns * campaign.units.size(), 0);
-  term.sigma = term.amplitude;
-  fit.model.terms.push_back(term);
+  Templates library = ListTemplates(*FindEffect("phase_imbalance"), facts);
+  const auto of = [&](std::size_t columns) {
+    return *std::ranges::find_if(library, [&](const Template& one) {
+      return one.axis == EffectAxis::kTheta && one.shape == 2 && one.columns == columns;
+    });
+  };
+  fit.model.terms = {OfEachUnit(of(6), campaign.units.size())};
+  Template left = of(6);
+  left.shape = 4;
+  fit.model.terms.push_back(OfEachUnit(left, campaign.units.size()));
+  if (also != nullptr)
+    for (Template& form : ListTemplates(*also, facts)) library.push_back(std::move(form));
   StepFit(&fit);
   SettleFit(&fit, 3);
   fit.noise.place_um *= noise_share;
   for (const std::size_t axis : {kTheta, kPhi})
     fit.noise.angle_deg[axis] *= noise_share, fit.noise.rest_deg[axis] *= noise_share;
   Selection selection;
-  selection.accepted.resize(1);
-  const RotorsToldBy told = SettleRotors(forms, {}, {}, &fit, &selection);
-  EXPECT_TRUE(told[kTheta].empty() || told[kTheta] == fit.model.terms[0].form.effect->cause);
-  return told[kTheta];
+  selection.accepted.resize(2);
+  Settled settled{.told = SettleRotors(library, {}, {}, &fit, &selection)};
+  settled.terms = fit.model.terms.size();
+  EXPECT_EQ(settled.terms, selection.accepted.size());
+  for (const Rival& rival : selection.accepted[0].rivals) settled.rivals.emplace_back(rival.cause);
+  EXPECT_TRUE(settled.told[kTheta].empty() ||
+              settled.told[kTheta] == fit.model.terms[0].form.effect->cause);
+  return settled;
 }
 
 TEST(Rotor, WhatIsFarFromEitherWaveIsNeithers) {
   const Turned turned = std::bind_front(DetentLag, 0.5, 2.0);
-  EXPECT_EQ(SettledBy(turned, 1), "cogging");
-  EXPECT_EQ(SettledBy(turned, 0.3), "");
+  EXPECT_EQ(Settle(turned, 1).told[kTheta], "cogging");
+  EXPECT_EQ(Settle(turned, 0.3).told[kTheta], "");
+}
+
+// What is exchanged stands alone, and has whom it cannot be told from beside it.
+TEST(Rotor, AnExchangedNameHasRivalsOfItsOwn) {
+  Effect twin = *FindEffect("cogging");
+  twin.cause = "cogging_again";
+  const Settled settled = Settle(std::bind_front(DetentLag, 0.5, 2.0), 1, &twin);
+  EXPECT_EQ(settled.terms, 1u);
+  EXPECT_EQ(settled.rivals, std::vector<std::string>{"cogging_again"});
 }
 
 TEST(Rotor, AFieldThatTurnsInAnEllipseIsPhaseImbalance) {
