@@ -72,20 +72,13 @@ std::vector<std::optional<Pose>> OffsetsOf(const FleetView& view,
   for (std::uint32_t n = 0; n < targets.size(); ++n) {
     const UnitView& unit = view.coordinator->unit({n});
     if (!targets[n] || unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) continue;
-    const Unit& described = view.layout->unit({n});
-    const UnitDrive& drive = view.coordinator->drives()[n];
-    const auto count =
-        view.compensation->CountFor({n}, {.fibre_fp = FibreAt(described, drive, *targets[n]),
-                                          .now = CountOf(view, {n}, PlaceOf(unit.knowledge)),
-                                          .guess = CountOf(view, {n}, *targets[n]),
-                                          .last_deg = last_deg});
-    if (!count) continue;
-    const double angle_deg[kAxisCount] = {count->theta_deg, count->phi_deg};
-    Pose offset = *targets[n];
-    for (const Axis axis : kAxes)
-      offset[Index(axis)] -= NearestVectors(angle_deg[Index(axis)], described.axis[Index(axis)],
-                                            drive.axis[Index(axis)]);
-    offsets[n] = offset;
+    offsets[n] = view.compensation->OffsetFor({n},
+                                              {.unit = &view.layout->unit({n}),
+                                               .drive = &view.coordinator->drives()[n],
+                                               .place = PlaceOf(unit.knowledge),
+                                               .offset = unit.offset,
+                                               .last_deg = last_deg},
+                                              *targets[n]);
   }
   return offsets;
 }

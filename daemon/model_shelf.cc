@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "daemon/campaign/campaign_log.h"
 #include "daemon/campaign/sha256.h"
 
 namespace focalfleet {
@@ -60,23 +59,9 @@ Json ChangeJson(const ModelHistory& change) {
 
 }  // namespace
 
-Result<ModelShelf::Checked> ModelShelf::Check(const std::string& text,
-                                              const std::string& file) const {
-  std::vector<sim::CampaignUnit> units;
-  for (const Unit& unit : layout_->units()) units.push_back(DescribeUnit(unit));
-  FOCALFLEET_TRY_ASSIGN(ModelFile read, ReadModelFile(text, file, units));
-  if (read.verdict == "insufficient")
-    return Fail(ErrorCode::kInvalid, file + ": its campaign was insufficient for a diagnosis");
-  Compensation compensation(read, *layout_);
-  if (compensation.units() == 0)
-    return Fail(ErrorCode::kInvalid,
-                file + ": it says of no unit of this fleet where its campaign left it");
-  return Checked{std::move(read), std::move(compensation)};
-}
-
-void ModelShelf::Take(Checked checked) {
-  file_ = std::move(checked.file);
-  compensation_ = std::move(checked.compensation);
+void ModelShelf::Take(ModelInForce model) {
+  file_ = std::move(model.file);
+  compensation_ = std::move(model.compensation);
 }
 
 ModelRow ModelShelf::Append(ModelRow row) {
@@ -91,26 +76,27 @@ Status ModelShelf::Restore(std::vector<ModelHistory> newest_first, const std::st
   changes_.assign(std::make_move_iterator(newest_first.rbegin()),
                   std::make_move_iterator(newest_first.rend()));
   if (changes_.empty() || changes_.back().row.sha256.empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(Checked checked, Check(text, "model " + changes_.back().row.name));
-  Take(std::move(checked));
+  FOCALFLEET_TRY_ASSIGN(ModelInForce model,
+                        ReadModelInForce(text, "model " + changes_.back().row.name, *layout_));
+  Take(std::move(model));
   return {};
 }
 
 Result<ModelRow> ModelShelf::Load(const std::string& text, const std::string& file) {
   const std::string sha256 = Sha256Hex(text);
-  FOCALFLEET_TRY_ASSIGN(Checked checked, Check(text, file));
+  FOCALFLEET_TRY_ASSIGN(ModelInForce model, ReadModelInForce(text, file, *layout_));
   if (compensation_ && changes_.back().row.sha256 == sha256)
     return Fail(ErrorCode::kRefused, file + ": it is in force already");
   ModelRow row{.entry = 0,
                .sha256 = sha256,
                .restores = 0,
-               .name = checked.file.model.name,
-               .campaign = checked.file.campaign,
-               .campaign_sha256 = checked.file.campaign_sha256,
-               .rms_before_um = checked.file.rms_before_um,
-               .rms_after_um = checked.file.rms_after_um,
+               .name = model.file.model.name,
+               .campaign = model.file.campaign,
+               .campaign_sha256 = model.file.campaign_sha256,
+               .rms_before_um = model.file.rms_before_um,
+               .rms_after_um = model.file.rms_after_um,
                .text = std::make_shared<const std::string>(text)};
-  Take(std::move(checked));
+  Take(std::move(model));
   return Append(std::move(row));
 }
 
@@ -149,8 +135,8 @@ Result<ModelRow> ModelShelf::Rollback(
     return Append(std::move(row));
   }
   FOCALFLEET_TRY_ASSIGN(const std::string text, text_of(row.sha256));
-  FOCALFLEET_TRY_ASSIGN(Checked checked, Check(text, "model " + row.name));
-  Take(std::move(checked));
+  FOCALFLEET_TRY_ASSIGN(ModelInForce model, ReadModelInForce(text, "model " + row.name, *layout_));
+  Take(std::move(model));
   return Append(std::move(row));
 }
 

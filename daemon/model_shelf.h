@@ -53,12 +53,7 @@ class ModelShelf {
   [[nodiscard]] std::string name() const { return file_ ? file_->model.name : ""; }
 
  private:
-  struct Checked {
-    ModelFile file;
-    Compensation compensation;
-  };
-  Result<Checked> Check(const std::string& text, const std::string& file) const;
-  void Take(Checked checked);
+  void Take(ModelInForce model);
   ModelRow Append(ModelRow row);
   /// Of changes_: itself, or the one that it restores.
   [[nodiscard]] std::size_t Origin(std::size_t index) const;

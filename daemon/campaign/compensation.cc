@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "daemon/campaign/campaign_log.h"
 
 namespace focalfleet {
 namespace {
@@ -132,6 +135,25 @@ std::optional<AxisAngles> Compensation::CountFor(PositionerIndex i, const Wish& 
   return AxisAngles{best[0], best[1]};
 }
 
+std::optional<Pose> Compensation::OffsetFor(PositionerIndex i, const Stand& stand,
+                                            const Pose& target) const {
+  const Pose& offset = stand.offset;
+  const auto counted = [&](const Pose& place) {
+    return AnglesOf(*stand.unit, *stand.drive, {place[0] - offset[0], place[1] - offset[1]});
+  };
+  const auto count = CountFor(i, {.fibre_fp = FibreAt(*stand.unit, *stand.drive, target),
+                                  .now = counted(stand.place),
+                                  .guess = counted(target),
+                                  .last_deg = stand.last_deg});
+  if (!count) return std::nullopt;
+  const double angle_deg[kAxisCount] = {count->theta_deg, count->phi_deg};
+  Pose more = target;
+  for (const Axis axis : kAxes)
+    more[Index(axis)] -= NearestVectors(angle_deg[Index(axis)], stand.unit->axis[Index(axis)],
+                                        stand.drive->axis[Index(axis)]);
+  return more;
+}
+
 std::optional<PointFp> Compensation::FibreAfter(PositionerIndex i, const AxisAngles& count) const {
   if (!units_[i.value]) return std::nullopt;
   sim::PoseTrack way = WayOf(*units_[i.value]);
@@ -171,6 +193,20 @@ void Compensation::Shorten(KnownUnit* unit) {
 std::size_t Compensation::units() const {
   return static_cast<std::size_t>(
       std::ranges::count_if(units_, [](const auto& unit) { return unit.has_value(); }));
+}
+
+Result<ModelInForce> ReadModelInForce(std::string_view text, const std::string& file,
+                                      const Layout& layout) {
+  std::vector<sim::CampaignUnit> units;
+  for (const Unit& unit : layout.units()) units.push_back(DescribeUnit(unit));
+  FOCALFLEET_TRY_ASSIGN(ModelFile read, ReadModelFile(text, file, units));
+  if (read.verdict == "insufficient")
+    return Fail(ErrorCode::kInvalid, file + ": its campaign was insufficient for a diagnosis");
+  Compensation compensation(read, layout);
+  if (compensation.units() == 0)
+    return Fail(ErrorCode::kInvalid,
+                file + ": it says of no unit of this fleet where its campaign left it");
+  return ModelInForce{std::move(read), std::move(compensation)};
 }
 
 }  // namespace focalfleet

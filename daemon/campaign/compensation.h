@@ -14,11 +14,14 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/campaign/model_file.h"
+#include "fleet/drive.h"
 #include "fleet/kinematics.h"
 #include "fleet/layout.h"
+#include "protocol/base/result.h"
 #include "sim/effects/pose_track.h"
 
 namespace focalfleet {
@@ -39,6 +42,20 @@ class Compensation {
   /// the model where the fibre can get there, else near the nearest.
   /// Cost: some microseconds for each effect and iteration; at most 12 iterations.
   [[nodiscard]] std::optional<AxisAngles> CountFor(PositionerIndex i, const Wish& wish) const;
+
+  /// A unit as the planner has it, in whole vectors.
+  struct Stand {
+    const Unit* unit = nullptr;
+    const UnitDrive* drive = nullptr;
+    Pose place{};
+    Pose offset{};                              // its place less its own count
+    std::array<double, kAxisCount> last_deg{};  // as in a wish
+  };
+  /// How much more than its count its place is to be from here on, so that the way from one place
+  /// to the target is the way of its count. None: as CountFor.
+  [[nodiscard]] std::optional<Pose> OffsetFor(PositionerIndex i, const Stand& stand,
+                                              const Pose& target) const;
+
   /// Where the model has the fibre when the unit comes from its last rest to `count`.
   [[nodiscard]] std::optional<PointFp> FibreAfter(PositionerIndex i, const AxisAngles& count) const;
 
@@ -73,5 +90,15 @@ class Compensation {
   std::vector<std::optional<KnownUnit>> units_;  // by position
   std::vector<std::string> left_out_;
 };
+
+/// A model.toml whose commands a fleet may take.
+struct ModelInForce {
+  ModelFile file;
+  Compensation compensation;
+};
+/// Errors: as ReadModelFile; kInvalid: its campaign was insufficient, or it says of no unit of the
+/// layout where its campaign left it.
+Result<ModelInForce> ReadModelInForce(std::string_view text, const std::string& file,
+                                      const Layout& layout);
 
 }  // namespace focalfleet

@@ -2,8 +2,11 @@
 // moves, and no plan is written.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <ctime>
+#include <optional>
+#include <utility>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/drive_options.h"
@@ -28,6 +31,7 @@ struct EstimateOptions {
   std::string mode;   // empty: all
   UnitDrive drive;    // both axes as the first; of every unit that was not tuned in `store`
   std::string store;  // empty: none
+  std::string model;  // empty: none
   std::string out;    // empty: none
 };
 
@@ -40,6 +44,7 @@ struct ModeEstimate {
 struct Estimated {
   OfflineFleet fleet;
   OfflinePlan planned;
+  std::optional<ModelInForce> model;
   EstimateSpread spread;
   std::vector<ModeEstimate> modes;
 };
@@ -73,6 +78,14 @@ Result<StatePoses> StartOf(const EstimateOptions& options, const OfflineFleet& f
   return StatePoses(folded.begin(), folded.end());
 }
 
+Result<std::optional<ModelInForce>> ModelOf(const EstimateOptions& options,
+                                            const OfflineFleet& fleet) {
+  if (options.model.empty()) return std::optional<ModelInForce>();
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.model));
+  FOCALFLEET_TRY_ASSIGN(ModelInForce model, ReadModelInForce(text, options.model, fleet.layout));
+  return std::optional(std::move(model));
+}
+
 Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& options) {
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
   UnitDrive drive = options.drive;
@@ -81,12 +94,15 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
   FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
   for (UnitDrive& tuned : fleet.drives) tuned.v_bus_V = drive.v_bus_V;
   FOCALFLEET_TRY_ASSIGN(const StatePoses start, StartOf(options, fleet));
+  FOCALFLEET_TRY_ASSIGN(auto model, ModelOf(options, fleet));
   const std::string from = options.from.empty() ? "all arms folded" : options.from;
-  FOCALFLEET_TRY_ASSIGN(
-      OfflinePlan planned,
-      PlanOffline(context, fleet, start,
-                  {.targets = options.targets, .from = from, .plan = {.fixed = options.fixed}}));
-  Estimated estimated{std::move(fleet), std::move(planned), {}, {}};
+  FOCALFLEET_TRY_ASSIGN(OfflinePlan planned,
+                        PlanOffline(context, fleet, start,
+                                    {.targets = options.targets,
+                                     .from = from,
+                                     .plan = {.fixed = options.fixed},
+                                     .compensation = model ? &model->compensation : nullptr}));
+  Estimated estimated{std::move(fleet), std::move(planned), std::move(model), {}, {}};
   bool any_turns = false;
   bool any_starts = false;
   StartCheck check{MotorModel{}};
@@ -152,6 +168,17 @@ Json ModeJson(const ModeEstimate& of) {
   return mode;
 }
 
+Json ModelJson(const Estimated& estimated) {
+  if (!estimated.model) return nullptr;
+  Json beyond = Json::array();
+  for (const PositionerIndex i : estimated.planned.beyond_range)
+    beyond.push_back(estimated.fleet.layout.unit(i).id.value);
+  return {{"name", estimated.model->file.model.name},
+          {"compensated", estimated.planned.compensated},
+          {"beyond_range", beyond},
+          {"left_out", estimated.model->compensation.left_out()}};
+}
+
 Json Summary(const Estimated& estimated, const EstimateOptions& options) {
   const AxisDrive& drive = options.drive.axis[0];
   Json modes = Json::array();
@@ -159,8 +186,9 @@ Json Summary(const Estimated& estimated, const EstimateOptions& options) {
   const Plan& plan = estimated.planned.plan;
   return {{"units", estimated.fleet.layout.size()},
           {"targeted", estimated.planned.targeted},
-          {"served", estimated.planned.targeted - plan.unserved.size()},
+          {"served", estimated.planned.served()},
           {"unserved", UnservedJson(plan, estimated.fleet.layout)},
+          {"model", ModelJson(estimated)},
           {"v_bus_V", options.drive.v_bus_V},
           {"counter1", drive.counter1},
           {"repeat", drive.repeat},
@@ -203,19 +231,35 @@ std::string DescribeMode(const ModeEstimate& of) {
   return text + DescribeBelowCritical(of.starts);
 }
 
+std::string DescribeModel(const Estimated& estimated) {
+  if (!estimated.model) return "";
+  const auto& left_out = estimated.model->compensation.left_out();
+  return fmt::format("\n  {}: {} of {} targets compensated{}{}", estimated.model->file.model.name,
+                     estimated.planned.compensated, estimated.planned.targeted,
+                     left_out.empty() ? "" : "; not compensated: ", fmt::join(left_out, ", "));
+}
+
+std::string DescribeBeyondRange(const Estimated& estimated) {
+  std::string text;
+  for (const PositionerIndex i : estimated.planned.beyond_range)
+    text += fmt::format("\n  unit {}: by the model its range ends before the target",
+                        estimated.fleet.layout.unit(i).id.value);
+  return text;
+}
+
 std::string Describe(const Estimated& estimated, const EstimateOptions& options) {
-  const Plan& plan = estimated.planned.plan;
-  std::string text = fmt::format("{}: {} of {} targets served\n  {}\n  makespan {} s",
-                                 options.targets, estimated.planned.targeted - plan.unserved.size(),
-                                 estimated.planned.targeted, DescribeDrive(options.drive),
-                                 BandText(estimated.modes.front().figures.makespan_s, 2));
+  std::string text = fmt::format(
+      "{}: {} of {} targets served\n  {}{}\n  makespan {} s", options.targets,
+      estimated.planned.served(), estimated.planned.targeted, DescribeDrive(options.drive),
+      DescribeModel(estimated), BandText(estimated.modes.front().figures.makespan_s, 2));
   for (const ModeEstimate& of : estimated.modes) text += DescribeMode(of);
   text += fmt::format(
       "\n(from low to high: load +-{:.0f} %, winding resistance +-{:.0f} %, all motors alike, and "
       "{:.0f} % of the model)",
       100 * estimated.spread.load, 100 * estimated.spread.resistance,
       100 * estimated.spread.model_error);
-  return text + DescribeUnserved(UnservedJson(plan, estimated.fleet.layout));
+  return text + DescribeUnserved(UnservedJson(estimated.planned.plan, estimated.fleet.layout)) +
+         DescribeBeyondRange(estimated);
 }
 
 ExitCode RunEstimate(const Context& context, const EstimateOptions& options) {
@@ -224,7 +268,7 @@ ExitCode RunEstimate(const Context& context, const EstimateOptions& options) {
   if (context.json) PrintJson(Summary(*estimated, options));
   const std::string text = Describe(*estimated, options);
   Say(context, text);
-  if (estimated->planned.plan.unserved.empty()) return ExitCode::kOk;
+  if (estimated->planned.served() == estimated->planned.targeted) return ExitCode::kOk;
   NameUnserved(context, text);
   return ExitCode::kSomeUnserved;
 }
@@ -261,6 +305,8 @@ void AddEstimateCommand(CommandLine* line) {
   OneOf(command->add_option("--mode", options->mode, "One wave mode (default: all, side by side)"),
         ModeWords());
   AddTunedStore(command, &options->store);
+  AddFile(command, "--model", &options->model,
+          "model.toml of a diagnosis: units are told what it says that leads to their targets");
   AxisDrive& axis = options->drive.axis[0];
   command->add_option("--v-bus", options->drive.v_bus_V, "Bus voltage, V")
       ->check(NumberBetween(0.1, kBridgeMax_V))

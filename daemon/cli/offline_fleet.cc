@@ -26,10 +26,10 @@ std::vector<UnitKnowledge> KnowledgeOf(const StatePoses& state) {
   return knowledge;
 }
 
-Result<Plan> PlanOf(const PlanRequest& request, const PlanFiles& files, std::uint32_t* sectors) {
-  if (files.sectors <= 1) return MakePlan(request, files.plan);
-  FOCALFLEET_TRY_ASSIGN(SectoredPlan made,
-                        PlanBySectors(request, files.plan, {.count = files.sectors}));
+Result<Plan> PlanOf(const PlanRequest& request, const PlanOptions& options, std::uint32_t wanted,
+                    std::uint32_t* sectors) {
+  if (wanted <= 1) return MakePlan(request, options);
+  FOCALFLEET_TRY_ASSIGN(SectoredPlan made, PlanBySectors(request, options, {.count = wanted}));
   *sectors = static_cast<std::uint32_t>(made.sectors.size());
   return std::move(made.plan);
 }
@@ -95,25 +95,77 @@ Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
   return ReadState(text, path, fleet.layout, fleet.drives);
 }
 
+namespace {
+
+/// What compensating changes of a request.
+struct Told {
+  std::vector<Pose> offsets;  // Shape: (n)
+  std::size_t compensated = 0;
+  std::vector<PositionerIndex> beyond_range;
+};
+
+bool CanCount(const Unit& unit, const UnitDrive& drive, const Pose& place, const Pose& offset) {
+  return InRange(unit, drive, {place[0] - offset[0], place[1] - offset[1]});
+}
+
+/// From here on `state` and `targets` are places.
+Told TellByModel(const Compensation& compensation, const OfflineFleet& fleet, StatePoses* state,
+                 StatePoses* targets) {
+  Told told{
+      .offsets = std::vector<Pose>(fleet.layout.size()), .compensated = 0, .beyond_range = {}};
+  for (std::uint32_t i = 0; i < fleet.layout.size(); ++i) {
+    const Unit& unit = fleet.layout.unit({i});
+    auto& target = (*targets)[i];
+    auto& stands = (*state)[i];
+    if (!unit.enabled || !target || !stands) continue;
+    const auto offset = compensation.OffsetFor(
+        {i}, {.unit = &unit, .drive = &fleet.drives[i], .place = *stands}, *target);
+    if (!offset) continue;
+    if (!CanCount(unit, fleet.drives[i], *target, *offset)) {
+      told.beyond_range.push_back({i});
+      target.reset();
+      continue;
+    }
+    ++told.compensated;
+    told.offsets[i] = *offset;
+    for (const Axis axis : kAxes) (*stands)[Index(axis)] += (*offset)[Index(axis)];
+  }
+  return told;
+}
+
+}  // namespace
+
 Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
                                 const StatePoses& state, const PlanFiles& files) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.targets));
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
   TellPassedOver(context, files.targets, targets.ignored_columns);
-  const std::vector<UnitKnowledge> start = KnowledgeOf(state);
   FOCALFLEET_TRY_ASSIGN(StatePoses poses,
-                        ResolveTargets(targets, fleet.layout, fleet.drives, start));
+                        ResolveTargets(targets, fleet.layout, fleet.drives, KnowledgeOf(state)));
+  StatePoses places = state;
+  Told told;
+  PlanOptions options = files.plan;
+  if (files.compensation != nullptr) {
+    told = TellByModel(*files.compensation, fleet, &places, &poses);
+    // Two that stand clear by their counts may be nearer by the model.
+    options.lead_apart = true;
+  }
   std::vector<std::uint8_t> frozen(fleet.layout.size());
   for (std::uint32_t i = 0; i < frozen.size(); ++i) {
     frozen[i] = fleet.layout.unit({i}).enabled ? 0 : 1;
   }
-  OfflinePlan made{{}, {}, targets.rows.size()};
+  OfflinePlan made{.plan = {},
+                   .targets = {},
+                   .targeted = targets.rows.size(),
+                   .compensated = told.compensated,
+                   .beyond_range = std::move(told.beyond_range)};
   auto plan = PlanOf({.layout = &fleet.layout,
                       .drives = fleet.drives,
-                      .start = start,
+                      .start = KnowledgeOf(places),
                       .targets = poses,
-                      .frozen = frozen},
-                     files, &made.sectors);
+                      .frozen = frozen,
+                      .offsets = told.offsets},
+                     options, files.sectors, &made.sectors);
   if (!plan) {
     return Fail(plan.error().code,
                 fmt::format("{} from {}: {}", files.targets, files.from, plan.error().text));

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/campaign/compensation.h"
 #include "daemon/cli/context.h"
 #include "fleet/drive.h"
 #include "fleet/layout.h"
@@ -59,17 +60,25 @@ using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
 
 struct PlanFiles {
   std::string targets;
-  std::string from;    // for messages: what `state` was read from
+  std::string from;  // for messages: what `state` was read from
   PlanOptions plan = {};
   std::uint32_t sectors = 1;
+  const Compensation* compensation = nullptr;  // none: units are told their targets as they are
 };
 struct OfflinePlan {
   Plan plan;
   StatePoses targets;
   std::size_t targeted = 0;
-  std::uint32_t sectors = 1;  // fewer than asked for where some had to become one
+  std::uint32_t sectors = 1;    // fewer than asked for where some had to become one
+  std::size_t compensated = 0;  // are told what their model has for their target
+  std::vector<PositionerIndex> beyond_range = {};  // could not be told that: they stay
+  [[nodiscard]] std::size_t served() const {
+    return targeted - plan.unserved.size() - beyond_range.size();
+  }
 };
-/// The plan from `state` to the targets; disabled units stand. Errors: as LoadFleet, and those of
+/// The plan from `state`, by each unit's count, to the targets; disabled units stand. With a
+/// compensation places differ from counts as the daemon has them: by what the model says of each
+/// unit's target. Errors: as LoadFleet, and those of
 /// ResolveTargets and MakePlan.
 Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
                                 const StatePoses& state, const PlanFiles& files);

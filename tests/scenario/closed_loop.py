@@ -40,5 +40,19 @@ print(
     f"{planted}: {report['verdict']}: {', '.join(named) or 'nothing'}; fresh targets blind {before:.1f} um rms without the model, "
     f"{predicted:.1f} predicted with it, {achieved:.1f} achieved"
 )
+
+
+def told(file):
+    with open(file) as text:
+        estimate = json.load(text)
+    return estimate["makespan_s"]["value"], estimate["modes"][0]["energy_J"]["value"]
+
+
+with open("one.json") as text:
+    one = json.load(text)
+makespan_s, energy_J = told("estimate.json")
+assert makespan_s == one["makespan_predicted_s"], (makespan_s, one)
+assert math.isclose(energy_J, one["energy_J"], rel_tol=1e-6), (energy_J, one)  # summed another way
+assert told("nominal.json") != told("estimate.json"), told("nominal.json")
 assert achieved < 0.5 * before, (before, achieved)
 assert achieved < 1.3 * predicted + 2, (predicted, achieved)

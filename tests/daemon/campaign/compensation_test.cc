@@ -187,6 +187,37 @@ TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
   EXPECT_GT(uncompensated_um, 50);  // or there was nothing to do
 }
 
+// What the planner has is places: their way is the way of the count, and the count leads there.
+TEST(Compensation, OffsetsMakeTheWayBetweenPlacesThatOfTheCount) {
+  Rng rng(6);
+  const Layout layout = SmallLayout();
+  Moves moves(layout, &rng);
+  const UnitDrive drive;
+  const Pose stood{9000, 20000}, before{40, -30};
+  for (std::uint32_t n = 0; n < layout.size(); ++n)
+    moves.Go(n, AnglesOf(layout.units()[n], drive, stood));
+  const Compensation compensation(FileOf(GearsInService(layout, &rng), moves.Campaign()), layout);
+  for (std::uint32_t n = 0; n < layout.size(); ++n) {
+    const Unit& unit = layout.units()[n];
+    const Pose target{6000 * static_cast<std::int32_t>(n) - 20000, 24000};
+    const Compensation::Stand stand{.unit = &unit,
+                                    .drive = &drive,
+                                    .place = {stood[0] + before[0], stood[1] + before[1]},
+                                    .offset = before};
+    const auto offset = compensation.OffsetFor({n}, stand, target);
+    ASSERT_TRUE(offset);
+    const AxisAngles told =
+        AnglesOf(unit, drive, {target[0] - (*offset)[0], target[1] - (*offset)[1]});
+    const auto fibre_fp = compensation.FibreAfter({n}, told);
+    ASSERT_TRUE(fibre_fp);
+    const PointFp wanted = FibreAt(unit, drive, target);
+    // A vector is 4 mdeg: at most half of one of each axis is left.
+    EXPECT_NEAR(fibre_fp->x_mm, wanted.x_mm, 1e-3);
+    EXPECT_NEAR(fibre_fp->y_mm, wanted.y_mm, 1e-3);
+    EXPECT_GT(std::abs((*offset)[0]) + std::abs((*offset)[1]), 10);  // or there was nothing to do
+  }
+}
+
 TEST(Compensation, AnEmpiricalRippleIsCompensatedLikeThatOfAGear) {
   Rng rng(4);
   const Layout layout = SmallLayout();

@@ -1,5 +1,6 @@
 // estimate as a process: its figures are those of the plan, its curves add up, and bad input is
 // named and writes nothing.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <map>
@@ -157,6 +158,79 @@ TEST_F(EstimateCommand, TakesVoltageAndTimerCounts) {
   const Json coarse = EstimateJson({"--subdivision", "48", "--repeat", "216"});
   EXPECT_NEAR(Of(coarse["makespan_s"]) / Of(slow["makespan_s"]), 1, 0.05);
   EXPECT_EQ(coarse["subdivision"], 48);
+}
+
+/// A model of unit 1 alone, whose theta goes so much farther than it is told since theta 0.
+std::string GearsOf(double gear_scale) {
+  return fmt::format(
+      "name = \"night-extended\"\n"
+      "[[unit]]\nunit_id = 1\nbase_x_mm = 0\nbase_y_mm = 0\narm_theta_mm = 8.25\n"
+      "arm_phi_mm = 8.25\ntheta_zero_deg = 0\nphi_zero_deg = 0\n"
+      "left_theta_deg = 0\nleft_phi_deg = 150\nadded_theta_deg = 0\nadded_phi_deg = 0\n"
+      "[[effect]]\ncause = \"gear_scale\"\naxis = \"theta\"\nform = 0\nshape = 0\nmemory = 2\n"
+      "columns = 1\nunits = [1]\namplitude = [{}]\nsigma = [1e-4]\n"
+      "[[effect]]\ncause = \"start_skew\"\naxis = \"theta\"\nform = 0\nshape = 0\nmemory = 0\n"
+      "columns = 1\nunits = [1]\namplitude = [0.01]\nsigma = [1e-4]\n",
+      gear_scale);
+}
+
+/// All 37 units stand so.
+std::string StateOf(double theta_deg, double phi_deg) {
+  std::string text = "unit_id,theta_deg,phi_deg\n";
+  for (int unit = 1; unit <= 37; ++unit)
+    text += fmt::format("{},{},{}\n", unit, theta_deg, phi_deg);
+  return text;
+}
+
+TEST_F(EstimateCommand, TellsWhatTheCommandsOfAModelTake) {
+  const std::string model = scratch_.Put("model.toml", GearsOf(0.01));
+  const std::string from = scratch_.Put("s.csv", StateOf(0, 150));
+  targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,-100,150\n");
+  const Json nominal = EstimateJson({"--from", from});
+  const Json told = EstimateJson({"--from", from, "--model", model});
+  EXPECT_TRUE(nominal["model"].is_null());
+  EXPECT_EQ(told["served"], 1);
+  EXPECT_EQ(told["model"]["name"], "night-extended");
+  EXPECT_EQ(told["model"]["compensated"], 1);
+  EXPECT_EQ(told["model"]["left_out"], Json::array({"start_skew"}));
+  // Time goes with the way of the count; so does energy, as the motor turns at the same speed.
+  EXPECT_NEAR(Of(nominal["makespan_s"]) / Of(told["makespan_s"]), 1.01, 2e-4);
+  EXPECT_NEAR(Of(nominal["modes"][0]["energy_J"]) / Of(told["modes"][0]["energy_J"]), 1.01, 2e-4);
+  // A unit that its campaign did not measure is told its target.
+  targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n2,-100,150\n");
+  EXPECT_EQ(Of(EstimateJson({"--from", from, "--model", model})["makespan_s"]),
+            Of(EstimateJson({"--from", from})["makespan_s"]));
+}
+
+TEST_F(EstimateCommand, NamesUnitsThatTheModelWouldSendBeyondTheirRange) {
+  const std::string model = scratch_.Put("model.toml", GearsOf(-0.01));
+  const std::string from = scratch_.Put("s.csv", StateOf(150, 150));
+  targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,189.5,150\n2,100,150\n");
+  EXPECT_EQ(EstimateJson({"--from", from})["served"], 2);
+  const auto result = Estimate({"--from", from, "--model", model, "--json"});
+  EXPECT_EQ(result.exit, 3) << result.err << result.out;
+  const Json told = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(told["served"], 1);
+  EXPECT_EQ(told["model"]["compensated"], 0);
+  EXPECT_EQ(told["model"]["beyond_range"], Json::array({1}));
+  const std::string text = Estimate({"--from", from, "--model", model}).out;
+  EXPECT_THAT(text, HasSubstr("night-extended: 0 of 2 targets compensated; not compensated: "
+                              "start_skew"));
+  EXPECT_THAT(text, HasSubstr("unit 1: by the model its range ends before the target"));
+}
+
+TEST_F(EstimateCommand, RefusesAModelThatIsNoneOfThisFleet) {
+  const auto refuse = [&](const std::string& text, const std::string& complaint) {
+    ExpectRefused({"--model", scratch_.Put("m.toml", text)}, 1, complaint);
+  };
+  refuse("[[unit", "m.toml:1");
+  std::string far = GearsOf(0.01);
+  far.replace(far.find("base_x_mm = 0"), 13, "base_x_mm = 99");
+  refuse(far, "m.toml:2: unit 1 has its base more than 10 mm from where it is described");
+  std::string unmeasured = GearsOf(0.01);
+  unmeasured.replace(unmeasured.find("unit_id = 1"), 11, "unit_id = 4711");
+  refuse(unmeasured, "it says of no unit of this fleet where its campaign left it");
+  ExpectRefused({"--model", scratch_ / "none.toml"}, 1, "none.toml: cannot be read");
 }
 
 TEST_F(EstimateCommand, TellsPeopleATableForEachMode) {
