@@ -375,10 +375,9 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.insufficient = WhyInsufficient(facts, aside);
   if (!diagnosis.insufficient.empty()) return diagnosis;
   options.progress(0.02, "static geometry");
-  Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
   std::optional<Campaign> as_named;  // under the table's names, where some of these are wrong
-  diagnosis.causes = UndoExchanges(fit, &campaign, &facts, &as_named);
-  if (as_named) fit = StartFit(facts, diagnosis.model, aside, options.parallel);
+  diagnosis.causes = UndoExchanges(&campaign, &facts, &as_named);
+  Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
   if (MedianMiss(fit) > kMissMax_mm) {
     diagnosis.insufficient =
         "the places do not belong to these units: half of them are more than " +

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -14,18 +15,11 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kBadUnit_mm = 0.3;   // median miss
-constexpr double kSwapBetter = 0.2;   // of the miss that is left once names are exchanged
-constexpr std::size_t kRowsMin = 3;   // that both have
-constexpr std::size_t kBadMost = 64;  // units: more are no exchange, but another table
-
-double MissOf(const Fit& fit, std::size_t unit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<double> misses;
-  for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-    if (fit.weight[row] > 0) misses.push_back(1e-3 * std::hypot(fit.x_um[row], fit.y_um[row]));
-  return misses.empty() ? 0 : Median(std::move(misses));
-}
+constexpr double kBadUnit_mm = 0.3;    // median miss
+constexpr double kSwapBetter = 0.2;    // of the miss that is left once names are exchanged
+constexpr std::size_t kOffMost = 512;  // units of an exposure: more are another table
+constexpr std::size_t kRowsMin = 3;    // that both have
+constexpr std::size_t kBadMost = 64;   // units: more are no exchange, but another table
 
 // Rows of an exposure that both units have.
 struct RowPair {
@@ -55,18 +49,6 @@ double MissAt(const Campaign& campaign, std::size_t row, std::size_t unit, doubl
 
 double OwnMiss(const Campaign& campaign, std::size_t row, std::size_t unit) {
   return MissAt(campaign, row, unit, campaign.cmd_deg[kTheta][row], campaign.cmd_deg[kPhi][row]);
-}
-
-// Median miss of a's measured places from b's commands with the table's geometry of b.
-double CrossMiss(const Fit& fit, std::size_t a, std::size_t b) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<double> misses;
-  for (const RowPair& rows : RowsOfBoth(*fit.facts, a, b))
-    if (std::isfinite(campaign.x_mm[rows.a]))
-      misses.push_back(MissAt(campaign, rows.a, b, campaign.cmd_deg[kTheta][rows.b],
-                              campaign.cmd_deg[kPhi][rows.b]));
-  return misses.size() < kRowsMin ? std::numeric_limits<double>::infinity()
-                                  : Median(std::move(misses));
 }
 
 // Units that are off at the end of the campaign, whenever that began.
@@ -140,64 +122,109 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
   return CommandSwap{a, b, rows[since].exposure, rms_mm};
 }
 
-// Pairs of units whose measured places belong to each other, for all of the campaign.
-std::vector<std::pair<std::size_t, std::size_t>> FindSwaps(const Fit& fit) {
-  const Campaign& campaign = *fit.facts->campaign;
-  std::vector<std::size_t> bad;
-  std::vector<double> miss_mm;
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    const double miss = MissOf(fit, unit);
-    // A wrong name also drags the fitted base away.
-    const double dragged =
-        std::hypot(fit.model.units[unit].base_x_mm - campaign.units[unit].base_x_mm,
-                   fit.model.units[unit].base_y_mm - campaign.units[unit].base_y_mm);
-    if (miss > kBadUnit_mm || dragged > 1) bad.push_back(unit), miss_mm.push_back(miss);
-  }
-  std::vector<std::pair<std::size_t, std::size_t>> swaps;
-  std::set<std::size_t> taken;
-  for (const std::size_t a : bad)
-    for (const std::size_t b : bad) {
-      if (b <= a || taken.count(a) != 0 || taken.count(b) != 0) continue;
-      const double own = CrossMiss(fit, a, a) + CrossMiss(fit, b, b);
-      const double crossed = CrossMiss(fit, a, b) + CrossMiss(fit, b, a);
-      if (crossed >= kSwapBetter * own) continue;
-      swaps.emplace_back(a, b);
-      taken.insert({a, b});
-    }
-  return swaps;
+// A unit far from its own place in an exposure.
+struct OffRow {
+  std::size_t unit = 0, row = 0;
+};
+
+std::vector<std::vector<OffRow>> OffRowsOf(const CampaignFacts& facts) {
+  const Campaign& campaign = *facts.campaign;
+  std::vector<std::vector<OffRow>> off(facts.exposures.size());
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      if (OwnMiss(campaign, row, unit) > kBadUnit_mm)
+        off[facts.exposures.of_row[row]].push_back({unit, row});
+  return off;
 }
 
-CauseFound SwapCause(const Campaign& campaign,
-                     const std::vector<std::pair<std::size_t, std::size_t>>& swaps) {
+// Each stands where the other should.
+bool AreCrossed(const Campaign& campaign, const OffRow& a, const OffRow& b) {
+  const auto crossed = [&](const OffRow& one, const OffRow& other) {
+    return MissAt(campaign, one.row, other.unit, campaign.cmd_deg[kTheta][other.row],
+                  campaign.cmd_deg[kPhi][other.row]) <
+           kSwapBetter * OwnMiss(campaign, one.row, one.unit);
+  };
+  return crossed(a, b) && crossed(b, a);
+}
+
+// The exposures of two units in which most rows say that they are crossed, and fewest that not.
+std::optional<FibreSwap> SpanOf(const Campaign& campaign, const std::vector<RowPair>& rows,
+                                std::size_t a, std::size_t b) {
+  std::ptrdiff_t score = 0, most = 0;
+  std::size_t begin = 0, first = 0, last = 0;
+  std::vector<double> square(rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const double own_a = OwnMiss(campaign, rows[k].a, a), own_b = OwnMiss(campaign, rows[k].b, b);
+    square[k] = own_a * own_a + own_b * own_b;
+    // A place that was not seen votes for neither.
+    if (!std::isfinite(square[k])) continue;
+    if (score <= 0) score = 0, begin = k;
+    score += AreCrossed(campaign, {a, rows[k].a}, {b, rows[k].b}) ? 1 : -1;
+    if (score > most) most = score, first = begin, last = k;
+  }
+  if (most < static_cast<std::ptrdiff_t>(kRowsMin)) return std::nullopt;
+  double sum = 0, seen = 0;
+  for (std::size_t k = first; k <= last; ++k)
+    if (std::isfinite(square[k])) sum += square[k], seen += 2;
+  const bool to_the_end = last + 1 == rows.size();
+  return FibreSwap{a, b, first == 0 ? 0 : rows[first].exposure,
+                   to_the_end ? UINT32_MAX : rows[last].exposure, std::sqrt(sum / seen)};
+}
+
+struct UnitPair {
+  std::size_t a = 0, b = 0;
+  double miss_mm = 0;
+};
+
+CauseFound SwapCause(const Campaign& campaign, const std::vector<UnitPair>& pairs) {
   CauseFound cause = CauseNamed("identity_swap");
   cause.axis = "none";
   cause.scope = "unit";
   cause.amplitude_unit = "pairs";
-  cause.amplitude = static_cast<double>(swaps.size());
+  cause.amplitude = static_cast<double>(pairs.size());
   cause.ci95[0] = cause.ci95[1] = cause.amplitude;
   double square = 0;
-  for (const auto& [a, b] : swaps) {
-    cause.units.push_back(campaign.units[a].id);
-    cause.units.push_back(campaign.units[b].id);
-    square += std::pow(1e3 * std::hypot(campaign.units[a].base_x_mm - campaign.units[b].base_x_mm,
-                                        campaign.units[a].base_y_mm - campaign.units[b].base_y_mm),
-                       2);
+  for (const UnitPair& pair : pairs) {
+    cause.units.push_back(campaign.units[pair.a].id);
+    cause.units.push_back(campaign.units[pair.b].id);
+    square += pair.miss_mm * pair.miss_mm;
   }
-  cause.size_um = std::sqrt(square / static_cast<double>(swaps.size()));
+  cause.size_um = 1e3 * std::sqrt(square / static_cast<double>(pairs.size()));
   cause.predicted_gain_um = cause.size_um;
   cause.delta_log_likelihood = 1e6;
-  cause.paragraph = "Two fibres are known under each other's name: exchange the names.";
+  return cause;
+}
+
+std::string WhileOf(const CampaignFacts& facts, const FibreSwap& swap) {
+  const auto unit = [&](std::size_t at) { return std::to_string(facts.campaign->units[at].id); };
+  const auto move = [&](std::uint32_t exposure) {
+    return std::to_string(facts.exposures.move_id[exposure]);
+  };
+  const std::string pair = "units " + unit(swap.a) + " and " + unit(swap.b);
+  if (swap.last == UINT32_MAX) return pair + " since move " + move(swap.first);
+  return pair + " in moves " + move(swap.first) + " to " + move(swap.last);
+}
+
+CauseFound FibreSwapCause(const CampaignFacts& facts, const std::vector<FibreSwap>& swaps) {
+  std::vector<UnitPair> pairs;
+  for (const FibreSwap& swap : swaps) pairs.push_back({swap.a, swap.b, swap.miss_mm});
+  CauseFound cause = SwapCause(*facts.campaign, pairs);
+  for (const FibreSwap& swap : swaps) {
+    if (swap.first == 0 && swap.last == UINT32_MAX) continue;
+    cause.shape += (cause.shape.empty() ? "" : "; ") + WhileOf(facts, swap);
+  }
+  cause.paragraph = cause.shape.empty()
+                        ? "Two fibres are known under each other's name: exchange the names."
+                        : "Two fibres are known under each other's name for a while: exchange the "
+                          "names there, and "
+                          "look at how spots are given to units.";
   return cause;
 }
 
 CauseFound CommandSwapCause(const CampaignFacts& facts, const std::vector<CommandSwap>& swaps) {
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  double square = 0;
-  for (const CommandSwap& swap : swaps)
-    pairs.emplace_back(swap.a, swap.b), square += swap.miss_mm * swap.miss_mm;
+  std::vector<UnitPair> pairs;
+  for (const CommandSwap& swap : swaps) pairs.push_back({swap.a, swap.b, swap.miss_mm});
   CauseFound cause = SwapCause(*facts.campaign, pairs);
-  cause.size_um = 1e3 * std::sqrt(square / static_cast<double>(swaps.size()));
-  cause.predicted_gain_um = cause.size_um;
   cause.shape = "each makes the other's moves, since move " +
                 std::to_string(facts.exposures.move_id[swaps.front().since]);
   cause.paragraph =
@@ -207,13 +234,40 @@ CauseFound CommandSwapCause(const CampaignFacts& facts, const std::vector<Comman
 
 }  // namespace
 
-void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign) {
+std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts) {
+  const Campaign& campaign = *facts.campaign;
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> votes;
+  for (const std::vector<OffRow>& off : OffRowsOf(facts)) {
+    if (off.size() > kOffMost) continue;
+    for (std::size_t i = 0; i < off.size(); ++i)
+      for (std::size_t j = i + 1; j < off.size(); ++j)
+        if (AreCrossed(campaign, off[i], off[j])) ++votes[{off[i].unit, off[j].unit}];
+  }
+  std::vector<FibreSwap> swaps;
+  std::set<std::size_t> taken;
+  for (const auto& [pair, crossed] : votes) {
+    const auto [a, b] = pair;
+    if (crossed < kRowsMin || taken.count(a) != 0 || taken.count(b) != 0) continue;
+    const auto swap = SpanOf(campaign, RowsOfBoth(facts, a, b), a, b);
+    if (!swap) continue;
+    swaps.push_back(*swap);
+    taken.insert({a, b});
+  }
+  return swaps;
+}
+
+void UndoFibreSwap(const Exposures& exposures, const FibreSwap& swap, Campaign* campaign) {
   constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+  const auto [a, b, first, last, miss_mm] = swap;
+  const auto is_in = [&](std::size_t row) {
+    return exposures.of_row[row] >= first && exposures.of_row[row] <= last;
+  };
   std::vector<std::size_t> row_of(exposures.size(), SIZE_MAX);
   for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
     row_of[exposures.of_row[row]] = row;
   std::set<std::size_t> met;
   for (std::size_t row = campaign->first_row[a]; row < campaign->first_row[a + 1]; ++row) {
+    if (!is_in(row)) continue;
     const std::size_t other = row_of[exposures.of_row[row]];
     if (other == SIZE_MAX) {
       campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
@@ -224,7 +278,7 @@ void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign
     std::swap(campaign->y_mm[row], campaign->y_mm[other]);
   }
   for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
-    if (met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
+    if (is_in(row) && met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
 }
 
 std::vector<CommandSwap> FindCommandSwaps(const CampaignFacts& facts) {
@@ -266,14 +320,14 @@ void UndoCommandSwap(const CampaignFacts& facts, const CommandSwap& swap, Campai
   lose(rows[since].a, swap.a), lose(rows[since].b, swap.b);
 }
 
-std::vector<CauseFound> UndoExchanges(const Fit& fit, Campaign* campaign, CampaignFacts* facts,
+std::vector<CauseFound> UndoExchanges(Campaign* campaign, CampaignFacts* facts,
                                       std::optional<Campaign>* as_named) {
   std::vector<CauseFound> causes;
-  const auto fibres = FindSwaps(fit);
+  const std::vector<FibreSwap> fibres = FindFibreSwaps(*facts);
   if (!fibres.empty()) {
     *as_named = *campaign;
-    for (const auto& [a, b] : fibres) UndoSwap(facts->exposures, a, b, campaign);
-    causes.push_back(SwapCause(*campaign, fibres));
+    causes.push_back(FibreSwapCause(*facts, fibres));
+    for (const FibreSwap& swap : fibres) UndoFibreSwap(facts->exposures, swap, campaign);
   }
   const std::vector<CommandSwap> commands = FindCommandSwaps(*facts);
   if (!commands.empty()) {

@@ -1,6 +1,7 @@
-// Units under each other's name. Either their fibres are: the measured places of two units belong
-// to each other. Or their addresses on the bus are: each obeys what was meant for the other, since
-// the campaign began or since somebody worked at the units.
+// Units under each other's name. Either their fibres are, for all of the campaign or for a while:
+// the measured places of two units belong to each other. Or their addresses on the bus are: each
+// obeys what was meant for the other, since the campaign began or since somebody worked at the
+// units.
 #pragma once
 
 #include <cstddef>
@@ -9,13 +10,24 @@
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
-#include "sim/diagnosis/fit.h"
 
 namespace focalfleet::sim {
 
-/// Exchanges the measured places of two units where both were measured in one exposure; rows of
-/// only one become missing.
-void UndoSwap(const Exposures& exposures, std::size_t a, std::size_t b, Campaign* campaign);
+/// Two fibres that are known under each other's name, from the first of these exposures to the
+/// last.
+struct FibreSwap {
+  std::size_t a = 0, b = 0;
+  std::uint32_t first = 0, last = UINT32_MAX;
+  double miss_mm = 0;  // rms, of both, in these exposures
+};
+
+/// By the table's geometry: each stands where the other's fibre should, in three exposures at
+/// least.
+std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts);
+
+/// Exchanges the measured places of the two where both were measured; rows of only one become
+/// missing.
+void UndoFibreSwap(const Exposures& exposures, const FibreSwap& swap, Campaign* campaign);
 
 /// Two units that make each other's moves, each from where it stands.
 struct CommandSwap {
@@ -31,10 +43,9 @@ std::vector<CommandSwap> FindCommandSwaps(const CampaignFacts& facts);
 /// becomes missing.
 void UndoCommandSwap(const CampaignFacts& facts, const CommandSwap& swap, Campaign* campaign);
 
-/// Sets all names right that are exchanged, for all of the campaign if they are fibres', and says
-/// what was wrong. `fit`: of the campaign as it came. `as_named`: that campaign, where anything
-/// was.
-std::vector<CauseFound> UndoExchanges(const Fit& fit, Campaign* campaign, CampaignFacts* facts,
+/// Sets all names right that are exchanged and says what was wrong. `as_named`: the campaign as it
+/// came, where anything was.
+std::vector<CauseFound> UndoExchanges(Campaign* campaign, CampaignFacts* facts,
                                       std::optional<Campaign>* as_named);
 
 }  // namespace focalfleet::sim

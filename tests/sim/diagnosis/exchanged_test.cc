@@ -50,6 +50,63 @@ TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
   }
 }
 
+/// The places of two units under each other's name in these moves.
+void ExchangePlacesOf(std::size_t a, std::size_t b, std::size_t begin, std::size_t end,
+                      Campaign* campaign) {
+  for (std::size_t move = begin; move < end; ++move)
+    for (std::vector<double>* place : {&campaign->x_mm, &campaign->y_mm})
+      std::swap((*place)[campaign->first_row[a] + move], (*place)[campaign->first_row[b] + move]);
+}
+
+TEST(Exchanged, FibresThatHaveEachOthersNameForAWhileAreFound) {
+  const struct {
+    std::size_t begin, end;
+    std::string_view shape;
+  } cases[] = {{0, 60, ""},
+               {0, 25, "units 4 and 10 in moves 1 to 25"},
+               {20, 41, "units 4 and 10 in moves 21 to 41"},
+               {52, 60, "units 4 and 10 since move 53"}};
+  for (const auto& [begin, end, shape] : cases) {
+    SCOPED_TRACE(shape);
+    Campaign campaign = Planted({{.cause = "gear_scale", .amplitude = 0.002, .axis = "theta"}},
+                                {.moves = 60, .seed = 5, .outlier_share = 0.01});
+    const Campaign right = campaign;
+    ExchangePlacesOf(3, 9, begin, end, &campaign);
+    const std::vector<FibreSwap> swaps = FindFibreSwaps(MakeFacts(campaign));
+    ASSERT_THAT(swaps, SizeIs(1));
+    Campaign undone = campaign;
+    UndoFibreSwap(MakeFacts(campaign).exposures, swaps[0], &undone);
+    EXPECT_EQ(undone.x_mm, right.x_mm);
+    EXPECT_EQ(undone.y_mm, right.y_mm);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    ASSERT_THAT(diagnosis.causes, SizeIs(2)) << Told(diagnosis);
+    EXPECT_EQ(diagnosis.causes[0].cause, "identity_swap");
+    EXPECT_EQ(diagnosis.causes[0].shape, shape);
+    EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(4u, 10u));
+    EXPECT_EQ(diagnosis.causes[1].cause, "gear_scale");
+  }
+}
+
+TEST(Exchanged, APairOfOutliersIsNoName) {
+  Campaign campaign = Planted({}, {.moves = 60, .seed = 5, .outlier_share = 0.05});
+  for (const std::size_t move : {7u, 33u}) ExchangePlacesOf(3, 9, move, move + 1, &campaign);
+  EXPECT_THAT(FindFibreSwaps(MakeFacts(campaign)), IsEmpty());
+}
+
+TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
+  Campaign campaign = Planted({}, {.moves = 30, .seed = 5});
+  ExchangePlacesOf(3, 9, 10, 20, &campaign);
+  const std::size_t gone = campaign.first_row[9] + 12;  // of the other: as if of another exposure
+  campaign.move_id[gone] = 1'000'000;
+  const CampaignFacts facts = MakeFacts(campaign);
+  const std::vector<FibreSwap> swaps = FindFibreSwaps(facts);
+  ASSERT_THAT(swaps, SizeIs(1));
+  UndoFibreSwap(facts.exposures, swaps[0], &campaign);
+  EXPECT_TRUE(std::isnan(campaign.x_mm[campaign.first_row[3] + 12]));
+  EXPECT_TRUE(std::isfinite(campaign.x_mm[campaign.first_row[3] + 13]));
+  EXPECT_TRUE(std::isfinite(campaign.x_mm[campaign.first_row[3] + 25]));
+}
+
 TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
   Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
   Rng rng = Rng::Stream(5, "where they go");
