@@ -317,6 +317,21 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   JudgeSeries(&causes, &diagnosis->unknown);
 }
 
+// Where far rows crowd: arms have touched, or nobody knows.
+void TellCrowds(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOptions& options,
+                Diagnosis* diagnosis) {
+  const auto is_contact = [](const CauseFound& cause) { return cause.cause == kContact; };
+  auto crowd = FindCrowd(fit, far, options.family_wise);
+  if (crowd && !crowd->touched.empty() && !IsLeftOut(options, kContact)) {
+    if (std::ranges::none_of(diagnosis->causes, is_contact))
+      diagnosis->causes.insert(diagnosis->causes.begin(), TouchCause(fit, crowd->touched));
+    const std::set<std::size_t> touched(crowd->touched.begin(), crowd->touched.end());
+    std::erase_if(far, [&](std::size_t row) { return touched.count(row) != 0; });
+    crowd = FindCrowd(fit, far, options.family_wise);
+  }
+  if (crowd) TakeSeen({std::move(crowd->told)}, &diagnosis->unknown);
+}
+
 void Conclude(Diagnosis* diagnosis) {
   bool ambiguous = false;
   for (const CauseFound& cause : diagnosis->causes)
@@ -413,9 +428,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);
-  const std::vector<std::size_t> far = FindAfterFit(fit, &diagnosis.outliers);
-  if (auto crowd = FindCrowd(fit, far, options.family_wise))
-    TakeSeen({std::move(*crowd)}, &diagnosis.unknown);
+  TellCrowds(fit, FindAfterFit(fit, &diagnosis.outliers), options, &diagnosis);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
   if (!diagnosis.unknown.empty())
     for (CauseFound& cause : diagnosis.causes)

@@ -240,6 +240,15 @@ bool AnyHasMet(const Fit& fit) {
                              [&](const EventTerm& event) { return IsOfContact(fit, event); });
 }
 
+// How near arms come where they have met; below any gap: none have, or nobody can say.
+double TouchingGap_mm(const Fit& fit) {
+  const FilledColumn* gap = fit.facts->Find(kArmGap);
+  std::vector<double> gaps_mm;
+  for (const EventTerm& event : fit.model.events)
+    if (gap != nullptr && IsOfContact(fit, event)) gaps_mm.push_back(gap->values[event.row]);
+  return gaps_mm.empty() ? -1 : Median(std::move(gaps_mm));
+}
+
 double SizeOf_um(const Fit& fit, const EventTerm& event) {
   const CampaignUnit& unit = fit.model.units[event.unit];
   const double lever_mm =
@@ -296,11 +305,21 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
                  "they have touched. Home both, and look at the plan of that move.",
                  {}};
   const bool has_met = AnyHasMet(fit);
+  // Some that are stopped end whole turns short.
+  const double touching_mm = TouchingGap_mm(fit);
+  const auto is_stopped = [&](const EventTerm& event) {
+    return HasMet(fit, event) ||
+           (touching_mm >= 0 && fit.facts->Find(kArmGap)->values[event.row] <= touching_mm);
+  };
   for (const EventTerm& event : fit.model.events) {
     const StepKind kind = KindOf(fit, event);
-    if (kind == StepKind::kTurns) turns.events.push_back(event);
-    if (kind == StepKind::kCommand) commands.events.push_back(event);
-    if (kind == StepKind::kBlocked && has_met) contacts.events.push_back(event);
+    if (kind == StepKind::kCommand) {
+      commands.events.push_back(event);
+    } else if (kind == StepKind::kBlocked ? has_met : is_stopped(event)) {
+      contacts.events.push_back(event);
+    } else if (kind == StepKind::kTurns) {
+      turns.events.push_back(event);
+    }
   }
   std::vector<CauseFound> causes;
   for (const Named* one : {&turns, &commands, &contacts})

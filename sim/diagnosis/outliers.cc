@@ -6,6 +6,7 @@
 #include <set>
 
 #include "sim/diagnosis/chances.h"
+#include "sim/diagnosis/events.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -16,6 +17,10 @@ constexpr double kStuckSpread_mm = 0.03;
 constexpr double kCrowdShare = 0.3;      // of the family-wise rate
 constexpr double kCrowdLeast = 4;        // units and exposures
 constexpr std::size_t kCrowdMost = 200;  // far visits in a window
+constexpr double kTouchedLeast =
+    1.0 / 3;                         // of those that are as near; some do not move, or touch little
+constexpr double kBeyondMost = 0.1;  // of that share, of those that are farther apart
+constexpr double kTouchEvidence = 25;  // ln L of a move
 constexpr std::string_view kCrowdColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 
@@ -85,14 +90,14 @@ std::vector<Visit> VisitsOf(const Fit& fit, const FilledColumn& column,
   return visits;
 }
 
-struct Crowd {
+struct Window {
   double log_p = 0;  // of so many far visits in so narrow a window, of all windows
   std::vector<const Visit*> visits;
 };
 
 // Of all windows from one far visit to another the one that chance fills least. `visits` in the
 // order of their values.
-Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
+Window DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   std::vector<std::size_t> far, rows_before = {0};
   for (std::size_t k = 0; k < visits.size(); ++k) {
     if (visits[k].far) far.push_back(k);
@@ -108,7 +113,7 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
     return static_cast<std::size_t>(past - visits.begin());
   };
   const auto all = static_cast<double>(far.size());
-  Crowd densest;
+  Window densest;
   std::size_t begin = 0, end = 0;
   for (std::size_t i = 0; i < far.size(); ++i) {
     // Many of one unit, or of one exposure, count once: they may have something else in common.
@@ -130,6 +135,28 @@ Crowd DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   }
   for (std::size_t i = begin; i < end; ++i) densest.visits.push_back(&visits[far[i]]);
   return densest;
+}
+
+double MissSquare_um2(const Fit& fit, std::size_t row) {
+  return fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
+}
+
+// Far rows where the gap is no wider than in the window. {}: many there are not far, or many beyond
+// are: it is not the arms that make them so.
+std::vector<std::size_t> TouchedRows(const std::vector<Visit>& visits, const Window& window) {
+  std::size_t within = 0, far_beyond = 0;
+  std::vector<std::size_t> rows;
+  for (const Visit& visit : visits) {
+    const bool near = visit.value <= window.visits.back()->value;
+    if (near) ++within;
+    if (visit.far && near) rows.push_back(visit.row);
+    if (visit.far && !near) ++far_beyond;
+  }
+  const double share = static_cast<double>(rows.size()) / static_cast<double>(within);
+  const double share_beyond = static_cast<double>(far_beyond) /
+                              static_cast<double>(std::max(visits.size() - within, std::size_t{1}));
+  if (share < kTouchedLeast || share_beyond > kBeyondMost * share) return {};
+  return rows;
 }
 
 }  // namespace
@@ -182,30 +209,56 @@ std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
   return far_rows;
 }
 
-std::optional<UnknownFound> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
-                                      double family_wise) {
+std::optional<Crowd> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
+                               double family_wise) {
   std::vector<char> is_far(fit.weight.size(), 0);
   for (const std::size_t row : far) is_far[row] = 1;
-  std::optional<UnknownFound> best;
+  std::optional<Crowd> best;
   double least =
       std::log(kCrowdShare * family_wise / static_cast<double>(std::size(kCrowdColumns)));
   for (const std::string_view name : kCrowdColumns) {
     const FilledColumn* column = fit.facts->Find(name);
     if (column == nullptr || !column->varies()) continue;
     const std::vector<Visit> visits = VisitsOf(fit, *column, is_far);
-    const Crowd crowd = DensestOf(visits, fit.facts->exposures);
-    if (crowd.log_p >= least) continue;
-    least = crowd.log_p;
+    const Window window = DensestOf(visits, fit.facts->exposures);
+    if (window.log_p >= least) continue;
+    least = window.log_p;
     double square = 0;
-    for (const Visit* visit : crowd.visits)
-      square += std::pow(std::hypot(fit.x_um[visit->row], fit.y_um[visit->row]), 2);
-    best = {.covariate = std::string(name),
-            .channel = "rows far from every prediction",
-            .p_value = std::exp(crowd.log_p) * static_cast<double>(std::size(kCrowdColumns)),
-            .size_um = std::sqrt(square / static_cast<double>(visits.size())),
-            .delta_log_likelihood = -crowd.log_p};
+    for (const Visit* visit : window.visits) square += MissSquare_um2(fit, visit->row);
+    best = {
+        .told = {.covariate = std::string(name),
+                 .channel = "rows far from every prediction",
+                 .p_value = std::exp(window.log_p) * static_cast<double>(std::size(kCrowdColumns)),
+                 .size_um = std::sqrt(square / static_cast<double>(visits.size())),
+                 .delta_log_likelihood = -window.log_p},
+        .touched = name == kArmGap ? TouchedRows(visits, window) : std::vector<std::size_t>()};
   }
   return best;
+}
+
+CauseFound TouchCause(const Fit& fit, const std::vector<std::size_t>& rows) {
+  CauseFound cause = CauseNamed(kContact);
+  cause.axis = "both";
+  cause.scope = "unit";
+  cause.amplitude_unit = "moves";
+  cause.amplitude = static_cast<double>(rows.size());
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
+  std::set<std::uint32_t> units;
+  double square = 0;
+  for (const std::size_t row : rows) {
+    const auto past = std::ranges::upper_bound(first_row, row);
+    units.insert(fit.model.units[static_cast<std::size_t>(past - first_row.begin()) - 1].id);
+    square += MissSquare_um2(fit, row);
+  }
+  cause.units.assign(units.begin(), units.end());
+  cause.all_units = units.size() == fit.model.units.size();
+  cause.size_um = std::sqrt(square / cause.amplitude);
+  cause.delta_log_likelihood = kTouchEvidence * cause.amplitude;
+  cause.paragraph =
+      "Where arms come nearest to each other their fibres are far from their place, in these moves "
+      "alone: they have touched. Look at the arms, and at the plans of these moves.";
+  return cause;
 }
 
 }  // namespace focalfleet::sim

@@ -17,10 +17,18 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
 /// Rows far from the final model, added by reason. Returns them.
 std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found);
 
+struct Crowd {
+  UnknownFound told;
+  std::vector<std::size_t>
+      touched;  // rows; {}: it is not where arms are nearest, or not there alone
+};
 /// Outliers that are far for a reason of their own lie anywhere. Where they crowd at one angle, or
 /// where arms come near each other, something happens there that no term has. `far`: rows. None:
 /// chance puts them so, at a share of the family-wise rate.
-std::optional<UnknownFound> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
-                                      double family_wise);
+std::optional<Crowd> FindCrowd(const Fit& fit, const std::vector<std::size_t>& far,
+                               double family_wise);
+
+/// Arms that touched and came apart again: what a crowd's rows are.
+CauseFound TouchCause(const Fit& fit, const std::vector<std::size_t>& rows);
 
 }  // namespace focalfleet::sim

@@ -329,6 +329,23 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
   EXPECT_LT(diagnosis.gain.rms_after_um, 20);
 }
 
+TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
+  Campaign campaign = Planted({}, {.moves = 200, .seed = 6});
+  const std::size_t move = MoveOfAll(campaign, {0, 1}, 30);
+  ASSERT_NE(move, 0u);
+  const double turns_deg = 7 * 360 / campaign.units[0].gear[kTheta];
+  StandElsewhere(0, move, std::copysign(turns_deg, -StepAt(campaign, 0, move, kTheta)), 0,
+                 &campaign);
+  StandElsewhere(1, move, -0.31 * StepAt(campaign, 1, move, kTheta),
+                 -0.4 * StepAt(campaign, 1, move, kPhi), &campaign);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_FALSE(diagnosis.causes.empty());
+  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact") << Told(diagnosis);
+  EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[0].id, campaign.units[1].id));
+  for (const CauseFound& cause : diagnosis.causes)
+    EXPECT_NE(cause.cause, "step_loss") << Told(diagnosis);
+}
+
 TEST(Events, AUnitThatStopsShortAloneIsUnknown) {
   Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
   constexpr std::size_t kUnit = 3;

@@ -119,6 +119,40 @@ TEST(Crowd, OutliersAtOneAngleAreUnknown) {
   EXPECT_EQ(unknown.channel, "rows far from every prediction");
 }
 
+// As many of the rows up to 2 mm off whose arm comes as near to a neighbour's; and some anywhere.
+Campaign Touched(double gap_mm, double share) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = 8, .outlier_share = 0.003});
+  const CampaignFacts facts = MakeFacts(campaign);
+  const FilledColumn& gap = *facts.Find(kArmGap);
+  Rng rng = Rng::Stream(8, "touched");
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    if (gap.values[row] > gap_mm || rng.Uniform() > share) continue;
+    campaign.x_mm[row] += rng.Uniform(-1.4, 1.4);
+    campaign.y_mm[row] += rng.Uniform(-1.4, 1.4);
+  }
+  return campaign;
+}
+
+TEST(Crowd, OutliersWhereArmsAreNearestHaveTouched) {
+  const Diagnosis diagnosis = Verdicts(Touched(1.5, 0.9));
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
+  EXPECT_EQ(diagnosis.causes[0].amplitude_unit, "moves");
+  EXPECT_GE(diagnosis.causes[0].amplitude, 10);
+}
+
+TEST(Crowd, OutliersAmongMostThatAreAsNearAreUnknown) {
+  const UnknownFound unknown = OnlyUnknown(Verdicts(Touched(4, 0.15)));
+  EXPECT_EQ(unknown.covariate, kArmGap);
+}
+
+TEST(Crowd, ContactsAreUnknownToALibraryWithoutThem) {
+  DiagnoseOptions options;
+  options.leave_out = {"collision_contact"};
+  EXPECT_EQ(OnlyUnknown(Verdicts(Touched(1.5, 0.9), options)).covariate, kArmGap);
+}
+
 TEST(Crowd, OutliersAnywhereAreOutliers) {
   const Diagnosis diagnosis = Verdicts(WithFarRows(false));
   ASSERT_GE(diagnosis.outliers.rows, 20u);
