@@ -23,6 +23,7 @@ struct CauseFound {
   // Who leaves nearly the same trace, and is behind by the likelihood alone: where the model leaves
   // something unexplained, that decides nothing.
   std::vector<std::string> behind;
+  std::vector<std::string> cannot_be;   // names that these data exclude, whatever is not told
   std::vector<std::string> remainders;  // what its shape leaves looks like these, by name
   std::string axis;
   std::string scope;

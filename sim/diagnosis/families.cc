@@ -386,7 +386,8 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
     for (const NotTestable& other : not_testable)
       for (const auto& pair : kAlikeWithoutColumn)
         if (other.why.starts_with("column ") && Has(pair, cause.cause) && Has(pair, other.cause) &&
-            !IsCandidate(cause, other.cause))
+            !IsCandidate(cause, other.cause) &&
+            std::ranges::count(cause.cannot_be, other.cause) == 0)
           cause.candidates.push_back(other.cause);
 }
 

@@ -319,6 +319,10 @@ TEST(Families, WhereNoElevationIsToldTheImageMayShiftByThePlate) {
   std::vector<CauseFound> causes = {Cause("camera_similarity", "none", 300)};
   JudgeUntested({{"gravity_sag", "column elevation_deg is missing"}}, &causes);
   EXPECT_THAT(causes[0].candidates, ElementsAre("camera_similarity", "gravity_sag"));
+  causes = {Cause("camera_similarity", "none", 300)};
+  causes[0].cannot_be = {"gravity_sag"};
+  JudgeUntested({{"gravity_sag", "column elevation_deg is missing"}}, &causes);
+  EXPECT_THAT(causes[0].candidates, ElementsAre("camera_similarity"));
 }
 
 TEST(Families, WhatIsHardlyThereBesideAStrongCauseOfAnyAxisIsItsRemainder) {

@@ -100,6 +100,24 @@ TEST(Image, OneThatForgetsMayBeAir) {
               testing::UnorderedElementsAre("camera_similarity", "air_turbulence"));
 }
 
+TEST(Image, OnlyOneThatMovesAlongALineMayBeGravitys) {
+  for (const double across : {0.0, 0.5}) {
+    Rng rng = Rng::Stream(3, "sags");
+    std::vector<Shift> anew(80);
+    for (Shift& s : anew) {
+      const double along = 4 * rng.Normal();
+      s = {0.6 * along - 0.8 * across * along * along / 4, 0.8 * along + 0.6 * across * along};
+    }
+    Campaign campaign = Shifted([&](std::size_t e) { return anew[e]; });
+    std::erase_if(campaign.covariates,
+                  [](const Covariate& c) { return c.name == "elevation_deg"; });
+    const Diagnosis diagnosis = Verdicts(campaign);
+    ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+    EXPECT_EQ(std::ranges::count(diagnosis.causes[0].candidates, "gravity_sag"), across == 0)
+        << Told(diagnosis);
+  }
+}
+
 // Shifted, and deformed, anew at each exposure: um at the plate's edge.
 Campaign Deformed(std::size_t units, double turn_and_scale_um, double shear_um) {
   Campaign campaign = Planted({}, {.units = units, .moves = 80, .seed = 8});
