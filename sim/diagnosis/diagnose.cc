@@ -163,6 +163,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
     for (const auto& [unit, evidence] : cause.evidence_of_unit)
       same->evidence_of_unit[unit] += evidence;
     for (std::string& name : cause.remainders) same->remainders.push_back(std::move(name));
+    for (std::string& name : cause.cannot_be) same->cannot_be.push_back(std::move(name));
     same->predicted_gain_um += cause.predicted_gain_um;
   }
   std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
@@ -323,8 +324,19 @@ void TellCrowds(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOpti
   const auto is_contact = [](const CauseFound& cause) { return cause.cause == kContact; };
   auto crowd = FindCrowd(fit, far, options.family_wise);
   if (crowd && !crowd->touched.empty() && !IsLeftOut(options, kContact)) {
-    if (std::ranges::none_of(diagnosis->causes, is_contact))
-      diagnosis->causes.insert(diagnosis->causes.begin(), TouchCause(fit, crowd->touched));
+    CauseFound touch = TouchCause(fit, crowd->touched);
+    std::vector<CauseFound>& causes = diagnosis->causes;
+    if (const auto told = std::ranges::find_if(causes, is_contact); told != causes.end()) {
+      std::set<std::uint32_t> units(told->units.begin(), told->units.end());
+      units.insert(touch.units.begin(), touch.units.end());
+      told->units.assign(units.begin(), units.end());
+      told->all_units = units.size() == fit.model.units.size();
+    } else {
+      const auto weaker = std::ranges::find_if(causes, [&](const CauseFound& cause) {
+        return cause.delta_log_likelihood < touch.delta_log_likelihood;
+      });
+      causes.insert(weaker, std::move(touch));
+    }
     const std::set<std::size_t> touched(crowd->touched.begin(), crowd->touched.end());
     std::erase_if(far, [&](std::size_t row) { return touched.count(row) != 0; });
     crowd = FindCrowd(fit, far, options.family_wise);
@@ -392,6 +404,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   options.progress(0.02, "static geometry");
   std::optional<Campaign> as_named;  // under the table's names, where some of these are wrong
   diagnosis.causes = UndoExchanges(&campaign, &facts, &as_named);
+  SetAside(RowsUnderAnothersName(facts), "at another unit's place", &aside, &diagnosis.outliers);
   Fit fit = StartFit(facts, diagnosis.model, aside, options.parallel);
   if (MedianMiss(fit) > kMissMax_mm) {
     diagnosis.insufficient =

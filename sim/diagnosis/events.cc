@@ -218,35 +218,20 @@ std::size_t AddEvents(Fit* fit) {
 
 namespace {
 
-// Units that stopped short in the same move, near enough to have met. Where some have, a unit that
-// did so alone has pushed its neighbour too little to be seen.
-bool HasMet(const Fit& fit, const EventTerm& event) {
-  const auto reach = [](const CampaignUnit& unit) {
-    return unit.arm_mm[kTheta] + unit.arm_mm[kPhi];
-  };
-  const CampaignUnit& own = fit.model.units[event.unit];
-  const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
-  return std::ranges::any_of(fit.model.events, [&](const EventTerm& other) {
-    const CampaignUnit& unit = fit.model.units[other.unit];
-    return other.unit != event.unit && exposure[other.row] == exposure[event.row] &&
-           KindOf(fit, other) == StepKind::kBlocked &&
-           std::hypot(unit.base_x_mm - own.base_x_mm, unit.base_y_mm - own.base_y_mm) <
-               reach(unit) + reach(own);
-  });
-}
-
 bool AnyHasMet(const Fit& fit) {
   return std::ranges::any_of(fit.model.events,
                              [&](const EventTerm& event) { return IsOfContact(fit, event); });
 }
 
-// How near arms come where they have met; below any gap: none have, or nobody can say.
+// How near arms come where they have met; below any gap: none have, or nobody can say. Arms that
+// meet on their way may be meant to end far apart.
 double TouchingGap_mm(const Fit& fit) {
   const FilledColumn* gap = fit.facts->Find(kArmGap);
   std::vector<double> gaps_mm;
   for (const EventTerm& event : fit.model.events)
     if (gap != nullptr && IsOfContact(fit, event)) gaps_mm.push_back(gap->values[event.row]);
-  return gaps_mm.empty() ? -1 : Median(std::move(gaps_mm));
+  return gaps_mm.empty() ? -1
+                         : std::min(Median(std::move(gaps_mm)), kThickestArm * fit.facts->pitch_mm);
 }
 
 double SizeOf_um(const Fit& fit, const EventTerm& event) {
@@ -284,7 +269,25 @@ CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view parag
 }  // namespace
 
 bool IsOfContact(const Fit& fit, const EventTerm& event) {
-  return KindOf(fit, event) == StepKind::kBlocked && HasMet(fit, event);
+  const auto reach = [](const CampaignUnit& unit) {
+    return unit.arm_mm[kTheta] + unit.arm_mm[kPhi];
+  };
+  const StepKind kind = KindOf(fit, event);
+  if (kind == StepKind::kCommand) return false;
+  const CampaignUnit& own = fit.model.units[event.unit];
+  const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
+  // Two that lost whole turns both slipped.
+  const auto has_met = [&](StepKind one, StepKind other) {
+    return other != StepKind::kCommand &&
+           (one == StepKind::kBlocked || other == StepKind::kBlocked);
+  };
+  return std::ranges::any_of(fit.model.events, [&](const EventTerm& other) {
+    const CampaignUnit& unit = fit.model.units[other.unit];
+    return exposure[other.row] == exposure[event.row] && other.unit != event.unit &&
+           has_met(kind, KindOf(fit, other)) &&
+           std::hypot(unit.base_x_mm - own.base_x_mm, unit.base_y_mm - own.base_y_mm) <
+               reach(unit) + reach(own);
+  });
 }
 
 std::vector<CauseFound> EventCauses(const Fit& fit) {
@@ -304,18 +307,20 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
                  "Two neighbours stopped short of their way in the same move, and stand off since: "
                  "they have touched. Home both, and look at the plan of that move.",
                  {}};
-  const bool has_met = AnyHasMet(fit);
-  // Some that are stopped end whole turns short.
+  const bool any_has_met = AnyHasMet(fit);
+  // Where some have met, a unit that stopped short alone has pushed its neighbour too little to be
+  // seen; and some that are stopped end whole turns short.
   const double touching_mm = TouchingGap_mm(fit);
-  const auto is_stopped = [&](const EventTerm& event) {
-    return HasMet(fit, event) ||
+  const auto has_met = [&](const EventTerm& event, StepKind kind) {
+    if (kind == StepKind::kBlocked) return any_has_met;
+    return IsOfContact(fit, event) ||
            (touching_mm >= 0 && fit.facts->Find(kArmGap)->values[event.row] <= touching_mm);
   };
   for (const EventTerm& event : fit.model.events) {
     const StepKind kind = KindOf(fit, event);
     if (kind == StepKind::kCommand) {
       commands.events.push_back(event);
-    } else if (kind == StepKind::kBlocked ? has_met : is_stopped(event)) {
+    } else if (has_met(event, kind)) {
       contacts.events.push_back(event);
     } else if (kind == StepKind::kTurns) {
       turns.events.push_back(event);

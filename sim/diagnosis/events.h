@@ -21,7 +21,7 @@ inline constexpr std::string_view kEvents = "events";
 /// Adds the steps that stand out from the residuals to the model. Returns how many.
 std::size_t AddEvents(Fit* fit);
 
-/// Whether it stopped short in a move in which a neighbour did so, too.
+/// Whether a neighbour was stopped in the same move, one of the two not after whole turns.
 bool IsOfContact(const Fit& fit, const EventTerm& event);
 
 /// The model's steps by their causes.

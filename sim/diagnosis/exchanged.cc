@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -15,11 +16,12 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kBadUnit_mm = 0.3;    // median miss
-constexpr double kSwapBetter = 0.2;    // of the miss that is left once names are exchanged
-constexpr std::size_t kOffMost = 512;  // units of an exposure: more are another table
-constexpr std::size_t kRowsMin = 3;    // that both have
-constexpr std::size_t kBadMost = 64;   // units: more are no exchange, but another table
+constexpr double kBad_mm = 0.3;       // miss
+constexpr double kSwapBetter = 0.2;   // of the miss that is left once names are exchanged
+constexpr double kSwapNear_mm = 3;    // and no more than this: the table's zeros may be wrong
+constexpr std::size_t kRowsMin = 3;   // that both have
+constexpr double kChange = 2.5;       // votes that names are exchanged, or back
+constexpr std::size_t kBadMost = 64;  // units: more are no exchange, but another table
 
 // Rows of an exposure that both units have.
 struct RowPair {
@@ -59,7 +61,7 @@ std::vector<std::size_t> OffAtTheEnd(const Campaign& campaign) {
     std::vector<double> misses;
     for (std::size_t row = end - (end - begin) / 3; row < end; ++row)
       if (std::isfinite(campaign.x_mm[row])) misses.push_back(OwnMiss(campaign, row, unit));
-    if (misses.size() >= kRowsMin && Median(std::move(misses)) > kBadUnit_mm) off.push_back(unit);
+    if (misses.size() >= kRowsMin && Median(std::move(misses)) > kBad_mm) off.push_back(unit);
   }
   return off;
 }
@@ -72,7 +74,7 @@ std::size_t SinceWhen(const Campaign& campaign, const std::vector<RowPair>& rows
   for (std::size_t k = rows.size(); k-- > 0;) {
     // A place that was not seen votes for neither.
     const double miss = OwnMiss(campaign, rows[k].a, a) + OwnMiss(campaign, rows[k].b, b);
-    if (std::isfinite(miss)) score += miss > kBadUnit_mm ? 1 : -1;
+    if (std::isfinite(miss)) score += miss > kBad_mm ? 1 : -1;
     if (score >= most && std::isfinite(miss)) most = score, since = k;
   }
   return since;
@@ -122,53 +124,130 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
   return CommandSwap{a, b, rows[since].exposure, rms_mm};
 }
 
-// A unit far from its own place in an exposure.
-struct OffRow {
-  std::size_t unit = 0, row = 0;
+// Where fibres should be by the table, and how far from there they were seen. Shape: (rows)
+struct Expected {
+  std::vector<PlacePoint> at;
+  std::vector<double> own_mm;  // NaN: not seen
 };
 
-std::vector<std::vector<OffRow>> OffRowsOf(const CampaignFacts& facts) {
-  const Campaign& campaign = *facts.campaign;
-  std::vector<std::vector<OffRow>> off(facts.exposures.size());
+Expected ExpectedOf(const Campaign& campaign) {
+  Expected expected;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
-    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
-      if (OwnMiss(campaign, row, unit) > kBadUnit_mm)
-        off[facts.exposures.of_row[row]].push_back({unit, row});
-  return off;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+      expected.at.push_back(PlaceOf(campaign.units[unit], campaign.cmd_deg[kTheta][row],
+                                    campaign.cmd_deg[kPhi][row]));
+      expected.own_mm.push_back(std::hypot(campaign.x_mm[row] - expected.at.back().x_mm,
+                                           campaign.y_mm[row] - expected.at.back().y_mm));
+    }
+  return expected;
 }
 
-// Each stands where the other should.
-bool AreCrossed(const Campaign& campaign, const OffRow& a, const OffRow& b) {
-  const auto crossed = [&](const OffRow& one, const OffRow& other) {
-    return MissAt(campaign, one.row, other.unit, campaign.cmd_deg[kTheta][other.row],
-                  campaign.cmd_deg[kPhi][other.row]) <
-           kSwapBetter * OwnMiss(campaign, one.row, one.unit);
+double MissOf(const Campaign& campaign, const Expected& expected, std::size_t row,
+              std::size_t other) {
+  return std::hypot(campaign.x_mm[row] - expected.at[other].x_mm,
+                    campaign.y_mm[row] - expected.at[other].y_mm);
+}
+
+// Each stands where the other should, and far from its own place.
+bool AreCrossed(const Campaign& campaign, const Expected& expected, std::size_t a, std::size_t b) {
+  const auto crossed = [&](std::size_t row, std::size_t other) {
+    const double own_mm = expected.own_mm[row];
+    return own_mm > kBad_mm &&
+           MissOf(campaign, expected, row, other) < std::min(kSwapBetter * own_mm, kSwapNear_mm);
   };
   return crossed(a, b) && crossed(b, a);
 }
 
-// The exposures of two units in which most rows say that they are crossed, and fewest that not.
-std::optional<FibreSwap> SpanOf(const Campaign& campaign, const std::vector<RowPair>& rows,
-                                std::size_t a, std::size_t b) {
-  std::ptrdiff_t score = 0, most = 0;
-  std::size_t begin = 0, first = 0, last = 0;
-  std::vector<double> square(rows.size());
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const double own_a = OwnMiss(campaign, rows[k].a, a), own_b = OwnMiss(campaign, rows[k].b, b);
-    square[k] = own_a * own_a + own_b * own_b;
-    // A place that was not seen votes for neither.
-    if (!std::isfinite(square[k])) continue;
-    if (score <= 0) score = 0, begin = k;
-    score += AreCrossed(campaign, {a, rows[k].a}, {b, rows[k].b}) ? 1 : -1;
-    if (score > most) most = score, first = begin, last = k;
+bool AreRight(const Campaign& campaign, const Expected& expected, std::size_t a, std::size_t b) {
+  const auto right = [&](std::size_t row, std::size_t other) {
+    return expected.own_mm[row] < kSwapBetter * MissOf(campaign, expected, row, other);
+  };
+  return right(a, b) && right(b, a);
+}
+
+// A row of one unit and one of a later unit that are crossed.
+struct Crossing {
+  std::size_t unit_a = 0, row_a = 0, unit_b = 0, row_b = 0;
+};
+
+std::vector<Crossing> FindCrossings(const CampaignFacts& facts, const Expected& expected) {
+  const Campaign& campaign = *facts.campaign;
+  struct Off {
+    std::size_t unit = 0, row = 0;
+    double x_mm = 0;  // where it should be
+  };
+  std::vector<std::vector<Off>> off_in(facts.exposures.size());
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      if (expected.own_mm[row] > kBad_mm)
+        off_in[facts.exposures.of_row[row]].push_back({unit, row, expected.at[row].x_mm});
+  std::vector<Crossing> crossings;
+  for (std::vector<Off>& off : off_in) {
+    std::ranges::stable_sort(off, {}, &Off::x_mm);
+    for (const Off& a : off) {
+      const double x_mm = campaign.x_mm[a.row];
+      auto b = std::ranges::lower_bound(off, x_mm - kSwapNear_mm, {}, &Off::x_mm);
+      for (; b != off.end() && b->x_mm < x_mm + kSwapNear_mm; ++b)
+        if (b->unit > a.unit && AreCrossed(campaign, expected, a.row, b->row))
+          crossings.push_back({a.unit, a.row, b->unit, b->row});
+    }
   }
-  if (most < static_cast<std::ptrdiff_t>(kRowsMin)) return std::nullopt;
-  double sum = 0, seen = 0;
-  for (std::size_t k = first; k <= last; ++k)
-    if (std::isfinite(square[k])) sum += square[k], seen += 2;
-  const bool to_the_end = last + 1 == rows.size();
-  return FibreSwap{a, b, first == 0 ? 0 : rows[first].exposure,
-                   to_the_end ? UINT32_MAX : rows[last].exposure, std::sqrt(sum / seen)};
+  return crossings;
+}
+
+// Where names are exchanged and where not: the changes that most rows agree with, for their price.
+// A row that says neither, an outlier's say, goes with those around it.
+std::vector<char> ExchangedIn(const Campaign& campaign, const Expected& expected,
+                              const std::vector<RowPair>& rows) {
+  std::array<double, 2> best = {0, 0};  // by whether names are exchanged
+  std::vector<std::array<char, 2>> came_from(rows.size());
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const auto [exposure, a, b] = rows[k];
+    const double vote = AreCrossed(campaign, expected, a, b) ? 1
+                        : AreRight(campaign, expected, a, b) ? -1
+                                                             : 0;
+    std::array<double, 2> next{};
+    for (const std::size_t is : {0u, 1u}) {
+      const bool changes = best[1 - is] - kChange > best[is];
+      came_from[k][is] = static_cast<char>(changes ? 1 - is : is);
+      next[is] = (changes ? best[1 - is] - kChange : best[is]) + (is == 1 ? vote : -vote);
+    }
+    best = next;
+  }
+  std::vector<char> exchanged(rows.size());
+  char is = best[1] > best[0] ? 1 : 0;
+  for (std::size_t k = rows.size(); k-- > 0;) {
+    exchanged[k] = is;
+    is = came_from[k][static_cast<std::size_t>(is)];
+  }
+  return exchanged;
+}
+
+// None: in no three exposures on end.
+std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected& expected,
+                                     std::size_t a, std::size_t b) {
+  const Campaign& campaign = *facts.campaign;
+  const std::vector<RowPair> rows = RowsOfBoth(facts, a, b);
+  const std::vector<char> exchanged = ExchangedIn(campaign, expected, rows);
+  FibreSwap swap{a, b, {}, 0};
+  double square = 0, seen = 0;
+  for (std::size_t begin = 0, end = 0; begin < rows.size(); begin = end) {
+    std::size_t crossed = 0;
+    for (end = begin; end < rows.size() && exchanged[end] == exchanged[begin]; ++end)
+      if (AreCrossed(campaign, expected, rows[end].a, rows[end].b)) ++crossed;
+    if (exchanged[begin] == 0 || crossed < kRowsMin) continue;
+    // To the unit's end where it is to the end of what both have.
+    FibreSwap::Stretch stretch = FibreSwap::Whole(campaign, a, b).stretches.front();
+    if (begin > 0) stretch.begin_a = rows[begin].a, stretch.begin_b = rows[begin].b;
+    if (end < rows.size()) stretch.end_a = rows[end].a, stretch.end_b = rows[end].b;
+    swap.stretches.push_back(stretch);
+    for (std::size_t k = begin; k < end; ++k)
+      for (const double own_mm : {expected.own_mm[rows[k].a], expected.own_mm[rows[k].b]})
+        if (std::isfinite(own_mm)) square += own_mm * own_mm, ++seen;
+  }
+  if (swap.stretches.empty()) return std::nullopt;
+  swap.miss_mm = std::sqrt(square / seen);
+  return swap;
 }
 
 struct UnitPair {
@@ -195,29 +274,35 @@ CauseFound SwapCause(const Campaign& campaign, const std::vector<UnitPair>& pair
   return cause;
 }
 
-std::string WhileOf(const CampaignFacts& facts, const FibreSwap& swap) {
-  const auto unit = [&](std::size_t at) { return std::to_string(facts.campaign->units[at].id); };
-  const auto move = [&](std::uint32_t exposure) {
-    return std::to_string(facts.exposures.move_id[exposure]);
-  };
-  const std::string pair = "units " + unit(swap.a) + " and " + unit(swap.b);
-  if (swap.last == UINT32_MAX) return pair + " since move " + move(swap.first);
-  return pair + " in moves " + move(swap.first) + " to " + move(swap.last);
+bool IsForAll(const Campaign& campaign, const FibreSwap& swap) {
+  return swap.stretches == FibreSwap::Whole(campaign, swap.a, swap.b).stretches;
 }
 
-CauseFound FibreSwapCause(const CampaignFacts& facts, const std::vector<FibreSwap>& swaps) {
+std::string WhileOf(const Campaign& campaign, const FibreSwap& swap) {
+  std::string when;
+  for (const FibreSwap::Stretch& stretch : swap.stretches) {
+    const std::string first = std::to_string(campaign.move_id[stretch.begin_a]);
+    const std::string last = std::to_string(campaign.move_id[stretch.end_a - 1]);
+    const bool to_the_end = stretch.end_a == campaign.first_row[swap.a + 1];
+    when += when.empty() ? "" : " and";
+    when += to_the_end ? " since move " + first : " in moves " + first + " to " + last;
+  }
+  return "units " + std::to_string(campaign.units[swap.a].id) + " and " +
+         std::to_string(campaign.units[swap.b].id) + when;
+}
+
+CauseFound FibreSwapCause(const Campaign& campaign, const std::vector<FibreSwap>& swaps) {
   std::vector<UnitPair> pairs;
   for (const FibreSwap& swap : swaps) pairs.push_back({swap.a, swap.b, swap.miss_mm});
-  CauseFound cause = SwapCause(*facts.campaign, pairs);
-  for (const FibreSwap& swap : swaps) {
-    if (swap.first == 0 && swap.last == UINT32_MAX) continue;
-    cause.shape += (cause.shape.empty() ? "" : "; ") + WhileOf(facts, swap);
-  }
-  cause.paragraph = cause.shape.empty()
-                        ? "Two fibres are known under each other's name: exchange the names."
-                        : "Two fibres are known under each other's name for a while: exchange the "
-                          "names there, and "
-                          "look at how spots are given to units.";
+  CauseFound cause = SwapCause(campaign, pairs);
+  for (const FibreSwap& swap : swaps)
+    if (!IsForAll(campaign, swap))
+      cause.shape += (cause.shape.empty() ? "" : "; ") + WhileOf(campaign, swap);
+  cause.paragraph =
+      cause.shape.empty()
+          ? "Two fibres are known under each other's name: exchange the names."
+          : "Two fibres are known under each other's name for a while: exchange the names there, "
+            "and look at how spots are given to units.";
   return cause;
 }
 
@@ -234,51 +319,70 @@ CauseFound CommandSwapCause(const CampaignFacts& facts, const std::vector<Comman
 
 }  // namespace
 
+FibreSwap FibreSwap::Whole(const Campaign& campaign, std::size_t a, std::size_t b) {
+  const std::vector<std::size_t>& first_row = campaign.first_row;
+  return {a, b, {{first_row[a], first_row[a + 1], first_row[b], first_row[b + 1]}}, 0};
+}
+
 std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts) {
-  const Campaign& campaign = *facts.campaign;
-  std::map<std::pair<std::size_t, std::size_t>, std::size_t> votes;
-  for (const std::vector<OffRow>& off : OffRowsOf(facts)) {
-    if (off.size() > kOffMost) continue;
-    for (std::size_t i = 0; i < off.size(); ++i)
-      for (std::size_t j = i + 1; j < off.size(); ++j)
-        if (AreCrossed(campaign, off[i], off[j])) ++votes[{off[i].unit, off[j].unit}];
-  }
+  const Expected expected = ExpectedOf(*facts.campaign);
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> crossed;  // exposures of a pair
+  for (const Crossing& one : FindCrossings(facts, expected)) ++crossed[{one.unit_a, one.unit_b}];
+  std::vector<std::pair<std::size_t, std::pair<std::size_t, std::size_t>>> pairs;
+  for (const auto& [pair, exposures] : crossed)
+    if (exposures >= kRowsMin) pairs.emplace_back(exposures, pair);
+  std::ranges::stable_sort(pairs, std::greater{}, [](const auto& one) { return one.first; });
   std::vector<FibreSwap> swaps;
   std::set<std::size_t> taken;
-  for (const auto& [pair, crossed] : votes) {
+  for (const auto& [exposures, pair] : pairs) {
     const auto [a, b] = pair;
-    if (crossed < kRowsMin || taken.count(a) != 0 || taken.count(b) != 0) continue;
-    const auto swap = SpanOf(campaign, RowsOfBoth(facts, a, b), a, b);
+    if (taken.count(a) != 0 || taken.count(b) != 0) continue;
+    auto swap = AsFibreSwap(facts, expected, a, b);
     if (!swap) continue;
-    swaps.push_back(*swap);
+    swaps.push_back(std::move(*swap));
     taken.insert({a, b});
   }
   return swaps;
 }
 
+std::vector<std::size_t> RowsUnderAnothersName(const CampaignFacts& facts) {
+  const Campaign& campaign = *facts.campaign;
+  const Expected expected = ExpectedOf(campaign);
+  // Where the table is wrong about a unit, who knows whose place it is at.
+  const auto is_known = [&](std::size_t unit) {
+    std::vector<double> misses;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      if (std::isfinite(expected.own_mm[row])) misses.push_back(expected.own_mm[row]);
+    return Median(std::move(misses)) < kBad_mm;
+  };
+  std::vector<std::size_t> rows;
+  for (const Crossing& one : FindCrossings(facts, expected))
+    if (is_known(one.unit_a) && is_known(one.unit_b))
+      rows.insert(rows.end(), {one.row_a, one.row_b});
+  std::ranges::sort(rows);
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+  return rows;
+}
+
 void UndoFibreSwap(const Exposures& exposures, const FibreSwap& swap, Campaign* campaign) {
   constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-  const auto [a, b, first, last, miss_mm] = swap;
-  const auto is_in = [&](std::size_t row) {
-    return exposures.of_row[row] >= first && exposures.of_row[row] <= last;
-  };
-  std::vector<std::size_t> row_of(exposures.size(), SIZE_MAX);
-  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
-    row_of[exposures.of_row[row]] = row;
-  std::set<std::size_t> met;
-  for (std::size_t row = campaign->first_row[a]; row < campaign->first_row[a + 1]; ++row) {
-    if (!is_in(row)) continue;
-    const std::size_t other = row_of[exposures.of_row[row]];
-    if (other == SIZE_MAX) {
-      campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
-      continue;
+  for (const FibreSwap::Stretch& stretch : swap.stretches) {
+    std::vector<std::size_t> row_of(exposures.size(), SIZE_MAX);
+    for (std::size_t row = stretch.begin_b; row < stretch.end_b; ++row)
+      row_of[exposures.of_row[row]] = row;
+    for (std::size_t row = stretch.begin_a; row < stretch.end_a; ++row) {
+      std::size_t& other = row_of[exposures.of_row[row]];
+      if (other == SIZE_MAX) {
+        campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
+        continue;
+      }
+      std::swap(campaign->x_mm[row], campaign->x_mm[other]);
+      std::swap(campaign->y_mm[row], campaign->y_mm[other]);
+      other = SIZE_MAX;
     }
-    met.insert(other);
-    std::swap(campaign->x_mm[row], campaign->x_mm[other]);
-    std::swap(campaign->y_mm[row], campaign->y_mm[other]);
+    for (const std::size_t alone : row_of)
+      if (alone != SIZE_MAX) campaign->x_mm[alone] = campaign->y_mm[alone] = kMissing;
   }
-  for (std::size_t row = campaign->first_row[b]; row < campaign->first_row[b + 1]; ++row)
-    if (is_in(row) && met.count(row) == 0) campaign->x_mm[row] = campaign->y_mm[row] = kMissing;
 }
 
 std::vector<CommandSwap> FindCommandSwaps(const CampaignFacts& facts) {
@@ -326,7 +430,7 @@ std::vector<CauseFound> UndoExchanges(Campaign* campaign, CampaignFacts* facts,
   const std::vector<FibreSwap> fibres = FindFibreSwaps(*facts);
   if (!fibres.empty()) {
     *as_named = *campaign;
-    causes.push_back(FibreSwapCause(*facts, fibres));
+    causes.push_back(FibreSwapCause(*campaign, fibres));
     for (const FibreSwap& swap : fibres) UndoFibreSwap(facts->exposures, swap, campaign);
   }
   const std::vector<CommandSwap> commands = FindCommandSwaps(*facts);

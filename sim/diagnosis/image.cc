@@ -371,17 +371,20 @@ bool OnlyGrows(const Motion& motion) {
 
 // Along one line, without turn or scale: what gravity may do. Which line it is nobody knows.
 bool MovesAlongALine(const Motion& motion) {
-  constexpr double kSure = 4;  // standard deviations of noise alone
+  constexpr double kSure = 4;     // standard deviations of noise alone
+  constexpr double kLeaks = 0.2;  // of the motion: where units move alike geometry bends the line
   const double exposures = static_cast<double>(std::max(motion.seen.size(), std::size_t{1}));
-  const Vector4 most = motion.noise * (1 + kSure * std::sqrt(2 / exposures));
-  if (motion.square[2] > most[2] || motion.square[3] > most[3]) return false;
+  const Vector4 noise = motion.noise * (1 + kSure * std::sqrt(2 / exposures));
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Vector4& one : motion.OfSeen()) mean += one.head<2>() / exposures;
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
   for (const Vector4& one : motion.OfSeen())
     spread += (one.head<2>() - mean) * (one.head<2>() - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> across(spread, Eigen::EigenvaluesOnly);
-  return across.eigenvalues()[0] <= std::max(most[0], most[1]);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread, Eigen::EigenvaluesOnly);
+  const double across = axes.eigenvalues()[0], along = axes.eigenvalues()[1];
+  return across <= noise.head<2>().maxCoeff() + kLeaks * along &&
+         motion.square[2] <= noise[2] + kLeaks * along &&
+         motion.square[3] <= noise[3] + kLeaks * along;
 }
 
 bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
@@ -462,7 +465,6 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   const Fit with_step = one_step_alone ? *fit : Fit{};
   if (DropImageSteps(fit)) motion = FindMotion(*fit);
   const Deformation deformed = FindDeformation(*fit);
-  const bool along_a_line = MovesAlongALine(motion);
   image.moves = true;
   double size_um = 0;
   motion = TakeMotion(std::move(motion), fit, &size_um);
@@ -482,7 +484,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
   if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back("air_turbulence");
   if (OnlyGrows(motion)) cause.candidates.emplace_back("plate_expansion");
-  if (!along_a_line) cause.cannot_be.emplace_back("gravity_sag");
+  if (!MovesAlongALine(motion)) cause.cannot_be.emplace_back("gravity_sag");
   if (after > kNeighboursAgree || deformed.IsAir()) {
     cause.cause = "air_turbulence";
     cause.candidates = {cause.cause};

@@ -1,6 +1,7 @@
 #include "sim/diagnosis/outliers.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -17,10 +18,11 @@ constexpr double kStuckSpread_mm = 0.03;
 constexpr double kCrowdShare = 0.3;      // of the family-wise rate
 constexpr double kCrowdLeast = 4;        // units and exposures
 constexpr std::size_t kCrowdMost = 200;  // far visits in a window
-constexpr double kTouchedLeast =
-    1.0 / 3;                         // of those that are as near; some do not move, or touch little
-constexpr double kBeyondMost = 0.1;  // of that share, of those that are farther apart
-constexpr double kTouchEvidence = 25;  // ln L of a move
+// Of those that are as near: some do not move, or touch little.
+constexpr double kTouchedLeast = 1.0 / 3;
+constexpr std::size_t kNextTouched = 12;  // visits by which to tell whether wider gaps touch, too
+constexpr double kBeyondMost = 0.1;       // of that share, of those that are farther apart
+constexpr double kTouchEvidence = 25;     // ln L of a row
 constexpr std::string_view kCrowdColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 
@@ -141,21 +143,36 @@ double MissSquare_um2(const Fit& fit, std::size_t row) {
   return fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
 }
 
-// Far rows where the gap is no wider than in the window. {}: many there are not far, or many beyond
-// are: it is not the arms that make them so.
-std::vector<std::size_t> TouchedRows(const std::vector<Visit>& visits, const Window& window) {
-  std::size_t within = 0, far_beyond = 0;
-  std::vector<std::size_t> rows;
+// The widest gap at which arms touch: on from the window while many of the next ones are far.
+double TouchingGap_mm(const std::vector<Visit>& visits, const Window& window, double pitch_mm) {
+  auto end = std::ranges::upper_bound(visits, window.visits.back()->value, {}, &Visit::value);
+  const auto many_of_next = [&] {
+    const auto next = std::min<std::ptrdiff_t>(kNextTouched, visits.end() - end);
+    const auto far = std::count_if(end, end + next, [](const Visit& visit) { return visit.far; });
+    return next > 0 && static_cast<double>(far) >= kTouchedLeast * static_cast<double>(next);
+  };
+  while (many_of_next()) ++end;
+  return std::min(std::prev(end)->value, kThickestArm * pitch_mm);
+}
+
+// Far rows whose arms are near enough to touch. {}: many there are not far, or many beyond are: it
+// is not the arms that make them so. `far`: rows.
+std::vector<std::size_t> TouchedRows(const Fit& fit, const std::vector<Visit>& visits,
+                                     const Window& window, const std::vector<std::size_t>& far) {
+  const double touching_mm = TouchingGap_mm(visits, window, fit.facts->pitch_mm);
+  std::array<double, 2> all{}, are_far{};  // by whether they are near
   for (const Visit& visit : visits) {
-    const bool near = visit.value <= window.visits.back()->value;
-    if (near) ++within;
-    if (visit.far && near) rows.push_back(visit.row);
-    if (visit.far && !near) ++far_beyond;
+    const std::size_t near = visit.value <= touching_mm ? 1 : 0;
+    ++all[near];
+    if (visit.far) ++are_far[near];
   }
-  const double share = static_cast<double>(rows.size()) / static_cast<double>(within);
-  const double share_beyond = static_cast<double>(far_beyond) /
-                              static_cast<double>(std::max(visits.size() - within, std::size_t{1}));
-  if (share < kTouchedLeast || share_beyond > kBeyondMost * share) return {};
+  if (all[1] == 0 || are_far[1] < kTouchedLeast * all[1]) return {};
+  if (are_far[0] * all[1] > kBeyondMost * are_far[1] * all[0]) return {};
+  const std::vector<double>& gap_mm = fit.facts->Find(kArmGap)->values;
+  const std::vector<double>& side = fit.facts->Find(kArmGapSide)->values;
+  std::vector<std::size_t> rows;
+  for (const std::size_t row : far)
+    if (side[row] != 0 && gap_mm[row] <= touching_mm) rows.push_back(row);
   return rows;
 }
 
@@ -183,6 +200,16 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
     }
   }
   return found;
+}
+
+void SetAside(const std::vector<std::size_t>& rows, const std::string& why,
+              std::vector<char>* aside, OutliersFound* found) {
+  for (const std::size_t row : rows) {
+    if ((*aside)[row] != 0) continue;
+    (*aside)[row] = 1;
+    ++found->rows;
+    ++found->why[why];
+  }
 }
 
 std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
@@ -231,7 +258,8 @@ std::optional<Crowd> FindCrowd(const Fit& fit, const std::vector<std::size_t>& f
                  .p_value = std::exp(window.log_p) * static_cast<double>(std::size(kCrowdColumns)),
                  .size_um = std::sqrt(square / static_cast<double>(visits.size())),
                  .delta_log_likelihood = -window.log_p},
-        .touched = name == kArmGap ? TouchedRows(visits, window) : std::vector<std::size_t>()};
+        .touched =
+            name == kArmGap ? TouchedRows(fit, visits, window, far) : std::vector<std::size_t>()};
   }
   return best;
 }
@@ -240,21 +268,22 @@ CauseFound TouchCause(const Fit& fit, const std::vector<std::size_t>& rows) {
   CauseFound cause = CauseNamed(kContact);
   cause.axis = "both";
   cause.scope = "unit";
-  cause.amplitude_unit = "moves";
-  cause.amplitude = static_cast<double>(rows.size());
-  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
   const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
-  std::set<std::uint32_t> units;
+  std::set<std::uint32_t> units, exposures;
   double square = 0;
   for (const std::size_t row : rows) {
     const auto past = std::ranges::upper_bound(first_row, row);
     units.insert(fit.model.units[static_cast<std::size_t>(past - first_row.begin()) - 1].id);
+    exposures.insert(fit.facts->exposures.of_row[row]);
     square += MissSquare_um2(fit, row);
   }
   cause.units.assign(units.begin(), units.end());
   cause.all_units = units.size() == fit.model.units.size();
-  cause.size_um = std::sqrt(square / cause.amplitude);
-  cause.delta_log_likelihood = kTouchEvidence * cause.amplitude;
+  cause.amplitude_unit = "moves";
+  cause.amplitude = static_cast<double>(exposures.size());
+  cause.ci95[0] = cause.ci95[1] = cause.amplitude;
+  cause.size_um = std::sqrt(square / static_cast<double>(rows.size()));
+  cause.delta_log_likelihood = kTouchEvidence * static_cast<double>(rows.size());
   cause.paragraph =
       "Where arms come nearest to each other their fibres are far from their place, in these moves "
       "alone: they have touched. Look at the arms, and at the plans of these moves.";

@@ -14,14 +14,19 @@ namespace focalfleet::sim {
 /// What can be told from the table alone. `aside` gets the rows that must not enter a fit.
 OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside);
 
+/// Takes rows out of all fits, and counts them.
+void SetAside(const std::vector<std::size_t>& rows, const std::string& why,
+              std::vector<char>* aside, OutliersFound* found);
+
 /// Rows far from the final model, added by reason. Returns them.
 std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found);
 
 struct Crowd {
   UnknownFound told;
-  std::vector<std::size_t>
-      touched;  // rows; {}: it is not where arms are nearest, or not there alone
+  // Rows. {}: it is not where arms are nearest, or not there alone.
+  std::vector<std::size_t> touched;
 };
+
 /// Outliers that are far for a reason of their own lie anywhere. Where they crowd at one angle, or
 /// where arms come near each other, something happens there that no term has. `far`: rows. None:
 /// chance puts them so, at a share of the family-wise rate.

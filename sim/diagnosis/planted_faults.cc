@@ -104,7 +104,8 @@ Status ExchangeNames(const PlantedEffect& planted, const CampaignFacts& facts, R
   };
   for (std::size_t k = 0; k < pairs; ++k) {
     const std::size_t a = take(), b = take();
-    UndoFibreSwap(facts.exposures, {.a = a, .b = b}, campaign);  // it exchanges either way
+    // It exchanges either way.
+    UndoFibreSwap(facts.exposures, FibreSwap::Whole(*campaign, a, b), campaign);
   }
   return {};
 }

@@ -240,11 +240,11 @@ void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
 }
 
 void FindContacts(const Campaign& campaign, CampaignFacts* facts) {
-  constexpr double kNear = 0.3;  // of the pitch: no arms are thicker
   if (campaign.units.size() < 2) return;
   const ArmGaps gaps = FindArmGaps(campaign, facts->exposures,
                                    NeighboursOf(campaign, 1.3 * facts->pitch_mm), facts->pitch_mm);
-  if (*std::min_element(gaps.gap_mm.begin(), gaps.gap_mm.end()) > kNear * facts->pitch_mm) return;
+  if (*std::min_element(gaps.gap_mm.begin(), gaps.gap_mm.end()) > kThickestArm * facts->pitch_mm)
+    return;
   facts->columns[std::string(kArmGap)] = Fill(gaps.gap_mm, campaign, facts->exposures);
   facts->columns[std::string(kArmGapSide)] = Fill(gaps.side, campaign, facts->exposures);
 }

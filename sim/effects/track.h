@@ -43,6 +43,7 @@ inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
 // Only where arms come near each other (arm_gap.h).
 inline constexpr std::string_view kArmGap = "gap to the next arm";
 inline constexpr std::string_view kArmGapSide = "side of the next arm";
+inline constexpr double kThickestArm = 0.3;  // of the pitch
 
 struct CampaignFacts {
   const Campaign* campaign = nullptr;

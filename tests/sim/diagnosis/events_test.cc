@@ -329,21 +329,55 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
   EXPECT_LT(diagnosis.gain.rms_after_um, 20);
 }
 
-TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
+// Two turns lost by unit 0, in the move in which unit 1 stops short.
+Campaign StoppedAfterTurns(std::size_t move) {
   Campaign campaign = Planted({}, {.moves = 200, .seed = 6});
-  const std::size_t move = MoveOfAll(campaign, {0, 1}, 30);
-  ASSERT_NE(move, 0u);
-  const double turns_deg = 7 * 360 / campaign.units[0].gear[kTheta];
+  const double turns_deg = 2 * 360 / campaign.units[0].gear[kTheta];
   StandElsewhere(0, move, std::copysign(turns_deg, -StepAt(campaign, 0, move, kTheta)), 0,
                  &campaign);
   StandElsewhere(1, move, -0.31 * StepAt(campaign, 1, move, kTheta),
                  -0.4 * StepAt(campaign, 1, move, kPhi), &campaign);
+  return campaign;
+}
+
+TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
+  const std::size_t move = MoveOfAll(Planted({}, {.moves = 200, .seed = 6}), {0, 1}, 30);
+  ASSERT_NE(move, 0u);
+  const Campaign campaign = StoppedAfterTurns(move);
   const Diagnosis diagnosis = Verdicts(campaign);
-  ASSERT_FALSE(diagnosis.causes.empty());
-  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact") << Told(diagnosis);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
   EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[0].id, campaign.units[1].id));
-  for (const CauseFound& cause : diagnosis.causes)
-    EXPECT_NE(cause.cause, "step_loss") << Told(diagnosis);
+}
+
+TEST(Events, SlipsOfOthersBesideAContactAreSlips) {
+  const std::size_t move = MoveOfAll(Planted({}, {.moves = 200, .seed = 6}), {0, 1}, 30);
+  ASSERT_NE(move, 0u);
+  Campaign campaign = StoppedAfterTurns(move);
+  const CampaignFacts facts = MakeFacts(campaign);
+  const std::vector<double>& gap_mm = facts.Find(kArmGap)->values;
+  std::vector<std::uint32_t> slipped;
+  for (const std::size_t unit : {8u, 12u, 17u, 20u}) {
+    std::size_t at = move + 10;
+    const auto is_fit = [&](std::size_t m) {
+      return gap_mm[campaign.first_row[unit] + m] > kThickestArm * facts.pitch_mm &&
+             std::abs(StepAt(campaign, unit, m, kTheta)) > 20;
+    };
+    while (!is_fit(at)) ++at;
+    const double turns_deg = 2 * 360 / campaign.units[unit].gear[kTheta];
+    StandElsewhere(unit, at, std::copysign(turns_deg, -StepAt(campaign, unit, at, kTheta)), 0,
+                   &campaign);
+    slipped.push_back(campaign.units[unit].id);
+  }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  for (const CauseFound& cause : diagnosis.causes) {
+    if (cause.cause == "step_loss")
+      EXPECT_THAT(cause.units, testing::ElementsAreArray(slipped)) << Told(diagnosis);
+    else
+      EXPECT_EQ(cause.cause, "collision_contact") << Told(diagnosis);
+  }
+  EXPECT_EQ(diagnosis.causes.size(), 2u) << Told(diagnosis);
 }
 
 TEST(Events, AUnitThatStopsShortAloneIsUnknown) {

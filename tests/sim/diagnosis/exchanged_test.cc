@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <limits>
+
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
@@ -93,6 +96,71 @@ TEST(Exchanged, APairOfOutliersIsNoName) {
   EXPECT_THAT(FindFibreSwaps(MakeFacts(campaign)), IsEmpty());
 }
 
+TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
+  const Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  Campaign campaign = right;
+  ExchangePlacesOf(3, 9, 10, 20, &campaign);
+  ExchangePlacesOf(3, 9, 25, 60, &campaign);
+  // Off anywhere, and not seen: these say nothing about names.
+  campaign.x_mm[campaign.first_row[3] + 14] += 1.5;
+  campaign.x_mm[campaign.first_row[9] + 59] = std::numeric_limits<double>::quiet_NaN();
+  const CampaignFacts facts = MakeFacts(campaign);
+  const std::vector<FibreSwap> swaps = FindFibreSwaps(facts);
+  ASSERT_THAT(swaps, SizeIs(1));
+  Campaign undone = campaign;
+  UndoFibreSwap(facts.exposures, swaps[0], &undone);
+  for (std::size_t move = 0; move < 60; ++move)
+    if (move != 14 && move != 59) {
+      EXPECT_EQ(undone.x_mm[right.first_row[3] + move], right.x_mm[right.first_row[3] + move]);
+      EXPECT_EQ(undone.x_mm[right.first_row[9] + move], right.x_mm[right.first_row[9] + move]);
+    }
+  const Diagnosis diagnosis = Verdicts(campaign);
+  ASSERT_THAT(diagnosis.causes, SizeIs(1)) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].shape, "units 4 and 10 in moves 11 to 20 and since move 26");
+}
+
+// Exposures have numbers in the order in which they are met, unit by unit.
+TEST(Exchanged, OfAFirstUnitThatLacksMovesFollowsNothing) {
+  Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  std::vector<bool> keep(right.rows(), true);
+  for (std::size_t move = 20; move < 30; ++move) keep[right.first_row[0] + move] = false;
+  right = Keep(right, keep);
+  Campaign campaign = right;
+  ExchangePlacesOf(3, 9, 14, 25, &campaign);
+  const CampaignFacts facts = MakeFacts(campaign);
+  const std::vector<FibreSwap> swaps = FindFibreSwaps(facts);
+  ASSERT_THAT(swaps, SizeIs(1));
+  UndoFibreSwap(facts.exposures, swaps[0], &campaign);
+  EXPECT_EQ(campaign.x_mm, right.x_mm);
+  EXPECT_EQ(campaign.y_mm, right.y_mm);
+}
+
+TEST(Exchanged, NamesAreFoundWhereTheTableIsOffForAllUnits) {
+  Campaign campaign = Planted({}, {.units = 600, .moves = 8, .seed = 5});
+  ExchangePlacesOf(3, 9, 0, 8, &campaign);
+  for (double& x_mm : campaign.x_mm) x_mm += 0.5;
+  const std::vector<FibreSwap> swaps = FindFibreSwaps(MakeFacts(campaign));
+  ASSERT_THAT(swaps, SizeIs(1));
+  EXPECT_EQ(swaps[0].a, 3u);
+  EXPECT_EQ(swaps[0].b, 9u);
+}
+
+// Neighbours that are given each other's spot now and then: no cause of an axis, whatever they are
+// near to.
+TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
+  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  std::size_t exchanged = 0;
+  for (std::size_t unit = 0; unit + 1 < campaign.units.size(); unit += 2)
+    for (const std::size_t move : {5 + unit, 30 + unit}) {
+      ExchangePlacesOf(unit, unit + 1, move, move + 1, &campaign);
+      exchanged += 2;
+    }
+  EXPECT_THAT(RowsUnderAnothersName(MakeFacts(campaign)), SizeIs(exchanged));
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kConsistent) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.outliers.why.at("at another unit's place"), exchanged);
+}
+
 TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
   Campaign campaign = Planted({}, {.moves = 30, .seed = 5});
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
@@ -102,6 +170,7 @@ TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
   const std::vector<FibreSwap> swaps = FindFibreSwaps(facts);
   ASSERT_THAT(swaps, SizeIs(1));
   UndoFibreSwap(facts.exposures, swaps[0], &campaign);
+  EXPECT_TRUE(std::isnan(campaign.x_mm[gone]));
   EXPECT_TRUE(std::isnan(campaign.x_mm[campaign.first_row[3] + 12]));
   EXPECT_TRUE(std::isfinite(campaign.x_mm[campaign.first_row[3] + 13]));
   EXPECT_TRUE(std::isfinite(campaign.x_mm[campaign.first_row[3] + 25]));

@@ -142,6 +142,29 @@ TEST(Crowd, OutliersWhereArmsAreNearestHaveTouched) {
   EXPECT_GE(diagnosis.causes[0].amplitude, 10);
 }
 
+// Arms that lean on each other as long as they stand so near are far for many rows; and no window
+// is as wide as all of them.
+TEST(Crowd, ContactsThatLastAndAreManyLeaveNothingUnknown) {
+  Campaign campaign = Planted({}, {.units = 60, .moves = 240, .seed = 8, .outlier_share = 0.003});
+  const CampaignFacts facts = MakeFacts(campaign);
+  const FilledColumn& gap = *facts.Find(kArmGap);
+  Rng rng = Rng::Stream(8, "leaned");
+  std::size_t rows = 0;
+  double dx_mm = 0, dy_mm = 0;
+  for (std::size_t row = 0; row < campaign.rows(); ++row) {
+    if (gap.values[row] > 2.8) continue;
+    // The same as long as it stands.
+    if (row == 0 || gap.values[row] != gap.values[row - 1])
+      dx_mm = rng.Uniform(-1.4, 1.4), dy_mm = rng.Uniform(-1.4, 1.4);
+    campaign.x_mm[row] += dx_mm, campaign.y_mm[row] += dy_mm, ++rows;
+  }
+  ASSERT_GT(rows, 200u);
+  const Diagnosis diagnosis = Verdicts(campaign);
+  EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
+  ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
+  EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
+}
+
 TEST(Crowd, OutliersAmongMostThatAreAsNearAreUnknown) {
   const UnknownFound unknown = OnlyUnknown(Verdicts(Touched(4, 0.15)));
   EXPECT_EQ(unknown.covariate, kArmGap);
