@@ -170,6 +170,9 @@ void AddRest(const Diagnosis& diagnosis, report::Page* page) {
       rows.push_back({why, std::to_string(count)});
     page->Table({"why", "rows"}, rows, {Align::kLeft, Align::kRight});
   }
+  if (!diagnosis.outliers.units.empty())
+    page->Paragraph(fmt::format("Stuck, or off by far more than others and by no cause: unit {}.",
+                                fmt::join(diagnosis.outliers.units, ", ")));
   if (!diagnosis.not_testable.empty()) {
     page->Heading("What these data cannot test");
     std::vector<std::vector<std::string>> rows;

@@ -147,6 +147,9 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
   if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
   for (const auto& [why, rows] : diagnosis.outliers.why)
     Say(context, fmt::format("{} of {} rows: {}", rows, diagnosis.rows, why));
+  if (!diagnosis.outliers.units.empty())
+    Say(context, fmt::format("stuck, or off by far more than others and by no cause: unit {}",
+                             fmt::join(diagnosis.outliers.units, ", ")));
   if (const std::string patches = PatchTable(diagnosis); !patches.empty()) Say(context, patches);
   Say(context, options.out + "/{report.json, report.html, model.toml, next_moves.csv}");
   return ExitCode::kOk;

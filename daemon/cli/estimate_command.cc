@@ -176,7 +176,8 @@ Json ModelJson(const Estimated& estimated) {
   return {{"name", estimated.model->file.model.name},
           {"compensated", estimated.planned.compensated},
           {"beyond_range", beyond},
-          {"left_out", estimated.model->compensation.left_out()}};
+          {"left_out", estimated.model->compensation.left_out()},
+          {"too_near", estimated.planned.plan.too_near}};
 }
 
 Json Summary(const Estimated& estimated, const EstimateOptions& options) {
@@ -239,6 +240,11 @@ std::string DescribeModel(const Estimated& estimated) {
                      left_out.empty() ? "" : "; not compensated: ", fmt::join(left_out, ", "));
 }
 
+std::string DescribeTooNear(const Estimated& estimated) {
+  const std::string& too_near = estimated.planned.plan.too_near;
+  return too_near.empty() ? "" : "\n  " + too_near + ": they may touch, and are led apart";
+}
+
 std::string DescribeBeyondRange(const Estimated& estimated) {
   std::string text;
   for (const PositionerIndex i : estimated.planned.beyond_range)
@@ -259,7 +265,7 @@ std::string Describe(const Estimated& estimated, const EstimateOptions& options)
       100 * estimated.spread.load, 100 * estimated.spread.resistance,
       100 * estimated.spread.model_error);
   return text + DescribeUnserved(UnservedJson(estimated.planned.plan, estimated.fleet.layout)) +
-         DescribeBeyondRange(estimated);
+         DescribeBeyondRange(estimated) + DescribeTooNear(estimated);
 }
 
 ExitCode RunEstimate(const Context& context, const EstimateOptions& options) {

@@ -25,6 +25,8 @@ constexpr double kBeyondMost = 0.1;       // of that share, of those that are fa
 constexpr double kTouchEvidence = 25;     // ln L of a row
 constexpr std::string_view kCrowdColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
+constexpr double kFarMore = 4;     // off than other units: so is it, whatever noise it passes for
+constexpr std::size_t kOthersMin = 8;
 
 double SpreadOf(const std::vector<double>& values) {
   return values.empty() ? 0 : Quantile(values, 0.95) - Quantile(values, 0.05);
@@ -139,6 +141,28 @@ Window DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   return densest;
 }
 
+// Units that are far more off than others are, as a rule and by no cause.
+std::vector<std::uint32_t> FarMoreThanOthers(const Fit& fit) {
+  const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
+  std::vector<std::pair<double, std::uint32_t>> usual_um;
+  std::vector<double> all_um;
+  for (std::size_t unit = 0; unit + 1 < first_row.size(); ++unit) {
+    std::vector<double> off_um;
+    for (std::size_t row = first_row[unit]; row < first_row[unit + 1]; ++row)
+      if (fit.aside[row] == 0 && std::isfinite(fit.x_um[row]))
+        off_um.push_back(std::hypot(fit.x_um[row], fit.y_um[row]));
+    if (off_um.empty()) continue;
+    usual_um.emplace_back(Median(std::move(off_um)), fit.model.units[unit].id);
+    all_um.push_back(usual_um.back().first);
+  }
+  std::vector<std::uint32_t> far;
+  if (all_um.size() < kOthersMin) return far;
+  const double most_um = kFarMore * Median(std::move(all_um));
+  for (const auto& [off_um, id] : usual_um)
+    if (off_um > most_um) far.push_back(id);
+  return far;
+}
+
 double MissSquare_um2(const Fit& fit, std::size_t row) {
   return fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
 }
@@ -231,6 +255,7 @@ std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
     if (static_cast<double>(far) > kMostRows * static_cast<double>(white.moves.size()))
       found->units.push_back(campaign.units[unit].id);
   }
+  for (const std::uint32_t unit : FarMoreThanOthers(fit)) found->units.push_back(unit);
   std::sort(found->units.begin(), found->units.end());
   found->units.erase(std::unique(found->units.begin(), found->units.end()), found->units.end());
   return far_rows;

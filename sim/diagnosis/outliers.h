@@ -18,7 +18,8 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
 void SetAside(const std::vector<std::size_t>& rows, const std::string& why,
               std::vector<char>* aside, OutliersFound* found);
 
-/// Rows far from the final model, added by reason. Returns them.
+/// Rows far from the final model, added by reason; and units that are so in many rows, or far more
+/// off than others. Returns the rows.
 std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found);
 
 struct Crowd {

@@ -219,6 +219,22 @@ TEST_F(EstimateCommand, NamesUnitsThatTheModelWouldSendBeyondTheirRange) {
   EXPECT_THAT(text, HasSubstr("unit 1: by the model its range ends before the target"));
 }
 
+// Units 1 and 5 are neighbours along x, and stretched at each other.
+TEST_F(EstimateCommand, SaysWhichArmsMayTouchByAModel) {
+  const std::string model = scratch_.Put("model.toml", GearsOf(0.01));
+  std::string state = StateOf(90, 180);
+  state.replace(state.find("\n1,90,180"), 9, "\n1,0,10");
+  state.replace(state.find("\n5,90,180"), 9, "\n5,180,10");
+  const std::string from = scratch_.Put("s.csv", state);
+  targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,60,150\n5,100,150\n");
+  ExpectRefused({"--from", from}, 1, "the starts of units 1 and 5 are 1.5804 mm apart");
+  const Json told = Json::parse(Estimate({"--from", from, "--model", model, "--json"}).out);
+  EXPECT_THAT(told["model"]["too_near"].get<std::string>(),
+              HasSubstr("the starts of units 1 and 5 are"));
+  EXPECT_THAT(Estimate({"--from", from, "--model", model}).out,
+              HasSubstr("they may touch, and are led apart"));
+}
+
 TEST_F(EstimateCommand, RefusesAModelThatIsNoneOfThisFleet) {
   const auto refuse = [&](const std::string& text, const std::string& complaint) {
     ExpectRefused({"--model", scratch_.Put("m.toml", text)}, 1, complaint);

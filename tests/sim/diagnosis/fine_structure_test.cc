@@ -1,7 +1,7 @@
 // What varies too fast for a smooth curve, and outliers that crowd at one place.
 #include "sim/diagnosis/fine_structure.h"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cmath>
 #include <string>
@@ -145,20 +145,21 @@ TEST(Crowd, OutliersWhereArmsAreNearestHaveTouched) {
 // Arms that lean on each other as long as they stand so near are far for many rows; and no window
 // is as wide as all of them.
 TEST(Crowd, ContactsThatLastAndAreManyLeaveNothingUnknown) {
-  Campaign campaign = Planted({}, {.units = 60, .moves = 240, .seed = 8, .outlier_share = 0.003});
+  Campaign campaign = Planted({}, {.units = 90, .moves = 200, .seed = 8, .outlier_share = 0.003});
   const CampaignFacts facts = MakeFacts(campaign);
   const FilledColumn& gap = *facts.Find(kArmGap);
   Rng rng = Rng::Stream(8, "leaned");
-  std::size_t rows = 0;
+  std::size_t visits = 0, rows = 0;
   double dx_mm = 0, dy_mm = 0;
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     if (gap.values[row] > 2.8) continue;
     // The same as long as it stands.
     if (row == 0 || gap.values[row] != gap.values[row - 1])
-      dx_mm = rng.Uniform(-1.4, 1.4), dy_mm = rng.Uniform(-1.4, 1.4);
+      dx_mm = rng.Uniform(-1.4, 1.4), dy_mm = rng.Uniform(-1.4, 1.4), ++visits;
     campaign.x_mm[row] += dx_mm, campaign.y_mm[row] += dy_mm, ++rows;
   }
-  ASSERT_GT(rows, 200u);
+  ASSERT_GT(visits, 250u);
+  ASSERT_GT(rows, visits + 50);
   const Diagnosis diagnosis = Verdicts(campaign);
   EXPECT_EQ(diagnosis.verdict, Verdict::kExplained) << Told(diagnosis);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Told(diagnosis);
@@ -174,6 +175,18 @@ TEST(Crowd, ContactsAreUnknownToALibraryWithoutThem) {
   DiagnoseOptions options;
   options.leave_out = {"collision_contact"};
   EXPECT_EQ(OnlyUnknown(Verdicts(Touched(1.5, 0.9), options)).covariate, kArmGap);
+}
+
+// A walk of its own is noise to a unit, and not to those who look after it.
+TEST(Crowd, AUnitThatIsFarMoreOffThanOthersIsNamed) {
+  Campaign campaign = Planted({}, {.moves = 60, .seed = 8});
+  Rng rng = Rng::Stream(8, "walks");
+  double x_mm = 0, y_mm = 0;
+  for (std::size_t row = campaign.first_row[5]; row < campaign.first_row[6]; ++row) {
+    x_mm += 0.004 * rng.Normal(), y_mm += 0.004 * rng.Normal();
+    campaign.x_mm[row] += x_mm, campaign.y_mm[row] += y_mm;
+  }
+  EXPECT_THAT(Verdicts(campaign).outliers.units, testing::ElementsAre(campaign.units[5].id));
 }
 
 TEST(Crowd, OutliersAnywhereAreOutliers) {
