@@ -42,8 +42,15 @@ bool IsOwnShape(const Effect& effect, const UnknownFound& told) {
          told.channel.find("against its direction") != std::string::npos;
 }
 
+bool IsOfAngleOf(EffectAxis axis, const UnknownFound& told) {
+  return told.channel.starts_with(Name(axis)) &&
+         told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
+}
+
 // Ripples of the gears, which come round too fast to be the shape of a curve.
 bool IsRipple(std::string_view cause) { return cause == "stage_ripple" || cause == "tooth_mesh"; }
+
+bool IsBump(const ModelTerm& term) { return term.form.effect->cause == "tooth_damage"; }
 
 // Without what is not of the structure: beside a curve for it, a ripple that is there explains as
 // much as it does alone, whatever its many amplitudes cost.
@@ -96,6 +103,15 @@ struct Beaten {
     FitAnew(&curved);
     FitAnew(&named);
     if (BetterBy(curved, named) <= better_by) return false;
+    // One of several that is as good alone is the structure: the others are beside it.
+    constexpr double kUndecided = 6;
+    const auto is_the_structure = [&](std::size_t term) {
+      Fit one = without;
+      one.model.terms.push_back(named.model.terms[term]);
+      FitAnew(&one);
+      return BetterBy(curved, one) <= kUndecided;
+    };
+    if (terms.size() > 1 && std::ranges::any_of(terms, is_the_structure)) return false;
     // What has nothing to do with the structure explains beside it what it explains alone.
     constexpr double kOfItsOwn = 0.5;
     Fit both = named;
@@ -124,13 +140,20 @@ void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* sel
   for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi}) {
     const LastFirst series = SeriesOf(fit->model, axis);
     if (series.size() < 2) continue;
-    beaten.DropIf(series, 0, [&](const UnknownFound& told) {
-      return told.channel.starts_with(Name(axis)) &&
-             told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
-    });
+    // Bumps at several places: where they are no wave, no wave comes near.
+    const auto bumps =
+        std::ranges::count_if(series, [&](std::size_t t) { return IsBump(fit->model.terms[t]); });
+    beaten.DropIf(series, bumps < 2 ? 0 : -kClearly * static_cast<double>(bumps),
+                  [&](const UnknownFound& told) { return IsOfAngleOf(axis, told); });
   }
   for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
     const Effect& effect = *fit->model.terms[t].form.effect;
+    const EffectAxis axis = fit->model.terms[t].form.axis;
+    if (IsBump(fit->model.terms[t])) {
+      beaten.DropIf({t}, -kClearly,
+                    [&](const UnknownFound& told) { return IsOfAngleOf(axis, told); });
+      continue;
+    }
     if (IsOfNight(effect.cause))
       beaten.DropIf({t}, kClearly,
                     [&](const UnknownFound& told) { return !IsOwnShape(effect, told); });

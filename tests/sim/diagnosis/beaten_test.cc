@@ -3,16 +3,24 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "sim/diagnosis/fleet_groups.h"
+#include "sim/effects/harmonic.h"
+#include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"
 
 namespace focalfleet::sim {
 namespace {
 
 // Of some units; no gear has it.
-Campaign Rippled(double order, double size_deg, std::uint64_t seed) {
+Campaign Rippled(double order, double size_deg, std::uint64_t seed,
+                 const std::vector<std::size_t>& units = {4, 13}) {
   Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
   std::vector<double> size_of_row(campaign.rows(), 0);
-  for (const std::size_t unit : {4u, 13u})
+  for (const std::size_t unit : units)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
       size_of_row[row] = size_deg;
   TurnTheta(
@@ -40,6 +48,57 @@ void ExpectNamed(const std::vector<std::string>& names, const Diagnosis& diagnos
   for (const CauseFound& cause : diagnosis.causes) named.push_back(cause.cause);
   EXPECT_EQ(named, names) << Told(diagnosis);
   EXPECT_TRUE(diagnosis.unknown.empty()) << Told(diagnosis);
+}
+
+// One unit's few moves see a few crests of it, which are as many bumps.
+TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
+  for (const std::uint64_t seed : {3u, 4u}) {
+    SCOPED_TRACE(seed);
+    const Diagnosis diagnosis = Verdicts(Rippled(3.7, 0.4, seed, {7}));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Told(diagnosis);
+    for (const CauseFound& cause : diagnosis.causes)
+      EXPECT_EQ(cause.cause, "zero_offset") << Told(diagnosis);
+  }
+}
+
+// The teeth's own wave, and what one side of the gear has more of it, in each unit its own: a
+// ripple of their order is cheaper than both, and no better than the wave.
+TEST(Beaten, ARippleOfTheTeethsOwnOrderIsTheTeeth) {
+  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  std::vector<double> phase_of_row;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    phase_of_row.resize(campaign.first_row[unit + 1], static_cast<double>(unit));
+  TurnTheta(
+      [&](std::size_t row) {
+        const double turn = campaign.cmd_deg[kTheta][row] * std::numbers::pi / 180;
+        return 0.05 * std::sin(kOutputTeeth * turn + phase_of_row[row]) *
+               (1 + 0.1 * std::cos(turn));
+      },
+      &campaign);
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = StaticFit(facts);
+  const Effect* effect = FindEffect("tooth_mesh");
+  Templates teeth;
+  effect->list(facts, &teeth);
+  const auto of_all = [&](double spread_deg) {
+    return Standing{.sharing = Sharing::kUnit,
+                    .has = std::vector<char>(campaign.units.size(), 1),
+                    .spread = spread_deg};
+  };
+  for (Template& form : teeth) {
+    form.effect = effect;
+    if (form.axis == EffectAxis::kTheta && form.shape == kOutputTeeth)
+      fit.model.terms.push_back(
+          MakeTerm(form, of_all(form.form == 0 ? 0.06 : 0.006), GroupsOf(facts)));
+  }
+  ASSERT_EQ(fit.model.terms.size(), 2u);
+  UpdateResiduals(&fit);
+  StepFit(&fit);
+  SettleFit(&fit, 3);
+  Selection selection;
+  selection.accepted.resize(2);
+  DropBeaten(0.01, 1, &fit, &selection);
+  EXPECT_EQ(fit.model.terms.size(), 2u);
 }
 
 TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
