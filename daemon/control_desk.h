@@ -18,15 +18,6 @@
 
 namespace focalfleet {
 
-/// Units of a request by their numbers. Errors: kInvalid names the first that does not exist.
-Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
-                                               const std::vector<std::uint32_t>& ids);
-
-/// A request that changes something, as the coordinator's command. Verbs: apply retarget stop home
-/// disable enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened
-/// then.
-Result<Command> CommandOf(const ControlRequest& request, const FleetView& view);
-
 /// Tells the model what the unit counts, if it rests.
 void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation);
 

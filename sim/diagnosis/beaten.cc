@@ -42,9 +42,12 @@ bool IsOwnShape(const Effect& effect, const UnknownFound& told) {
          told.channel.find("against its direction") != std::string::npos;
 }
 
-bool IsOfAngleOf(EffectAxis axis, const UnknownFound& told) {
-  return told.channel.starts_with(Name(axis)) &&
-         told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
+// Whether a structure follows where this axis stands.
+auto AtAngleOf(EffectAxis axis) {
+  return [axis](const UnknownFound& told) {
+    return told.channel.starts_with(Name(axis)) &&
+           told.covariate == kCommand[axis == EffectAxis::kTheta ? kTheta : kPhi];
+  };
 }
 
 // Ripples of the gears, which come round too fast to be the shape of a curve.
@@ -143,18 +146,13 @@ void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* sel
     // Bumps at several places: where they are no wave, no wave comes near.
     const auto bumps =
         std::ranges::count_if(series, [&](std::size_t t) { return IsBump(fit->model.terms[t]); });
-    beaten.DropIf(series, bumps < 2 ? 0 : -kClearly * static_cast<double>(bumps),
-                  [&](const UnknownFound& told) { return IsOfAngleOf(axis, told); });
+    beaten.DropIf(series, bumps < 2 ? 0 : -kClearly * static_cast<double>(bumps), AtAngleOf(axis));
   }
   for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
     const Effect& effect = *fit->model.terms[t].form.effect;
-    const EffectAxis axis = fit->model.terms[t].form.axis;
-    if (IsBump(fit->model.terms[t])) {
-      beaten.DropIf({t}, -kClearly,
-                    [&](const UnknownFound& told) { return IsOfAngleOf(axis, told); });
-      continue;
-    }
-    if (IsOfNight(effect.cause))
+    if (IsBump(fit->model.terms[t]))
+      beaten.DropIf({t}, -kClearly, AtAngleOf(fit->model.terms[t].form.axis));
+    else if (IsOfNight(effect.cause))
       beaten.DropIf({t}, kClearly,
                     [&](const UnknownFound& told) { return !IsOwnShape(effect, told); });
   }

@@ -17,7 +17,7 @@
 #include "sim/diagnosis/fine_structure.h"
 #include "sim/diagnosis/gain.h"
 #include "sim/diagnosis/geometry_causes.h"
-#include "sim/diagnosis/image.h"
+#include "sim/diagnosis/image_followed.h"
 #include "sim/diagnosis/next_moves.h"
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
@@ -129,6 +129,13 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   return cause;
 }
 
+void AddUnits(const CauseFound& more, CauseFound* cause) {
+  std::set<std::uint32_t> units(cause->units.begin(), cause->units.end());
+  units.insert(more.units.begin(), more.units.end());
+  cause->units.assign(units.begin(), units.end());
+  cause->all_units = cause->all_units || more.all_units;
+}
+
 // One entry a cause: both axes, or several shapes, of one name belong together.
 void MergeCauses(std::vector<CauseFound>* causes) {
   // Strongest first: what cannot be told of the strongest part cannot be told of the whole, and
@@ -152,10 +159,7 @@ void MergeCauses(std::vector<CauseFound>* causes) {
       same->shape = cause.shape;
       same->scope = cause.scope;
     }
-    std::set<std::uint32_t> units(same->units.begin(), same->units.end());
-    units.insert(cause.units.begin(), cause.units.end());
-    same->units.assign(units.begin(), units.end());
-    same->all_units = same->all_units || cause.all_units;
+    AddUnits(cause, &*same);
     same->size_um = std::hypot(same->size_um, cause.size_um);
     same->delta_log_likelihood += cause.delta_log_likelihood;
     if (same->evidence_of_unit.empty()) cause.evidence_of_unit.clear();
@@ -327,10 +331,7 @@ void TellCrowds(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOpti
     CauseFound touch = TouchCause(fit, crowd->touched);
     std::vector<CauseFound>& causes = diagnosis->causes;
     if (const auto told = std::ranges::find_if(causes, is_contact); told != causes.end()) {
-      std::set<std::uint32_t> units(told->units.begin(), told->units.end());
-      units.insert(touch.units.begin(), touch.units.end());
-      told->units.assign(units.begin(), units.end());
-      told->all_units = units.size() == fit.model.units.size();
+      AddUnits(touch, &*told);
     } else {
       const auto weaker = std::ranges::find_if(causes, [&](const CauseFound& cause) {
         return cause.delta_log_likelihood < touch.delta_log_likelihood;

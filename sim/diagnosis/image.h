@@ -3,7 +3,6 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "sim/diagnosis/diagnosis.h"
@@ -11,9 +10,6 @@
 #include "sim/diagnosis/select.h"
 
 namespace focalfleet::sim {
-
-/// The channel of a column that the image's shifts follow.
-inline constexpr std::string_view kImageShift = "the image's shift";
 
 struct ImageFound {
   bool moves = false;  // the model has changed

@@ -168,7 +168,7 @@ double MissSquare_um2(const Fit& fit, std::size_t row) {
 }
 
 // The widest gap at which arms touch: on from the window while many of the next ones are far.
-double TouchingGap_mm(const std::vector<Visit>& visits, const Window& window, double pitch_mm) {
+double WidestTouch_mm(const std::vector<Visit>& visits, const Window& window, double pitch_mm) {
   auto end = std::ranges::upper_bound(visits, window.visits.back()->value, {}, &Visit::value);
   const auto many_of_next = [&] {
     const auto next = std::min<std::ptrdiff_t>(kNextTouched, visits.end() - end);
@@ -183,7 +183,7 @@ double TouchingGap_mm(const std::vector<Visit>& visits, const Window& window, do
 // is not the arms that make them so. `far`: rows.
 std::vector<std::size_t> TouchedRows(const Fit& fit, const std::vector<Visit>& visits,
                                      const Window& window, const std::vector<std::size_t>& far) {
-  const double touching_mm = TouchingGap_mm(visits, window, fit.facts->pitch_mm);
+  const double touching_mm = WidestTouch_mm(visits, window, fit.facts->pitch_mm);
   std::array<double, 2> all{}, are_far{};  // by whether they are near
   for (const Visit& visit : visits) {
     const std::size_t near = visit.value <= touching_mm ? 1 : 0;

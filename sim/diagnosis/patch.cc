@@ -5,6 +5,7 @@
 #include <string>
 
 #include "sim/diagnosis/image.h"
+#include "sim/diagnosis/image_followed.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/select.h"
 #include "sim/diagnosis/term_trace.h"

@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "daemon/control/messages.h"
-#include "daemon/control_desk.h"
+#include "daemon/requested_command.h"
 #include "protocol/base/check.h"
 #include "tests/daemon/shell/small_fleet.h"
 

@@ -9,6 +9,7 @@
 #include "daemon/campaign/campaign_files.h"
 #include "daemon/files/text_file.h"
 #include "sim/diagnosis/diagnosis.h"
+#include "sim/diagnosis/next_moves.h"
 
 namespace focalfleet {
 namespace {
@@ -50,8 +51,7 @@ TEST_P(MeasuredArcs, TheStrongCauseIsFoundWithTheRivalThatMovesOfOneLengthLeaveI
     const std::set<std::string> names = {pair.cause, pair.rival};
     if (names == std::set<std::string>{"gear_scale", "ramp_travel"}) apart = pair.d;
   }
-  constexpr double kHardlyConfused = 38;  // 0.1 %
-  EXPECT_GE(apart, kHardlyConfused);
+  EXPECT_LT(sim::ConfusionAt(apart), 1e-3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Real, MeasuredArcs,

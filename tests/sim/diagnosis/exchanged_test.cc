@@ -161,6 +161,20 @@ TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
   EXPECT_EQ(diagnosis.outliers.why.at("at another unit's place"), exchanged);
 }
 
+// Zeros anywhere put fibres near others' places by chance, now and then.
+TEST(Exchanged, WhereTheTableIsWrongNobodyIsAtAnothersPlace) {
+  std::size_t exchanged = 0;
+  for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {
+    Campaign campaign = Planted({}, {.units = 60, .moves = 60, .seed = seed});
+    Rng rng = Rng::Stream(seed, "zeros");
+    for (CampaignUnit& unit : campaign.units) unit.zero_deg[kTheta] += rng.Uniform(-180, 180);
+    for (std::size_t unit = 0; unit + 1 < campaign.units.size(); unit += 2)
+      ExchangePlacesOf(unit, unit + 1, 7, 8, &campaign);
+    exchanged += RowsUnderAnothersName(MakeFacts(campaign)).size();
+  }
+  EXPECT_EQ(exchanged, 0u);
+}
+
 TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
   Campaign campaign = Planted({}, {.moves = 30, .seed = 5});
   ExchangePlacesOf(3, 9, 10, 20, &campaign);

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "protocol/base/rng.h"
+#include "sim/diagnosis/image_followed.h"
 #include "sim/diagnosis/term_trace.h"
 #include "sim/effects/registry.h"
 #include "tests/sim/diagnosis/planted_campaign.h"

@@ -1,10 +1,11 @@
-#include "daemon/control_desk.h"
+#include "daemon/requested_command.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <variant>
 
+#include "daemon/status_json.h"
 #include "tests/daemon/control/scratch.h"
 #include "tests/daemon/shell/small_fleet.h"
 
@@ -22,7 +23,7 @@ std::string ErrorOf(const SmallFleet& fleet, const std::string& verb, const Json
   return command ? "" : command.error().text;
 }
 
-TEST(ControlDesk, MakesCommandsOfVerbs) {
+TEST(RequestedCommand, MakesCommandsOfVerbs) {
   const SmallFleet fleet;
   const auto stop = Try(fleet, "stop", Json::object());
   ASSERT_TRUE(stop);
@@ -44,7 +45,7 @@ TEST(ControlDesk, MakesCommandsOfVerbs) {
   EXPECT_TRUE(Try(fleet, "home", {{"unit_ids", {1}}}));
 }
 
-TEST(ControlDesk, ResolvesTargets) {
+TEST(RequestedCommand, ResolvesTargets) {
   const SmallFleet fleet;
   const auto apply = Try(fleet, "apply",
                          {{"source", "t.csv"},
@@ -58,7 +59,7 @@ TEST(ControlDesk, ResolvesTargets) {
   EXPECT_TRUE(command.targets[1]);
 }
 
-TEST(ControlDesk, RetargetTakesAPlaceOrTwoAngles) {
+TEST(RequestedCommand, RetargetTakesAPlaceOrTwoAngles) {
   const SmallFleet fleet;
   const auto place = Try(fleet, "retarget", {{"unit_id", 2}, {"x_mm", 30.5}, {"y_mm", 4}});
   ASSERT_TRUE(place) << place.error().text;
@@ -79,7 +80,7 @@ TEST(ControlDesk, RetargetTakesAPlaceOrTwoAngles) {
   EXPECT_THAT(far, HasSubstr("out of patrol"));
 }
 
-TEST(ControlDesk, NamesWhatIsWrong) {
+TEST(RequestedCommand, NamesWhatIsWrong) {
   const SmallFleet fleet;
   EXPECT_THAT(ErrorOf(fleet, "dance", Json::object()), HasSubstr("no verb 'dance'"));
   EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", 99}}), HasSubstr("no unit 99"));
@@ -102,7 +103,7 @@ TEST(ControlDesk, NamesWhatIsWrong) {
               HasSubstr("no parameter 'colour'"));
 }
 
-TEST(ControlDesk, RefusesValuesThatNoUnitTakes) {
+TEST(RequestedCommand, RefusesValuesThatNoUnitTakes) {
   const SmallFleet fleet;
   const auto error = [&](const char* parameter, std::int64_t value) {
     return ErrorOf(fleet, "params_set",
