@@ -76,7 +76,8 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
     return;
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
-  pending.pursues = request->verb == "apply" || request->verb == "home";
+  pending.pursues =
+      request->verb == "apply" || request->verb == "home" || request->verb == "measure";
   pending.retargets = request->verb == "retarget";
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
@@ -88,6 +89,7 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
     return Answer(pending, tl::unexpected<Error>(command.error()));
   }
   options_.log(request->verb + " commanded");
+  pending.note = NoteOn(view, *command);
   command->request = next_request_++;
   pending_.emplace(command->request, pending);
   waiting_ += pending.wait ? 1u : 0u;
@@ -179,35 +181,56 @@ std::optional<Result<Command>> ControlDesk::ChangeModel(const FleetView& view,
   if (request.verb != "model_load" && request.verb != "model_unload" &&
       request.verb != "model_rollback")
     return std::nullopt;
-  auto row = change();
+  // A change is numbered after those that the store has.
+  const Status known = models_.changes_known() ? Status() : TakeModelChanges();
+  auto row = known ? change() : Result<ModelRow>(tl::unexpected<Error>(known.error()));
   if (!row) return Result<Command>(tl::unexpected<Error>(std::move(row).error()));
-  if (auto known = ForgetHomed(); !known) options_.log("model: " + known.error().text);
+  if (const Status forgot = ForgetStrangers(); !forgot)
+    options_.log("model: " + forgot.error().text);
   NoteRests(view, models_.compensation());
   Command command;
   command.what = KeepModelCommand{std::move(*row)};
   return command;
 }
 
-Status ControlDesk::RestoreModel() {
+Status ControlDesk::TakeModelChanges() {
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
   FOCALFLEET_TRY_ASSIGN(auto changes, reader->Models(kHistoryRowsMax));
-  if (changes.empty()) return {};
-  std::string text;
-  if (!changes.front().row.sha256.empty()) {
-    FOCALFLEET_TRY_ASSIGN(text, reader->ModelText(changes.front().row.sha256));
-  }
-  FOCALFLEET_TRY(models_.Restore(std::move(changes), text));
-  return ForgetHomed();
+  models_.TakeChanges(std::move(changes));
+  return {};
 }
 
-/// Units that were homed since the model came count anew.
-Status ControlDesk::ForgetHomed() {
-  if (models_.compensation() == nullptr) return {};
+Status ControlDesk::RestoreModel() {
+  FOCALFLEET_TRY(TakeModelChanges());
+  if (models_.newest_sha256().empty()) return {};
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto homed, reader->HomedSince(models_.since()));
-  for (const UnitId id : homed)
-    if (const auto i = options_.layout->Find(id)) models_.compensation()->Forget(*i);
+  FOCALFLEET_TRY_ASSIGN(const std::string text, reader->ModelText(models_.newest_sha256()));
+  FOCALFLEET_TRY(models_.Restore(text));
+  return ForgetStrangers();
+}
+
+Status ControlDesk::ForgetStrangers() {
+  Compensation* const model = models_.compensation();
+  if (model == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const auto counted_anew, reader->CountedAnewSince(models_.since()));
+  for (const UnitId id : counted_anew)
+    if (const auto i = options_.layout->Find(id)) model->Forget(*i);
+  FOCALFLEET_TRY_ASSIGN(const auto bindings, reader->Bindings());
+  for (const auto& [id, serial] : bindings) {
+    const auto i = options_.layout->Find(id);
+    if (i && model->serial(*i).value != 0 && model->serial(*i) != serial) model->Forget(*i);
+  }
   return {};
+}
+
+/// Adopted hardware is not driven by the model of what sat there before, and the operator is told.
+std::string ControlDesk::NoteOn(const FleetView& view, const Command& command) const {
+  const auto* adopt = std::get_if<AdoptCommand>(&command.what);
+  if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
+    return "";
+  return "; the model in force (" + models_.name() +
+         ") was measured on the robot before it, so its commands go without one";
 }
 
 Result<StoreReader*> ControlDesk::Reader() {
@@ -243,7 +266,7 @@ void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
     return Answer(pending, summary);
   }
   if (pending.retargets) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
-  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text}});
+  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text + pending.note}});
   if (!pending.wait)
     return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});
   Answer(pending, ConfigurationJson(view));

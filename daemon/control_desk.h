@@ -59,6 +59,7 @@ class ControlDesk {
     bool pursues = false;  // apply or home: its summary is the configuration
     bool retargets = false;
     bool began = false;  // and the coordinator took it up
+    std::string note;    // to go after the answer's text
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
@@ -70,7 +71,11 @@ class ControlDesk {
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   /// None: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
-  Status ForgetHomed();
+  Status TakeModelChanges();
+  /// Units that are not any more what the model in force was measured on go without it: their count
+  /// began anew, or other hardware sits there.
+  Status ForgetStrangers();
+  [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
 

@@ -146,8 +146,8 @@ Status Daemon::OpenCamera() {
 
 StoreThread::Sinks Daemon::StoreSinks() {
   StoreThread::Sinks sinks;
-  sinks.commit = [this](std::span<const Row> rows, WallTime at) {
-    Status done = store_->Commit(rows, at);
+  sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
+    Status done = store_->Commit(rows, at, refused);
     counters_.transactions = store_->counters().transactions;
     counters_.rows = store_->counters().rows;
     return done;

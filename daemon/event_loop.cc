@@ -57,11 +57,10 @@ void LogRow(const AlarmRow& alarm) {
 }
 void LogRow(const ConfigurationRow& row) {
   spdlog::info(
-      "configuration {} ({}) is {}: {} targeted, {} arrived, {} refused, {} failed, makespan "
-      "{:.1f} "
-      "s of {:.1f} s predicted",
+      "configuration {} ({}) is {}: {} targeted, {} arrived, {} refused, {} failed, {} stopped, "
+      "{} unmeasured, makespan {:.1f} s of {:.1f} s predicted",
       row.id, row.source, Name(row.state), row.targeted, row.arrived, row.refused, row.failed,
-      row.makespan_s, row.makespan_predicted_s);
+      row.stopped, row.unmeasured, row.makespan_s, row.makespan_predicted_s);
 }
 void LogRow(const EnableRow& row) {
   spdlog::info("unit {} {}{}", row.unit.value, row.enabled ? "enabled" : "disabled: ", row.reason);
@@ -210,6 +209,7 @@ void EventLoop::Step() {
   // In this order: a batch that comes through in between is then only told a step later.
   store_failing_ = parts_.store->failing();
   committed_through_ = parts_.store->committed_through();
+  const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
   effects_.Clear();
   parts_.coordinator->Step({.now = now_,
                             .frames = frames_,
@@ -218,7 +218,8 @@ void EventLoop::Step() {
                             .plans = plans_,
                             .exposures = exposures_,
                             .committed_through = committed_through_,
-                            .store_failing = store_failing_},
+                            .store_failing = store_failing_,
+                            .refused = refused},
                            &effects_);
   ++steps_;
 }
@@ -246,15 +247,24 @@ void EventLoop::Perform() {
   if (parts_.feed != nullptr) parts_.feed->Changed(effects_.changed);
 }
 
-// A model predicts from how a unit came to where it rests.
+// A model predicts from how a unit came to where it rests. A count that began anew, or other
+// hardware, is not what it was measured on.
 void EventLoop::TellModel() {
   Compensation* compensation = parts_.desk->models().compensation();
   if (compensation == nullptr) return;
-  for (const Row& row : effects_.rows) {
-    const auto* end = std::get_if<IntentEndRow>(&row);
-    if (end == nullptr || end->end != IntentEnd::kHomed) continue;
+  const auto forget = [&](SerialNumber serial) {
     for (const PositionerIndex i : effects_.changed)
-      if (parts_.coordinator->unit(i).serial == end->serial) compensation->Forget(i);
+      if (parts_.coordinator->unit(i).serial == serial) compensation->Forget(i);
+  };
+  for (const Row& row : effects_.rows) {
+    if (const auto* end = std::get_if<IntentEndRow>(&row); end && end->end == IntentEnd::kHomed)
+      forget(end->serial);
+    if (const auto* vector = std::get_if<VectorRow>(&row);
+        vector && (vector->origin == Origin::kOperator || vector->origin == Origin::kFound))
+      forget(vector->serial);
+    if (const auto* binding = std::get_if<BindingRow>(&row);
+        binding && binding->replaced.value != 0)
+      if (const auto i = parts_.layout->Find(binding->unit)) compensation->Forget(*i);
   }
   for (const PositionerIndex i : effects_.changed) NoteRest(View(), i, compensation);
 }

@@ -72,10 +72,13 @@ ModelRow ModelShelf::Append(ModelRow row) {
   return row;
 }
 
-Status ModelShelf::Restore(std::vector<ModelHistory> newest_first, const std::string& text) {
+void ModelShelf::TakeChanges(std::vector<ModelHistory> newest_first) {
   changes_.assign(std::make_move_iterator(newest_first.rbegin()),
                   std::make_move_iterator(newest_first.rend()));
-  if (changes_.empty() || changes_.back().row.sha256.empty()) return {};
+  changes_known_ = true;
+}
+
+Status ModelShelf::Restore(const std::string& text) {
   FOCALFLEET_TRY_ASSIGN(ModelInForce model,
                         ReadModelInForce(text, "model " + changes_.back().row.name, *layout_));
   Take(std::move(model));

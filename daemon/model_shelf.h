@@ -22,9 +22,18 @@ class ModelShelf {
   /// `layout` outlives the shelf.
   explicit ModelShelf(const Layout* layout) : layout_(layout) {}
 
-  /// What the store has: all changes, newest first, and the text of the newest. Errors: as Load;
-  /// then no model is in force, and the changes are known all the same.
-  Status Restore(std::vector<ModelHistory> newest_first, const std::string& text);
+  /// All changes that the store has are known; none is in force yet. Changes are numbered after
+  /// them, so none may be made before this.
+  void TakeChanges(std::vector<ModelHistory> newest_first);
+  [[nodiscard]] bool changes_known() const { return changes_known_; }
+  /// The sha256 of the model that the newest change put in force; empty: it ended one, or there is
+  /// no change.
+  [[nodiscard]] std::string newest_sha256() const {
+    return changes_.empty() ? "" : changes_.back().row.sha256;
+  }
+  /// The newest change's model is in force again. Errors: as Load; then none is. Pre:
+  /// newest_sha256() is not empty and is that of `text`.
+  Status Restore(const std::string& text);
 
   // ---- changes: the row that makes it last; nothing has changed where there is an error
 
@@ -62,6 +71,7 @@ class ModelShelf {
   std::optional<ModelFile> file_;
   std::optional<Compensation> compensation_;
   std::vector<ModelHistory> changes_;  // oldest first
+  bool changes_known_ = false;
 };
 
 }  // namespace focalfleet

@@ -258,6 +258,7 @@ Result<Command> CommandOf(const ControlRequest& request, const FleetView& view) 
   if (verb == "retarget") return Wrapped(RetargetOf(args, view));
   if (verb == "stop") return Wrapped(StopOf(args, view));
   if (verb == "home") return Wrapped(HomeOf(args, view));
+  if (verb == "measure") return Wrapped(Result<MeasureCommand>(MeasureCommand{}));
   if (verb == "disable") return Wrapped(EnableOf(args, view, false));
   if (verb == "enable") return Wrapped(EnableOf(args, view, true));
   if (verb == "adopt") {

@@ -73,10 +73,12 @@ Json UnservedJson(const FleetView& view) {
   Json unserved = Json::array();
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
     const UnitView& unit = view.coordinator->unit({n});
-    if (unit.outcome != TargetOutcome::kRefused && unit.outcome != TargetOutcome::kFailed) continue;
+    if (!IsUnserved(unit.outcome)) continue;
     unserved.push_back({{"unit_id", view.layout->unit({n}).id.value},
                         {"outcome", Name(unit.outcome)},
                         {"reason", unit.outcome_reason},
+                        {"sighting", unit.sighting ? Json(Name(*unit.sighting)) : Json()},
+                        {"error_um", unit.error_um ? Json(*unit.error_um) : Json()},
                         {"state", Name(unit.phase)}});
   }
   return unserved;
@@ -183,6 +185,7 @@ Json MeasuredJson(const ConfigurationView& configuration) {
 Json ConfigurationJson(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   Json json{{"id", c.id},
+            {"kind", Name(c.kind)},
             {"source", c.source},
             {"state", Name(c.state)},
             {"round", c.round},
@@ -190,6 +193,8 @@ Json ConfigurationJson(const FleetView& view) {
             {"arrived", c.arrived},
             {"refused", c.refused},
             {"failed", c.failed},
+            {"stopped", c.stopped},
+            {"unmeasured", c.unmeasured},
             {"makespan_predicted_s", Number(c.makespan_predicted_s)},
             {"makespan_s", Number(MakespanSoFar(view))},
             {"energy_J", Number(c.energy_J)},
@@ -200,18 +205,22 @@ Json ConfigurationJson(const FleetView& view) {
   PutUpload(c.upload, &json);
   PutStarts(view, &json);
   json["measured"] = MeasuredJson(c);
+  json["not_measured"] = c.not_measured.empty() ? Json() : Json(c.not_measured);
   return json;
 }
 
 Json ProgressJson(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   return {{"id", c.id},
+          {"kind", Name(c.kind)},
           {"state", Name(c.state)},
           {"round", c.round},
           {"targeted", c.targeted},
           {"arrived", c.arrived},
           {"refused", c.refused},
           {"failed", c.failed},
+          {"stopped", c.stopped},
+          {"unmeasured", c.unmeasured},
           {"frames", c.frames},
           {"makespan_predicted_s", Number(c.makespan_predicted_s)},
           {"waiting_for", c.waiting_for},
@@ -238,7 +247,7 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
           {"units", view.layout->size()},
           {"enabled", counts.enabled},
           {"phases", std::move(phases)},
-          {"witnesses", std::move(witnesses)},
+          {"positions", std::move(witnesses)},
           {"busy", view.coordinator->busy()},
           {"store",
            {{"path", facts.store_path},
@@ -307,8 +316,8 @@ std::string StateText(const FleetView& view) {
   fmt::format_to(out, "{{\"rows\":[");
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
     const UnitStatusValue unit = SnapshotUnit(view, {n});
-    fmt::format_to(out, "{}{{\"unit_id\":{},\"phase\":\"{}\"", n == 0 ? "" : ",", unit.unit.value,
-                   Name(unit.phase));
+    fmt::format_to(out, "{}{{\"unit_id\":{},\"serial\":{},\"phase\":\"{}\"", n == 0 ? "" : ",",
+                   unit.unit.value, unit.serial.value, Name(unit.phase));
     for (const Axis axis : kAxes) {
       const char* name = Name(axis);
       const std::size_t a = Index(axis);
@@ -343,6 +352,8 @@ Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
                     {"arrived", row.arrived},
                     {"refused", row.refused},
                     {"failed", row.failed},
+                    {"stopped", row.stopped},
+                    {"unmeasured", row.unmeasured},
                     {"makespan_predicted_s", Number(row.makespan_predicted_s)},
                     {"makespan_s", Number(row.makespan_s)},
                     {"energy_J", Number(row.energy_J)},
@@ -354,7 +365,7 @@ Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
 
 Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
   Json rows = Json::array();
-  for (const auto& [row, at] : measurements) {
+  for (const auto& [row, at, moved_since] : measurements) {
     Json json = {{"unit_id", row.unit.value},
                  {"configuration", row.configuration},
                  {"status", Name(row.status)},
@@ -370,6 +381,7 @@ Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
                  {"target_x_mm", row.target_fp ? Json(row.target_fp->x_mm) : Json()},
                  {"target_y_mm", row.target_fp ? Json(row.target_fp->y_mm) : Json()},
                  {"error_um", row.error_um ? Json(*row.error_um) : Json()},
+                 {"moved_since", moved_since},
                  {"other_unit_id", row.other ? Json(row.other->value) : Json()},
                  {"orientation", row.spine ? SpineJson(*row.spine) : Json()},
                  {"at", ToIso8601(at)}};

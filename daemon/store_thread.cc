@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "fleet/row_check.h"
+
 namespace focalfleet {
 namespace {
 
@@ -39,7 +41,7 @@ StoreThread::~StoreThread() {
 // ---- the giving thread
 
 void StoreThread::Commit(std::uint64_t batch, std::vector<Row> rows) {
-  held_.push_back({batch, std::move(rows), WallTime::Now()});
+  held_.push_back({batch, batch, std::move(rows), WallTime::Now()});
   HandOver();
 }
 
@@ -56,6 +58,11 @@ bool StoreThread::Publish(StatusBatch* status) {
   if (!statuses_.Push(status)) return false;
   wake_.Raise();
   return true;
+}
+
+std::vector<RefusedRow> StoreThread::TakeRefused() {
+  const std::lock_guard lock(refused_lock_);
+  return std::exchange(refused_, {});
 }
 
 Status StoreThread::Finish() {
@@ -113,10 +120,18 @@ void StoreThread::Gather() {
 bool StoreThread::TryCommit() {
   if (open_.rows.empty()) return true;
   if (attempted_ && !ending_ && std::chrono::steady_clock::now() < retry_at_) return false;
-  const Status done = sinks_.commit(open_.rows, open_.at);
-  if (!done) {
-    NoteFailure(done.error());
-    return false;
+  for (std::size_t k = open_.rows.size(); k-- > 0;)
+    if (const char* const flaw = Flaw(open_.rows[k])) SetAside(k, flaw);
+  while (!open_.rows.empty()) {
+    std::size_t refused = open_.rows.size();
+    const Status done = sinks_.commit(open_.rows, open_.at, &refused);
+    if (done) break;
+    const bool for_ever = done.error().code == ErrorCode::kInvalid && refused < open_.rows.size();
+    if (!for_ever) {
+      NoteFailure(done.error());
+      return false;
+    }
+    SetAside(refused, done.error().text);
   }
   for (const Row& row : open_.rows)
     if (const auto* alarm = std::get_if<AlarmRow>(&row)) sinks_.alarm({open_.at, *alarm});
@@ -127,6 +142,17 @@ bool StoreThread::TryCommit() {
     sinks_.log_info("the store can be written again");
   progressed_->Raise();
   return true;
+}
+
+/// The rest of its batch goes on without the row; whoever reads committed_through() finds it told.
+void StoreThread::SetAside(std::size_t row, const std::string& why) {
+  const auto at = open_.rows.begin() + static_cast<std::ptrdiff_t>(row);
+  sinks_.log_error("the store refuses the " + Describe(*at) + ": " + why + "; it is set aside");
+  {
+    const std::lock_guard lock(refused_lock_);
+    refused_.push_back({open_.first, open_.number, std::move(*at), why});
+  }
+  open_.rows.erase(at);
 }
 
 void StoreThread::NoteFailure(const Error& error) {

@@ -1,7 +1,10 @@
 // The thread that may wait for a disk, so that no other has to. It commits batches of rows in order
 // and never drops one: what cannot be written now is tried again each second, and everything behind
-// it waits. Status goes out after the commit of all that it tells of, never before. It hands back
-// two facts: through which batch all is durable, and whether the last attempt failed.
+// it waits. A row that can never be written (fleet/row_check.h, or a contradiction to what is
+// stored) would hold up all others for ever: it alone is set aside, and told. Status goes out after
+// the commit of all that it tells of, never before. The thread hands back three facts: through
+// which batch all is durable, which rows up to there were set aside, and whether the last attempt
+// failed.
 //
 // A slow disk makes the batches that wait one transaction, in order, so that it never falls behind
 // by more than one flush.
@@ -13,6 +16,7 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
@@ -40,7 +44,9 @@ class StoreThread {
  public:
   /// What the thread does with what it is given; called on the thread.
   struct Sinks {
-    std::function<Status(std::span<const Row>, WallTime)> commit;
+    /// As Store::Commit: where the error is kInvalid, `refused` is the index of the row that it is
+    /// about, if it is about one, else the number of rows.
+    std::function<Status(std::span<const Row>, WallTime, std::size_t* refused)> commit;
     /// True: something still waits to go out, call again soon (with nothing new).
     std::function<bool(const StatusBatch&)> publish;
     std::function<void(const AlarmValue&)> alarm;
@@ -69,11 +75,15 @@ class StoreThread {
 
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
   [[nodiscard]] bool failing() const { return failing_; }
+  /// Rows that were set aside since the last call. All of the batches through a committed_through()
+  /// that was read before are among these or were handed over earlier.
+  std::vector<RefusedRow> TakeRefused();
   [[nodiscard]] std::size_t waiting() const { return batches_.size() + held_.size(); }
 
  private:
   struct Batch {
-    std::uint64_t number = 0;
+    std::uint64_t first = 0;   // of the batches that became this one transaction
+    std::uint64_t number = 0;  // the last of them
     std::vector<Row> rows;
     WallTime at;
   };
@@ -82,6 +92,7 @@ class StoreThread {
   void Run();
   void Gather();
   bool TryCommit();
+  void SetAside(std::size_t row, const std::string& why);
   void NoteFailure(const Error& error);
   void PublishReady();
   [[nodiscard]] bool Idle() const;
@@ -95,6 +106,9 @@ class StoreThread {
   std::atomic<std::uint64_t> committed_through_{0};
   std::atomic<bool> failing_{false};
   std::atomic<bool> ending_{false};
+
+  std::mutex refused_lock_;
+  std::vector<RefusedRow> refused_;  // under the lock
 
   // Of the thread alone.
   Batch open_;  // being committed; empty rows: none

@@ -20,6 +20,7 @@ class Coordinator::Impl {
   void Step(const Inputs& inputs, Effects* effects) {
     core_.BeginStep(inputs, effects);
     pursuit_.EndThoseOfAnEarlierRun();
+    for (const RefusedRow& refused : inputs.refused) contact_.StoreRefused(refused);
     for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
     for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
@@ -95,6 +96,7 @@ class Coordinator::Impl {
     return pursuit_.Retarget(request, c);
   }
   Status Do(std::uint64_t request, const HomeCommand& c) { return pursuit_.Home(request, c); }
+  Status Do(std::uint64_t request, const MeasureCommand&) { return pursuit_.Measure(request); }
   Status Do(std::uint64_t, const StopCommand& c) {
     if (c.unit) {
       pursuit_.StopUnit(*c.unit);

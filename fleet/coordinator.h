@@ -70,6 +70,9 @@ struct RetargetCommand {
 struct StopCommand {
   std::optional<PositionerIndex> unit;  // none: all
 };
+/// The camera, or the units' own sensors, look once; nobody moves. Units of unknown place are put
+/// where they are found. Targets of the configuration before stay, so that errors can be told.
+struct MeasureCommand {};
 struct HomeCommand {
   std::vector<PositionerIndex> units;
   bool unproven =
@@ -95,8 +98,8 @@ struct KeepModelCommand {
 };
 struct Command {
   std::uint64_t request = 0;
-  std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, EnableCommand, AdoptCommand,
-               WriteParameterCommand, KeepModelCommand>
+  std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, MeasureCommand,
+               EnableCommand, AdoptCommand, WriteParameterCommand, KeepModelCommand>
       what;
 };
 
@@ -134,6 +137,8 @@ struct Inputs {
   std::span<const ExposureDone> exposures = {};
   std::uint64_t committed_through = 0;  // highest batch that is durable
   bool store_failing = false;           // the last attempt to commit failed; the shell tries again
+  /// Rows of batches up to committed_through that the store set aside, each told once.
+  std::span<const RefusedRow> refused = {};
 };
 
 // ---- what goes out
@@ -169,7 +174,9 @@ struct ExposureJob {
   HostInstant since;  // the exposure begins no earlier
   std::vector<UnitKnowledge> expected;
   std::vector<std::optional<Pose>> before;  // where it stood before it was sent; none: not known
-  std::vector<std::uint8_t> seen;           // non-zero: a camera has put it somewhere before
+  /// What a unit of unknown place says itself. The store contradicts it, so it is a hypothesis.
+  std::vector<std::optional<Pose>> reported;
+  std::vector<std::uint8_t> seen;  // non-zero: a camera has put it somewhere before
   // Shapes: (n). What units with sensors showed; who has a target and is to be found, so that no
   // exposure is needed where their own sensors say it exactly enough.
   std::vector<SensorReading> readings = {};
@@ -219,12 +226,25 @@ enum class UnitPhase : std::uint8_t {
 inline constexpr std::uint8_t kUnitPhaseCount = 13;
 const char* Name(UnitPhase phase);
 
-/// What came of a unit's target in the current or last configuration.
-enum class TargetOutcome : std::uint8_t { kNone, kPending, kArrived, kRefused, kFailed };
+/// What came of a unit's target in the current or last configuration. The values stand in the
+/// order of the DDS codes.
+enum class TargetOutcome : std::uint8_t {
+  kNone,        // it had no target
+  kPending,     // under way
+  kArrived,     // the end of its motion is reported and stored; if measured: within the tolerance
+  kRefused,     // it was not moved
+  kFailed,      // it did not arrive, or was measured beyond the tolerance
+  kStopped,     // an operator's stop, or a stop on the bus, came first
+  kUnmeasured,  // its motion ended as told, and no measurement that was asked for confirms it
+};
+inline constexpr TargetOutcome kLastTargetOutcome = TargetOutcome::kUnmeasured;
 constexpr const char* Name(TargetOutcome outcome) {
-  constexpr const char* kNames[] = {"none", "pending", "arrived", "refused", "failed"};
+  constexpr const char* kNames[] = {"none",   "pending", "arrived",   "refused",
+                                    "failed", "stopped", "unmeasured"};
   return kNames[static_cast<std::size_t>(outcome)];
 }
+/// The configuration did not do for this unit what was asked of it.
+constexpr bool IsUnserved(TargetOutcome outcome) { return outcome > TargetOutcome::kArrived; }
 
 /// How a unit's clock runs against the host's (fleet/coordinate/clock_map.h).
 struct ClockView {
@@ -304,8 +324,16 @@ struct MeasuredRound {
   double worst_um = 0;
 };
 
+/// What a configuration was asked to do with its units.
+enum class ConfigurationKind : std::uint8_t { kApply, kHome, kMeasure };
+constexpr const char* Name(ConfigurationKind kind) {
+  constexpr const char* kNames[] = {"apply", "home", "measure"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
 struct ConfigurationView {
   std::uint64_t id = 0;
+  ConfigurationKind kind = ConfigurationKind::kApply;
   std::string source;
   ConfigurationState state = ConfigurationState::kDone;
   std::uint32_t round = 0;
@@ -313,6 +341,8 @@ struct ConfigurationView {
   std::uint32_t arrived = 0;
   std::uint32_t refused = 0;
   std::uint32_t failed = 0;
+  std::uint32_t stopped = 0;
+  std::uint32_t unmeasured = 0;
   double makespan_predicted_s = 0;  // all rounds that were started
   double makespan_s = 0;            // start signals to last arrival, all rounds
   double energy_J = 0;              // predicted, of the same
@@ -324,6 +354,7 @@ struct ConfigurationView {
   HostInstant started;                  // start signal of this round; kNever before it
   std::string waiting_for;              // what holds it up, for people; usually empty
   std::vector<MeasuredRound> measured;  // blind, then after each correction
+  std::string not_measured;  // why the last exposure that was due failed; empty: none did
 };
 
 struct CoordinatorConfig {

@@ -27,11 +27,13 @@ enum class Origin : std::uint8_t {
   kMove,
   kHoming,
   kCamera,
-  kSensors
+  kSensors,
+  kFound  // a unit of unknown place, where the camera found it; its count was set anew
 };
+inline constexpr Origin kLastOrigin = Origin::kFound;
 constexpr const char* Name(Origin origin) {
-  constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator",
-                                    "move",    "homing", "camera",   "sensors"};
+  constexpr const char* kNames[] = {"factory", "tuning", "campaign", "operator", "move",
+                                    "homing",  "camera", "sensors",  "found"};
   return kNames[static_cast<std::size_t>(origin)];
 }
 
@@ -45,6 +47,7 @@ struct VectorRow {
   std::array<std::uint16_t, kAxisCount> subdivision{};
   MoveId move;  // the last one begun, as the unit says
   Origin origin = Origin::kFactory;
+  bool operator==(const VectorRow&) const = default;
 };
 
 /// "This unit is about to move": durable before any start signal; low..high is all that it may
@@ -57,6 +60,7 @@ struct IntentRow {
   Pose from{};
   Pose to{};
   std::array<AxisKnowledge, kAxisCount> hull;  // kInterval
+  bool operator==(const IntentRow&) const = default;
 };
 
 /// The intent's end, kept as history.
@@ -102,6 +106,7 @@ struct MeasurementRow {
 struct BindingRow {  // which hardware sits at a place
   UnitId unit;
   SerialNumber serial;
+  SerialNumber replaced = {};  // that sat there before; 0: none. Not stored: the history tells.
 };
 
 struct EnableRow {
@@ -116,6 +121,7 @@ struct ParameterRow {
   Parameter parameter = Parameter::kCounter1;
   std::int32_t value = 0;
   Origin origin = Origin::kOperator;
+  bool operator==(const ParameterRow&) const = default;
 };
 
 /// What the row says of its unit's drive, if anything. A unit has one mode; a tuning writes it for
@@ -136,6 +142,7 @@ struct TuningRow {
   std::uint16_t subdivision = 0;
   WaveMode mode = WaveMode::kAsymmetric;
   Origin origin = Origin::kTuning;
+  bool operator==(const TuningRow&) const = default;
 };
 
 enum class ConfigurationState : std::uint8_t {
@@ -168,6 +175,9 @@ struct ConfigurationRow {
   // Of the starts of its units, where they are known; else not a number.
   double start_skew_s = std::numeric_limits<double>::quiet_NaN();
   double start_skew_bound_s = std::numeric_limits<double>::quiet_NaN();
+  std::uint32_t stopped = 0;
+  std::uint32_t unmeasured = 0;
+  bool operator==(const ConfigurationRow&) const = default;
 };
 
 enum class Severity : std::uint8_t { kInfo, kWarning, kError };
@@ -201,6 +211,15 @@ using Row =
     std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
                  ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow, ModelRow>;
 
+/// A row that the store can never keep. It was set aside, and the rest of its batch was kept.
+struct RefusedRow {
+  // Batches that the store may have written together with it, both included.
+  std::uint64_t first_batch = 0;
+  std::uint64_t last_batch = 0;
+  Row row;
+  std::string why;
+};
+
 /// All that the coordinator needs to go on after a restart.
 struct StoredFleet {
   struct StoredUnit {
@@ -208,6 +227,7 @@ struct StoredFleet {
     SerialNumber serial;
     bool enabled = true;
     std::string reason;
+    bool operator==(const StoredUnit&) const = default;
   };
   std::vector<StoredUnit> units;   // places that have a binding or were disabled
   std::vector<VectorRow> vectors;  // by serial

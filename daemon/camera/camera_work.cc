@@ -51,6 +51,7 @@ Result<ExposureFindings> CameraWorker::Judge(const CameraWork& work, const Expos
                             {.now = work.job.expected,
                              .before = work.job.before,
                              .seen = work.job.seen,
+                             .reported = work.job.reported,
                              .drives = work.drives},
                             options_.site, exposure);
   if (findings)

@@ -216,6 +216,23 @@ bool HasColumn(std::string_view text, std::string_view column) {
   return header.find(column) != std::string_view::npos;
 }
 
+/// Which hardware stood at each place, where units.csv says so.
+Status ReadSerials(const CampaignTables& tables, Campaign* campaign) {
+  FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.units, tables.units_file));
+  if (!table.Find("serial")) return {};
+  std::unordered_map<std::uint32_t, CampaignUnit*> unit_of;
+  for (CampaignUnit& unit : campaign->units) unit_of[unit.id] = &unit;
+  for (std::size_t k = 0; k < table.size(); ++k) {
+    CsvRow row(table, k);
+    const auto id = static_cast<std::uint32_t>(row.Integer("unit_id", {0, UINT32_MAX}));
+    const auto serial = row.IntegerIfAny("serial", {0, UINT32_MAX});
+    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (const auto unit = unit_of.find(id); unit != unit_of.end())
+      unit->second->serial = static_cast<std::uint32_t>(serial.value_or(0));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Campaign> ReadCampaign(const CampaignTables& tables) {
@@ -228,6 +245,7 @@ Result<Campaign> ReadCampaign(const CampaignTables& tables) {
   campaign.name = tables.name;
   TakeRows(rows, units, HasColumn(tables.units, "rail_id"), HasColumn(tables.units, "bus_id"),
            &campaign);
+  FOCALFLEET_TRY(ReadSerials(tables, &campaign));
   for (const std::string& column : table.columns()) {
     if (std::find(kFixedColumns.begin(), kFixedColumns.end(), column) != kFixedColumns.end())
       continue;
@@ -263,7 +281,7 @@ std::string WriteCampaignUnits(const Campaign& campaign) {
   CsvWriter csv({"unit_id", "base_x_mm", "base_y_mm", "arm_theta_mm", "arm_phi_mm",
                  "theta_zero_deg", "phi_zero_deg", "theta_gear", "phi_gear", "theta_min_deg",
                  "theta_max_deg", "phi_min_deg", "phi_max_deg", "rail_id", "rail_slot", "bus_id",
-                 "bus_slot", "enabled"});
+                 "bus_slot", "enabled", "serial"});
   for (const CampaignUnit& unit : campaign.units) {
     csv.Integer(unit.id).Number(unit.base_x_mm).Number(unit.base_y_mm);
     csv.Number(unit.arm_mm[kTheta]).Number(unit.arm_mm[kPhi]);
@@ -272,7 +290,9 @@ std::string WriteCampaignUnits(const Campaign& campaign) {
     for (const std::size_t axis : {kTheta, kPhi})
       csv.Number(unit.min_deg[axis]).Number(unit.max_deg[axis]);
     csv.Number(unit.rail).Number(unit.rail_slot).Number(unit.bus).Number(unit.bus_slot);
-    csv.Integer(unit.enabled ? 1 : 0).EndRow();
+    csv.Integer(unit.enabled ? 1 : 0);
+    unit.serial == 0 ? csv.Missing() : csv.Integer(unit.serial);
+    csv.EndRow();
   }
   return csv.Take();
 }

@@ -45,6 +45,18 @@ sim::CampaignUnit DescribeUnit(const Unit& unit) {
   return described;
 }
 
+namespace {
+
+/// The hardware that made all these moves; 0: not known, or it was replaced in between.
+SerialNumber SerialOf(const std::vector<LoggedMove>& moves) {
+  const SerialNumber first = moves.front().serial;
+  const bool same =
+      std::ranges::all_of(moves, [&](const LoggedMove& move) { return move.serial == first; });
+  return same ? first : SerialNumber{};
+}
+
+}  // namespace
+
 void CampaignLog::Add(const std::vector<LoggedMove>& units) {
   for (const LoggedMove& row : units) {
     of_unit_[row.unit.value].push_back(row);
@@ -69,6 +81,7 @@ sim::Campaign CampaignLog::Campaign(const std::string& name) const {
     const auto found = of_unit_.find(unit.id.value);
     if (found == of_unit_.end()) continue;
     campaign.units.push_back(DescribeUnit(unit));
+    campaign.units.back().serial = SerialOf(found->second).value;
     const sim::CampaignUnit& described = campaign.units.back();
     double cycles[2] = {0, 0};
     for (const LoggedMove& row : found->second) {

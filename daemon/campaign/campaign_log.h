@@ -32,6 +32,7 @@ struct LoggedMove {
   double counter1 = 0;
   double repeat = 0;
   std::string mode;
+  SerialNumber serial = {};  // that made the move; 0: not known
 };
 
 /// What the layout says of a unit, as campaigns have it.

@@ -61,7 +61,14 @@ class Compensation {
 
   /// The unit rests, and counts that.
   void Rests(PositionerIndex i, const AxisAngles& count);
-  /// It was homed, or another unit stands in its place.
+  /// The serial number of the hardware that the campaign measured there; 0: the model does not say.
+  [[nodiscard]] SerialNumber serial(PositionerIndex i) const {
+    return units_[i.value] ? SerialNumber{units_[i.value]->geometry.serial} : SerialNumber{};
+  }
+  /// Commands to this unit go through the model.
+  [[nodiscard]] bool Knows(PositionerIndex i) const { return units_[i.value].has_value(); }
+  /// Its count began anew (homed, set by hand, found by the camera), or other hardware stands in
+  /// its place.
   void Forget(PositionerIndex i) { units_[i.value].reset(); }
 
   /// Units that it has a say on.

@@ -172,6 +172,7 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
   for (std::size_t u = 0; u < diagnosis.model.units.size(); ++u) {
     const sim::CampaignUnit& unit = diagnosis.model.units[u];
     text += fmt::format("\n[[unit]]\nunit_id = {}\n", unit.id);
+    if (unit.serial != 0) text += fmt::format("serial = {}\n", unit.serial);
     text += fmt::format("base_x_mm = {:.9g}\nbase_y_mm = {:.9g}\n", unit.base_x_mm, unit.base_y_mm);
     text +=
         fmt::format("arm_theta_mm = {:.9g}\narm_phi_mm = {:.9g}\n", unit.arm_mm[0], unit.arm_mm[1]);

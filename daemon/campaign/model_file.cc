@@ -88,6 +88,13 @@ class ModelReader {
     if (at == index_.end()) return {};
     sim::CampaignUnit& unit = model_.units[at->second];
     const sim::CampaignUnit described = unit;
+    unit.serial = 0;
+    if (table.contains("serial")) {
+      FOCALFLEET_TRY_ASSIGN(const double serial, Number(table, "serial"));
+      if (!(serial >= 1 && serial <= UINT32_MAX) || serial != std::floor(serial))
+        return Wrong(table, "serial is no serial number (1..4294967295)");
+      unit.serial = static_cast<std::uint32_t>(serial);
+    }
     FOCALFLEET_TRY_ASSIGN(unit.base_x_mm, Number(table, "base_x_mm"));
     FOCALFLEET_TRY_ASSIGN(unit.base_y_mm, Number(table, "base_y_mm"));
     FOCALFLEET_TRY_ASSIGN(unit.arm_mm[0], Number(table, "arm_theta_mm"));

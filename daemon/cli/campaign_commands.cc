@@ -70,6 +70,7 @@ struct Believed {
   double counter1 = 0;
   double repeat = 0;
   std::string mode;
+  SerialNumber serial;
 };
 using BelievedFleet = std::map<std::uint32_t, Believed>;  // by unit id
 
@@ -89,7 +90,8 @@ tl::expected<BelievedFleet, Failure> AskBelieved(const Context& context) {
           .v_bus_V = NumberIn(row, "v_bus_V", std::nan("")),
           .counter1 = NumberIn(row, "counter1", std::nan("")),
           .repeat = NumberIn(row, "repeat", std::nan("")),
-          .mode = TextIn(row, "mode")};
+          .mode = TextIn(row, "mode"),
+          .serial = {static_cast<std::uint32_t>(CountIn(row, "serial"))}};
   }
   return fleet;
 }
@@ -122,7 +124,8 @@ std::vector<LoggedMove> RowsOf(const ListedMove& move, const BelievedFleet& befo
                    .v_bus_V = to.v_bus_V,
                    .counter1 = to.counter1,
                    .repeat = to.repeat,
-                   .mode = to.mode};
+                   .mode = to.mode,
+                   .serial = to.serial};
     const auto found = seen.find(id);
     if (found != seen.end() && IsCertainStatus(TextIn(*found->second, "status"))) {
       row.x_mm = NumberIn(*found->second, "x_mm");
@@ -142,11 +145,16 @@ Status WriteFolder(const std::string& folder, const sim::Campaign& campaign) {
 
 constexpr int kUnmeasuredInARowMax = 3;
 
-/// One move, with its exposure. The answer of the daemon to `measurements`; none: it was made, as
-/// far as it was, and nothing of it was measured.
-tl::expected<std::optional<Json>, Failure> MakeMove(const Context& context, const ListedMove& move,
-                                                    const std::string& source, ProgressBar* bar,
-                                                    const std::string& stage) {
+/// What came of one move.
+struct MadeMove {
+  std::optional<Json> measured;  // the daemon's answer to `measurements`; none: nothing was seen
+  std::size_t unserved = 0;      // units that did not make the move, or that nobody saw
+};
+
+/// One move, with its exposure. Errors: as Ask; kBroken: it was stopped, so no other may follow.
+tl::expected<MadeMove, Failure> MakeMove(const Context& context, const ListedMove& move,
+                                         const std::string& source, ProgressBar* bar,
+                                         const std::string& stage) {
   Question question{.verb = "apply",
                     .args = {{"source", source},
                              {"targets_csv", WriteTargets({.source = source, .rows = move.rows})},
@@ -159,10 +167,16 @@ tl::expected<std::optional<Json>, Failure> MakeMove(const Context& context, cons
                     }};
   const auto done = Ask(context, question);
   if (!done) return tl::unexpected(done.error());
-  if (ListIn(*done, "measured").empty()) return std::optional<Json>();
+  if (TextIn(*done, "state") == "stopped")
+    return tl::unexpected(
+        Failure{ExitCode::kBroken,
+                {ErrorCode::kUnavailable, source + ": stopped; no further move is made"}});
+  MadeMove made{.measured = {}, .unserved = ListIn(*done, "unserved").size()};
+  if (ListIn(*done, "measured").empty()) return made;
   const auto measured = Ask(context, {.verb = "measurements"});
   if (!measured) return tl::unexpected(measured.error());
-  return std::optional<Json>(*measured);
+  made.measured = *measured;
+  return made;
 }
 
 ExitCode RunCampaign(const Context& context, const RunOptions& options) {
@@ -191,15 +205,17 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (failed)
     return Report(context, {ErrorCode::kUnavailable, options.out + ": " + failed.message()});
   std::size_t unmeasured = 0;
+  std::size_t unserved = 0;
   int in_a_row = 0;
   for (std::size_t m = 0; m < moves->size(); ++m) {
     const ListedMove& move = (*moves)[m];
     const std::string source = fmt::format("{} move {}", options.list, move.id);
-    const auto measured =
+    const auto made =
         MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves->size()));
-    if (!measured) return Report(context, measured.error());
-    in_a_row = *measured ? 0 : in_a_row + 1;
-    unmeasured += *measured ? 0u : 1u;
+    if (!made) return Report(context, made.error());
+    in_a_row = made->measured ? 0 : in_a_row + 1;
+    unmeasured += made->measured ? 0u : 1u;
+    unserved += made->unserved;
     if (in_a_row == kUnmeasuredInARowMax)
       return Report(context,
                     Failure{ExitCode::kBroken,
@@ -212,7 +228,7 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
     const auto after = AskBelieved(context);
     if (!after) return Report(context, after.error());
     // What nobody saw was made all the same: its rows are there, without places.
-    log.Add(RowsOf(move, *before, *after, measured->value_or(Json::object()), t_s));
+    log.Add(RowsOf(move, *before, *after, made->measured.value_or(Json::object()), t_s));
     before = after;
     // After each move, so that what was measured is kept whatever comes.
     const auto written = WriteFolder(options.out, log.Campaign(options.list));
@@ -225,14 +241,18 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
                {"units", campaign.units.size()},
                {"rows", campaign.rows()},
                {"unmeasured_moves", unmeasured},
+               {"unserved_rows", unserved},
                {"out", options.out}});
   if (unmeasured > 0)
     Say(context, fmt::format("{} could not be measured (focalfleet history says why)",
                              Count(unmeasured, "move", "moves")));
+  if (unserved > 0)
+    Say(context, fmt::format("{} not made or not seen (focalfleet history says why)",
+                             Count(unserved, "move of a unit was", "moves of units were")));
   Say(context, fmt::format("{}: {} of {}, {}", options.out, Count(moves->size(), "move", "moves"),
                            Count(campaign.units.size(), "unit", "units"),
                            Count(campaign.rows(), "row", "rows")));
-  return ExitCode::kOk;
+  return unmeasured + unserved == 0 ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
 
 }  // namespace

@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/cli/client.h"
@@ -11,8 +14,9 @@
 namespace focalfleet::cli {
 namespace {
 
-constexpr std::size_t kUnservedShown = 20;  // one by one; the others by reason
-constexpr std::size_t kReasonsShown = 10;
+// Reasons that few units share are told unit by unit; the others as one line a reason.
+constexpr std::size_t kUnitsShownSingly = 3;
+constexpr std::size_t kReasonsShown = 20;
 constexpr std::size_t kUnitsOfReasonShown = 5;
 
 std::string ReasonOf(const Json& unit) {
@@ -24,28 +28,91 @@ std::string ReasonOf(const Json& unit) {
   return text;
 }
 
-/// The units from `first` on: a line a reason, the most frequent one first.
-std::string DescribeByReason(const Json& unserved, std::size_t first) {
-  std::map<std::string, std::vector<std::uint64_t>> units_of;
-  for (std::size_t i = first; i < unserved.size(); ++i) {
-    units_of[ReasonOf(unserved[i])].push_back(CountIn(unserved[i], "unit_id"));
+bool IsDigit(char c) { return c >= '0' && c <= '9'; }
+
+/// A reason taken apart at its numbers: "12.3 um from unit 7" is {"", " um from unit ", ""} and
+/// {"12.3", "7"}.
+struct TakenApart {
+  std::vector<std::string> words;
+  std::vector<std::string> numbers;
+};
+TakenApart TakeApart(const std::string& text) {
+  TakenApart parts{{""}, {}};
+  for (std::size_t at = 0; at < text.size();) {
+    if (!IsDigit(text[at])) {
+      parts.words.back() += text[at++];
+      continue;
+    }
+    std::size_t end = at;
+    while (end < text.size() && (IsDigit(text[end]) || (text[end] == '.' && end + 1 < text.size() &&
+                                                        IsDigit(text[end + 1]))))
+      ++end;
+    parts.numbers.push_back(text.substr(at, end - at));
+    parts.words.emplace_back();
+    at = end;
   }
-  std::vector<std::pair<std::string, std::vector<std::uint64_t>>> reasons(units_of.begin(),
-                                                                          units_of.end());
-  std::stable_sort(reasons.begin(), reasons.end(),
-                   [](const auto& a, const auto& b) { return a.second.size() > b.second.size(); });
+  return parts;
+}
+
+/// Units whose reasons differ by their numbers alone.
+struct Alike {
+  TakenApart first;
+  std::vector<std::pair<std::string, std::string>> range;  // of each number, as text
+  std::vector<std::size_t> members;                        // rows of the unserved
+
+  void Add(std::size_t row, const TakenApart& parts) {
+    if (members.empty()) {
+      first = parts;
+      for (const std::string& number : parts.numbers) range.emplace_back(number, number);
+    }
+    members.push_back(row);
+    for (std::size_t k = 0; k < range.size(); ++k) {
+      const double value = std::stod(parts.numbers[k]);
+      if (value < std::stod(range[k].first)) range[k].first = parts.numbers[k];
+      if (value > std::stod(range[k].second)) range[k].second = parts.numbers[k];
+    }
+  }
+  /// The common words, with each number that differs as "low to high".
+  [[nodiscard]] std::string Text() const {
+    std::string text = first.words[0];
+    for (std::size_t k = 0; k < range.size(); ++k) {
+      text += range[k].first == range[k].second
+                  ? range[k].first
+                  : fmt::format("{} to {}", range[k].first, range[k].second);
+      text += first.words[k + 1];
+    }
+    return text;
+  }
+};
+
+/// The most frequent reason first, else in the order of the units.
+std::vector<Alike> GroupByReason(const Json& unserved) {
+  std::map<std::vector<std::string>, std::size_t> group_of;
+  std::vector<Alike> groups;
+  for (std::size_t row = 0; row < unserved.size(); ++row) {
+    const TakenApart parts = TakeApart(ReasonOf(unserved[row]));
+    const auto [it, is_new] = group_of.emplace(parts.words, groups.size());
+    if (is_new) groups.emplace_back();
+    groups[it->second].Add(row, parts);
+  }
+  std::ranges::stable_sort(groups, std::greater{},
+                           [](const Alike& group) { return group.members.size(); });
+  return groups;
+}
+
+std::string DescribeGroup(const Json& unserved, const Alike& group) {
+  const auto id = [&](std::size_t row) { return CountIn(unserved[row], "unit_id"); };
   std::string text;
-  for (std::size_t r = 0; r < reasons.size() && r < kReasonsShown; ++r) {
-    std::vector<std::uint64_t>& ids = reasons[r].second;
-    const std::size_t count = ids.size();
-    ids.resize(std::min(count, kUnitsOfReasonShown));
-    text += fmt::format("  {} {}: {}{}: {}\n", count, count == 1 ? "more unit" : "more units",
-                        fmt::join(ids, ", "), count > ids.size() ? " ..." : "", reasons[r].first);
+  if (group.members.size() <= kUnitsShownSingly) {
+    for (const std::size_t row : group.members)
+      text += fmt::format("  unit {}: {}\n", id(row), ReasonOf(unserved[row]));
+    return text;
   }
-  if (reasons.size() > kReasonsShown) {
-    text += fmt::format("  and {} more reasons\n", reasons.size() - kReasonsShown);
-  }
-  return text + "  --json names them all\n";
+  std::vector<std::uint64_t> ids;
+  for (const std::size_t row : group.members)
+    if (ids.size() < kUnitsOfReasonShown) ids.push_back(id(row));
+  return fmt::format("  {} units ({}{}): {}\n", group.members.size(), fmt::join(ids, ", "),
+                     group.members.size() > ids.size() ? ", ..." : "", group.Text());
 }
 
 /// What is known of it: nothing before the upload, nothing of the starts before units told.
@@ -74,11 +141,13 @@ std::string DescribeMeasured(const Json& c) {
   for (const Json& round : ListIn(c, "measured")) {
     text += fmt::format(
         "\n  {}: rms {:.1f} um, median {:.1f} um, worst {:.1f} um; {} of {} within the tolerance",
-        correction == 0 ? "measured as they came" : fmt::format("after correction {}", correction),
+        TextIn(c, "kind") == "measure" ? "measured"
+        : correction == 0              ? "measured as they came"
+                                       : fmt::format("after correction {}", correction),
         NumberIn(round, "rms_um"), NumberIn(round, "median_um"), NumberIn(round, "worst_um"),
         CountIn(round, "within_tolerance"), CountIn(round, "measured"));
     if (const std::uint64_t unknown = CountIn(round, "unknown"); unknown > 0)
-      text += fmt::format(", {} not to be told", unknown);
+      text += fmt::format(", {} not found", unknown);
     if (const std::uint64_t sensed = CountIn(round, "by_sensors"); sensed > 0)
       text += fmt::format(", {} by their own sensors{}", sensed,
                           round.value("camera", true) ? "" : " without an exposure");
@@ -99,9 +168,7 @@ ExitCode ExitCodeOf(const Json& configuration) {
   const std::string state = TextIn(configuration, "state");
   if (state == "stopped" || state == "failed") return ExitCode::kBroken;
   if (!TextIn(configuration, "error").empty()) return ExitCode::kBroken;
-  const bool all = CountIn(configuration, "refused") == 0 &&
-                   CountIn(configuration, "failed") == 0 &&
-                   CountIn(configuration, "arrived") == CountIn(configuration, "targeted");
+  const bool all = CountIn(configuration, "arrived") == CountIn(configuration, "targeted");
   return all ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
 
@@ -113,8 +180,17 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
   std::string text =
       fmt::format("configuration {} ({}): {}, round {}\n", CountIn(c, "id"), TextIn(c, "source"),
                   Paint(colour_on, colour, state), CountIn(c, "round"));
-  text += fmt::format("  {} of {} units arrived, {} refused, {} failed\n", CountIn(c, "arrived"),
-                      CountIn(c, "targeted"), CountIn(c, "refused"), CountIn(c, "failed"));
+  const std::string kind = TextIn(c, "kind");
+  text += fmt::format("  {} of {} units {}, {} refused, {} failed", CountIn(c, "arrived"),
+                      CountIn(c, "targeted"),
+                      kind == "home"      ? "homed"
+                      : kind == "measure" ? "found"
+                                          : "arrived",
+                      CountIn(c, "refused"), CountIn(c, "failed"));
+  for (const char* rarer : {"stopped", "unmeasured"})
+    if (const std::uint64_t count = CountIn(c, rarer); count > 0)
+      text += fmt::format(", {} {}", count, rarer);
+  text += '\n';
   // Nothing has begun where it is 0, and nothing was predicted.
   const auto span = [&](const char* key) {
     return NumberIn(c, key) > 0 || over ? Shown(c, key, "s", 1) : "-";
@@ -125,6 +201,8 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
                       Shown(c, "peak_power_W", "W", 1), CountIn(c, "frames"));
   text += DescribeUploadAndStarts(c);
   text += DescribeMeasured(c);
+  if (const std::string why = TextIn(c, "not_measured"); !why.empty())
+    text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, "not measured: " + why));
   if (const std::string error = TextIn(c, "error"); !error.empty()) {
     text += fmt::format("\n  {}", Paint(colour_on, Colour::kRed, error));
   }
@@ -138,14 +216,19 @@ std::string DescribeStage(const Json& progress) {
 }
 
 std::string DescribeNotServed(const Json& configuration) {
-  const Json& unserved = ListIn(configuration, "unserved");
-  if (unserved.empty()) return "";
+  // A stop of all is told by its counts: nothing is wrong with the units that it cut short.
+  const bool stopped = TextIn(configuration, "state") == "stopped";
+  Json unserved = Json::array();
+  for (const Json& unit : ListIn(configuration, "unserved"))
+    if (!stopped || TextIn(unit, "outcome") != "stopped") unserved.push_back(unit);
+  const std::vector<Alike> groups = GroupByReason(unserved);
   std::string text;
-  for (std::size_t i = 0; i < unserved.size() && i < kUnservedShown; ++i) {
-    text += fmt::format("  unit {}: {}\n", CountIn(unserved[i], "unit_id"), ReasonOf(unserved[i]));
-  }
-  if (unserved.size() > kUnservedShown) text += DescribeByReason(unserved, kUnservedShown);
-  text.pop_back();
+  for (std::size_t g = 0; g < groups.size() && g < kReasonsShown; ++g)
+    text += DescribeGroup(unserved, groups[g]);
+  if (groups.size() > kReasonsShown)
+    text += fmt::format("  and {} more reasons; --json names all units\n",
+                        groups.size() - kReasonsShown);
+  if (!text.empty()) text.pop_back();
   return text;
 }
 
@@ -154,7 +237,8 @@ Json ApplySummary(const Json& configuration, const Json& status) {
   summary["configuration"] = CountIn(configuration, "id");
   summary["state"] = TextIn(configuration, "state");
   summary["units"] = CountIn(status, "units");
-  for (const char* key : {"targeted", "arrived", "refused", "failed", "frames"}) {
+  for (const char* key :
+       {"targeted", "arrived", "refused", "failed", "stopped", "unmeasured", "frames"}) {
     summary[key] = CountIn(configuration, key);
   }
   for (const char* key : {"makespan_predicted_s", "makespan_s", "energy_J", "peak_power_W"}) {
@@ -168,6 +252,7 @@ Json ApplySummary(const Json& configuration, const Json& status) {
     summary[key] = configuration.value(key, Json(nullptr));
   }
   summary["measured"] = ListIn(configuration, "measured");
+  summary["not_measured"] = configuration.value("not_measured", Json(nullptr));
   summary["bus_load_max"] =
       NumberIn(configuration, "bus_load_max", NumberIn(status, "bus_load_max"));
   // Only where it failed on the way: the reason.
@@ -179,6 +264,8 @@ Json ApplySummary(const Json& configuration, const Json& status) {
     summary["unserved"].push_back({{"unit_id", CountIn(unit, "unit_id")},
                                    {"outcome", TextIn(unit, "outcome")},
                                    {"reason", TextIn(unit, "reason")},
+                                   {"sighting", unit.value("sighting", Json(nullptr))},
+                                   {"error_um", unit.value("error_um", Json(nullptr))},
                                    {"state", TextIn(unit, "state")}});
   }
   return summary;

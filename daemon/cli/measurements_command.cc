@@ -25,8 +25,12 @@ double NumberOrNan(const Json& row, const char* key) {
   return found != row.end() && found->is_number() ? found->get<double>() : std::nan("");
 }
 
-/// One bit a status, in the order of SightingStatus; docs/files.md.
+/// Of a unit that was sent again after the exposure and not seen since: nobody knows its place.
+constexpr const char* kMovedSince = "moved_since";
+
+/// One bit a status, in the order of SightingStatus, then kMovedSince; docs/files.md.
 std::int64_t StatusBits(const std::string& status) {
+  if (status == kMovedSince) return std::int64_t{1} << kSightingStatusCount;
   for (std::size_t bit = 0; bit < kSightingStatusCount; ++bit)
     if (status == Name(static_cast<SightingStatus>(bit))) return std::int64_t{1} << bit;
   return 0;
@@ -42,7 +46,8 @@ FitsTable TableOf(const Json& answer) {
   for (const Json& row : ListIn(answer, "measurements")) {
     units.push_back(static_cast<std::int64_t>(CountIn(row, "unit_id")));
     configuration = static_cast<std::int64_t>(CountIn(row, "configuration"));
-    status.push_back(TextIn(row, "status"));
+    const bool moved_since = row.value("moved_since", false);
+    status.push_back(moved_since ? kMovedSince : TextIn(row, "status"));
     source.push_back(TextIn(row, "source"));
     const Json& orientation = ObjectIn(row, "orientation");
     sensors.push_back(TextIn(orientation, "verdict"));
@@ -50,8 +55,9 @@ FitsTable TableOf(const Json& answer) {
     beta.push_back(NumberOrNan(orientation, "beta_deg"));
     gamma.push_back(NumberOrNan(orientation, "gamma_deg"));
     bits.push_back(StatusBits(status.back()));
-    // Without a spot there is no place; 0, 0 would look like one.
-    const bool seen = NumberIn(row, "sigma_um") > 0;
+    // Without a spot there is no place; 0, 0 would look like one. Where it was before it moved on
+    // is not its place either (--json has it).
+    const bool seen = NumberIn(row, "sigma_um") > 0 && !moved_since;
     x.push_back(seen ? NumberIn(row, "x_mm") : std::nan(""));
     y.push_back(seen ? NumberIn(row, "y_mm") : std::nan(""));
     sigma.push_back(seen ? NumberIn(row, "sigma_um") : std::nan(""));
@@ -61,7 +67,7 @@ FitsTable TableOf(const Json& answer) {
     target.push_back(TextIn(row, "target_id"));
     target_x.push_back(NumberOrNan(row, "target_x_mm"));
     target_y.push_back(NumberOrNan(row, "target_y_mm"));
-    error.push_back(NumberOrNan(row, "error_um"));
+    error.push_back(moved_since ? std::nan("") : NumberOrNan(row, "error_um"));
     at.push_back(TextIn(row, "at"));
   }
   return {.name = "FIBRES",

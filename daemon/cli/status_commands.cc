@@ -60,7 +60,7 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
       busy ? Paint(colour_on, Colour::kYellow, "busy") : Paint(colour_on, Colour::kGreen, "idle"));
   text += fmt::format("units      {}, {} enabled: {}\n", CountIn(status, "units"),
                       CountIn(status, "enabled"), Counted(ObjectIn(status, "phases")));
-  text += fmt::format("positions  {}\n", Counted(ObjectIn(status, "witnesses")));
+  text += fmt::format("positions  {}\n", Counted(ObjectIn(status, "positions")));
   text += fmt::format(
       "store      {}{}\n", TextIn(store, "path"),
       failing ? Paint(colour_on, Colour::kRed, "  FAILING: nothing new is started") : "");
@@ -222,16 +222,17 @@ struct HistoryTable {
   std::vector<std::string> columns;
 };
 std::vector<HistoryTable> HistoryTables() {
-  return {{"configurations",
-           {"id", "state", "source", "began", "changed", "targeted", "arrived", "refused", "failed",
-            "makespan_s", "makespan_predicted_s", "energy_J", "peak_power_W"}},
-          {"alarms", {"id", "at", "severity", "bus_id", "unit_id", "text"}},
-          {"moves",
-           {"configuration", "move", "end", "began", "ended", "theta_from_vectors",
-            "theta_to_vectors", "theta_low_vectors", "theta_high_vectors", "theta_witness",
-            "phi_from_vectors", "phi_to_vectors", "phi_low_vectors", "phi_high_vectors",
-            "phi_witness", "unit_id", "serial"}},
-          {"unit", {"at", "enabled", "reason", "unit_id", "serial"}}};
+  return {
+      {"configurations",
+       {"id", "state", "source", "began", "changed", "targeted", "arrived", "refused", "failed",
+        "stopped", "unmeasured", "makespan_s", "makespan_predicted_s", "energy_J", "peak_power_W"}},
+      {"alarms", {"id", "at", "severity", "bus_id", "unit_id", "text"}},
+      {"moves",
+       {"configuration", "move", "end", "began", "ended", "theta_from_vectors", "theta_to_vectors",
+        "theta_low_vectors", "theta_high_vectors", "theta_witness", "phi_from_vectors",
+        "phi_to_vectors", "phi_low_vectors", "phi_high_vectors", "phi_witness", "unit_id",
+        "serial"}},
+      {"unit", {"at", "enabled", "reason", "unit_id", "serial"}}};
 }
 
 ExitCode RunHistory(const Context& context, const HistoryOptions& options) {

@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <chrono>
 #include <optional>
+#include <thread>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
@@ -14,6 +18,9 @@ namespace {
 struct StopOptions {
   std::optional<std::uint32_t> unit_id;
   bool direct = false;
+  // Units answer a stop within some tens of milliseconds. The daemon repeats a lost frame for up to
+  // 1.6 s (CoordinatorConfig::reply_wait).
+  double within_s = 5;
   std::string config = "/etc/focalfleet/focalfleet.toml";
 };
 
@@ -55,6 +62,57 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
   return ExitCode::kSomeUnserved;
 }
 
+constexpr std::chrono::milliseconds kLookEvery{50};
+
+/// How many units may still move: all, or the one named. Errors: as Ask.
+tl::expected<std::uint64_t, Failure> CountMoving(const Context& context,
+                                                 const std::optional<std::uint32_t>& unit_id) {
+  constexpr std::array kMoving{"moving", "homing", "settling"};
+  const auto is_moving = [&](const std::string& phase) {
+    return std::ranges::find(kMoving, phase) != kMoving.end();
+  };
+  if (unit_id) {
+    const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", *unit_id}}});
+    if (!unit) return tl::unexpected(unit.error());
+    return std::uint64_t{is_moving(TextIn(*unit, "phase")) ? 1u : 0u};
+  }
+  const auto status = Ask(context, {.verb = "status"});
+  if (!status) return tl::unexpected(status.error());
+  std::uint64_t moving = 0;
+  for (const char* phase : kMoving) moving += CountIn(ObjectIn(*status, "phases"), phase);
+  return moving;
+}
+
+/// What was asked for is that units stand; "sent" alone is not done.
+ExitCode TellWhetherAllStand(const Context& context, const StopOptions& options) {
+  const auto give_up =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
+  for (;;) {
+    const auto moving = CountMoving(context, options.unit_id);
+    if (!moving)
+      return Report(context, Failure{ExitCode::kBroken,
+                                     {moving.error().error.code,
+                                      "stop sent; whether units stand is not known: " +
+                                          moving.error().error.text}});
+    const bool over = std::chrono::steady_clock::now() >= give_up;
+    if (*moving > 0 && !over) {
+      std::this_thread::sleep_for(kLookEvery);
+      continue;
+    }
+    if (context.json) PrintJson({{"text", "stop sent"}, {"not_standing", *moving}});
+    if (*moving == 0) {
+      Say(context, options.unit_id ? "it stands" : "all units stand, or do not answer");
+      return ExitCode::kOk;
+    }
+    Complain(
+        fmt::format("focalfleet: {} did not confirm within {:g} s to stand: `focalfleet status`, "
+                    "`focalfleet stop` "
+                    "again, or `focalfleet stop --direct`\n",
+                    Count(*moving, "unit", "units"), options.within_s));
+    return ExitCode::kSomeUnserved;
+  }
+}
+
 ExitCode RunStop(const Context& context, const StopOptions& options) {
   if (options.direct) return RunDirectStop(context, options);
   Json args = Json::object();
@@ -67,10 +125,9 @@ ExitCode RunStop(const Context& context, const StopOptions& options) {
     }
     return Report(context, failure);
   }
-  if (context.json) PrintJson(*answer);
   Say(context, options.unit_id ? fmt::format("unit {}: stop sent", *options.unit_id)
                                : "stop sent to all units");
-  return ExitCode::kOk;
+  return TellWhetherAllStand(context, options);
 }
 
 }  // namespace
@@ -82,6 +139,9 @@ void AddStopCommand(CommandLine* line) {
                  "  focalfleet stop --direct --config /etc/focalfleet/focalfleet.toml");
   auto options = std::make_shared<StopOptions>();
   command->add_option("UNIT", options->unit_id, "Its unit_id (default: all)");
+  command->add_option("--within-s", options->within_s, "How long to wait until they stand")
+      ->check(NumberBetween(0, 600))
+      ->capture_default_str();
   CLI::Option* direct = command->add_flag(
       "--direct", options->direct, "Past the daemon: put the stop frame on the buses from here");
   AddFile(command, "--config", &options->config,

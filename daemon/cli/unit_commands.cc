@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <thread>
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
@@ -13,6 +15,13 @@
 
 namespace focalfleet::cli {
 namespace {
+
+ExitCode TellConfiguration(const Context& context, const Json& configuration) {
+  Say(context, DescribeConfiguration(configuration, context.colour_out));
+  const ExitCode exit = ExitCodeOf(configuration);
+  if (exit == ExitCode::kSomeUnserved) NameUnserved(context, DescribeNotServed(configuration));
+  return exit;
+}
 
 // The answer as it is, or `done` for people.
 ExitCode Tell(const Context& context, const tl::expected<Json, Failure>& answer,
@@ -64,10 +73,7 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
     Say(context, "homing begins; `focalfleet status` shows how it goes");
     return ExitCode::kOk;
   }
-  Say(context, DescribeConfiguration(*answer, context.colour_out));
-  const ExitCode exit = ExitCodeOf(*answer);
-  if (exit == ExitCode::kSomeUnserved) NameUnserved(context, DescribeNotServed(*answer));
-  return exit;
+  return TellConfiguration(context, *answer);
 }
 
 void AddHome(CommandLine* line) {
@@ -84,11 +90,47 @@ void AddHome(CommandLine* line) {
   OnChosen(line, command, options, RunHome);
 }
 
+// ---- measure
+
+struct MeasureOptions {
+  bool wait = false;
+};
+
+ExitCode RunMeasure(const Context& context, const MeasureOptions& options) {
+  ProgressBar bar(context);
+  const auto answer = Ask(context, {.verb = "measure",
+                                    .args = {{"wait", options.wait}},
+                                    .long_lasting = options.wait,
+                                    .on_progress = [&bar](const Json& p) {
+                                      bar.Show(NumberIn(p, "fraction"), DescribeStage(p), "");
+                                    }});
+  bar.End();
+  if (!answer) return Report(context, answer.error());
+  if (context.json) PrintJson(*answer);
+  if (!options.wait) {
+    Say(context, "an exposure is asked for; `focalfleet status` shows what it finds");
+    return ExitCode::kOk;
+  }
+  return TellConfiguration(context, *answer);
+}
+
+void AddMeasure(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "measure", "Look with the camera where every fibre is; nothing moves",
+                 "  focalfleet measure --wait    # units of unknown place are known again where "
+                 "they are found\n"
+                 "  focalfleet measurements --out fibres.fits");
+  auto options = std::make_shared<MeasureOptions>();
+  command->add_flag("--wait", options->wait, "Wait for the exposure, and tell what it found");
+  OnChosen(line, command, options, RunMeasure);
+}
+
 // ---- disable, enable, adopt
 
 struct EnableOptions {
   std::vector<std::uint32_t> units;
   std::string reason;
+  double within_s = 5;  // a unit that clears a fault is read anew, with repeats some seconds at most
 };
 
 ExitCode RunDisable(const Context& context, const EnableOptions& options) {
@@ -98,9 +140,41 @@ ExitCode RunDisable(const Context& context, const EnableOptions& options) {
               fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
 }
 
+constexpr std::chrono::milliseconds kLookEvery{50};
+
+/// The units that are still in fault when the daemon has had time to clear it. Errors: as Ask.
+tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(
+    const Context& context, const EnableOptions& options) {
+  const auto give_up =
+      std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
+  for (;;) {
+    std::vector<std::uint32_t> faulty;
+    for (const std::uint32_t id : options.units) {
+      const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", id}}});
+      if (!unit) return tl::unexpected(unit.error());
+      const std::string phase = TextIn(*unit, "phase");
+      if (phase == "fault" || phase == "identifying") faulty.push_back(id);
+    }
+    if (faulty.empty() || std::chrono::steady_clock::now() >= give_up) return faulty;
+    std::this_thread::sleep_for(kLookEvery);
+  }
+}
+
 ExitCode RunEnable(const Context& context, const EnableOptions& options) {
-  return Tell(context, Ask(context, {.verb = "enable", .args = {{"unit_ids", options.units}}}),
-              fmt::format("{} enabled", Count(options.units.size(), "unit", "units")));
+  const auto answer = Ask(context, {.verb = "enable", .args = {{"unit_ids", options.units}}});
+  if (!answer) return Report(context, answer.error());
+  const auto faulty = StillInFault(context, options);
+  if (!faulty) return Report(context, faulty.error());
+  if (context.json) {
+    Json result = *answer;
+    result["still_in_fault"] = *faulty;
+    PrintJson(result);
+  }
+  Say(context, fmt::format("{} enabled", Count(options.units.size(), "unit", "units")));
+  if (faulty->empty()) return ExitCode::kOk;
+  Complain(fmt::format("focalfleet: still in fault: {} (`focalfleet unit {}` says which)\n",
+                       fmt::join(*faulty, ", "), faulty->front()));
+  return ExitCode::kSomeUnserved;
 }
 
 void AddEnable(CommandLine* line) {
@@ -117,6 +191,9 @@ void AddEnable(CommandLine* line) {
                  "  focalfleet enable 4711");
   auto taken_in = std::make_shared<EnableOptions>();
   AddUnits(enable, &taken_in->units)->required();
+  enable->add_option("--within-s", taken_in->within_s, "How long to wait for faults to be cleared")
+      ->check(NumberBetween(0, 600))
+      ->capture_default_str();
   OnChosen(line, enable, taken_in, RunEnable);
 }
 
@@ -125,9 +202,12 @@ struct AdoptOptions {
 };
 
 ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
-  return Tell(
-      context, Ask(context, {.verb = "adopt", .args = {{"unit_id", options.unit_id}}}),
-      fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id));
+  const auto answer = Ask(context, {.verb = "adopt", .args = {{"unit_id", options.unit_id}}});
+  std::string done =
+      fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id);
+  if (const std::string text = answer ? TextIn(*answer, "text") : ""; text.starts_with("done"))
+    done += text.substr(4);
+  return Tell(context, answer, done);
 }
 
 void AddAdopt(CommandLine* line) {
@@ -254,6 +334,7 @@ void AddParams(CommandLine* line) {
 
 void AddUnitCommands(CommandLine* line) {
   AddHome(line);
+  AddMeasure(line);
   AddEnable(line);
   AddAdopt(line);
   AddParams(line);

@@ -65,7 +65,7 @@ Json Counts(const FleetStatusValue& fleet) {
           {"units", fleet.units},
           {"enabled", fleet.enabled},
           {"phases", phases},
-          {"witnesses", witnesses},
+          {"positions", witnesses},
           {"configuration", fleet.configuration},
           {"bus_load_max", fleet.bus_load_max},
           {"busy", fleet.busy},
@@ -83,6 +83,8 @@ Json JsonOf(const ConfigurationProgressValue& value) {
           {"arrived", view.arrived},
           {"refused", view.refused},
           {"failed", view.failed},
+          {"stopped", view.stopped},
+          {"unmeasured", view.unmeasured},
           {"makespan_predicted_s", view.makespan_predicted_s},
           {"makespan_s", view.makespan_s},
           {"energy_J", view.energy_J},
@@ -194,8 +196,10 @@ std::string DescribeProgress(const ConfigurationProgressValue& value) {
   return fmt::format("configuration {} ({}): {}, round {}\n{}\n", view.id, view.source,
                      Name(view.state), view.round,
                      DrawBar(fraction,
-                             fmt::format("{} of {} arrived, {} refused, {} failed", view.arrived,
-                                         view.targeted, view.refused, view.failed),
+                             fmt::format("{} of {} arrived, {} refused, {} failed, {} stopped, {} "
+                                         "unmeasured",
+                                         view.arrived, view.targeted, view.refused, view.failed,
+                                         view.stopped, view.unmeasured),
                              100));
 }
 

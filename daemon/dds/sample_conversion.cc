@@ -15,6 +15,7 @@ static_assert(focalfleet_PHASE_MOVING == static_cast<int>(UnitPhase::kMoving));
 static_assert(focalfleet_STATE_HOST_LOST == static_cast<int>(UnitState::kHostLost));
 static_assert(focalfleet_FAULT_DRIVER == static_cast<int>(FaultCode::kDriver));
 static_assert(focalfleet_OUTCOME_FAILED == static_cast<int>(TargetOutcome::kFailed));
+static_assert(focalfleet_OUTCOME_UNMEASURED == static_cast<int>(TargetOutcome::kUnmeasured));
 static_assert(focalfleet_LINK_DOWN == static_cast<int>(LinkState::kDown));
 static_assert(focalfleet_CONFIGURATION_FAILED == static_cast<int>(ConfigurationState::kFailed));
 static_assert(focalfleet_SEVERITY_ERROR == static_cast<int>(Severity::kError));
@@ -28,7 +29,6 @@ constexpr Witness kLastWitness = Witness::kMeasured;
 constexpr UnitPhase kLastPhase = static_cast<UnitPhase>(kUnitPhaseCount - 1);
 constexpr UnitState kLastUnitState = static_cast<UnitState>(kUnitStateCount - 1);
 constexpr FaultCode kLastFault = static_cast<FaultCode>(kFaultCodeCount - 1);
-constexpr TargetOutcome kLastOutcome = TargetOutcome::kFailed;
 constexpr LinkState kLastLink = LinkState::kDown;
 constexpr ConfigurationState kLastState = ConfigurationState::kFailed;
 constexpr Severity kLastSeverity = Severity::kError;
@@ -68,7 +68,7 @@ const char* Flaw(const UnitStatusValue& value) {
   if (value.phase > kLastPhase) return "phase";
   if (value.reported_state > kLastUnitState) return "reported state";
   if (value.fault > kLastFault) return "fault";
-  if (value.outcome > kLastOutcome) return "outcome";
+  if (value.outcome > kLastTargetOutcome) return "outcome";
   return nullptr;
 }
 template <class Sample>
@@ -199,6 +199,8 @@ void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationP
   sample->arrived = value.view.arrived;
   sample->refused = value.view.refused;
   sample->failed = value.view.failed;
+  sample->stopped = value.view.stopped;
+  sample->unmeasured = value.view.unmeasured;
   sample->state = Code(value.view.state);
   CopyText(value.view.source, sample->source);
 }
@@ -231,7 +233,7 @@ bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value) {
          Take(sample.phi_witness, kLastWitness, &value->witness[1]) &&
          Take(sample.reported_state, kLastUnitState, &value->reported_state) &&
          Take(sample.fault, kLastFault, &value->fault) &&
-         Take(sample.outcome, kLastOutcome, &value->outcome);
+         Take(sample.outcome, kLastTargetOutcome, &value->outcome);
 }
 
 bool FromSample(const focalfleet_UnitOrientation& sample, UnitOrientationValue* value) {
@@ -303,6 +305,8 @@ bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationPro
   value->view.arrived = sample.arrived;
   value->view.refused = sample.refused;
   value->view.failed = sample.failed;
+  value->view.stopped = sample.stopped;
+  value->view.unmeasured = sample.unmeasured;
   value->view.source = TextOf(sample.source);
   return Take(sample.state, kLastState, &value->view.state);
 }

@@ -296,9 +296,10 @@ CLI::App* AddMisbehave(CLI::App* app, Given* given) {
   sub->add_flag("--wrong-digest", given->wrong_digest,
                 "what they say they hold is not what was staged");
   sub->add_flag("--mute-done", given->mute_done, "they never report the end of a motion unasked");
-  sub->add_option("--foreign", given->foreign_serial,
-                  "other hardware, with this serial number, sits at the place of the one unit")
-      ->check(CLI::Range(1u, UINT32_MAX));
+  sub->add_option(
+      "--foreign", given->foreign_serial,
+      "other hardware, with this serial number, sits at the place of the one unit; 0: its "
+      "number is lost");
   sub->add_flag("--off", given->off, "first: they behave again");
   return sub;
 }

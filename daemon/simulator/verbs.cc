@@ -153,11 +153,12 @@ Result<Json> Verbs::Misbehave(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const bool deaf, FlagArgumentOr(args, "deaf", false));
   FOCALFLEET_TRY_ASSIGN(const bool wrong_digest, FlagArgumentOr(args, "wrong_digest", false));
   FOCALFLEET_TRY_ASSIGN(const bool mute_done, FlagArgumentOr(args, "mute_done", false));
+  const bool foreign = args.contains("foreign_serial");
   FOCALFLEET_TRY_ASSIGN(const std::uint64_t serial, UnsignedArgumentOr(args, "foreign_serial", 0));
   if (copies < 1 || copies > kCopiesMax)
     return Fail(ErrorCode::kInvalid, "copies is not within 1.." + std::to_string(kCopiesMax));
   if (serial > UINT32_MAX) return Fail(ErrorCode::kInvalid, "a serial number has 32 bits");
-  if (serial != 0 && units.size() != 1)
+  if (serial != 0 && units.size() > 1)
     return Fail(ErrorCode::kInvalid,
                 "one serial number is one unit's; " + std::to_string(units.size()) + " are named");
   for (const UnitId unit : units) {
@@ -173,7 +174,7 @@ Result<Json> Verbs::Misbehave(const Json& args) {
     faults.deaf |= deaf;
     faults.wrong_digest |= wrong_digest;
     faults.mute_done |= mute_done;
-    if (serial != 0) faults.foreign_serial = SerialNumber{static_cast<std::uint32_t>(serial)};
+    if (foreign) faults.foreign_serial = SerialNumber{static_cast<std::uint32_t>(serial)};
   }
   return Json{{"units", units.size()}};
 }

@@ -70,7 +70,9 @@ ConfigurationRow ReadConfiguration(Cells& cells) {
           .energy_J = cells.Real(9),
           .peak_power_W = cells.Real(10),
           .start_skew_s = cells.Real(11),
-          .start_skew_bound_s = cells.Real(12)};
+          .start_skew_bound_s = cells.Real(12),
+          .stopped = cells.Whole<std::uint32_t>(13),
+          .unmeasured = cells.Whole<std::uint32_t>(14)};
 }
 
 void Cells::Require(bool condition, const char* what) {
@@ -95,33 +97,6 @@ TuningRow ReadTuning(Cells& cells, int first) {
     cells.Require(flaw == nullptr, flaw);
   }
   return row;
-}
-
-const char* Flaw(const TuningRow& row) {
-  if (row.serial.value == 0) return "it has no serial number";
-  if (row.axis > Axis::kPhi || row.mode > kLastMode || row.origin > kLastOrigin) {
-    return "its axis, mode or origin does not exist";
-  }
-  if (row.critical < 1 || row.repeat < row.critical || row.repeat > 255) {
-    return "its n are not 1 <= critical <= repeat <= 255";
-  }
-  if (row.counter1 == 0 || row.subdivision == 0) return "V_counter1 or subdivision is 0";
-  if (!std::isfinite(row.margin) || !(row.load_uNm > 0) || !std::isfinite(row.load_uNm) ||
-      !(row.v_bus_V > 0) || !std::isfinite(row.v_bus_V)) {
-    return "margin, load or V_bus is no possible number";
-  }
-  return nullptr;
-}
-
-const char* Flaw(const SpineReading& spine) {
-  if (spine.trusted && !spine.solved) return "it is trusted, and there is none";
-  if (!spine.solved) return nullptr;
-  for (const double angle_deg : spine.angles_deg)
-    if (!(std::abs(angle_deg) <= 360)) return "its angle is no angle";
-  for (const double covariance_deg2 : spine.covariance_deg2)
-    if (!std::isfinite(covariance_deg2)) return "its covariance is not finite";
-  const auto& c = spine.covariance_deg2;
-  return c[0] >= 0 && c[3] >= 0 && c[5] >= 0 ? nullptr : "its variance is negative";
 }
 
 std::optional<SpineReading> ReadSpine(Cells& cells, int first) {

@@ -12,6 +12,7 @@
 #include "daemon/wall_time.h"
 #include "fleet/knowledge.h"
 #include "fleet/records.h"
+#include "fleet/row_check.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet::store_internal {
@@ -65,40 +66,14 @@ class Cells {
   std::optional<Error> error_;
 };
 
-/// What a stored state of knowledge must satisfy, when written and when read: nullptr, or what is
-/// wrong.
-constexpr const char* Flaw(const AxisKnowledge& knowledge) {
-  if (knowledge.witness > Witness::kMeasured) return "its witness does not exist";
-  if (knowledge.witness == Witness::kUnknown) return nullptr;
-  if (knowledge.low > knowledge.high) return "low is above high";
-  if (knowledge.witness != Witness::kInterval && knowledge.low != knowledge.high) {
-    return "it claims one place and has two";
-  }
-  return nullptr;
-}
-
-inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kTooCoarse;
-inline constexpr SightingSource kLastSightingSource = SightingSource::kSensors;
-inline constexpr Origin kLastOrigin = Origin::kSensors;
-inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
-inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
-inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
-inline constexpr Severity kLastSeverity = Severity::kError;
-inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
-
 /// The columns id, source, state, targeted, arrived, refused, failed, makespan_predicted_s,
-/// makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, in this order from the
-/// first on.
+/// makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, in
+/// this order from the first on.
 ConfigurationRow ReadConfiguration(Cells& cells);
 
 /// serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, mode, origin,
 /// in this order from column `first` on.
 TuningRow ReadTuning(Cells& cells, int first);
-/// What such a row must satisfy, when written and when read: nullptr, or what is wrong.
-const char* Flaw(const TuningRow& row);
-
-/// What a stored orientation must satisfy: nullptr, or what is wrong.
-const char* Flaw(const SpineReading& spine);
 /// trusted, verdict, used, three angles and six covariances, in this order from column `first` on;
 /// nothing where the first is NULL.
 std::optional<SpineReading> ReadSpine(Cells& cells, int first);

@@ -136,7 +136,8 @@ Status LoadConfigurations(Connection& connection, StoredFleet* fleet) {
   return ForEach(
       connection, "configuration", 1,
       "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
-      "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s FROM configuration "
+      "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured "
+      "FROM configuration "
       "WHERE state < 3 OR id = (SELECT max(id) FROM configuration) ORDER BY id",
       [fleet](Cells& cells) { fleet->configurations.push_back(ReadConfiguration(cells)); });
 }

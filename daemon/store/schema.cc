@@ -327,8 +327,15 @@ CREATE VIEW measured AS SELECT
   FROM measurement LEFT JOIN orientation USING (exposure, unit_id);
 )sql";
 
+// Targets that a stop cut short, and arrivals that no measurement confirmed, are counted apart from
+// failures.
+constexpr const char* kVersion8 = R"sql(
+ALTER TABLE configuration ADD COLUMN stopped INTEGER NOT NULL DEFAULT 0;
+ALTER TABLE configuration ADD COLUMN unmeasured INTEGER NOT NULL DEFAULT 0;
+)sql";
+
 constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4,
-                                       kVersion5, kVersion6, kVersion7};
+                                       kVersion5, kVersion6, kVersion7, kVersion8};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

@@ -1,6 +1,5 @@
 #include "daemon/store/store.h"
 
-#include <cmath>
 #include <cstdlib>
 
 #include "daemon/store/cells.h"
@@ -108,14 +107,15 @@ constexpr const char* kOrientation =
 constexpr const char* kConfiguration =
     "INSERT INTO configuration(id, source, state, targeted, arrived, refused, failed, "
     "makespan_predicted_s, "
-    "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, began_ns, changed_ns) "
-    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?14) "
+    "makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, "
+    "began_ns, changed_ns) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?15, ?16, ?14, ?14) "
     "ON CONFLICT(id) DO UPDATE SET "
     "source = ?2, "
     "state = ?3, targeted = ?4, arrived = ?5, refused = ?6, failed = ?7, makespan_predicted_s = "
     "?8, "
     "makespan_s = ?9, energy_J = ?10, peak_power_W = ?11, start_skew_s = ?12, start_skew_bound_s = "
-    "?13, "
+    "?13, stopped = ?15, unmeasured = ?16, "
     "changed_ns = ?14";
 constexpr const char* kAlarm =
     "INSERT INTO alarm(id, severity, unit_id, bus_id, text, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6) "
@@ -175,13 +175,7 @@ class RowWriter {
   }
 
   Status operator()(const VectorRow& row) {
-    if (row.serial.value == 0) return Wrong("vector row without a serial number");
-    if (row.origin > kLastOrigin)
-      return Wrong("vector row", row.serial, "its origin does not exist");
     for (const Axis axis : kAxes) {
-      if (const char* flaw = Flaw(row.knowledge[Index(axis)])) {
-        return Wrong("vector row", row.serial, flaw);
-      }
       // Motions are kept in intent, exposures in measurement; what sets a vector otherwise would
       // leave no trace.
       if (row.origin != Origin::kMove && row.origin != Origin::kHoming &&
@@ -194,15 +188,7 @@ class RowWriter {
   }
 
   Status operator()(const MeasurementRow& row) {
-    if (row.serial.value == 0) return Wrong("measurement without a serial number");
-    if (row.exposure > INT64_MAX || row.configuration > INT64_MAX)
-      return Wrong("measurement", row.serial, "its number is too large");
     const auto& [xx, xy, yy] = row.covariance;
-    for (const double value : {row.x_mm, row.y_mm, xx, xy, yy, row.delay_s.value_or(0)})
-      if (!std::isfinite(value)) return Wrong("measurement", row.serial, "it is not finite");
-    if (xx < 0 || yy < 0) return Wrong("measurement", row.serial, "its variance is negative");
-    if (row.source > kLastSightingSource)
-      return Wrong("measurement", row.serial, "its source does not exist");
     if (row.spine) FOCALFLEET_TRY(WriteOrientation(row, *row.spine));
     Statement& s = statements_.measurement;
     s.Bind(1, static_cast<std::int64_t>(row.exposure));
@@ -231,12 +217,6 @@ class RowWriter {
   }
 
   Status operator()(const IntentRow& row) {
-    if (row.serial.value == 0) return Wrong("intent without a serial number");
-    for (const AxisKnowledge& hull : row.hull) {
-      if (hull.low > hull.high) return Wrong("intent", row.serial, "low is above high");
-    }
-    if (row.configuration > INT64_MAX)
-      return Wrong("intent", row.serial, "its configuration is too large");
     Statement& s = statements_.intent;
     s.Bind(1, static_cast<std::int64_t>(row.configuration));
     s.Bind(2, row.unit.value);
@@ -255,7 +235,6 @@ class RowWriter {
   }
 
   Status operator()(const IntentEndRow& row) {
-    if (row.end > kLastIntentEnd) return Wrong("intent end", row.serial, "its end does not exist");
     Statement& s = statements_.intent_end;
     s.Bind(1, row.serial.value);
     s.Bind(2, row.move.value);
@@ -287,10 +266,6 @@ class RowWriter {
   }
 
   Status operator()(const ParameterRow& row) {
-    if (row.serial.value == 0) return Wrong("parameter without a serial number");
-    if (row.parameter > kLastParameter || row.axis > Axis::kPhi || row.origin > kLastOrigin) {
-      return Wrong("parameter", row.serial, "its axis, parameter or origin does not exist");
-    }
     for (Statement* s : {&statements_.parameter_changed, &statements_.parameter}) {
       s->Bind(1, row.serial.value);
       s->Bind(2, Code(row.axis));
@@ -304,7 +279,6 @@ class RowWriter {
   }
 
   Status operator()(const TuningRow& row) {
-    if (const char* const flaw = Flaw(row)) return Wrong("tuning", row.serial, flaw);
     for (Statement* s : {&statements_.tuning_kept, &statements_.tuning}) {
       s->Bind(1, row.serial.value);
       s->Bind(2, Code(row.axis));
@@ -324,9 +298,6 @@ class RowWriter {
   }
 
   Status operator()(const ConfigurationRow& row) {
-    if (row.state > kLastConfigurationState || row.id >= INT64_MAX) {
-      return Wrong("configuration: its state or id does not exist");
-    }
     Statement& s = statements_.configuration;
     s.Bind(1, static_cast<std::int64_t>(row.id));
     s.BindText(2, row.source);
@@ -342,14 +313,13 @@ class RowWriter {
     s.BindReal(12, row.start_skew_s);
     s.BindReal(13, row.start_skew_bound_s);
     s.Bind(14, now_.ns);
+    s.Bind(15, row.stopped);
+    s.Bind(16, row.unmeasured);
     FOCALFLEET_TRY(s.Run());
     return Meta(statements_.raise_meta, "next_configuration", row.id + 1);
   }
 
   Status operator()(const AlarmRow& row) {
-    if (row.severity > kLastSeverity || row.id >= INT64_MAX) {
-      return Wrong("alarm: its severity or id does not exist");
-    }
     Statement& s = statements_.alarm;
     s.Bind(1, static_cast<std::int64_t>(row.id));
     s.Bind(2, Code(row.severity));
@@ -375,8 +345,6 @@ class RowWriter {
   }
 
   Status operator()(const ModelRow& row) {
-    if (row.entry == 0 || row.entry >= INT64_MAX || row.restores >= row.entry)
-      return Wrong("model: its entry, or the one that it restores, does not exist");
     if (row.text != nullptr && !row.sha256.empty()) {
       Statement& model = statements_.model;
       model.BindText(1, row.sha256);
@@ -406,11 +374,6 @@ class RowWriter {
   }
 
  private:
-  static Status Wrong(std::string text) { return Fail(ErrorCode::kInvalid, std::move(text)); }
-  static Status Wrong(const char* what, SerialNumber serial, const char* why) {
-    return Wrong(std::string(what) + " of serial " + std::to_string(serial.value) + ": " + why);
-  }
-
   Status WriteAxis(const VectorRow& row, Axis axis) {
     const AxisKnowledge& knowledge = row.knowledge[Index(axis)];
     const std::int32_t subdivision = row.subdivision[Index(axis)];
@@ -439,8 +402,6 @@ class RowWriter {
   }
 
   Status WriteOrientation(const MeasurementRow& row, const SpineReading& spine) {
-    const char* flaw = Flaw(spine);
-    if (flaw != nullptr) return Wrong("orientation", row.serial, flaw);
     Statement& s = statements_.orientation;
     s.Bind(1, static_cast<std::int64_t>(row.exposure));
     s.Bind(2, row.unit.value);
@@ -539,30 +500,44 @@ Result<std::unique_ptr<Store>> Store::Open(const std::string& path, const StoreO
 
 Result<StoredFleet> Store::Load() { return LoadFleet(*connection_); }
 
-Status Store::Rollback(Error why) {
-  connection_->Rollback();
+Status Store::Reject(Error why) {
   ++counters_.failed;
   return tl::unexpected<Error>(connection_->Named(std::move(why)));
 }
 
-Status Store::Commit(std::span<const Row> rows, WallTime now) {
+Status Store::Rollback(Error why) {
+  connection_->Rollback();
+  return Reject(std::move(why));
+}
+
+Status Store::Commit(std::span<const Row> rows, WallTime now, std::size_t* refused) {
+  if (refused != nullptr) *refused = rows.size();
+  const auto refuse = [&](std::size_t row, const Error& why) {
+    if (refused != nullptr) *refused = row;
+    return Error{why.code, Describe(rows[row]) + ": " + why.text};
+  };
   if (rows.empty()) return {};
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    if (const char* const flaw = Flaw(rows[k]))
+      return Reject(refuse(k, {ErrorCode::kInvalid, flaw}));
   if (auto begun = statements_->begin.Run(); !begun) return Rollback(begun.error());
   RowWriter writer(*statements_, now);
+  const auto write = [&](std::size_t k) -> Status {
+    const Status written = std::visit(writer, rows[k]);
+    if (written || written.error().code != ErrorCode::kInvalid) return written;
+    return tl::unexpected<Error>(refuse(k, written.error()));
+  };
   bool ends = false;
-  for (const Row& row : rows) {
-    if (std::holds_alternative<IntentEndRow>(row)) {
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (std::holds_alternative<IntentEndRow>(rows[k])) {
       ends = true;
-    } else if (auto written = std::visit(writer, row); !written) {
+    } else if (auto written = write(k); !written) {
       return Rollback(written.error());
     }
   }
-  if (ends) {
-    for (const Row& row : rows) {
-      const auto* end = std::get_if<IntentEndRow>(&row);
-      if (end == nullptr) continue;
-      if (auto written = writer(*end); !written) return Rollback(written.error());
-    }
+  for (std::size_t k = 0; ends && k < rows.size(); ++k) {
+    if (!std::holds_alternative<IntentEndRow>(rows[k])) continue;
+    if (auto written = write(k); !written) return Rollback(written.error());
   }
   if (auto done = statements_->commit.Run(); !done) return Rollback(done.error());
   ++counters_.transactions;

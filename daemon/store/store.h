@@ -63,10 +63,11 @@ class Store {
   /// `rows` are durable, all of them, in order; but ends of intents are written last, with the
   /// place at which the batch leaves the unit. A batch that failed may be offered again.
   /// Errors: kFull: no space; kUnavailable: the disk or file fails; kInvalid: a row could not be
-  /// read back (a code that does not exist, one place with two positions). Nothing of the batch
-  /// was written then, and a later Commit may succeed.
+  /// read back (fleet/row_check.h) or contradicts what is stored; `refused`, where it is given, is
+  /// then the index of that row, else rows.size(). Nothing of the batch was written then, and a
+  /// later Commit may succeed.
   /// Cost: one prepared statement a row (two for a VectorRow), no allocation, one fsync.
-  Status Commit(std::span<const Row> rows, WallTime now);
+  Status Commit(std::span<const Row> rows, WallTime now, std::size_t* refused = nullptr);
 
   /// Ended moves, configurations and alarms that are older are gone; at most `rows_max` of each
   /// table, so that the transaction stays short. What the coordinator loads is never pruned.
@@ -77,6 +78,7 @@ class Store {
 
  private:
   Store();
+  Status Reject(Error why);
   Status Rollback(Error why);
 
   std::string path_;
@@ -134,6 +136,8 @@ struct UnitHistory {
 struct MeasurementHistory {
   MeasurementRow row;
   WallTime at;  // stored
+  /// The unit was sent again after this exposure, in the same configuration: it is elsewhere now.
+  bool moved_since = false;
 };
 
 struct ModelHistory {
@@ -164,8 +168,11 @@ class StoreReader {
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
-  /// Units that were homed later than that.
-  Result<std::vector<UnitId>> HomedSince(WallTime since);
+  /// Units whose count began anew later than that: homed, set by hand, found by the camera, or
+  /// other hardware was adopted there.
+  Result<std::vector<UnitId>> CountedAnewSince(WallTime since);
+  /// Which hardware is bound to which place.
+  Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
   /// Errors: kRefused: there is none of that sha256.
   Result<std::string> ModelText(const std::string& sha256);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);

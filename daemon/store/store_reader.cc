@@ -114,13 +114,14 @@ Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(std::uint3
       *connection_, "configuration",
       "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
       "makespan_s, energy_J, "
-      "peak_power_W, start_skew_s, start_skew_bound_s, began_ns, changed_ns FROM configuration "
+      "peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, began_ns, changed_ns "
+      "FROM configuration "
       "ORDER BY id DESC LIMIT ?1",
       limit, std::nullopt, [](Cells& cells) {
         ConfigurationHistory entry;
         entry.row = ReadConfiguration(cells);
-        entry.began = cells.Time(13);
-        entry.changed = cells.Time(14);
+        entry.began = cells.Time(15);
+        entry.changed = cells.Time(16);
         return entry;
       });
 }
@@ -179,7 +180,10 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
       "SELECT exposure, unit_id, m.serial, configuration, status, other, x_mm, y_mm, sigma_um, "
       "theta, phi, error_um, target_x_mm, target_y_mm, m.at_ns, var_x_mm2, cov_xy_mm2, var_y_mm2, "
       "target_id, delay_s, source, trusted, verdict, used, alpha_deg, beta_deg, gamma_deg, "
-      "cov_aa_deg2, cov_ab_deg2, cov_ag_deg2, cov_bb_deg2, cov_bg_deg2, cov_gg_deg2 "
+      "cov_aa_deg2, cov_ab_deg2, cov_ag_deg2, cov_bb_deg2, cov_bg_deg2, cov_gg_deg2, "
+      "coalesce((SELECT began_ns >= m.at_ns FROM intent WHERE unit_id = m.unit_id AND "
+      "configuration = m.configuration AND (end IS NULL OR end <> 3) ORDER BY entry DESC LIMIT 1), "
+      "0) "
       "FROM measurement AS m LEFT JOIN orientation USING (exposure, unit_id) WHERE exposure = ?2 "
       "ORDER BY unit_id LIMIT ?1",
       limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
@@ -206,6 +210,7 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
         if (!cells.IsNull(19)) row.delay_s = cells.Real(19);
         row.source = cells.Code(20, kLastSightingSource);
         row.spine = ReadSpine(cells, 21);
+        history.moved_since = cells.Whole<std::int64_t>(33) != 0;
         return history;
       });
 }
@@ -244,13 +249,28 @@ Result<std::vector<ModelHistory>> StoreReader::Models(std::uint32_t limit) {
       });
 }
 
-Result<std::vector<UnitId>> StoreReader::HomedSince(WallTime since) {
+Result<std::vector<UnitId>> StoreReader::CountedAnewSince(WallTime since) {
   static_assert(IntentEnd::kHomed == IntentEnd{5});
-  return Query<UnitId>(*connection_, "intent",
-                       "SELECT DISTINCT unit_id FROM intent WHERE end = 5 AND ended_ns > ?2 "
-                       "ORDER BY unit_id LIMIT ?1",
-                       limits::kUnits, since.ns,
-                       [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
+  static_assert(Origin::kOperator == Origin{3} && Origin::kFound == Origin{8});
+  return Query<UnitId>(
+      *connection_, "intent",
+      "SELECT unit_id FROM intent WHERE end = 5 AND ended_ns > ?2 "
+      "UNION SELECT unit_id FROM axis_history JOIN unit USING (serial) "
+      "WHERE axis_history.origin IN (3, 8) AND axis_history.at_ns > ?2 "
+      "UNION SELECT unit_id FROM unit_history AS now WHERE at_ns > ?2 AND serial <> 0 AND EXISTS("
+      "SELECT 1 FROM unit_history AS before WHERE before.unit_id = now.unit_id AND "
+      "before.entry < now.entry AND before.serial NOT IN (0, now.serial)) "
+      "ORDER BY unit_id LIMIT ?1",
+      limits::kUnits, since.ns, [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
+}
+
+Result<std::vector<std::pair<UnitId, SerialNumber>>> StoreReader::Bindings() {
+  return Query<std::pair<UnitId, SerialNumber>>(
+      *connection_, "unit",
+      "SELECT unit_id, serial FROM unit WHERE serial <> 0 ORDER BY unit_id LIMIT ?1",
+      limits::kUnits, std::nullopt, [](Cells& cells) {
+        return std::pair{UnitId{cells.Whole<std::uint32_t>(0)}, cells.Serial(1)};
+      });
 }
 
 Result<std::string> StoreReader::ModelText(const std::string& sha256) {

@@ -45,6 +45,13 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
       Round(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
   const double as_told =
       1 - options.did_not_move_share - options.strayed_share - options.missing_share;
+  if (expectation.lost) {
+    if (expectation.expected_fp)
+      places->push_back({PlaceKind::kExpected, *expectation.expected_fp,
+                         CovarianceAt(unit, *expectation.commanded, expectation.blind),
+                         options.lost_says_right_share});
+    return;
+  }
   if (!expectation.moved) {
     if (expectation.before_fp)
       places->push_back({PlaceKind::kExpected, *expectation.before_fp, as_before, as_told});
@@ -126,7 +133,8 @@ Claims FindClaims(const ClaimSearch& search) {
         claimed[spot] = 1;
       });
     }
-    if (places.empty()) continue;
+    // A lost unit says nothing of whether this is the field that was expected.
+    if (places.empty() || search.request->expectations[i].lost) continue;
     AddOtherReasons(search, i, before, places, odds.dark_and_dust, &claims.all);
     ++claims.units;
     if (claims.all.size() > before) ++claims.recognised;
@@ -136,6 +144,20 @@ Claims FindClaims(const ClaimSearch& search) {
   return claims;
 }
 
+namespace {
+
+/// Some pose of the unit within its box puts the fibre there.
+bool IsWithin(const Unit& unit, PointFp at_fp, const UnitExpectation& expectation) {
+  if (!expectation.within) return true;
+  const auto inside = InReach(unit, at_fp, kStraySlackMm);
+  if (!inside) return false;
+  const std::vector<AxisAngles> poses = AnglesFor(unit, *inside);
+  return std::ranges::any_of(
+      poses, [&](const AxisAngles& angles) { return expectation.within->Holds(angles); });
+}
+
+}  // namespace
+
 std::vector<Claim> FindStrays(const ClaimSearch& search, std::span<const std::uint32_t> units,
                               std::span<const char> is_free) {
   const Layout& layout = *search.request->layout;
@@ -143,33 +165,41 @@ std::vector<Claim> FindStrays(const ClaimSearch& search, std::span<const std::ui
   std::vector<Claim> strays;
   for (const std::uint32_t i : units) {
     const Unit& unit = layout.unit({i});
-    // Nothing else is known of a unit without a place: it is somewhere.
-    const bool lost =
-        !search.request->expectations[i].expected_fp && !search.request->expectations[i].before_fp;
-    const double share = lost ? 1 : search.options->strayed_share;
+    const UnitExpectation& expectation = search.request->expectations[i];
+    // A unit without a place is somewhere: where it says, or anywhere.
+    const double share = !expectation.lost          ? search.options->strayed_share
+                         : !expectation.expected_fp ? 1
+                                                    : 1 - search.options->lost_says_right_share;
     const double log_odds = std::log(share / PatrolAreaMm2(unit) / odds.dark_and_dust);
     const double reach_mm = PatrolOf(unit).max_mm + kStraySlackMm;
     search.grid->ForNear(unit.base_fp, reach_mm, [&](std::uint32_t spot, double) {
-      if (is_free[spot] != 0 && InPatrol(unit, search.spots->at_fp[spot], kStraySlackMm))
+      if (is_free[spot] != 0 && InPatrol(unit, search.spots->at_fp[spot], kStraySlackMm) &&
+          IsWithin(unit, search.spots->at_fp[spot], expectation))
         strays.push_back({i, spot, PlaceKind::kAnywhere, log_odds});
     });
   }
   return strays;
 }
 
-bool InPatrol(const Unit& unit, PointFp at_fp, double slack_mm) {
+std::optional<PointFp> InReach(const Unit& unit, PointFp at_fp, double slack_mm) {
   const double distance_mm = DistanceMm(unit.base_fp, at_fp);
   const PatrolLimits limits = PatrolOf(unit);
   if (distance_mm < limits.min_mm - slack_mm || distance_mm > limits.max_mm + slack_mm)
-    return false;
+    return std::nullopt;
+  const double inside_mm = std::clamp(distance_mm, limits.min_mm, limits.max_mm);
+  if (inside_mm == distance_mm || distance_mm == 0) return at_fp;
+  const double scale = inside_mm / distance_mm;
+  return PointFp{unit.base_fp.x_mm + (at_fp.x_mm - unit.base_fp.x_mm) * scale,
+                 unit.base_fp.y_mm + (at_fp.y_mm - unit.base_fp.y_mm) * scale};
+}
+
+bool InPatrol(const Unit& unit, PointFp at_fp, double slack_mm) {
+  const auto inside = InReach(unit, at_fp, slack_mm);
+  if (!inside) return false;
   // A theta that goes all round leaves no direction out.
   if (unit.theta().max_deg - unit.theta().min_deg >= 360) return true;
-  if (distance_mm <= slack_mm) return true;
-  const double inside_mm = std::clamp(distance_mm, limits.min_mm, limits.max_mm);
-  const double scale = inside_mm / distance_mm;
-  return !AnglesFor(unit, {unit.base_fp.x_mm + (at_fp.x_mm - unit.base_fp.x_mm) * scale,
-                           unit.base_fp.y_mm + (at_fp.y_mm - unit.base_fp.y_mm) * scale})
-              .empty();
+  if (DistanceMm(unit.base_fp, at_fp) <= slack_mm) return true;
+  return !AnglesFor(unit, *inside).empty();
 }
 
 }  // namespace focalfleet

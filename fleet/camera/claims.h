@@ -6,6 +6,7 @@
 // the wide part because real blind errors have tails.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "fleet/camera/identify.h"
@@ -53,6 +54,9 @@ std::vector<Claim> FindStrays(const ClaimSearch& search, std::span<const std::ui
                               std::span<const char> is_free);
 
 inline constexpr double kStraySlackMm = 0.1;  // arms and air
+/// The point itself, or the nearest one on the rim of the patrol area where the point is beyond it
+/// by at most `slack_mm`; none: farther out.
+std::optional<PointFp> InReach(const Unit& unit, PointFp at_fp, double slack_mm);
 /// The unit's arms lead there, within the ranges of both axes, or within `slack_mm` of there.
 bool InPatrol(const Unit& unit, PointFp at_fp, double slack_mm);
 

@@ -66,6 +66,18 @@ UnitExpectation ExpectStill(PointFp seen_fp, double sigma_mm) {
   return expectation;
 }
 
+UnitExpectation ExpectLost(const Unit& unit, const std::optional<AxisAngles>& says,
+                           const std::optional<AngleBox>& within, const BlindError& blind) {
+  UnitExpectation expectation;
+  expectation.lost = true;
+  expectation.within = within;
+  expectation.blind = blind;
+  if (!says || (within && !within->Holds(*says))) return expectation;
+  expectation.expected_fp = FibreAt(unit, *says);
+  expectation.commanded = *says;
+  return expectation;
+}
+
 PoseReading ReadPose(const Unit& unit, PointFp seen_fp, const AxisAngles& believed,
                      double travel_max_deg) {
   PoseReading reading;

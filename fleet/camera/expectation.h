@@ -5,6 +5,7 @@
 //                                              perpendicular to base-fibre and elbow-fibre
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include "fleet/kinematics.h"
@@ -20,6 +21,19 @@ struct BlindError {
   double place_sigma_mm = 0.003;
 };
 
+/// A range of each axis' own angle, ends included.
+struct AngleBox {
+  struct Range {
+    double low_deg = 0;
+    double high_deg = 0;
+  };
+  std::array<Range, kAxisCount> axis;
+  [[nodiscard]] bool Holds(const AxisAngles& angles) const {
+    return angles.theta_deg >= axis[0].low_deg && angles.theta_deg <= axis[0].high_deg &&
+           angles.phi_deg >= axis[1].low_deg && angles.phi_deg <= axis[1].high_deg;
+  }
+};
+
 struct UnitExpectation {
   /// By the current model, after the move. None: nobody can say (unknown, an interval).
   std::optional<PointFp> expected_fp;
@@ -31,6 +45,11 @@ struct UnitExpectation {
   bool moved = true;
   BlindError blind;
   double flux = 0;  // of its spot, as usual; 0: not known
+  /// Its place is not known. expected_fp is then what the unit says itself, against the store: a
+  /// hypothesis; none: it says nothing, or its word cannot be right.
+  bool lost = false;
+  /// Of a lost unit: its axes stand within these angles; none: anywhere in their ranges.
+  std::optional<AngleBox> within;
 };
 
 /// S at these angles.
@@ -45,6 +64,10 @@ UnitExpectation ExpectMove(const Unit& unit, const AxisAngles& before, const Axi
                            const BlindError& blind);
 /// A unit that stays where it is: disabled, or without a target.
 UnitExpectation ExpectStill(PointFp seen_fp, double sigma_mm);
+
+/// A unit whose place is not known.
+UnitExpectation ExpectLost(const Unit& unit, const std::optional<AxisAngles>& says,
+                           const std::optional<AngleBox>& within, const BlindError& blind);
 
 /// What x and y leave open. Theta's whole turn and the side of the elbow cannot be seen; they are
 /// taken from where the axes are believed, where that decides.

@@ -1,8 +1,10 @@
 #include "fleet/camera/findings.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "fleet/camera/claims.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/check.h"
 
@@ -18,6 +20,22 @@ constexpr double kMeasuredSigmaMm = 0.005;  // of a unit that rests where a came
 
 bool IsMeasured(const UnitKnowledge& knowledge) {
   return knowledge[0].witness == Witness::kMeasured && knowledge[1].witness == Witness::kMeasured;
+}
+
+/// By how much zero angles and arms may put a unit of unknown place outside of its interval.
+constexpr double kBoxSlackDeg = 3;
+
+/// Where an interval of vectors is known, its angles; none: one axis at least is unknown.
+std::optional<AngleBox> BoxOf(const Unit& unit, const UnitDrive& drive,
+                              const UnitKnowledge& knowledge) {
+  AngleBox box;
+  for (const Axis axis : kAxes) {
+    const std::size_t a = Index(axis);
+    if (knowledge[a].witness == Witness::kUnknown) return std::nullopt;
+    box.axis[a] = {AngleDeg(knowledge[a].low, unit.axis[a], drive.axis[a]) - kBoxSlackDeg,
+                   AngleDeg(knowledge[a].high, unit.axis[a], drive.axis[a]) + kBoxSlackDeg};
+  }
+  return box;
 }
 
 /// An axis that stayed is believed where it was.
@@ -37,8 +55,14 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
       believed.seen.size() == layout.size() && believed.drives.size() == layout.size());
   std::vector<UnitExpectation> all(layout.size());
   for (std::size_t n = 0; n < layout.size(); ++n) {
-    if (!IsPlace(believed.now[n])) continue;
     const Unit& unit = layout.units()[n];
+    if (!IsPlace(believed.now[n])) {
+      std::optional<AxisAngles> says;
+      if (!believed.reported.empty() && believed.reported[n])
+        says = AnglesOf(unit, believed.drives[n], *believed.reported[n]);
+      all[n] = ExpectLost(unit, says, BoxOf(unit, believed.drives[n], believed.now[n]), kNeverSeen);
+      continue;
+    }
     const Pose place = PlaceOf(believed.now[n]);
     if (IsMeasured(believed.now[n])) {
       all[n] = ExpectStill(FibreAt(unit, believed.drives[n], place), kMeasuredSigmaMm);
@@ -53,6 +77,25 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
     all[n].moved = true;
   }
   return all;
+}
+
+std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
+                               const UnitExpectation& expectation, double sigma_mm) {
+  const auto at_fp = InReach(unit, seen_fp, kStraySlackMm);
+  if (!at_fp) return std::nullopt;
+  std::vector<AxisAngles> possible = AnglesFor(unit, *at_fp);
+  if (expectation.within)
+    std::erase_if(possible,
+                  [&](const AxisAngles& angles) { return !expectation.within->Holds(angles); });
+  if (possible.size() > 1 && expectation.commanded)
+    std::erase_if(possible, [&](const AxisAngles& angles) {
+      return std::abs(angles.theta_deg - expectation.commanded->theta_deg) > kBoxSlackDeg ||
+             std::abs(angles.phi_deg - expectation.commanded->phi_deg) > kBoxSlackDeg;
+    });
+  if (possible.size() != 1) return std::nullopt;
+  const Pose pose{NearestVectors(possible[0].theta_deg, unit.axis[0], drive.axis[0]),
+                  NearestVectors(possible[0].phi_deg, unit.axis[1], drive.axis[1])};
+  return PlaceSeen(unit, drive, seen_fp, pose, {.sigma_mm = sigma_mm});
 }
 
 Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const Believed& believed,
@@ -78,7 +121,10 @@ Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const
       sighting.y_mm = seen.at_fp.y_mm;
       const double sigma_mm = std::sqrt((seen.covariance.xx + seen.covariance.yy) / 2);
       sighting.covariance = seen.covariance;
-      if (IsCertain(seen.status) && IsPlace(believed.now[n]))
+      if (IsCertain(seen.status) && expectations[n].lost)
+        sighting.place = PoseOfLost(layout.units()[n], believed.drives[n], seen.at_fp,
+                                    expectations[n], sigma_mm);
+      else if (IsCertain(seen.status))
         sighting.place = PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
                                    BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
                                    {.sigma_mm = sigma_mm});

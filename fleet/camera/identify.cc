@@ -153,7 +153,14 @@ class Matching {
       if (settled_[decision.unit] != 0) continue;
       if (decision.doubt > options_.stray_doubt_max) {
         LeaveAmbiguous(decision.unit, decision.doubt);
-      } else if (decision.spot != kNoSpot) {
+      } else if (decision.spot == kNoSpot) {
+        continue;
+      } else if (request_.expectations[decision.unit].lost &&
+                 decision.doubt <= options_.doubt_max) {
+        // Nobody knew where it was, so it did not stray: it is found.
+        Give(decision.unit, decision.spot, SightingStatus::kMeasured, decision.doubt);
+        sightings_[decision.unit].motion_is_known = false;
+      } else {
         Give(decision.unit, decision.spot, SightingStatus::kStrayed, decision.doubt);
         Suspect(decision.unit, decision.spot);
       }

@@ -66,6 +66,10 @@ struct IdentifyOptions {
   double one_axis_stayed_share = 0.01;
   double strayed_share = 0.01;
   double missing_share = 0.01;
+  /// Of units of unknown place: those that stand where they say. With a half, neither their word
+  /// nor the store's is taken; with 0.25 or 0.9 the log odds of a spot there change by 0.6, of some
+  /// 10 that it has.
+  double lost_says_right_share = 0.5;
   double dust_share = 0.005;
   double recognised_share_min = 0.5;  // below: another field
   double spots_share_min = 0.3;       // of units and fiducials, else the exposure is refused

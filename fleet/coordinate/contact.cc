@@ -59,6 +59,10 @@ bool Contact::Service(PositionerIndex i) {
     core_.Ask(i, SensorsRequest{record.sensing.next_part}, kSensorsAnswerBits);
     return true;
   }
+  if (record.view.phase == kReady && record.locating) {
+    WriteCount(i);
+    return true;
+  }
   const bool poll = core_.now >= record.next_poll;
   switch (record.view.phase) {
     case kAbsent:
@@ -132,6 +136,7 @@ void Contact::Identify(PositionerIndex i) {
   core_.Forget(i);
   record.reading = {};
   record.sensing = {};
+  record.locating.reset();
   record.wants_start = false;
   record.clock_told = false;
   core_.SetPhase(i, kIdentifying);
@@ -149,6 +154,7 @@ void Contact::Lose(PositionerIndex i, UnitPhase phase, const std::string& reason
                Origin::kMove);
   }
   core_.Forget(i);
+  record.locating.reset();
   record.wants_start = false;
   core_.SetPhase(i, phase);
   record.next_poll = core_.now + core_.config.identify_period;
@@ -237,6 +243,8 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
     if (!answers(Function::kIdentify)) return;
     record.asked_once = true;
     if (!IsSpoken(identity->protocol_version)) return OnOtherVersion(i, *identity);
+    if (identity->serial.value == 0) return OnNoSerial(i);
+    record.no_serial = false;
     record.protocol_version = identity->protocol_version;
     record.other_version.reset();
     record.view.serial = identity->serial;
@@ -272,12 +280,31 @@ void Contact::OnOtherVersion(PositionerIndex i, const IdentifyReply& identity) {
                     std::to_string(kProtocolVersionWithSensors) + ": it is not moved");
   record.other_version = identity.protocol_version;
   record.view.serial = identity.serial;
+  NotToBeRead(i, "speaks another protocol version");
+}
+
+/// Nothing can be kept of a unit without a serial number: its memory is lost, or it was never
+/// programmed. It is asked again, and not moved.
+void Contact::OnNoSerial(PositionerIndex i) {
+  UnitRecord& record = core_.unit(i);
+  if (!std::exchange(record.no_serial, true))
+    core_.Raise(Severity::kError, i, {},
+                core_.NameOf(i) +
+                    " answers with serial number 0: its memory is lost, or it was never "
+                    "programmed; it is not moved");
+  record.view.serial = {};
+  NotToBeRead(i, "has no serial number");
+}
+
+/// It answers, and is not one of ours: its identity alone is asked from now on.
+void Contact::NotToBeRead(PositionerIndex i, const std::string& reason) {
+  UnitRecord& record = core_.unit(i);
   record.view.knowledge = {};
   core_.Changed(i);
   if (record.view.phase == kIdentifying) core_.SetPhase(i, kAbsent);
   record.next_poll = core_.now + core_.config.identify_period;
   core_.SetDue(i, record.next_poll);
-  core_.Tell(i, UnitEventKind::kLost, "speaks another protocol version");
+  core_.Tell(i, UnitEventKind::kLost, reason);
 }
 
 void Contact::OnStatus(PositionerIndex i, const StatusReply& status) {
@@ -423,6 +450,7 @@ void Contact::OnParameter(PositionerIndex i, const ParameterReply& reply) {
   if (record.view.phase == kIdentifying && reply.parameter == Parameter::kCounter1)
     record.reading.counter1[Index(reply.axis)] = reply.value;
   if (reply.written) {
+    if (record.locating && reply.parameter == Parameter::kPosition) return OnCountWritten(i, reply);
     if (record.view.phase != kIdentifying) OnWritten(i, reply);
     // A misfit is read again and again.
     if (reply.answer != Answer::kOk && record.unfit.empty())
@@ -467,9 +495,9 @@ void Contact::OnWritten(PositionerIndex i, const ParameterReply& reply) {
 
 void Contact::Bind(PositionerIndex i) {
   UnitView& view = core_.unit(i).view;
-  view.bound_serial = view.serial;
+  const SerialNumber replaced = std::exchange(view.bound_serial, view.serial);
   core_.place_of[view.serial] = i;
-  core_.Note(BindingRow{core_.layout.unit(i).id, view.serial});
+  core_.Note(BindingRow{core_.layout.unit(i).id, view.serial, replaced});
 }
 
 /// The unit is bound to its place, or is now; false: it is foreign there.
@@ -483,13 +511,32 @@ bool Contact::Belongs(PositionerIndex i) {
     core_.SetPhase(i, kForeign);
     core_.Raise(Severity::kWarning, i, {},
                 core_.NameOf(i) + " answers with serial number " +
-                    std::to_string(view.serial.value) + ", not " +
+                    std::to_string(view.serial.value) + ", " + core_.WhoseSerial(i) + ", not " +
                     std::to_string(view.bound_serial.value) +
                     ": it is not moved until it is adopted");
+    NameExchange(i);
     core_.Tell(i, UnitEventKind::kLost, "has another serial number");
     return false;
   }
   return true;
+}
+
+/// Two places that answer with each other's serial numbers: their cables, or the robots themselves,
+/// were exchanged. Said once, when the second of them is read.
+void Contact::NameExchange(PositionerIndex i) {
+  const UnitView& view = core_.unit(i).view;
+  const auto other = core_.place_of.find(view.serial);
+  if (other == core_.place_of.end()) return;
+  const PositionerIndex j = other->second;
+  const UnitView& there = core_.unit(j).view;
+  if (j == i || there.phase != kForeign || there.serial != view.bound_serial) return;
+  const std::string id = std::to_string(core_.layout.unit(i).id.value);
+  const std::string other_id = std::to_string(core_.layout.unit(j).id.value);
+  core_.Raise(Severity::kError, i, {},
+              "units " + other_id + " and " + id +
+                  " are exchanged: each answers with the other's serial number. Exchange their "
+                  "cables, or, if the robots themselves changed places, `focalfleet adopt " +
+                  other_id + "` and `focalfleet adopt " + id + "`");
 }
 
 void Contact::Concluded(PositionerIndex i) {
@@ -549,7 +596,7 @@ void Contact::Concluded(PositionerIndex i) {
     core_.Tell(i, UnitEventKind::kLost, "is in fault");
     return;
   }
-  if (!unfit.empty()) {
+  if (!unfit.empty() || !record.not_kept.empty()) {
     Unfit(i);
     return;
   }
@@ -595,6 +642,9 @@ Status Contact::Adopt(PositionerIndex i) {
   }
   core_.place_of.erase(view.bound_serial);
   Bind(i);
+  // What came of the last configuration stays; the robot that answers there now is not the reason.
+  if (IsUnserved(view.outcome))
+    view.outcome_reason = "it had not been adopted when the configuration ran";
   Identify(i);
   return {};
 }
@@ -606,6 +656,7 @@ void Contact::Enable(const EnableCommand& command) {
     view.disabled_reason = command.enabled ? "" : command.reason;
     core_.Note(EnableRow{core_.layout.unit(i).id, command.enabled, command.reason});
     core_.Changed(i);
+    if (command.enabled) core_.unit(i).not_kept.clear();
     if (command.enabled && view.phase == kFault) core_.Ask(i, FaultRequest{.clear = true});
   }
 }

@@ -29,8 +29,17 @@ class Contact {
   /// stands for many units.
   void Lose(PositionerIndex i, UnitPhase phase, const std::string& reason, bool alarm = true);
 
+  /// The store set a row aside. Where it tells of a unit's place or binding, that unit is not moved
+  /// until an operator enables it again; a command that wanted the row kept is told.
+  void StoreRefused(const RefusedRow& refused);
+
   /// Reads the sensors of a unit that rests and has some: UnitRecord::sensing.
   void Sense(PositionerIndex i);
+
+  /// Sets the count of a unit of unknown place to where it was found, to the vector that it shows
+  /// (UnitRecord::locating until that is over). The unit does not move. Its place is known,
+  /// `measured`, when both axes have taken it; else it stays unknown, with an alarm. Pre: kReady.
+  void Locate(PositionerIndex i, const Pose& place);
 
   Status Adopt(PositionerIndex i);
   void Enable(const EnableCommand& command);
@@ -40,6 +49,7 @@ class Contact {
  private:
   void AskNext(PositionerIndex i);  // the next question of the identification
   [[nodiscard]] bool Belongs(PositionerIndex i);
+  void NameExchange(PositionerIndex i);
   void Concluded(PositionerIndex i);
   /// See UnitRecord::unfit.
   [[nodiscard]] std::string MisfitOf(PositionerIndex i) const;
@@ -48,6 +58,8 @@ class Contact {
   void Watch(PositionerIndex i);
   void MissSoon(PositionerIndex i);
   void NoAnswer(PositionerIndex i);
+  void OnNoSerial(PositionerIndex i);
+  void NotToBeRead(PositionerIndex i, const std::string& reason);
   void OnOtherVersion(PositionerIndex i, const IdentifyReply& identity);
   void OnStatus(PositionerIndex i, const StatusReply& status);
   void OnMotionStatus(PositionerIndex i, const StatusReply& status);
@@ -57,6 +69,8 @@ class Contact {
   void OnSensors(PositionerIndex i, const SensorsReply& reply);
   void SensorsDoNotAnswer(PositionerIndex i, const std::string& what);
   void OnWritten(PositionerIndex i, const ParameterReply& reply);
+  void WriteCount(PositionerIndex i);
+  void OnCountWritten(PositionerIndex i, const ParameterReply& reply);
   void MotionEnded(PositionerIndex i, const Done& done);
 
   Core& core_;

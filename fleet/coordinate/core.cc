@@ -84,20 +84,25 @@ std::string Core::TroubleOf(PositionerIndex i) const {
   const std::string id = std::to_string(layout.unit(i).id.value);
   switch (view.phase) {
     case UnitPhase::kFault:
+      if (!units[i.value].not_kept.empty())
+        return "is not moved, for the store refuses its rows (" + units[i.value].not_kept +
+               "): `focalfleet enable " + id + "` tries again";
       if (!units[i.value].unfit.empty() && view.reported_state != UnitState::kFault)
         return "is not fit to move: " + units[i.value].unfit;
       return "is in fault" +
              (view.fault == FaultCode::kNone ? "" : " (" + std::string(Name(view.fault)) + ")") +
              ": `focalfleet enable " + id + "` clears it";
     case UnitPhase::kForeign:
-      return "has another serial number than the one that belongs there: `focalfleet adopt " + id +
-             "` accepts it";
+      return "has another serial number than the one that belongs there, " + WhoseSerial(i) +
+             ": `focalfleet adopt " + id + "` accepts it";
     case UnitPhase::kSilent:
     case UnitPhase::kAbsent:
       if (units[i.value].other_version)
         return "speaks protocol version " + std::to_string(*units[i.value].other_version) +
                ", not " + std::to_string(kProtocolVersion) + " or " +
                std::to_string(kProtocolVersionWithSensors);
+      if (units[i.value].no_serial)
+        return "answers with serial number 0: its memory is lost, or it was never programmed";
       return view.phase == UnitPhase::kAbsent ? "has never answered" : "does not answer any more";
     case UnitPhase::kIdentifying:
       return "is still being read";
@@ -114,6 +119,12 @@ std::string Core::TroubleOf(PositionerIndex i) const {
       break;
   }
   return "is ready";
+}
+
+std::string Core::WhoseSerial(PositionerIndex i) const {
+  const auto place = place_of.find(units[i.value].view.serial);
+  return place == place_of.end() ? "which belongs to no unit"
+                                 : "which belongs to " + NameOf(place->second);
 }
 
 BusRecord* Core::FindBus(BusId id) {
@@ -277,10 +288,23 @@ void Core::ReplyWhenDurable(std::uint64_t request, std::string text) {
   kept_replies_.push_back({batch_now(), request, std::move(text)});
 }
 
+void Core::RefuseReplies(std::uint64_t first_batch, std::uint64_t last_batch,
+                         const std::string& why) {
+  for (KeptReply& kept : kept_replies_)
+    if (kept.batch >= first_batch && kept.batch <= last_batch) kept.refused = why;
+}
+
 void Core::SayWhatIsDurable() {
   while (!kept_replies_.empty()) {
     KeptReply& kept = kept_replies_.front();
-    if (committed_through >= kept.batch) {
+    if (!kept.refused.empty()) {
+      out->replies.push_back(
+          {kept.request,
+           true,
+           Error{ErrorCode::kRefused,
+                 "effective now, NOT stored: the store refuses it (" + kept.refused + ")"},
+           {}});
+    } else if (committed_through >= kept.batch) {
       out->replies.push_back({kept.request, true, {}, std::move(kept.text)});
     } else if (store_failing) {
       out->replies.push_back(

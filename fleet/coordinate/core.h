@@ -62,7 +62,9 @@ struct UnitRecord {
   /// kFault, and read again with every poll.
   std::string unfit;
   std::optional<std::uint8_t> other_version;  // of the protocol, that it said last
-  HostInstant due = kNever;                   // when Service has something to do
+  bool no_serial = false;                     // it said last that its serial number is 0
+  std::string not_kept;      // why the store refuses its rows; empty: it does not. Kept in kFault.
+  HostInstant due = kNever;  // when Service has something to do
   HostInstant next_poll{INT64_MIN};
   bool asked_once = false;  // has had the chance to answer since start
   // In motion: when others depend on where it is, and when the last question was asked to which it
@@ -85,6 +87,13 @@ struct UnitRecord {
     [[nodiscard]] bool begun() const { return parts > 0 || given_up; }
     [[nodiscard]] bool under_way() const { return next_part < parts; }
   } sensing;
+  /// A unit of unknown place was found there; its own count is being set to it, axis by axis.
+  struct Locating {
+    Pose place{};
+    Axis axis = Axis::kTheta;  // whose count is written now
+    Pose count{};              // as the unit took it
+  };
+  std::optional<Locating> locating;
   bool wants_start = false;  // began with the others; when, is not known yet
   ClockMap::Instant began;   // told last
   // Stops of ours, so that one of somebody else's is told from them.
@@ -144,6 +153,9 @@ class Core {
   /// What keeps it from being moved, and what helps, to go after its name or "it":
   /// "is in fault (driver): `focalfleet enable 9` clears it". Pre: it is not kReady.
   [[nodiscard]] std::string TroubleOf(PositionerIndex i) const;
+  /// Where the serial number that answers at this place belongs: "which belongs to unit 8", or
+  /// "which belongs to no unit".
+  [[nodiscard]] std::string WhoseSerial(PositionerIndex i) const;
 
   // ---- doing
 
@@ -175,6 +187,8 @@ class Core {
   /// Answers when this step's rows are durable; at once, with an error, where they cannot be
   /// written.
   void ReplyWhenDurable(std::uint64_t request, std::string text);
+  /// Replies that wait for these batches, both included, tell instead that it is not stored.
+  void RefuseReplies(std::uint64_t first_batch, std::uint64_t last_batch, const std::string& why);
 
   /// Where it stands when its own count of vectors says `count`.
   [[nodiscard]] Pose PlaceAt(PositionerIndex i, const Pose& count) const;
@@ -240,6 +254,7 @@ class Core {
     std::uint64_t batch;
     std::uint64_t request;
     std::string text;
+    std::string refused = {};  // why it is not stored, and never will be
   };
   std::deque<KeptReply> kept_replies_;
 

@@ -29,6 +29,14 @@ std::uint64_t UploadBitsOf(const Core& core) {
   return bits;
 }
 
+/// A unit that is at no known place cannot be planned for; this says so, and what helps.
+std::string WhereaboutsUnknown(const Core& core, PositionerIndex i) {
+  const bool interval = core.units[i.value].view.knowledge[0].witness == Witness::kInterval;
+  return std::string("its place is ") + (interval ? "known only within an interval" : "not known") +
+         ": `focalfleet home " + std::to_string(core.layout.unit(i).id.value) +
+         "`, or `focalfleet measure` with a camera";
+}
+
 std::string DaemonEnded(std::uint64_t configuration) {
   return "configuration " + std::to_string(configuration) +
          " has failed: the daemon ended; what moves finishes by itself";
@@ -57,6 +65,8 @@ Pursuit::Pursuit(Core* core, Contact* contact)
            .arrived = last.arrived,
            .refused = last.refused,
            .failed = last.failed,
+           .stopped = last.stopped,
+           .unmeasured = last.unmeasured,
            .makespan_predicted_s = last.makespan_predicted_s,
            .makespan_s = last.makespan_s,
            .energy_J = last.energy_J,
@@ -97,15 +107,13 @@ Status Pursuit::Apply(std::uint64_t request, const ApplyCommand& command) {
     return Fail(ErrorCode::kInvalid, "names of targets for another layout");
   if (!command.offsets.empty() && command.offsets.size() != core_.units.size())
     return Fail(ErrorCode::kInvalid, "offsets for another layout");
-  const bool has_sensors =
-      std::ranges::any_of(core_.layout.units(), [](const Unit& unit) { return unit.sensors > 0; });
-  if (command.measure && !core_.config.has_camera && !(core_.config.reads_sensors && has_sensors))
+  if (command.measure && !CanMeasure())
     return Fail(ErrorCode::kRefused, "there is no camera to measure with: [camera] directory");
   targets_ = command.targets;
   fixed_ = command.fixed;
   measure_ = command.measure;
   target_ids_ = command.target_ids;
-  Begin(request, command.source);
+  Begin(request, ConfigurationKind::kApply, command.source);
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     const UnitView& view = core_.units[n].view;
     if (!targets_[n]) continue;
@@ -145,7 +153,7 @@ Status Pursuit::Home(std::uint64_t request, const HomeCommand& command) {
   fixed_ = false;
   measure_.reset();
   unproven_ = command.unproven;
-  Begin(request, "home");
+  Begin(request, ConfigurationKind::kHome, "home");
   if (unproven_)
     core_.Raise(Severity::kWarning, {}, {},
                 "homing of " + std::to_string(command.units.size()) +
@@ -156,7 +164,37 @@ Status Pursuit::Home(std::uint64_t request, const HomeCommand& command) {
   return {};
 }
 
-void Pursuit::Begin(std::uint64_t request, std::string source) {
+bool Pursuit::CanMeasure() const {
+  return core_.config.has_camera ||
+         (core_.config.reads_sensors &&
+          std::ranges::any_of(core_.layout.units(),
+                              [](const Unit& unit) { return unit.sensors > 0; }));
+}
+
+Status Pursuit::Measure(std::uint64_t request) {
+  if (busy())
+    return Fail(ErrorCode::kRefused, "configuration " + std::to_string(view_.id) +
+                                         " is under way: stop it or wait until it ends");
+  if (core_.store_failing)
+    return Fail(ErrorCode::kRefused,
+                "the store cannot be written: what is found could not be kept");
+  if (!CanMeasure())
+    return Fail(ErrorCode::kRefused, "there is no camera to measure with: [camera] directory");
+  targets_.clear();
+  for (const UnitRecord& unit : core_.units) targets_.push_back(unit.view.target);
+  fixed_ = false;
+  measure_ = ApplyCommand::Measure{};
+  Begin(request, ConfigurationKind::kMeasure, "measure");
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    if (!core_.units[n].view.enabled) continue;
+    ++view_.targeted;
+    SetOutcome({n}, TargetOutcome::kPending);
+  }
+  Record();
+  return {};
+}
+
+void Pursuit::Begin(std::uint64_t request, ConfigurationKind kind, std::string source) {
   request_ = request;
   failure_.clear();
   stopping_ = false;
@@ -169,7 +207,10 @@ void Pursuit::Begin(std::uint64_t request, std::string source) {
   approaches_.assign(core_.units.size(), std::nullopt);
   waves_left_ = 0;
   exposures_refused_ = 0;
+  looked_first_ = false;
+  is_locating_ = false;
   view_ = {.id = core_.next_configuration++,
+           .kind = kind,
            .source = std::move(source),
            .state = ConfigurationState::kPlanning,
            .began = core_.now,
@@ -210,6 +251,8 @@ void Pursuit::GatherIfDue() {
     due_ = core_.now + kGatherStep;
     return;
   }
+  if (view_.kind == ConfigurationKind::kMeasure) return StartLook(Look::kOnly);
+  if (LooksFirst()) return StartLook(Look::kBefore);
   BeginRound();
 }
 
@@ -251,9 +294,7 @@ void Pursuit::BeginRound() {
         SetOutcome({n}, TargetOutcome::kFailed,
                    view.phase == kReady ? "fell out before" : "it " + core_.TroubleOf({n}));
       } else if (!IsPlace(view.knowledge)) {
-        SetOutcome({n}, TargetOutcome::kRefused,
-                   std::string("its position is ") + Name(view.knowledge[0].witness) +
-                       ": home it, or measure it");
+        SetOutcome({n}, TargetOutcome::kRefused, WhereaboutsUnknown(core_, {n}));
       } else {
         target = targets_[n];
         any = true;
@@ -401,6 +442,7 @@ void Pursuit::Advance() {
       break;
     case State::kMeasuring:
       if (exposure_ == 0 && arrivals_.empty() && SensorsAreRead()) AskForExposure();
+      if (is_locating_ && !IsLocating()) LookIsOver();
       break;
     case State::kIdle:
     case State::kGathering:
@@ -577,12 +619,15 @@ void Pursuit::Strike(PositionerIndex i, const std::string& reason) {
 void Pursuit::Exclude(PositionerIndex i) { excluded_[i.value] = 1; }
 
 void Pursuit::Finish() {
+  const bool stopped = end_ == ConfigurationState::kStopped;
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
     part_[n] = Part::kNone;
     plan_of_[n] = kNoPlan;
     if (core_.units[n].view.outcome == TargetOutcome::kPending)
-      SetOutcome({n}, TargetOutcome::kFailed, failure_.empty() ? "did not arrive" : failure_);
+      SetOutcome({n}, stopped ? TargetOutcome::kStopped : TargetOutcome::kFailed,
+                 failure_.empty() ? "did not arrive" : failure_);
   }
+  JudgeMeasured();
   parts_ = {};
   plan_ = {};
   late_.clear();
@@ -610,6 +655,8 @@ void Pursuit::SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string r
   if (outcome == TargetOutcome::kArrived) ++view_.arrived;
   if (outcome == TargetOutcome::kRefused) ++view_.refused;
   if (outcome == TargetOutcome::kFailed) ++view_.failed;
+  if (outcome == TargetOutcome::kStopped) ++view_.stopped;
+  if (outcome == TargetOutcome::kUnmeasured) ++view_.unmeasured;
   core_.Changed(i);
 }
 
@@ -637,7 +684,9 @@ void Pursuit::Record() {
                               .energy_J = view_.energy_J,
                               .peak_power_W = view_.peak_power_W,
                               .start_skew_s = known ? view_.starts.skew_s : kNotKnown,
-                              .start_skew_bound_s = known ? view_.starts.bound_s : kNotKnown});
+                              .start_skew_bound_s = known ? view_.starts.bound_s : kNotKnown,
+                              .stopped = view_.stopped,
+                              .unmeasured = view_.unmeasured});
 }
 
 }  // namespace focalfleet

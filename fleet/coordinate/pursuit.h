@@ -40,6 +40,8 @@ class Pursuit {
   /// Another target for one unit while the others move.
   Status Retarget(std::uint64_t request, const RetargetCommand& command);
   Status Home(std::uint64_t request, const HomeCommand& command);
+  /// One look by camera or sensors; nobody moves.
+  Status Measure(std::uint64_t request);
   void StopAll() { StopAll("stopped by the operator"); }
   /// By the operator: it takes no further part in this goal.
   void StopUnit(PositionerIndex i);
@@ -113,7 +115,8 @@ class Pursuit {
     MoveId move;
   };
 
-  void Begin(std::uint64_t request, std::string source);
+  void Begin(std::uint64_t request, ConfigurationKind kind, std::string source);
+  [[nodiscard]] bool CanMeasure() const;
   void Gather();
   void GatherIfDue();
   void BeginRound();
@@ -194,12 +197,25 @@ class Pursuit {
   void NoteDirections(PositionerIndex i, const UnitPlan* reached);
   bool GoPast(std::vector<std::optional<Pose>>* targets);
   void MeasureOrFinish();
+  /// What an exposure is for.
+  enum class Look : std::uint8_t {
+    kBefore,  // units of unknown place are to be found before anybody moves
+    kAfter,   // all have arrived
+    kOnly,    // nothing else was asked for
+  };
+  void StartLook(Look look);
+  [[nodiscard]] bool LooksFirst() const;
+  [[nodiscard]] bool IsLocating() const;
+  void ExposureFailed(const Error& error);
+  void LookIsOver();
+  void JudgeMeasured();
+  [[nodiscard]] bool IsWithinTolerance(PositionerIndex i) const;
+  [[nodiscard]] std::string WhyNotMeasured(PositionerIndex i) const;
   [[nodiscard]] bool SensorsAreRead();
   void AskForExposure();
   void TakeSpine(PositionerIndex i, const Sighting& sighting);
   void TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
                     MeasuredRound* round);
-  void CorrectOrFinish();
   bool Correct();
   [[nodiscard]] std::vector<Pose> AimsOf(PositionerIndex i) const;
   [[nodiscard]] bool NeedsRunUp(PositionerIndex i, Axis axis, std::int32_t left) const;
@@ -270,6 +286,9 @@ class Pursuit {
   HostInstant sense_until_{0};     // who is read anew is awaited until then
   bool sensing_ = false;           // and are being read
   int exposures_refused_ = 0;
+  Look look_ = Look::kAfter;
+  bool looked_first_ = false;
+  bool is_locating_ = false;  // the counts of units that were found are being set
 
   std::vector<PositionerIndex> to_home_;
   std::vector<std::uint8_t> excluded_;  // failed in this goal: stands still from then on

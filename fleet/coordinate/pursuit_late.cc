@@ -385,6 +385,7 @@ void Pursuit::StartLate(Late* late) {
   core_.SetPhase(i, kMoving);
   before_[i.value].reset();
   core_.unit(i).seen_moving = HostInstant{INT64_MIN};
+  core_.unit(i).view.error_um.reset();
   WatchLeader(i);
   core_.SetDue(i, core_.unit(i).next_poll);
   view_.energy_J += late->predicted.energy_J;

@@ -1,4 +1,10 @@
-// Pursuit, when all have arrived: the camera looks, and who is too far off is sent again.
+// Pursuit, when all have arrived: the camera looks, and who is too far off is sent again. Where
+// units of unknown place have targets, the camera looks before anybody moves, too, and their counts
+// are set to where they are found (Contact::Locate).
+//
+// A measured configuration has served those units alone that are known to be within the tolerance:
+// by an exposure after their last motion. All others end as failed (beyond it), unmeasured, or
+// stopped (JudgeMeasured).
 //
 // What a unit reports is its own count. The camera's place takes its stead, so a correction is a
 // configuration like any other, from where everything truly stands; only the way to it is fixed
@@ -49,6 +55,21 @@ void Pursuit::MeasureOrFinish() {
     FinishWhenDurable(ConfigurationState::kDone);
     return;
   }
+  StartLook(Look::kAfter);
+}
+
+/// Units of unknown place have targets, and nobody has looked for them yet.
+bool Pursuit::LooksFirst() const {
+  if (!measure_ || measure_->observe || looked_first_ || !core_.config.has_camera) return false;
+  return std::ranges::any_of(core_.units, [](const UnitRecord& unit) {
+    return unit.view.outcome == TargetOutcome::kPending && unit.view.enabled &&
+           unit.view.phase == UnitPhase::kReady && !IsPlace(unit.view.knowledge);
+  });
+}
+
+void Pursuit::StartLook(Look look) {
+  look_ = look;
+  looked_first_ = true;
   exposures_refused_ = 0;
   exposure_ = 0;  // asked for when the arrivals are durable
   sensing_ = false;
@@ -82,10 +103,21 @@ bool Pursuit::SensorsAreRead() {
 void Pursuit::AskForExposure() {
   exposure_ = core_.next_exposure++;
   exposure_asked_ = core_.now;
-  ExposureJob job{
-      .id = exposure_, .since = core_.now, .expected = {}, .before = stood_, .seen = {}};
-  for (const UnitRecord& unit : core_.units) {
+  ExposureJob job{.id = exposure_,
+                  .since = core_.now,
+                  .expected = {},
+                  .before = {},
+                  .reported = {},
+                  .seen = {}};
+  job.before = stood_;
+  if (look_ != Look::kAfter) job.before.assign(core_.units.size(), std::nullopt);
+  for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+    const UnitRecord& unit = core_.units[n];
     job.expected.push_back(unit.view.knowledge);
+    std::optional<Pose> says;
+    if (unit.view.phase == UnitPhase::kReady && !IsPlace(unit.view.knowledge))
+      says = core_.PlaceAt({n}, unit.reading.position);
+    job.reported.push_back(says);
     job.seen.push_back(unit.view.offset != Pose{} ? 1 : 0);
     job.wanted.push_back(unit.view.target && unit.view.phase == UnitPhase::kReady ? 1 : 0);
     if (core_.config.reads_sensors) job.readings.push_back(unit.sensing.reading);
@@ -96,19 +128,8 @@ void Pursuit::AskForExposure() {
 
 void Pursuit::OnExposure(const ExposureDone& done) {
   if (state_ != State::kMeasuring || done.id != exposure_) return;  // of a goal that was stopped
-  if (!done.exposure) {
-    core_.Raise(Severity::kWarning, {}, {},
-                "exposure " + std::to_string(exposure_) + ": " + done.exposure.error().text);
-    if (++exposures_refused_ < kExposuresRefusedMax) {
-      AskForExposure();
-      return;
-    }
-    core_.Raise(Severity::kError, {}, {},
-                "configuration " + std::to_string(view_.id) + " is not measured: " +
-                    std::to_string(exposures_refused_) + " exposures could not be used");
-    FinishWhenDurable(ConfigurationState::kDone);
-    return;
-  }
+  if (!done.exposure) return ExposureFailed(done.exposure.error());
+  view_.not_measured.clear();
   MeasuredRound round{.exposure = exposure_, .camera = done.exposure->camera};
   if (!done.exposure->camera_trouble.empty())
     core_.Raise(Severity::kError, {}, {},
@@ -121,10 +142,63 @@ void Pursuit::OnExposure(const ExposureDone& done) {
     if (view.target && view.error_um) errors_um.push_back(*view.error_um);
   }
   Summarise(std::move(errors_um), &round);
-  view_.measured.push_back(round);
+  if (look_ != Look::kBefore) view_.measured.push_back(round);
   // Where nobody was found there is nothing to wait for.
   measured_batch_ = core_.out->rows.empty() ? 0 : core_.batch_now();
-  CorrectOrFinish();
+  is_locating_ = true;
+  if (!IsLocating()) LookIsOver();
+}
+
+void Pursuit::ExposureFailed(const Error& error) {
+  core_.Raise(Severity::kWarning, {}, {},
+              "exposure " + std::to_string(exposure_) + ": " + error.text);
+  if (++exposures_refused_ < kExposuresRefusedMax) {
+    AskForExposure();
+    return;
+  }
+  const std::string tried = std::to_string(exposures_refused_) +
+                            " exposures could not be used, the last because " + error.text;
+  if (look_ == Look::kBefore) {
+    core_.Raise(Severity::kWarning, {}, {}, "units of unknown place were not looked for: " + tried);
+    Gather();
+    return;
+  }
+  core_.Raise(Severity::kError, {}, {},
+              "configuration " + std::to_string(view_.id) + " is not measured: " + tried);
+  view_.not_measured = tried;
+  if (look_ == Look::kOnly) failure_ = "not measured: " + tried;
+  FinishWhenDurable(look_ == Look::kOnly ? ConfigurationState::kFailed : ConfigurationState::kDone);
+}
+
+bool Pursuit::IsLocating() const {
+  return std::ranges::any_of(core_.units,
+                             [](const UnitRecord& unit) { return unit.locating.has_value(); });
+}
+
+/// What was found is taken in, the counts of units that were lost included.
+void Pursuit::LookIsOver() {
+  is_locating_ = false;
+  if (!core_.out->rows.empty()) measured_batch_ = core_.batch_now();
+  switch (look_) {
+    case Look::kBefore:
+      Gather();
+      return;
+    case Look::kAfter:
+      if (corrections_left_ == 0 || !Correct()) FinishWhenDurable(ConfigurationState::kDone);
+      return;
+    case Look::kOnly:
+      for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
+        const UnitView& view = core_.units[n].view;
+        const bool found = view.knowledge[0].witness == Witness::kMeasured &&
+                           view.knowledge[1].witness == Witness::kMeasured && view.sighting &&
+                           IsPut(*view.sighting);
+        if (view.outcome != TargetOutcome::kPending) continue;
+        SetOutcome({n}, found ? TargetOutcome::kArrived : TargetOutcome::kUnmeasured,
+                   found ? "" : WhyNotMeasured({n}));
+      }
+      FinishWhenDurable(ConfigurationState::kDone);
+      return;
+  }
 }
 
 void Pursuit::TakeSighting(const ExposureFindings& exposure, const Sighting& sighting,
@@ -136,7 +210,9 @@ void Pursuit::TakeSighting(const ExposureFindings& exposure, const Sighting& sig
   TakeSpine(i, sighting);
   view.error_um.reset();
   core_.Changed(i);
-  if (put && view.target) {
+  if (look_ == Look::kBefore) {
+    // It is still to move: how far it is from its target is no error.
+  } else if (put && view.target) {
     const PointFp wanted = FibreAt(core_.layout.unit(i), core_.drives[i.value], *view.target);
     view.error_um = 1e3 * std::hypot(sighting.x_mm - wanted.x_mm, sighting.y_mm - wanted.y_mm);
     ++round->measured;
@@ -146,10 +222,14 @@ void Pursuit::TakeSighting(const ExposureFindings& exposure, const Sighting& sig
     ++round->unknown;
   }
   if (view.serial.value != 0) core_.Note(RowOf(exposure, sighting));
-  if (put && !measure_->observe && view.phase == UnitPhase::kReady && IsPlace(view.knowledge))
-    core_.See(i, *sighting.place, sighting.source);
-  if (sighting.status == SightingStatus::kDidNotMove && stood_[i.value] && view.target &&
-      *stood_[i.value] != *view.target)
+  if (put && !measure_->observe && view.phase == UnitPhase::kReady) {
+    if (IsPlace(view.knowledge))
+      core_.See(i, *sighting.place, sighting.source);
+    else
+      contact_.Locate(i, *sighting.place);
+  }
+  if (look_ == Look::kAfter && sighting.status == SightingStatus::kDidNotMove && stood_[i.value] &&
+      view.target && *stood_[i.value] != *view.target)
     core_.Raise(Severity::kWarning, i, {},
                 core_.NameOf(i) + " did not move, though it reports that it did");
   if (sighting.status == SightingStatus::kSwapped && sighting.other)
@@ -190,32 +270,53 @@ MeasurementRow Pursuit::RowOf(const ExposureFindings& exposure, const Sighting& 
                      .source = sighting.source,
                      .spine = sighting.spine};
   if (sighting.other) row.other = core_.layout.unit(*sighting.other).id;
-  if (view.target)
+  if (view.target && look_ != Look::kBefore)
     row.target_fp = FibreAt(core_.layout.unit(i), core_.drives[i.value], *view.target);
-  if (view.target && !target_ids_.empty()) row.target_id = target_ids_[i.value];
+  if (row.target_fp && !target_ids_.empty()) row.target_id = target_ids_[i.value];
   if (ended_[i.value] != kNever && std::isfinite(exposure.after_request_s))
     row.delay_s = (exposure_asked_ - ended_[i.value]).seconds() + exposure.after_request_s;
   return row;
 }
 
-void Pursuit::CorrectOrFinish() {
-  if (corrections_left_ > 0 && Correct()) return;
+bool Pursuit::IsWithinTolerance(PositionerIndex i) const {
+  const UnitView& view = core_.units[i.value].view;
+  return view.error_um && *view.error_um <= measure_->tolerance_um;
+}
+
+std::string Pursuit::WhyNotMeasured(PositionerIndex i) const {
+  const UnitView& view = core_.units[i.value].view;
+  if (!view_.not_measured.empty()) return "not measured: " + view_.not_measured;
+  if (view.phase != UnitPhase::kReady) return "not measured: it " + core_.TroubleOf(i);
+  if (!view.sighting) return "not measured: not looked for";
+  if (IsPut(*view.sighting))
+    return IsPlace(view.knowledge)
+               ? "not measured: it was seen, and has moved since"
+               : "not measured: its fibre was seen, but more than one pose of its arms is possible";
+  std::string why = std::string("not measured: ") + Name(*view.sighting);
+  if (view.sighting == SightingStatus::kSensorsDoubted && view.spine)
+    why += " (" + view.spine->verdict + ")";
+  return why;
+}
+
+/// Takes back the arrival of whoever was to be measured and is not known to be within the
+/// tolerance. A configuration that is only observed asks for the look alone.
+void Pursuit::JudgeMeasured() {
+  if (!measure_ || view_.kind != ConfigurationKind::kApply) return;
+  const bool looked = !view_.measured.empty() && view_.not_measured.empty();
   for (std::uint32_t n = 0; n < core_.units.size(); ++n) {
-    UnitView& view = core_.unit({n}).view;
-    if (view.outcome != TargetOutcome::kArrived || !view.target || measure_->observe) continue;
-    if (!view.error_um) {
-      view.outcome_reason =
-          std::string("not measured: ") + (view.sighting ? Name(*view.sighting) : "not looked for");
-      if (view.sighting == SightingStatus::kSensorsDoubted && view.spine)
-        view.outcome_reason += " (" + view.spine->verdict + ")";
-    } else if (*view.error_um > measure_->tolerance_um) {
-      Reopen({n});
+    const UnitView& view = core_.units[n].view;
+    if (view.outcome != TargetOutcome::kArrived || !view.target) continue;
+    if (measure_->observe ? looked : IsWithinTolerance({n})) continue;
+    Reopen({n});
+    if (!measure_->observe && view.error_um)
       SetOutcome({n}, TargetOutcome::kFailed,
                  Micrometres(*view.error_um) + " from its target as measured, more than " +
                      Micrometres(measure_->tolerance_um) + WhyItStays({n}));
-    }
+    else if (end_ == ConfigurationState::kStopped)
+      SetOutcome({n}, TargetOutcome::kStopped, failure_ + ", before it was measured");
+    else
+      SetOutcome({n}, TargetOutcome::kUnmeasured, WhyNotMeasured({n}));
   }
-  FinishWhenDurable(ConfigurationState::kDone);
 }
 
 /// How far it was off says nothing of where it goes now.

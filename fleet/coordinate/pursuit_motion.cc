@@ -81,6 +81,7 @@ void Pursuit::Start() {
     SetPart(move.unit, Part::kMoving);
     core_.SetPhase(move.unit, kMoving);
     before_[move.unit.value].reset();
+    unit.view.error_um.reset();  // nobody has seen it where it goes now
     unit.seen_moving = HostInstant{INT64_MIN};
     WatchLeader(move.unit);
     core_.SetDue(move.unit, unit.next_poll);
@@ -342,7 +343,7 @@ void Pursuit::StopAll(const std::string& reason) {
 }
 
 void Pursuit::StopUnit(PositionerIndex i) {
-  SetOutcome(i, TargetOutcome::kFailed, "stopped by the operator");
+  SetOutcome(i, TargetOutcome::kStopped, "stopped by the operator");
   if (busy()) Exclude(i);
   if (const Late* late = FindLate(i); late != nullptr && late->stage != Late::Stage::kStarted) {
     EndLate(*late, {ErrorCode::kRefused, core_.NameOf(i) + " was stopped by the operator"});

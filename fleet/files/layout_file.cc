@@ -85,7 +85,7 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
                     "phi_gear",          "theta_min_deg",  "theta_max_deg", "phi_min_deg",
                     "phi_max_deg",       "rail_id",        "rail_slot",     "bus_id",
                     "bus_slot",          "node_id",        "group_id",      "enabled",
-                    "arm_half_width_mm", "hall_sensors",   "spine_mm"});
+                    "arm_half_width_mm", "hall_sensors",   "spine_mm",      "serial"});
   std::unordered_map<UnitId, int> line_of;
   for (std::size_t k = 0; k < table.size(); ++k) {
     CsvRow row(table, k);

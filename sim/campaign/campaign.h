@@ -24,6 +24,7 @@ enum CampaignAxis : std::size_t { kTheta = 0, kPhi = 1 };
 
 struct CampaignUnit {
   std::uint32_t id = 0;
+  std::uint32_t serial = 0;  // of the hardware that made the moves; 0: the table does not say
   double base_x_mm = 0;
   double base_y_mm = 0;
   double arm_mm[2] = {0, 0};

@@ -200,6 +200,7 @@ class Theatre {
   void Restart() {
     committed_ = 0;
     commits_.clear();
+    refused_.clear();
     commands_.clear();
     plans_.clear();
     heard_.clear();
@@ -293,7 +294,8 @@ class Theatre {
     heard.swap(heard_);
     ++step_;
     while (!store_fails_ && !commits_.empty() && commits_.front().due <= step_) {
-      store_.Commit(commits_.front().rows);
+      for (RefusedRow& row : store_.CommitAllBut(commits_.front().batch, commits_.front().rows))
+        refused_.push_back(std::move(row));
       committed_ = commits_.front().batch;
       commits_.erase(commits_.begin());
     }
@@ -304,8 +306,10 @@ class Theatre {
                         .commands = commands_,
                         .plans = plans,
                         .committed_through = committed_,
-                        .store_failing = store_fails_},
+                        .store_failing = store_fails_,
+                        .refused = refused_},
                        &effects);
+    refused_.clear();
     links_.clear();
     commands_.clear();
     if (!effects.rows.empty())
@@ -365,6 +369,7 @@ class Theatre {
   std::vector<Commit> commits_;
   std::uint64_t step_ = 0;
   std::uint64_t committed_ = 0;
+  std::vector<RefusedRow> refused_;
   bool store_fails_ = false;
   std::vector<Command> commands_;
   std::vector<LinkEvent> links_;

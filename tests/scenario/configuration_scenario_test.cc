@@ -389,7 +389,7 @@ TEST(Configuration, StopOfOneUnitLetsTheOthersArrive) {
   const PositionerIndex one = SomebodyMoving(&fleet);
   fleet.Send({900, StopCommand{one}});
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.coordinator().unit(one).outcome, TargetOutcome::kFailed);
+  EXPECT_EQ(fleet.coordinator().unit(one).outcome, TargetOutcome::kStopped);
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge));
   ExpectOthersArrive(&fleet, 4);
 }
@@ -409,7 +409,7 @@ void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*
   const UnitView& view = fleet.coordinator().unit({4});
   EXPECT_EQ(view.knowledge[0].witness, Witness::kInterval) << when;
   EXPECT_EQ(view.knowledge[1].witness, Witness::kInterval) << when;
-  EXPECT_EQ(view.outcome, TargetOutcome::kFailed) << when;
+  EXPECT_TRUE(IsUnserved(view.outcome)) << when;
   EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
   fleet.ExpectStoreTellsTheTruth(when);
@@ -565,6 +565,98 @@ TEST(Configuration, ForeignHardwareIsNotMovedUntilAdopted) {
   fleet.ApplyRandom(27);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+}
+
+TEST(Configuration, AStopIsAnOutcomeOfItsOwn) {
+  InProcessFleet fleet(Small(43));
+  const auto request = fleet.ApplyRandom(43);
+  RunIntoMotion(&fleet, Seconds(3));
+  fleet.Send({900, StopCommand{}});
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.Run(Seconds(1));  // its last row becomes durable
+  const ConfigurationView& view = fleet.coordinator().configuration();
+  EXPECT_EQ(view.state, ConfigurationState::kStopped);
+  EXPECT_EQ(view.failed, 0u) << "nobody failed";
+  EXPECT_GT(view.stopped, 20u);
+  EXPECT_EQ(view.stopped + view.arrived + view.refused, view.targeted);
+  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kStopped), view.stopped);
+  EXPECT_EQ(fleet.store().configurations.back().stopped, view.stopped);
+  ASSERT_TRUE(fleet.LastReply(request));
+  EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
+}
+
+TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
+  for (const bool from_the_start : {true, false}) {
+    InProcessFleet fleet(Small(44));
+    if (!from_the_start) fleet.Run(Seconds(3));
+    fleet.world().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
+    fleet.Restart();
+    fleet.ApplyRandom(44);
+    ASSERT_TRUE(fleet.RunUntilIdle()) << "a batch that the store refuses holds up all others";
+    EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
+    EXPECT_EQ(fleet.coordinator().unit({5}).outcome, TargetOutcome::kFailed);
+    EXPECT_NE(fleet.coordinator().unit({5}).outcome_reason.find("serial number 0"),
+              std::string::npos);
+    EXPECT_EQ(fleet.world().Truth(std::size_t{5}).moves_begun, 0u);
+    EXPECT_TRUE(HasAlarm(fleet, "unit 6 answers with serial number 0"));
+    // Programmed again, it is one like the others.
+    fleet.world().faults(fleet.id(5))->foreign_serial.reset();
+    fleet.Run(Seconds(5));
+    EXPECT_EQ(fleet.coordinator().unit({5}).phase, UnitPhase::kReady);
+  }
+}
+
+TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
+  InProcessFleet fleet(Small(45));
+  fleet.Run(Seconds(3));
+  fleet.refuse = [](const Row& row) {
+    const auto* intent = std::get_if<IntentRow>(&row);
+    return intent != nullptr && intent->unit == UnitId{8};
+  };
+  fleet.ApplyRandom(45);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  EXPECT_EQ(fleet.world().Truth(std::size_t{7}).moves_begun, 0u) << "without a durable intent";
+  EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
+  EXPECT_TRUE(HasAlarm(fleet, "the store refuses the intent of serial"));
+  ExpectOthersArrive(&fleet, 4);
+  // It stays out until somebody says that it is mended.
+  fleet.refuse = nullptr;
+  fleet.Run(Seconds(30));
+  EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
+  fleet.Send({900, EnableCommand{{{7}}, true, {}}});
+  fleet.Run(Seconds(5));
+  EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kReady);
+}
+
+TEST(Configuration, ACommandWhoseRowIsRefusedIsNotDone) {
+  InProcessFleet fleet(Small(46));
+  fleet.Run(Seconds(3));
+  fleet.refuse = [](const Row& row) { return std::holds_alternative<ModelRow>(row); };
+  fleet.Send({900, KeepModelCommand{{.entry = 1}}});
+  fleet.Send({901, EnableCommand{{{5}}, false, "fibre broken"}});
+  fleet.Run(Seconds(1));
+  ASSERT_TRUE(fleet.LastReply(900));
+  ASSERT_TRUE(fleet.LastReply(900)->error);
+  EXPECT_NE(fleet.LastReply(900)->error->text.find("NOT stored"), std::string::npos);
+}
+
+TEST(Configuration, ExchangedCablesAreNamed) {
+  InProcessFleet fleet(Small(47));
+  fleet.ApplyRandom(47);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  const SerialNumber seven = fleet.coordinator().unit({7}).serial;
+  const SerialNumber eight = fleet.coordinator().unit({8}).serial;
+  fleet.world().faults(fleet.id(7))->foreign_serial = eight;
+  fleet.world().faults(fleet.id(8))->foreign_serial = seven;
+  fleet.Restart();
+  fleet.Run(Seconds(3));
+  EXPECT_TRUE(HasAlarm(fleet, "which belongs to unit 9"));
+  EXPECT_TRUE(HasAlarm(fleet, "are exchanged"));
+  fleet.Send({900, AdoptCommand{{7}}});
+  fleet.Send({901, AdoptCommand{{8}}});
+  fleet.Run(Seconds(2));
+  EXPECT_EQ(fleet.coordinator().unit({7}).bound_serial, eight);
+  EXPECT_EQ(fleet.coordinator().unit({8}).bound_serial, seven);
 }
 
 TEST(Configuration, DoneIsSaidWhenItIsStored) {

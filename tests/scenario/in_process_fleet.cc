@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "fleet/camera/findings.h"
 #include "fleet/hex_layout.h"
 #include "fleet/kinematics.h"
 #include "fleet/plan/job.h"
@@ -45,49 +46,6 @@ sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDriv
 
 }  // namespace
 
-void MemoryStore::Commit(const std::vector<Row>& rows) {
-  for (const Row& any : rows) {
-    if (const auto* vector = std::get_if<VectorRow>(&any)) {
-      std::erase_if(fleet.vectors,
-                    [&](const VectorRow& row) { return row.serial == vector->serial; });
-      fleet.vectors.push_back(*vector);
-    } else if (const auto* intent = std::get_if<IntentRow>(&any)) {
-      fleet.open_intents.push_back(*intent);
-      begun.push_back(*intent);
-    } else if (const auto* end = std::get_if<IntentEndRow>(&any)) {
-      std::erase_if(fleet.open_intents, [&](const IntentRow& row) {
-        return row.serial == end->serial && row.move == end->move;
-      });
-      ended.push_back(*end);
-    } else if (const auto* binding = std::get_if<BindingRow>(&any)) {
-      std::erase_if(fleet.units, [&](const auto& row) { return row.unit == binding->unit; });
-      fleet.units.push_back({binding->unit, binding->serial, true, {}});
-    } else if (const auto* alarm = std::get_if<AlarmRow>(&any)) {
-      alarms.push_back(*alarm);
-      fleet.next_alarm = alarm->id + 1;
-    } else if (const auto* next = std::get_if<NextMoveRow>(&any)) {
-      fleet.next_move = next->next;
-    } else if (const auto* configuration = std::get_if<ConfigurationRow>(&any)) {
-      configurations.push_back(*configuration);
-      fleet.next_configuration = configuration->id + 1;
-      fleet.configurations = {*configuration};  // one at a time is under way
-    } else if (const auto* enable = std::get_if<EnableRow>(&any)) {
-      for (auto& row : fleet.units)
-        if (row.unit == enable->unit) row.enabled = enable->enabled, row.reason = enable->reason;
-    } else if (const auto* parameter = std::get_if<ParameterRow>(&any)) {
-      fleet.parameters.push_back(*parameter);
-    } else if (const auto* tuning = std::get_if<TuningRow>(&any)) {
-      fleet.tunings.push_back(*tuning);
-    }
-  }
-}
-
-const VectorRow* MemoryStore::Vector(SerialNumber serial) const {
-  for (const VectorRow& row : fleet.vectors)
-    if (row.serial == serial) return &row;
-  return nullptr;
-}
-
 InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
   std::vector<focalfleet::Unit> units = MakeHexLayout(
       {.count = options.count, .units_per_bus = options.units_per_bus, .sensors = options.sensors});
@@ -116,6 +74,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
 
 void InProcessFleet::Restart() {
   commits_.clear();  // what was not durable is gone
+  refused_.clear();
   planning_.clear();
   exposing_.clear();
   commands_.clear();
@@ -128,8 +87,8 @@ void InProcessFleet::Restart() {
 void InProcessFleet::End() {
   Effects last;
   coordinator_->End(now_, &last);
-  for (const Commit& commit : commits_) store_.Commit(commit.rows);
-  store_.Commit(last.rows);
+  for (const Commit& commit : commits_) store_.CommitAllBut(commit.batch, commit.rows);
+  store_.CommitAllBut(last.batch, last.rows);
 }
 
 void InProcessFleet::StepOnce() {
@@ -154,7 +113,14 @@ void InProcessFleet::StepOnce() {
     exposing_.pop_front();
   }
   while (!store_fails && !commits_.empty() && commits_.front().at <= now_) {
-    store_.Commit(commits_.front().rows);
+    Commit& next = commits_.front();
+    for (std::size_t k = next.rows.size(); refuse && k-- > 0;) {
+      if (!refuse(next.rows[k])) continue;
+      refused_.push_back({next.batch, next.batch, next.rows[k], "the test refuses it"});
+      next.rows.erase(next.rows.begin() + static_cast<std::ptrdiff_t>(k));
+    }
+    for (RefusedRow& row : store_.CommitAllBut(next.batch, next.rows))
+      refused_.push_back(std::move(row));
     committed_through_ = commits_.front().batch;
     commits_.pop_front();
   }
@@ -166,8 +132,10 @@ void InProcessFleet::StepOnce() {
                       .plans = plans,
                       .exposures = exposures,
                       .committed_through = committed_through_,
-                      .store_failing = store_fails},
+                      .store_failing = store_fails,
+                      .refused = refused_},
                      &effects_);
+  refused_.clear();
   heard_.clear();
   commands_.clear();
   links_.clear();
@@ -196,6 +164,11 @@ void InProcessFleet::Perform(const Effects& effects) {
 // elsewhere.
 ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
   if (measurer) return measurer(job);
+  const std::vector<UnitExpectation> expected = Expect(*layout_, {.now = job.expected,
+                                                                  .before = job.before,
+                                                                  .seen = job.seen,
+                                                                  .reported = job.reported,
+                                                                  .drives = drives_});
   ExposureFindings exposure{
       .id = job.id, .sightings = {}, .after_request_s = options_.exposure_delay.seconds()};
   for (std::uint32_t n = 0; n < layout_->size(); ++n) {
@@ -208,9 +181,12 @@ ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
                       .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
                       .covariance = RoundCovariance(options_.centroid_sigma_um),
                       .place = {}};
-    if (job.expected[n][0].witness >= Witness::kReported)
-      sighting.place = PlaceSeen(layout_->units()[n], drives_[n], {sighting.x_mm, sighting.y_mm},
-                                 PlaceOf(job.expected[n]));
+    const PointFp seen{sighting.x_mm, sighting.y_mm};
+    if (IsPlace(job.expected[n]))
+      sighting.place = PlaceSeen(layout_->units()[n], drives_[n], seen, PlaceOf(job.expected[n]));
+    else
+      sighting.place = PoseOfLost(layout_->units()[n], drives_[n], seen, expected[n],
+                                  options_.centroid_sigma_um * 1e-3);
     exposure.sightings.push_back(sighting);
   }
   return {job.id, std::move(exposure)};

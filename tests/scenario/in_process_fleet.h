@@ -18,20 +18,9 @@
 #include "fleet/layout.h"
 #include "protocol/base/rng.h"
 #include "sim/world.h"
+#include "tests/support/memory_store.h"
 
 namespace focalfleet::testing {
-
-/// Rows as the store would hold them; a restart begins from `fleet`.
-struct MemoryStore {
-  StoredFleet fleet;
-  std::vector<IntentEndRow> ended;
-  std::vector<IntentRow> begun;  // all intents that were ever durable
-  std::vector<AlarmRow> alarms;
-  std::vector<ConfigurationRow> configurations;
-
-  void Commit(const std::vector<Row>& rows);
-  [[nodiscard]] const VectorRow* Vector(SerialNumber serial) const;
-};
 
 class InProcessFleet {
  public:
@@ -110,6 +99,8 @@ class InProcessFleet {
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
+  /// Rows that the store refuses beside those that it always does.
+  std::function<bool(const Row&)> refuse;
   /// What the camera makes of an exposure before the coordinator hears of it.
   std::function<void(ExposureDone*)> camera_fault;
   /// Answers exposure jobs in the stead of that camera.
@@ -151,6 +142,7 @@ class InProcessFleet {
   std::deque<Exposing> exposing_;
   Rng camera_noise_{1};
   std::uint64_t committed_through_ = 0;
+  std::vector<RefusedRow> refused_;
   std::vector<Command> commands_;
   std::vector<LinkEvent> links_;
   std::vector<ReplyEffect> replies_;

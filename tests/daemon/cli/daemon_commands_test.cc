@@ -56,7 +56,7 @@ Json Status() {
           {"units", 2},
           {"enabled", 2},
           {"phases", {{"ready", 2}}},
-          {"witnesses", {{"reported", 2}}},
+          {"positions", {{"reported", 2}}},
           {"busy", false},
           {"store", {{"path", "fleet.db"}, {"failing", false}}},
           {"configuration", Configuration("done", 2, 0)},
@@ -122,9 +122,12 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"arrived", 2},
                       {"refused", 0},
                       {"failed", 0},
+                      {"stopped", 0},
+                      {"unmeasured", 0},
                       {"makespan_predicted_s", 12.5},
                       {"makespan_s", 12.75},
                       {"measured", Json::array()},
+                      {"not_measured", nullptr},
                       {"energy_J", 3.5},
                       {"peak_power_W", 0.5},
                       {"frames", 420},
@@ -155,9 +158,9 @@ TEST_F(DaemonCommands, ApplyWaitTellsUploadAndStarts) {
 TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
   const auto json = Apply({"--wait", "--json"}, {.result = Configuration("done", 1, 1)});
   EXPECT_EQ(json.exit, 3);
-  EXPECT_EQ(
-      Json::parse(json.out, nullptr, false)["unserved"],
-      Json::parse(R"([{"unit_id":2,"outcome":"failed","reason":"no answer","state":"silent"}])"));
+  EXPECT_EQ(Json::parse(json.out, nullptr, false)["unserved"],
+            Json::parse(R"([{"unit_id":2,"outcome":"failed","reason":"no answer","sighting":null,)"
+                        R"("error_um":null,"state":"silent"}])"));
   const auto text = Apply({"--wait"}, {.result = Configuration("done", 1, 1)});
   EXPECT_EQ(text.exit, 3);
   EXPECT_THAT(text.out, HasSubstr("unit 2: failed: no answer (now silent)"));
@@ -187,13 +190,66 @@ TEST_F(DaemonCommands, ManyUnservedUnitsAreToldByReason) {
                                          {"state", "silent"}});
   }
   const auto text = Apply({"--wait"}, {.result = configuration});
-  EXPECT_THAT(text.out, HasSubstr("  unit 20: failed: no answer (now silent)\n"
-                                  "  299 more units: 21, 22, 23, 24, 25 ...: failed: no answer "
-                                  "(now silent)\n"
-                                  "  1 more unit: 30: failed: stalled (now silent)\n"
-                                  "  --json names them all\n"));
-  // What it is, what it took, its upload and starts; 20 units; the rest by reason.
-  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 5 + 20 + 3);
+  EXPECT_THAT(text.out,
+              HasSubstr("  319 units (1, 2, 3, 4, 5, ...): failed: no answer (now silent)\n"
+                        "  unit 30: failed: stalled (now silent)\n"));
+  // What it is, what it took, its upload and starts; a line a reason.
+  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 5 + 2);
+}
+
+TEST_F(DaemonCommands, ReasonsThatDifferInNumbersAloneAreOne) {
+  Json configuration = Configuration("done", 0, 0);
+  configuration["unserved"] = Json::array();
+  for (std::uint32_t id = 1; id <= 100; ++id)
+    configuration["unserved"].push_back(
+        {{"unit_id", id},
+         {"outcome", "failed"},
+         {"reason",
+          std::to_string(10 + id) + ".5 um from its target as measured, more than 10.0 um"},
+         {"state", "ready"}});
+  const auto text = Apply({"--wait"}, {.result = configuration});
+  EXPECT_THAT(text.out,
+              HasSubstr("  100 units (1, 2, 3, 4, 5, ...): failed: 11.5 to 110.5 um from its "
+                        "target as measured, more than 10.0 um (now ready)\n"));
+  EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 5 + 1);
+}
+
+TEST_F(DaemonCommands, WhatNobodyMeasuredIsNotDone) {
+  Json configuration = Configuration("done", 0, 0);
+  configuration["unmeasured"] = 2;
+  configuration["not_measured"] = "3 exposures could not be used, the last because nothing came";
+  for (const std::uint32_t id : {1u, 2u})
+    configuration["unserved"].push_back({{"unit_id", id},
+                                         {"outcome", "unmeasured"},
+                                         {"reason", "not measured: nothing came"},
+                                         {"state", "ready"}});
+  const auto text = Apply({"--wait", "--correct", "1"}, {.result = configuration});
+  EXPECT_EQ(text.exit, 3);
+  EXPECT_THAT(text.out, HasSubstr("0 of 2 units arrived, 0 refused, 0 failed, 2 unmeasured\n"));
+  EXPECT_THAT(text.out, HasSubstr("not measured: 3 exposures could not be used"));
+  const auto json = Apply({"--wait", "--json"}, {.result = configuration});
+  const Json told = Json::parse(json.out, nullptr, false);
+  EXPECT_EQ(told["unmeasured"], 2);
+  EXPECT_EQ(told["not_measured"], configuration["not_measured"]);
+  EXPECT_EQ(told["unserved"][1]["outcome"], "unmeasured");
+}
+
+TEST_F(DaemonCommands, AStoppedConfigurationIsOneLineAndNoListOfItsUnits) {
+  Json configuration = Configuration("stopped", 1, 0);
+  configuration["targeted"] = 100;
+  configuration["stopped"] = 98;
+  configuration["failed"] = 1;
+  for (std::uint32_t id = 1; id <= 99; ++id)
+    configuration["unserved"].push_back(
+        {{"unit_id", id},
+         {"outcome", id == 7 ? "failed" : "stopped"},
+         {"reason", id == 7 ? "it does not answer" : "stopped by the operator"},
+         {"state", "ready"}});
+  const auto text = Apply({"--wait"}, {.result = configuration});
+  EXPECT_EQ(text.exit, 5);
+  EXPECT_THAT(text.out, HasSubstr("1 of 100 units arrived, 0 refused, 1 failed, 98 stopped\n"));
+  EXPECT_THAT(text.out, HasSubstr("unit 7: failed: it does not answer"));
+  EXPECT_THAT(text.out, Not(HasSubstr("stopped by the operator")));
 }
 
 TEST_F(DaemonCommands, ApplyWaitEndsWithFiveWhereItWasStoppedOrFailed) {
@@ -358,10 +414,26 @@ TEST_F(DaemonCommands, AnAnswerThatStdoutDoesNotTakeEndsWithFive) {
 }
 
 TEST_F(DaemonCommands, StopNamesAUnitOrNone) {
-  EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 0);
+  const auto all = Ask({"stop"}, {{"stop", {}}, {"status", {.result = Status()}}});
+  EXPECT_EQ(all.exit, 0) << all.err;
   EXPECT_EQ(requests_.at(0).args, Json::object());
-  EXPECT_EQ(Ask({"stop", "17"}, {{"stop", {}}}).exit, 0);
+  const auto one =
+      Ask({"stop", "17"}, {{"stop", {}}, {"unit", {.result = Json{{"phase", "ready"}}}}});
+  EXPECT_EQ(one.exit, 0) << one.err;
   EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 17}}));
+}
+
+TEST_F(DaemonCommands, AStopIsDoneWhenUnitsStand) {
+  Json moves = Status();
+  moves["phases"] = {{"ready", 1}, {"settling", 1}};
+  const auto all = Ask({"stop", "--within-s", "0"}, {{"stop", {}}, {"status", {.result = moves}}});
+  EXPECT_EQ(all.exit, 3);
+  EXPECT_THAT(all.err, HasSubstr("1 unit did not confirm"));
+  const auto one = Ask({"stop", "17", "--within-s", "0", "--json"},
+                       {{"stop", {}}, {"unit", {.result = Json{{"phase", "moving"}}}}});
+  EXPECT_EQ(one.exit, 3);
+  EXPECT_EQ(Json::parse(one.out, nullptr, false)["not_standing"], 1);
+  EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 5) << "whether they stand is not known";
 }
 
 TEST_F(DaemonCommands, StopPointsToTheDirectWayWhereNoDaemonAnswers) {
@@ -400,8 +472,15 @@ TEST_F(DaemonCommands, DisableWantsAReason) {
   EXPECT_EQ(Ask({"disable", "1"}, {{"disable", {}}}).exit, 2);
   EXPECT_EQ(Ask({"disable", "1", "3", "--reason", "phi stalls"}, {{"disable", {}}}).exit, 0);
   EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {1, 3}}, {"reason", "phi stalls"}}));
-  EXPECT_EQ(Ask({"enable", "3"}, {{"enable", {}}}).exit, 0);
+  const auto enable = [&](const char* phase) {
+    return Ask({"enable", "3", "--within-s", "0"},
+               {{"enable", {}}, {"unit", {.result = Json{{"phase", phase}}}}});
+  };
+  EXPECT_EQ(enable("ready").exit, 0);
   EXPECT_EQ(requests_.at(0).args, (Json{{"unit_ids", {3}}}));
+  const auto faulty = enable("fault");
+  EXPECT_EQ(faulty.exit, 3);
+  EXPECT_THAT(faulty.err, HasSubstr("still in fault: 3"));
 }
 
 TEST_F(DaemonCommands, AdoptUnitAndHistoryAskForTheirUnit) {

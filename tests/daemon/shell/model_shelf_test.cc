@@ -122,7 +122,8 @@ TEST_F(ModelShelfTest, ARestartFindsWhatHeld) {
   for (const char* name : {"one", "two"})
     newest_first.insert(newest_first.begin(), ModelHistory{Load(&shelf, name), {5}});
   ModelShelf after(&layout_);
-  ASSERT_TRUE(after.Restore(newest_first, Text("two")));
+  after.TakeChanges(newest_first);
+  ASSERT_TRUE(after.Restore(Text("two")));
   EXPECT_EQ(after.name(), "two");
   EXPECT_EQ(after.since().ns, 5);
   ASSERT_TRUE(Rollback(&after));
@@ -131,9 +132,21 @@ TEST_F(ModelShelfTest, ARestartFindsWhatHeld) {
   const auto other = Layout::Create(MakeHexLayout({.count = 3, .pitch_mm = 60}), {});
   ASSERT_TRUE(other);
   ModelShelf elsewhere(&*other);
-  EXPECT_FALSE(elsewhere.Restore(newest_first, Text("two")));
+  elsewhere.TakeChanges(newest_first);
+  EXPECT_FALSE(elsewhere.Restore(Text("two")));
   EXPECT_EQ(elsewhere.compensation(), nullptr);
   EXPECT_EQ(elsewhere.Show(10)["changes"].size(), 2u);
+}
+
+TEST_F(ModelShelfTest, AChangeIsNumberedAfterAllThatTheStoreHas) {
+  // Also where the text of the newest could not be read: no number is given twice.
+  ModelShelf after(&layout_);
+  after.TakeChanges({ModelHistory{{.entry = 7, .sha256 = "lost", .name = "two"}, {5}},
+                     ModelHistory{{.entry = 6, .sha256 = "older", .name = "one"}, {4}}});
+  EXPECT_EQ(after.compensation(), nullptr);
+  const auto loaded = after.Load(Text("three"), "three.toml");
+  ASSERT_TRUE(loaded) << loaded.error().text;
+  EXPECT_EQ(loaded->entry, 8u);
 }
 
 }  // namespace

@@ -136,7 +136,7 @@ TEST(StatusJson, StatusCountsEveryUnitOnce) {
   const Json status = StatusJson(fleet.View(), facts);
   EXPECT_EQ(status["units"], 3);
   EXPECT_EQ(status["phases"]["absent"], 3);
-  EXPECT_EQ(status["witnesses"]["unknown"], 3);
+  EXPECT_EQ(status["positions"]["unknown"], 3);
   EXPECT_EQ(status["buses"].size(), 1u);
   EXPECT_EQ(status["configuration"]["unserved"].size(), 0u);
 }

@@ -16,10 +16,13 @@ class Disk {
  public:
   StoreThread::Sinks Sinks() {
     return {
-        .commit = [this](std::span<const Row> rows, WallTime) -> Status {
+        .commit = [this](std::span<const Row> rows, WallTime, std::size_t* refused) -> Status {
           const std::lock_guard lock(mutex_);
           ++attempts_;
           if (broken_) return Fail(ErrorCode::kFull, "no space");
+          for (*refused = 0; *refused < rows.size(); ++*refused)
+            if (TextOf(rows[*refused]) == "poison")
+              return Fail(ErrorCode::kInvalid, "it contradicts what is stored");
           std::string text = "commit";
           for (const Row& row : rows) text += " " + TextOf(row);
           Log(std::move(text));
@@ -126,6 +129,48 @@ TEST(StoreThread, KeepsABatchThatCannotBeWrittenAndTriesAgain) {
   EXPECT_THAT(log[0], HasSubstr("no space"));
   EXPECT_EQ(log[1], "commit one");
   EXPECT_EQ(log[2], "commit two");
+}
+
+TEST(StoreThread, SetsAsideARowThatCanNeverBeWrittenAndGoesOn) {
+  Disk disk;
+  disk.Break(true);  // so that all of it becomes one transaction
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("first"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  std::vector<Row> rows = Named("two");
+  rows.push_back(Named("poison")[0]);
+  rows.push_back(VectorRow{});  // flawed: it has no serial number
+  rows.push_back(Named("three")[0]);
+  thread->Commit(2, rows);
+  thread->Commit(3, Named("four"));
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 3; }));
+  const std::vector<RefusedRow> refused = thread->TakeRefused();
+  ASSERT_EQ(refused.size(), 2u);
+  for (const RefusedRow& row : refused) {
+    EXPECT_LE(row.first_batch, 2u);
+    EXPECT_GE(row.last_batch, 2u);
+  }
+  EXPECT_TRUE(std::holds_alternative<VectorRow>(refused[0].row));
+  EXPECT_TRUE(std::holds_alternative<EnableRow>(refused[1].row));
+  EXPECT_TRUE(thread->TakeRefused().empty());
+  EXPECT_FALSE(thread->failing());
+  ASSERT_TRUE(thread->Finish());
+  std::string all;
+  for (const std::string& line : disk.log())
+    if (line.starts_with("commit")) all += line.substr(6);
+  EXPECT_EQ(all, " first two three four");
+}
+
+TEST(StoreThread, ABatchOfRefusedRowsAloneIsOverToo) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("poison"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  EXPECT_EQ(thread->TakeRefused().size(), 1u);
+  EXPECT_TRUE(thread->Finish());
 }
 
 TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {

@@ -143,7 +143,7 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   EXPECT_EQ(OpenReader()->Models(10)->size(), 3u);
 }
 
-TEST_F(StoreTest, TellsWhoWasHomedSince) {
+TEST_F(StoreTest, TellsWhoseCountBeganAnewSince) {
   auto store = OpenStore();
   const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
     testing::ExpectDone(store->Commit(
@@ -153,10 +153,27 @@ TEST_F(StoreTest, TellsWhoWasHomedSince) {
   home(12, 7001, IntentEnd::kHomed, kEight);
   home(13, 7002, IntentEnd::kHomed, kNine);
   home(14, 7003, IntentEnd::kArrived, kNine);
-  const auto since = OpenReader()->HomedSince(kEight);
+  // Set by hand, found by the camera, corrected by it (no new count), bound first, replaced.
+  const auto stands = [](std::uint32_t serial, Origin origin) {
+    return testing::Vector(serial, Witness::kReported, 5, 5, 1, origin);
+  };
+  testing::ExpectDone(store->Commit(
+      std::vector<Row>{BindingRow{{15}, {7004}}, BindingRow{{16}, {7005}}, BindingRow{{17}, {7006}},
+                       BindingRow{{19}, {7008}}, BindingRow{{20}, {7009}}},
+      kEight));
+  testing::ExpectDone(store->Commit(
+      std::vector<Row>{stands(7004, Origin::kOperator), stands(7005, Origin::kFound),
+                       stands(7006, Origin::kCamera), BindingRow{{18}, {7007}},
+                       BindingRow{{19}, {7999}}, BindingRow{{20}, {0}}, BindingRow{{20}, {7009}}},
+      kNine));
+  const auto since = OpenReader()->CountedAnewSince(kEight);
   ASSERT_TRUE(since) << since.error().text;
-  ASSERT_EQ(since->size(), 1u);
-  EXPECT_EQ(since->front().value, 13u);
+  std::vector<std::uint32_t> units;
+  for (const UnitId unit : *since) units.push_back(unit.value);
+  EXPECT_EQ(units, (std::vector<std::uint32_t>{13, 15, 16, 19}));
+  const auto bound = OpenReader()->Bindings();
+  ASSERT_TRUE(bound) << bound.error().text;
+  EXPECT_EQ(bound->size(), 6u);
 }
 
 TuningRow Tuned(std::uint16_t critical, double margin) {
@@ -344,7 +361,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
       no_witness,
       turned_hull,
       Vector(0, Witness::kReported, 5, 5),
-      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(8)),
+      Vector(1, Witness::kReported, 5, 5, 1, static_cast<Origin>(9)),
       IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
       ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
       Tuned(0, 0.5),   // no n at all
@@ -403,7 +420,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE axis_state SET vector = NULL", "vector and turns do not belong"},
         Garbage{"UPDATE axis_state SET vector = 96", "vector is 96"},
         Garbage{"UPDATE axis_state SET subdivision = 70000", "subdivision is 70000"},
-        Garbage{"UPDATE axis_state SET origin = 8", "origin is 8"},
+        Garbage{"UPDATE axis_state SET origin = 9", "origin is 9"},
         Garbage{"UPDATE axis_state SET move = 65536", "move is 65536"},
         Garbage{"UPDATE axis_state SET axis = 2 WHERE axis = 1", "axis is 2"},
         Garbage{"UPDATE axis_state SET move = 7 WHERE axis = 1", "of different moves"},
@@ -420,7 +437,7 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"UPDATE tuning SET critical = 55", "tuning, row serial 7, axis 1: its n are not"},
         Garbage{"UPDATE tuning SET load_uNm = 0", "load"},
         Garbage{"UPDATE tuning SET mode = 3", "mode is 3"},
-        Garbage{"UPDATE tuning SET origin = 8", "origin is 8"},
+        Garbage{"UPDATE tuning SET origin = 9", "origin is 9"},
         Garbage{"UPDATE meta SET value = 65536 WHERE key = 'next_move'", "value is 65536"},
         Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 

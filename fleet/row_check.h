@@ -1,0 +1,29 @@
+// What a row must satisfy to be kept. One rule for all: the store asks before it writes and when it
+// reads back, the thread in front of it sets rows aside by it, and the store of the tests refuses
+// by it. A row that passes can be read back as it was given.
+#pragma once
+
+#include <string>
+
+#include "fleet/records.h"
+
+namespace focalfleet {
+
+inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kTooCoarse;
+inline constexpr SightingSource kLastSightingSource = SightingSource::kSensors;
+inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
+inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
+inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
+inline constexpr Severity kLastSeverity = Severity::kError;
+inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
+
+// Each of these: nullptr, or what is wrong, for people.
+const char* Flaw(const AxisKnowledge& knowledge);
+const char* Flaw(const SpineReading& spine);
+const char* Flaw(const TuningRow& row);
+const char* Flaw(const Row& row);
+
+/// What the row is about: "vectors of serial 7", "alarm 12".
+std::string Describe(const Row& row);
+
+}  // namespace focalfleet
