@@ -121,6 +121,13 @@ std::string Core::TroubleOf(PositionerIndex i) const {
   return "is ready";
 }
 
+std::string Core::WhyNoPlace(PositionerIndex i) const {
+  const bool interval = units[i.value].view.knowledge[0].witness == Witness::kInterval;
+  return std::string("is ") + (interval ? "known only within an interval" : "not known") +
+         ": `focalfleet home " + std::to_string(layout.unit(i).id.value) +
+         "`, or `focalfleet measure` with a camera";
+}
+
 std::string Core::WhoseSerial(PositionerIndex i) const {
   const auto place = place_of.find(units[i.value].view.serial);
   return place == place_of.end() ? "which belongs to no unit"

@@ -153,6 +153,9 @@ class Core {
   /// What keeps it from being moved, and what helps, to go after its name or "it":
   /// "is in fault (driver): `focalfleet enable 9` clears it". Pre: it is not kReady.
   [[nodiscard]] std::string TroubleOf(PositionerIndex i) const;
+  /// What is known instead of a place, and what helps, to go after "its place": "is not known:
+  /// `focalfleet home 9` ...". Pre: it is at no known place.
+  [[nodiscard]] std::string WhyNoPlace(PositionerIndex i) const;
   /// Where the serial number that answers at this place belongs: "which belongs to unit 8", or
   /// "which belongs to no unit".
   [[nodiscard]] std::string WhoseSerial(PositionerIndex i) const;

@@ -29,14 +29,6 @@ std::uint64_t UploadBitsOf(const Core& core) {
   return bits;
 }
 
-/// A unit that is at no known place cannot be planned for; this says so, and what helps.
-std::string WhereaboutsUnknown(const Core& core, PositionerIndex i) {
-  const bool interval = core.units[i.value].view.knowledge[0].witness == Witness::kInterval;
-  return std::string("its place is ") + (interval ? "known only within an interval" : "not known") +
-         ": `focalfleet home " + std::to_string(core.layout.unit(i).id.value) +
-         "`, or `focalfleet measure` with a camera";
-}
-
 std::string DaemonEnded(std::uint64_t configuration) {
   return "configuration " + std::to_string(configuration) +
          " has failed: the daemon ended; what moves finishes by itself";
@@ -294,7 +286,7 @@ void Pursuit::BeginRound() {
         SetOutcome({n}, TargetOutcome::kFailed,
                    view.phase == kReady ? "fell out before" : "it " + core_.TroubleOf({n}));
       } else if (!IsPlace(view.knowledge)) {
-        SetOutcome({n}, TargetOutcome::kRefused, WhereaboutsUnknown(core_, {n}));
+        SetOutcome({n}, TargetOutcome::kRefused, "its place " + core_.WhyNoPlace({n}));
       } else {
         target = targets_[n];
         any = true;
@@ -652,12 +644,28 @@ void Pursuit::SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string r
   if (outcome != TargetOutcome::kPending && view.outcome != TargetOutcome::kPending) return;
   view.outcome = outcome;
   view.outcome_reason = std::move(reason);
-  if (outcome == TargetOutcome::kArrived) ++view_.arrived;
-  if (outcome == TargetOutcome::kRefused) ++view_.refused;
-  if (outcome == TargetOutcome::kFailed) ++view_.failed;
-  if (outcome == TargetOutcome::kStopped) ++view_.stopped;
-  if (outcome == TargetOutcome::kUnmeasured) ++view_.unmeasured;
+  if (std::uint32_t* const count = CountOf(outcome)) ++*count;
   core_.Changed(i);
+}
+
+/// Where targets of this outcome are counted; null: nowhere.
+std::uint32_t* Pursuit::CountOf(TargetOutcome outcome) {
+  switch (outcome) {
+    case TargetOutcome::kArrived:
+      return &view_.arrived;
+    case TargetOutcome::kRefused:
+      return &view_.refused;
+    case TargetOutcome::kFailed:
+      return &view_.failed;
+    case TargetOutcome::kStopped:
+      return &view_.stopped;
+    case TargetOutcome::kUnmeasured:
+      return &view_.unmeasured;
+    case TargetOutcome::kNone:
+    case TargetOutcome::kPending:
+      break;
+  }
+  return nullptr;
 }
 
 void Pursuit::SetPart(PositionerIndex i, Part part) {

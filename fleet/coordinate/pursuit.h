@@ -189,6 +189,7 @@ class Pursuit {
   void EndAllLate(const std::string& reason);
   [[nodiscard]] bool RoundIsOver() const;
   void SetOutcome(PositionerIndex i, TargetOutcome outcome, std::string reason = {});
+  [[nodiscard]] std::uint32_t* CountOf(TargetOutcome outcome);
   void SetPart(PositionerIndex i, Part part);
   void SetState(State state);
   void JudgeTargets();

@@ -135,9 +135,7 @@ Status Pursuit::MayRetarget(const RetargetCommand& command) {
   if (!moves && view.phase != kReady)
     return Fail(ErrorCode::kRefused, core_.NameOf(i) + " cannot go: it " + core_.TroubleOf(i));
   if (!moves && !IsPlace(view.knowledge))
-    return Fail(ErrorCode::kRefused, "the position of " + core_.NameOf(i) + " is " +
-                                         Name(view.knowledge[0].witness) +
-                                         ": home it, or measure it");
+    return Fail(ErrorCode::kRefused, "the place of " + core_.NameOf(i) + " " + core_.WhyNoPlace(i));
   // Before it is stopped for nothing.
   const double now_s = (core_.now - view_.started).seconds();
   return running_->CheckTarget({.unit = i,
@@ -153,9 +151,7 @@ Status Pursuit::Retarget(std::uint64_t request, const RetargetCommand& command) 
   const PositionerIndex i = command.unit;
   UnitView& view = core_.unit(i).view;
   if (!targets_[i.value]) ++view_.targeted;
-  if (view.outcome == TargetOutcome::kArrived) --view_.arrived;
-  if (view.outcome == TargetOutcome::kRefused) --view_.refused;
-  if (view.outcome == TargetOutcome::kFailed) --view_.failed;
+  if (std::uint32_t* const count = CountOf(view.outcome)) --*count;
   std::erase_if(arrivals_, [i](const Arrival& arrival) { return arrival.unit == i; });
   targets_[i.value] = goals_[i.value] = view.target = command.target;
   approaches_[i.value].reset();                            // of a correction to the other target

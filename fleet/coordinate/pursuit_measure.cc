@@ -330,8 +330,8 @@ void Pursuit::Reopen(PositionerIndex i) {
   UnitView& view = core_.unit(i).view;
   std::erase_if(arrivals_, [&](const Arrival& arrival) { return arrival.unit == i; });
   if (view.outcome != TargetOutcome::kArrived) return;
+  --*CountOf(view.outcome);
   view.outcome = TargetOutcome::kPending;
-  --view_.arrived;
   core_.Changed(i);
 }
 

@@ -315,10 +315,27 @@ TEST(Retarget, StopOfTheUnitAtAnyStageLeavesItKnown) {
         [](Retargeting* run, PositionerIndex unit) {
           run->fleet.Send({1, StopCommand{unit}});
           run->fleet.RunUntilIdle();
-          EXPECT_EQ(run->fleet.coordinator().unit(unit).outcome, TargetOutcome::kFailed);
+          EXPECT_EQ(run->fleet.coordinator().unit(unit).outcome, TargetOutcome::kStopped);
           EXPECT_TRUE(IsPlace(run->fleet.coordinator().unit(unit).knowledge));
         },
         true);
+}
+
+TEST(Retarget, AStoppedUnitThatGetsAnotherTargetIsCountedOnce) {
+  Retargeting run(TestSeed(570));
+  run.Begin();
+  run.fleet.Run(Seconds(2));
+  const PositionerIndex unit = run.Moving(5);
+  run.fleet.Send({1, StopCommand{unit}});
+  run.fleet.Run(Milliseconds(300));
+  EXPECT_EQ(run.fleet.coordinator().configuration().stopped, 1u);
+  run.Send(unit, run.DrawTarget(unit, 1));
+  ASSERT_TRUE(run.fleet.RunUntilIdle());
+  const ConfigurationView& view = run.fleet.coordinator().configuration();
+  EXPECT_EQ(view.stopped, run.fleet.CountOutcome(TargetOutcome::kStopped));
+  EXPECT_EQ(view.arrived, run.fleet.CountOutcome(TargetOutcome::kArrived));
+  EXPECT_EQ(view.arrived + view.refused + view.failed + view.stopped + view.unmeasured,
+            view.targeted);
 }
 
 TEST(Retarget, UnitThatFallsSilentAtAnyStageIsNamed) {
