@@ -90,7 +90,8 @@ UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& o
   UnitTraits traits;
   traits.mechanism = BuiltAsDescribed(description);
   Rng rng = Rng::Stream(options.seed, "unit", description.id.value);
-  traits.clock.rate = 1 + rng.Uniform(-options.clock_error_max, options.clock_error_max);
+  const double drawn = rng.Uniform(-options.clock_error_max, options.clock_error_max);
+  traits.clock.rate = 1 + description.clock_error.value_or(drawn);
   for (const Axis which : kAxes) {
     const AxisDescription& described = description.axis[Index(which)];
     AxisTraits& axis = traits.axis[Index(which)];

@@ -32,6 +32,8 @@ struct UnitDescription {
   std::uint8_t sensors = 0;  // Hall sensors at its joint (unit/joint_sensors.h)
   double spine_mm = 0;       // from the joint's centre to the fibre, where it has such sensors
   bool enabled = true;       // false: only its default pose differs; it answers as any other
+  /// Its clock's seconds a true second, less 1; none: drawn (WorldConfig::clock_error_max).
+  std::optional<double> clock_error = {};
 };
 
 /// What FLASH holds when a unit leaves the factory, both axes alike.

@@ -84,6 +84,9 @@ Status ValidateUnit(const UnitDescription& unit, const FactoryDrive& drive) {
   if (unit.sensors > 0 && !(unit.spine_mm > 0 && std::isfinite(unit.spine_mm)))
     return Complain(unit, "has sensors at its joint, and no spine on it");
   if (unit.node == kBroadcastNode) return Complain(unit, "node 255 is the broadcast address");
+  constexpr double kClockErrorMax = 0.5;  // a clock that stands still or runs back is none
+  if (!(std::abs(unit.clock_error.value_or(0)) <= kClockErrorMax))
+    return Complain(unit, "has a clock that is off by more than a half");
   for (const Axis which : kAxes) {
     const AxisDescription& axis = unit.axis[Index(which)];
     const std::string name = Name(which);
@@ -380,6 +383,8 @@ UnitTruth World::Impl::Truth(std::size_t row) const {
   truth.moves_begun = unit.flash().moves_begun;
   truth.last_move = unit.flash().last_begun;
   truth.begun_twice = unit.begun_twice();
+  truth.began = unit.began();
+  truth.clock_error = unit.traits().clock.rate - 1;
   return truth;
 }
 

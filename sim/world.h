@@ -91,6 +91,8 @@ struct UnitTruth {
   std::uint32_t moves_begun = 0;
   MoveId last_move;
   std::uint32_t begun_twice = 0;  // a move begun that was begun before: must stay 0
+  HostInstant began = kNever;     // its last motion; kNever: none in this run
+  double clock_error = 0;         // its clock's seconds a second of the world's, less 1
 };
 
 /// One frame as the wire carried it, for whoever listens beside the host.

@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <functional>
@@ -58,6 +59,7 @@ struct Given {
   SimulatorOptions run;
   std::string spread = "nominal";
   std::vector<std::string> plant;
+  std::vector<std::string> clock_errors;
   std::string buses_text;
   std::string control;
   std::string units_text;
@@ -189,6 +191,22 @@ Result<sim::PlantedTrait> ParsePlant(const std::string& text) {
   return planted;
 }
 
+Result<SimulatorOptions::ClockError> ParseClockError(const std::string& text) {
+  const auto wrong = [&](const std::string& why) {
+    return Fail(ErrorCode::kInvalid, "--clock-error " + text + ": " + why);
+  };
+  constexpr double kShareMax = 0.1;
+  const std::size_t equals = text.find('=');
+  SimulatorOptions::ClockError error;
+  if (equals == std::string::npos || !Parse(text.substr(equals + 1), &error.share) ||
+      !(std::abs(error.share) <= kShareMax))
+    return wrong("UNITS=SHARE is expected, with a share of -0.1 to 0.1");
+  auto units = ParseNumbers(text.substr(0, equals));
+  if (!units) return wrong(units.error().text);
+  error.units = std::move(*units);
+  return error;
+}
+
 int Run(Given* given, const CLI::App& app) {
   if (given->run.units_path.empty()) {
     std::fprintf(stderr, "focalfleet-sim: --units is required (see %s --help)\n",
@@ -219,6 +237,11 @@ int Run(Given* given, const CLI::App& app) {
     std::fputs("focalfleet-sim: --plant and --flash exclude each other: FLASH does not keep it\n",
                stderr);
     return static_cast<int>(ExitCode::kUsage);
+  }
+  for (const std::string& text : given->clock_errors) {
+    auto error = ParseClockError(text);
+    if (!error) return Complain(error.error(), ExitCode::kUsage);
+    given->run.clock_errors.push_back(std::move(*error));
   }
   const auto ran = RunSimulator(given->run);
   return ran ? static_cast<int>(ExitCode::kOk) : Complain(ran.error(), ExitCode::kRefused);
@@ -260,6 +283,9 @@ void AddRunOptions(CLI::App* app, Given* given) {
   app->add_option("--plant", given->plant,
                   "CAUSE=SIZE or CAUSE:AXIS=SIZE, on top of the spread; repeat: zero_offset (deg), "
                   "arm_length (mm), gear_scale (share), backlash (deg), eccentricity (deg)");
+  app->add_option("--clock-error", given->clock_errors,
+                  "UNITS=SHARE: the clocks of these units run that much fast, or slow below 0; "
+                  "repeat. Otherwise up to 50 ppm");
   app->add_option("--bit-rate", run.bit_rate_bps, "bit/s of the simulated buses")
       ->check(CLI::Range(10'000, 1'000'000))
       ->capture_default_str();

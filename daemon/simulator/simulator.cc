@@ -73,6 +73,18 @@ Status PlanFaults(const SimulatorOptions& options, sim::WorldConfig* config) {
   return {};
 }
 
+Status SetClocks(const SimulatorOptions& options, sim::WorldConfig* config) {
+  for (const SimulatorOptions::ClockError& error : options.clock_errors)
+    for (const std::uint32_t number : error.units) {
+      const auto unit = std::ranges::find(config->units, UnitId{number}, &sim::UnitDescription::id);
+      if (unit == config->units.end())
+        return Fail(ErrorCode::kInvalid, "--clock-error: there is no unit " +
+                                             std::to_string(number) + " in " + options.units_path);
+      unit->clock_error = error.share;
+    }
+  return {};
+}
+
 Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostClock& clock) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(options.units_path));
   FOCALFLEET_TRY_ASSIGN(const Layout layout, ReadLayout(text, options.units_path, {}));
@@ -84,6 +96,7 @@ Result<sim::WorldConfig> Configure(const SimulatorOptions& options, const HostCl
   config.bit_rate_bps = options.bit_rate_bps;
   config.bit_clock = options.interfaces.empty();
   config.joint_sensors = MakeJoints(layout, options.seed, options.spread);
+  FOCALFLEET_TRY(SetClocks(options, &config));
   FOCALFLEET_TRY(PlaceUnits(options.state_path, layout, &config));
   FOCALFLEET_TRY(Remember(options, &config));
   FOCALFLEET_TRY(PlanFaults(options, &config));

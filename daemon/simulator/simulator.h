@@ -28,6 +28,11 @@ struct SimulatorOptions {
   sim::Spread spread = sim::Spread::kNominal;
   std::vector<sim::PlantedTrait> planted = {};  // on top of it
   std::uint32_t bit_rate_bps = 1'000'000;
+  struct ClockError {
+    std::vector<std::uint32_t> units;
+    double share = 0;
+  };
+  std::vector<ClockError> clock_errors = {};
 };
 
 /// Runs until SIGTERM, SIGINT or the verb `quit`; says `ready` on stdout when everything is open.

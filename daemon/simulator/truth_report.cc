@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <variant>
 
 #include "fleet/files/csv.h"
@@ -19,9 +20,10 @@ std::complex<double> Wanted(const TargetRow& row, const sim::UnitDescription& un
 }  // namespace
 
 std::string TruthCsv(const sim::World& world) {
+  constexpr double kNotYet = std::numeric_limits<double>::quiet_NaN();  // an empty field
   CsvWriter csv({"unit_id", "theta_true_deg", "phi_true_deg", "theta_vectors", "phi_vectors",
                  "theta_true_vectors", "phi_true_vectors", "x_mm", "y_mm", "state", "moves_begun",
-                 "last_move", "powered", "interrupted", "begun_twice"});
+                 "last_move", "powered", "interrupted", "begun_twice", "began_s", "clock_error"});
   for (std::size_t row = 0; row < world.units().size(); ++row) {
     const sim::UnitTruth truth = world.Truth(row);
     csv.Integer(truth.id.value)
@@ -38,7 +40,9 @@ std::string TruthCsv(const sim::World& world) {
         .Integer(truth.last_move.value)
         .Integer(truth.powered ? 1 : 0)
         .Integer(truth.interrupted ? 1 : 0)
-        .Integer(truth.begun_twice);
+        .Integer(truth.begun_twice)
+        .Number(truth.began == kNever ? kNotYet : 1e-9 * static_cast<double>(truth.began.ns))
+        .Number(truth.clock_error);
     csv.EndRow();
   }
   return csv.Take();

@@ -14,7 +14,8 @@ namespace focalfleet::simulator {
 
 /// Columns: unit_id, theta_true_deg, phi_true_deg, theta_vectors, phi_vectors (what the unit
 /// believes), theta_true_vectors, phi_true_vectors, x_mm, y_mm, state, moves_begun, last_move,
-/// powered, interrupted, begun_twice.
+/// powered, interrupted, begun_twice, began_s (its last motion, by the clock that daemon and
+/// simulation share; empty: none in this run), clock_error.
 std::string TruthCsv(const sim::World& world);
 
 struct TrueErrors {

@@ -30,22 +30,23 @@ Unit::Unit(const Parts& parts)
 
 void Unit::OnFrame(const CanFrame& frame, HostInstant now, Outbox* out) {
   firmware_.OnFrame(frame, now, out);
-  RecordBegun();
+  RecordBegun(now);
 }
 
 void Unit::OnTime(HostInstant now, Outbox* out) {
   firmware_.OnTime(now, out);
-  RecordBegun();
+  RecordBegun(now);
 }
 
 void Unit::OnSync(HostInstant now, Outbox* out) {
   firmware_.OnSync(now, out);
-  RecordBegun();
+  RecordBegun(now);
 }
 
-void Unit::RecordBegun() {
+void Unit::RecordBegun(HostInstant now) {
   if (recorded_ == flash_.moves_begun) return;
   recorded_ = flash_.moves_begun;
+  began_ = now;
   if (begun_.size() >= kBegunMax) begun_.clear();
   const std::uint16_t move = flash_.last_begun.value;
   const auto at = std::lower_bound(begun_.begin(), begun_.end(), move);

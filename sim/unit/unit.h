@@ -37,9 +37,11 @@ class Unit {
   [[nodiscard]] UnitFaults& faults() { return faults_; }
   [[nodiscard]] const UnitFaults& faults() const { return faults_; }
   [[nodiscard]] std::uint32_t begun_twice() const { return begun_twice_; }
+  /// Its last motion; kNever: none in this run.
+  [[nodiscard]] HostInstant began() const { return began_; }
 
  private:
-  void RecordBegun();
+  void RecordBegun(HostInstant now);
 
   UnitTraits traits_;
   Flash flash_;
@@ -49,6 +51,7 @@ class Unit {
   std::uint32_t recorded_ = 0;        // flash_.moves_begun that is in begun_
   std::vector<std::uint16_t> begun_;  // sorted
   std::uint32_t begun_twice_ = 0;
+  HostInstant began_ = kNever;
 };
 
 }  // namespace focalfleet::sim

@@ -246,6 +246,21 @@ TEST(World, ClocksRunAsFastAsDrawn) {
   EXPECT_GT(high, 1.003);
 }
 
+TEST(World, AClockRunsAsItIsDescribedAndATruthTellsIt) {
+  WorldConfig config = FleetOf(1, 3);
+  config.units[1].clock_error = -0.01;
+  ASSERT_TRUE(World::Validate(config));
+  Rig rig(std::move(config));
+  rig.RunWatched(Milliseconds(100'000));
+  const auto ticks = rig.AskFor<ClockReply>(0, 2, ClockRequest{})->ticks;
+  EXPECT_NEAR(ticks / (static_cast<double>(rig.world().now().ns) / 100'000), 0.99, 1e-4);
+  EXPECT_NEAR(rig.world().Truth(1).clock_error, -0.01, 1e-12);
+  EXPECT_LE(std::abs(rig.world().Truth(0).clock_error), 50e-6);
+  WorldConfig stands = FleetOf(1, 3);
+  stands.units[0].clock_error = -1;
+  EXPECT_FALSE(World::Validate(stands));
+}
+
 TEST(Metrology, SeesFibresWithItsOwnError) {
   Rig rig(FleetOf(10, 100));
   Rng rng(5);

@@ -163,6 +163,22 @@ TEST_F(Simulation, AnswersOnEachBusAndEndsCleanly) {
   EXPECT_FALSE(late.connected());
 }
 
+TEST_F(Simulation, ClocksRunAsTheCommandLineSays) {
+  RunningSimulation simulation(
+      Arguments({"--clock-error", "11=0.01", "--clock-error", "12-13=-0.02"}));
+  ASSERT_TRUE(simulation.ready());
+  const std::string out = scratch_ / "truth.csv";
+  ASSERT_EQ(RunToEnd({"truth", "--out", out, "--control", control()}).exit, 0);
+  const std::string truth = Slurp(out);
+  EXPECT_NE(truth.find(",,0.01"), std::string::npos) << truth;
+  EXPECT_NE(truth.find(",,-0.02"), std::string::npos) << truth;
+  for (const char* wrong : {"11", "11=fast", "11=0.2", "eleven=0.01"})
+    EXPECT_EQ(RunToEnd(Arguments({"--clock-error", wrong})).exit, 2) << wrong;
+  const auto nobody = RunToEnd(Arguments({"--clock-error", "99=0.01"}));
+  EXPECT_EQ(nobody.exit, 1);
+  EXPECT_NE(nobody.err.find("--clock-error: there is no unit 99"), std::string::npos);
+}
+
 TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   RunningSimulation simulation(Arguments());
   ASSERT_TRUE(simulation.ready());
@@ -227,10 +243,10 @@ TEST_F(Simulation, TellsTheTruthAndPlantsMisfortune) {
   auto said = ask({"truth", "--out", out, "--targets", scratch_ / "targets.csv"});
   EXPECT_EQ(said.exit, 0) << said.err;
   EXPECT_NE(said.out.find("true position 0.0 um rms"), std::string::npos) << said.out;
-  EXPECT_EQ(
-      Slurp(out).substr(0, Slurp(out).find('\n')),
-      "unit_id,theta_true_deg,phi_true_deg,theta_vectors,phi_vectors,theta_true_vectors,"
-      "phi_true_vectors,x_mm,y_mm,state,moves_begun,last_move,powered,interrupted,begun_twice");
+  EXPECT_EQ(Slurp(out).substr(0, Slurp(out).find('\n')),
+            "unit_id,theta_true_deg,phi_true_deg,theta_vectors,phi_vectors,theta_true_vectors,"
+            "phi_true_vectors,x_mm,y_mm,state,moves_begun,last_move,powered,interrupted,begun_"
+            "twice,began_s,clock_error");
   said = ask({"truth", "--json"});
   EXPECT_EQ(said.out.find("csv"), std::string::npos);
   EXPECT_NE(said.out.find("\"begun_twice\":0"), std::string::npos);
