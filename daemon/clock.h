@@ -11,15 +11,20 @@
 
 namespace focalfleet {
 
+inline std::int64_t ReadClockNs(clockid_t which) {
+  timespec now{};
+  ::clock_gettime(which, &now);
+  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
+}
+inline std::int64_t ReadMonotonicNs() { return ReadClockNs(CLOCK_MONOTONIC); }
+
 class HostClock {
  public:
-  explicit HostClock(double speed = 1) : speed_(speed) {}
+  /// `read`: CLOCK_MONOTONIC in ns; a test has one of its own.
+  explicit HostClock(double speed = 1, std::int64_t (*read)() = ReadMonotonicNs)
+      : speed_(speed), read_(read) {}
 
-  [[nodiscard]] HostInstant Now() const {
-    timespec now{};
-    ::clock_gettime(CLOCK_MONOTONIC, &now);
-    return FromMonotonic(now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec);
-  }
+  [[nodiscard]] HostInstant Now() const { return FromMonotonic(read_()); }
   /// The reading of CLOCK_MONOTONIC, in ns, at which host time reaches `at`, rounded up.
   [[nodiscard]] std::int64_t ToMonotonic(HostInstant at) const {
     if (at == kNever) return at.ns;
@@ -37,6 +42,7 @@ class HostClock {
 
  private:
   double speed_;
+  std::int64_t (*read_)();
 };
 
 }  // namespace focalfleet

@@ -41,7 +41,8 @@ Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const H
                       ("bus" + std::to_string(bus.value) + ".sock");
     FOCALFLEET_TRY_ASSIGN(auto port, UnixPort::Create({.bus = bus,
                                                        .path = path.string(),
-                                                       .retry_period = clock.Real(kRetryPeriod)}));
+                                                       .retry_period = clock.Real(kRetryPeriod),
+                                                       .clock = clock}));
     ports.push_back(std::move(port));
   }
   return ports;
@@ -93,7 +94,7 @@ Result<Ports> OpenSimulated(const DaemonConfig& config, const Layout& layout,
   world.bit_rate_bps = config.bus.bit_rate_bps;
   world.start = clock.Now();
   world.joint_sensors = MakeJoints(layout, world.seed, world.spread);
-  FOCALFLEET_TRY_ASSIGN(const auto fleet, SimulatedFleet::Create(std::move(world)));
+  FOCALFLEET_TRY_ASSIGN(const auto fleet, SimulatedFleet::Create(std::move(world), clock));
   Ports ports;
   for (const BusId bus : layout.buses())
     ports.push_back(std::make_unique<SimulatedPort>(fleet, bus));

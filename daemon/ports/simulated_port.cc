@@ -36,13 +36,15 @@ can_frame ErrorFrameOf(sim::FrameError error) {
 
 }  // namespace
 
-Result<std::shared_ptr<SimulatedFleet>> SimulatedFleet::Create(sim::WorldConfig config) {
+Result<std::shared_ptr<SimulatedFleet>> SimulatedFleet::Create(sim::WorldConfig config,
+                                                               std::optional<HostClock> clock) {
   FOCALFLEET_TRY(sim::World::Validate(config));
-  return std::shared_ptr<SimulatedFleet>(new SimulatedFleet(std::move(config)));
+  return std::shared_ptr<SimulatedFleet>(new SimulatedFleet(std::move(config), clock));
 }
 
+// The world may stand where it last had something to do; a frame is not there before it is sent.
 bool SimulatedFleet::Inject(BusId bus, const CanFrame& frame) {
-  return world_.Inject(bus, frame, world_.now());
+  return world_.Inject(bus, frame, clock_ ? clock_->Now() : world_.now());
 }
 
 void SimulatedFleet::Take(BusId bus, HostInstant now, std::vector<ReceivedFrame>* out) {

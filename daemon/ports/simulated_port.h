@@ -6,10 +6,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
 
+#include "daemon/clock.h"
 #include "daemon/ports/can_errors.h"
 #include "daemon/ports/pollable_port.h"
 #include "fleet/layout.h"
@@ -19,8 +21,10 @@ namespace focalfleet {
 
 class SimulatedFleet {
  public:
+  /// `clock`: that the world goes by; without it, by what it is told (Take).
   /// Errors: kInvalid: the simulation cannot have such units.
-  static Result<std::shared_ptr<SimulatedFleet>> Create(sim::WorldConfig config);
+  static Result<std::shared_ptr<SimulatedFleet>> Create(sim::WorldConfig config,
+                                                        std::optional<HostClock> clock = {});
 
   bool Inject(BusId bus, const CanFrame& frame);
   /// Lets the whole fleet go on to `now` and gives what this bus heard.
@@ -32,9 +36,11 @@ class SimulatedFleet {
   [[nodiscard]] sim::World& world() { return world_; }
 
  private:
-  explicit SimulatedFleet(sim::WorldConfig config) : world_(std::move(config)) {}
+  SimulatedFleet(sim::WorldConfig config, const std::optional<HostClock>& clock)
+      : world_(std::move(config)), clock_(clock) {}
 
   sim::World world_;
+  std::optional<HostClock> clock_;
   std::vector<ReceivedFrame> delivered_;
   std::unordered_map<BusId, std::vector<ReceivedFrame>> inbox_;
 };

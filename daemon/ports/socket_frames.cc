@@ -9,6 +9,7 @@
 #include <cstring>
 #include <ctime>
 #include <optional>
+#include <utility>
 
 namespace focalfleet {
 namespace {
@@ -80,13 +81,20 @@ can_frame Classic(const canfd_frame& frame) {
   return classic;
 }
 
-HostInstant StampOf(const Packet& packet, HostInstant otherwise, const Aside* aside) {
-  if (aside == nullptr || !aside->stamps || !packet.told.wall_ns) return otherwise;
-  return aside->stamps->At(*packet.told.wall_ns);
+/// All that is said of a batch once it has been read.
+struct Stamp {
+  BusId bus;
+  HostInstant at;  // the clock after that
+  HostClock clock;
+};
+
+HostInstant StampOf(const Packet& packet, const Stamp& stamp, const Aside* aside) {
+  if (aside == nullptr || !aside->stamps || !packet.told.wall_ns) return stamp.at;
+  return aside->stamps->At(*packet.told.wall_ns, stamp.clock);
 }
 
 /// Hands on what a group is made of.
-void TakeApart(const Packet& packet, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+void TakeApart(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* out,
                PortCounters* counters, const Aside& aside) {
   const auto group = FromSocketFrame(*packet.raw);
   const auto entries =
@@ -96,12 +104,12 @@ void TakeApart(const Packet& packet, const ReceivedFrame& stamp, std::vector<Rec
     return;
   }
   if (aside.only_units) return;  // another host's
-  const HostInstant at = StampOf(packet, stamp.at, &aside);
+  const HostInstant at = StampOf(packet, stamp, &aside);
   for (std::size_t i = 0; i < entries->count; ++i)
     out->push_back({stamp.bus, at, entries->frame[i]});
 }
 
-void Sort(const Packet& packet, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* out,
           PortCounters* counters, Aside* aside) {
   counters->lost = std::max<std::uint64_t>(counters->lost, packet.told.dropped);
   if (packet.own && aside != nullptr) {
@@ -120,7 +128,7 @@ void Sort(const Packet& packet, const ReceivedFrame& stamp, std::vector<Received
     return;
   }
   if (aside != nullptr && aside->only_units && !IsFromUnit(*frame)) return;  // another host's
-  out->push_back({stamp.bus, StampOf(packet, stamp.at, aside), *frame});
+  out->push_back({stamp.bus, StampOf(packet, stamp, aside), *frame});
 }
 
 }  // namespace
@@ -193,13 +201,37 @@ int SendGroup(int fd, const FdFrame& group) {
   return 0;
 }
 
-HostInstant FrameStamps::At(std::int64_t wall_ns) const {
-  const HostInstant at = clock.FromMonotonic(wall_ns - wall_ahead_ns);
-  return at > now || now - at > clock.Real(kOldest) ? now : at;
+WallAhead ReadWallAhead() {
+  const std::int64_t before_ns = ReadMonotonicNs();
+  const std::int64_t wall_ns = ReadClockNs(CLOCK_REALTIME);
+  return {wall_ns - ReadMonotonicNs(), wall_ns - before_ns};
 }
 
-BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+FrameStamps::Readings FrameStamps::Readings::And(const WallAhead& ahead) const {
+  return {{std::max(common.low_ns, ahead.low_ns), std::min(common.high_ns, ahead.high_ns)},
+          std::min(least_ns, ahead.low_ns)};
+}
+
+void FrameStamps::HaveRead(HostInstant before, HostInstant after, bool empty) {
+  const WallAhead ahead = read_();
+  around_ = since_empty_.And(ahead);
+  since_ = emptied_;
+  now_ = after;
+  // What comes next may have come before this reading of the clocks, not before the last one.
+  since_empty_ = empty ? Readings{last_, last_.low_ns}.And(ahead) : around_;
+  if (empty) emptied_ = before;
+  last_ = ahead;
+}
+
+// By the least: one small step that hides within the readings makes no stamp too early.
+HostInstant FrameStamps::At(std::int64_t wall_ns, const HostClock& clock) const {
+  const HostInstant at = clock.FromMonotonic(wall_ns - around_.least_ns);
+  return around_.alike() && at >= since_ && at <= now_ ? at : now_;
+}
+
+BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<ReceivedFrame>* out,
                             PortCounters* counters, Aside* aside) {
+  Stamp stamp{source.bus, source.clock.Now(), source.clock};
   for (std::size_t total = 0; total < kFramesPerReceive;) {
     Batch batch(kBatch, /*with_control=*/true);
     const int got = ::recvmmsg(fd, batch.messages.data(), kBatch, MSG_DONTWAIT, nullptr);
@@ -208,6 +240,9 @@ BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<Rece
       return {.closed = false, .error = errno == EAGAIN ? 0 : errno};
     }
     const auto count = static_cast<std::size_t>(got);
+    const HostInstant before = std::exchange(stamp.at, source.clock.Now());
+    if (aside != nullptr && aside->stamps)
+      aside->stamps->HaveRead(before, stamp.at, count < kBatch);
     for (std::size_t i = 0; i < count; ++i) {
       mmsghdr& message = batch.messages[i];
       if (message.msg_len == 0) return {.closed = true, .error = 0};

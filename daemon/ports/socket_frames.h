@@ -40,29 +40,68 @@ struct BatchReceived {
   int error = 0;        // errno that ended it, but EAGAIN
 };
 
-/// When the kernel took a frame in, on the host's clock. The kernel stamps with the wall clock.
-struct FrameStamps {
-  HostInstant now;
-  std::int64_t wall_ahead_ns = 0;  // of CLOCK_MONOTONIC
-  HostClock clock;
+/// By how much the wall clock is ahead of CLOCK_MONOTONIC: within these, because a reader may be
+/// held up between reading the one and the other. It changes only where the wall clock steps: what
+/// slews one of them slews both.
+struct WallAhead {
+  std::int64_t low_ns = 0;
+  std::int64_t high_ns = 0;
+};
+WallAhead ReadWallAhead();
 
-  /// Never later than now; older than kOldest is a step of the wall clock: now.
-  [[nodiscard]] HostInstant At(std::int64_t wall_ns) const;
-  static constexpr DurationNs kOldest = Milliseconds(2000);  // of real time
+/// When the kernel took frames in, on the host's clock. The kernel stamps with the wall clock,
+/// which may step. So a stamp counts only where it lies between the readings of the socket before
+/// and behind the frame, and where both clocks ran alike from the one to the other. Otherwise the
+/// frame has the time at which it had been read: late, and never too early.
+class FrameStamps {
+ public:
+  /// To be made before frames can come.
+  explicit FrameStamps(WallAhead (*read)() = ReadWallAhead)
+      : read_(read), last_(read()), since_empty_{last_, last_.low_ns} {}
+
+  /// Frames have been read. `before`: a time from before that. `empty`: none were left.
+  void HaveRead(HostInstant before, HostInstant after, bool empty);
+  /// Pre: HaveRead, since this frame was read.
+  [[nodiscard]] HostInstant At(std::int64_t wall_ns, const HostClock& clock) const;
+
+ private:
+  /// What several readings of both clocks have in common, and the least of them.
+  struct Readings {
+    WallAhead common;
+    std::int64_t least_ns = 0;
+    [[nodiscard]] Readings And(const WallAhead& ahead) const;
+    [[nodiscard]] bool alike() const { return common.low_ns <= common.high_ns; }
+  };
+
+  WallAhead (*read_)();
+  WallAhead last_;
+  Readings since_empty_;            // from one before the socket was found empty on
+  HostInstant emptied_{INT64_MIN};  // whatever is read next came in later
+  // Of the frames read last.
+  Readings around_;
+  HostInstant since_{INT64_MIN};
+  HostInstant now_;
 };
 
 /// What a CAN_RAW socket tells beside the frames of others.
 struct Aside {
   std::vector<can_frame> errors;
   std::size_t confirmed = 0;          // our own frames that came back
-  std::optional<FrameStamps> stamps;  // given: frames are stamped by the kernel
+  std::optional<FrameStamps> stamps;  // given: frames are stamped by the kernel. To be kept
   bool only_units = false;            // of others' frames, drop those of hosts
   bool groups = false;                // CAN FD frames may come
 };
 
+/// Whose frames are read, and what they are stamped by: the clock is read after a batch has been,
+/// so that a stamp is never before the frame's end, wherever the process is held up.
+struct FrameSource {
+  BusId bus;
+  HostClock clock = HostClock();
+};
+
 /// Reads until nothing is left, at most kFramesPerReceive. What is no data frame is counted as
 /// rejected, but for error frames where `aside` takes them.
-BatchReceived ReceiveFrames(int fd, const ReceivedFrame& stamp, std::vector<ReceivedFrame>* out,
+BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<ReceivedFrame>* out,
                             PortCounters* counters, Aside* aside = nullptr);
 
 /// One bus must not keep the others waiting; what is left makes the descriptor readable again.

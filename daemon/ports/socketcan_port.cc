@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 #include <utility>
 
 namespace focalfleet {
@@ -17,13 +16,7 @@ constexpr DurationNs kLookPeriod = Milliseconds(1000);  // real time
 constexpr DurationNs kConfirmationLost = Milliseconds(1000);
 constexpr DurationNs kFull = Milliseconds(1);
 
-std::int64_t ReadClock(clockid_t which) {
-  timespec now{};
-  ::clock_gettime(which, &now);
-  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
-}
-
-HostInstant Monotonic() { return {ReadClock(CLOCK_MONOTONIC)}; }
+HostInstant Monotonic() { return {ReadMonotonicNs()}; }
 
 bool IsUrgent(const CanFrame& frame) { return frame.id >> 26 == 0; }
 
@@ -96,6 +89,7 @@ Result<std::unique_ptr<SocketCanPort>> SocketCanPort::Create(Options options) {
 }
 
 Status SocketCanPort::Open() {
+  aside_.stamps.emplace(options_.wall_ahead);
   auto opened = options_.open(options_.interface, {options_.hears, aside_.groups});
   found_ = opened.has_value();
   if (!opened) {
@@ -231,10 +225,9 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   }
   aside_.errors.clear();
   aside_.confirmed = 0;
-  aside_.stamps = Stamps(now);
   const std::size_t before = out->size();
   const BatchReceived received =
-      ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_, &aside_);
+      ReceiveFrames(socket_.socket(), {options_.bus, options_.clock}, out, &counters_, &aside_);
   window_.Confirmed(aside_.confirmed);
   if (aside_.confirmed > 0) waits_since_ = options_.wire_clock();
   // Only on a bus in real time does the window go by bits, and there the host's clock is monotonic.
@@ -247,15 +240,6 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
   retry_at_ = now + options_.clock.Real(options_.retry_period);
-}
-
-// A step of the wall clock spoils the stamps of so long; more often would cost a slow kernel.
-FrameStamps SocketCanPort::Stamps(HostInstant now) {
-  if (clocks_read_ == kNever || now - clocks_read_ > options_.clock.Real(Milliseconds(20))) {
-    clocks_read_ = now;
-    wall_ahead_ns_ = ReadClock(CLOCK_REALTIME) - Monotonic().ns;
-  }
-  return {now, wall_ahead_ns_, options_.clock};
 }
 
 std::string SocketCanPort::WithCauses(const std::string& what) const {

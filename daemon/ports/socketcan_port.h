@@ -39,6 +39,7 @@ class SocketCanPort : public PollablePort {
     // What the frames below go by: bits do not hurry when the host's clock does. None: the
     // monotonic clock.
     std::function<HostInstant()> wire_clock = {};
+    WallAhead (*wall_ahead)() = ReadWallAhead;
     InterfaceOpener open = OpenInterface;
     LinkRecovery::Reviver revive = {};  // none: ReviveLink
   };
@@ -73,7 +74,6 @@ class SocketCanPort : public PollablePort {
   /// Hands down what fits into `room` frames, or one group. Pre: room is not 0.
   BatchSent HandDown(std::span<const CanFrame> frames, std::size_t room, HostInstant monotonic);
   [[nodiscard]] std::size_t Room(bool urgent, HostInstant monotonic);
-  [[nodiscard]] FrameStamps Stamps(HostInstant now);
   [[nodiscard]] std::string WithCauses(const std::string& what) const;
 
   Options options_;
@@ -89,11 +89,9 @@ class SocketCanPort : public PollablePort {
   HostInstant retry_at_{0};           // while there is no socket
   HostInstant look_at_ = kNever;      // while the controller is not well: its state is asked for
   HostInstant waits_since_ = kNever;  // monotonic: confirmations are outstanding since
-  HostInstant clocks_read_ = kNever;  // when wall_ahead_ns_ was
-  std::int64_t wall_ahead_ns_ = 0;
   PortCounters counters_;
   std::string trouble_;
-  Aside aside_;  // of one Receive, kept for its room
+  Aside aside_;  // of one Receive, kept for its room and its stamps
 };
 
 }  // namespace focalfleet

@@ -64,7 +64,7 @@ void UnixPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
     }
   }
   const BatchReceived received =
-      ReceiveFrames(socket_.socket(), {options_.bus, now, {}}, out, &counters_);
+      ReceiveFrames(socket_.socket(), {options_.bus, options_.clock}, out, &counters_);
   if (!received.closed && received.error == 0) return;
   Lose(received.closed ? "the other end closed"
                        : std::string("cannot receive: ") + std::strerror(received.error));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "daemon/clock.h"
 #include "daemon/ports/pollable_port.h"
 #include "daemon/ports/watched_socket.h"
 
@@ -17,6 +18,7 @@ class UnixPort : public PollablePort {
     BusId bus;
     std::string path;
     DurationNs retry_period = Milliseconds(200);
+    HostClock clock = HostClock();
   };
   /// Tries to connect once; a bus that is not there is down, no error.
   /// Errors: kInvalid: the path is too long; kUnavailable: no descriptors left.

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "daemon/clock.h"
 #include "protocol/base/instants.h"
 #include "sim/world.h"
 
@@ -21,8 +22,10 @@ class BusDoors {
   [[nodiscard]] virtual int fd() const = 0;
   /// When Exchange wants to be called though nothing came.
   [[nodiscard]] virtual HostInstant wake_at() const = 0;
-  /// Puts what has arrived into the world, and sends what still waits to be sent.
-  virtual void Exchange(HostInstant now, sim::World* world) = 0;
+  /// Puts what has arrived into the world, and sends what still waits to be sent. What came from
+  /// all doors enters the world at one time, read after it had been taken in: never before its
+  /// sender let it go, and however long that took, all buses later by the same.
+  virtual void Exchange(const HostClock& clock, sim::World* world) = 0;
   /// Frames that the simulated buses carried, in order.
   virtual void Carry(std::span<const sim::WireFrame> frames) = 0;
 };

@@ -62,7 +62,8 @@ void CanDoors::Write(Door* door) {
   }
 }
 
-void CanDoors::Exchange(HostInstant now, sim::World* world) {
+void CanDoors::Exchange(const HostClock& clock, sim::World* world) {
+  const HostInstant now = clock.Now();
   std::array<epoll_event, 64> events{};
   const int count = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
   std::vector<ReceivedFrame> received;
@@ -75,7 +76,8 @@ void CanDoors::Exchange(HostInstant now, sim::World* world) {
     wake_at_ = std::min(wake_at_, door.port->wake_at());
     if (!door.waiting.empty()) wake_at_ = std::min(wake_at_, now + kRetry);
   }
-  for (const ReceivedFrame& frame : received) world->Inject(frame.bus, frame.frame, now);
+  const HostInstant at = clock.Now();
+  for (const ReceivedFrame& frame : received) world->Inject(frame.bus, frame.frame, at);
 }
 
 void CanDoors::Carry(std::span<const sim::WireFrame> frames) {

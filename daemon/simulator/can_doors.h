@@ -27,7 +27,7 @@ class CanDoors : public BusDoors {
 
   [[nodiscard]] int fd() const override { return epoll_; }
   [[nodiscard]] HostInstant wake_at() const override { return wake_at_; }
-  void Exchange(HostInstant now, sim::World* world) override;
+  void Exchange(const HostClock& clock, sim::World* world) override;
   void Carry(std::span<const sim::WireFrame> frames) override;
 
  private:

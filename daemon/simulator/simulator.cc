@@ -223,9 +223,9 @@ class Loop {
     const HostInstant now = parts_.clock->Now();
     Advance(now);
     verbs_.Tick(now);
-    parts_.doors->Exchange(now, parts_.world);
+    parts_.doors->Exchange(*parts_.clock, parts_.world);
     // What came in may end at once (a real bus has taken its time already).
-    Advance(now);
+    Advance(parts_.clock->Now());
     if (parts_.camera != nullptr) LetLook(now);
     if (parts_.control != nullptr) Answer();
   }
@@ -255,7 +255,6 @@ class Loop {
       parts_.control->Answer(line.client, result ? EncodeResult(request->id, *result)
                                                  : EncodeError(request->id, result.error()));
     }
-    if (!lines_.empty()) parts_.control->Service(&lines_);
   }
 
   Parts parts_;

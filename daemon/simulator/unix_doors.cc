@@ -124,12 +124,11 @@ void UnixDoors::Drop(std::uint32_t id, const std::string& why) {
   clients_.erase(found);
 }
 
-void UnixDoors::Read(Client* client, HostInstant now, sim::World* world) {
+void UnixDoors::Read(Client* client) {
   const BusId bus = listeners_[client->bus].bus;
-  std::vector<ReceivedFrame> received;
   PortCounters counters;
-  const BatchReceived batch = ReceiveFrames(client->fd, {bus, now, {}}, &received, &counters);
-  for (const ReceivedFrame& frame : received) world->Inject(bus, frame.frame, now, client->id);
+  const BatchReceived batch = ReceiveFrames(client->fd, {bus}, &received_, &counters);
+  senders_.resize(received_.size(), client->id);
   if (counters.rejected > 0)
     std::fprintf(stderr, "focalfleet-sim: bus %u: %llu packets are no extended CAN data frames\n",
                  bus.value, static_cast<unsigned long long>(counters.rejected));
@@ -153,7 +152,9 @@ void UnixDoors::Write(Client* client) {
   }
 }
 
-void UnixDoors::Exchange(HostInstant now, sim::World* world) {
+void UnixDoors::Exchange(const HostClock& clock, sim::World* world) {
+  received_.clear();
+  senders_.clear();
   std::array<epoll_event, 64> events{};
   const int count = ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), 0);
   for (int i = 0; i < count; ++i) {
@@ -169,8 +170,11 @@ void UnixDoors::Exchange(HostInstant now, sim::World* world) {
       Write(&found->second);
       if (found->second.waiting.empty()) Watch(found->second, EPOLL_CTL_MOD);
     }
-    if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) Read(&found->second, now, world);
+    if ((event.events & (EPOLLIN | EPOLLHUP | EPOLLERR)) != 0) Read(&found->second);
   }
+  const HostInstant at = clock.Now();
+  for (std::size_t i = 0; i < received_.size(); ++i)
+    world->Inject(received_[i].bus, received_[i].frame, at, senders_[i]);
   SetPace(world);
 }
 

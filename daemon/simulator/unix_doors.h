@@ -30,7 +30,7 @@ class UnixDoors : public BusDoors {
 
   [[nodiscard]] int fd() const override { return epoll_; }
   [[nodiscard]] HostInstant wake_at() const override { return kNever; }
-  void Exchange(HostInstant now, sim::World* world) override;
+  void Exchange(const HostClock& clock, sim::World* world) override;
   void Carry(std::span<const sim::WireFrame> frames) override;
 
  private:
@@ -50,7 +50,7 @@ class UnixDoors : public BusDoors {
   explicit UnixDoors(int epoll) : epoll_(epoll) {}
   Status Listen(const std::string& path, BusId bus);
   void Accept(std::size_t listener);
-  void Read(Client* client, HostInstant now, sim::World* world);
+  void Read(Client* client);
   void Write(Client* client);
   void Watch(const Client& client, int operation) const;
   void Drop(std::uint32_t id, const std::string& why);
@@ -62,6 +62,8 @@ class UnixDoors : public BusDoors {
   std::map<std::uint32_t, Client> clients_;
   std::uint32_t next_client_ = 1;
   bool told_no_descriptors_ = false;
+  std::vector<ReceivedFrame> received_;  // in this exchange
+  std::vector<std::uint32_t> senders_;   // of these
 };
 
 }  // namespace focalfleet::simulator

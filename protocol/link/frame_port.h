@@ -14,7 +14,7 @@ namespace focalfleet {
 
 struct ReceivedFrame {
   BusId bus;
-  HostInstant at;
+  HostInstant at;  // the frame had ended by then, however long its reader was held up
   CanFrame frame;
 };
 
@@ -34,7 +34,7 @@ class FramePort {
   /// How many of `frames` were taken, from the front. Fewer than all: the link is full or down.
   virtual std::size_t Send(std::span<const CanFrame> frames) = 0;
 
-  /// Appends what has arrived; never waits.
+  /// Appends what has arrived; never waits. Frames that arrived while it ran are later than `now`.
   virtual void Receive(HostInstant now, std::vector<ReceivedFrame>* out) = 0;
 
   [[nodiscard]] virtual LinkState state() const = 0;

@@ -145,10 +145,9 @@ TEST(SocketCanPort, FramesAreStampedWhenTheyComeIn) {
   while (clock.Now() < after + Milliseconds(20)) continue;  // read late
   host->Receive(clock.Now(), &in);
   ASSERT_EQ(in.size(), 1u);
-  // Both clocks are read one after the other, and the wall clock is slewed now and then.
-  constexpr DurationNs kApart = Milliseconds(5);
-  EXPECT_GE(in[0].at, before - kApart);
-  EXPECT_LE(in[0].at, after + kApart);
+  EXPECT_GE(in[0].at, before);
+  // Where the reader of both clocks was held up between them the stamp is later by so much.
+  EXPECT_LE(in[0].at, after + Milliseconds(5));
 }
 
 TEST(SocketCanPort, InterfacesAreSeparateBuses) {

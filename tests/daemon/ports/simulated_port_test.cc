@@ -55,6 +55,27 @@ TEST(SimulatedPort, WhatWasHeardWhileAnotherBusWasAskedIsDueAtOnce) {
   EXPECT_EQ(received.size(), 1u);
 }
 
+std::int64_t g_now_ns = 0;
+
+// Nothing happens in a world in which all rest: it stands where it last had something to do.
+TEST(SimulatedPort, AFrameIsNotThereBeforeItWasSent) {
+  const Layout layout = TwoUnitsOnTwoBuses();
+  sim::WorldConfig config;
+  config.units = DescribeUnits(layout);
+  const HostClock clock(1, [] { return g_now_ns; });
+  const auto fleet = SimulatedFleet::Create(std::move(config), clock).value();
+  SimulatedPort port(fleet, BusId{0});
+  g_now_ns = Milliseconds(2000).ns;
+  EXPECT_EQ(port.Send(std::vector{Encode(HostMessage(ClockRequest{}), {NodeId{1}, 9})}), 1u);
+  std::vector<ReceivedFrame> received;
+  port.Receive(HostInstant{} + Milliseconds(2100), &received);
+  ASSERT_EQ(received.size(), 1u);
+  EXPECT_GE(received[0].at, HostInstant{} + Milliseconds(2000));
+  const auto answer = DecodeUnit(received[0].frame);
+  ASSERT_TRUE(answer);
+  EXPECT_GE(std::get<ClockReply>(answer->message).ticks, 19'990u);
+}
+
 TEST(SimulatedPort, RefusesUnitsThatTheSimulationCannotHave) {
   const Layout layout = TwoUnitsOnTwoBuses();
   sim::WorldConfig config;

@@ -2,15 +2,17 @@
 
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
+#include <vector>
 
 namespace focalfleet {
 namespace {
 
-constexpr ReceivedFrame kStamp{.bus = BusId{7}, .at = HostInstant{42}, .frame = {}};
+const FrameSource kSource{.bus = BusId{7}, .clock = HostClock(1, [] { return std::int64_t{42}; })};
 
 class Pair {
  public:
@@ -72,13 +74,13 @@ TEST(SocketFrames, BatchesKeepTheOrder) {
   EXPECT_EQ(sent.taken, frames.size());
   std::vector<ReceivedFrame> received;
   PortCounters counters;
-  const BatchReceived end = ReceiveFrames(pair.b(), kStamp, &received, &counters);
+  const BatchReceived end = ReceiveFrames(pair.b(), kSource, &received, &counters);
   EXPECT_FALSE(end.closed);
   EXPECT_EQ(end.error, 0);
   ASSERT_EQ(received.size(), frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) EXPECT_EQ(received[i].frame, frames[i]);
-  EXPECT_EQ(received[0].bus, kStamp.bus);
-  EXPECT_EQ(received[0].at, kStamp.at);
+  EXPECT_EQ(received[0].bus, kSource.bus);
+  EXPECT_EQ(received[0].at, HostInstant{42});
 }
 
 TEST(SocketFrames, AFullSocketTakesAPart) {
@@ -97,7 +99,7 @@ TEST(SocketFrames, WhatIsNoFrameIsCounted) {
   pair.Write(ToSocketFrame(CanFrame{.id = 1, .length = 0, .data = {}}));
   std::vector<ReceivedFrame> received;
   PortCounters counters;
-  ReceiveFrames(pair.b(), kStamp, &received, &counters);
+  ReceiveFrames(pair.b(), kSource, &received, &counters);
   EXPECT_EQ(received.size(), 1u);
   EXPECT_EQ(counters.rejected, 3u);
 }
@@ -111,9 +113,175 @@ TEST(SocketFrames, ErrorFramesGoApart) {
   std::vector<ReceivedFrame> received;
   Aside aside;
   PortCounters counters;
-  ReceiveFrames(pair.b(), kStamp, &received, &counters, &aside);
+  ReceiveFrames(pair.b(), kSource, &received, &counters, &aside);
   EXPECT_EQ(aside.errors.size(), 1u);
   EXPECT_EQ(counters.rejected, 0u);
+}
+
+// ---- stamps of the kernel
+
+/// What the next readings of both clocks show.
+std::vector<WallAhead> g_ahead;
+WallAhead ReadPlanned() {
+  const WallAhead next = g_ahead.front();
+  g_ahead.erase(g_ahead.begin());
+  return next;
+}
+constexpr std::int64_t kAheadNs = 1'700'000'000'000'000'000;
+constexpr HostInstant At(std::int64_t ms) { return HostInstant{} + Milliseconds(ms); }
+
+WallAhead Ahead(std::int64_t low_ms, std::int64_t high_ms) {
+  return {kAheadNs + low_ms * 1'000'000, kAheadNs + high_ms * 1'000'000};
+}
+WallAhead Ahead(std::int64_t ms) { return Ahead(ms, ms); }
+
+/// Of a frame that the kernel took in at 150 ms, read between 200 ms and 300 ms, behind a reading
+/// that had left none at 100 ms. `before`, `after`: what both clocks showed at these two.
+HostInstant StampAfter(WallAhead before, WallAhead after, std::int64_t stamp_ms = 150) {
+  g_ahead = {before, before, after};
+  FrameStamps stamps(ReadPlanned);
+  stamps.HaveRead(At(100), At(101), /*empty=*/true);
+  stamps.HaveRead(At(200), At(300), /*empty=*/true);
+  return stamps.At(kAheadNs + stamp_ms * 1'000'000, HostClock());
+}
+
+TEST(FrameStamps, AreTheKernelsWhereBothClocksRanAlike) {
+  EXPECT_EQ(StampAfter(Ahead(0), Ahead(0)), At(150));
+}
+
+TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedInMidReceive) {
+  for (const std::int64_t step_ms : {-86'400'000, -3'600'000, -40, -1, 1, 40, 3'600'000}) {
+    EXPECT_EQ(StampAfter(Ahead(0), Ahead(step_ms)), At(300)) << "stamped before it";
+    EXPECT_EQ(StampAfter(Ahead(0), Ahead(step_ms), 150 + step_ms), At(300)) << "and after it";
+  }
+}
+
+// The first batch of a burst is read behind the step, and so is the second: both clocks run alike
+// from the one to the other, and the frame came before the step.
+TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedAheadOfABatch) {
+  g_ahead = {Ahead(0), Ahead(0), Ahead(40), Ahead(40)};
+  FrameStamps stamps(ReadPlanned);
+  stamps.HaveRead(At(100), At(101), /*empty=*/true);
+  stamps.HaveRead(At(200), At(210), /*empty=*/false);
+  stamps.HaveRead(At(210), At(220), /*empty=*/true);
+  EXPECT_EQ(stamps.At(kAheadNs + 150'000'000, HostClock()), At(220));
+}
+
+// A frame comes when the socket has been found empty, the wall clock steps, and only then both
+// clocks are read.
+TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedBeforeItWasRead) {
+  g_ahead = {Ahead(0), Ahead(0), Ahead(40), Ahead(40)};
+  FrameStamps stamps(ReadPlanned);
+  stamps.HaveRead(At(100), At(101), /*empty=*/true);
+  stamps.HaveRead(At(200), At(210), /*empty=*/true);
+  stamps.HaveRead(At(300), At(310), /*empty=*/true);
+  EXPECT_EQ(stamps.At(kAheadNs + 205'000'000 + 40'000'000, HostClock()), At(310));
+}
+
+TEST(FrameStamps, CountAgainOnceTheStepIsOver) {
+  g_ahead = {Ahead(0), Ahead(0), Ahead(40), Ahead(40), Ahead(40)};
+  FrameStamps stamps(ReadPlanned);
+  for (const std::int64_t ms : {100, 200, 300, 400})
+    stamps.HaveRead(At(ms), At(ms + 50), /*empty=*/true);
+  EXPECT_EQ(stamps.At(kAheadNs + 380'000'000 + 40'000'000, HostClock()), At(380));
+}
+
+TEST(FrameStamps, DoNotCountOutsideOfWhatWasBetweenTheReadings) {
+  EXPECT_EQ(StampAfter(Ahead(0), Ahead(0), 99), At(300));
+  EXPECT_EQ(StampAfter(Ahead(0), Ahead(0), 301), At(300));
+}
+
+TEST(FrameStamps, AreNotTooEarlyWhereTheReaderWasHeldUpBetweenTheClocks) {
+  EXPECT_EQ(StampAfter(Ahead(-30, 0), Ahead(0)), At(180));
+  EXPECT_EQ(StampAfter(Ahead(0), Ahead(-30, 0)), At(180));
+  EXPECT_EQ(StampAfter(Ahead(-1000, 0), Ahead(0)), At(300));
+}
+
+TEST(FrameStamps, OfWhatWasLeftBehindMayBeOlder) {
+  g_ahead.assign(4, Ahead(0));
+  FrameStamps stamps(ReadPlanned);
+  stamps.HaveRead(At(100), At(110), /*empty=*/true);
+  stamps.HaveRead(At(200), At(210), /*empty=*/false);
+  stamps.HaveRead(At(210), At(220), /*empty=*/true);
+  EXPECT_EQ(stamps.At(kAheadNs + 150'000'000, HostClock()), At(150));
+}
+
+/// Two ends with which the kernel stamps what it takes in, as it does for CAN.
+class StampedPair {
+ public:
+  StampedPair() {
+    for (int& fd : fds_) {
+      fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK, 0);
+      sockaddr_in any{};
+      any.sin_family = AF_INET;
+      any.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      EXPECT_EQ(::bind(fd, Address(&any), sizeof any), 0);
+    }
+    sockaddr_in address{};
+    socklen_t length = sizeof address;
+    EXPECT_EQ(::getsockname(fds_[1], Address(&address), &length), 0);
+    EXPECT_EQ(::connect(fds_[0], Address(&address), length), 0);
+    const int on = 1;
+    EXPECT_EQ(::setsockopt(fds_[1], SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof on), 0);
+  }
+  ~StampedPair() {
+    for (const int fd : fds_) ::close(fd);
+  }
+  StampedPair(const StampedPair&) = delete;
+  StampedPair& operator=(const StampedPair&) = delete;
+  void Write(const CanFrame& frame) const {
+    const can_frame raw = ToSocketFrame(frame);
+    EXPECT_EQ(::send(fds_[0], &raw, sizeof raw, 0), static_cast<ssize_t>(sizeof raw));
+  }
+  [[nodiscard]] int b() const { return fds_[1]; }
+
+ private:
+  static sockaddr* Address(sockaddr_in* address) { return reinterpret_cast<sockaddr*>(address); }
+  std::array<int, 2> fds_{-1, -1};
+};
+
+/// Read once, and not while this process was held up.
+WallAhead ReadWell() {
+  static const WallAhead well = [] {
+    WallAhead ahead = ReadWallAhead();
+    while (ahead.high_ns - ahead.low_ns > 100'000) ahead = ReadWallAhead();
+    return ahead;
+  }();
+  return well;
+}
+
+WallAhead ReadStepped() {
+  static std::int64_t stepped_ns = 0;
+  const WallAhead ahead = ReadWallAhead();
+  stepped_ns += 3'600'000'000'000;  // put on by an hour between any two readings
+  return {ahead.low_ns + stepped_ns, ahead.high_ns + stepped_ns};
+}
+
+TEST(SocketFrames, KernelStampsLieBetweenSendingAndReadingWhateverTheWallClockDoes) {
+  const HostClock clock;
+  for (WallAhead (*read)() : {ReadWell, ReadWallAhead, ReadStepped}) {
+    const StampedPair pair;
+    Aside aside;
+    aside.stamps.emplace(read);
+    std::vector<ReceivedFrame> received;
+    PortCounters counters;
+    // The kernel begins to stamp some time after it was asked to.
+    bool stamped = false;
+    for (int i = 0; i < 3 || (read == ReadWell && !stamped && i < 10'000); ++i) {
+      const HostInstant before = clock.Now();
+      pair.Write({.id = 1, .length = 0, .data = {}});
+      const HostInstant sent = clock.Now();
+      while (clock.Now() < sent + Milliseconds(1)) continue;
+      const HostInstant late = clock.Now();
+      received.clear();
+      ReceiveFrames(pair.b(), {.bus = {}, .clock = clock}, &received, &counters, &aside);
+      ASSERT_EQ(received.size(), 1u);
+      EXPECT_GE(received[0].at, before);
+      EXPECT_LE(received[0].at, clock.Now());
+      stamped = received[0].at < late;
+    }
+    EXPECT_TRUE(stamped || read != ReadWell);
+  }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <functional>
 #include <vector>
 
 #include "daemon/control/unix_address.h"
@@ -49,7 +50,7 @@ class Listener {
   [[nodiscard]] std::vector<CanFrame> Receive() const {
     std::vector<ReceivedFrame> received;
     PortCounters counters;
-    ReceiveFrames(peer_, {}, &received, &counters);
+    ReceiveFrames(peer_, {.bus = {}}, &received, &counters);
     std::vector<CanFrame> frames;
     for (const ReceivedFrame& r : received) frames.push_back(r.frame);
     return frames;
@@ -93,6 +94,35 @@ TEST(UnixPort, CarriesFramesBothWays) {
   ASSERT_EQ(received.size(), 1u);
   EXPECT_EQ(received[0].frame, kFrame);
   EXPECT_EQ(received[0].bus, BusId{3});
+}
+
+// A process that is held up for a tenth of a second whenever it has read the time, and in the midst
+// of that a frame comes.
+std::int64_t g_held_up_ns = 0;
+std::function<void(HostInstant)> g_meanwhile;
+std::int64_t ReadHeldUp() {
+  g_held_up_ns += Milliseconds(100).ns;
+  if (g_meanwhile) g_meanwhile(HostInstant{g_held_up_ns} + Milliseconds(50));
+  return g_held_up_ns;
+}
+
+TEST(UnixPort, AFrameThatWasReadLateIsNotStampedEarlier) {
+  const Scratch scratch;
+  Listener listener(scratch / "bus3.sock");
+  const HostClock clock(1, ReadHeldUp);
+  const auto port =
+      UnixPort::Create({.bus = BusId{3}, .path = scratch / "bus3.sock", .clock = clock}).value();
+  listener.Accept();
+  std::vector<HostInstant> sent;
+  g_meanwhile = [&](HostInstant at) {
+    listener.Send(kFrame);
+    sent.push_back(at);
+  };
+  std::vector<ReceivedFrame> received;
+  for (int turn = 0; turn < 3; ++turn) port->Receive(clock.Now(), &received);
+  g_meanwhile = nullptr;
+  ASSERT_GE(received.size(), 3u);
+  for (std::size_t i = 0; i < received.size(); ++i) EXPECT_GE(received[i].at, sent[i]) << i;
 }
 
 TEST(UnixPort, IsDownUntilTheSimulatorIsThere) {

@@ -328,7 +328,7 @@ TEST_F(Simulation, PowerComesBackAfterItsTime) {
   const auto powered = [&] {
     const std::string csv = RunToEnd({"truth", "--control", control()}).out;
     const std::size_t row = csv.find("\n13,");
-    return row == std::string::npos || csv.find(",1,0,0\n", row) != std::string::npos;
+    return row == std::string::npos || csv.find(",1,0,0,", row) != std::string::npos;
   };
   while (!powered()) {
   }

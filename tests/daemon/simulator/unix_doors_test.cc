@@ -1,0 +1,76 @@
+#include "daemon/simulator/unix_doors.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "daemon/ports/unix_port.h"
+#include "protocol/wire/codec.h"
+#include "tests/daemon/control/scratch.h"
+
+namespace focalfleet::simulator {
+namespace {
+
+// A process that is held up for a tenth of a second whenever it has read the time. In the midst of
+// the hold-up behind one of these readings something happens.
+std::int64_t g_now_ns = 0;
+int g_readings_left = 0;
+std::function<void(HostInstant)> g_meanwhile;
+std::int64_t ReadHeldUp() {
+  g_now_ns += Milliseconds(100).ns;
+  if (g_readings_left > 0 && --g_readings_left == 0)
+    g_meanwhile(HostInstant{g_now_ns} + Milliseconds(50));
+  return g_now_ns;
+}
+
+sim::WorldConfig OneUnit() {
+  sim::UnitDescription unit;
+  unit.id = UnitId{1};
+  unit.bus = BusId{3};
+  unit.node = NodeId{1};
+  for (sim::AxisDescription& axis : unit.axis)
+    axis = {.arm_mm = 7.4,
+            .zero_deg = 0,
+            .gear = 890,
+            .min_deg = -190,
+            .max_deg = 190,
+            .angle_deg = {}};
+  sim::WorldConfig config;
+  config.units = {unit};
+  return config;
+}
+
+TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
+  const Scratch scratch;
+  const HostClock clock(1, ReadHeldUp);
+  sim::World world(OneUnit());
+  const auto doors = UnixDoors::Create({scratch.path(), {BusId{3}}}).value();
+  const auto client = UnixPort::Create({.bus = BusId{3}, .path = scratch / "bus3.sock"}).value();
+  std::vector<ReceivedFrame> heard;
+  const auto turn = [&] {
+    world.AdvanceTo(clock.Now(), &heard);
+    doors->Exchange(clock, &world);
+    world.AdvanceTo(clock.Now(), &heard);
+  };
+  turn();  // takes the client in
+  HostInstant sent;
+  g_meanwhile = [&](HostInstant at) {
+    sent = at;
+    EXPECT_EQ(client->Send(std::vector{Encode(HostMessage(ClockRequest{}), {NodeId{1}, 9})}), 1u);
+  };
+  for (int behind = 1; behind <= 6; ++behind) {
+    g_readings_left = behind;
+    heard.clear();
+    for (int i = 0; i < 10 && heard.empty(); ++i) turn();
+    ASSERT_EQ(heard.size(), 1u) << behind;
+    const auto answer = DecodeUnit(heard[0].frame);
+    ASSERT_TRUE(answer);
+    // A clock as nominal is off by 50 ppm at most.
+    const double sent_ticks = static_cast<double>(sent.ns) / static_cast<double>(kTick.ns);
+    EXPECT_GE(std::get<ClockReply>(answer->message).ticks, sent_ticks * (1 - 50e-6) - 1) << behind;
+    EXPECT_GE(heard[0].at, sent) << behind;
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet::simulator
