@@ -137,10 +137,15 @@ void EventLoop::Wait() {
       {effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock), parts_.desk->wake_at()});
   if (parts_.feed != nullptr) wake = std::min(wake, parts_.feed->wake_at());
   if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
-  if (wake > now_) ArmTimer(wake);
+  if (wake <= now_) return;
+  ArmTimer(wake);
+  DispatchReady(-1);
+}
+
+void EventLoop::DispatchReady(int timeout_ms) {
   std::array<epoll_event, 128> events;
   const int count =
-      ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), wake > now_ ? -1 : 0);
+      ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), timeout_ms);
   for (int i = 0; i < count; ++i) Dispatch(events[static_cast<std::size_t>(i)].data.u64);
 }
 
@@ -186,7 +191,10 @@ void EventLoop::ReadSignals() {
 }
 
 void EventLoop::Gather() {
+  // Whatever is there at `now_` is heard in this turn. Else units would pass for silent whose
+  // answers wait, where the host was held up on its way here.
   now_ = parts_.clock.Now();
+  DispatchReady(0);
   frames_.clear();
   links_.clear();
   commands_.clear();

@@ -65,6 +65,7 @@ class EventLoop {
   Status Watch(int fd, std::uint64_t what);
   void Wait();
   void ArmTimer(HostInstant at);
+  void DispatchReady(int timeout_ms);
   void Dispatch(std::uint64_t what);
   void ReadSignals();
   void Gather();
