@@ -37,6 +37,8 @@ void PutStarts(const FleetView& view, Json* out) {
   (*out)["starts_known"] = starts.told;
   (*out)["start_skew_s"] = seconds(starts.skew_s);
   (*out)["start_skew_bound_s"] = seconds(starts.bound_s);
+  (*out)["start_skew_least_s"] = seconds(starts.least_s);
+  (*out)["start_skew_most_s"] = seconds(starts.most_s);
   (*out)["start_skew_allowed_s"] = seconds(starts.allowed_s);
   (*out)["start_first"] = PlaceJson(view, starts.first);
   (*out)["start_last"] = PlaceJson(view, starts.last);

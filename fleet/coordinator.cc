@@ -53,6 +53,7 @@ class Coordinator::Impl {
     BusRecord* bus = core_.FindBus(received.bus);
     FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
     ++bus->view.frames_received;
+    core_.heard_until = std::max(core_.heard_until, received.at);
     core_.Count(bus, {&received.frame, 1});
     const auto heard = DecodeUnit(received.frame);
     if (!heard) {

@@ -281,9 +281,11 @@ struct StartView {
   std::uint32_t round = 0;  // 0: none yet
   std::uint32_t begun = 0;  // units that were started
   std::uint32_t told = 0;   // those of which it is known when they began
-  double skew_s = 0;        // from the first start to the last
+  double skew_s = 0;        // from the first start to the last, the likeliest
   double bound_s = 0;       // the true skew is within skew_s +- bound_s
-  double allowed_s = 0;     // that the plan was made for
+  double least_s = 0;       // and within these, both included
+  double most_s = 0;
+  double allowed_s = 0;  // that the plan was made for
   std::optional<PositionerIndex> first = {};
   std::optional<PositionerIndex> last = {};
 };

@@ -125,10 +125,11 @@ std::string DescribeUploadAndStarts(const Json& c) {
   }
   if (CountIn(c, "starts_known") > 0) {
     text += fmt::format(
-        "\n  units began within {:.1f} ms of each other (+- {:.1f}; {} of {} told; plans allow for "
-        "{:.0f} ms)",
-        1e3 * NumberIn(c, "start_skew_s"), 1e3 * NumberIn(c, "start_skew_bound_s"),
-        CountIn(c, "starts_known"), CountIn(c, "starts"),
+        "\n  units began within at most {:.1f} ms of each other, at least {:.1f} ms (likely "
+        "{:.1f}; "
+        "{} of {} told; plans allow for {:.0f} ms)",
+        1e3 * NumberIn(c, "start_skew_most_s"), 1e3 * NumberIn(c, "start_skew_least_s"),
+        1e3 * NumberIn(c, "start_skew_s"), CountIn(c, "starts_known"), CountIn(c, "starts"),
         1e3 * NumberIn(c, "start_skew_allowed_s"));
   }
   return text;
@@ -248,7 +249,8 @@ Json ApplySummary(const Json& configuration, const Json& status) {
     summary[key] = CountIn(configuration, key);
   }
   for (const char* key : {"upload_predicted_s", "upload_s", "start_skew_s", "start_skew_bound_s",
-                          "start_skew_allowed_s", "start_first", "start_last"}) {
+                          "start_skew_least_s", "start_skew_most_s", "start_skew_allowed_s",
+                          "start_first", "start_last"}) {
     summary[key] = configuration.value(key, Json(nullptr));
   }
   summary["measured"] = ListIn(configuration, "measured");

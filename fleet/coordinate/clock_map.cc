@@ -12,21 +12,30 @@ constexpr double kTickNs = static_cast<double>(kTick.ns);
 
 }  // namespace
 
-void ClockMap::Observe(const Reading& reading) {
-  FOCALFLEET_CHECK(reading.earliest <= reading.latest);
-  const auto keep = [&](std::int64_t ticks) {
-    if (count_ == kReadings) {
-      std::move(kept_.begin() + 1, kept_.end(), kept_.begin());
-      --count_;
-    }
-    kept_[count_++] = {ticks, reading.earliest, reading.latest};
-  };
-  if (count_ == 0) return keep(reading.ticks);
-  keep(Unwrap(reading.ticks, reading.latest));
-  const Rates rates = PossibleRates();
-  if (rates.low <= rates.high) return;
+bool ClockMap::Observe(const Reading& reading) {
+  if (reading.earliest > reading.latest) return false;
+  if (count_ > 0 && !RanThrough(reading)) count_ = 0;
+  Keep(count_ > 0 ? Unwrap(reading.ticks, reading.latest) : reading.ticks, reading);
+  const Rates rates = RatesByReadings();
+  if (rates.low <= rates.high) return true;
   count_ = 0;
-  keep(reading.ticks);
+  Keep(reading.ticks, reading);
+  return true;
+}
+
+// A counter that began anew since the newest reading shows at most the time since then. One that
+// came round (every five days) looks the same, and costs what a restart does.
+bool ClockMap::RanThrough(const Reading& reading) const {
+  const auto since_ns = static_cast<double>((reading.latest - newest().earliest).ns);
+  return static_cast<double>(reading.ticks) * kTickNs > kUsual.high * since_ns;
+}
+
+void ClockMap::Keep(std::int64_t ticks, const Reading& reading) {
+  if (count_ == kReadings) {
+    std::move(kept_.begin() + 1, kept_.end(), kept_.begin());
+    --count_;
+  }
+  kept_[count_++] = {ticks, reading.earliest, reading.latest};
 }
 
 // Of all numbers with these low bits the one nearest to where the last reading leads.
@@ -36,22 +45,26 @@ std::int64_t ClockMap::Unwrap(std::uint32_t ticks, HostInstant at) const {
 }
 
 // A counter that shows T is at least T and less than T + 1 ticks old.
-ClockMap::Rates ClockMap::PossibleRates() const {
-  Rates rates;
+ClockMap::Rates ClockMap::RatesByReadings() const {
+  Rates rates = kAny;
   for (std::size_t b = 1; b < count_; ++b) {
     for (std::size_t a = 0; a < b; ++a) {
       const auto ticks = static_cast<double>(kept_[b].ticks - kept_[a].ticks);
       const auto longest_ns = static_cast<double>((kept_[b].latest - kept_[a].earliest).ns);
       const auto shortest_ns = static_cast<double>((kept_[b].earliest - kept_[a].latest).ns);
-      if (longest_ns > 0) rates.low = std::max(rates.low, (ticks - 1) * kTickNs / longest_ns);
-      if (shortest_ns > 0) rates.high = std::min(rates.high, (ticks + 1) * kTickNs / shortest_ns);
+      if (longest_ns > 0)
+        rates.low = std::max(rates.low, (ticks - 1) * kTickNs / longest_ns - kWander);
+      if (shortest_ns > 0)
+        rates.high = std::min(rates.high, (ticks + 1) * kTickNs / shortest_ns + kWander);
     }
   }
-  if (count_ > 1) {
-    rates.low = std::max(1 - kRateErrorMax, rates.low - kWander);
-    rates.high = std::min(1 + kRateErrorMax, rates.high + kWander);
-  }
   return rates;
+}
+
+ClockMap::Rates ClockMap::PossibleRates() const {
+  const Rates rates = RatesByReadings();
+  const Rates usual{std::max(rates.low, kUsual.low), std::min(rates.high, kUsual.high)};
+  return usual.low <= usual.high ? usual : rates;
 }
 
 ClockMap::Line ClockMap::Fit(const Rates& rates) const {
@@ -88,10 +101,14 @@ ClockMap::Line ClockMap::Fit(const Rates& rates) const {
 }
 
 ClockMap::Rate ClockMap::rate() const {
-  const Rates rates = PossibleRates();
   if (count_ == 0) return {0, kRateErrorMax};
+  const Rates rates = PossibleRates();
+  const Rates by_readings = RatesByReadings();
   const double fitted = kTickNs / Fit(rates).ns_per_tick;
-  return {fitted - 1, std::max(rates.high - fitted, fitted - rates.low)};
+  return {.error = fitted - 1,
+          .bound = std::max(rates.high - fitted, fitted - rates.low),
+          .least = by_readings.low - 1,
+          .most = by_readings.high - 1};
 }
 
 void ClockMap::Narrow(const Kept& reading, std::int64_t ticks, const Rates& rates,
@@ -118,14 +135,14 @@ ClockMap::Instant ClockMap::TimeOf(std::uint32_t ticks) const {
   if (earliest > latest) {  // a rate that changed by more than kWander
     earliest = {INT64_MIN};
     latest = {INT64_MAX};
-    Narrow(newest(), at, Rates{}, &earliest, &latest);
+    Narrow(newest(), at, {std::min(rates.low, kUsual.low), std::max(rates.high, kUsual.high)},
+           &earliest, &latest);
   }
   const Line line = Fit(rates);
   const double host_ns =
       line.host_ns + (static_cast<double>(at - newest().ticks) - line.ticks) * line.ns_per_tick;
   const HostInstant likely = newest().middle() + DurationNs{static_cast<std::int64_t>(host_ns)};
-  const HostInstant fitted = std::clamp(likely, earliest, latest);
-  return {fitted, std::max(fitted - earliest, latest - fitted)};
+  return {std::clamp(likely, earliest, latest), earliest, latest};
 }
 
 }  // namespace focalfleet

@@ -1,20 +1,50 @@
 // One unit's clock against the host's, from the answers to clock requests.
 //
 // An answer says what the unit's counter showed when the request had ended. When that was the host
-// knows only within bounds: not before it let the request go, not after it heard the answer less
-// the time that the answer took. On an idle bus that is some tenths of a millisecond, behind a full
-// horizon some milliseconds. A handful of such readings gives
+// knows only within bounds, and these hold wherever host, kernel and bus are held up:
+//
+//   earliest   the time of the step that let the request go, read before that step began. The
+//              request is on the bus later, and the unit reads its counter later still. A request
+//              that is repeated keeps its sequence number; `earliest` is of the first copy, and
+//              copies that a fault of the bus makes come later, too. Answers to earlier requests
+//              have other numbers. These come round after 254 requests: an answer that old would
+//              have to be overtaken by all later ones. An answer to a request that has not left
+//              answers none. Requests never travel in groups; staging frames alone do.
+//   latest     a time read after the answer had been, or the kernel's stamp where that is sound
+//              (FrameStamps). The unit read its counter before it answered. Of several copies of
+//              an answer the first counts.
+//
+// A pause anywhere between the two makes the reading wider and never wrong. A reading whose bounds
+// contradict each other is none, and dropped. On an idle bus a reading is some tenths of a
+// millisecond wide, behind a full horizon some milliseconds. A handful of them gives
 //
 //   rate    of the unit's clock, by regression over their middles, and the bounds that all pairs of
 //           readings leave: with two 10 s apart and 0.5 ms wide each, 50 ppm
 //   time    of any reading of the counter, by the same regression, and the bounds that all readings
 //           leave with all rates that are possible
 //
-// The bounds hold whatever the delays were; the regression is only the likeliest value within them.
-// Readings that contradict each other mean another clock than before (the unit restarted): then
-// only the newest counts.
+// The regression is only the likeliest value within the bounds. The bounds of the rate exclude the
+// truth only where one of these is not so:
+//
+//   - the counter ran through from the first reading kept to the last. A restart lets it begin
+//     anew, and a young counter that did looks like a slow one. So a reading is only put beside
+//     those before it where it shows more than 1.02 times the time since: no clock that is off by
+//     less than 2 % comes to that from 0. Else it stands alone. Readings that contradict each other
+//     are of another clock, too: then only the newest counts. Either way nothing is said of a rate
+//     before the next reading.
+//   - the rate changes by less than kWander while kReadings are taken.
+//
+// That no clock is off by more than kRateErrorMax is used for times and for the likeliest rate, and
+// never to say that a clock is off: `least` and `most` come from the readings alone.
+//
+// How soon a rate is known: two readings that are w1 and w2 wide and d apart leave (w1 + w2 + 0.2
+// ms) / d between least and most. A clock that is off by 1 % is told from one that is off by 0.5 %
+// as soon as that is below 0.5 %: by the second reading where both are narrower than a fifth of a
+// percent of the time between them (2 ms of 1 s, 20 ms of the 10 s at rest), by the first two such
+// ones of the last eight where others are wide.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -24,6 +54,13 @@
 namespace focalfleet {
 
 class ClockMap {
+  struct Rates {
+    double low;
+    double high;
+  };
+  /// A counter outside of these is no clock.
+  static constexpr Rates kAny{0.1, 10};
+
  public:
   /// A reading and when it was taken, both ends included.
   struct Reading {
@@ -31,31 +68,42 @@ class ClockMap {
     HostInstant earliest;
     HostInstant latest;
   };
-  /// Pre: earliest <= latest, and neither is before the last one's. Takes the place of the oldest
-  /// one where there are kReadings already.
-  void Observe(const Reading& reading);
+  /// Pre: taken after the last one. Takes the place of the oldest one where there are kReadings
+  /// already. False: it was dropped, because its bounds contradict each other.
+  bool Observe(const Reading& reading);
   void Forget() { count_ = 0; }
 
   [[nodiscard]] std::size_t readings() const { return count_; }
 
+  /// Unit's seconds a host's second, less 1.
   struct Rate {
-    double error = 0;  // unit's seconds a host's second, less 1
+    double error = 0;  // the likeliest
     double bound = 0;  // the true one is within error +- bound
+    // By the readings alone, the true one is within these.
+    double least = kAny.low - 1;
+    double most = kAny.high - 1;
+    /// For certain it is off by more than `error_max`, one way or the other.
+    [[nodiscard]] bool IsBeyond(double error_max) const {
+      return least > error_max || most < -error_max;
+    }
   };
   /// Without readings and with one only: 0, with the widest bound.
   [[nodiscard]] Rate rate() const;
 
   struct Instant {
-    HostInstant at;
-    DurationNs bound;  // the true one is within at +- bound
-    [[nodiscard]] HostInstant earliest() const { return at - bound; }
-    [[nodiscard]] HostInstant latest() const { return at + bound; }
+    HostInstant at;  // the likeliest
+    // The true one is within these, both included.
+    HostInstant earliest;
+    HostInstant latest;
+    /// The true one is within at +- bound.
+    [[nodiscard]] DurationNs bound() const { return std::max(at - earliest, latest - at); }
   };
   /// When the counter showed `ticks`: the time nearest to the newest reading. Pre: a reading.
   [[nodiscard]] Instant TimeOf(std::uint32_t ticks) const;
 
   static constexpr std::size_t kReadings = 8;
-  /// No clock is off by more. Wider than what units may have, so that one beyond it is seen.
+  /// No clock is off by more: a controller that runs by it would not keep up with a CAN bus, whose
+  /// bit timing allows for 1.58 % at most (ISO 11898-1). Wider than what units may have.
   static constexpr double kRateErrorMax = 0.02;
   /// By how much a rate may change while kReadings are taken (temperature).
   static constexpr double kWander = 20e-6;
@@ -74,13 +122,15 @@ class ClockMap {
     double host_ns = 0;  // since the newest reading's middle
     double ns_per_tick = 0;
   };
-  struct Rates {
-    double low = 1 - kRateErrorMax;
-    double high = 1 + kRateErrorMax;
-  };
+  static constexpr Rates kUsual{1 - kRateErrorMax, 1 + kRateErrorMax};
 
   [[nodiscard]] const Kept& newest() const { return kept_[count_ - 1]; }
+  [[nodiscard]] bool RanThrough(const Reading& reading) const;
+  void Keep(std::int64_t ticks, const Reading& reading);
   [[nodiscard]] std::int64_t Unwrap(std::uint32_t ticks, HostInstant at) const;
+  /// That the readings leave; low > high: they contradict each other.
+  [[nodiscard]] Rates RatesByReadings() const;
+  /// Of these the usual ones, where there are any.
   [[nodiscard]] Rates PossibleRates() const;
   [[nodiscard]] Line Fit(const Rates& rates) const;
   /// From one reading: when the counter showed `ticks`.

@@ -247,6 +247,7 @@ void Contact::Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostI
     record.no_serial = false;
     record.protocol_version = identity->protocol_version;
     record.other_version.reset();
+    if (record.view.serial != identity->serial) record.clock.Forget();
     record.view.serial = identity->serial;
     if (record.view.phase != kIdentifying) core_.SetPhase(i, kIdentifying);
     record.reading.step = 1;

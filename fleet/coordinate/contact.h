@@ -66,6 +66,7 @@ class Contact {
   void OnDone(PositionerIndex i, Done done, std::uint8_t sequence);
   void OnParameter(PositionerIndex i, const ParameterReply& reply);
   void OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at);
+  void TellClock(PositionerIndex i, const ClockReply& reply);
   void OnSensors(PositionerIndex i, const SensorsReply& reply);
   void SensorsDoNotAnswer(PositionerIndex i, const std::string& what);
   void OnWritten(PositionerIndex i, const ParameterReply& reply);

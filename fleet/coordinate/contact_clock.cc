@@ -1,6 +1,5 @@
 // Contact, what a unit says of its clock.
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -20,28 +19,30 @@ std::string InPercent(double share) {
 
 void Contact::OnClock(PositionerIndex i, const ClockReply& reply, HostInstant at) {
   UnitRecord& record = core_.unit(i);
-  // Its request ended in between. By how much later and sooner the bits of both would tell, but
-  // virtual interfaces take no time.
-  const HostInstant earliest = std::min(record.answered_asked, at);
-  record.clock.Observe({reply.ticks, earliest, at});
+  const bool taken = record.clock.Observe({reply.ticks, record.answered_asked, at});
+  if (taken) TellClock(i, reply);
+  if (record.view.phase == UnitPhase::kIdentifying) {
+    ++record.reading.step;
+  } else if (taken && std::exchange(record.wants_start, false) && reply.began_ticks != 0) {
+    record.began = record.clock.TimeOf(reply.began_ticks);
+    core_.Tell(i, UnitEventKind::kStartTold);
+  }
+}
+
+void Contact::TellClock(PositionerIndex i, const ClockReply& reply) {
+  UnitRecord& record = core_.unit(i);
   const ClockMap::Rate rate = record.clock.rate();
   record.view.clock = {.readings = static_cast<std::uint32_t>(record.clock.readings()),
                        .rate_error = rate.error,
                        .rate_bound = rate.bound,
-                       .bound_s = record.clock.TimeOf(reply.ticks).bound.seconds()};
-  const double off = std::abs(rate.error) - rate.bound;
-  if (off > PlanOptions{}.clock_error && !record.clock_told)
-    core_.Raise(Severity::kError, i, {},
-                core_.NameOf(i) + "'s clock is off by " + InPercent(rate.error) + " (+- " +
-                    InPercent(rate.bound) + "), more than the " +
-                    InPercent(PlanOptions{}.clock_error) + " that plans allow for");
-  if (off > PlanOptions{}.clock_error) record.clock_told = true;  // once; anew when it is read anew
-  if (record.view.phase == UnitPhase::kIdentifying) {
-    ++record.reading.step;
-  } else if (std::exchange(record.wants_start, false) && reply.began_ticks != 0) {
-    record.began = record.clock.TimeOf(reply.began_ticks);
-    core_.Tell(i, UnitEventKind::kStartTold);
-  }
+                       .bound_s = record.clock.TimeOf(reply.ticks).bound().seconds()};
+  const double allowed = PlanOptions{}.clock_error;
+  if (!rate.IsBeyond(allowed) || std::exchange(record.clock_told, true)) return;
+  core_.Raise(Severity::kError, i, {},
+              core_.NameOf(i) + "'s clock is off by " + InPercent(rate.least) + " to " +
+                  InPercent(rate.most) + ", more than the " + InPercent(allowed) +
+                  " that plans allow for (" + std::to_string(record.clock.readings()) +
+                  " readings)");
 }
 
 }  // namespace focalfleet

@@ -237,7 +237,7 @@ void Core::DropQuestion(PositionerIndex i) {
 bool Core::Answers(PositionerIndex i, Function function, std::uint8_t sequence) {
   UnitRecord& record = unit(i);
   if (!record.question || record.question->answer_function != function ||
-      record.question->sequence != sequence)
+      record.question->sequence != sequence || record.question->asked == kNever)
     return false;
   record.answered_asked = record.question->asked;
   record.question.reset();
@@ -437,13 +437,14 @@ void Core::CountSent() {
 }
 
 void Core::CloseLoadWindow(BusRecord* bus) const {
-  if (bus->window_began == kNever) bus->window_began = now;
-  const DurationNs window = now - bus->window_began;
+  const HostInstant until = std::max(now, heard_until);
+  if (bus->window_began == kNever) bus->window_began = until;
+  const DurationNs window = until - bus->window_began;
   if (window < Milliseconds(1000)) return;
   bus->view.load = static_cast<double>(bus->window_bits) /
                    (window.seconds() * static_cast<double>(config.bit_rate_bps));
   bus->view.load_max = std::max(bus->view.load_max, bus->view.load);
-  bus->window_began = now;
+  bus->window_began = until;
   bus->window_bits = 0;
 }
 

@@ -222,7 +222,7 @@ class Core {
   // ---- being driven
 
   void BeginStep(const Inputs& inputs, Effects* effects);
-  /// Matches an answer to the open question; false: late, doubled, or never asked.
+  /// Matches an answer to the open question; false: late, doubled, or not asked, not yet either.
   [[nodiscard]] bool Answers(PositionerIndex i, Function function, std::uint8_t sequence);
   /// Frames that passed the bus together: one, or those of a group.
   void Count(BusRecord* bus, std::span<const CanFrame> frames);
@@ -248,6 +248,9 @@ class Core {
   std::uint64_t committed_through = 0;
   bool store_failing = false;
   HostInstant now;
+  /// Frames heard so far had ended by then; later than `now` where the host was held up on its way
+  /// to them.
+  HostInstant heard_until{INT64_MIN};
   Effects* out = nullptr;
 
  private:

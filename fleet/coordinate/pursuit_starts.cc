@@ -40,6 +40,8 @@ void Pursuit::NoteStart(PositionerIndex i) {
           .told = skew_.told(),
           .skew_s = skew_s,
           .bound_s = std::max(most_s - skew_s, skew_s - least_s),
+          .least_s = least_s,
+          .most_s = most_s,
           .allowed_s = 2 * round_skew_s_,
           .first = skew_.first(),
           .last = skew_.last()};
@@ -57,15 +59,16 @@ void Pursuit::JudgeStarts() {
   const double allowed_s = 2 * round_skew_s_;
   const double least_s = skew_.least().seconds();
   if (least_s <= allowed_s) return;
-  const double most_s = skew_.most().seconds();
-  planned_skew_s_ = std::min(kSkewMost_s, std::max(planned_skew_s_, most_s / 2));
+  planned_skew_s_ = std::min(kSkewMost_s, std::max(planned_skew_s_, least_s / 2));
+  const StartSkew::Start& first = skew_.surely_first();
+  const StartSkew::Start& last = skew_.surely_last();
   const auto name = [&](PositionerIndex i) {
     return core_.NameOf(i) + " (bus " + std::to_string(core_.bus_of(i).id.value) + ")";
   };
-  core_.Raise(Severity::kError, skew_.last(), core_.bus_of(skew_.last()).id,
-              name(skew_.last()) + " began " + InMilliseconds(least_s) + " to " +
-                  InMilliseconds(most_s) + " after " + name(skew_.first()) + ", more than the " +
-                  InMilliseconds(allowed_s) +
+  core_.Raise(Severity::kError, last.unit, core_.bus_of(last.unit).id,
+              name(last.unit) + " began " + InMilliseconds(least_s) + " to " +
+                  InMilliseconds((last.began.latest - first.began.earliest).seconds()) + " after " +
+                  name(first.unit) + ", more than the " + InMilliseconds(allowed_s) +
                   " that the plan allowed for; from now on plans allow for " +
                   InMilliseconds(2 * planned_skew_s_));
 }

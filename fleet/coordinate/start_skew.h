@@ -3,6 +3,8 @@
 // A start is known within bounds (clock_map.h), so the skew is, too: the last may have begun at
 // most max(latest) - min(earliest) after the first, and at least max(earliest) - min(latest). Plans
 // allow for a start `start_skew_s` before or after a common instant: for 2 start_skew_s in all.
+// Only the least that the skew can have been says that this was not enough, and the next plans
+// allow for so much: a host that was busy knows less, and never something that is not so.
 #pragma once
 
 #include <algorithm>
@@ -15,37 +17,57 @@ namespace focalfleet {
 
 class StartSkew {
  public:
+  /// A start within less than this is well known: a tenth of what plans allow for. Of half of it
+  /// units behind a full horizon of their bus would never be; of double, what is only unknown of a
+  /// start would pass for skew of that size.
+  static constexpr DurationNs kWellKnown = Milliseconds(4);
+
   void Clear() { *this = {}; }
   void Add(PositionerIndex unit, const ClockMap::Instant& began) {
-    if (told_ == 0 || began.at < first_at_) first_ = unit, first_at_ = began.at;
-    if (told_ == 0 || began.at > last_at_) last_ = unit, last_at_ = began.at;
-    earliest_first_ = std::min(earliest_first_, began.earliest());
-    latest_first_ = std::min(latest_first_, began.latest());
-    earliest_last_ = std::max(earliest_last_, began.earliest());
-    latest_last_ = std::max(latest_last_, began.latest());
+    if (told_ == 0 || began.latest < surely_first_.began.latest) surely_first_ = {unit, began};
+    if (told_ == 0 || began.earliest > surely_last_.began.earliest) surely_last_ = {unit, began};
+    earliest_ = std::min(earliest_, began.earliest);
+    latest_ = std::max(latest_, began.latest);
     ++told_;
+    if (began.latest - began.earliest > kWellKnown) return;
+    if (well_known_ == 0 || began.at < first_.began.at) first_ = {unit, began};
+    if (well_known_ == 0 || began.at > last_.began.at) last_ = {unit, began};
+    ++well_known_;
   }
 
   [[nodiscard]] std::uint32_t told() const { return told_; }
   // Pre, of all below: told() > 0.
-  [[nodiscard]] PositionerIndex first() const { return first_; }
-  [[nodiscard]] PositionerIndex last() const { return last_; }
-  [[nodiscard]] DurationNs likely() const { return last_at_ - first_at_; }
+  struct Start {
+    PositionerIndex unit;
+    ClockMap::Instant began;
+  };
   [[nodiscard]] DurationNs least() const {
-    return std::max(DurationNs{0}, earliest_last_ - latest_first_);
+    return std::max(DurationNs{0}, surely_last_.began.earliest - surely_first_.began.latest);
   }
-  [[nodiscard]] DurationNs most() const { return latest_last_ - earliest_first_; }
+  [[nodiscard]] DurationNs most() const { return latest_ - earliest_; }
+  /// The two by which it is known to be at least least().
+  [[nodiscard]] const Start& surely_first() const { return surely_first_; }
+  [[nodiscard]] const Start& surely_last() const { return surely_last_; }
+  /// The likeliest: that of the starts that are well known, and what the others prove. All were
+  /// told one instant; that a start is badly known makes it no later.
+  [[nodiscard]] DurationNs likely() const { return std::max(least(), ThatIsWellKnown()); }
+  [[nodiscard]] PositionerIndex first() const { return (Proves() ? surely_first_ : first_).unit; }
+  [[nodiscard]] PositionerIndex last() const { return (Proves() ? surely_last_ : last_).unit; }
 
  private:
+  [[nodiscard]] DurationNs ThatIsWellKnown() const { return last_.began.at - first_.began.at; }
+  [[nodiscard]] bool Proves() const { return well_known_ == 0 || least() > ThatIsWellKnown(); }
+
   std::uint32_t told_ = 0;
-  PositionerIndex first_;
-  PositionerIndex last_;
-  HostInstant first_at_;
-  HostInstant last_at_;
-  HostInstant earliest_first_{INT64_MAX};
-  HostInstant latest_first_{INT64_MAX};
-  HostInstant earliest_last_{INT64_MIN};
-  HostInstant latest_last_{INT64_MIN};
+  std::uint32_t well_known_ = 0;
+  // Of these.
+  Start first_;
+  Start last_;
+  // Of all.
+  Start surely_first_;
+  Start surely_last_;
+  HostInstant earliest_{INT64_MAX};
+  HostInstant latest_{INT64_MIN};
 };
 
 }  // namespace focalfleet

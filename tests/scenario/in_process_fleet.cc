@@ -63,6 +63,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
                           .faults = options.faults};
   for (std::uint32_t n = 0; n < layout_->size(); ++n)
     config.units.push_back(Describe(layout_->units()[n], (*start)[n], drives_[n]));
+  for (const auto& [n, error] : options.clock_errors) config.units[n].clock_error = error;
   config.joint_sensors = MakeJoints(*layout_, options.seed, options.spread);
   config.start = now_;
   config.clock_error_max = options.clock_error_max;
@@ -124,6 +125,8 @@ void InProcessFleet::StepOnce() {
     committed_through_ = commits_.front().batch;
     commits_.pop_front();
   }
+  if (options_.stamped_when_heard)
+    for (ReceivedFrame& frame : heard_) frame.at = std::max(frame.at, now_);
   effects_.Clear();
   coordinator_->Step({.now = now_,
                       .frames = heard_,
@@ -143,6 +146,7 @@ void InProcessFleet::StepOnce() {
 }
 
 void InProcessFleet::Perform(const Effects& effects) {
+  if (held_up) Freeze(held_up(), Heard::kWaits);
   if (sent != nullptr) sent->insert(sent->end(), effects.frames.begin(), effects.frames.end());
   if (!effects.rows.empty())
     commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -38,7 +39,11 @@ class InProcessFleet {
     std::uint32_t first_id = 1;
     sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
     std::vector<sim::PlannedFault> faults = {};
-    std::uint8_t sensors = 0;  // at the joint of each unit
+    std::uint8_t sensors = 0;                           // at the joint of each unit
+    std::map<std::uint32_t, double> clock_errors = {};  // of single units, by number in the layout
+    /// Frames are stamped when the coordinator hears them, as on a socket without stamps of the
+    /// kernel; else when they end.
+    bool stamped_when_heard = false;
   };
 
   explicit InProcessFleet(const Options& options);
@@ -101,6 +106,8 @@ class InProcessFleet {
   bool store_fails = false;
   /// Rows that the store refuses beside those that it always does.
   std::function<bool(const Row&)> refuse;
+  /// Given: for so long the host is held up between a step and sending what came of it.
+  std::function<DurationNs()> held_up;
   /// What the camera makes of an exposure before the coordinator hears of it.
   std::function<void(ExposureDone*)> camera_fault;
   /// Answers exposure jobs in the stead of that camera.

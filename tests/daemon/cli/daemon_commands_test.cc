@@ -39,7 +39,9 @@ Json Configuration(const std::string& state, std::uint64_t arrived, std::uint64_
          {"starts", 2},
          {"starts_known", 2},
          {"start_skew_s", 0.0021},
-         {"start_skew_bound_s", 0.0004},
+         {"start_skew_bound_s", 0.0006},
+         {"start_skew_least_s", 0.0017},
+         {"start_skew_most_s", 0.0027},
          {"start_skew_allowed_s", 0.04},
          {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
          {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
@@ -138,7 +140,9 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"starts", 2},
                       {"starts_known", 2},
                       {"start_skew_s", 0.0021},
-                      {"start_skew_bound_s", 0.0004},
+                      {"start_skew_bound_s", 0.0006},
+                      {"start_skew_least_s", 0.0017},
+                      {"start_skew_most_s", 0.0027},
                       {"start_skew_allowed_s", 0.04},
                       {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
                       {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
@@ -151,8 +155,8 @@ TEST_F(DaemonCommands, ApplyWaitTellsUploadAndStarts) {
   const auto result = Apply({"--wait"}, {.result = Configuration("done", 2, 0)});
   EXPECT_THAT(result.out, HasSubstr("upload 0.002 s (its bits take 0.002 s), 1900 bits (1800 "
                                     "predicted)"));
-  EXPECT_THAT(result.out, HasSubstr("units began within 2.1 ms of each other (+- 0.4; 2 of 2 told; "
-                                    "plans allow for 40 ms)"));
+  EXPECT_THAT(result.out, HasSubstr("units began within at most 2.7 ms of each other, at least "
+                                    "1.7 ms (likely 2.1; 2 of 2 told; plans allow for 40 ms)"));
 }
 
 TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
