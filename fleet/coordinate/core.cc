@@ -308,7 +308,7 @@ void Core::SayWhatIsDurable() {
       out->replies.push_back(
           {kept.request,
            true,
-           Error{ErrorCode::kRefused,
+           Error{ErrorCode::kUnavailable,
                  "effective now, NOT stored: the store refuses it (" + kept.refused + ")"},
            {}});
     } else if (committed_through >= kept.batch) {
