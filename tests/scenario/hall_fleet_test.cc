@@ -166,7 +166,7 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
   ASSERT_EQ(rows->size(), kUnits);
   std::uint32_t stored = 0;
   Spines spine_of;
-  for (const auto& [row, at] : *rows) {
+  for (const auto& [row, at, moved_since] : *rows) {
     ASSERT_TRUE(row.spine) << row.unit.value;
     EXPECT_EQ(row.source, SightingSource::kSensors);
     spine_of[row.unit.value] = *row.spine;
@@ -246,7 +246,7 @@ TEST_F(HallFleet, WhoseSensorLiesIsNamedInTheStore) {
   std::map<std::uint32_t, const Liar*> liar_of;
   for (const Liar& liar : kLiars) liar_of[liar.unit] = &liar;
   std::size_t judged = 0;
-  for (const auto& [row, at] : *rows) {
+  for (const auto& [row, at, moved_since] : *rows) {
     ASSERT_TRUE(row.spine) << row.unit.value;
     const auto found = liar_of.find(row.unit.value);
     if (found == liar_of.end()) {
