@@ -25,6 +25,8 @@ void CheckUnits(const Command& command) {
           for (const PositionerIndex i : what.units) exists(i);
         } else if constexpr (std::is_same_v<What, StopCommand>) {
           if (what.unit) exists(*what.unit);
+        } else if constexpr (std::is_same_v<What, MeasureCommand>) {
+          return;  // all units at once
         } else if constexpr (std::is_same_v<What, ApplyCommand>) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
         } else if constexpr (std::is_same_v<What, KeepModelCommand>) {
