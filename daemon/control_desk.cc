@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "daemon/requested_command.h"
+#include "fleet/files/bad_rows.h"
 
 namespace focalfleet {
 namespace {
@@ -85,7 +86,7 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
   auto change = ChangeModel(view, *request);
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
-    options_.log(request->verb + " refused: " + command.error().text);
+    options_.log(request->verb + " refused: " + FirstRow(command.error().text));
     return Answer(pending, tl::unexpected<Error>(command.error()));
   }
   options_.log(request->verb + " commanded");

@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
-#include <system_error>
 #include <utility>
 
+#include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
 #include "daemon/ports/unix_port.h"
 #include "fleet/files/fiducials_file.h"
@@ -22,17 +20,6 @@ using Ports = std::vector<std::unique_ptr<PollablePort>>;
 
 /// In real time; a link that is gone is looked for so often.
 constexpr DurationNs kRetryPeriod = Milliseconds(200);
-
-Result<std::string> ReadText(const std::string& path) {
-  std::error_code failed;
-  if (std::filesystem::is_directory(path, failed))
-    return Fail(ErrorCode::kUnavailable, path + " is a directory");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return Fail(ErrorCode::kUnavailable, "cannot read " + path);
-  std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  if (file.bad()) return Fail(ErrorCode::kUnavailable, "cannot read " + path);
-  return text;
-}
 
 Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {
   Ports ports;
@@ -106,17 +93,17 @@ Result<Ports> OpenSimulated(const DaemonConfig& config, const Layout& layout,
 Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet) {
   Layout::Options options{.clearance_mm = fleet.clearance_mm, .obstacles = {}};
   if (!fleet.obstacles.empty()) {
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.obstacles));
+    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(fleet.obstacles));
     FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(text, fleet.obstacles));
   }
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(fleet.units));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(fleet.units));
   return ReadLayout(text, fleet.units, std::move(options));
 }
 
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {
   CameraSite site{.model = camera.model, .sensor = camera.sensor, .fiducials = {}, .options = {}};
   site.options.centroid_sigma_mm = 1e-3 * camera.centroid_sigma_um;
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(camera.fiducials));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(camera.fiducials));
   FOCALFLEET_TRY_ASSIGN(site.fiducials, ReadFiducials(text, camera.fiducials));
   double radius_mm = 0;
   for (const Fiducial& fiducial : site.fiducials)
@@ -128,7 +115,7 @@ Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera) {
 Result<std::unique_ptr<SpineWorker>> OpenSpines(const DaemonConfig::Hall& hall,
                                                 const Layout& layout) {
   if (hall.model.empty()) return std::unique_ptr<SpineWorker>();
-  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadText(hall.model));
+  FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(hall.model));
   FOCALFLEET_TRY_ASSIGN(const HallModelFile model, ReadHallModel(text, hall.model));
   return SpineWorker::Create(layout, model,
                              {.noise_T = 1e-3 * hall.noise_mT, .tilt_max_deg = hall.tilt_max_deg});

@@ -8,6 +8,7 @@
 #include <map>
 #include <utility>
 
+#include "fleet/files/bad_rows.h"
 #include "fleet/geometry/segment.h"
 #include "protocol/base/limits.h"
 
@@ -182,21 +183,25 @@ void SpreadOverBuses(std::vector<Unit>* units) {
 // Nodes that were given keep their place; the others take the lowest free ones in order.
 Status AssignNodes(std::vector<Unit>* units,
                    std::unordered_map<std::uint64_t, PositionerIndex>* by_address) {
+  BadRows bad;
   for (std::uint32_t i = 0; i < units->size(); ++i) {
     const Unit& unit = (*units)[i];
     if (unit.node == kNoNode) continue;
-    if (unit.node.value > limits::kNodesPerBus)
-      return Fail(ErrorCode::kInvalid,
-                  Named(unit.id) + ": node " + std::to_string(unit.node.value) +
-                      " is not between 1 and " + std::to_string(limits::kNodesPerBus));
+    if (unit.node.value > limits::kNodesPerBus) {
+      bad.Add(Named(unit.id) + ": node " + std::to_string(unit.node.value) +
+                  " is not between 1 and " + std::to_string(limits::kNodesPerBus),
+              "node_id out of bounds");
+      continue;
+    }
     const auto [it, fresh] =
         by_address->emplace(AddressKey(unit.bus, unit.node), PositionerIndex{i});
     if (!fresh)
-      return Fail(ErrorCode::kInvalid, Named(unit.id) + ": bus " + std::to_string(unit.bus.value) +
-                                           " node " + std::to_string(unit.node.value) +
-                                           " is also that of " +
-                                           Named((*units)[it->second.value].id));
+      bad.Add(Named(unit.id) + ": bus " + std::to_string(unit.bus.value) + " node " +
+                  std::to_string(unit.node.value) + " is also that of " +
+                  Named((*units)[it->second.value].id),
+              "address of another unit");
   }
+  FOCALFLEET_TRY(bad.Check());
   std::map<BusId, std::uint32_t> next;
   for (std::uint32_t i = 0; i < units->size(); ++i) {
     Unit& unit = (*units)[i];
@@ -222,15 +227,17 @@ Status CheckUnits(const std::vector<Unit>& units,
   if (units.size() > limits::kUnits)
     return Fail(ErrorCode::kInvalid, std::to_string(units.size()) + " units, at most " +
                                          std::to_string(limits::kUnits) + " are possible");
+  BadRows bad;
   for (std::uint32_t i = 0; i < units.size(); ++i) {
+    const std::string name = Named(units[i].id);
     if (const std::string fault = FaultOf(units[i]); !fault.empty())
-      return Fail(ErrorCode::kInvalid, Named(units[i].id) + ": " + fault);
-    if (units[i].bus == kNoBus && units[i].node != kNoNode)
-      return Fail(ErrorCode::kInvalid, Named(units[i].id) + ": a node without a bus");
-    if (!by_id->emplace(units[i].id, PositionerIndex{i}).second)
-      return Fail(ErrorCode::kInvalid, Named(units[i].id) + " is there twice");
+      bad.Add(name + ": " + fault, fault.substr(0, fault.find(' ')) + " out of bounds");
+    else if (units[i].bus == kNoBus && units[i].node != kNoNode)
+      bad.Add(name + ": a node without a bus", "a node without a bus");
+    else if (!by_id->emplace(units[i].id, PositionerIndex{i}).second)
+      bad.Add(name + " is there twice", "is there twice");
   }
-  return {};
+  return bad.Check();
 }
 
 Status CheckObstacles(const std::vector<Obstacle>& obstacles) {
@@ -290,13 +297,17 @@ Status Layout::MeasurePitch(double clearance_mm) {
     nearest_mm_[0] = 2 * (units_[0].theta().arm_mm + units_[0].phi().arm_mm);
   } else {
     const Grid grid(units_);
+    BadRows bad;
+    std::vector<std::uint8_t> named(units_.size());  // in a pair that is told
     for (std::uint32_t i = 0; i < units_.size(); ++i) {
       const auto [distance, who] = grid.Nearest(i);
-      if (distance < kNearestMinMm)
-        return Fail(ErrorCode::kInvalid,
-                    Named(units_[i].id) + " and " + Named(units_[who].id) + " sit at one place");
       nearest_mm_[i] = distance;
+      if (distance >= kNearestMinMm || named[i] != 0) continue;
+      named[i] = named[who] = 1;
+      bad.Add(Named(units_[i].id) + " and " + Named(units_[who].id) + " sit at one place",
+              "at one place");
     }
+    FOCALFLEET_TRY(bad.Check());
   }
   for (std::uint32_t i = 0; i < units_.size(); ++i)
     if (units_[i].arm_half_width_mm == 0)

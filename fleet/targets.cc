@@ -6,6 +6,7 @@
 #include <numbers>
 #include <unordered_map>
 
+#include "fleet/files/bad_rows.h"
 #include "fleet/geometry/clearance.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/check.h"
@@ -57,47 +58,55 @@ Way WayTo(const Unit& unit, const UnitDrive& drive, const AxisAngles& from, cons
   return {std::max(theta_s, phi_s), theta_s + phi_s};
 }
 
-Result<std::vector<AxisAngles>> SolutionsFor(const TargetAngles& target, const Unit& unit,
-                                             const std::string& at) {
+struct Wrong {
+  std::string text;
+  const char* kind;
+};
+using Solutions = tl::expected<std::vector<AxisAngles>, Wrong>;
+tl::unexpected<Wrong> Not(const char* kind, std::string text) {
+  return tl::unexpected<Wrong>(Wrong{std::move(text), kind});
+}
+
+constexpr const char* kNotFinite = "not finite";
+constexpr const char* kOutOfRange = "out of range";
+
+Solutions SolutionsFor(const TargetAngles& target, const Unit& unit) {
   if (!std::isfinite(target.theta_deg) || !std::isfinite(target.phi_deg))
-    return Fail(ErrorCode::kInvalid, at + ": the target's angles are not finite numbers");
+    return Not(kNotFinite, "the target's angles are not finite numbers");
   for (const Axis axis : kAxes) {
     const double angle_deg = axis == Axis::kTheta ? target.theta_deg : target.phi_deg;
     if (std::abs(angle_deg) > kAngleMaxDeg)
-      return Fail(ErrorCode::kInvalid, at + ": " + Name(axis) + "_deg " + Number(angle_deg) +
-                                           " is not an angle within " +
-                                           std::to_string(static_cast<int>(kAngleMaxDeg)));
+      return Not(kOutOfRange, std::string(Name(axis)) + "_deg " + Number(angle_deg) +
+                                  " is not an angle within " +
+                                  std::to_string(static_cast<int>(kAngleMaxDeg)));
   }
   if (target.phi_deg < unit.phi().min_deg || target.phi_deg > unit.phi().max_deg)
-    return Fail(ErrorCode::kInvalid, at + ": phi_deg " + Number(target.phi_deg) +
-                                         " is out of its range " + RangeText(unit.phi()));
+    return Not(kOutOfRange, "phi_deg " + Number(target.phi_deg) + " is out of its range " +
+                                RangeText(unit.phi()));
   std::vector<AxisAngles> solutions;
   for (const double theta_deg : TurnsInRange(target.theta_deg, unit.theta()))
     solutions.push_back({theta_deg, target.phi_deg});
   if (solutions.empty())
-    return Fail(ErrorCode::kInvalid, at + ": theta_deg " + Number(target.theta_deg) +
-                                         ", whole turns added, is out of its range " +
-                                         RangeText(unit.theta()));
+    return Not(kOutOfRange, "theta_deg " + Number(target.theta_deg) +
+                                ", whole turns added, is out of its range " +
+                                RangeText(unit.theta()));
   return solutions;
 }
 
-Result<std::vector<AxisAngles>> SolutionsFor(PointFp target, const Unit& unit,
-                                             const std::string& at, double free_theta_deg) {
+Solutions SolutionsFor(PointFp target, const Unit& unit, double free_theta_deg) {
   if (!std::isfinite(target.x_mm) || !std::isfinite(target.y_mm))
-    return Fail(ErrorCode::kInvalid, at + ": the target's place is not two finite numbers");
+    return Not(kNotFinite, "the target's place is not two finite numbers");
   std::vector<AxisAngles> solutions = AnglesFor(unit, target, free_theta_deg);
   if (!solutions.empty()) return solutions;
   const PatrolLimits patrol = PatrolOf(unit);
   const double distance = DistanceMm(target, unit.base_fp);
-  const std::string where = at + ": x_mm " + Number(target.x_mm) + ", y_mm " + Number(target.y_mm) +
+  const std::string where = "x_mm " + Number(target.x_mm) + ", y_mm " + Number(target.y_mm) +
                             " is " + Number(distance) + " mm from its base ";
   if (distance < patrol.min_mm || distance > patrol.max_mm)
-    return Fail(ErrorCode::kInvalid, where + "(out of patrol, its fibre reaches " +
-                                         Number(patrol.min_mm) + ".." + Number(patrol.max_mm) +
-                                         " mm)");
-  return Fail(ErrorCode::kInvalid, where + "in a direction out of range (theta " +
-                                       RangeText(unit.theta()) + ", phi " + RangeText(unit.phi()) +
-                                       ")");
+    return Not("out of patrol", where + "(out of patrol, its fibre reaches " +
+                                    Number(patrol.min_mm) + ".." + Number(patrol.max_mm) + " mm)");
+  return Not(kOutOfRange, where + "in a direction out of range (theta " + RangeText(unit.theta()) +
+                              ", phi " + RangeText(unit.phi()) + ")");
 }
 
 // What one target leaves open: poses in the order of preference, nearest first.
@@ -172,15 +181,20 @@ class SideChooser {
   std::vector<std::optional<SegmentFp>> arms_;
 };
 
+// A row that is good by itself.
+struct Resolved {
+  PositionerIndex unit;
+  const TargetRow* row = nullptr;
+};
+
 // Two fibres wanted where their arms touch is the author's error, so it is told with the author's
 // lines: all such pairs.
-Status CheckClear(const Targets& targets, const Layout& layout, std::span<const UnitDrive> drives,
-                  std::span<const std::optional<Pose>> poses) {
+void FindCollisions(const Targets& targets, std::span<const Resolved> rows, const Layout& layout,
+                    std::span<const UnitDrive> drives, std::span<const std::optional<Pose>> poses,
+                    BadRows* bad) {
   constexpr double kToleranceMm = 0.002;  // "2 um less is still clear"
-  std::string text;
   std::unordered_map<std::uint32_t, const TargetRow*> row_of;
-  for (const TargetRow& row : targets.rows) {
-    const PositionerIndex i = *layout.Find(row.unit);
+  for (const auto& [i, row] : rows) {
     if (!layout.unit(i).enabled) continue;
     const ArmOf arm{i, ArmAt(layout.unit(i), drives[i.value], *poses[i.value])};
     for (const PositionerIndex j : layout.neighbours(i)) {
@@ -188,17 +202,15 @@ Status CheckClear(const Targets& targets, const Layout& layout, std::span<const 
       if (earlier == row_of.end()) continue;
       const ArmOf other{j, ArmAt(layout.unit(j), drives[j.value], *poses[j.value])};
       if (IsClear(layout, arm, other, -kToleranceMm)) continue;
-      if (!text.empty()) text += "; ";
-      text += At(targets, row) + ": its target collides with that of unit " +
-              std::to_string(earlier->second->unit.value) + " in line " +
-              std::to_string(earlier->second->line) + ": their arms would be " +
-              Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
-              Number(ClearDistanceMm(layout, i, j)) + " mm are needed";
+      bad->Add(At(targets, *row) + ": its target collides with that of unit " +
+                   std::to_string(earlier->second->unit.value) + " in line " +
+                   std::to_string(earlier->second->line) + ": their arms would be " +
+                   Number(std::sqrt(SquaredDistance(arm.arm_fp, other.arm_fp))) + " mm apart, " +
+                   Number(ClearDistanceMm(layout, i, j)) + " mm are needed",
+               "collides with another target");
     }
-    row_of.emplace(i.value, &row);
+    row_of.emplace(i.value, row);
   }
-  if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
-  return {};
 }
 
 }  // namespace
@@ -211,30 +223,41 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
   FOCALFLEET_CHECK(now.empty() || now.size() == layout.size());
   std::vector<Choice> choices(layout.size());
   std::vector<std::optional<Pose>> poses(layout.size());
+  BadRows bad;
   std::unordered_map<UnitId, int> line_of;
+  std::vector<Resolved> resolved;
   for (const TargetRow& row : targets.rows) {
-    const std::string at = At(targets, row);
+    const std::string at = At(targets, row) + ": ";
     const std::optional<PositionerIndex> index = layout.Find(row.unit);
-    if (!index) return Fail(ErrorCode::kInvalid, at + ": unknown unit, the layout has none such");
-    if (const auto [it, fresh] = line_of.emplace(row.unit, row.line); !fresh)
-      return Fail(ErrorCode::kInvalid,
-                  at + ": named twice, first in line " + std::to_string(it->second));
+    if (!index) {
+      bad.Add(at + "unknown unit, the layout has none such", "unknown unit");
+      continue;
+    }
+    if (const auto [it, fresh] = line_of.emplace(row.unit, row.line); !fresh) {
+      bad.Add(at + "named twice, first in line " + std::to_string(it->second), "named twice");
+      continue;
+    }
     const std::uint32_t i = index->value;
     const Unit& unit = layout.unit(*index);
     const AxisAngles from = StandsAt(unit, drives[i], now.empty() ? nullptr : &now[i]);
     const auto* angles = std::get_if<TargetAngles>(&row.place);
-    FOCALFLEET_TRY_ASSIGN(
-        auto solutions, angles != nullptr
-                            ? SolutionsFor(*angles, unit, at)
-                            : SolutionsFor(std::get<PointFp>(row.place), unit, at, from.theta_deg));
-    choices[i] = NearestFirst(unit, drives[i], from, std::move(solutions));
+    auto solutions = angles != nullptr
+                         ? SolutionsFor(*angles, unit)
+                         : SolutionsFor(std::get<PointFp>(row.place), unit, from.theta_deg);
+    if (!solutions) {
+      bad.Add(at + solutions.error().text, solutions.error().kind);
+      continue;
+    }
+    choices[i] = NearestFirst(unit, drives[i], from, std::move(*solutions));
     poses[i] = choices[i].front();
+    resolved.push_back({*index, &row});
   }
   std::vector<std::optional<SegmentFp>> standing(layout.size());
   for (std::uint32_t i = 0; i < now.size(); ++i)
     if (IsPlace(now[i])) standing[i] = ArmAt(layout.unit({i}), drives[i], PlaceOf(now[i]));
   SideChooser(layout, drives, std::move(standing)).Settle(choices, &poses);
-  FOCALFLEET_TRY(CheckClear(targets, layout, drives, poses));
+  FindCollisions(targets, resolved, layout, drives, poses, &bad);
+  FOCALFLEET_TRY(bad.Check());
   return poses;
 }
 

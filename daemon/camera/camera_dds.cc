@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/dds/cyclone.h"
+#include "fleet/files/spots_file.h"
 #include "focalfleet.h"  // generated from focalfleet.idl
 #include "protocol/base/limits.h"
 
@@ -19,8 +20,9 @@ constexpr std::int32_t kDepth = 8;
 
 Result<Exposure> FromSample(const focalfleet_Exposure& sample, const SensorLimits& sensor) {
   Exposure exposure{.id = sample.exposure_id, .taken_unix_ns = sample.taken_ns, .spots = {}};
-  if (exposure.id.empty())
-    return Fail(ErrorCode::kInvalid, std::string(kExposureTopic) + ": exposure_id is empty");
+  if (const Status good = CheckExposureId(exposure.id); !good)
+    return Fail(ErrorCode::kInvalid,
+                std::string(kExposureTopic) + ": exposure_id " + good.error().text);
   exposure.spots.reserve(sample.spots._length);
   for (std::uint32_t k = 0; k < sample.spots._length; ++k) {
     const focalfleet_Spot& spot = sample.spots._buffer[k];

@@ -1,76 +1,126 @@
 #include "daemon/camera/camera_folder.h"
 
-#include <filesystem>
+#include <algorithm>
+#include <array>
 #include <utility>
 
-#include "daemon/camera/spots_fits.h"
-#include "daemon/files/text_file.h"
+#include "daemon/camera/exposure_bytes.h"
 #include "fleet/files/spots_file.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
-namespace fs = std::filesystem;
+namespace {
+
+constexpr const char* kRequest = "request.json";
+
+constexpr std::array<std::string_view, 4> kSpotEndings = {".csv", ".fits", ".fit", ".fts"};
+constexpr std::array<std::string_view, 28> kForeignEndings = {
+    ".gz",  ".bz2",  ".xz",  ".zst", ".z",   ".fz",  ".lz4",  ".zip",    ".7z",      ".tar",
+    ".tgz", ".ecsv", ".txt", ".dat", ".tsv", ".asc", ".xml",  ".vot",    ".votable", ".h5",
+    ".hdf", ".hdf5", ".npy", ".npz", ".xls", ".ods", ".xlsx", ".parquet"};
+
+std::string LowerCase(std::string_view name) {
+  std::string lower(name);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
+}
+
+template <std::size_t kCount>
+bool EndsInOneOf(std::string_view name, const std::array<std::string_view, kCount>& endings) {
+  return std::ranges::any_of(endings, [&](std::string_view end) { return name.ends_with(end); });
+}
+
+/// The name, shortened so that ".reason" fits behind it.
+std::string ReasonName(const std::string& name) {
+  constexpr std::size_t kStemMax = 240;
+  return name.substr(0, kStemMax) + ".reason";
+}
+
+}  // namespace
+
+CameraFile KindOfName(std::string_view name) {
+  if (name.starts_with('.')) return CameraFile::kNotOurs;
+  const std::string lower = LowerCase(name);
+  std::string_view unpacked = lower;
+  if (unpacked.ends_with(".gz")) unpacked.remove_suffix(3);
+  if (EndsInOneOf(unpacked, kSpotEndings)) return CameraFile::kSpots;
+  return EndsInOneOf(lower, kForeignEndings) ? CameraFile::kForeign : CameraFile::kNotOurs;
+}
+
+Result<CameraFolder::Folders> CameraFolder::OpenAll(const std::string& path) {
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder camera, GuardedFolder::Open(path));
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder taken, camera.Subfolder("taken"));
+  FOCALFLEET_TRY_ASSIGN(GuardedFolder refused, camera.Subfolder("refused"));
+  return Folders{std::move(camera), std::move(taken), std::move(refused)};
+}
 
 Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, SensorLimits sensor) {
-  std::error_code failed;
-  for (const char* part : {"", "taken", "refused"}) {
-    fs::create_directories(fs::path(path) / part, failed);
-    if (failed)
-      return Fail(ErrorCode::kUnavailable,
-                  "camera folder " + path + " cannot be made: " + failed.message());
-  }
-  std::unique_ptr<CameraFolder> folder(new CameraFolder(std::move(path), sensor));
-  for (std::string name = folder->NextFile(); !name.empty(); name = folder->NextFile())
+  auto folders = OpenAll(path);
+  if (!folders)
+    return Fail(folders.error().code, "camera folder " + path + ": " + folders.error().text);
+  std::unique_ptr<CameraFolder> folder(
+      new CameraFolder(std::move(path), std::move(*folders), sensor));
+  for (;;) {
+    FOCALFLEET_TRY_ASSIGN(const std::string name, folder->NextFile());
+    if (name.empty()) return folder;
     folder->Refuse(name, "it was there before the daemon asked for anything");
-  return folder;
+  }
 }
 
 Status CameraFolder::Request(std::uint64_t id, WallTime since) {
-  return WriteFileAtomically(
-      path_ + "/request.json",
-      "{\"exposure\": " + std::to_string(id) + ", \"since_utc\": \"" + UtcOf(since.ns) + "\"}\n");
+  // The path may lead elsewhere by now: cleared up, mounted anew.
+  FOCALFLEET_TRY_ASSIGN(folders_, OpenAll(path_));
+  return folders_.camera.Write(kRequest, "{\"exposure\": " + std::to_string(id) +
+                                             ", \"since_utc\": \"" + UtcOf(since.ns) + "\"}\n");
 }
 
 Result<std::optional<Exposure>> CameraFolder::Take() {
-  const std::string name = NextFile();
+  FOCALFLEET_TRY_ASSIGN(const std::string name, NextFile());
   if (name.empty()) return std::optional<Exposure>();
-  const std::string file = path_ + "/" + name;
-  Result<Exposure> exposure = [&]() -> Result<Exposure> {
-    if (name.ends_with(".fits")) return ReadSpotsFits(file, sensor_);
-    FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(file));
-    return ReadSpots(text, file, sensor_);
+  const GuardedFolder& folder = folders_.camera;
+  auto exposure = [&]() -> Result<Exposure> {
+    if (KindOfName(name) == CameraFile::kForeign)
+      return Fail(ErrorCode::kInvalid,
+                  folder.Shown(name) +
+                      ": spots come as .csv, .fits, .fit or .fts, or as these with .gz behind");
+    FOCALFLEET_TRY_ASSIGN(std::string bytes, folder.Read(name, limits::kExposureBytes));
+    return ParseExposure(std::move(bytes), folder.Shown(name), sensor_);
   }();
   if (!exposure) {
+    if (!folder.IdentityOf(name)) return std::optional<Exposure>();  // taken back meanwhile
     Refuse(name, exposure.error().text);
     return tl::unexpected(exposure.error());
   }
-  SetAside(name, "taken");
+  SetAside(name, folders_.taken);
   return std::optional(std::move(*exposure));
 }
 
 /// The first by name, so that a camera that counts is taken in its order; empty: none.
-std::string CameraFolder::NextFile() const {
-  std::string first;
-  std::error_code failed;
-  for (fs::directory_iterator entry(path_, failed), end; !failed && entry != end;
-       entry.increment(failed)) {
-    const std::string name = entry->path().filename().string();
-    if (!name.ends_with(".csv") && !name.ends_with(".fits")) continue;
-    if (first.empty() || name < first) first = name;
+Result<std::string> CameraFolder::NextFile() {
+  FOCALFLEET_TRY_ASSIGN(const auto names, folders_.camera.Names(limits::kCameraFiles));
+  std::erase_if(stays_, [&](const auto& stays) {
+    return !std::binary_search(names.begin(), names.end(), stays.first);
+  });
+  for (const std::string& name : names) {
+    if (KindOfName(name) == CameraFile::kNotOurs) continue;
+    const auto stays = stays_.find(name);
+    if (stays != stays_.end() && folders_.camera.IdentityOf(name) == stays->second) continue;
+    return name;
   }
-  return first;
+  return std::string();
 }
 
-// A file that cannot be moved would be read for ever: it is removed then.
-void CameraFolder::SetAside(const std::string& name, const std::string& folder) const {
-  std::error_code failed;
-  fs::rename(fs::path(path_) / name, fs::path(path_) / folder / name, failed);
-  if (failed) fs::remove_all(fs::path(path_) / name, failed);
+// A file that cannot be moved would be read for ever, so it is remembered.
+void CameraFolder::SetAside(const std::string& name, const GuardedFolder& folder) {
+  const auto identity = folders_.camera.IdentityOf(name);
+  stays_.erase(name);
+  if (!folders_.camera.Move(name, folder) && identity) stays_.emplace(name, *identity);
 }
 
-void CameraFolder::Refuse(const std::string& name, const std::string& reason) const {
-  SetAside(name, "refused");
-  [[maybe_unused]] const Status said =
-      WriteFileAtomically(path_ + "/refused/" + name + ".reason", reason + "\n");
+void CameraFolder::Refuse(const std::string& name, const std::string& reason) {
+  SetAside(name, folders_.refused);
+  [[maybe_unused]] const Status said = folders_.refused.Write(ReasonName(name), reason + "\n");
 }
 
 }  // namespace focalfleet

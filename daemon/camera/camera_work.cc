@@ -3,6 +3,8 @@
 #include <thread>
 #include <utility>
 
+#include "fleet/files/bad_rows.h"
+
 namespace focalfleet {
 namespace {
 
@@ -29,7 +31,7 @@ ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& e
       continue;
     }
     if (!taken) {
-      trouble = taken.error();
+      trouble = {taken.error().code, FirstRow(taken.error().text)};
       options_.log("not an exposure: " + trouble.text);
     }
     if (std::chrono::steady_clock::now() >= give_up) return {id, tl::unexpected(trouble)};

@@ -1,5 +1,7 @@
 // One exposure as a FITS binary table: columns SPOT_ID, X_PX, Y_PX, FLUX and perhaps FWHM_PX, keys
-// EXPID and DATE-OBS, which say what `# exposure_id` and `# taken_utc` say in spots.csv.
+// EXPID and DATE-OBS, which say what `# exposure_id` and `# taken_utc` say in spots.csv. The first
+// table with these columns is meant; other columns of it, images and tables before it do not
+// matter. Keys may stand in the primary header, EXPID may be a whole number.
 #pragma once
 
 #include <string>
@@ -9,8 +11,9 @@
 
 namespace focalfleet {
 
-/// As ReadSpots. Errors: kUnavailable, kInvalid; names file and column or key.
-Result<Exposure> ReadSpotsFits(const std::string& path, const SensorLimits& sensor);
+/// As ReadSpots, of a file's bytes. Errors: kInvalid; names `name` and column, key or row.
+Result<Exposure> ParseSpotsFits(std::string bytes, const std::string& name,
+                                const SensorLimits& sensor);
 
 Status WriteSpotsFits(const std::string& path, const Exposure& exposure);
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "fleet/files/cell.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 
@@ -30,21 +31,24 @@ constexpr std::array<std::string_view, 8> kFixedColumns = {
     "unit_id",      "move_id",     "theta_from_deg", "theta_cmd_deg",
     "phi_from_deg", "phi_cmd_deg", "x_mm",           "y_mm"};
 constexpr std::string_view kWordColumn = "mode";
+constexpr std::array<std::string_view, 2> kFlagColumns = {"rehomed", "from_measured"};
 constexpr std::array<std::string_view, 3> kModes = {"asymmetric", "five_segment", "seven_segment"};
 
-// Covariates of which some values can be known to be wrong.
+// Columns of numbers that docs/files.md names, with the values that they can have. A word in one of
+// them is a slip, not another meaning.
 struct CovariateBounds {
   std::string_view column;
   double low;
   double high;
 };
 constexpr double kFar = 1e300;
-constexpr CovariateBounds kCovariateBounds[] = {
-    {"sigma_um", 0, 1e6},        {"rehomed", 0, 1},
-    {"temp_C", -200, 300},       {"v_bus_V", 0, 1000},
-    {"elevation_deg", -90, 180}, {"movers_on_rail", 0, 1e6},
-    {"delay_s", 0, 1e7},         {"drive_amplitude", 0, 1000},
-    {"cycles_theta", 0, kFar},   {"cycles_phi", 0, kFar},
+constexpr CovariateBounds kKnownCovariates[] = {
+    {"t_s", -kFar, kFar},         {"sigma_um", 0, 1e6},       {"frame_id", -kFar, kFar},
+    {"temp_C", -200, 300},        {"v_bus_V", 0, 1000},       {"elevation_deg", -90, 180},
+    {"rail_id", -kFar, kFar},     {"rail_slot", -kFar, kFar}, {"movers_on_rail", 0, 1e6},
+    {"bus_id", -kFar, kFar},      {"bus_slot", -kFar, kFar},  {"delay_s", 0, 1e7},
+    {"drive_amplitude", 0, 1000}, {"counter1", -kFar, kFar},  {"repeat", -kFar, kFar},
+    {"cycles_theta", 0, kFar},    {"cycles_phi", 0, kFar},
 };
 
 double OrMissing(std::optional<std::uint32_t> value) {
@@ -88,35 +92,34 @@ void CheckSize(CsvRow* row, std::string_view column, double value, double size_m
     row->Reject(column, NumberText(value) + " is not within +-" + NumberText(size_max));
 }
 
-Result<MoveRow> ReadMove(const CsvTable& table, std::size_t at,
-                         const std::unordered_map<std::uint32_t, std::size_t>& unit_of_id,
-                         const std::string& units_file) {
-  CsvRow row(table, at);
+MoveRow ReadMove(CsvRow* row, const std::unordered_map<std::uint32_t, std::size_t>& unit_of_id,
+                 const std::string& units_file) {
   MoveRow move;
-  move.at = at;
-  const auto id = static_cast<std::uint32_t>(row.Integer("unit_id", kIdBounds));
-  move.move = row.Integer("move_id", kMoveBounds);
+  move.at = row->at();
+  const auto id = static_cast<std::uint32_t>(row->Integer("unit_id", kIdBounds));
+  move.move = row->Integer("move_id", kMoveBounds);
   constexpr std::string_view kFrom[] = {"theta_from_deg", "phi_from_deg"};
   constexpr std::string_view kCmd[] = {"theta_cmd_deg", "phi_cmd_deg"};
   for (const std::size_t axis : {kTheta, kPhi}) {
-    move.from_deg[axis] = row.Number(kFrom[axis]);
-    move.cmd_deg[axis] = row.Number(kCmd[axis]);
-    CheckSize(&row, kFrom[axis], move.from_deg[axis], kAngleMax_deg);
-    CheckSize(&row, kCmd[axis], move.cmd_deg[axis], kAngleMax_deg);
+    move.from_deg[axis] = row->Number(kFrom[axis]);
+    move.cmd_deg[axis] = row->Number(kCmd[axis]);
+    CheckSize(row, kFrom[axis], move.from_deg[axis], kAngleMax_deg);
+    CheckSize(row, kCmd[axis], move.cmd_deg[axis], kAngleMax_deg);
   }
-  move.x_mm = row.NumberIfAny("x_mm").value_or(kMissing);
-  move.y_mm = row.NumberIfAny("y_mm").value_or(kMissing);
-  CheckSize(&row, "x_mm", move.x_mm, kPlaceMax_mm);
-  CheckSize(&row, "y_mm", move.y_mm, kPlaceMax_mm);
+  move.x_mm = row->NumberIfAny("x_mm").value_or(kMissing);
+  move.y_mm = row->NumberIfAny("y_mm").value_or(kMissing);
+  CheckSize(row, "x_mm", move.x_mm, kPlaceMax_mm);
+  CheckSize(row, "y_mm", move.y_mm, kPlaceMax_mm);
   if (std::isnan(move.x_mm) != std::isnan(move.y_mm))
-    row.Reject(std::isnan(move.x_mm) ? "x_mm" : "y_mm",
-               "the other coordinate is there: both or neither");
-  if (row.error()) return tl::unexpected<Error>(*row.error());
+    row->Reject(std::isnan(move.x_mm) ? "x_mm" : "y_mm",
+                "the other coordinate is there: both or neither");
+  if (row->error()) return move;
   const auto unit = unit_of_id.find(id);
   if (unit == unit_of_id.end())
-    return tl::unexpected<Error>(table.ErrorAt(
-        at, "column unit_id: unit " + std::to_string(id) + " is not in " + units_file));
-  move.unit = unit->second;
+    row->RejectRow("column unit_id: unit " + std::to_string(id) + " is not in " + units_file,
+                   "unknown unit");
+  else
+    move.unit = unit->second;
   return move;
 }
 
@@ -125,68 +128,124 @@ std::string TwiceText(std::uint32_t id, std::int64_t move, int line) {
          " twice, first in line " + std::to_string(line);
 }
 
-Result<std::vector<MoveRow>> ReadMoveRows(const CsvTable& table, const UnitsFile& units) {
+/// The columns of moves.csv beside those that must be there. Values stand in the order of the file.
+class MoreColumns {
+ public:
+  /// Says of each column whether it is read, by its name and, where nobody knows that, by its
+  /// cells.
+  explicit MoreColumns(const CsvTable& table) {
+    for (std::size_t column = 0; column < table.columns().size(); ++column) {
+      const std::string& name = table.columns()[column];
+      if (std::ranges::count(kFixedColumns, name) > 0) continue;
+      if (name == kWordColumn) {
+        modes_ = sim::WordColumn{name, {kModes.begin(), kModes.end()}, {}};
+      } else if (IsKnown(name) || ReasonToPassOver(table, column).empty()) {
+        covariates_.push_back({name, {}});
+      } else {
+        passed_over_.push_back(ReasonToPassOver(table, column));
+      }
+    }
+  }
+
+  void Read(CsvRow* row) {
+    for (sim::Covariate& covariate : covariates_)
+      covariate.values.push_back(ValueOf(row, covariate.name).value_or(kMissing));
+    if (modes_) modes_->values.push_back(ModeOf(row));
+  }
+
+  /// In the order of `rows`.
+  void TakeInto(Campaign* campaign, const std::vector<MoveRow>& rows) {
+    const auto in_order = [&](auto* values) {
+      auto sorted = *values;
+      for (std::size_t k = 0; k < rows.size(); ++k) sorted[k] = (*values)[rows[k].at];
+      *values = std::move(sorted);
+    };
+    for (sim::Covariate& covariate : covariates_) in_order(&covariate.values);
+    campaign->covariates = std::move(covariates_);
+    if (!modes_) return;
+    in_order(&modes_->values);
+    campaign->word_columns.push_back(std::move(*modes_));
+  }
+
+  [[nodiscard]] const std::vector<std::string>& passed_over() const { return passed_over_; }
+
+ private:
+  static const CovariateBounds* BoundsOf(std::string_view name) {
+    const auto* found = std::ranges::find(kKnownCovariates, name, &CovariateBounds::column);
+    return found == std::end(kKnownCovariates) ? nullptr : found;
+  }
+  static bool IsFlag(std::string_view name) { return std::ranges::count(kFlagColumns, name) > 0; }
+  static bool IsKnown(std::string_view name) { return IsFlag(name) || BoundsOf(name) != nullptr; }
+
+  /// Empty where all cells are numbers or flags. A column of words is told by its name; where words
+  /// stand among numbers one of them may be a slip, so the first is told.
+  static std::string ReasonToPassOver(const CsvTable& table, std::size_t column) {
+    const std::string name = table.Shown(column);
+    if (!table.HasName(column)) return name;
+    bool any_number = false;
+    std::optional<std::size_t> word;
+    for (std::size_t k = 0; k < table.size() && !(word && any_number); ++k) {
+      const CellKind kind = KindOf(Trimmed(table.cell(k, column)));
+      any_number |= kind == CellKind::kNumber;
+      if (kind == CellKind::kWord && !word) word = k;
+    }
+    if (!word) return {};
+    if (!any_number) return name;
+    return name + " (not all numbers: " + Quoted(table.cell(*word, column)) + " in line " +
+           std::to_string(table.line(*word)) + ")";
+  }
+
+  static std::optional<double> ValueOf(CsvRow* row, const std::string& name) {
+    if (IsFlag(name)) {
+      const auto flag = row->FlagIfAny(name);
+      return flag ? std::optional<double>(*flag ? 1 : 0) : std::nullopt;
+    }
+    const CovariateBounds* bounds = BoundsOf(name);
+    if (bounds == nullptr) return row->NumberOrFlagIfAny(name);
+    const auto value = row->NumberIfAny(name);
+    if (value && (*value < bounds->low || *value > bounds->high))
+      row->Reject(name, NumberText(*value) + " is not between " + NumberText(bounds->low) +
+                            " and " + NumberText(bounds->high));
+    return value;
+  }
+
+  static int ModeOf(CsvRow* row) {
+    if (!row->Has(kWordColumn)) return -1;
+    const std::string word = row->Text(kWordColumn);
+    const auto* it = std::ranges::find(kModes, word);
+    if (it == kModes.end())
+      row->Reject(kWordColumn, Quoted(word) + " is not asymmetric, five_segment or seven_segment");
+    return static_cast<int>(it - kModes.begin());
+  }
+
+  std::vector<sim::Covariate> covariates_;
+  std::optional<sim::WordColumn> modes_;
+  std::vector<std::string> passed_over_;
+};
+
+Result<std::vector<MoveRow>> ReadMoveRows(const CsvTable& table, const UnitsFile& units,
+                                          MoreColumns* more) {
   std::unordered_map<std::uint32_t, std::size_t> unit_of_id;
   for (std::size_t u = 0; u < units.units.size(); ++u) unit_of_id[units.units[u].id.value] = u;
   std::vector<MoveRow> rows;
   rows.reserve(table.size());
   std::unordered_map<std::uint64_t, int> line_of;
   line_of.reserve(table.size());
-  for (std::size_t at = 0; at < table.size(); ++at) {
-    FOCALFLEET_TRY_ASSIGN(const MoveRow row, ReadMove(table, at, unit_of_id, units.source));
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
+    const MoveRow move = ReadMove(&row, unit_of_id, units.source);
+    more->Read(&row);
+    if (row.error()) return;
     const std::uint64_t key =
-        (std::uint64_t{row.unit} << 32) | static_cast<std::uint64_t>(row.move);
-    const auto [it, fresh] = line_of.emplace(key, table.line(at));
-    if (!fresh)
-      return tl::unexpected<Error>(
-          table.ErrorAt(at, TwiceText(units.units[row.unit].id.value, row.move, it->second)));
-    rows.push_back(row);
-  }
+        (std::uint64_t{move.unit} << 32) | static_cast<std::uint64_t>(move.move);
+    if (const auto [it, fresh] = line_of.emplace(key, row.line()); !fresh)
+      return row.RejectRow(TwiceText(units.units[move.unit].id.value, move.move, it->second),
+                           "a move twice");
+    rows.push_back(move);
+  }));
   if (rows.empty()) return Fail(ErrorCode::kInvalid, table.file() + ": a header, but no moves");
   std::stable_sort(rows.begin(), rows.end(),
                    [](const MoveRow& a, const MoveRow& b) { return a.unit < b.unit; });
   return rows;
-}
-
-Status ReadCovariate(const CsvTable& table, const std::string& name,
-                     const std::vector<MoveRow>& rows, Campaign* campaign) {
-  sim::Covariate covariate{name, {}};
-  covariate.values.reserve(rows.size());
-  const auto bounds =
-      std::find_if(std::begin(kCovariateBounds), std::end(kCovariateBounds),
-                   [&](const CovariateBounds& candidate) { return candidate.column == name; });
-  for (const MoveRow& move : rows) {
-    CsvRow row(table, move.at);
-    const std::optional<double> value = row.NumberIfAny(name);
-    if (value && bounds != std::end(kCovariateBounds) &&
-        (*value < bounds->low || *value > bounds->high))
-      row.Reject(name, NumberText(*value) + " is not between " + NumberText(bounds->low) + " and " +
-                           NumberText(bounds->high));
-    if (row.error()) return tl::unexpected<Error>(*row.error());
-    covariate.values.push_back(value.value_or(kMissing));
-  }
-  campaign->covariates.push_back(std::move(covariate));
-  return {};
-}
-
-Status ReadModes(const CsvTable& table, const std::vector<MoveRow>& rows, Campaign* campaign) {
-  sim::WordColumn column{std::string(kWordColumn), {kModes.begin(), kModes.end()}, {}};
-  for (const MoveRow& move : rows) {
-    CsvRow row(table, move.at);
-    if (!row.Has(kWordColumn)) {
-      column.values.push_back(-1);
-      continue;
-    }
-    const std::string word = row.Text(kWordColumn);
-    const auto it = std::find(kModes.begin(), kModes.end(), word);
-    if (it == kModes.end())
-      return tl::unexpected<Error>(
-          table.ErrorAt(move.at, "column mode: '" + word.substr(0, 40) +
-                                     "' is not asymmetric, five_segment or seven_segment"));
-    column.values.push_back(static_cast<int>(it - kModes.begin()));
-  }
-  campaign->word_columns.push_back(std::move(column));
-  return {};
 }
 
 void TakeRows(const std::vector<MoveRow>& rows, const UnitsFile& units, bool has_rail, bool has_bus,
@@ -209,49 +268,39 @@ void TakeRows(const std::vector<MoveRow>& rows, const UnitsFile& units, bool has
   campaign->first_row.push_back(campaign->move_id.size());
 }
 
-bool HasColumn(std::string_view text, std::string_view column) {
-  // Of the header alone: whether units.csv has it, or its reader put a default there.
-  while (text.starts_with('#')) text.remove_prefix(std::min(text.size(), text.find('\n') + 1));
-  const std::string_view header = text.substr(0, text.find('\n'));
-  return header.find(column) != std::string_view::npos;
-}
-
 /// Which hardware stood at each place, where units.csv says so.
 Status ReadSerials(const CampaignTables& tables, Campaign* campaign) {
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.units, tables.units_file));
   if (!table.Find("serial")) return {};
   std::unordered_map<std::uint32_t, CampaignUnit*> unit_of;
   for (CampaignUnit& unit : campaign->units) unit_of[unit.id] = &unit;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  return table.ReadRows([&](CsvRow& row) {
     const auto id = static_cast<std::uint32_t>(row.Integer("unit_id", {0, UINT32_MAX}));
     const auto serial = row.IntegerIfAny("serial", {0, UINT32_MAX});
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     if (const auto unit = unit_of.find(id); unit != unit_of.end())
       unit->second->serial = static_cast<std::uint32_t>(serial.value_or(0));
-  }
-  return {};
+  });
 }
 
 }  // namespace
 
-Result<Campaign> ReadCampaign(const CampaignTables& tables) {
+Result<Campaign> ReadCampaign(const CampaignTables& tables, PassedOver* passed_over) {
   FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(tables.units, tables.units_file));
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.moves, tables.moves_file));
   FOCALFLEET_TRY(table.Require({"unit_id", "move_id", "theta_from_deg", "theta_cmd_deg",
                                 "phi_from_deg", "phi_cmd_deg", "x_mm", "y_mm"}));
-  FOCALFLEET_TRY_ASSIGN(const std::vector<MoveRow> rows, ReadMoveRows(table, units));
+  MoreColumns more(table);
+  FOCALFLEET_TRY_ASSIGN(const std::vector<MoveRow> rows, ReadMoveRows(table, units, &more));
   Campaign campaign;
   campaign.name = tables.name;
-  TakeRows(rows, units, HasColumn(tables.units, "rail_id"), HasColumn(tables.units, "bus_id"),
-           &campaign);
+  const auto has = [&](std::string_view column) {
+    return std::ranges::count(units.columns, column) > 0;
+  };
+  TakeRows(rows, units, has("rail_id"), has("bus_id"), &campaign);
   FOCALFLEET_TRY(ReadSerials(tables, &campaign));
-  for (const std::string& column : table.columns()) {
-    if (std::find(kFixedColumns.begin(), kFixedColumns.end(), column) != kFixedColumns.end())
-      continue;
-    FOCALFLEET_TRY(column == kWordColumn ? ReadModes(table, rows, &campaign)
-                                         : ReadCovariate(table, column, rows, &campaign));
-  }
+  if (passed_over != nullptr) *passed_over = {more.passed_over(), units.ignored_columns};
+  more.TakeInto(&campaign, rows);
   FOCALFLEET_TRY(Validate(campaign));
   return campaign;
 }

@@ -6,6 +6,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "protocol/base/result.h"
 #include "sim/campaign/campaign.h"
@@ -21,9 +22,17 @@ struct CampaignTables {
   std::string name = "campaign";
 };
 
-/// Errors: kInvalid with file:line: column: reason. A unit that has moves must stand in units.csv;
-/// one that has none is left out. Rows of units may alternate.
-Result<sim::Campaign> ReadCampaign(const CampaignTables& tables);
+/// Columns that nobody reads, as messages call them; where words stand among the numbers of one,
+/// with the line of the first.
+struct PassedOver {
+  std::vector<std::string> of_moves;
+  std::vector<std::string> of_units;
+};
+
+/// A unit that has moves must stand in units.csv; one that has none is left out. Rows of units may
+/// alternate. A column of moves.csv that nobody knows is a covariate where it holds numbers or
+/// flags alone. Errors: kInvalid with file:line: column: reason, of all rows.
+Result<sim::Campaign> ReadCampaign(const CampaignTables& tables, PassedOver* passed_over = nullptr);
 
 /// Every column; reads back equal.
 std::string WriteMoves(const sim::Campaign& campaign);

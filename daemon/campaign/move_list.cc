@@ -107,30 +107,32 @@ std::vector<ListedMove> Diagnostic(const Layout& layout, std::size_t count) {
 
 }  // namespace
 
-Result<std::vector<ListedMove>> ReadMoveList(std::string_view text, std::string file,
-                                             const Layout& layout) {
+Result<MoveList> ReadMoveList(std::string_view text, std::string file, const Layout& layout) {
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(text, std::move(file)));
   FOCALFLEET_TRY(table.Require({"move_id", "unit_id", "theta_deg", "phi_deg"}));
   std::map<std::int64_t, ListedMove> moves;
   std::set<std::pair<std::int64_t, std::uint32_t>> named;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     const std::int64_t id = row.Integer("move_id", {0, INT64_MAX});
     const auto unit = static_cast<std::uint32_t>(row.Integer("unit_id", {0, UINT32_MAX}));
     const TargetAngles angles{row.Number("theta_deg"), row.Number("phi_deg")};
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     if (!layout.Find(UnitId{unit}))
-      return tl::unexpected<Error>(table.ErrorAt(k, "there is no unit " + std::to_string(unit)));
+      return row.RejectRow("there is no unit " + std::to_string(unit), "unknown unit");
     if (!named.insert({id, unit}).second)
-      return tl::unexpected<Error>(table.ErrorAt(
-          k, "unit " + std::to_string(unit) + " is twice in move " + std::to_string(id)));
+      return row.RejectRow(
+          "unit " + std::to_string(unit) + " is twice in move " + std::to_string(id),
+          "twice in one move");
     ListedMove& move = moves[id];
     move.id = id;
     move.rows.push_back({.unit = UnitId{unit}, .place = angles, .line = row.line()});
-  }
+  }));
   if (moves.empty()) return Fail(ErrorCode::kInvalid, table.file() + ": a header, but no moves");
-  std::vector<ListedMove> list;
-  for (auto& [id, move] : moves) list.push_back(std::move(move));
+  MoveList list;
+  list.ignored_columns =
+      table.Others({"move_id", "unit_id", "theta_deg", "phi_deg", "drive_amplitude", "delay_s",
+                    "elevation_deg", "rehomed", "separates"});
+  for (auto& [id, move] : moves) list.moves.push_back(std::move(move));
   return list;
 }
 

@@ -19,10 +19,13 @@ struct ListedMove {
   std::vector<TargetRow> rows;
 };
 
-/// Ascending by id. Errors: kInvalid with file:line: a column or value missing, a unit twice in one
-/// move, or one that the layout has not; nothing to do.
-Result<std::vector<ListedMove>> ReadMoveList(std::string_view text, std::string file,
-                                             const Layout& layout);
+struct MoveList {
+  std::vector<ListedMove> moves;             // ascending by id
+  std::vector<std::string> ignored_columns;  // not known
+};
+/// Errors: kInvalid with file:line: a column missing; of all rows a value missing, a unit twice in
+/// one move, or one that the layout has not; nothing to do.
+Result<MoveList> ReadMoveList(std::string_view text, std::string file, const Layout& layout);
 std::string WriteMoveList(const std::vector<ListedMove>& moves);
 
 enum class CampaignKind : std::uint8_t {

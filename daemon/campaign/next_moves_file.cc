@@ -16,9 +16,10 @@ namespace {
 struct Condition {
   const char* column;
   double nothing;
+  bool is_flag = false;
 };
 const Condition kConditions[] = {
-    {"drive_amplitude", 1}, {"delay_s", 3}, {"elevation_deg", std::nan("")}, {"rehomed", 0}};
+    {"drive_amplitude", 1}, {"delay_s", 3}, {"elevation_deg", std::nan("")}, {"rehomed", 0, true}};
 
 sim::MoveConditions ConditionsOf(CsvRow* row) {
   sim::MoveConditions conditions;
@@ -26,7 +27,7 @@ sim::MoveConditions ConditionsOf(CsvRow* row) {
   if (const auto delay_s = row->NumberIfAny("delay_s")) conditions.delay_s = *delay_s;
   if (const auto elevation = row->NumberIfAny("elevation_deg"))
     conditions.elevation_deg = *elevation;
-  if (const auto homed = row->IntegerIfAny("rehomed", {0, 1})) conditions.home_first = *homed == 1;
+  conditions.home_first = row->FlagIfAny("rehomed").value_or(conditions.home_first);
   return conditions;
 }
 
@@ -65,30 +66,29 @@ Result<std::vector<sim::PlateMove>> ReadNextMoves(std::string_view text, std::st
   std::map<std::int64_t, std::size_t> place;  // of a unit
   for (std::size_t u = 0; u < units.size(); ++u) place[units[u].id] = u;
   std::map<std::int64_t, sim::PlateMove> moves;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     const std::int64_t id = row.Integer("move_id", {0, INT64_MAX});
     const std::int64_t unit = row.Integer("unit_id", {0, UINT32_MAX});
     const std::array<double, 2> to_deg = {row.Number("theta_deg"), row.Number("phi_deg")};
     const sim::MoveConditions conditions = ConditionsOf(&row);
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     const auto at = place.find(unit);
     if (at == place.end())
-      return tl::unexpected<Error>(table.ErrorAt(k, fmt::format("there is no unit {}", unit)));
+      return row.RejectRow(fmt::format("there is no unit {}", unit), "unknown unit");
     const auto [move, fresh] = moves.try_emplace(id);
     if (fresh) {
       move->second.conditions = conditions;
       move->second.to_deg.resize(units.size());
     }
     if (!AreSame(move->second.conditions, conditions))
-      return tl::unexpected<Error>(
-          table.ErrorAt(k, fmt::format("move {} has other conditions in a row before", id)));
+      return row.RejectRow(fmt::format("move {} has other conditions in a row before", id),
+                           "other conditions in one move");
     auto& own = move->second.to_deg[at->second];
     if (own)
-      return tl::unexpected<Error>(
-          table.ErrorAt(k, fmt::format("unit {} is twice in move {}", unit, id)));
+      return row.RejectRow(fmt::format("unit {} is twice in move {}", unit, id),
+                           "twice in one move");
     own = to_deg;
-  }
+  }));
   std::vector<sim::PlateMove> list;
   for (auto& [id, move] : moves) list.push_back(std::move(move));
   return list;
@@ -100,13 +100,13 @@ Result<std::vector<std::string>> ConditionsAsked(std::string_view text, std::str
   for (const Condition& condition : kConditions) {
     if (!table.Find(condition.column)) continue;
     std::set<std::int64_t> moves;
-    for (std::size_t k = 0; k < table.size(); ++k) {
-      CsvRow row(table, k);
+    FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
       const std::int64_t id = row.Integer("move_id", {0, INT64_MAX});
-      const std::optional<double> value = row.NumberIfAny(condition.column);
-      if (row.error()) return tl::unexpected<Error>(*row.error());
+      const std::optional<double> value = condition.is_flag
+                                              ? row.NumberOrFlagIfAny(condition.column)
+                                              : row.NumberIfAny(condition.column);
       if (value && *value != condition.nothing) moves.insert(id);
-    }
+    }));
     if (!moves.empty())
       asked.push_back(fmt::format("{} in {} {}, first in move {}", condition.column, moves.size(),
                                   moves.size() == 1 ? "move" : "moves", *moves.begin()));

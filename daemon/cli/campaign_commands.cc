@@ -184,8 +184,10 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (!fleet) return Report(context, fleet.error());
   const auto text = ReadTextFile(options.list);
   if (!text) return Report(context, text.error());
-  const auto moves = ReadMoveList(*text, options.list, fleet->layout);
-  if (!moves) return Report(context, moves.error());
+  const auto list = ReadMoveList(*text, options.list, fleet->layout);
+  if (!list) return Report(context, list.error());
+  TellPassedOver(context, options.list, list->ignored_columns);
+  const std::vector<ListedMove>& moves = list->moves;
   const auto asked = ConditionsAsked(*text, options.list);
   if (!asked) return Report(context, asked.error());
   for (const std::string& condition : *asked)
@@ -207,11 +209,11 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   std::size_t unmeasured = 0;
   std::size_t unserved = 0;
   int in_a_row = 0;
-  for (std::size_t m = 0; m < moves->size(); ++m) {
-    const ListedMove& move = (*moves)[m];
+  for (std::size_t m = 0; m < moves.size(); ++m) {
+    const ListedMove& move = moves[m];
     const std::string source = fmt::format("{} move {}", options.list, move.id);
     const auto made =
-        MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves->size()));
+        MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves.size()));
     if (!made) return Report(context, made.error());
     in_a_row = made->measured ? 0 : in_a_row + 1;
     unmeasured += made->measured ? 0u : 1u;
@@ -237,7 +239,7 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   bar.End();
   const sim::Campaign campaign = log.Campaign(options.list);
   if (context.json)
-    PrintJson({{"moves", moves->size()},
+    PrintJson({{"moves", moves.size()},
                {"units", campaign.units.size()},
                {"rows", campaign.rows()},
                {"unmeasured_moves", unmeasured},
@@ -249,7 +251,7 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (unserved > 0)
     Say(context, fmt::format("{} not made or not seen (focalfleet history says why)",
                              Count(unserved, "move of a unit was", "moves of units were")));
-  Say(context, fmt::format("{}: {} of {}, {}", options.out, Count(moves->size(), "move", "moves"),
+  Say(context, fmt::format("{}: {} of {}, {}", options.out, Count(moves.size(), "move", "moves"),
                            Count(campaign.units.size(), "unit", "units"),
                            Count(campaign.rows(), "row", "rows")));
   return unmeasured + unserved == 0 ? ExitCode::kOk : ExitCode::kSomeUnserved;

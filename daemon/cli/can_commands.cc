@@ -9,7 +9,7 @@
 #include <system_error>
 
 #include "daemon/cli/command_line.h"
-#include "daemon/files/text_file.h"
+#include "fleet/files/foreign_format.h"
 #include "protocol/wire/candump_line.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/message_rows.h"
@@ -135,14 +135,58 @@ struct Tally {
   std::uint64_t lines = 0;
   std::uint64_t bad = 0;
   std::uint64_t first_bad = 0;
+  std::uint64_t passed_over = 0;  // words of candump that are about no frame
+  std::int64_t dropped = 0;       // frames, as candump counted them
 };
 
+/// The error frame that the words of the next lines are about.
+struct ErrorFrame {
+  std::string time;
+  std::string interface;
+};
+
+void PrintNote(const Context& context, const CandumpNote& note, const ErrorFrame& of,
+               Tally* tally) {
+  switch (note.kind) {
+    case CandumpNote::Kind::kErrorWords:
+      if (context.json)
+        PrintJson(
+            {{"time", of.time}, {"interface", of.interface}, {"error", std::string(note.text)}});
+      else
+        PrintText(fmt::format("{}{}  error frame: {}\n",
+                              of.time.empty() ? "" : fmt::format("{}  ", of.time), of.interface,
+                              note.text));
+      return;
+    case CandumpNote::Kind::kDropped:
+      tally->dropped += note.dropped;
+      if (context.json)
+        PrintJson({{"interface", std::string(note.interface)},
+                   {"dropped", note.dropped},
+                   {"dropped_total", note.dropped_total}});
+      else
+        PrintText(fmt::format("{}  dropped {} (in all {})\n", note.interface,
+                              Count(static_cast<std::uint64_t>(note.dropped), "frame", "frames"),
+                              note.dropped_total));
+      return;
+    case CandumpNote::Kind::kOther:
+      ++tally->passed_over;
+  }
+}
+
 // Line by line and each told at once, so that candump may run on before it in a pipe.
-Tally DecodeAll(const Context& context, const std::string& name, std::istream& in) {
+Result<Tally> DecodeAll(const Context& context, const std::string& name, std::istream& in) {
   Tally tally;
-  for (std::string line; OutputError() == 0 && std::getline(in, line);) {
-    ++tally.lines;
+  ErrorFrame error_frame;
+  for (std::string raw; OutputError() == 0 && std::getline(in, raw);) {
+    if (tally.lines++ == 0)
+      if (const auto format = ForeignFormat(raw))
+        return Fail(ErrorCode::kInvalid, fmt::format("{}: this is {}", name, *format));
+    const std::string line = WithoutDecoration(raw);
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+    if (const auto note = ParseCandumpNote(line)) {
+      PrintNote(context, *note, error_frame, &tally);
+      continue;
+    }
     const auto parsed = ParseCandumpLine(line);
     if (!parsed) {
       if (tally.bad++ == 0) tally.first_bad = tally.lines;
@@ -150,6 +194,7 @@ Tally DecodeAll(const Context& context, const std::string& name, std::istream& i
           fmt::format("{}:{}: not a line of candump: {}\n", name, tally.lines, parsed.error()));
       continue;
     }
+    error_frame = {std::string(parsed->time), std::string(parsed->interface)};
     if (parsed->group)
       PrintGroup(context, *parsed);
     else if (context.json)
@@ -158,6 +203,18 @@ Tally DecodeAll(const Context& context, const std::string& name, std::istream& i
       PrintText(TextOf(*parsed));
   }
   return tally;
+}
+
+/// Tells what the frames alone do not show.
+void TellTally(const Context& context, const std::string& name, const Tally& tally) {
+  if (context.quiet) return;
+  if (tally.dropped != 0)
+    Complain(fmt::format(
+        "focalfleet: {}: {} missing: candump could not keep up\n", name,
+        tally.dropped == 1 ? "1 frame is" : fmt::format("{} frames are", tally.dropped)));
+  if (tally.passed_over > 0)
+    Complain(fmt::format("focalfleet: {}: {} of candump's own words passed over\n", name,
+                         Count(tally.passed_over, "line", "lines")));
 }
 
 ExitCode RunCanDecode(const Context& context, const CanDecodeOptions& options) {
@@ -172,11 +229,14 @@ ExitCode RunCanDecode(const Context& context, const CanDecodeOptions& options) {
       return Report(context, {ErrorCode::kUnavailable,
                               fmt::format("{}: {}", name, file ? "a directory" : why.message())});
   }
-  const Tally tally = DecodeAll(context, name, from_stdin ? std::cin : file);
-  if (tally.bad == 0) return ExitCode::kOk;
-  return Report(context, {ErrorCode::kInvalid,
-                          fmt::format("{}: {} of {} not candump's, first {}:{}", name, tally.bad,
-                                      Count(tally.lines, "line", "lines"), name, tally.first_bad)});
+  const auto tally = DecodeAll(context, name, from_stdin ? std::cin : file);
+  if (!tally) return Report(context, tally.error());
+  TellTally(context, name, *tally);
+  if (tally->bad == 0) return ExitCode::kOk;
+  return Report(context,
+                {ErrorCode::kInvalid,
+                 fmt::format("{}: {} of {} not candump's, first {}:{}", name, tally->bad,
+                             Count(tally->lines, "line", "lines"), name, tally->first_bad)});
 }
 
 }  // namespace

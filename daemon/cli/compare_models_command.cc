@@ -194,7 +194,7 @@ std::string ComparisonText(const Compared& compared) {
 }  // namespace
 
 ExitCode RunCompareModels(const Context& context, const CompareModelsOptions& options) {
-  const auto in = ReadMeasuredCampaign(options.campaign);
+  const auto in = ReadMeasuredCampaign(context, options.campaign);
   if (!in) return Report(context, in.error());
   auto a = ReadSide("A", options.model_a, in->campaign);
   if (!a) return Report(context, a.error());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -60,8 +61,13 @@ void Say(const Context& context, std::string_view line) {
 void TellPassedOver(const Context& context, const std::string& file,
                     const std::vector<std::string>& columns) {
   if (columns.empty() || context.quiet || context.json) return;
-  Complain(
-      fmt::format("focalfleet: {}: columns passed over: {}\n", file, fmt::join(columns, ", ")));
+  constexpr std::size_t kTold = 20;
+  const std::size_t told = std::min(columns.size(), kTold);
+  const std::string names = fmt::format(
+      "{}", fmt::join(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(told), ", "));
+  const std::string more =
+      columns.size() > told ? fmt::format(" and {} more", columns.size() - told) : "";
+  Complain(fmt::format("focalfleet: {}: columns passed over: {}{}\n", file, names, more));
 }
 
 void NameUnserved(const Context& context, std::string_view lines) {

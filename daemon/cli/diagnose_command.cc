@@ -113,7 +113,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
                                       .threads = options.threads});
   if (const auto known = CheckCauses(options.leave_out); !known)
     return Report(context, known.error(), ExitCode::kUsage);
-  auto in = ReadMeasuredCampaign(options.campaign);
+  auto in = ReadMeasuredCampaign(context, options.campaign);
   if (!in) return Report(context, in.error());
   std::optional<sim::CampaignModel> before;
   if (!options.model.empty()) {
@@ -169,8 +169,8 @@ struct SimulateCampaignOptions {
 
 // The moves of a measured campaign, with the places where the model says that they end. What was
 // not seen stays so.
-Result<sim::Campaign> Predicted(const SimulateCampaignOptions& options) {
-  FOCALFLEET_TRY_ASSIGN(MeasuredCampaign measured, ReadMeasuredCampaign(options.of));
+Result<sim::Campaign> Predicted(const Context& context, const SimulateCampaignOptions& options) {
+  FOCALFLEET_TRY_ASSIGN(MeasuredCampaign measured, ReadMeasuredCampaign(context, options.of));
   sim::Campaign& campaign = measured.campaign;
   FOCALFLEET_TRY_ASSIGN(const ModelFile file, ReadModelFor(campaign, options.model));
   const sim::Places places = sim::Predict(file.model, sim::MakeFacts(campaign), OnThreads(0));
@@ -232,7 +232,8 @@ ExitCode RunSimulateCampaign(const Context& context, const SimulateCampaignOptio
                                                            "folder for what is predicted"},
                   ExitCode::kUsage);
   const bool reads_files = !options.of.empty() || !options.next.empty();
-  const auto campaign = options.of.empty() ? Simulate(planted, options.next) : Predicted(options);
+  const auto campaign =
+      options.of.empty() ? Simulate(planted, options.next) : Predicted(context, options);
   if (!campaign)
     return Report(context, campaign.error(), reads_files ? ExitCode::kRefused : ExitCode::kUsage);
   std::filesystem::create_directories(options.out, failed);

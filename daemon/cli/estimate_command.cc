@@ -73,7 +73,7 @@ std::string DescribeDrive(const UnitDrive& drive) {
 }
 
 Result<StatePoses> StartOf(const EstimateOptions& options, const OfflineFleet& fleet) {
-  if (!options.from.empty()) return LoadState(options.from, fleet);
+  if (!options.from.empty()) return LoadState(options.from, fleet, WhoseState::kAll);
   const std::vector<Pose> folded = FoldedConfiguration(fleet.layout, fleet.drives);
   return StatePoses(folded.begin(), folded.end());
 }

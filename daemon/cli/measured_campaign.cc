@@ -12,18 +12,22 @@
 
 namespace focalfleet::cli {
 
-Result<MeasuredCampaign> ReadMeasuredCampaign(const std::string& folder) {
+Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std::string& folder) {
   const std::filesystem::path path(folder);
   const std::string moves_file = path / "moves.csv", units_file = path / "units.csv";
   FOCALFLEET_TRY_ASSIGN(const std::string moves, ReadTextFile(moves_file));
   FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTextFile(units_file));
   MeasuredCampaign in;
   in.names.campaign = path.filename().empty() ? path.parent_path().filename() : path.filename();
+  PassedOver passed_over;
   FOCALFLEET_TRY_ASSIGN(in.campaign, ReadCampaign({.moves = moves,
                                                    .units = units,
                                                    .moves_file = moves_file,
                                                    .units_file = units_file,
-                                                   .name = in.names.campaign}));
+                                                   .name = in.names.campaign},
+                                                  &passed_over));
+  TellPassedOver(context, units_file, passed_over.of_units);
+  TellPassedOver(context, moves_file, passed_over.of_moves);
   in.names.sha256 = Sha256Hex(moves + units);
   in.names.model_after = in.names.campaign + "-extended";
   return in;

@@ -6,6 +6,7 @@
 
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/model_file.h"
+#include "daemon/cli/context.h"
 #include "protocol/base/result.h"
 #include "sim/campaign/campaign.h"
 #include "sim/diagnosis/model.h"
@@ -17,8 +18,9 @@ struct MeasuredCampaign {
   ReportNames names;
 };
 
-/// moves.csv and units.csv of the folder. Errors: a file that cannot be read, or is no such table.
-Result<MeasuredCampaign> ReadMeasuredCampaign(const std::string& folder);
+/// moves.csv and units.csv of the folder. Tells which columns of them were passed over. Errors: a
+/// file that cannot be read, or is no such table.
+Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std::string& folder);
 
 /// Errors: as above, of a model.toml for the campaign's units.
 Result<ModelFile> ReadModelFor(const sim::Campaign& campaign, const std::string& file);

@@ -10,6 +10,7 @@
 #include "daemon/campaign/compensation.h"
 #include "daemon/cli/context.h"
 #include "fleet/drive.h"
+#include "fleet/files/state_file.h"
 #include "fleet/layout.h"
 #include "fleet/plan/planner.h"
 #include "fleet/records.h"
@@ -52,11 +53,11 @@ Status TakeTuned(const std::string& store, OfflineFleet* fleet);
 /// Errors: kUnavailable, kInvalid with file:line.
 Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files);
 
-/// Shape: (n); none: the file does not name the unit. Errors: as LoadFleet.
-Result<std::vector<std::optional<Pose>>> LoadState(const std::string& path,
-                                                   const OfflineFleet& fleet);
-
 using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
+
+/// Where the units of `whose` stand, and others that the file names.
+/// Errors: as LoadFleet, and a unit of these that the file does not name.
+Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet, WhoseState whose);
 
 struct PlanFiles {
   std::string targets;

@@ -66,7 +66,7 @@ std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
 Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& options) {
   FOCALFLEET_TRY_ASSIGN(OfflineFleet fleet, LoadFleet(context, options.files));
   FOCALFLEET_TRY(TakeTuned(options.store, &fleet));
-  FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet));
+  FOCALFLEET_TRY_ASSIGN(const auto state, LoadState(options.from, fleet, WhoseState::kAll));
   FOCALFLEET_TRY_ASSIGN(OfflinePlan planned, PlanOffline(context, fleet, state,
                                                          {.targets = options.targets,
                                                           .from = options.from,

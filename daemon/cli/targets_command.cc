@@ -29,18 +29,9 @@ using Poses = std::vector<std::optional<Pose>>;
 Result<Poses> Standing(const TargetsOptions& options, const OfflineFleet& fleet) {
   Poses standing(fleet.layout.size());
   if (options.from.empty()) return standing;
-  FOCALFLEET_TRY_ASSIGN(const Poses state, LoadState(options.from, fleet));
-  for (std::uint32_t i = 0; i < standing.size(); ++i) {
-    const Unit& unit = fleet.layout.unit({i});
-    if (unit.enabled) continue;
-    if (!state[i]) {
-      return Fail(ErrorCode::kInvalid,
-                  fmt::format("{}: no row for unit {}, which is disabled in {}: where it stands is "
-                              "needed to keep clear of it",
-                              options.from, unit.id.value, options.files.units));
-    }
-    standing[i] = state[i];
-  }
+  FOCALFLEET_TRY_ASSIGN(const Poses state, LoadState(options.from, fleet, WhoseState::kDisabled));
+  for (std::uint32_t i = 0; i < standing.size(); ++i)
+    if (!fleet.layout.unit({i}).enabled) standing[i] = state[i];
   return standing;
 }
 

@@ -228,8 +228,7 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(loads_text, options.loads));
   FOCALFLEET_TRY(table.Require({"unit_id", "axis", "load_uNm"}));
   std::vector<bool> given(loads.size(), false);
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     const std::int64_t id = row.Integer("unit_id", {0, UINT32_MAX});
     const double load_uNm = row.Number("load_uNm");
     if (!(load_uNm > 0 && load_uNm <= 1000)) row.Reject("load_uNm", "not above 0 and up to 1000");
@@ -241,10 +240,10 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
       ++at;
     if (at == loads.size()) row.Reject("unit_id", "not in " + options.units);
     if (at < loads.size() && given[at]) row.Reject("unit_id", "this axis is there twice");
-    if (const auto& error = row.error()) return tl::unexpected<Error>(*error);
+    if (row.error()) return;
     given[at] = true;
     loads[at].load_Nm = load_uNm * 1e-6;
-  }
+  }));
   return loads;
 }
 

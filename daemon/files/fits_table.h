@@ -1,9 +1,11 @@
 // A FITS binary table as plain columns, in and out. FITS is what astronomers' pipelines read; the
-// same columns as in our CSV files stand under the same names. Files are opened by their exact
-// name: cfitsio's extended file names, which can run filters and fetch URLs, are off.
+// same columns as in our CSV files stand under the same names. Tables are read from memory: what a
+// file says of itself is held against the bytes that are there, and cfitsio's extended file names,
+// which can run filters and fetch URLs, never see a name from outside.
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <variant>
@@ -41,11 +43,24 @@ struct FitsTable {
 
 inline constexpr std::int64_t kFitsRowsMax = 10'000'000;
 
-/// The first binary table of a file. Numbers come as whole numbers where the file has them as such
-/// (without scaling), else as double; a missing whole number is an error. Columns that hold more
-/// than one value a row are left out. Errors: kUnavailable: not readable; kInvalid: not FITS, no
-/// table, too long; names the file and cfitsio's reason.
-Result<FitsTable> ReadFitsTable(const std::string& path);
+/// The columns to be read of a file; whatever else stands in it does not matter.
+struct FitsWanted {
+  /// The first table that has all of these is meant; empty: the first table, and of it all columns
+  /// with one number or text a row.
+  std::vector<std::string> columns;
+  std::vector<std::string> optional = {};  // taken where that table has them
+  std::int64_t rows_max = kFitsRowsMax;
+};
+
+/// Numbers come as whole numbers where the file has them as such (without scaling), else as double,
+/// NaN where one is missing. Keys are those of the table; then those of the primary header that it
+/// lacks, which hold for the whole file. Errors: kInvalid: not FITS, no such table, too long, a
+/// wanted column that holds no number or text a row, or misses a whole one; says which, after
+/// `name`.
+Result<FitsTable> ParseFitsTable(std::string bytes, const std::string& name,
+                                 const FitsWanted& wanted);
+/// Errors: also kUnavailable: the file cannot be read.
+Result<FitsTable> ReadFitsTable(const std::string& path, const FitsWanted& wanted = {});
 
 /// `path` holds the table, or what it held before. Errors: kUnavailable, names the file.
 Status WriteFitsTable(const std::string& path, const FitsTable& table);

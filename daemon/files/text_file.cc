@@ -12,41 +12,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <optional>
-#include <string_view>
+
+#include "daemon/files/descriptor.h"
+#include "fleet/files/foreign_format.h"
 
 namespace focalfleet {
 namespace {
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (fd_ >= 0) close(fd_);
-  }
-  [[nodiscard]] int get() const { return fd_; }
-
- private:
-  int fd_;
-};
-
-tl::unexpected<Error> FailErrno(const std::string& path, const char* what, int error) {
-  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
-  return Fail(full ? ErrorCode::kFull : ErrorCode::kUnavailable,
-              fmt::format("{}: {}: {}", path, what, std::strerror(error)));
-}
-
-// 0: all written, else errno.
-int WriteAll(int fd, std::string_view text) {
-  while (!text.empty()) {
-    const ssize_t n = write(fd, text.data(), text.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return errno;
-    text.remove_prefix(static_cast<std::size_t>(n));
-  }
-  return 0;
-}
 
 /// Length of the UTF-8 sequence that begins at `at`, 0 where none does.
 std::size_t SequenceLength(std::string_view text, std::size_t at) {
@@ -102,6 +73,38 @@ Status WriteDirectly(const std::string& path, const std::string& text) {
 
 }  // namespace
 
+tl::unexpected<Error> FailErrno(const std::string& path, const char* what, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT || error == EFBIG;
+  return Fail(full ? ErrorCode::kFull : ErrorCode::kUnavailable,
+              fmt::format("{}: {}: {}", path, what, std::strerror(error)));
+}
+
+int WriteAll(int fd, std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t n = write(fd, text.data(), text.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return errno;
+    text.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return 0;
+}
+
+tl::expected<std::string, int> ReadAll(int fd, std::size_t bytes_max) {
+  std::string bytes;
+  for (;;) {
+    constexpr std::size_t kChunk = 1u << 20;
+    const std::size_t had = bytes.size();
+    bytes.resize(had + kChunk);
+    const ssize_t n = read(fd, bytes.data() + had, kChunk);
+    const int error = n < 0 ? errno : 0;
+    bytes.resize(had + (n > 0 ? static_cast<std::size_t>(n) : 0));
+    if (error == EINTR) continue;
+    if (error != 0) return tl::unexpected<int>(error);
+    if (n == 0) return bytes;
+    if (bytes.size() > bytes_max) return tl::unexpected<int>(EFBIG);
+  }
+}
+
 Result<std::string> ReadFile(const std::string& path) {
   // Without waiting for a writer, who may never come. /dev/stdin is not opened anew: its file may
   // be half read, or a socket.
@@ -110,27 +113,18 @@ Result<std::string> ReadFile(const std::string& path) {
                             : open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
   if (file.get() < 0) return FailErrno(path, "cannot be read", errno);
   if (path != "/dev/stdin") FOCALFLEET_TRY(ReadWithWaiting(file.get(), path));
-  std::string text;
-  for (;;) {
-    constexpr std::size_t kChunk = 1u << 20;
-    const std::size_t had = text.size();
-    text.resize(had + kChunk);
-    const ssize_t n = read(file.get(), text.data() + had, kChunk);
-    const int error = n < 0 ? errno : 0;
-    text.resize(had + (n > 0 ? static_cast<std::size_t>(n) : 0));
-    if (error == EINTR) continue;
-    if (error != 0) return FailErrno(path, "cannot be read", error);
-    if (n == 0) return text;
-    if (text.size() > kFileBytesMax) {
-      return Fail(ErrorCode::kInvalid,
-                  fmt::format("{}: larger than {} MiB, so not one of our files", path,
-                              kFileBytesMax >> 20));
-    }
+  auto bytes = ReadAll(file.get(), kFileBytesMax);
+  if (bytes) return std::move(*bytes);
+  if (bytes.error() == EFBIG) {
+    return Fail(ErrorCode::kInvalid, fmt::format("{}: larger than {} MiB, so not one of our files",
+                                                 path, kFileBytesMax >> 20));
   }
+  return FailErrno(path, "cannot be read", bytes.error());
 }
 
-Result<std::string> ReadTextFile(const std::string& path) {
-  FOCALFLEET_TRY_ASSIGN(std::string text, ReadFile(path));
+Status CheckText(std::string_view text, const std::string& path) {
+  if (const auto format = ForeignFormat(text))
+    return Fail(ErrorCode::kInvalid, fmt::format("{}: this is {}", path, *format));
   if (const auto at = FirstNonText(text)) {
     std::size_t row = 1;
     for (std::size_t i = 0; i < *at; ++i) row += text[i] == '\n' ? 1u : 0u;
@@ -140,6 +134,12 @@ Result<std::string> ReadTextFile(const std::string& path) {
                     "is wanted",
                     path, row, static_cast<unsigned char>(text[*at]), *at));
   }
+  return {};
+}
+
+Result<std::string> ReadTextFile(const std::string& path) {
+  FOCALFLEET_TRY_ASSIGN(std::string text, ReadFile(path));
+  FOCALFLEET_TRY(CheckText(text, path));
   return text;
 }
 

@@ -72,8 +72,7 @@ Result<sim::FieldMap> ReadFieldMap(std::string_view text, std::string file) {
   FOCALFLEET_TRY(NotEmpty(table));
   sim::FieldMap map;
   map.reserve(table.size());
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     sim::FieldPoint point;
     point.theta_rad = Angle_rad(&row, "theta_deg");
     if (point.theta_rad < -1e-9 || point.theta_rad > 180 * kRadPerDeg + 1e-9)
@@ -87,9 +86,8 @@ Result<sim::FieldMap> ReadFieldMap(std::string_view text, std::string file) {
       if (!(*radius_mm > 0 && *radius_mm < 1e4))
         row.Reject("r_mm", row.Text("r_mm") + " is not between 0 and 10000 mm");
     }
-    if (row.error()) return tl::unexpected<Error>(*row.error());
     map.push_back(point);
-  }
+  }));
   return map;
 }
 
@@ -103,11 +101,10 @@ Result<std::vector<sim::HallSensor>> ReadSensors(std::string_view text, std::str
                                          " is the most");
   std::vector<sim::HallSensor> sensors(table.size());
   std::vector<int> line_of(table.size(), 0);
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     const std::int64_t number = row.Integer("sensor", {1, static_cast<std::int64_t>(table.size())});
     const sim::Vector3 direction{row.Number("x"), row.Number("y"), row.Number("z")};
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     const auto index = static_cast<std::size_t>(number - 1);
     if (line_of[index] != 0)
       row.Reject("sensor", "sensor " + std::to_string(number) + " is there twice, first in line " +
@@ -116,10 +113,10 @@ Result<std::vector<sim::HallSensor>> ReadSensors(std::string_view text, std::str
     if (std::abs(length - 1) > kLengthTolerance)
       row.Reject("x", "x, y, z have length " + NumberText(length) + ", a unit vector is expected");
     ReadGainAndOffset(&row, &sensors[index]);
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     line_of[index] = row.line();
     sensors[index].direction = Unit(direction);
-  }
+  }));
   return sensors;
 }
 
@@ -153,11 +150,7 @@ Result<std::vector<sim::VoltageRow>> ReadVoltages(std::string_view text, std::st
   FOCALFLEET_TRY(NotEmpty(table));
   std::vector<sim::VoltageRow> rows;
   rows.reserve(table.size());
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
-    rows.push_back(ReadRow(&row, sensors));
-    if (row.error()) return tl::unexpected<Error>(*row.error());
-  }
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) { rows.push_back(ReadRow(&row, sensors)); }));
   return rows;
 }
 
@@ -167,14 +160,12 @@ Result<PoseTable> ReadPoses(std::string_view text, std::string file, std::size_t
   FOCALFLEET_TRY(RequireVoltages(table, sensors));
   FOCALFLEET_TRY(NotEmpty(table));
   PoseTable poses;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     poses.poses.push_back(
         {Angle_rad(&row, "alpha_deg"), Angle_rad(&row, "beta_deg"), Angle_rad(&row, "gamma_deg")});
     poses.rows.push_back(ReadRow(&row, sensors));
-    if (row.error()) return tl::unexpected<Error>(*row.error());
     poses.has_temperature = poses.has_temperature || row.Has("temp_C");
-  }
+  }));
   for (const std::string& column : table.Others({"alpha_deg", "beta_deg", "gamma_deg", "temp_C"})) {
     bool voltage = false;
     for (std::size_t k = 0; k < sensors; ++k) voltage = voltage || column == VoltageColumn(k);

@@ -12,6 +12,7 @@
 namespace focalfleet::simulator {
 namespace {
 
+using namespace std::string_view_literals;
 using sim::FaultKind;
 using sim::FaultKindInfo;
 using sim::PlannedFault;
@@ -40,11 +41,7 @@ class Reader {
   }
 
   Result<std::vector<PlannedFault>> Read() {
-    for (std::size_t k = 0; k < table_.size(); ++k) {
-      CsvRow row(table_, k);
-      ReadRow(&row);
-      if (row.error()) return tl::unexpected<Error>(*row.error());
-    }
+    FOCALFLEET_TRY(table_.ReadRows([this](CsvRow& row) { ReadRow(&row); }));
     return std::move(plan_);
   }
 
@@ -150,13 +147,13 @@ class Reader {
 Result<std::vector<PlannedFault>> ReadFaults(std::string_view text, std::string file,
                                              const FaultsFor& fleet) {
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(text, std::move(file)));
-  FOCALFLEET_TRY(
-      table.Require({"fault", "bus_id", "unit_id", "from_s", "to_s", "chance", "value"}));
-  if (const auto others =
-          table.Others({"fault", "bus_id", "unit_id", "from_s", "to_s", "chance", "value"});
-      !others.empty())
-    return Fail(ErrorCode::kInvalid,
-                table.file() + ": no column is called '" + others.front() + "'");
+  static constexpr std::initializer_list<std::string_view> kKnown = {
+      "fault"sv, "bus_id"sv, "unit_id"sv, "from_s"sv, "to_s"sv, "chance"sv, "value"sv};
+  FOCALFLEET_TRY(table.Require(kKnown));
+  for (std::size_t column = 0; column < table.columns().size(); ++column)
+    if (table.HasName(column) && !std::ranges::count(kKnown, table.columns()[column]))
+      return Fail(ErrorCode::kInvalid,
+                  table.file() + ": no column is called '" + table.columns()[column] + "'");
   return Reader(table, fleet).Read();
 }
 

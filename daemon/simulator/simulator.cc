@@ -42,13 +42,12 @@ Status PlaceUnits(const std::string& path, const Layout& layout, sim::WorldConfi
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
   const std::vector<UnitDrive> drives(layout.size());
   FOCALFLEET_TRY_ASSIGN(const auto poses, ReadState(text, path, layout, drives));
-  for (std::size_t i = 0; i < layout.size(); ++i) {
-    if (!poses[i]) continue;
+  FOCALFLEET_TRY(RequirePoses(path, layout, poses, WhoseState::kAll));
+  for (std::size_t i = 0; i < layout.size(); ++i)
     for (const Axis axis : kAxes)
       config->units[i].axis[Index(axis)].angle_deg =
           AngleDeg((*poses[i])[Index(axis)], layout.units()[i].axis[Index(axis)],
                    drives[i].axis[Index(axis)]);
-  }
   return {};
 }
 

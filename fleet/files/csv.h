@@ -1,36 +1,49 @@
 // A CSV table as the project's files use it: one header line, then one row a line. Lines that start
-// with `#` are comments; a cell may be quoted ("" is a quote within); lines may end in CRLF; an
-// empty cell or `nan` is a missing value. ECSV of astropy reads too, also with its usual blanks
-// instead of commas.
+// with `#` are comments, lines of nothing but commas and blanks are passed over; a cell may be
+// quoted ("" is a quote within); lines may end in CRLF; an empty cell or `nan` is a missing value.
+// ECSV of astropy reads too, also with its usual blanks instead of commas.
+//
+// Columns without a name (the index of pandas, the last commas of spreadsheets) are passed over, as
+// are columns that a reader does not know.
 //
 // Parsing is total: any bytes give a table or an Error that names file, line, column and reason. A
 // file that was cut short is refused where that shows: a row with too few cells, an open quote, a
 // last line without its newline. (A file cut exactly between two lines cannot be told from a whole
 // one.)
+//
+// Cost: linear in the text; a cell by its column's name O(1).
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "fleet/files/bad_rows.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
 
 class CsvTable {
  public:
-  /// Errors: kInvalid: empty, not text, no header, a column twice, a row of another width, cut
-  /// short.
+  /// Errors: kInvalid: empty, not text, no header, a column twice, more columns or a longer row
+  /// than limits.h has, rows of another width, cut short.
   static Result<CsvTable> Parse(std::string_view text, std::string file);
 
   [[nodiscard]] const std::string& file() const { return file_; }
+  /// As they stand in the header.
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
+  /// A column as messages call it; "column 1 (no name)" where it has none.
+  [[nodiscard]] std::string Shown(std::size_t column) const;
+  /// Not where it has none, or the one that pandas gives to a column without (`Unnamed: 0`).
+  [[nodiscard]] bool HasName(std::size_t column) const;
   [[nodiscard]] std::optional<std::size_t> Find(std::string_view column) const;
   [[nodiscard]] std::size_t size() const { return lines_.size(); }  // rows
   /// Line of the file in which the row begins, from 1.
@@ -46,11 +59,24 @@ class CsvTable {
       std::initializer_list<std::string_view> known) const;
   [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
 
+  /// Calls `read(CsvRow&)` for every row, in their order; a reader rejects what it does not take
+  /// and keeps nothing of it. Errors: kInvalid tells all rows that were rejected.
+  template <class Read>
+  [[nodiscard]] Status ReadRows(Read read) const;
+
  private:
   friend class CsvParser;
+  struct TextHash {
+    using is_transparent = void;
+    std::size_t operator()(std::string_view text) const {
+      return std::hash<std::string_view>()(text);
+    }
+  };
   std::string file_;
   int header_line_ = 0;
   std::vector<std::string> columns_;
+  std::unordered_map<std::string, std::size_t, TextHash, std::equal_to<>>
+      index_;  // those with name
   std::vector<int> lines_;
   std::vector<std::string> cells_;  // Shape: (rows, columns), flat
 };
@@ -61,8 +87,7 @@ struct IntegerBounds {
 };
 
 /// One row's cells as values. The first cell that is wrong is remembered and the values read after
-/// it mean nothing, so a reader takes all that it needs and asks once: `if (auto e = row.error())
-/// return ...`.
+/// it mean nothing, so a reader takes all that it needs and looks once whether there is an error().
 class CsvRow {
  public:
   CsvRow(const CsvTable& table, std::size_t row) : table_(table), row_(row) {}
@@ -72,12 +97,21 @@ class CsvRow {
   std::optional<double> NumberIfAny(std::string_view column);
   std::int64_t Integer(std::string_view column, IntegerBounds bounds);
   std::optional<std::int64_t> IntegerIfAny(std::string_view column, IntegerBounds bounds);
+  /// A cell of a 0/1 column: 1 and 0, or as other writers have them: true and false, T and F, in
+  /// capitals or not.
+  std::optional<bool> FlagIfAny(std::string_view column);
+  /// A cell of a column that nobody knows: numbers, and flags as 1 and 0.
+  std::optional<double> NumberOrFlagIfAny(std::string_view column);
   /// The cell as it stands, without the blanks around it; empty where there is none.
   [[nodiscard]] std::string Text(std::string_view column) const;
 
   void Reject(std::string_view column, const std::string& reason);
+  /// A fault of more than one cell. Rows with the same `kind` are counted together.
+  void RejectRow(std::string_view reason, std::string_view kind);
+  [[nodiscard]] std::size_t at() const { return row_; }  // in the table, from 0
   [[nodiscard]] int line() const { return table_.line(row_); }
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
+  [[nodiscard]] const std::string& kind() const { return kind_; }  // of the error
 
  private:
   // Without the blanks around it; empty where the column is not there.
@@ -86,7 +120,19 @@ class CsvRow {
   const CsvTable& table_;
   std::size_t row_;
   std::optional<Error> error_;
+  std::string kind_;
 };
+
+template <class Read>
+Status CsvTable::ReadRows(Read read) const {
+  BadRows bad;
+  for (std::size_t k = 0; k < size(); ++k) {
+    CsvRow row(*this, k);
+    read(row);
+    if (row.error()) bad.Add(row.error()->text, row.kind());
+  }
+  return bad.Check();
+}
 
 /// The shortest decimal text that reads back as the same number; empty for one that is not finite.
 std::string NumberText(double value);

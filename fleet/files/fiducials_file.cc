@@ -22,27 +22,25 @@ Result<std::vector<Fiducial>> ReadFiducials(std::string_view text, std::string f
   std::vector<Fiducial> fiducials;
   std::unordered_map<std::uint32_t, int> line_of;
   std::map<std::pair<double, double>, int> line_at;
-  const auto twice = [&](std::size_t k, const std::string& what, int line) {
-    return tl::unexpected<Error>(
-        table.ErrorAt(k, what + ", first in line " + std::to_string(line)));
-  };
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     Fiducial fiducial;
     fiducial.id = static_cast<std::uint32_t>(row.Integer("fiducial_id", {0, UINT32_MAX}));
     fiducial.at_fp = {row.Number("x_mm"), row.Number("y_mm")};
     for (const char* column : {"x_mm", "y_mm"})
       if (!row.error() && std::abs(row.Number(column)) > kCoordinateMaxMm)
         row.Reject(column, row.Text(column) + " is not on any plate");
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     const std::string named = "fiducial " + std::to_string(fiducial.id);
+    const auto twice = [&](const std::string& what, int line) {
+      row.RejectRow(named + ": " + what + ", first in line " + std::to_string(line), what);
+    };
     if (const auto [it, fresh] = line_of.emplace(fiducial.id, row.line()); !fresh)
-      return twice(k, named + ": is there twice", it->second);
+      return twice("is there twice", it->second);
     const std::pair<double, double> place{fiducial.at_fp.x_mm, fiducial.at_fp.y_mm};
     if (const auto [it, fresh] = line_at.emplace(place, row.line()); !fresh)
-      return twice(k, named + ": is where another one is", it->second);
+      return twice("is where another one is", it->second);
     fiducials.push_back(fiducial);
-  }
+  }));
   if (fiducials.size() < kFiducialsMin || fiducials.size() > limits::kFiducials)
     return Fail(ErrorCode::kInvalid, table.file() + ": " + std::to_string(fiducials.size()) +
                                          " fiducials are not " + std::to_string(kFiducialsMin) +

@@ -51,12 +51,12 @@ Unit ReadUnit(CsvRow* row) {
   unit.sensors = static_cast<std::uint8_t>(
       row->IntegerIfAny("hall_sensors", {0, limits::kSensorsPerUnit}).value_or(0));
   unit.spine_mm = row->NumberIfAny("spine_mm").value_or(0);
-  unit.enabled = row->IntegerIfAny("enabled", {0, 1}).value_or(1) == 1;
+  unit.enabled = row->FlagIfAny("enabled").value_or(true);
   return unit;
 }
 
-// Layout::Create begins with "unit <id>" where the fault is one unit's; that unit's line helps
-// more.
+// Layout::Create begins a line with "unit <id>" where the fault is one unit's; that unit's line of
+// the file helps more.
 std::string LinePrefix(const UnitsFile& file, std::string_view text) {
   constexpr std::string_view kUnit = "unit ";
   std::uint32_t id = 0;
@@ -70,6 +70,19 @@ std::string LinePrefix(const UnitsFile& file, std::string_view text) {
   return file.source + ": ";
 }
 
+// Each line of a message by itself.
+std::string WithLines(const UnitsFile& file, std::string_view text) {
+  std::string told;
+  while (!text.empty()) {
+    const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
+    const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
+    const std::string_view line = text.substr(begin, end - begin);
+    told.append(text.substr(0, begin)).append(LinePrefix(file, line)).append(line);
+    text.remove_prefix(end);
+  }
+  return told;
+}
+
 }  // namespace
 
 Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
@@ -79,6 +92,7 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
                                 "theta_min_deg", "theta_max_deg", "phi_min_deg", "phi_max_deg"}));
   UnitsFile units;
   units.source = table.file();
+  units.columns = table.columns();
   units.ignored_columns =
       table.Others({"unit_id",           "base_x_mm",      "base_y_mm",     "arm_theta_mm",
                     "arm_phi_mm",        "theta_zero_deg", "phi_zero_deg",  "theta_gear",
@@ -87,19 +101,18 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
                     "bus_slot",          "node_id",        "group_id",      "enabled",
                     "arm_half_width_mm", "hall_sensors",   "spine_mm",      "serial"});
   std::unordered_map<UnitId, int> line_of;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     const Unit unit = ReadUnit(&row);
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     const std::string name = "unit " + std::to_string(unit.id.value) + ": ";
     if (const std::string fault = FaultOf(unit); !fault.empty())
-      return tl::unexpected<Error>(table.ErrorAt(k, name + fault));
+      return row.RejectRow(name + fault, fault.substr(0, fault.find(' ')) + " out of bounds");
     if (const auto [it, fresh] = line_of.emplace(unit.id, row.line()); !fresh)
-      return tl::unexpected<Error>(
-          table.ErrorAt(k, name + "is there twice, first in line " + std::to_string(it->second)));
+      return row.RejectRow(name + "is there twice, first in line " + std::to_string(it->second),
+                           "is there twice");
     units.units.push_back(unit);
     units.lines.push_back(row.line());
-  }
+  }));
   if (units.units.empty())
     return Fail(ErrorCode::kInvalid, units.source + ": a header, but no units");
   return units;
@@ -108,8 +121,7 @@ Result<UnitsFile> ReadUnits(std::string_view text, std::string file) {
 Result<Layout> ReadLayout(std::string_view text, std::string file, Layout::Options options) {
   FOCALFLEET_TRY_ASSIGN(UnitsFile units, ReadUnits(text, std::move(file)));
   auto layout = Layout::Create(units.units, std::move(options));
-  if (!layout)
-    return Fail(layout.error().code, LinePrefix(units, layout.error().text) + layout.error().text);
+  if (!layout) return Fail(layout.error().code, WithLines(units, layout.error().text));
   return layout;
 }
 

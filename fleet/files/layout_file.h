@@ -18,11 +18,12 @@ struct UnitsFile {
   std::string source;
   std::vector<Unit> units;
   std::vector<int> lines;                    // Shape: (n), of each unit's row
+  std::vector<std::string> columns;          // of the header: the others have their defaults
   std::vector<std::string> ignored_columns;  // not known; a misspelt `enabled` would be among them
 };
 
-/// Errors: kInvalid with file:line: a column missing, a value missing or out of its bounds, a unit
-/// twice.
+/// Errors: kInvalid with file:line: a column missing; of all rows a value missing or out of its
+/// bounds, a unit twice.
 Result<UnitsFile> ReadUnits(std::string_view text, std::string file);
 
 /// ReadUnits and Layout::Create in one, errors of both with file:line.

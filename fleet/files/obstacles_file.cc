@@ -11,20 +11,19 @@ Result<std::vector<Obstacle>> ReadObstacles(std::string_view text, std::string f
   FOCALFLEET_TRY(table.Require({"obstacle_id", "x_mm", "y_mm", "radius_mm"}));
   std::vector<Obstacle> obstacles;
   std::unordered_map<std::uint32_t, int> line_of;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     Obstacle obstacle;
     obstacle.id = static_cast<std::uint32_t>(row.Integer("obstacle_id", {0, UINT32_MAX}));
     obstacle.centre_fp = {row.Number("x_mm"), row.Number("y_mm")};
     obstacle.radius_mm = row.Number("radius_mm");
     if (obstacle.radius_mm < 0) row.Reject("radius_mm", row.Text("radius_mm") + " is negative");
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(obstacle.id, row.line()); !fresh)
-      return tl::unexpected<Error>(table.ErrorAt(k, "obstacle " + std::to_string(obstacle.id) +
-                                                        ": is there twice, first in line " +
-                                                        std::to_string(it->second)));
+      return row.RejectRow("obstacle " + std::to_string(obstacle.id) +
+                               ": is there twice, first in line " + std::to_string(it->second),
+                           "is there twice");
     obstacles.push_back(obstacle);
-  }
+  }));
   return obstacles;
 }
 

@@ -68,6 +68,7 @@ Status CheckJoins(const std::string& file, const std::vector<PlanRow>& rows) {
     if (p.unit != q.unit) return p.unit < q.unit;
     return p.axis != q.axis ? p.axis < q.axis : p.t0_s < q.t0_s;
   });
+  BadRows bad;
   for (std::size_t k = 1; k < order.size(); ++k) {
     const PlanRow& before = rows[order[k - 1]];
     const PlanRow& later = rows[order[k]];
@@ -76,9 +77,9 @@ Status CheckJoins(const std::string& file, const std::vector<PlanRow>& rows) {
     if (fault.empty()) continue;
     std::string text = file + ":" + std::to_string(later.line) + ": unit ";
     text += std::to_string(later.unit.value) + " " + Name(later.axis) + ": " + fault;
-    return Fail(ErrorCode::kInvalid, std::move(text));
+    bad.Add(text, "does not join up");
   }
-  return {};
+  return bad.Check();
 }
 
 }  // namespace
@@ -129,11 +130,7 @@ Result<std::vector<PlanRow>> ReadPlan(std::string_view text, std::string file) {
   FOCALFLEET_TRY(
       table.Require({"unit_id", "axis", "t0_s", "t1_s", "from_deg", "to_deg", "mode", "power_W"}));
   std::vector<PlanRow> rows;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
-    rows.push_back(ReadRow(&row));
-    if (row.error()) return tl::unexpected<Error>(*row.error());
-  }
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) { rows.push_back(ReadRow(&row)); }));
   FOCALFLEET_TRY(CheckJoins(table.file(), rows));
   return rows;
 }

@@ -12,7 +12,6 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::size_t kIdMax = 64;
 constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 constexpr std::int64_t kSecondsPerDay = 86'400;
 constexpr int kYearMax = 2261;  // the last whole one that 63 bits of nanoseconds hold
@@ -109,12 +108,22 @@ Spot ReadSpot(CsvRow* row, const SensorLimits& sensor) {
 
 }  // namespace
 
+Status CheckExposureId(std::string_view id) {
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
+  if (id.empty()) return Fail(ErrorCode::kInvalid, "is empty");
+  if (id.size() > limits::kExposureIdBytes)
+    return Fail(ErrorCode::kInvalid,
+                "is longer than " + std::to_string(limits::kExposureIdBytes) + " characters");
+  if (std::any_of(id.begin(), id.end(), is_control))
+    return Fail(ErrorCode::kInvalid, "has control characters");
+  return {};
+}
+
 Result<Exposure> ReadSpots(std::string_view text, std::string file, const SensorLimits& sensor) {
   Exposure exposure;
   FOCALFLEET_TRY_ASSIGN(const Keyed id, FindKey(text, file, "exposure_id"));
-  if (id.value.empty() || id.value.size() > kIdMax)
-    return Fail(ErrorCode::kInvalid, Where(file, id.line) + "exposure_id: not between 1 and " +
-                                         std::to_string(kIdMax) + " characters");
+  if (const Status good = CheckExposureId(id.value); !good)
+    return Fail(ErrorCode::kInvalid, Where(file, id.line) + "exposure_id: " + good.error().text);
   exposure.id = std::string(id.value);
   FOCALFLEET_TRY_ASSIGN(const Keyed taken, FindKey(text, file, "taken_utc"));
   const auto unix_ns = UnixNsOf(taken.value);
@@ -129,16 +138,15 @@ Result<Exposure> ReadSpots(std::string_view text, std::string file, const Sensor
         table.ErrorAt(limits::kSpotsPerExposure,
                       "more than " + std::to_string(limits::kSpotsPerExposure) + " spots"));
   std::unordered_map<std::uint32_t, int> line_of;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
-    exposure.spots.push_back(ReadSpot(&row, sensor));
-    if (row.error()) return tl::unexpected<Error>(*row.error());
-    const std::uint32_t spot = exposure.spots.back().id;
-    if (const auto [it, fresh] = line_of.emplace(spot, row.line()); !fresh)
-      return tl::unexpected<Error>(table.ErrorAt(k, "spot " + std::to_string(spot) +
-                                                        ": is there twice, first in line " +
-                                                        std::to_string(it->second)));
-  }
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
+    const Spot spot = ReadSpot(&row, sensor);
+    if (row.error()) return;
+    if (const auto [it, fresh] = line_of.emplace(spot.id, row.line()); !fresh)
+      return row.RejectRow("spot " + std::to_string(spot.id) + ": is there twice, first in line " +
+                               std::to_string(it->second),
+                           "is there twice");
+    exposure.spots.push_back(spot);
+  }));
   if (const auto checked = CheckSpots(exposure, sensor); !checked)
     return Fail(checked.error().code, table.file() + ": " + checked.error().text);
   return exposure;

@@ -17,6 +17,10 @@
 
 namespace focalfleet {
 
+/// Errors: kInvalid: empty, longer than limits::kExposureIdBytes, control characters (it stands in
+/// logs).
+Status CheckExposureId(std::string_view id);
+
 /// Errors: kInvalid with file:line: a key or column missing or twice, an empty or overlong id, a
 /// time that is none, a value that is not finite or out of range, a spot twice, too many spots.
 Result<Exposure> ReadSpots(std::string_view text, std::string file, const SensorLimits& sensor);

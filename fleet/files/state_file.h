@@ -21,6 +21,12 @@ Result<std::vector<std::optional<Pose>>> ReadState(std::string_view text, std::s
                                                    const Layout& layout,
                                                    std::span<const UnitDrive> drives);
 
+enum class WhoseState : std::uint8_t { kAll, kDisabled };
+/// A plan needs to know where each unit stands, a draw of targets where the disabled ones do.
+/// Errors: kInvalid names the file and the units without a pose.
+Status RequirePoses(const std::string& file, const Layout& layout,
+                    std::span<const std::optional<Pose>> poses, WhoseState whose);
+
 /// A row for each unit that has a pose. Reads back equal.
 std::string WriteState(const Layout& layout, std::span<const UnitDrive> drives,
                        std::span<const std::optional<Pose>> poses);

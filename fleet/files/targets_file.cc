@@ -42,8 +42,7 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
   targets.ignored_columns =
       table.Others({"unit_id", "x_mm", "y_mm", "theta_deg", "phi_deg", "priority", "target_id"});
   std::unordered_map<UnitId, int> line_of;
-  for (std::size_t k = 0; k < table.size(); ++k) {
-    CsvRow row(table, k);
+  FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {
     TargetRow target;
     target.unit = UnitId{static_cast<std::uint32_t>(row.Integer("unit_id", {0, UINT32_MAX}))};
     target.place = ReadPlace(&row);
@@ -52,13 +51,13 @@ Result<Targets> ReadTargets(std::string_view text, std::string file) {
     if (target.target_id.size() > kTargetIdMax)
       row.Reject("target_id", "is longer than " + std::to_string(kTargetIdMax) + " characters");
     target.line = row.line();
-    if (row.error()) return tl::unexpected<Error>(*row.error());
+    if (row.error()) return;
     if (const auto [it, fresh] = line_of.emplace(target.unit, target.line); !fresh)
-      return tl::unexpected<Error>(table.ErrorAt(k, "unit " + std::to_string(target.unit.value) +
-                                                        ": named twice, first in line " +
-                                                        std::to_string(it->second)));
+      return row.RejectRow("unit " + std::to_string(target.unit.value) +
+                               ": named twice, first in line " + std::to_string(it->second),
+                           "named twice");
     targets.rows.push_back(std::move(target));
-  }
+  }));
   if (targets.rows.empty())
     return Fail(ErrorCode::kInvalid, targets.source + ": a header, but no targets");
   return targets;

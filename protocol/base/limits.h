@@ -22,6 +22,12 @@ inline constexpr std::uint32_t kFramesPerBusQueued = 4096;
 inline constexpr std::uint32_t kFramesPerStep = 65'536;
 inline constexpr std::uint32_t kSpotsPerExposure = 131'072;  // fibres, fiducials, dust
 inline constexpr std::uint32_t kFiducials = 4096;
+inline constexpr std::uint32_t kCsvColumns = 1024;         // moves.csv has some 30
+inline constexpr std::uint32_t kCsvRowBytes = 1u << 20;    // a quote without an end stops here
+inline constexpr std::uint32_t kBadRowsTold = 20;          // of a table; the others are counted
+inline constexpr std::uint32_t kExposureBytes = 1u << 28;  // an image of the sensor and its spots
+inline constexpr std::uint32_t kExposureIdBytes = 64;      // a name, told in logs and alarms
+inline constexpr std::uint32_t kCameraFiles = 16'384;      // seen in the camera's folder at once
 
 // The largest focal plane in view (20,000 units at 100 a bus) fits with room.
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
@@ -29,6 +35,9 @@ static_assert(kNodesPerBus < 255, "255 is the broadcast address");
 static_assert(kSensorsPerUnit <= 4 * 8, "four a frame, the part in three bits");
 static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
 static_assert(kSpotsPerExposure >= 2 * (kUnits + kFiducials), "a plate seen with as much dust");
+static_assert(kCsvRowBytes >= kUnits * 11, "faults.csv may name every unit in one cell");
+static_assert(kExposureBytes >= 11'000u * 11'000u * 2 + kSpotsPerExposure * 128,
+              "16 bits a pixel, and 128 characters a spot");
 // A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8
 // segments.
 static_assert(kFramesPerBusQueued >= kNodesPerBus * (1 + 2 * 8));

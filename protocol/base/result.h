@@ -20,7 +20,7 @@ enum class ErrorCode : std::uint8_t {
 
 struct Error {
   ErrorCode code = ErrorCode::kInvalid;
-  std::string text;  // one line: what, where (file:row), why, and where it helps what to do
+  std::string text;  // one line a fault: what, where (file:row), why, where it helps what to do
 };
 
 template <class T>

@@ -205,6 +205,34 @@ TEST(ResolveTargets, RefusesTwoTargetsThatTouchUnlessOneIsPassedOver) {
   EXPECT_EQ(ErrorOf(FleetOf(units), rows), "");
 }
 
+TEST(ResolveTargets, TellsAllBadRowsAtOnce) {
+  const Fleet fleet = Hex(7);
+  const Unit& other = fleet.layout.unit({1});
+  const double toward = std::atan2(other.base_fp.y_mm, other.base_fp.x_mm) * 57.29578;
+  const std::string told =
+      ErrorOf(fleet, {Row(99, PointFp{0, 0}, 2), Row(3, PointFp{300, 0}, 3),
+                      Row(2, TargetAngles{toward + 180, 0}, 4), Row(2, PointFp{0, 0}, 5),
+                      Row(1, TargetAngles{toward, 0}, 6), Row(4, TargetAngles{0, 270}, 7)});
+  EXPECT_THAT(told, ::testing::MatchesRegex(
+                        "night.csv:2: unit 99: unknown unit[^\n]*\n"
+                        "  night.csv:3: unit 3: x_mm 300.0000[^\n]*out of patrol[^\n]*\n"
+                        "  night.csv:5: unit 2: named twice, first in line 4\n"
+                        "  night.csv:7: unit 4: phi_deg 270.0000 is out of its range[^\n]*\n"
+                        "  night.csv:6: unit 1: its target collides with that of unit 2 in line "
+                        "4[^\n]*"));
+}
+
+TEST(ResolveTargets, CountsWhatItDoesNotTellByItsReason) {
+  const Fleet fleet = Hex(37);
+  std::vector<TargetRow> rows;
+  for (std::uint32_t unit = 1; unit <= 37; ++unit)
+    rows.push_back(Row(unit, PointFp{-999, -999}, static_cast<int>(unit) + 1));
+  for (std::uint32_t unit = 101; unit <= 103; ++unit)
+    rows.push_back(Row(unit, PointFp{0, 0}, static_cast<int>(unit)));
+  EXPECT_THAT(ErrorOf(fleet, rows),
+              HasSubstr("\n  and 20 more rows; all 40: out of patrol (37), unknown unit (3)"));
+}
+
 TEST(DrawConfiguration, IsClearInRangeAndTheSameForTheSameSeed) {
   const std::uint64_t seed = testing::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <string>
 #include <string_view>
 
 #include "protocol/base/check.h"
@@ -20,7 +21,11 @@ void TryAgain(const CanFrame& frame) {
   FOCALFLEET_CHECK(again && again->foreign == nullptr && again->frame == frame);
 }
 
-void Try(std::string_view line) {
+void Try(std::string_view raw) {
+  const std::string line = WithoutDecoration(raw);
+  FOCALFLEET_CHECK(line.size() <= raw.size());
+  if (const auto note = ParseCandumpNote(line))
+    FOCALFLEET_CHECK(!note->text.empty() && note->text.size() <= line.size());
   const auto parsed = ParseCandumpLine(line);
   if (!parsed) {
     FOCALFLEET_CHECK(parsed.error() != nullptr && *parsed.error() != 0);

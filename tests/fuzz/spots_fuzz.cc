@@ -1,15 +1,15 @@
-// Any bytes as one exposure of the camera, as CSV or as a FITS file by the first byte, or as the
-// fiducials' table: an exposure that holds to all rules or an error that names the file, never
-// more. What was read and is written again reads back the same.
+// Any bytes as one exposure of the camera, as CSV or as whatever lies in the camera's folder by the
+// first byte, or as the fiducials' table: an exposure that holds to all rules or an error that
+// names the file, never more. What was read and is written again reads back the same.
 #include <unistd.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <string>
 #include <string_view>
 
+#include "daemon/camera/exposure_bytes.h"
 #include "daemon/camera/spots_fits.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/spots_file.h"
@@ -30,7 +30,7 @@ class Scratch {
     folder_ = name;
   }
   ~Scratch() {
-    for (const char* name : {"/in.fits", "/again.fits"}) unlink((folder_ + name).c_str());
+    unlink((folder_ + "/again.fits").c_str());
     rmdir(folder_.c_str());
   }
   [[nodiscard]] std::string File(const char* name) const { return folder_ + "/" + name; }
@@ -55,19 +55,17 @@ void TryCsv(std::string_view text) {
   ExpectSame(*exposure, ReadSpots(WriteSpots(*exposure), "again.csv", kSensor));
 }
 
-void TryFits(std::string_view bytes) {
+/// FITS, or whatever a camera may hand over, packed by gzip, too.
+void TryBytes(std::string_view bytes) {
   static const Scratch scratch;
-  const std::string path = scratch.File("in.fits");
-  std::ofstream(path, std::ios::binary | std::ios::trunc)
-      .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  const auto exposure = ReadSpotsFits(path, kSensor);
+  const auto exposure = ParseExposure(std::string(bytes), "in.fits", kSensor);
   if (!exposure) {
-    FOCALFLEET_CHECK(exposure.error().text.find("in.fits") != std::string::npos);
+    FOCALFLEET_CHECK(exposure.error().text.find("in.fits") == 0);
     return;
   }
   FOCALFLEET_CHECK(CheckSpots(*exposure, kSensor).has_value());
-  const std::string again = scratch.File("again.fits");
-  FOCALFLEET_CHECK(WriteSpotsFits(again, *exposure).has_value());
+  FOCALFLEET_CHECK(CheckExposureId(exposure->id).has_value());
+  FOCALFLEET_CHECK(WriteSpotsFits(scratch.File("again.fits"), *exposure).has_value());
 }
 
 void TryFiducials(std::string_view text) {
@@ -82,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string_view rest(static_cast<const char*>(static_cast<const void*>(data + 1)),
                               size - 1);
-  constexpr void (*kReaders[])(std::string_view) = {focalfleet::TryCsv, focalfleet::TryFits,
+  constexpr void (*kReaders[])(std::string_view) = {focalfleet::TryCsv, focalfleet::TryBytes,
                                                     focalfleet::TryFiducials};
   kReaders[data[0] % 3](rest);
   return 0;

@@ -2,84 +2,295 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <filesystem>
+#include <fstream>
 
+#include "daemon/camera/camera_work.h"
 #include "daemon/camera/spots_fits.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/spots_file.h"
+#include "fleet/hex_layout.h"
+#include "tests/support/as_user.h"
+#include "tests/support/gzip.h"
 #include "tests/support/temporary_folder.h"
 
 namespace focalfleet {
 namespace {
 
+namespace fs = std::filesystem;
+using testing::AsUser;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr SensorLimits kSensor{1000, 1000};
+constexpr WallTime kSince{1'795'316'645'678'000'000};
 
 Exposure Three(const std::string& id) {
-  return {id, 1'795'316'645'678'000'000, {{1, 10.5, 20, 1, 2}, {2, 30, 40, 2, 2}, {3, 5, 6, 3, 2}}};
+  return {id, kSince.ns, {{1, 10.5, 20, 1, 2}, {2, 30, 40, 2, 2}, {3, 5, 6, 3, 2}}};
 }
 
-class CameraFolderTest : public ::testing::Test {
+class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
-  void Open() { folder_ = CameraFolder::Open(files_.File("camera"), kSensor).value(); }
-  [[nodiscard]] std::string File(const std::string& name) const {
-    return files_.File("camera/" + name);
+  CameraFolderTest() : user_(GetParam()), files_(std::make_unique<testing::TemporaryFolder>()) {
+    std::ofstream(files_->File("secret")) << "secret";
   }
-  testing::TemporaryFolder files_;
+  ~CameraFolderTest() override {
+    EXPECT_EQ(ReadTextFile(files_->File("secret")).value_or("none"), "secret");
+    std::error_code ignored;
+    fs::permissions(File(""), fs::perms::owner_all, ignored);
+    fs::permissions(File("taken"), fs::perms::owner_all, ignored);
+  }
+  void Open() { folder_ = CameraFolder::Open(files_->File("camera"), kSensor).value(); }
+  [[nodiscard]] std::string File(const std::string& name) const {
+    return files_->File("camera/" + name);
+  }
+  void Put(const std::string& name, const std::string& bytes) const {
+    ASSERT_TRUE(WriteFileAtomically(File(name), bytes));
+  }
+  [[nodiscard]] std::string FitsOf(const Exposure& exposure) const {
+    EXPECT_TRUE(WriteSpotsFits(files_->File("made.fits"), exposure));
+    return ReadFile(files_->File("made.fits")).value();
+  }
+  [[nodiscard]] static bool Exists(const std::string& path) {
+    struct stat status {};
+    return lstat(path.c_str(), &status) == 0;
+  }
+  [[nodiscard]] std::string TakenId() const {
+    const auto taken = folder_->Take();
+    return !taken ? taken.error().text : !*taken ? "nothing" : (*taken)->id;
+  }
+  /// The file stands in refused/ now, with the reason, and the next is looked at.
+  void ExpectRefused(const std::string& name, const std::string& reason) const {
+    EXPECT_THAT(TakenId(), HasSubstr(reason)) << name;
+    EXPECT_FALSE(Exists(File(name)));
+    EXPECT_TRUE(Exists(File("refused/" + name)));
+    EXPECT_THAT(ReadTextFile(File("refused/" + name + ".reason")).value_or("none"),
+                HasSubstr(reason));
+    EXPECT_EQ(TakenId(), "nothing");
+  }
+
+  AsUser user_;
+  std::unique_ptr<testing::TemporaryFolder> files_;
   std::unique_ptr<CameraFolder> folder_;
 };
 
-TEST_F(CameraFolderTest, AsksByAFileThatIsThereAsAWhole) {
+INSTANTIATE_TEST_SUITE_P(Users, CameraFolderTest, ::testing::ValuesIn(testing::UsersOfTests()),
+                         testing::NameOfUser);
+
+TEST_P(CameraFolderTest, AsksByAFileThatIsThereAsAWhole) {
   Open();
-  ASSERT_TRUE(folder_->Request(12, {1'795'316'645'678'000'000}));
+  ASSERT_TRUE(folder_->Request(12, kSince));
   const auto text = ReadTextFile(File("request.json"));
   ASSERT_TRUE(text);
   EXPECT_THAT(*text, HasSubstr("\"exposure\": 12"));
-  EXPECT_THAT(*text, HasSubstr(UtcOf(1'795'316'645'678'000'000)));
+  EXPECT_THAT(*text, HasSubstr(UtcOf(kSince.ns)));
 }
 
-TEST_F(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesCsvAndFitsAlike) {
+TEST_P(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesWhateverHoldsThem) {
   Open();
-  ASSERT_TRUE(WriteFileAtomically(File("b.csv"), WriteSpots(Three("second"))));
-  ASSERT_TRUE(WriteSpotsFits(File("a.fits"), Three("first")));
-  for (const char* id : {"first", "second"}) {
+  const std::string csv = WriteSpots(Three("csv"));
+  Put("a.csv", csv);
+  Put("b.fits", FitsOf(Three("fits")));
+  Put("c.csv.gz", testing::Gzipped(WriteSpots(Three("csv.gz"))));
+  Put("d.fits.gz", testing::Gzipped(FitsOf(Three("fits.gz"))));
+  Put("e.FIT", FitsOf(Three("fit")));
+  Put("f.fts.GZ", testing::Gzipped(FitsOf(Three("fts.gz"))));
+  Put("g.csv", FitsOf(Three("fits called csv")));
+  for (const char* id : {"csv", "fits", "csv.gz", "fits.gz", "fit", "fts.gz", "fits called csv"}) {
     const auto taken = folder_->Take();
     ASSERT_TRUE(taken) << taken.error().text;
     ASSERT_TRUE(*taken);
     EXPECT_EQ((*taken)->id, id);
-    EXPECT_EQ((*taken)->taken_unix_ns, Three(id).taken_unix_ns);
+    EXPECT_EQ((*taken)->taken_unix_ns, kSince.ns);
     ASSERT_EQ((*taken)->spots.size(), 3u);
     EXPECT_EQ((*taken)->spots[0].x_px, 10.5);
   }
-  const auto nothing = folder_->Take();
-  ASSERT_TRUE(nothing);
-  EXPECT_FALSE(*nothing);
-  EXPECT_TRUE(std::filesystem::exists(File("taken/b.csv")));
+  EXPECT_EQ(TakenId(), "nothing");
+  EXPECT_EQ(ReadTextFile(File("taken/a.csv")).value(), csv);
 }
 
-TEST_F(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
+TEST_P(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
   Open();
-  ASSERT_TRUE(WriteFileAtomically(File("bad.csv"), "spot_id,x_px\n1,NaN\n"));
-  ASSERT_TRUE(WriteFileAtomically(File("bad.fits"), "no table"));
-  for (const char* name : {"bad.csv", "bad.fits"}) {
-    const auto taken = folder_->Take();
-    ASSERT_FALSE(taken);
-    EXPECT_THAT(taken.error().text, HasSubstr(name));
-    EXPECT_TRUE(std::filesystem::exists(File(std::string("refused/") + name)));
-    EXPECT_TRUE(std::filesystem::exists(File(std::string("refused/") + name + ".reason")));
+  const std::string csv = WriteSpots(Three("x"));
+  const std::string packed = testing::Gzipped(csv);
+  const struct {
+    const char* name;
+    std::string bytes;
+    const char* reason;
+  } cases[] = {
+      {"bad.csv", "spot_id,x_px\n1,NaN\n", "bad.csv"},
+      {"bad.fits", "no table", "bad.fits"},
+      {"empty.fits", "", "empty.fits"},
+      {"cut.csv.gz", packed.substr(0, packed.size() / 2), "its gzip stream is cut short"},
+      {"plain.csv.gz.csv", testing::Gzipped(packed), "this is compressed with gzip"},
+      {"x.csv.bz2", "BZh9", "spots come as .csv, .fits, .fit or .fts"},
+      {"x.fits.fz", "SIMPLE  =", "spots come as .csv"},
+      {"spots.txt", csv, "spots come as .csv"},
+      {"log.gz", packed, "spots come as .csv"},
+      {"SPOTS.ECSV", csv, "spots come as .csv"},
+      {"x.parquet", "PAR1", "spots come as .csv"},
+  };
+  for (const auto& c : cases) {
+    Put(c.name, c.bytes);
+    ExpectRefused(c.name, c.reason);
   }
-  EXPECT_FALSE(*folder_->Take());
 }
 
-TEST_F(CameraFolderTest, WhatLayThereBeforeAnswersNothing) {
+TEST_P(CameraFolderTest, TellsAllBadSpotsInTheReason) {
   Open();
-  ASSERT_TRUE(WriteFileAtomically(File("old.csv"), WriteSpots(Three("old"))));
+  Put("bad.csv",
+      "# exposure_id: a\n# taken_utc: 2026-11-22T03:04:05Z\nspot_id,x_px,y_px,flux\n"
+      "1,nan,2,1\n2,3,4,1\n3,5,6,-1\n");
+  ExpectRefused("bad.csv", "bad.csv:4: column x_px: the value is missing (empty or nan)\n  " +
+                               File("bad.csv") + ":6: column flux: -1 is not above 0");
+}
+
+TEST_P(CameraFolderTest, OtherNamesAreLeftAloneForTheCameraMayBeWritingThem) {
+  Open();
+  for (const char* name : {"x.csv.part", "x.fits.tmp", "part", ".x.csv", "x.csv~", "camera.log",
+                           "side.json", "x.csv.gz.filepart"}) {
+    Put(name, WriteSpots(Three("x")));
+    EXPECT_EQ(TakenId(), "nothing");
+    EXPECT_TRUE(Exists(File(name)));
+  }
+  fs::rename(File("x.csv.part"), File("x.csv"));
+  EXPECT_EQ(TakenId(), "x");
+}
+
+TEST_P(CameraFolderTest, WhatLayThereBeforeAnswersNothing) {
+  Open();
+  Put("old.csv", WriteSpots(Three("old")));
+  ASSERT_EQ(mkfifo(File("old.fits").c_str(), 0600), 0);
   folder_.reset();
   Open();
-  EXPECT_FALSE(*folder_->Take());
-  EXPECT_TRUE(std::filesystem::exists(File("refused/old.csv")));
+  EXPECT_EQ(TakenId(), "nothing");
+  EXPECT_TRUE(Exists(File("refused/old.csv")));
+  EXPECT_TRUE(Exists(File("refused/old.fits")));
+}
+
+// ---- a camera that is broken or hostile
+
+TEST_P(CameraFolderTest, ARequestIsWrittenIntoNothingOfOthers) {
+  Open();
+  ASSERT_EQ(symlink("../secret", File("request.json").c_str()), 0);
+  ASSERT_TRUE(folder_->Request(1, kSince));
+  EXPECT_THAT(ReadTextFile(File("request.json")).value(), HasSubstr("\"exposure\": 1"));
+  fs::remove(File("request.json"));
+  ASSERT_EQ(mkfifo(File("request.json").c_str(), 0600), 0);
+  ASSERT_TRUE(folder_->Request(2, kSince));
+  EXPECT_THAT(ReadTextFile(File("request.json")).value(), HasSubstr("\"exposure\": 2"));
+  fs::remove(File("request.json"));
+  fs::create_directories(File("request.json/theirs"));
+  const Status asked = folder_->Request(3, kSince);
+  ASSERT_FALSE(asked);
+  EXPECT_THAT(asked.error().text, HasSubstr("request.json: cannot be written: Is a directory"));
+  EXPECT_TRUE(Exists(File("request.json/theirs")));
+}
+
+TEST_P(CameraFolderTest, WhatIsNoFileIsRefusedWithoutLookingIntoIt) {
+  Open();
+  ASSERT_EQ(symlink("../secret", File("link.csv").c_str()), 0);
+  ExpectRefused("link.csv", "link.csv: a symbolic link, no file");
+  ASSERT_EQ(symlink("/dev/zero", File("zero.fits").c_str()), 0);
+  ExpectRefused("zero.fits", "a symbolic link, no file");
+  ASSERT_EQ(mkfifo(File("pipe.fits.gz").c_str(), 0600), 0);
+  ExpectRefused("pipe.fits.gz", "a named pipe, no file");
+  fs::create_directories(File("folder.csv/theirs"));
+  ExpectRefused("folder.csv", "a folder, no file");
+  EXPECT_TRUE(Exists(File("refused/folder.csv/theirs")));
+}
+
+TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
+  for (const char* part : {"taken", "refused"}) {
+    fs::create_directories(File(""));
+    fs::create_directories(files_->File("theirs"));
+    ASSERT_EQ(symlink("../theirs", File(part).c_str()), 0);
+    const auto folder = CameraFolder::Open(files_->File("camera"), kSensor);
+    ASSERT_FALSE(folder);
+    EXPECT_EQ(folder.error().code, ErrorCode::kUnavailable);
+    EXPECT_THAT(folder.error().text, HasSubstr(std::string(part) + ": a symbolic link"));
+    fs::remove(File(part));
+  }
+  // Also when it comes later: what is held open is the folder that it was.
+  Open();
+  fs::rename(File("refused"), File("gone"));
+  ASSERT_EQ(symlink("../theirs", File("refused").c_str()), 0);
+  Put("bad.csv", "no spots\n");
+  EXPECT_THAT(TakenId(), HasSubstr("bad.csv"));
+  EXPECT_TRUE(Exists(File("gone/bad.csv")));
+  EXPECT_TRUE(fs::is_empty(files_->File("theirs")));
+  EXPECT_THAT(folder_->Request(1, kSince).error().text, HasSubstr("refused: a symbolic link"));
+}
+
+TEST_P(CameraFolderTest, AFolderThatIsMadeAnewIsLookedIntoFromTheNextRequest) {
+  Open();
+  fs::remove_all(File(""));
+  ASSERT_TRUE(folder_->Request(1, kSince));
+  Put("x.csv", WriteSpots(Three("x")));
+  EXPECT_EQ(TakenId(), "x");
+}
+
+TEST_P(CameraFolderTest, WhatCannotBeMovedIsTakenOnceAndStays) {
+  Open();
+  Put("a.csv", WriteSpots(Three("a")));
+  Put("b.csv", "no spots\n");
+  fs::permissions(File(""), fs::perms::owner_read | fs::perms::owner_exec);
+  const bool root = GetParam() == 0;  // may move them all the same
+  EXPECT_EQ(TakenId(), "a");
+  EXPECT_THAT(TakenId(), HasSubstr("b.csv"));
+  EXPECT_EQ(TakenId(), "nothing");
+  EXPECT_EQ(Exists(File("a.csv")), !root);
+  EXPECT_EQ(folder_->Request(1, kSince).has_value(), root);
+  // At the start, too, it would be refused for ever.
+  folder_.reset();
+  Open();
+  EXPECT_EQ(TakenId(), "nothing");
+  fs::permissions(File(""), fs::perms::owner_all);
+  EXPECT_EQ(TakenId(), "nothing") << "the same file";
+  Put("b.csv", WriteSpots(Three("b anew")));
+  EXPECT_EQ(TakenId(), "b anew");
+}
+
+TEST_P(CameraFolderTest, LongNamesAndStrangeOnesAreSetAsideToo) {
+  Open();
+  const std::string name(251, 'x');
+  std::ofstream(File(name + ".csv")) << "no spots\n";
+  EXPECT_THAT(TakenId(), HasSubstr("xxx.csv"));
+  EXPECT_TRUE(Exists(File("refused/" + name + ".csv")));
+  EXPECT_TRUE(Exists(File("refused/" + name.substr(0, 240) + ".reason")));
+  std::ofstream(File("a\nforged.csv")) << "no spots\n";
+  EXPECT_THAT(TakenId(), HasSubstr("camera/a?forged.csv"));
+  EXPECT_EQ(TakenId(), "nothing");
+}
+
+// The camera's thread ends when the daemon does, whatever lies in the folder.
+TEST_P(CameraFolderTest, NothingInTheFolderHoldsTheCamerasThread) {
+  Open();
+  for (const char* name : {"request.json", "a.csv", "b.fits", "c.csv.gz"})
+    ASSERT_EQ(mkfifo(File(name).c_str(), 0600), 0);
+  const auto layout = Layout::Create(MakeHexLayout({.count = 1}), {});
+  CameraWorker::Options options{.layout = &*layout,
+                                .site = {},
+                                .patience = std::chrono::milliseconds(5),
+                                .pause = std::chrono::milliseconds(1)};
+  CameraWorker worker(std::move(folder_), std::move(options));
+  const std::atomic<bool> ending{false};
+  const ExposureDone done = worker.Do({}, ending);
+  ASSERT_FALSE(done.exposure);
+  EXPECT_THAT(done.exposure.error().text, HasSubstr("a named pipe, no file"));
+}
+
+TEST(CameraFile, IsKnownByItsEnding) {
+  for (const char* name : {"a.csv", "a.fits", "a.fit", "a.fts", "a.csv.gz", "A.FITS.GZ", "a.b.csv"})
+    EXPECT_EQ(KindOfName(name), CameraFile::kSpots) << name;
+  for (const char* name : {"a.gz", "a.csv.bz2", "a.tgz", "a.txt", "a.fits.fz", "a.xlsx"})
+    EXPECT_EQ(KindOfName(name), CameraFile::kForeign) << name;
+  for (const char* name : {"", "csv", ".csv", "request.json", "taken", "a.csv.part", "a.csv.tmp"})
+    EXPECT_EQ(KindOfName(name), CameraFile::kNotOurs) << name;
 }
 
 }  // namespace

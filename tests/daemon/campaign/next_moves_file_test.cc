@@ -43,11 +43,12 @@ TEST(NextMovesFile, IsAListThatCampaignRunMakes) {
   const auto layout = Layout::Create(MakeHexLayout({.count = 4}), {});
   ASSERT_TRUE(layout);
   const std::string text = WriteNextMoves(Units(4), kMoves);
-  const auto list = ReadMoveList(text, "next_moves.csv", *layout);
-  ASSERT_TRUE(list) << list.error().text;
-  ASSERT_EQ(list->size(), 3u);
-  EXPECT_EQ((*list)[0].rows.size(), 4u);
-  EXPECT_EQ((*list)[1].rows.size(), 2u);
+  const auto read = ReadMoveList(text, "next_moves.csv", *layout);
+  ASSERT_TRUE(read) << read.error().text;
+  EXPECT_THAT(read->ignored_columns, IsEmpty());
+  ASSERT_EQ(read->moves.size(), 3u);
+  EXPECT_EQ(read->moves[0].rows.size(), 4u);
+  EXPECT_EQ(read->moves[1].rows.size(), 2u);
   const auto asked = ConditionsAsked(text, "next_moves.csv");
   ASSERT_TRUE(asked) << asked.error().text;
   EXPECT_THAT(*asked, ElementsAre("drive_amplitude in 1 move, first in move 2",

@@ -90,6 +90,50 @@ TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
   EXPECT_EQ(objects[2]["malformed"], "function");
 }
 
+// As candump -e -d prints them.
+constexpr const char* kErrors =
+    "  can0  10501800   [5]  07 00 01 00 00\n"
+    "  can0  20000088   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"
+    "\tbus-error\n"
+    "\n"
+    "Enabling Logfile 'candump-2026-02-01_201500.log'\n"
+    "DROPCOUNT: dropped 3 CAN frames on 'can0' socket (total drops 4)\n"
+    "\033[32m (1.000000)  can1  0007F800   [0] \033[0m\n";
+
+TEST(CanDecodeCommand, TellsErrorFramesInWordsAndFramesThatAreMissing) {
+  const ScratchDirectory scratch;
+  const std::string log = scratch.Put("bus.log", kErrors);
+  const auto result = Focalfleet({"can", "decode", log});
+  EXPECT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("can0  not ours: an error frame\n"
+                                    "can0  error frame: bus-error\n"
+                                    "can0  dropped 3 frames (in all 4)\n"
+                                    "1.000000  can1  all <- host  #0    stop\n"));
+  EXPECT_EQ(result.err, "focalfleet: " + log +
+                            ": 3 frames are missing: candump could not keep up\n"
+                            "focalfleet: " +
+                            log + ": 1 line of candump's own words passed over\n");
+  const auto json = Focalfleet({"can", "decode", log, "--json", "--quiet"});
+  EXPECT_EQ(json.exit, 0);
+  EXPECT_EQ(json.err, "");
+  const std::vector<Json> objects = Objects(json.out);
+  ASSERT_EQ(objects.size(), 5u);
+  EXPECT_EQ(objects[2], Json({{"time", ""}, {"interface", "can0"}, {"error", "bus-error"}}));
+  EXPECT_EQ(objects[3], Json({{"interface", "can0"}, {"dropped", 3}, {"dropped_total", 4}}));
+}
+
+TEST(CanDecodeCommand, ACompressedLogIsToldOnce) {
+  const ScratchDirectory scratch;
+  const std::string log = scratch.Put("bus.log.gz", std::string("\x1f\x8b\x08\0\n\n\n\n", 8));
+  for (const bool from_stdin : {false, true}) {
+    const auto result = from_stdin ? FocalfleetInto("<" + log, {"can", "decode"})
+                                   : Focalfleet({"can", "decode", log});
+    EXPECT_EQ(result.exit, 1);
+    EXPECT_THAT(result.err, HasSubstr("this is compressed with gzip: unpack it first"));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+  }
+}
+
 TEST(CanDecodeCommand, NamesBadLinesAndDecodesTheOthers) {
   const ScratchDirectory scratch;
   const std::string log = scratch.Put("bus.log", std::string(kLog) + "hello\n" + kLog + "x y z\n");

@@ -98,8 +98,8 @@ TEST_F(OfflineCommands, LayoutPutsFiducialsBesideTheUnits) {
   const auto fiducials = ReadFiducials(Slurp(lights), "f.csv");
   ASSERT_TRUE(fiducials) << fiducials.error().text;
   EXPECT_EQ(fiducials->size(), 7u);
-  EXPECT_EQ(
-      Focalfleet({"layout", "hex", "--count", "30", "--fiducials", "7", "--out", units}).exit, 2);
+  EXPECT_EQ(Focalfleet({"layout", "hex", "--count", "30", "--fiducials", "7", "--out", units}).exit,
+            2);
 }
 
 TEST_F(OfflineCommands, LayoutOutOfLimitsIsWrongUsage) {
@@ -182,7 +182,8 @@ TEST_F(OfflineCommands, DrawingRefusesAStateWithoutTheDisabledUnit) {
   const std::string state = scratch_.Put("s.csv", "unit_id,theta_deg,phi_deg\n2,0,180\n");
   const auto result = Draw({"--seed", "1", "--from", state, "--out", scratch_ / "t.csv"});
   EXPECT_EQ(result.exit, 1);
-  EXPECT_THAT(result.err, HasSubstr("s.csv: no row for unit 1, which is disabled"));
+  EXPECT_THAT(result.err,
+              HasSubstr("s.csv: no row for disabled unit 1: where it stands is needed"));
   EXPECT_THAT(scratch_.List(), Not(Contains("t.csv")));
 }
 

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <fstream>
@@ -127,6 +128,56 @@ TEST_F(FocalfleetdTest, TellsTheTimeSoFarWhileAConfigurationMoves) {
       kPatienceMs));
 }
 
+TEST_F(FocalfleetdTest, TellsTheClientAllBadRowsAndItsLogTheFirst) {
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  const auto refused =
+      Ask("apply", {{"source", "t.csv"},
+                    {"targets_csv", "unit_id,theta_deg,phi_deg\n1,20,999\n2,20,999\n3,0,0\n"}});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().text, HasSubstr("t.csv:2: unit 1: phi_deg 999"));
+  EXPECT_THAT(refused.error().text, HasSubstr("\n  t.csv:3: unit 2: phi_deg 999"));
+  EXPECT_THAT(refused.error().text, HasSubstr("\n  t.csv:4: unit 3: unknown unit"));
+  EXPECT_TRUE(
+      WaitUntil([&] { return Log().find("(and 2 more)") != std::string::npos; }, kPatienceMs))
+      << Log();
+  EXPECT_THAT(Log(), HasSubstr("apply refused: t.csv:2: unit 1: phi_deg 999"));
+  EXPECT_THAT(Log(), Not(HasSubstr("t.csv:4")));
+}
+
+// The camera may be another user: what it puts into its folder is neither followed nor waited for.
+TEST_F(FocalfleetdTest, EndsWhateverLiesInTheCamerasFolder) {
+  std::ofstream(scratch_ / "fiducials.csv") << "fiducial_id,x_mm,y_mm\n1,-40,0\n2,40,9\n3,0,40\n";
+  Configure(
+      "[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n[camera]\ndirectory = \"camera\"\n"
+      "fiducials = \"fiducials.csv\"\npatience_ms = 600000\n");
+  std::ofstream(scratch_ / "secret") << "secret";
+  ASSERT_EQ(mkdir((scratch_ / "camera").c_str(), 0700), 0);
+  for (const char* name : {"camera/old.csv", "camera/request.json"})
+    ASSERT_EQ(mkfifo((scratch_ / name).c_str(), 0600), 0);
+  auto daemon = Start();
+  ASSERT_TRUE(Ready()) << Log();
+  ASSERT_EQ(mkfifo((scratch_ / "camera/new.fits").c_str(), 0600), 0);
+  ASSERT_EQ(symlink("../secret", (scratch_ / "camera/new.csv").c_str()), 0);
+  ASSERT_TRUE(
+      Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,20,150\n"}, {"corrections", 1}}));
+  EXPECT_TRUE(WaitUntil(
+      [&] {
+        return Log().find("new.csv: a symbolic link, no file") != std::string::npos &&
+               Log().find("new.fits: a named pipe, no file") != std::string::npos;
+      },
+      kPatienceMs))
+      << Log();
+  EXPECT_EQ(::access((scratch_ / "camera/refused/new.fits.reason").c_str(), F_OK), 0);
+  // A request into a link would be written now, and the thread would wait for this pipe.
+  daemon.Signal(SIGTERM);
+  EXPECT_EQ(daemon.Wait(), 0) << Log();
+  std::ifstream secret(scratch_ / "secret");
+  std::string text;
+  secret >> text;
+  EXPECT_EQ(text, "secret");
+}
+
 TEST_F(FocalfleetdTest, ASecondOneOnTheSameStoreIsRefused) {
   const auto first = Start();
   ASSERT_TRUE(Answers()) << Log();
@@ -193,6 +244,14 @@ TEST_F(FocalfleetdTest, SaysWhatIsWrongWithItsFilesAndTouchesNothing) {
   Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"none.csv\"\n");
   EXPECT_EQ(Start("a").Wait(), 1);
   EXPECT_THAT(Log("a"), HasSubstr("none.csv"));
+  ASSERT_EQ(mkfifo((scratch_ / "pipe.csv").c_str(), 0600), 0);
+  Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"pipe.csv\"\n");
+  EXPECT_EQ(Start("pipe").Wait(), 1);
+  EXPECT_THAT(Log("pipe"), HasSubstr("pipe.csv: a named pipe"));
+  std::ofstream(scratch_ / "units.fits") << "SIMPLE  =                    T";
+  Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"units.fits\"\n");
+  EXPECT_EQ(Start("fits").Wait(), 1);
+  EXPECT_THAT(Log("fits"), HasSubstr("units.fits: this is a FITS file"));
   Configure("[buss]\n");
   EXPECT_EQ(Start("b").Wait(), 1);
   EXPECT_THAT(Log("b"), HasSubstr("f.toml:3: unknown key 'buss'"));

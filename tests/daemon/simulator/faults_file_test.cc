@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <string_view>
@@ -44,6 +45,26 @@ TEST(FaultsFile, EachRowIsOneFaultForEachThatItNames) {
   EXPECT_EQ((*plan)[5].kind, sim::FaultKind::kBabble);
   EXPECT_EQ((*plan)[5].value, 1) << "its priority, where none is given";
   EXPECT_EQ((*plan)[5].chance, 1);
+}
+
+TEST(FaultsFile, TellsAllBadRows) {
+  const auto plan = Read("noize,0,,,,1e-5,\nsilent,,13,,,,\nnoise,0,,,,1e-5,\n");
+  ASSERT_FALSE(plan);
+  EXPECT_EQ(std::count(plan.error().text.begin(), plan.error().text.end(), '\n'), 1);
+  EXPECT_NE(plan.error().text.find("f.csv:2: column fault: 'noize'"), std::string::npos);
+  EXPECT_NE(plan.error().text.find("f.csv:3: column unit_id: there is no unit 13"),
+            std::string::npos);
+}
+
+TEST(FaultsFile, PassesOverAColumnWithoutANameAndNoOther) {
+  static const std::vector<sim::UnitDescription> units = TwelveUnitsOnTwoBuses();
+  const auto read = [&](const std::string& column) {
+    return ReadFaults(column + "," + kHeader + "0,noise,0,,,,1e-5,\n", "f.csv", {units, true});
+  };
+  EXPECT_TRUE(read(""));
+  EXPECT_TRUE(read("Unnamed: 0"));
+  ASSERT_FALSE(read("chanse"));
+  EXPECT_EQ(read("chanse").error().text, "f.csv: no column is called 'chanse'");
 }
 
 TEST(FaultsFile, WhatIsWrongIsNamedWithFileLineAndReason) {
@@ -103,8 +124,7 @@ TEST(FaultsFile, AnyBytesGiveAPlanOrAnError) {
     for (int k = 0; k < 3; ++k) {
       constexpr std::string_view kLikely = ",-.0129ax\n";
       const char likely = kLikely[rng.Below(kLikely.size())];
-      text[rng.Below(text.size())] =
-          rng.Below(2) != 0 ? static_cast<char>(rng.Below(256)) : likely;
+      text[rng.Below(text.size())] = rng.Below(2) != 0 ? static_cast<char>(rng.Below(256)) : likely;
     }
     refused += Read(text) ? 0 : 1;
   }

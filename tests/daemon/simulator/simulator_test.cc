@@ -375,6 +375,11 @@ TEST_F(Simulation, SaysWhatIsWrongAndEnds) {
 
 TEST_F(Simulation, AStateFilePlacesTheUnits) {
   Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n");
+  const auto lacks = RunToEnd({"--units", units(), "--state", scratch_ / "state.csv",
+                               "--unix-directory", scratch_.path()});
+  EXPECT_EQ(lacks.exit, 1);
+  EXPECT_NE(lacks.err.find("state.csv: no row for units 11, 13"), std::string::npos) << lacks.err;
+  Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n11,0,180\n13,0,180\n");
   RunningSimulation simulation(Arguments({"--state", scratch_ / "state.csv"}));
   ASSERT_TRUE(simulation.ready());
   Put(scratch_ / "targets.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n");

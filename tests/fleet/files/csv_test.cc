@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "fleet/files/cell.h"
 #include "protocol/base/rng.h"
 #include "tests/support/seed.h"
 
@@ -78,11 +79,91 @@ TEST(Csv, RefusesFilesNamingLineAndReason) {
             "a.csv:2: a quote is not closed: the file is cut short or wrong");
   EXPECT_EQ(ErrorOf("a,b\n1,\"2\"3\n"), "a.csv:2: text after a closing quote");
   EXPECT_EQ(ErrorOf("a,a\n"), "a.csv:1: column 'a' is there twice");
-  EXPECT_EQ(ErrorOf("a,,b\n"), "a.csv:1: a column of the header has no name");
   EXPECT_EQ(ErrorOf(std::string_view("a\n1\n\0\n", 6)), "a.csv:3: not a text file (byte 0x00)");
-  EXPECT_EQ(ErrorOf("\x1f\x8b\x08 gzip"), "a.csv:1: not a text file (byte 0x1f)");
-  EXPECT_EQ(ErrorOf("SIMPLE  =                    T"),
-            "a.csv:1: this is a FITS file, a CSV table is expected");
+  EXPECT_EQ(ErrorOf("a\x1f\n"), "a.csv:1: not a text file (byte 0x1f)");
+  EXPECT_EQ(ErrorOf("unit_id;x_mm\n1;2,5\n"),
+            "a.csv:1: the header 'unit_id;x_mm' is one column: cells are to be separated by "
+            "commas");
+}
+
+TEST(Csv, TellsAllRowsOfAnotherWidth) {
+  EXPECT_EQ(ErrorOf("a,b\n1\n1,2\n1,2,3\n"),
+            "a.csv:2: 1 cells, but the header has 2 columns: cut short?\n"
+            "  a.csv:4: 3 cells, but the header has 2 columns");
+}
+
+TEST(Csv, ColumnsWithoutANameArePassedOver) {
+  // The index that pandas writes, and what a spreadsheet adds behind the last column.
+  const CsvTable table = Parsed(",unit_id,Unnamed: 0,x_mm,Unnamed: 0.1,,\n0,7,0,2.5,0,,\n");
+  ASSERT_EQ(table.size(), 1u);
+  CsvRow row(table, 0);
+  EXPECT_EQ(row.Integer("unit_id", {0, 9}), 7);
+  EXPECT_EQ(row.Number("x_mm"), 2.5);
+  EXPECT_FALSE(row.Has("Unnamed: 0"));
+  EXPECT_FALSE(row.Has(""));
+  EXPECT_FALSE(row.error());
+  EXPECT_EQ(table.Others({"unit_id", "x_mm"}),
+            (std::vector<std::string>{"column 1 (no name)", "Unnamed: 0", "Unnamed: 0.1",
+                                      "column 6 (no name)", "column 7 (no name)"}));
+  EXPECT_EQ(table.Require({"y_mm"}).error().text,
+            "a.csv:1: column y_mm is missing; there are: column 1 (no name), unit_id, Unnamed: 0, "
+            "x_mm, Unnamed: 0.1, column 6 (no name), column 7 (no name)");
+  EXPECT_EQ(ErrorOf("Unnamed: 0,Unnamed: 0\n1,2\n"), "");
+  EXPECT_TRUE(Parsed("Unnamed: x\n1\n").Find("Unnamed: x")) << "a name of somebody's own";
+}
+
+TEST(Csv, LinesOfCommasAloneAreEmptyLines) {
+  const CsvTable table = Parsed(",,\na,b,c\n,,\n1,2,3\n , ,\t\n,,\n");
+  ASSERT_EQ(table.size(), 1u);
+  EXPECT_EQ(table.line(0), 4);
+}
+
+// A header of n columns once cost n^2: minutes for a line that a client may send.
+TEST(Csv, LimitsColumnsAndTheLengthOfARow) {
+  std::string header = "c0";
+  for (int k = 1; k < 1024; ++k) header += ",c" + std::to_string(k);
+  const CsvTable widest = Parsed(header + "\n");
+  EXPECT_EQ(widest.columns().size(), 1024u);
+  EXPECT_EQ(widest.Find("c1023"), 1023u);
+  EXPECT_EQ(ErrorOf(header + ",c1024\n"), "a.csv:1: more than 1024 columns");
+  std::string million = "c";
+  for (int k = 0; k < 1'000'000; ++k) million += ",c" + std::to_string(k);
+  EXPECT_EQ(ErrorOf(million + "\n"), "a.csv:1: more than 1024 columns");
+  EXPECT_EQ(ErrorOf("a,b\n" + std::string(2000, ',') + "1\n"), "a.csv:2: more than 1024 cells");
+  const std::string long_cell(1 << 20, 'x');
+  EXPECT_EQ(ErrorOf("a,b\n1," + long_cell + "\n"),
+            "a.csv:2: the row is longer than 1024 KiB: is a quote not closed?");
+  EXPECT_EQ(ErrorOf("a,b\n1,\"" + long_cell + "\n\"\n"),
+            "a.csv:2: the row is longer than 1024 KiB: is a quote not closed?");
+  EXPECT_EQ(ErrorOf("# " + long_cell + "\na\n1\n"), "") << "a comment may be long";
+}
+
+TEST(Csv, ReadersAreToldOfAllRowsThatTheyRejected) {
+  const CsvTable table = Parsed("a,b\n1,x\n2,2\n3,y\n4,4\n");
+  std::vector<double> good;
+  const Status read = table.ReadRows([&](CsvRow& row) {
+    const double b = row.Number("b");
+    if (row.error()) return;
+    if (b == 4) return row.RejectRow("four", "four");
+    good.push_back(b);
+  });
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().text,
+            "a.csv:2: column b: 'x' is not a number\n  a.csv:4: column b: 'y' is not a number\n"
+            "  a.csv:5: four");
+  EXPECT_EQ(good, std::vector<double>{2});
+}
+
+TEST(Csv, RejectedCellsAreCountedByColumnAndReason) {
+  std::string text = "a\n";
+  for (int k = 0; k < 30; ++k) text += "word" + std::to_string(k) + "\n";
+  for (int k = 0; k < 5; ++k) text += std::to_string(k) + ".5\n";
+  const Status read = Parsed(text).ReadRows([](CsvRow& row) { row.Integer("a", {0, 100}); });
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().text.find("and 15 more rows; all 35: column a: is not a number (30), "
+                                   "column a: is not a whole number (5)"),
+            std::string::npos)
+      << read.error().text;
 }
 
 TEST(Csv, NamesTheColumnThatIsMissingAndThoseThatAreThere) {
@@ -115,6 +196,42 @@ TEST(CsvRow, RefusesCellsNamingLineColumnAndReason) {
   EXPECT_EQ(error_of("+7", number), "");
   EXPECT_NE(error_of("+-7", number), "");
   EXPECT_NE(error_of("0x10", number), "");
+}
+
+TEST(CsvRow, ReadsFlagsAsNumbersAndAsOthersWriteThem) {
+  const auto flag = [](const std::string& cell) {
+    const CsvTable table = Parsed("a,b\n1," + cell + "\n");
+    CsvRow row(table, 0);
+    const auto value = row.FlagIfAny("b");
+    return row.error() ? row.error()->text : !value ? "missing" : *value ? "1" : "0";
+  };
+  for (const char* yes : {"1", "1.0", "True", "true", "TRUE", "T", "t", "\"True\""})
+    EXPECT_EQ(flag(yes), "1") << yes;
+  for (const char* no : {"0", "0.0", "-0", "False", "false", "FALSE", "F", "f"})
+    EXPECT_EQ(flag(no), "0") << no;
+  EXPECT_EQ(flag(""), "missing");
+  EXPECT_EQ(flag("nan"), "missing");
+  for (const char* wrong : {"2", "0.5", "-1", "yes", "truely", "inf"})
+    EXPECT_EQ(flag(wrong), "a.csv:2: column b: '" + std::string(wrong) +
+                               "' is neither 0 nor 1 (nor false nor true)");
+}
+
+TEST(CsvRow, WholeNumbersEndWhereTheyAreNotToldApart) {
+  for (const char* cell : {"9223372036854775808", "1e300", "9007199254740994"}) {
+    const CsvTable table = Parsed("a\n" + std::string(cell) + "\n");
+    CsvRow row(table, 0);
+    row.Integer("a", {0, INT64_MAX});
+    ASSERT_TRUE(row.error()) << cell;
+    EXPECT_NE(row.error()->text.find("is not between 0 and 9007199254740992"), std::string::npos);
+  }
+}
+
+TEST(Cell, NumbersFlagsAndWordsAreToldApart) {
+  for (const char* cell : {"", "nan", "NaN"}) EXPECT_EQ(KindOf(cell), CellKind::kMissing) << cell;
+  for (const char* cell : {"1", "-2.5e3", "+7"}) EXPECT_EQ(KindOf(cell), CellKind::kNumber) << cell;
+  for (const char* cell : {"True", "F"}) EXPECT_EQ(KindOf(cell), CellKind::kFlag) << cell;
+  for (const char* cell : {"arc", "1,5", "0x10", "inf", "2026-03-17", "1 2"})
+    EXPECT_EQ(KindOf(cell), CellKind::kWord) << cell;
 }
 
 TEST(CsvRow, KeepsTheFirstError) {

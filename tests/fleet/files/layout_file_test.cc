@@ -92,11 +92,46 @@ TEST(LayoutFile, NamesFileLineAndReason) {
             "units.csv:2: the last line does not end: the file is cut short (or end it with a "
             "newline)");
   EXPECT_EQ(ErrorOf(kHeader + ",enabled\n" + kFirst + ",2\n"),
-            "units.csv:2: column enabled: '2' is not between 0 and 1");
+            "units.csv:2: column enabled: '2' is neither 0 nor 1 (nor false nor true)");
   EXPECT_EQ(ErrorOf(kHeader + ",node_id\n" + kFirst + ",7\n"),
             "units.csv:2: column bus_id: a node_id needs a bus_id");
   EXPECT_EQ(ErrorOf(kHeader + ",arm_half_width_mm\n" + kFirst + ",0\n"),
             "units.csv:2: column arm_half_width_mm: 0 is not above 0");
+}
+
+TEST(LayoutFile, TellsAllBadRows) {
+  EXPECT_EQ(ErrorOf(kHeader + "\n" + kFirst + "\n" + kFirst +
+                    "\n2,30,0,8,nan,0,0,892,892,-190,190,0,180\n"
+                    "3,60,0,8,-8,0,0,892,892,-190,190,0,180\n"),
+            "units.csv:3: unit 1: is there twice, first in line 2\n"
+            "  units.csv:4: column arm_phi_mm: the value is missing (empty or nan)\n"
+            "  units.csv:5: unit 3: arm_phi_mm -8 is not a length between 0 and 10000");
+}
+
+TEST(LayoutFile, ReadsFlagsAsOthersWriteThem) {
+  for (const auto& [cell, enabled] : {std::pair("True", true),
+                                      {"False", false},
+                                      {"1", true},
+                                      {"0", false},
+                                      {"F", false},
+                                      {"", true}}) {
+    const auto file = ReadUnits(kHeader + ",enabled\n" + kFirst + "," + cell + "\n", "units.csv");
+    ASSERT_TRUE(file) << file.error().text;
+    EXPECT_EQ(file->units[0].enabled, enabled) << cell;
+  }
+}
+
+TEST(LayoutFile, NamesTheLinesOfAllFaultsBetweenUnits) {
+  const std::string at = ",8,8,0,0,892,892,-190,190,0,180";
+  EXPECT_EQ(ErrorOf(kHeader + "\n1,0,0" + at + "\n2,30,0" + at + "\n3,0,0" + at + "\n4,30,0" + at +
+                    "\n5,0,0" + at + "\n6,60,0" + at + "\n"),
+            "units.csv:2: unit 1 and unit 3 sit at one place\n"
+            "  units.csv:3: unit 2 and unit 4 sit at one place\n"
+            "  units.csv:6: unit 5 and unit 1 sit at one place");
+  EXPECT_EQ(ErrorOf(kHeader + ",bus_id,node_id\n1,0,0" + at + ",3,9\n2,30,0" + at + ",3,9\n3,60,0" +
+                    at + ",3,9\n"),
+            "units.csv:3: unit 2: bus 3 node 9 is also that of unit 1\n"
+            "  units.csv:4: unit 3: bus 3 node 9 is also that of unit 1");
 }
 
 TEST(LayoutFile, NamesTheLineOfFaultsBetweenUnitsToo) {

@@ -95,5 +95,24 @@ TEST(PlanFile, NamesFileLineAndReason) {
             "plan.csv:3: unit 1 theta: begins at 6 deg, but the row of line 2 ends at 5 deg");
 }
 
+TEST(PlanFile, TellsAllBadRows) {
+  const std::string head = "unit_id,axis,t0_s,t1_s,from_deg,to_deg,mode,power_W\n";
+  const auto rows =
+      ReadPlan(head + "1,alpha,0,1,0,5,asymmetric,0.1\n1,theta,0,1,0,5,fast,0.1\n", "plan.csv");
+  ASSERT_FALSE(rows);
+  EXPECT_EQ(rows.error().text,
+            "plan.csv:2: column axis: 'alpha' is neither theta nor phi\n"
+            "  plan.csv:3: column mode: 'fast' is not one of asymmetric, five_segment, "
+            "seven_segment");
+  const auto joins = ReadPlan(head +
+                                  "1,theta,0,1,0,5,asymmetric,0.1\n1,theta,1,2,6,7,asymmetric,0.1\n"
+                                  "1,theta,2,3,8,9,asymmetric,0.1\n",
+                              "plan.csv");
+  ASSERT_FALSE(joins);
+  EXPECT_EQ(joins.error().text,
+            "plan.csv:3: unit 1 theta: begins at 6 deg, but the row of line 2 ends at 5 deg\n"
+            "  plan.csv:4: unit 1 theta: begins at 8 deg, but the row of line 3 ends at 7 deg");
+}
+
 }  // namespace
 }  // namespace focalfleet

@@ -59,7 +59,7 @@ TEST(SpotsFile, SaysWhereAndWhy) {
   EXPECT_EQ(ErrorOf("# exposure_id: a\n" + table),
             "s.csv: no line `# taken_utc: ...` before the table");
   EXPECT_EQ(ErrorOf("# exposure_id:\n# taken_utc: 2026-11-22T03:04:05Z\n" + table),
-            "s.csv:1: exposure_id: not between 1 and 64 characters");
+            "s.csv:1: exposure_id: is empty");
   EXPECT_EQ(ErrorOf("# exposure_id: a\n" + kHead + table),
             "s.csv:2: exposure_id: is there twice, first in line 1");
   EXPECT_EQ(ErrorOf("# exposure_id: a\n# taken_utc: yesterday\n" + table),

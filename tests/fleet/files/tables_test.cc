@@ -75,6 +75,13 @@ TEST(TargetsFile, NamesFileLineAndReason) {
             "night.csv:2: column unit_id: 'one' is not a number");
 }
 
+TEST(TargetsFile, TellsAllBadRows) {
+  EXPECT_EQ(TargetsError("unit_id,x_mm,y_mm\n1,nan,3\n2,1,1\n3,x,1\n2,5,6\n"),
+            "night.csv:2: column x_mm: the value is missing (empty or nan)\n"
+            "  night.csv:4: column x_mm: 'x' is not a number\n"
+            "  night.csv:5: unit 2: named twice, first in line 3");
+}
+
 TEST(TargetsFile, WhatIsWrittenReadsBackEqual) {
   const auto targets = ReadTargets(
       "unit_id,x_mm,y_mm,theta_deg,phi_deg,priority,target_id\n"
@@ -151,6 +158,43 @@ TEST(StateFile, NamesFileLineAndReason) {
   EXPECT_EQ(error_of(head + "1,,1\n"),
             "state.csv:2: column theta_deg: the value is missing (empty or nan)");
   EXPECT_NE(error_of(head + "1,1e300,1\n"), "");
+}
+
+TEST(StateFile, TellsAllBadRows) {
+  const Fleet fleet = Hex(3);
+  const auto state = ReadState("unit_id,theta_deg,phi_deg\n9,1,1\n1,200,1\n2,1,1\n2,1,1\n",
+                               "state.csv", fleet.layout, fleet.drives);
+  ASSERT_FALSE(state);
+  EXPECT_EQ(state.error().text,
+            "state.csv:2: unit 9: unknown unit, the layout has none such\n"
+            "  state.csv:3: column theta_deg: unit 1: 200 is out of its range -190..190 deg\n"
+            "  state.csv:5: unit 2: named twice, first in line 4");
+}
+
+TEST(StateFile, TellsTheUnitsWithoutARow) {
+  auto units = MakeHexLayout({.count = 40});
+  units[2].enabled = false;
+  units[4].enabled = false;
+  const auto layout = Layout::Create(units, {});
+  std::vector<std::optional<Pose>> poses(40, Pose{});
+  const auto missing = [&](WhoseState whose) {
+    const Status all = RequirePoses("state.csv", *layout, poses, whose);
+    return all ? "" : all.error().text;
+  };
+  EXPECT_EQ(missing(WhoseState::kAll), "");
+  poses[0].reset();
+  EXPECT_EQ(missing(WhoseState::kAll),
+            "state.csv: no row for unit 1: where it stands is needed to keep clear of it");
+  EXPECT_EQ(missing(WhoseState::kDisabled), "");
+  poses[4].reset();
+  EXPECT_EQ(missing(WhoseState::kAll),
+            "state.csv: no row for units 1, 5: where they stand is needed to keep clear of them");
+  EXPECT_EQ(missing(WhoseState::kDisabled),
+            "state.csv: no row for disabled unit 5: where it stands is needed to keep clear of it");
+  poses.assign(40, std::nullopt);
+  EXPECT_EQ(missing(WhoseState::kAll),
+            "state.csv: no row for units 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, "
+            "17, 18, 19, 20 and 20 more: where they stand is needed to keep clear of them");
 }
 
 TEST(StateFile, ADisabledUnitStandsWhereItStands) {

@@ -1,0 +1,62 @@
+#include "fleet/files/cell.h"
+
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+namespace focalfleet {
+namespace {
+
+std::string Lower(std::string_view text) {
+  std::string lower(text);
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return lower;
+}
+
+}  // namespace
+
+std::string_view Trimmed(std::string_view text) {
+  const auto blank = [](char c) { return c == ' ' || c == '\t'; };
+  while (!text.empty() && blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && blank(text.back())) text.remove_suffix(1);
+  return text;
+}
+
+std::string Quoted(std::string_view cell) {
+  constexpr std::size_t kShown = 40;
+  std::string shown = "'";
+  for (const char c : cell.substr(0, kShown))
+    shown += static_cast<unsigned char>(c) < 0x20 || c == 0x7f ? '?' : c;
+  return shown + (cell.size() > kShown ? "...'" : "'");
+}
+
+bool IsMissing(std::string_view cell) {
+  return cell.empty() || (cell.size() == 3 && Lower(cell) == "nan");
+}
+
+std::optional<double> ParseNumber(std::string_view cell) {
+  if (cell.starts_with('+') && !cell.starts_with("+-")) cell.remove_prefix(1);
+  double value = 0;
+  const auto [end, problem] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (problem != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<bool> ParseFlagWord(std::string_view cell) {
+  constexpr std::size_t kLongest = 5;
+  if (cell.size() > kLongest) return std::nullopt;
+  const std::string word = Lower(cell);
+  if (word == "true" || word == "t") return true;
+  if (word == "false" || word == "f") return false;
+  return std::nullopt;
+}
+
+CellKind KindOf(std::string_view cell) {
+  if (IsMissing(cell)) return CellKind::kMissing;
+  if (const auto number = ParseNumber(cell))
+    return std::isfinite(*number) ? CellKind::kNumber : CellKind::kWord;
+  return ParseFlagWord(cell) ? CellKind::kFlag : CellKind::kWord;
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,43 @@
+// A test as another user: what root may do no permission forbids, so a test of root alone proves
+// nothing of the others, and the other way round.
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <string>
+#include <vector>
+
+namespace focalfleet::testing {
+
+/// The users that tests can be: root and nobody where root runs them, else whoever does.
+inline std::vector<uid_t> UsersOfTests() {
+  constexpr uid_t kNobody = 65'534;
+  return geteuid() == 0 ? std::vector<uid_t>{0, kNobody} : std::vector<uid_t>{geteuid()};
+}
+
+inline std::string NameOfUser(const ::testing::TestParamInfo<uid_t>& info) {
+  return info.param == 0 ? "AsRoot" : "AsAUser";
+}
+
+/// The whole process is that user until the end of the scope.
+class AsUser {
+ public:
+  explicit AsUser(uid_t user) : before_(geteuid()) {
+    if (user != before_) {
+      EXPECT_EQ(seteuid(user), 0);
+    }
+  }
+  AsUser(const AsUser&) = delete;
+  AsUser& operator=(const AsUser&) = delete;
+  ~AsUser() {
+    if (geteuid() != before_) {
+      EXPECT_EQ(seteuid(before_), 0);
+    }
+  }
+
+ private:
+  uid_t before_;
+};
+
+}  // namespace focalfleet::testing
