@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/campaign/move_order.h"
 #include "fleet/files/cell.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
@@ -32,6 +33,7 @@ constexpr std::array<std::string_view, 8> kFixedColumns = {
     "phi_from_deg", "phi_cmd_deg", "x_mm",           "y_mm"};
 constexpr std::string_view kWordColumn = "mode";
 constexpr std::array<std::string_view, 2> kFlagColumns = {"rehomed", "from_measured"};
+constexpr std::string_view kTimeColumn = "t_s";
 constexpr std::array<std::string_view, 3> kModes = {"asymmetric", "five_segment", "seven_segment"};
 
 // Columns of numbers that docs/files.md names, with the values that they can have. A word in one of
@@ -76,7 +78,7 @@ CampaignUnit UnitOf(const Unit& unit, bool has_rail, bool has_bus) {
   return out;
 }
 
-// One row of moves.csv as it stands in the file, before the rows are sorted by unit.
+// One row of moves.csv as it stands in the file, before the rows are sorted.
 struct MoveRow {
   std::size_t unit = 0;
   std::size_t at = 0;  // row of the table
@@ -167,6 +169,11 @@ class MoreColumns {
     campaign->word_columns.push_back(std::move(*modes_));
   }
 
+  /// The values of a column of numbers in the order of the file; null where there is none.
+  [[nodiscard]] const std::vector<double>* Find(std::string_view name) const {
+    const auto found = std::ranges::find(covariates_, name, &sim::Covariate::name);
+    return found == covariates_.end() ? nullptr : &found->values;
+  }
   [[nodiscard]] const std::vector<std::string>& passed_over() const { return passed_over_; }
 
  private:
@@ -243,9 +250,25 @@ Result<std::vector<MoveRow>> ReadMoveRows(const CsvTable& table, const UnitsFile
     rows.push_back(move);
   }));
   if (rows.empty()) return Fail(ErrorCode::kInvalid, table.file() + ": a header, but no moves");
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const MoveRow& a, const MoveRow& b) { return a.unit < b.unit; });
   return rows;
+}
+
+// Rows by unit, and those of one unit as its moves were made.
+std::vector<MoveRow> InOrder(const std::vector<MoveRow>& rows, const MoreColumns& more,
+                             TableNotes* notes) {
+  const std::vector<double>* times_s = more.Find(kTimeColumn);
+  std::vector<MoveKey> keys;
+  keys.reserve(rows.size());
+  for (const MoveRow& row : rows)
+    keys.push_back({.unit = row.unit,
+                    .move = row.move,
+                    .t_s = times_s == nullptr ? kMissing : (*times_s)[row.at]});
+  const MoveOrder order = OrderMoves(std::move(keys));
+  if (notes != nullptr) notes->rows_out_of_order = order.out_of_order;
+  std::vector<MoveRow> sorted;
+  sorted.reserve(rows.size());
+  for (const std::size_t row : order.rows) sorted.push_back(rows[row]);
+  return sorted;
 }
 
 void TakeRows(const std::vector<MoveRow>& rows, const UnitsFile& units, bool has_rail, bool has_bus,
@@ -285,13 +308,15 @@ Status ReadSerials(const CampaignTables& tables, Campaign* campaign) {
 
 }  // namespace
 
-Result<Campaign> ReadCampaign(const CampaignTables& tables, PassedOver* passed_over) {
+Result<Campaign> ReadCampaign(const CampaignTables& tables, TableNotes* notes) {
   FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(tables.units, tables.units_file));
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.moves, tables.moves_file));
   FOCALFLEET_TRY(table.Require({"unit_id", "move_id", "theta_from_deg", "theta_cmd_deg",
                                 "phi_from_deg", "phi_cmd_deg", "x_mm", "y_mm"}));
   MoreColumns more(table);
-  FOCALFLEET_TRY_ASSIGN(const std::vector<MoveRow> rows, ReadMoveRows(table, units, &more));
+  FOCALFLEET_TRY_ASSIGN(const std::vector<MoveRow> as_they_stand,
+                        ReadMoveRows(table, units, &more));
+  const std::vector<MoveRow> rows = InOrder(as_they_stand, more, notes);
   Campaign campaign;
   campaign.name = tables.name;
   const auto has = [&](std::string_view column) {
@@ -299,7 +324,10 @@ Result<Campaign> ReadCampaign(const CampaignTables& tables, PassedOver* passed_o
   };
   TakeRows(rows, units, has("rail_id"), has("bus_id"), &campaign);
   FOCALFLEET_TRY(ReadSerials(tables, &campaign));
-  if (passed_over != nullptr) *passed_over = {more.passed_over(), units.ignored_columns};
+  if (notes != nullptr) {
+    notes->ignored_of_moves = more.passed_over();
+    notes->ignored_of_units = units.ignored_columns;
+  }
   more.TakeInto(&campaign, rows);
   FOCALFLEET_TRY(Validate(campaign));
   return campaign;

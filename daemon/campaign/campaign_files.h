@@ -4,6 +4,7 @@
 // values that sim/ takes.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,17 +23,20 @@ struct CampaignTables {
   std::string name = "campaign";
 };
 
-/// Columns that nobody reads, as messages call them; where words stand among the numbers of one,
-/// with the line of the first.
-struct PassedOver {
-  std::vector<std::string> of_moves;
-  std::vector<std::string> of_units;
+/// Notes on the tables, which are no errors.
+struct TableNotes {
+  // Columns that nobody reads, as messages call them; where words stand among the numbers of one,
+  // with the line of the first.
+  std::vector<std::string> ignored_of_moves;
+  std::vector<std::string> ignored_of_units;
+  std::size_t rows_out_of_order = 0;  // of moves.csv, behind a later move of their unit
 };
 
-/// A unit that has moves must stand in units.csv; one that has none is left out. Rows of units may
-/// alternate. A column of moves.csv that nobody knows is a covariate where it holds numbers or
-/// flags alone. Errors: kInvalid with file:line: column: reason, of all rows.
-Result<sim::Campaign> ReadCampaign(const CampaignTables& tables, PassedOver* passed_over = nullptr);
+/// A unit that has moves must stand in units.csv; one that has none is left out. Rows may stand in
+/// any order (move_order.h). A column of moves.csv that nobody knows is a covariate where it holds
+/// numbers or flags alone. `notes`: if wanted. Errors: kInvalid with file:line: column: reason, of
+/// all rows.
+Result<sim::Campaign> ReadCampaign(const CampaignTables& tables, TableNotes* notes = nullptr);
 
 /// Every column; reads back equal.
 std::string WriteMoves(const sim::Campaign& campaign);

@@ -42,6 +42,14 @@ json UnknownJson(const sim::UnknownFound& found) {
   return unknown;
 }
 
+// Null: none was found.
+json StepsJson(const sim::PlaceSteps& steps) {
+  json both = json::array();
+  for (const double step_mm : {steps.x_mm, steps.y_mm})
+    both.push_back(step_mm > 0 ? json(step_mm) : json(nullptr));
+  return both;
+}
+
 json GainJson(const sim::HeldOutGain& gain) {
   return {{"rms_before_um", Finite(gain.rms_before_um)},
           {"rms_after_um", Finite(gain.rms_after_um)},
@@ -61,12 +69,26 @@ std::string Quoted(std::string_view text) {
   return out + "\"";
 }
 
-std::string NumberList(std::span<const double> values, int digits = 9) {
+constexpr int kDigits = 9;
+
+// Pre: all are finite.
+std::string NumberList(std::span<const double> values, int digits = kDigits) {
   std::string text = "[";
   for (std::size_t i = 0; i < values.size(); ++i)
-    text += (i == 0 ? "" : ", ") +
-            (std::isfinite(values[i]) ? fmt::format("{:.{}g}", values[i], digits) : "nan");
+    text += (i == 0 ? "" : ", ") + fmt::format("{:.{}g}", values[i], digits);
   return text + "]";
+}
+
+// A line of TOML; none where the number is not known.
+std::string NumberLine(std::string_view key, double value) {
+  return std::isfinite(value) ? fmt::format("{} = {:.{}g}\n", key, value, kDigits) : "";
+}
+
+// Where the campaign left the unit is told whole or not at all: a reader takes no part of it.
+bool IsTold(const sim::UnitLeft& left) {
+  const auto is_known = [](double deg) { return std::isfinite(deg); };
+  return left.moved && std::ranges::all_of(left.pose_deg, is_known) &&
+         std::ranges::all_of(left.added_deg, is_known);
 }
 
 // Where an empirical term acts, and the knots that a curve is read through.
@@ -119,8 +141,11 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
     if (!term.form.shape_of_unit.empty()) shapes.push_back(*shape);
     amplitude.insert(amplitude.end(), own.begin(), own.end());
     const std::size_t at = term.group_of_unit[u] * term.form.columns;
-    for (std::size_t c = 0; c < term.form.columns; ++c) sigma.push_back(term.sigma[at + c]);
+    // 0: nothing is known of it.
+    for (std::size_t c = 0; c < term.form.columns; ++c)
+      sigma.push_back(std::isfinite(term.sigma[at + c]) ? term.sigma[at + c] : 0);
   }
+  if (units.empty()) return {};  // nobody has it any more
   text += fmt::format("columns = {}\n", term.form.columns);
   text += "units = " + NumberList(units) + "\n";
   if (!shapes.empty()) text += "shapes = " + NumberList(shapes) + "\n";
@@ -152,7 +177,9 @@ json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& names) {
                {{"rows", diagnosis.rows},
                 {"units", diagnosis.units},
                 {"moves", diagnosis.moves},
+                {"place_step_mm", StepsJson(diagnosis.steps)},
                 {"sha256", names.sha256}}},
+              {"remarks", diagnosis.remarks},
               {"model", {{"before", names.model_before}, {"after", names.model_after}}}};
   if (!diagnosis.insufficient.empty()) report["missing"] = diagnosis.insufficient;
   return report;
@@ -165,57 +192,68 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
   text += "campaign = " + Quoted(names.campaign) + "\n";
   text += "campaign_sha256 = " + Quoted(names.sha256) + "\n";
   text += "verdict = " + Quoted(sim::Name(diagnosis.verdict)) + "\n";
-  text += fmt::format("rms_before_um = {:.9g}\nrms_after_um = {:.9g}\n",
-                      diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
+  text += NumberLine("rms_before_um", diagnosis.gain.rms_before_um) +
+          NumberLine("rms_after_um", diagnosis.gain.rms_after_um);
   for (const sim::ModelTerm& term : diagnosis.model.terms) text += TermText(term, diagnosis, names);
   const std::vector<sim::UnitLeft> left = sim::LeftByCampaign(diagnosis.model, campaign);
   for (std::size_t u = 0; u < diagnosis.model.units.size(); ++u) {
     const sim::CampaignUnit& unit = diagnosis.model.units[u];
+    if (std::ranges::count(diagnosis.without_geometry, unit.id) > 0) continue;
     text += fmt::format("\n[[unit]]\nunit_id = {}\n", unit.id);
     if (unit.serial != 0) text += fmt::format("serial = {}\n", unit.serial);
-    text += fmt::format("base_x_mm = {:.9g}\nbase_y_mm = {:.9g}\n", unit.base_x_mm, unit.base_y_mm);
-    text +=
-        fmt::format("arm_theta_mm = {:.9g}\narm_phi_mm = {:.9g}\n", unit.arm_mm[0], unit.arm_mm[1]);
-    text += fmt::format("theta_zero_deg = {:.9g}\nphi_zero_deg = {:.9g}\n", unit.zero_deg[0],
-                        unit.zero_deg[1]);
-    if (left[u].moved)
-      text += fmt::format(
-          "left_theta_deg = {:.9g}\nleft_phi_deg = {:.9g}\nadded_theta_deg = {:.9g}\n"
-          "added_phi_deg = {:.9g}\n",
-          left[u].pose_deg[0], left[u].pose_deg[1], left[u].added_deg[0], left[u].added_deg[1]);
+    text += NumberLine("base_x_mm", unit.base_x_mm) + NumberLine("base_y_mm", unit.base_y_mm);
+    text += NumberLine("arm_theta_mm", unit.arm_mm[0]) + NumberLine("arm_phi_mm", unit.arm_mm[1]);
+    text += NumberLine("theta_zero_deg", unit.zero_deg[0]) +
+            NumberLine("phi_zero_deg", unit.zero_deg[1]);
+    if (IsTold(left[u]))
+      text += NumberLine("left_theta_deg", left[u].pose_deg[0]) +
+              NumberLine("left_phi_deg", left[u].pose_deg[1]) +
+              NumberLine("added_theta_deg", left[u].added_deg[0]) +
+              NumberLine("added_phi_deg", left[u].added_deg[1]);
   }
   return text;
+}
+
+std::string Decimals(double value, int decimals) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "?";
+}
+
+std::string Significant(double value, int digits) {
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : "?";
 }
 
 std::string VerdictSentence(const sim::Diagnosis& diagnosis) {
   if (diagnosis.verdict == sim::Verdict::kInsufficient)
     return "Insufficient: " + diagnosis.insufficient + ".";
   if (diagnosis.verdict == sim::Verdict::kConsistent)
-    return fmt::format(
-        "Consistent: the simulation explains the data to their noise ({:.1f} um rms).",
-        diagnosis.gain.rms_after_um);
+    return fmt::format("Consistent: the simulation explains the data to {} ({} um rms).",
+                       diagnosis.steps_limit ? "the steps that places come in" : "their noise",
+                       Decimals(diagnosis.gain.rms_after_um, 1));
   std::string what;
   for (const sim::CauseFound& cause : diagnosis.causes) {
     std::string name = cause.cause;
     for (std::size_t i = 1; i < cause.candidates.size(); ++i) name += " or " + cause.candidates[i];
     if (cause.axis == "theta" || cause.axis == "phi") name += " of " + cause.axis;
-    what += (what.empty() ? "" : ", ") + fmt::format("{} ({:.1f} um)", name, cause.size_um);
+    what +=
+        (what.empty() ? "" : ", ") + fmt::format("{} ({} um)", name, Decimals(cause.size_um, 1));
   }
   const char* word = diagnosis.verdict == sim::Verdict::kUnknown     ? "Unknown"
                      : diagnosis.verdict == sim::Verdict::kAmbiguous ? "Ambiguous"
                                                                      : "Explained";
   std::string text = fmt::format("{}: {}", word, what.empty() ? "no named cause" : what);
   if (!diagnosis.unknown.empty())
-    text += fmt::format("; structure that no candidate explains remains against {} ({:.1f} um)",
-                        diagnosis.unknown.front().covariate, diagnosis.unknown.front().size_um);
+    text += fmt::format("; structure that no candidate explains remains against {} ({} um)",
+                        diagnosis.unknown.front().covariate,
+                        Decimals(diagnosis.unknown.front().size_um, 1));
   const auto patches =
       std::count_if(diagnosis.unknown.begin(), diagnosis.unknown.end(),
                     [](const sim::UnknownFound& found) { return found.patched.has_value(); });
   if (patches > 0)
     text += fmt::format("; {} of {} such structures patched by empirical terms, which name nothing",
                         patches, diagnosis.unknown.size());
-  return text + fmt::format("; held-out rms {:.1f} um before, {:.1f} um after.",
-                            diagnosis.gain.rms_before_um, diagnosis.gain.rms_after_um);
+  return text + fmt::format("; held-out rms {} um before, {} um after.",
+                            Decimals(diagnosis.gain.rms_before_um, 1),
+                            Decimals(diagnosis.gain.rms_after_um, 1));
 }
 
 }  // namespace focalfleet

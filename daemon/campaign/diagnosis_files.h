@@ -1,6 +1,7 @@
 // What `focalfleet diagnose` leaves behind for programs: report.json (the fields of
 // docs/diagnosis.md) and model.toml (the extended model: fitted geometry, and every accepted
-// effect with its amplitudes, their uncertainty and the campaign they came from).
+// effect with its amplitudes, their uncertainty and the campaign they came from). A number that is
+// not known is null in the report and absent from the model; ReadModelFile reads every model.
 #pragma once
 
 #include <map>
@@ -29,5 +30,9 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
 
 /// The verdict in one sentence, for people.
 std::string VerdictSentence(const sim::Diagnosis& diagnosis);
+
+/// A number for people with so many decimals, or significant digits; "?" where it is not known.
+std::string Decimals(double value, int decimals);
+std::string Significant(double value, int digits);
 
 }  // namespace focalfleet

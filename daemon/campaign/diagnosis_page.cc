@@ -31,10 +31,11 @@ void AddCauses(const Diagnosis& diagnosis, report::Page* page) {
       rivals += (rivals.empty() ? "" : ", ") + cause.candidates[k];
     rows.push_back({cause.cause, rivals.empty() ? "none" : rivals, cause.axis, cause.scope,
                     cause.all_units ? "all" : std::to_string(cause.units.size()),
-                    fmt::format("{:.4g} ({:.4g} to {:.4g}) {}", cause.amplitude, cause.ci95[0],
-                                cause.ci95[1], cause.amplitude_unit),
-                    fmt::format("{:.2f}", cause.size_um),
-                    fmt::format("{:.0f}", 2 * cause.delta_log_likelihood), cause.shape});
+                    fmt::format("{} ({} to {}) {}", Significant(cause.amplitude, 4),
+                                Significant(cause.ci95[0], 4), Significant(cause.ci95[1], 4),
+                                cause.amplitude_unit),
+                    Decimals(cause.size_um, 2), Decimals(2 * cause.delta_log_likelihood, 0),
+                    cause.shape});
   }
   page->Table({"cause", "cannot be told from", "axis", "scope", "units", "amplitude (95 %)",
                "rms at the fibre (um)", "2 d ln L", "shape"},
@@ -51,6 +52,10 @@ void AddGain(const Diagnosis& diagnosis, report::Page* page) {
   const bool exchanged = std::ranges::any_of(diagnosis.causes, [](const sim::CauseFound& cause) {
     return cause.cause == "identity_swap";
   });
+  if (!std::isfinite(gain.rms_before_um) || !std::isfinite(gain.rms_after_um)) {
+    page->Paragraph("No move could be held out.");
+    return;
+  }
   page->Paragraph(gain.held_out + ".");
   page->Plot(report::DrawBars(
       {.title = "2-D residual",
@@ -139,8 +144,7 @@ void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
                                     next.moves.size()));
   std::vector<std::vector<std::string>> rows;
   for (const sim::Prospect& one : next.prospects)
-    rows.push_back(
-        {one.cause, one.rival, fmt::format("{:.1f}", one.d), PercentOf(sim::ConfusionAt(one.d))});
+    rows.push_back({one.cause, one.rival, Decimals(one.d, 1), PercentOf(sim::ConfusionAt(one.d))});
   for (const auto& [cause, rival] : next.untold)
     rows.push_back({cause, rival, "-", "no move tells"});
   page->Table({"cause", "or", "set apart by (chi-square)", "still confused"}, rows,
@@ -152,11 +156,11 @@ void AddRest(const Diagnosis& diagnosis, report::Page* page) {
     page->Heading("What no candidate explains");
     std::vector<std::vector<std::string>> rows;
     for (const sim::UnknownFound& found : diagnosis.unknown)
-      rows.push_back(
-          {found.covariate, found.channel, fmt::format("{:.2g}", found.p_value),
-           fmt::format("{:.2f}", found.size_um),
-           found.patched ? fmt::format("{}, {:.2f} um", found.patched->term, found.patched->size_um)
-                         : "no"});
+      rows.push_back({found.covariate, found.channel, Significant(found.p_value, 2),
+                      Decimals(found.size_um, 2),
+                      found.patched ? fmt::format("{}, {} um", found.patched->term,
+                                                  Decimals(found.patched->size_um, 2))
+                                    : "no"});
     page->Table({"against", "in", "p", "rms (um)", "patched"}, rows);
     page->Paragraph(
         "A patch is a smooth curve or a ripple that follows the data: it corrects, and explains "
@@ -190,6 +194,7 @@ std::string DiagnosisPage(const Campaign& campaign, const Diagnosis& diagnosis,
   page.Paragraph(VerdictSentence(diagnosis));
   page.Paragraph(fmt::format("{} rows of {} units, {} moves; SHA-256 of the tables {}.",
                              diagnosis.rows, diagnosis.units, diagnosis.moves, names.sha256));
+  for (const std::string& remark : diagnosis.remarks) page.Paragraph("Note: " + remark + ".");
   if (diagnosis.verdict == sim::Verdict::kInsufficient) return page.Html();
   AddCauses(diagnosis, &page);
   AddGain(diagnosis, &page);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "sim/diagnosis/planted.h"
+#include "sim/diagnosis/static_geometry.h"
 #include "sim/effects/empirical.h"
 #include "sim/effects/registry.h"
 
@@ -103,25 +104,14 @@ class ModelReader {
     FOCALFLEET_TRY_ASSIGN(unit.zero_deg[1], Number(table, "phi_zero_deg"));
     if (!(unit.arm_mm[0] > 0) || !(unit.arm_mm[1] > 0))
       return Wrong(table, "an arm is not above 0");
-    FOCALFLEET_TRY(CheckGeometry(table, described, unit));
+    const sim::GeometryCheck check = sim::CheckGeometry(described, unit);
+    const std::string name = "unit " + std::to_string(unit.id);
+    if (!check.base)
+      return Wrong(table, name + " has its base more than 10 mm from where it is described");
+    if (!check.arms)
+      return Wrong(table, name + " has an arm that differs by more than half from its description");
     ++read_.units_known;
     return ReadLeft(table, at->second);
-  }
-
-  /// A fit moves a base by its play on the plate and an arm by its making, not to another unit.
-  Status CheckGeometry(const toml::table& table, const sim::CampaignUnit& described,
-                       const sim::CampaignUnit& fitted) const {
-    constexpr double kBaseMm = 10;
-    constexpr double kArmShare = 0.5;
-    const std::string name = "unit " + std::to_string(fitted.id);
-    if (std::hypot(fitted.base_x_mm - described.base_x_mm, fitted.base_y_mm - described.base_y_mm) >
-        kBaseMm)
-      return Wrong(table, name + " has its base more than 10 mm from where it is described");
-    for (const std::size_t axis : {sim::kTheta, sim::kPhi})
-      if (std::abs(fitted.arm_mm[axis] / described.arm_mm[axis] - 1) > kArmShare)
-        return Wrong(table,
-                     name + " has an arm that differs by more than half from its description");
-    return {};
   }
 
   Status ReadLeft(const toml::table& table, std::size_t unit) {

@@ -72,9 +72,8 @@ std::string CauseTable(const sim::Diagnosis& diagnosis) {
       rivals += (rivals.empty() ? "" : ", ") + cause.candidates[k];
     rows.push_back({cause.cause, cause.axis, cause.scope,
                     cause.all_units ? "all" : std::to_string(cause.units.size()),
-                    fmt::format("{:.4g} {}", cause.amplitude, cause.amplitude_unit),
-                    fmt::format("{:.2f}", cause.size_um),
-                    fmt::format("{:.0f}", 2 * cause.delta_log_likelihood),
+                    Significant(cause.amplitude, 4) + " " + cause.amplitude_unit,
+                    Decimals(cause.size_um, 2), Decimals(2 * cause.delta_log_likelihood, 0),
                     rivals.empty() ? "-" : rivals});
   }
   return AlignColumns(rows);
@@ -87,7 +86,7 @@ std::string PatchTable(const sim::Diagnosis& diagnosis) {
   for (const sim::UnknownFound& found : diagnosis.unknown)
     if (found.patched)
       rows.push_back({found.patched->term, found.channel, found.covariate,
-                      fmt::format("{:.2f}", found.patched->size_um)});
+                      Decimals(found.patched->size_um, 2)});
   return rows.size() == 1 ? "" : AlignColumns(rows);
 }
 
@@ -144,6 +143,7 @@ ExitCode RunDiagnose(const Context& context, const DiagnoseCommandOptions& optio
     return Report(context, written.error());
   if (context.json) PrintJson(report);
   Say(context, VerdictSentence(diagnosis));
+  for (const std::string& remark : diagnosis.remarks) Say(context, "note: " + remark);
   if (!diagnosis.causes.empty()) Say(context, CauseTable(diagnosis));
   for (const auto& [why, rows] : diagnosis.outliers.why)
     Say(context, fmt::format("{} of {} rows: {}", rows, diagnosis.rows, why));

@@ -1,5 +1,7 @@
 #include "daemon/cli/measured_campaign.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <atomic>
 #include <filesystem>
@@ -19,15 +21,19 @@ Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std:
   FOCALFLEET_TRY_ASSIGN(const std::string units, ReadTextFile(units_file));
   MeasuredCampaign in;
   in.names.campaign = path.filename().empty() ? path.parent_path().filename() : path.filename();
-  PassedOver passed_over;
+  TableNotes notes;
   FOCALFLEET_TRY_ASSIGN(in.campaign, ReadCampaign({.moves = moves,
                                                    .units = units,
                                                    .moves_file = moves_file,
                                                    .units_file = units_file,
                                                    .name = in.names.campaign},
-                                                  &passed_over));
-  TellPassedOver(context, units_file, passed_over.of_units);
-  TellPassedOver(context, moves_file, passed_over.of_moves);
+                                                  &notes));
+  TellPassedOver(context, units_file, notes.ignored_of_units);
+  TellPassedOver(context, moves_file, notes.ignored_of_moves);
+  if (notes.rows_out_of_order > 0)
+    Say(context, fmt::format("note: {} of {} rows stand behind a later move of their unit: rows "
+                             "were sorted",
+                             notes.rows_out_of_order, in.campaign.rows()));
   in.names.sha256 = Sha256Hex(moves + units);
   in.names.model_after = in.names.campaign + "-extended";
   return in;

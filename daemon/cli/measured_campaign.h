@@ -18,7 +18,8 @@ struct MeasuredCampaign {
   ReportNames names;
 };
 
-/// moves.csv and units.csv of the folder. Tells which columns of them were passed over. Errors: a
+/// moves.csv and units.csv of the folder. Tells which columns of them were passed over, and
+/// whether rows had to be sorted. Errors: a
 /// file that cannot be read, or is no such table.
 Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std::string& folder);
 

@@ -117,8 +117,7 @@ ExitCode RunMeasure(const Context& context, const MeasureOptions& options) {
 void AddMeasure(CommandLine* line) {
   CLI::App* command =
       AddCommand(&line->app, "measure", "Look with the camera where every fibre is; nothing moves",
-                 "  focalfleet measure --wait    # units of unknown place are known again where "
-                 "they are found\n"
+                 "  focalfleet measure --wait    # find units of unknown place, among others\n"
                  "  focalfleet measurements --out fibres.fits");
   auto options = std::make_shared<MeasureOptions>();
   command->add_flag("--wait", options->wait, "Wait for the exposure, and tell what it found");
@@ -130,7 +129,7 @@ void AddMeasure(CommandLine* line) {
 struct EnableOptions {
   std::vector<std::uint32_t> units;
   std::string reason;
-  double within_s = 5;  // a unit that clears a fault is read anew, with repeats some seconds at most
+  double within_s = 5;  // a unit that clears a fault is read anew, within seconds with repeats
 };
 
 ExitCode RunDisable(const Context& context, const EnableOptions& options) {
@@ -143,8 +142,8 @@ ExitCode RunDisable(const Context& context, const EnableOptions& options) {
 constexpr std::chrono::milliseconds kLookEvery{50};
 
 /// The units that are still in fault when the daemon has had time to clear it. Errors: as Ask.
-tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(
-    const Context& context, const EnableOptions& options) {
+tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(const Context& context,
+                                                               const EnableOptions& options) {
   const auto give_up =
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
   for (;;) {

@@ -182,12 +182,14 @@ std::vector<TermDifference> TermDifferences(const ModelPair& models) {
 
 }  // namespace
 
-ModelComparison CompareModels(const ModelPair& models, const Campaign& campaign,
+ModelComparison CompareModels(const ModelPair& models, const Campaign& given,
                               const CompareOptions& options) {
   ModelComparison out;
+  Campaign campaign = given;
+  const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
   const CampaignFacts facts = MakeFacts(campaign);
   std::vector<char> aside;
-  out.left_out = FindBeforeFit(facts, &aside).why;
+  out.left_out = FindBeforeFit(facts, repeated, &aside).why;
   CampaignModel a = *models.a, b = *models.b;
   out.a.left_out = LeaveOutUntold(facts, &a), out.b.left_out = LeaveOutUntold(facts, &b);
   const std::vector<double> lengths_a = LengthsOf(a, facts, aside, options.parallel);

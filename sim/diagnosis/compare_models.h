@@ -48,9 +48,10 @@ struct CompareOptions {
   ParallelFor parallel = OneAfterTheOther();
 };
 
-/// rows == 0: none could be judged. Rows that were not seen, of units that do not move or stand
-/// elsewhere by both models, or far off by both, are left out. Exchanging the models changes the
-/// sign of the difference and nothing else. Pre: Validate(campaign), whose units the models have.
+/// rows == 0: none could be judged. Rows that were not seen or repeat a place, of units that do not
+/// move or stand elsewhere by both models, or far off by both, are left out. Exchanging the models
+/// changes the sign of the difference and nothing else. Pre: Validate(campaign), whose units the
+/// models have.
 ModelComparison CompareModels(const ModelPair& models, const Campaign& campaign,
                               const CompareOptions& options);
 

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -22,6 +23,7 @@
 #include "sim/diagnosis/outliers.h"
 #include "sim/diagnosis/patch.h"
 #include "sim/diagnosis/polished.h"
+#include "sim/diagnosis/remarks.h"
 #include "sim/diagnosis/rotors.h"
 #include "sim/diagnosis/screen.h"
 #include "sim/diagnosis/shared_walk.h"
@@ -365,6 +367,45 @@ HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
   return MeasureGain(fit, &misnamed);
 }
 
+void Remark(std::vector<std::string> remarks, Diagnosis* diagnosis) {
+  for (std::string& remark : remarks) diagnosis->remarks.push_back(std::move(remark));
+}
+
+void RemarkOnRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
+                  Diagnosis* diagnosis) {
+  Remark(RemarksOnRepeats(repeated, facts.campaign->rows()), diagnosis);
+  Remark(RemarksOnOrder(facts), diagnosis);
+  diagnosis->steps = FindPlaceSteps(*facts.campaign);
+}
+
+// The steps of the places limit what is told where they make more of the noise than all else does.
+void RemarkOnNoise(const Fit& fit, Diagnosis* diagnosis) {
+  const double of_steps_um = 1e3 * SpreadOfStep(diagnosis->steps.wider_mm());
+  diagnosis->steps_limit = std::numbers::sqrt2 * of_steps_um > fit.noise.place_um;
+  if (diagnosis->steps_limit) Remark({RemarkOnSteps(diagnosis->steps)}, diagnosis);
+}
+
+// A fit to rows that say nothing of a unit, or that are not its own, is no model of it: whoever
+// reads the model has the table's.
+void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
+  CampaignModel& model = diagnosis->model;
+  for (std::size_t unit = 0; unit < model.units.size(); ++unit) {
+    const auto is_known = [&](const ModelTerm& term) {
+      return std::ranges::all_of(term.AmplitudeOf(unit), [](double a) { return std::isfinite(a); });
+    };
+    if (CheckGeometry(given.units[unit], model.units[unit]).passes() &&
+        std::ranges::all_of(model.terms, is_known))
+      continue;
+    model.units[unit] = given.units[unit];
+    for (ModelTerm& term : model.terms) term.group_of_unit[unit] = kNoGroup;
+    diagnosis->without_geometry.push_back(given.units[unit].id);
+  }
+  if (!diagnosis->without_geometry.empty())
+    Remark({"no geometry like that of units.csv puts unit " + FirstOf(diagnosis->without_geometry) +
+            " where it was seen: the model leaves such units out"},
+           diagnosis);
+}
+
 }  // namespace
 
 std::string_view Name(Verdict verdict) {
@@ -387,12 +428,14 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   Campaign campaign = given;
   Diagnosis diagnosis;
   options.progress(0, "reading the moves");
+  const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
   CampaignFacts facts = MakeFacts(campaign);
+  RemarkOnRows(repeated, facts, &diagnosis);
   diagnosis.rows = campaign.rows();
   diagnosis.units = campaign.units.size();
   diagnosis.moves = facts.exposures.size();
   std::vector<char> aside;
-  diagnosis.outliers = FindBeforeFit(facts, &aside);
+  diagnosis.outliers = FindBeforeFit(facts, repeated, &aside);
   CampaignModel before;
   if (options.before != nullptr) {
     before = *options.before;
@@ -463,6 +506,8 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   diagnosis.model = fit.model;
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),
                                before.terms.end());
+  LeaveOutImpossible(given, &diagnosis);
+  RemarkOnNoise(fit, &diagnosis);
   options.progress(1, "done");
   return diagnosis;
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
+#include "sim/campaign/place_steps.h"
 #include "sim/diagnosis/ahead.h"
 #include "sim/diagnosis/model.h"
 
@@ -68,11 +70,13 @@ struct OutliersFound {
   std::map<std::string, std::size_t> why;  // rows by reason
 };
 
+/// NaN: not known, as where nothing could be held out.
 struct HeldOutGain {
-  double rms_before_um = 0, rms_after_um = 0;
-  double mad_before_um = 0, mad_after_um = 0;
-  double noise_floor_um = 0;
-  double explained_share = 0;
+  static constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  double rms_before_um = kNotKnown, rms_after_um = kNotKnown;
+  double mad_before_um = kNotKnown, mad_after_um = kNotKnown;
+  double noise_floor_um = kNotKnown;
+  double explained_share = kNotKnown;
   std::string held_out;
 };
 
@@ -102,7 +106,13 @@ struct Diagnosis {
   OutliersFound outliers;
   HeldOutGain gain;
   std::size_t rows = 0, units = 0, moves = 0;
-  CampaignModel model;  // the extended one
+  PlaceSteps steps;
+  bool steps_limit = false;          // they are wider than the noise
+  std::vector<std::string> remarks;  // on what is odd in the data (remarks.h)
+  CampaignModel model;               // the extended one
+  // Ids of units of which the fit has made no such unit as the table describes: the model has the
+  // table's geometry, and no effects of theirs.
+  std::vector<std::uint32_t> without_geometry;
   NextMoves next;
   // Residuals in um, for pictures. Shape: (rows); NaN where nothing was measured.
   std::vector<double> x_before_um, y_before_um, x_after_um, y_after_um;

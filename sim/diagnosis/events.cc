@@ -124,7 +124,8 @@ double UsualNoise_mm(const Fit& fit, std::size_t unit, std::size_t axis) {
   for (std::size_t k = 1; k < rows.size(); ++k)
     jumps.push_back(std::abs(rows[k].error_deg - rows[k - 1].error_deg) /
                     std::hypot(rows[k].sigma_deg(1), rows[k - 1].sigma_deg(1)));
-  return jumps.size() < kJumpsMin ? -1 : Median(std::move(jumps)) / 0.6745;
+  if (jumps.size() < kJumpsMin) return -1;
+  return std::max(Median(std::move(jumps)) / 0.6745, 1e-3 * fit.noise.least_um);
 }
 
 // `noise_mm`: of a place, without slips.

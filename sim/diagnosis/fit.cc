@@ -39,6 +39,7 @@ Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> 
   fit.model = std::move(model);
   fit.aside = std::move(aside);
   fit.parallel = std::move(parallel);
+  fit.noise.least_um = LeastNoise_um(*facts.campaign, FindPlaceSteps(*facts.campaign));
   fit.noise.unit_factor.assign(fit.model.units.size(), 1);
   std::vector<CampaignUnit> first = fit.model.units;
   const std::vector<UnitChunk> chunks = ChunksOf(first.size());

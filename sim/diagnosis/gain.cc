@@ -129,6 +129,7 @@ double NoiseFloor(const Fit& fit) {
   for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
     const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
     const double f2 = fit.noise.unit_factor[unit] * fit.noise.unit_factor[unit];
+    const double least2 = fit.noise.least_um * fit.noise.least_um;
     for (std::size_t i = 0; i < track.moves; ++i) {
       if (!fit.Used(track.first_row + i)) continue;
       const double theta_um = 1e3 * kRadians * AngleSpread(fit.noise, 0) *
@@ -136,12 +137,12 @@ double NoiseFloor(const Fit& fit) {
                                          track.elbow_y_mm[i] + track.reach_y_mm[i]);
       const double phi_um = 1e3 * kRadians * AngleSpread(fit.noise, 1) *
                             std::hypot(track.reach_x_mm[i], track.reach_y_mm[i]);
-      sum += f2 *
-             (2 * fit.noise.place_um * fit.noise.place_um + theta_um * theta_um + phi_um * phi_um);
+      const double place2 = std::max(fit.noise.place_um * fit.noise.place_um, least2 / f2);
+      sum += f2 * (2 * place2 + theta_um * theta_um + phi_um * phi_um);
       count += 1;
     }
   }
-  return count > 0 ? std::sqrt(sum / count) : 0;
+  return count > 0 ? std::sqrt(sum / count) : HeldOutGain::kNotKnown;
 }
 
 HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
@@ -179,7 +180,8 @@ HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named) {
   const auto rms = [](const std::vector<double>& values) {
     double sum = 0;
     for (const double value : values) sum += value * value;
-    return values.empty() ? 0 : std::sqrt(sum / static_cast<double>(values.size()));
+    return values.empty() ? HeldOutGain::kNotKnown
+                          : std::sqrt(sum / static_cast<double>(values.size()));
   };
   gain.rms_before_um = rms(before), gain.rms_after_um = rms(after);
   if (!before.empty()) gain.mad_before_um = Median(before), gain.mad_after_um = Median(after);

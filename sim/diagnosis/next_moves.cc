@@ -440,6 +440,11 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
     for (const std::size_t u : units) chosen += square[u];
     if (chosen > 0) pairs[p].scale = std::accumulate(square.begin(), square.end(), 0.0) / chosen;
   }
+  // Nobody who has the term was seen: no moves of theirs tell anything.
+  if (units.empty()) {
+    for (const Pair& pair : pairs) none.untold.push_back({pair.cause, pair.rival});
+    pairs.clear();
+  }
   if (pairs.empty()) return none;
   Ground ground = GroundOf(fit, units);
   TakeTerms(fit, &ground, &pairs, &none);

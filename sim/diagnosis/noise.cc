@@ -13,9 +13,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
-constexpr double kPlaceNoiseMin_um = 0.02;
-constexpr std::size_t kRowsMax = 4000;  // of those that the variances come from
-constexpr std::size_t kRowsMin = 200;   // fewer: one variance only
+constexpr std::size_t kRowsMax = 4000;                   // of those that the variances come from
+constexpr std::size_t kRowsMin = 200;                    // fewer: one variance only
 
 struct NoiseMove {
   bool restarts = false, theta_moves = false, phi_moves = false;
@@ -228,7 +227,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
                           (unit.factor * unit.factor));
   if (squares.empty()) return;
   const bool with_axes = squares.size() >= kRowsMin;
-  const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), kPlaceNoiseMin_um);
+  const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), noise->least_um);
   // Near where it was: a short search. Anew where it was never made, or is far away.
   const bool near =
       noise->fitted && typical < 2 * noise->typical_um && typical > 0.5 * noise->typical_um;
@@ -246,7 +245,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
   }
   noise->fitted = true;
   noise->typical_um = typical;
-  noise->place_um = std::max(noise->place_um, kPlaceNoiseMin_um);
+  noise->place_um = std::max(noise->place_um, noise->least_um);
 }
 
 std::size_t OwnColumns(const Fit& fit, std::size_t unit) {
@@ -268,8 +267,13 @@ struct UnitLengths {
   std::vector<std::size_t> exposure;
 };
 
-// Factors are about 1; what they have in common is the fleet's noise.
+// Factors are about 1; what they have in common is the fleet's noise. A unit or an exposure without
+// any residual has a factor, too: the least that numbers bear. Half or double of it decides
+// nothing, as a place's noise does not fall below the least one with it (rest_filter.h).
 void Normalise(Noise* noise) {
+  constexpr double kFactorLeast = 0.01;
+  for (std::vector<double>* factors : {&noise->unit_factor, &noise->exposure_factor})
+    for (double& factor : *factors) factor = std::max(factor, kFactorLeast);
   if (!noise->exposure_factor.empty()) {
     const double usual = Median(noise->exposure_factor);
     for (double& factor : noise->exposure_factor) factor /= usual;
@@ -277,7 +281,7 @@ void Normalise(Noise* noise) {
   }
   const double usual = Median(noise->unit_factor);
   for (double& factor : noise->unit_factor) factor /= usual;
-  noise->place_um *= usual;
+  noise->place_um = std::max(noise->place_um * usual, noise->least_um);
   for (int axis = 0; axis < 2; ++axis)
     noise->rest_deg[axis] *= usual, noise->angle_deg[axis] *= usual;
 }

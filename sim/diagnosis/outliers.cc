@@ -202,10 +202,15 @@ std::vector<std::size_t> TouchedRows(const Fit& fit, const std::vector<Visit>& v
 
 }  // namespace
 
-OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside) {
+OutliersFound FindBeforeFit(const CampaignFacts& facts, const RepeatedPlaces& repeated,
+                            std::vector<char>* aside) {
   const Campaign& campaign = *facts.campaign;
   OutliersFound found;
   aside->assign(campaign.rows(), 0);
+  std::vector<const char*> unseen(campaign.rows(), "not seen");
+  for (const std::size_t row : repeated.carried_on)
+    unseen[row] = "carried on, the unit was not moved";
+  for (const std::size_t row : repeated.copied) unseen[row] = "the exposure repeats the one before";
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
     const bool stuck = IsStuck(campaign, unit);
     const CampaignUnit& u = campaign.units[unit];
@@ -213,7 +218,7 @@ OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
       std::string why;
       if (!std::isfinite(campaign.x_mm[row])) {
-        why = "not seen";
+        why = unseen[row];
       } else if (stuck) {
         why = "stuck unit";
         (*aside)[row] = 1;

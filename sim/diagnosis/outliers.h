@@ -6,13 +6,16 @@
 #include <optional>
 #include <vector>
 
+#include "sim/campaign/repeated_places.h"
 #include "sim/diagnosis/diagnosis.h"
 #include "sim/diagnosis/fit.h"
 
 namespace focalfleet::sim {
 
-/// What can be told from the table alone. `aside` gets the rows that must not enter a fit.
-OutliersFound FindBeforeFit(const CampaignFacts& facts, std::vector<char>* aside);
+/// Outliers that the table alone tells. `repeated`: rows whose places have been forgotten.
+/// `aside` gets the rows that must not enter a fit.
+OutliersFound FindBeforeFit(const CampaignFacts& facts, const RepeatedPlaces& repeated,
+                            std::vector<char>* aside);
 
 /// Takes rows out of all fits, and counts them.
 void SetAside(const std::vector<std::size_t>& rows, const std::string& why,

@@ -34,7 +34,8 @@ Series SeriesOf(const Fit& fit, std::size_t unit, std::size_t axis) {
   for (double& error : errors) error = std::abs(error - middle);
   const double far = kFar * Median(std::move(errors)) / kOfNormal;
   for (AngleRow& row : series.rows) {
-    row.error_deg = std::clamp(row.error_deg - middle, -far, far);
+    const double far_deg = std::max(far, kFar * row.sigma_deg(1e-3 * fit.noise.least_um));
+    row.error_deg = std::clamp(row.error_deg - middle, -far_deg, far_deg);
     series.weight.push_back(row.lever_mm * row.lever_mm);
     series.square += series.weight.back() * row.error_deg * row.error_deg;
   }

@@ -13,7 +13,8 @@ namespace focalfleet::sim {
 class RestFilter {
  public:
   /// `factor`: of all the unit's noise.
-  RestFilter(const Noise& noise, double factor) : carry_{noise.carry[0], noise.carry[1]} {
+  RestFilter(const Noise& noise, double factor)
+      : carry_{noise.carry[0], noise.carry[1]}, least2_(noise.least_um * noise.least_um) {
     const double f2 = factor * factor;
     place2_ = f2 * noise.place_um * noise.place_um;
     for (int a = 0; a < 2; ++a) {
@@ -43,7 +44,7 @@ class RestFilter {
   void See(const double* t, double exposure_factor) {
     e_[0] *= keep_[0], e_[1] *= keep_[1];
     const double a = p_[0] + angle2_[0], c = p_[2] + angle2_[1], b = p_[1];
-    const double v = place2_ * exposure_factor * exposure_factor;
+    const double v = std::max(place2_ * exposure_factor * exposure_factor, least2_);
     s_[0] = v + a * t[0] * t[0] + 2 * b * t[0] * t[2] + c * t[2] * t[2];
     s_[1] = a * t[0] * t[1] + b * (t[0] * t[3] + t[1] * t[2]) + c * t[2] * t[3];
     s_[2] = v + a * t[1] * t[1] + 2 * b * t[1] * t[3] + c * t[3] * t[3];
@@ -93,6 +94,7 @@ class RestFilter {
 
  private:
   double carry_[2];
+  double least2_;
   double place2_ = 0;
   double angle2_[2] = {0, 0};
   double rest2_[2] = {0, 0};

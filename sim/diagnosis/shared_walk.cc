@@ -22,7 +22,8 @@ std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, s
   constexpr int kCurves = 3, kRounds = 2;  // curves: a step is no smooth one
   if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembers) return std::nullopt;
   Fit forgetful = fit;
-  forgetful.noise = {.may_carry = false, .unit_factor = fit.noise.unit_factor};
+  forgetful.noise = {
+      .least_um = fit.noise.least_um, .may_carry = false, .unit_factor = fit.noise.unit_factor};
   UpdateNoise(&forgetful);
   UpdateWeights(&forgetful);
   SettleFit(&forgetful, kRounds);

@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 
 #include "sim/campaign/campaign.h"
@@ -28,6 +29,26 @@ inline void AddStatic(const StaticVector& step, CampaignUnit* unit) {
   unit->arm_mm[kTheta] = std::max(v[2], kArmMin_mm);
   unit->arm_mm[kPhi] = std::max(v[3], kArmMin_mm);
   unit->zero_deg[kTheta] = v[4], unit->zero_deg[kPhi] = v[5];
+}
+
+/// Whether the fitted unit can be the one that the table describes: a fit moves a base by its play
+/// on the plate and an arm by its making, not to another unit.
+struct GeometryCheck {
+  bool base = false, arms = false;
+  [[nodiscard]] bool passes() const { return base && arms; }
+};
+inline GeometryCheck CheckGeometry(const CampaignUnit& described, const CampaignUnit& fitted) {
+  constexpr double kBase_mm = 10;
+  constexpr double kArmShare = 0.5;
+  GeometryCheck check;
+  check.base = std::hypot(fitted.base_x_mm - described.base_x_mm,
+                          fitted.base_y_mm - described.base_y_mm) <= kBase_mm;
+  check.arms = true;
+  for (const std::size_t axis : {kTheta, kPhi})
+    check.arms = check.arms && fitted.arm_mm[axis] > 0 &&
+                 std::abs(fitted.arm_mm[axis] / described.arm_mm[axis] - 1) <= kArmShare &&
+                 std::isfinite(fitted.zero_deg[axis]);
+  return check;
 }
 
 /// Wide: what the moves do not show stays where units.csv has it. Per mm^2 and degree^2.

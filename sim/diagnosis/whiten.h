@@ -6,8 +6,9 @@
 // Noise of one measured place:
 //   cov = place^2 I + sum over axes of t t' (angle^2 + var(rest)),  t = dplace / dangle,
 //   rest <- carry rest + N(0, rest^2) whenever the axis moves, N(0, rest^2) after a homing,
-// times factors of the unit and of the exposure. Rows count less (Huber) where the whitened length
-// is beyond what noise does; the filter believes them less, too.
+// times factors of the unit and of the exposure. Place times these has a floor, by what places are
+// rounded to (place_steps.h). Rows count less (Huber) where the whitened length is beyond what noise
+// does; the filter believes them less, too.
 // Source: Durbin and Koopman, Time Series Analysis by State Space Methods, chapter 4.
 #pragma once
 
@@ -16,12 +17,14 @@
 #include <cstddef>
 #include <vector>
 
+#include "sim/campaign/place_steps.h"
 #include "sim/diagnosis/model.h"
 
 namespace focalfleet::sim {
 
 struct Noise {
   double place_um = 1;
+  double least_um = kNoiseLeast_um;     // that a place's own noise can be, of any unit and exposure
   double angle_deg[2] = {0, 0};         // anew at each exposure
   double rest_deg[2] = {0, 0};          // anew at each move of the axis, held until the next
   double carry[2] = {0, 0};             // share of it that the next move takes along, 0..1

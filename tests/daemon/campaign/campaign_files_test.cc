@@ -3,8 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <string>
+#include <vector>
+
+#include "daemon/campaign/diagnosis_files.h"
+#include "protocol/base/rng.h"
+#include "sim/diagnosis/planted.h"
 
 namespace focalfleet {
 namespace {
@@ -28,28 +35,99 @@ Result<sim::Campaign> Read(const std::string& moves, std::string_view units = kU
   return ReadCampaign({.moves = moves, .units = units});
 }
 
+std::vector<std::string> Lines(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 std::string WhyNot(const std::string& moves, std::string_view units = kUnits) {
   const auto campaign = Read(moves, units);
   return campaign ? "it was read" : campaign.error().text;
 }
 
-TEST(CampaignFiles, SortsRowsByUnitAndKeepsTheirOrder) {
-  const auto campaign = Read(kHeader +
-                             "9,1,0,10,0,20,5,1,nan,asymmetric,0.5\n"
-                             "7,5,0,11,0,21,4,2,12.5,,\n"
-                             "9,2,10,12,20,22,,,13,seven_segment,1\n"
-                             "7,3,11,13,21,23,3,3,14,five_segment,2\n");
+TEST(CampaignFiles, SortsRowsByUnitAndMove) {
+  TableNotes notes;
+  const std::string moves = kHeader +
+                            "9,1,0,10,0,20,5,1,nan,asymmetric,0.5\n"
+                            "7,5,0,11,0,21,4,2,12.5,,\n"
+                            "9,2,10,12,20,22,,,13,seven_segment,1\n"
+                            "7,3,11,13,21,23,3,3,14,five_segment,2\n";
+  const auto campaign = ReadCampaign({.moves = moves, .units = kUnits}, &notes);
   ASSERT_TRUE(campaign) << campaign.error().text;
+  EXPECT_EQ(notes.rows_out_of_order, 1u);
   ASSERT_EQ(campaign->units.size(), 2u);
   EXPECT_EQ(campaign->units[0].id, 7u);
   EXPECT_EQ(campaign->units[0].rail, 2);
-  EXPECT_EQ(campaign->move_id, (std::vector<std::int64_t>{5, 3, 1, 2}));
+  EXPECT_EQ(campaign->move_id, (std::vector<std::int64_t>{3, 5, 1, 2}));
   EXPECT_EQ(campaign->first_row, (std::vector<std::size_t>{0, 2, 4}));
   EXPECT_TRUE(std::isnan(campaign->x_mm[3]));
-  EXPECT_EQ(campaign->Find("oil")[1], 2);
+  EXPECT_EQ(campaign->Find("oil")[0], 2);
   EXPECT_TRUE(std::isnan(campaign->Find("temp_C")[2]));
   EXPECT_TRUE(campaign->Find("delay_s").empty());
-  EXPECT_EQ(campaign->FindWords("mode")->values, (std::vector<int>{-1, 1, 0, 2}));
+  EXPECT_EQ(campaign->FindWords("mode")->values, (std::vector<int>{1, -1, 0, 2}));
+}
+
+// Rows come out of a database descending, by numbers as text, in any order.
+TEST(CampaignFiles, AnyOrderOfRowsIsTheSameCampaign) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
+    const auto planted =
+        sim::PlantCampaign({.units = 12,
+                            .moves = 40,
+                            .seed = seed,
+                            .homing_share = seed % 2 == 0 ? 0.1 : 0,
+                            .effects = {{.cause = "backlash", .amplitude = 0.1, .axis = "phi"}}});
+    ASSERT_TRUE(planted) << planted.error().text;
+    const std::string units = WriteCampaignUnits(*planted);
+    const std::string in_order = WriteMoves(*planted);
+    const auto report = [&](const std::string& moves, std::size_t* out_of_order) {
+      TableNotes notes;
+      const auto campaign = ReadCampaign({.moves = moves, .units = units}, &notes);
+      EXPECT_TRUE(campaign) << campaign.error().text;
+      EXPECT_EQ(WriteMoves(*campaign), in_order);
+      *out_of_order = notes.rows_out_of_order;
+      const sim::Diagnosis diagnosis = sim::Diagnose(*campaign, {});
+      return ReportJson(diagnosis, {}).dump() + WriteModel(diagnosis, {}, *campaign);
+    };
+    std::size_t out_of_order = 0;
+    const std::string expected = report(in_order, &out_of_order);
+    EXPECT_EQ(out_of_order, 0u);
+    std::vector<std::string> lines = Lines(in_order);
+    const auto joined = [&](const std::vector<std::string>& rows) {
+      std::string text = lines.front() + "\n";
+      for (const std::string& row : rows) text += row + "\n";
+      return text;
+    };
+    std::vector<std::string> rows(lines.begin() + 1, lines.end());
+    std::ranges::reverse(rows);
+    EXPECT_EQ(report(joined(rows), &out_of_order), expected);
+    EXPECT_EQ(out_of_order, 12 * 39u);
+    std::ranges::stable_sort(rows, {}, [](const std::string& row) {
+      const std::size_t comma = row.find(',') + 1;
+      return row.substr(comma, row.find(',', comma) - comma);  // move 10 before move 2
+    });
+    EXPECT_EQ(report(joined(rows), &out_of_order), expected);
+    EXPECT_EQ(out_of_order, 96u);  // 2, 20, 21 .. and 3, 4 .. behind 10 to 19
+    Rng rng = Rng::Stream(seed, "shuffled");
+    for (std::size_t k = rows.size(); k > 1; --k) std::swap(rows[k - 1], rows[rng.Below(k)]);
+    EXPECT_EQ(report(joined(rows), &out_of_order), expected);
+    EXPECT_GT(out_of_order, 300u);
+  }
+}
+
+TEST(CampaignFiles, TimesGoBeforeNumbersOfMoves) {
+  const std::string header =
+      "unit_id,move_id,theta_from_deg,theta_cmd_deg,phi_from_deg,phi_cmd_deg,x_mm,y_mm,t_s\n";
+  const auto campaign = Read(header +
+                             "7,1,20,30,0,0,1,1,300\n"
+                             "7,2,0,10,0,0,1,1,100\n"
+                             "7,3,10,20,0,0,1,1,200\n");
+  ASSERT_TRUE(campaign) << campaign.error().text;
+  EXPECT_EQ(campaign->move_id, (std::vector<std::int64_t>{2, 3, 1}));
+  EXPECT_EQ(campaign->Find("t_s")[2], 300);
+  EXPECT_THAT(WhyNot(header + "7,1,0,10,0,0,1,1,soon\n"),
+              HasSubstr("moves.csv:2: column t_s: 'soon' is not a number"));
 }
 
 TEST(CampaignFiles, ReadsBackWhatItWrites) {
@@ -67,19 +145,19 @@ TEST(CampaignFiles, ReadsBackWhatItWrites) {
 
 // As a table comes out of a database or out of pandas: an index, names, dates, notes, flags.
 TEST(CampaignFiles, ColumnsOfWordsArePassedOverAndThoseOfFlagsAreNumbers) {
-  PassedOver passed_over;
+  TableNotes notes;
   const std::string moves =
       ",unit_id,move_id,theta_from_deg,theta_cmd_deg,phi_from_deg,phi_cmd_deg,x_mm,y_mm,pos_id,"
       "date,rehomed,ok,flag,grease,load,Unnamed: 0,filter\n"
       "0,7,1,0,10,0,20,5,1,M00007,2026-03-17T03:04:05,True,True,T,,0.5,0,F\n"
       "1,9,1,0,10,0,20,5,1,M00009,2026-03-17T03:05:05,False,False,,2,high,1,G\n"
       "2,7,2,10,11,20,21,4,2,,,,nan,F,3,inf,2,R\n";
-  const auto campaign = ReadCampaign({.moves = moves, .units = kUnits}, &passed_over);
+  const auto campaign = ReadCampaign({.moves = moves, .units = kUnits}, &notes);
   ASSERT_TRUE(campaign) << campaign.error().text;
-  EXPECT_THAT(passed_over.of_moves,
+  EXPECT_THAT(notes.ignored_of_moves,
               ElementsAre("column 1 (no name)", "pos_id", "date",
                           "load (not all numbers: 'high' in line 3)", "Unnamed: 0", "filter"));
-  EXPECT_THAT(passed_over.of_units, IsEmpty());
+  EXPECT_THAT(notes.ignored_of_units, IsEmpty());
   const auto values = [&](const char* name) {
     const auto found = campaign->Find(name);
     return std::vector<double>(found.begin(), found.end());
@@ -118,12 +196,12 @@ TEST(CampaignFiles, ColumnsOfUnitsAreThoseOfTheHeader) {
   // Nobody else's column whose name holds "rail_id", and not what a comment says.
   std::string units = std::string("# rail_id, bus_id: see the drawing\n\n") + kUnits;
   units.replace(units.find(",rail_id\n"), 9, ",guiderail_id\n");
-  PassedOver passed_over;
+  TableNotes notes;
   const std::string moves = kHeader + "9,1,0,10,0,20,5,1,1,,\n";
-  const auto campaign = ReadCampaign({.moves = moves, .units = units}, &passed_over);
+  const auto campaign = ReadCampaign({.moves = moves, .units = units}, &notes);
   ASSERT_TRUE(campaign) << campaign.error().text;
   EXPECT_TRUE(std::isnan(campaign->units[0].rail));
-  EXPECT_THAT(passed_over.of_units, ElementsAre("guiderail_id"));
+  EXPECT_THAT(notes.ignored_of_units, ElementsAre("guiderail_id"));
 }
 
 TEST(CampaignFiles, NamesFileLineAndColumnOfWhatIsWrong) {

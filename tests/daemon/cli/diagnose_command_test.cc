@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <fstream>
 #include <sstream>
 
 #include "daemon/control/messages.h"
@@ -209,6 +210,64 @@ TEST(Diagnose, SaysHowManyRowsAreSetAside) {
   const int far = outliers["why"]["far from every prediction"];
   EXPECT_GT(far, 10);
   EXPECT_THAT(result.out, HasSubstr(std::to_string(far) + " of 480 rows: far from every"));
+}
+
+// Rounds the places of moves.csv to a step, and turns its rows around.
+void MakeOdd(const std::string& campaign, double step_mm) {
+  std::istringstream lines(Slurp(campaign + "/moves.csv"));
+  std::string line, header;
+  std::getline(lines, header);
+  std::string rows;
+  while (std::getline(lines, line)) {
+    std::istringstream cells(line);
+    std::string cell, row;
+    for (int k = 0; std::getline(cells, cell, ','); ++k) {
+      if (k == 6 || k == 7) cell = std::to_string(std::round(std::stod(cell) / step_mm) * step_mm);
+      row += (k == 0 ? "" : ",") + cell;
+    }
+    rows.insert(0, row + (line.ends_with(',') ? ",\n" : "\n"));
+  }
+  std::ofstream(campaign + "/moves.csv") << header << "\n" << rows;
+}
+
+// Oddities of the data are said, and the model is one that every command reads.
+TEST(Diagnose, SaysWhatIsOddAboutTheData) {
+  const ScratchDirectory scratch;
+  const std::string night = MadeCampaign(scratch, "night", "8e-4", "1");
+  MakeOdd(night, 0.1);
+  const auto result = Focalfleet({"diagnose", night, "--out", scratch / "report"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("note: 468 of 480 rows stand behind a later move of their "
+                                    "unit: rows were sorted\n"));
+  EXPECT_THAT(result.out, HasSubstr("note: places come in steps of 0.1 mm: nothing finer can be"));
+  const Json report = Json::parse(Slurp(scratch / "report/report.json"));
+  ASSERT_EQ(report["remarks"].size(), 1u) << report["remarks"];
+  EXPECT_NEAR(report["data"]["place_step_mm"][0], 0.1, 1e-6);
+  EXPECT_THAT(Slurp(scratch / "report/report.html"), HasSubstr("Note: places come in steps of"));
+  const std::string model = scratch / "report/model.toml";
+  const auto predicted = Focalfleet({"simulate", "campaign", "--of", night, "--model", model,
+                                     "--out", scratch / "predicted", "-q"});
+  EXPECT_EQ(predicted.exit, 0) << predicted.err;
+  const auto against = Focalfleet({"diagnose", night, "--against", model});
+  EXPECT_EQ(against.exit, 0) << against.err;
+  EXPECT_THAT(against.out, HasSubstr("note: 468 of 480 rows stand behind"));
+}
+
+// No fit, no figures: what is not known is null, and no line of the model.
+TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
+  const ScratchDirectory scratch;
+  ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "5", "--moves", "3", "--out",
+                        scratch / "night"})
+                .exit,
+            0);
+  const auto result = Focalfleet({"diagnose", scratch / "night", "--out", scratch / "report"});
+  ASSERT_EQ(result.exit, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("Insufficient: no unit was seen after 8 moves"));
+  const Json gain = Json::parse(Slurp(scratch / "report/report.json"))["gain"];
+  for (const char* figure :
+       {"rms_before_um", "rms_after_um", "noise_floor_um", "mad_after_um", "explained_fraction"})
+    EXPECT_TRUE(gain[figure].is_null()) << gain;
+  EXPECT_THAT(Slurp(scratch / "report/model.toml"), ::testing::Not(HasSubstr("rms_after_um")));
 }
 
 TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {

@@ -318,7 +318,7 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
   for (const std::size_t unit : {std::size_t{0}, std::size_t{1}})
     StandElsewhere(unit, move, -0.31 * StepAt(campaign, unit, move, kTheta),
                    -0.4 * StepAt(campaign, unit, move, kPhi), &campaign);
-  const Diagnosis diagnosis = Verdicts(campaign);
+  const Diagnosis diagnosis = Diagnose(campaign, {});
   ASSERT_FALSE(diagnosis.causes.empty());
   EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
   // Where they stand is known to some thousandths of a degree: what is left is a zero's.

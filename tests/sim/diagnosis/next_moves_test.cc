@@ -153,6 +153,20 @@ TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
   EXPECT_THAT(diagnosis.next.prospects, IsEmpty());
 }
 
+// All rows of the units that have a term may be set aside.
+TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
+  const Campaign campaign =
+      Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}}, {.moves = 40});
+  const CampaignFacts facts = MakeFacts(campaign);
+  Fit fit = FittedWith("backlash", Memory::kHold, facts);
+  std::vector<std::uint32_t>& has = fit.model.terms[0].group_of_unit;
+  std::fill(has.begin() + 1, has.end(), kNoGroup);
+  std::fill_n(fit.aside.begin(), campaign.first_row[1], 1);
+  const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "friction_windup")});
+  EXPECT_THAT(next.moves, IsEmpty());
+  EXPECT_THAT(next.untold, testing::ElementsAre(std::pair("backlash", "friction_windup")));
+}
+
 TEST(Ahead, AUnitGoesWhereItIsSentAndStaysWhereItIsNot) {
   const Campaign made = Planted({}, {.units = 8, .moves = 10, .seed = 2});
   const std::vector<ProposedMove> moves = {
