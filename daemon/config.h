@@ -35,7 +35,7 @@ struct DaemonConfig {
     bool enabled = true;
     std::uint32_t domain = 0;
     double rate_hz = 10;  // at most so often is the status of changed units published
-    std::string config;   // Cyclone's XML file; empty: $CYCLONEDDS_URI, or loopback only
+    std::string config;   // Cyclone's XML file; empty: loopback only
   } dds;
   struct Log {
     std::string level = "info";

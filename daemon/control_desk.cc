@@ -5,6 +5,7 @@
 
 #include "daemon/requested_command.h"
 #include "fleet/files/bad_rows.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet {
 namespace {
@@ -58,9 +59,26 @@ void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensati
 }
 
 void ControlDesk::Service(const FleetView& view, std::vector<Command>* commands) {
-  lines_.clear();
-  server_.Service(&lines_);
-  for (const IncomingLine& line : lines_) Handle(view, line, commands);
+  stops_.clear();
+  server_.Service(&stops_);
+  for (const IncomingLine& line : stops_) Handle(view, line, commands);
+  // A flood of stops must not keep everybody else out, so every second turn is for all.
+  stopped_ = !stops_.empty() && !stopped_;
+  if (stopped_) return;
+  spent_bytes_ = 0;
+  while (spent_bytes_ < kTurnBytes) {
+    const auto line = server_.Next();
+    if (!line) return;
+    spent_bytes_ += kLineBytes + line->text.size();
+    Handle(view, *line, commands);
+  }
+}
+
+bool ControlDesk::IsStop(std::string_view line) {
+  constexpr std::size_t kBytesMax = 512;
+  if (line.size() > kBytesMax || line.find("\"stop\"") == std::string_view::npos) return false;
+  const auto request = DecodeRequest(line);
+  return request && request->verb == "stop";
 }
 
 void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
@@ -68,18 +86,27 @@ void ControlDesk::Handle(const FleetView& view, const IncomingLine& line,
   const auto request = DecodeRequest(line.text);
   Pending pending{.client = line.client, .id = request ? request->id : 0};
   if (!request) return Answer(pending, tl::unexpected<Error>(request.error()));
+  if (line.reserved && request->verb != "stop")
+    return Answer(pending,
+                  Fail(ErrorCode::kFull, "too many clients, only stop is taken: all " +
+                                             std::to_string(limits::kControlClients) +
+                                             " places have requests open, try again later"));
   if (request->verb == "state") {
     // Spliced in as text; the frame around it is the one that EncodeResult makes.
     std::string answer = EncodeResult(request->id, nullptr);
     const std::size_t place = answer.find("null");
     answer.replace(place, 4, StateText(view));
-    server_.Answer(line.client, answer);
-    return;
+    return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
   pending.pursues =
       request->verb == "apply" || request->verb == "home" || request->verb == "measure";
   pending.retargets = request->verb == "retarget";
+  if (line.overtaken && (pending.pursues || pending.retargets))
+    return Answer(pending, Fail(ErrorCode::kRefused,
+                                "a stop that came before " + request->verb +
+                                    " was begun went ahead of it; command it again if it is still "
+                                    "wanted"));
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.pursues;
@@ -174,7 +201,8 @@ std::optional<Result<Command>> ControlDesk::ChangeModel(const FleetView& view,
         FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
         return reader->ModelText(sha256);
       });
-    FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgument(request.args, "model_toml"));
+    FOCALFLEET_TRY_ASSIGN(const std::string text,
+                          TextArgument(request.args, "model_toml", kControlLineBytesMax));
     FOCALFLEET_TRY_ASSIGN(const std::string source,
                           TextArgumentOr(request.args, "source", "model.toml"));
     return models_.Load(text, source);
@@ -242,8 +270,13 @@ Result<StoreReader*> ControlDesk::Reader() {
 }
 
 void ControlDesk::Answer(const Pending& pending, const Result<Json>& result) {
-  server_.Answer(pending.client, result ? EncodeResult(pending.id, *result)
-                                        : EncodeError(pending.id, result.error()));
+  Send(pending.client,
+       result ? EncodeResult(pending.id, *result) : EncodeError(pending.id, result.error()));
+}
+
+void ControlDesk::Send(ClientId client, const std::string& answer) {
+  spent_bytes_ += answer.size();
+  server_.Answer(client, answer);
 }
 
 void ControlDesk::Reply(const FleetView& view, const ReplyEffect& reply) {
@@ -288,6 +321,7 @@ void ControlDesk::Close() {
                 "the daemon ends; what moves goes on by itself and is read at the next start"));
   pending_.clear();
   waiting_ = 0;
+  reader_.reset();
 }
 
 }  // namespace focalfleet

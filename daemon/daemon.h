@@ -9,9 +9,15 @@ namespace focalfleet {
 
 const char* Version();
 
+struct DaemonEnd {
+  Status status;
+  /// A thread did not end in time and still runs, so the process has to end by _exit.
+  bool left = false;
+};
+
 /// Runs until SIGTERM or SIGINT. Errors: why it could not start (kRefused: another daemon holds the
 /// store or the socket), or that rows could not be stored at the end.
-Status RunDaemon(const DaemonConfig& config);
+DaemonEnd RunDaemon(const DaemonConfig& config);
 
 /// `--check`: the configuration and its files are good. The effective configuration, for people and
 /// programs.

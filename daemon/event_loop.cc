@@ -204,12 +204,14 @@ void EventLoop::Gather() {
   while (auto plan = parts_.planner->Take()) plans_.push_back(std::move(*plan));
   while (auto done = parts_.camera != nullptr ? parts_.camera->Take() : std::nullopt)
     exposures_.push_back(std::move(*done));
+  if (parts_.troubles != nullptr) notes_ = parts_.troubles->TakeNotes();
   if (std::exchange(desk_ready_, false)) parts_.desk->Service(View(), &commands_);
 }
 
 bool EventLoop::StepIsDue() const {
   return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
-         !exposures_.empty() || parts_.store->committed_through() != committed_through_ ||
+         !exposures_.empty() || !notes_.empty() ||
+         parts_.store->committed_through() != committed_through_ ||
          parts_.store->failing() != store_failing_ || now_ >= effects_.wake_at;
 }
 
@@ -225,6 +227,7 @@ void EventLoop::Step() {
                             .commands = commands_,
                             .plans = plans_,
                             .exposures = exposures_,
+                            .notes = notes_,
                             .committed_through = committed_through_,
                             .store_failing = store_failing_,
                             .refused = refused},

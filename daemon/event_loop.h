@@ -12,6 +12,7 @@
 #include "daemon/camera/camera_work.h"
 #include "daemon/clock.h"
 #include "daemon/control_desk.h"
+#include "daemon/dds_troubles.h"
 #include "daemon/event_signal.h"
 #include "daemon/job_thread.h"
 #include "daemon/status_feed.h"
@@ -41,6 +42,7 @@ class EventLoop {
     StoreThread* store = nullptr;
     StatusFeed* feed = nullptr;            // none: DDS is off
     SyncPulse* sync = nullptr;             // none: no SYNC line
+    DdsTroubles* troubles = nullptr;       // none: nobody speaks DDS
     const EventSignal* threads = nullptr;  // raised by planner, camera, store
     HostClock clock;
   };
@@ -92,6 +94,7 @@ class EventLoop {
   std::vector<Command> commands_;
   std::vector<PlanDone> plans_;
   std::vector<ExposureDone> exposures_;
+  std::vector<ShellNote> notes_;
   std::uint64_t committed_through_ = 0;  // as the coordinator knows it
   bool store_failing_ = false;
   Effects effects_;

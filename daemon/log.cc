@@ -1,14 +1,40 @@
 #include "daemon/log.h"
 
+#include <spdlog/formatter.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/basic_file_sink.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <system_error>
 
+#include "daemon/control/printable.h"
+
 namespace focalfleet {
+namespace {
+
+/// One line an event, whatever is in its text: names of verbs, exposures and files come from
+/// outside.
+class OneLine : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
+    const std::string text = Printable({message.payload.data(), message.payload.size()});
+    spdlog::details::log_msg clean = message;
+    clean.payload = text;
+    pattern_.format(clean, out);
+  }
+  [[nodiscard]] std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<OneLine>();
+  }
+
+ private:
+  spdlog::pattern_formatter pattern_{"%Y-%m-%dT%H:%M:%S.%e%z %l %v"};
+};
+
+}  // namespace
 
 Status OpenLog(const DaemonConfig::Log& log) {
   // spdlog would make the folders; of a misspelt path, too.
@@ -26,7 +52,7 @@ Status OpenLog(const DaemonConfig::Log& log) {
     return Fail(ErrorCode::kUnavailable, log.file_at + ": log.file: " + error.what());
   }
   logger->set_level(spdlog::level::from_str(log.level));
-  logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+  logger->set_formatter(std::make_unique<OneLine>());
   // A crash must not take the last sentences with it.
   logger->flush_on(spdlog::level::info);
   spdlog::set_default_logger(std::move(logger));

@@ -1,5 +1,5 @@
 // The daemon's log: one sentence an event, by spdlog, to standard error or a file. Any thread may
-// write.
+// write. An event is one line of the log whatever its text holds (control/printable.h).
 #pragma once
 
 #include <string>

@@ -1,10 +1,13 @@
 // focalfleetd: one machine's buses, their store and their status.
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <string>
 
 #include "daemon/config.h"
+#include "daemon/control/printable.h"
 #include "daemon/daemon.h"
 
 namespace {
@@ -13,14 +16,14 @@ constexpr int kCannotRun = 1;
 constexpr int kUsage = 2;
 
 int Report(const focalfleet::Error& error) {
-  std::fprintf(stderr, "focalfleetd: %s\n", error.text.c_str());
+  std::fprintf(stderr, "focalfleetd: %s\n", focalfleet::PrintableLines(error.text).c_str());
   return kCannotRun;
 }
 
 int Check(const focalfleet::DaemonConfig& config) {
   const auto text = focalfleet::CheckDaemon(config);
   if (!text) return Report(text.error());
-  std::fputs(text->c_str(), stdout);
+  std::fputs(focalfleet::PrintableLines(*text).c_str(), stdout);
   return 0;
 }
 
@@ -46,5 +49,7 @@ int main(int argc, char** argv) {
   if (!config) return Report(config.error());
   if (check) return Check(*config);
   const auto ended = focalfleet::RunDaemon(*config);
-  return ended ? 0 : Report(ended.error());
+  const int code = ended.status ? 0 : Report(ended.status.error());
+  if (ended.left) ::_exit(code);  // no destructor may pull anything from under what hangs
+  return code;
 }

@@ -13,16 +13,22 @@
 namespace focalfleet {
 namespace {
 
-/// Units of a request by their numbers. Errors: kInvalid names the first that does not exist.
+/// Units of a request by their numbers, each once. Errors: kInvalid names the first that does not
+/// exist.
 Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
                                                const std::vector<std::uint32_t>& ids) {
   if (ids.empty()) return Fail(ErrorCode::kInvalid, "no unit named");
+  if (ids.size() > layout.size())
+    return Fail(ErrorCode::kInvalid, std::to_string(ids.size()) +
+                                         " units are named, and there are " +
+                                         std::to_string(layout.size()));
   std::vector<PositionerIndex> units;
   units.reserve(ids.size());
+  std::vector<std::uint8_t> named(layout.size(), 0);
   for (const std::uint32_t id : ids) {
     const auto i = layout.Find(UnitId{id});
     if (!i) return Fail(ErrorCode::kInvalid, "there is no unit " + std::to_string(id));
-    units.push_back(*i);
+    if (std::exchange(named[i->value], std::uint8_t{1}) == 0) units.push_back(*i);
   }
   return units;
 }
@@ -85,7 +91,8 @@ std::vector<std::optional<Pose>> OffsetsOf(const FleetView& view,
 
 Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
-  FOCALFLEET_TRY_ASSIGN(const std::string csv, TextArgument(args, "targets_csv"));
+  FOCALFLEET_TRY_ASSIGN(const std::string csv,
+                        TextArgument(args, "targets_csv", kControlLineBytesMax));
   FOCALFLEET_TRY_ASSIGN(const bool fixed, FlagArgumentOr(args, "fixed", false));
   // First, because it is the answer that the operator needs whatever is in the file.
   if (view.coordinator->busy())

@@ -1,5 +1,6 @@
 #include "daemon/status_json.h"
 
+#include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -259,6 +260,7 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
             {"rows", facts.store.rows}}},
           {"dds",
            {{"enabled", facts.dds_enabled},
+            {"trouble", facts.dds_trouble},
             {"samples", facts.dds_samples},
             {"bytes", facts.dds_bytes}}},
           {"process", {{"cpu_s", facts.cpu_s}, {"steps", facts.steps}}},
@@ -308,37 +310,37 @@ Json UnitJson(const FleetView& view, PositionerIndex i) {
 
 std::string StateText(const FleetView& view) {
   fmt::memory_buffer text;
-  auto out = std::back_inserter(text);
+  const fmt::appender out(text);
   const auto number = [&](const char* name, double value) {
     if (std::isfinite(value))
-      fmt::format_to(out, ",\"{}\":{}", name, value);
+      fmt::format_to(out, FMT_COMPILE(",\"{}\":{}"), name, value);
     else
-      fmt::format_to(out, ",\"{}\":null", name);
+      fmt::format_to(out, FMT_COMPILE(",\"{}\":null"), name);
   };
-  fmt::format_to(out, "{{\"rows\":[");
+  fmt::format_to(out, FMT_COMPILE("{{\"rows\":["));
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
     const UnitStatusValue unit = SnapshotUnit(view, {n});
-    fmt::format_to(out, "{}{{\"unit_id\":{},\"serial\":{},\"phase\":\"{}\"", n == 0 ? "" : ",",
-                   unit.unit.value, unit.serial.value, Name(unit.phase));
+    fmt::format_to(out, FMT_COMPILE("{}{{\"unit_id\":{},\"serial\":{},\"phase\":\"{}\""),
+                   n == 0 ? "" : ",", unit.unit.value, unit.serial.value, Name(unit.phase));
     for (const Axis axis : kAxes) {
       const char* name = Name(axis);
       const std::size_t a = Index(axis);
-      fmt::format_to(out, ",\"{}_witness\":\"{}\"", name, Name(unit.witness[a]));
-      number(fmt::format("{}_low_deg", name).c_str(), unit.low_deg[a]);
-      number(fmt::format("{}_high_deg", name).c_str(), unit.high_deg[a]);
-      number(fmt::format("{}_offset_deg", name).c_str(),
+      fmt::format_to(out, FMT_COMPILE(",\"{}_witness\":\"{}\""), name, Name(unit.witness[a]));
+      number(fmt::format(FMT_COMPILE("{}_low_deg"), name).c_str(), unit.low_deg[a]);
+      number(fmt::format(FMT_COMPILE("{}_high_deg"), name).c_str(), unit.high_deg[a]);
+      number(fmt::format(FMT_COMPILE("{}_offset_deg"), name).c_str(),
              AngleDeg(view.coordinator->unit({n}).offset[a], view.layout->unit({n}).axis[a],
                       view.coordinator->drives()[n].axis[a]));
     }
     number("x_mm", unit.x_fp_mm);
     number("y_mm", unit.y_fp_mm);
     const UnitDrive& drive = view.coordinator->drives()[n];
-    fmt::format_to(out, ",\"counter1\":{},\"repeat\":{},\"mode\":\"{}\"", drive.axis[0].counter1,
-                   drive.axis[0].repeat, Name(drive.mode));
+    fmt::format_to(out, FMT_COMPILE(",\"counter1\":{},\"repeat\":{},\"mode\":\"{}\""),
+                   drive.axis[0].counter1, drive.axis[0].repeat, Name(drive.mode));
     number("v_bus_V", drive.v_bus_V);
-    fmt::format_to(out, "}}");
+    fmt::format_to(out, FMT_COMPILE("}}"));
   }
-  fmt::format_to(out, "]}}");
+  fmt::format_to(out, FMT_COMPILE("]}}"));
   return fmt::to_string(text);
 }
 

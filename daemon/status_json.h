@@ -28,6 +28,7 @@ struct ShellFacts {
   std::size_t batches_waiting = 0;
   StoreCounters store;
   bool dds_enabled = false;
+  std::string dds_trouble;  // why it is not there (it is tried again); empty: it is, or is off
   std::uint64_t dds_samples = 0;
   std::uint64_t dds_bytes = 0;
   std::uint64_t steps = 0;

@@ -2,51 +2,59 @@
 
 #include <spdlog/spdlog.h>
 
+#include <span>
+
 namespace focalfleet {
 
 bool StatusOutlet::Publish(const StatusBatch& status) {
-  Keep(status.units);
-  const auto taken = publisher_->Publish(std::span<const UnitStatusValue>(units_));
-  if (!taken) Note(tl::unexpected<Error>(taken.error()));
-  // A value that DDS calls wrong would be wrong the next time, too.
-  const std::size_t gone = taken ? *taken : units_.size();
-  units_.erase(units_.begin(), units_.begin() + static_cast<std::ptrdiff_t>(gone));
-  place_of_.clear();
-  for (std::size_t i = 0; i < units_.size(); ++i) place_of_[units_[i].unit] = i;
-  if (!status.orientations.empty()) {
-    const auto told =
-        publisher_->Publish(std::span<const UnitOrientationValue>(status.orientations));
-    if (!told) Note(tl::unexpected<Error>(told.error()));
-  }
-  if (!status.buses.empty()) {
-    const auto buses = publisher_->Publish(std::span<const BusStatusValue>(status.buses));
-    if (!buses) Note(tl::unexpected<Error>(buses.error()));
-  }
-  if (status.fleet) Note(publisher_->Publish(*status.fleet));
-  if (status.configuration) Note(publisher_->Publish(*status.configuration));
-  publisher_->Flush();
+  Keep(status);
+  if (joined_.get() == nullptr) return false;
+  Tell(&units_);
+  Tell(&orientations_);
+  Tell(&buses_);
+  Tell(&fleet_);
+  Tell(&configuration_);
+  TellAlarms();
+  joined_.get()->Flush();
   Count();
-  return !units_.empty();
+  return !units_.values().empty();
 }
 
 void StatusOutlet::Publish(const AlarmValue& alarm) {
-  Note(publisher_->Publish(alarm));
-  publisher_->Flush();
+  alarms_.push_back(alarm);
+  if (alarms_.size() > StatusPublisher::kAlarmsKept) alarms_.pop_front();
+  if (joined_.get() == nullptr) return;
+  TellAlarms();
+  joined_.get()->Flush();
   Count();
 }
 
-void StatusOutlet::Keep(const std::vector<UnitStatusValue>& units) {
-  if (units_.empty()) {
-    units_ = units;
-    return;
-  }
-  for (const UnitStatusValue& unit : units) {
-    const auto [it, is_new] = place_of_.emplace(unit.unit, units_.size());
-    if (is_new)
-      units_.push_back(unit);
-    else
-      units_[it->second] = unit;
-  }
+void StatusOutlet::Keep(const StatusBatch& status) {
+  units_.Keep(status.units);
+  orientations_.Keep(status.orientations);
+  buses_.Keep(status.buses);
+  if (status.fleet) fleet_ = status.fleet;
+  if (status.configuration) configuration_ = status.configuration;
+}
+
+template <class Value>
+void StatusOutlet::Tell(Newest<Value>* kept) {
+  if (kept->values().empty()) return;
+  const auto taken = joined_.get()->Publish(std::span<const Value>(kept->values()));
+  if (!taken) Note(tl::unexpected<Error>(taken.error()));
+  // A value that DDS calls wrong would be wrong the next time, too.
+  kept->DropFirst(taken ? *taken : kept->values().size());
+}
+
+template <class Value>
+void StatusOutlet::Tell(std::optional<Value>* kept) {
+  if (*kept) Note(joined_.get()->Publish(**kept));
+  kept->reset();
+}
+
+void StatusOutlet::TellAlarms() {
+  for (const AlarmValue& alarm : alarms_) Note(joined_.get()->Publish(alarm));
+  alarms_.clear();
 }
 
 void StatusOutlet::Note(const Status& status) {
@@ -56,8 +64,8 @@ void StatusOutlet::Note(const Status& status) {
 }
 
 void StatusOutlet::Count() {
-  samples_ = publisher_->counters().samples;
-  bytes_ = publisher_->counters().payload_bytes;
+  samples_ = joined_.get()->counters().samples;
+  bytes_ = joined_.get()->counters().payload_bytes;
 }
 
 }  // namespace focalfleet

@@ -20,6 +20,7 @@ class Coordinator::Impl {
   void Step(const Inputs& inputs, Effects* effects) {
     core_.BeginStep(inputs, effects);
     pursuit_.EndThoseOfAnEarlierRun();
+    for (const ShellNote& note : inputs.notes) core_.Raise(note.severity, {}, {}, note.text);
     for (const RefusedRow& refused : inputs.refused) contact_.StoreRefused(refused);
     for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);

@@ -128,6 +128,12 @@ struct ExposureDone {
   Result<ExposureFindings> exposure;
 };
 
+/// What the shell has to tell of itself; it becomes an alarm.
+struct ShellNote {
+  Severity severity = Severity::kInfo;
+  std::string text;
+};
+
 struct Inputs {
   HostInstant now;
   std::span<const ReceivedFrame> frames;
@@ -135,6 +141,7 @@ struct Inputs {
   std::span<const Command> commands;
   std::span<const PlanDone> plans;
   std::span<const ExposureDone> exposures = {};
+  std::span<const ShellNote> notes = {};
   std::uint64_t committed_through = 0;  // highest batch that is durable
   bool store_failing = false;           // the last attempt to commit failed; the shell tries again
   /// Rows of batches up to committed_through that the store set aside, each told once.

@@ -57,6 +57,7 @@ class CameraDds::Impl {
     const focalfleet_ExposureRequest sample{.since_ns = since.ns, .exposure = id};
     const dds_return_t code = dds_write(writer_, &sample);
     if (code < 0) return DdsFailure("ask for an exposure", code);
+    dds_write_flush(writer_);  // a publisher in the process packs what all writers write
     return {};
   }
 
@@ -83,15 +84,22 @@ class CameraDds::Impl {
   Handle reader_ = 0;
 };
 
-CameraDds::CameraDds(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+CameraDds::CameraDds(Options options)
+    : joined_({.join = [dds = std::move(options.dds),
+                        sensor = options.sensor] { return Impl::Create(dds, sensor); },
+               .tell = std::move(options.tell),
+               .period = options.rejoin_period}) {}
 CameraDds::~CameraDds() = default;
 
-Result<std::unique_ptr<CameraDds>> CameraDds::Open(const DdsOptions& dds, SensorLimits sensor) {
-  FOCALFLEET_TRY_ASSIGN(auto impl, Impl::Create(dds, sensor));
-  return std::unique_ptr<CameraDds>(new CameraDds(std::move(impl)));
+Status CameraDds::Request(std::uint64_t id, WallTime since) {
+  if (Impl* impl = joined_.get()) return impl->Request(id, since);
+  return Fail(ErrorCode::kUnavailable,
+              "the camera cannot be asked: the DDS domain is not joined yet (see the log)");
 }
 
-Status CameraDds::Request(std::uint64_t id, WallTime since) { return impl_->Request(id, since); }
-Result<std::optional<Exposure>> CameraDds::Take() { return impl_->Take(); }
+Result<std::optional<Exposure>> CameraDds::Take() {
+  if (Impl* impl = joined_.get()) return impl->Take();
+  return std::optional<Exposure>();
+}
 
 }  // namespace focalfleet

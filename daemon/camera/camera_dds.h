@@ -1,20 +1,29 @@
 // A camera behind two DDS topics (daemon/dds/focalfleet.idl): we ask by
 // focalfleet/exposure_request, it answers by focalfleet/exposure. What was sent before the daemon
 // listened never comes. Samples are held to what files are held to (CheckSpots); Cyclone has
-// refused those that are no Exposure at all, without a word.
+// refused those that are no Exposure at all, without a word. Until the domain can be joined, no
+// exposure is taken, and the answer says why.
 #pragma once
 
-#include <memory>
+#include <chrono>
+#include <functional>
+#include <string>
 
 #include "daemon/camera/camera_port.h"
+#include "daemon/dds/late_join.h"
 #include "daemon/dds/status_publisher.h"
 
 namespace focalfleet {
 
 class CameraDds : public CameraPort {
  public:
-  /// Errors: kUnavailable.
-  static Result<std::unique_ptr<CameraDds>> Open(const DdsOptions& dds, SensorLimits sensor);
+  struct Options {
+    DdsOptions dds;
+    SensorLimits sensor;
+    std::function<void(const std::string& trouble)> tell = [](const std::string&) {};  // LateJoin's
+    std::chrono::milliseconds rejoin_period{5000};
+  };
+  explicit CameraDds(Options options);
   ~CameraDds() override;
 
   Status Request(std::uint64_t id, WallTime since) override;
@@ -22,8 +31,7 @@ class CameraDds : public CameraPort {
 
  private:
   class Impl;
-  explicit CameraDds(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  LateJoin<Impl> joined_;
 };
 
 }  // namespace focalfleet

@@ -86,7 +86,7 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   if (options.wait) InstallInterruptNote();
   ProgressBar bar(context);
   Question question{.verb = "apply",
-                    .args = {{"source", options.file},
+                    .args = {{"source", SourceOf(options.file)},
                              {"targets_csv", std::move(*text)},
                              {"fixed", options.fixed},
                              {"wait", options.wait}},

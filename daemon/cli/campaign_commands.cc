@@ -211,7 +211,7 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   int in_a_row = 0;
   for (std::size_t m = 0; m < moves.size(); ++m) {
     const ListedMove& move = moves[m];
-    const std::string source = fmt::format("{} move {}", options.list, move.id);
+    const std::string source = SourceOf(fmt::format("{} move {}", options.list, move.id));
     const auto made =
         MakeMove(context, move, source, &bar, fmt::format("move {} of {}", m + 1, moves.size()));
     if (!made) return Report(context, made.error());

@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 
 #include "daemon/control/line_client.h"
+#include "daemon/control/printable.h"
+#include "protocol/base/limits.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -58,6 +61,10 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
                            answer.error().text, question.verb)}});
 }
 
+std::string SourceOf(const std::string& file) {
+  return file.size() <= limits::kTextBytes ? file : std::filesystem::path(file).filename().string();
+}
+
 namespace {
 
 const Json* Find(const Json& object, const char* key) {
@@ -78,9 +85,13 @@ std::uint64_t CountIn(const Json& object, const char* key) {
   return value != nullptr && value->is_number_unsigned() ? value->get<std::uint64_t>() : 0;
 }
 
+std::string TextOf(const Json& value) {
+  return value.is_string() ? Printable(value.get_ref<const std::string&>()) : std::string();
+}
+
 std::string TextIn(const Json& object, const char* key) {
   const Json* value = Find(object, key);
-  return value != nullptr && value->is_string() ? value->get<std::string>() : std::string();
+  return value != nullptr ? TextOf(*value) : std::string();
 }
 
 const Json& ObjectIn(const Json& object, const char* key) {

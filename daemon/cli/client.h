@@ -23,10 +23,15 @@ struct Question {
 
 tl::expected<Json, Failure> Ask(const Context& context, const Question& question);
 
-/// Members of an answer, total: what is missing or of another type is the default.
+/// What the daemon shall call a file: its path, or where that is longer than it keeps its name.
+std::string SourceOf(const std::string& file);
+
+/// Members of an answer, total: what is missing or of another type is the default. Texts are fit
+/// for a terminal (control/printable.h).
 double NumberIn(const Json& object, const char* key, double otherwise = 0);
 std::uint64_t CountIn(const Json& object, const char* key);
 std::string TextIn(const Json& object, const char* key);
+std::string TextOf(const Json& value);
 const Json& ObjectIn(const Json& object, const char* key);
 const Json& ListIn(const Json& object, const char* key);
 

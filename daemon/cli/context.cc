@@ -8,10 +8,37 @@
 #include <cerrno>
 #include <cstdlib>
 
+#include "daemon/control/printable.h"
+
 namespace focalfleet::cli {
 namespace {
 
 int output_error = 0;  // as standard output itself: one a process
+
+void Write(std::string_view text) {
+  const bool written =
+      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (!written && output_error == 0) output_error = errno;
+}
+
+constexpr std::array kCodes = {"\033[0m", "\033[32m", "\033[33m", "\033[31m", "\033[1m"};
+
+/// Lines of text; of all else that moves a terminal, the colours that Paint makes are left.
+std::string ForTerminal(std::string_view text) {
+  std::string out;
+  while (!text.empty()) {
+    const std::size_t plain = text.find('\033');
+    out += PrintableLines(text.substr(0, plain));
+    text.remove_prefix(std::min(plain, text.size()));
+    if (text.empty()) break;
+    const auto code = std::ranges::find_if(
+        kCodes, [text](std::string_view known) { return text.starts_with(known); });
+    const std::size_t bytes = code != kCodes.end() ? std::string_view(*code).size() : 1;
+    out += code != kCodes.end() ? std::string(*code) : PrintableLines(text.substr(0, bytes));
+    text.remove_prefix(bytes);
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -32,21 +59,26 @@ void Context::LookAtTerminals() {
 }
 
 std::string Paint(bool colour_on, Colour colour, std::string_view text) {
-  constexpr std::array<const char*, 5> kCodes = {"", "32", "33", "31", "1"};
   if (!colour_on || colour == Colour::kPlain) return std::string(text);
-  return fmt::format("\033[{}m{}\033[0m", kCodes[static_cast<std::size_t>(colour)], text);
+  return fmt::format("{}{}{}", kCodes[static_cast<std::size_t>(colour)], text, kCodes[0]);
 }
 
-void PrintText(std::string_view text) {
-  const bool written =
-      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
-  if (!written && output_error == 0) output_error = errno;
-}
+void PrintText(std::string_view text) { Write(ForTerminal(text)); }
+
+void PrintScreen(std::string_view text) { Write("\033[H\033[2J" + ForTerminal(text)); }
 
 int OutputError() { return output_error; }
 
 // Not fmt::print, which throws where the stream takes nothing.
-void Complain(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+void Complain(std::string_view text) {
+  const std::string clean = ForTerminal(text);
+  std::fwrite(clean.data(), 1, clean.size(), stderr);
+}
+
+void RedrawLine(std::string_view text) {
+  std::fputs("\r\033[K", stderr);
+  Complain(text);
+}
 
 void Say(const Context& context, std::string_view line) {
   if (context.quiet || context.json) return;
@@ -76,7 +108,7 @@ void NameUnserved(const Context& context, std::string_view lines) {
 }
 
 void PrintJson(const Json& object) {
-  PrintText(object.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n");
+  Write(PrintableJson(object.dump(-1, ' ', false, Json::error_handler_t::replace)) + "\n");
 }
 
 ExitCode Report(const Context& context, const Failure& failure) {

@@ -34,14 +34,19 @@ inline constexpr const char* kDefaultSocket = "/run/focalfleet/control.sock";
 
 std::string Paint(bool colour_on, Colour colour, std::string_view text);
 
-/// Writes to stdout, at once.
+/// Writes to stdout, at once: lines of text and the colours of Paint, whatever `text` holds
+/// (control/printable.h).
 void PrintText(std::string_view text);
+/// As PrintText, in place of all that the terminal shows.
+void PrintScreen(std::string_view text);
 /// errno of the first text that stdout did not take, else 0. Main tells it: an answer that nobody
 /// got is not done.
 int OutputError();
 
-/// Writes to stderr. Where that takes nothing, there is nobody to tell.
+/// Writes to stderr what PrintText would. Where that takes nothing, there is nobody to tell.
 void Complain(std::string_view text);
+/// As Complain, in place of the line that the cursor is in.
+void RedrawLine(std::string_view text);
 
 /// Writes to stdout; nothing with --quiet or --json.
 void Say(const Context& context, std::string_view line);

@@ -23,7 +23,7 @@ std::string EffectTable(const Json& model) {
   for (const Json& effect : ListIn(model, "effects")) {
     std::string rivals;
     for (const Json& rival : ListIn(effect, "candidates")) {
-      const auto name = rival.is_string() ? rival.get<std::string>() : std::string();
+      const std::string name = TextOf(rival);
       if (name != TextIn(effect, "cause")) rivals += (rivals.empty() ? "" : ", ") + name;
     }
     rows.push_back({TextIn(effect, "cause"), TextIn(effect, "axis"),
@@ -54,7 +54,7 @@ std::string ChangeTable(const Json& answer) {
 std::string NotCompensated(const Json& in_force) {
   std::string left_out;
   for (const Json& cause : ListIn(in_force, "left_out"))
-    if (cause.is_string()) left_out += (left_out.empty() ? "" : ", ") + cause.get<std::string>();
+    if (cause.is_string()) left_out += (left_out.empty() ? "" : ", ") + TextOf(cause);
   return left_out.empty() ? "" : "not compensated: " + left_out;
 }
 
@@ -107,7 +107,7 @@ ExitCode RunLoad(const Context& context, const std::string& file) {
     return Report(context,
                   {ErrorCode::kInvalid, fmt::format("{}: {} bytes; the daemon takes at most {}",
                                                     file, text->size(), kControlLineBytesMax / 2)});
-  return Change(context, "model_load", {{"model_toml", *text}, {"source", file}});
+  return Change(context, "model_load", {{"model_toml", *text}, {"source", SourceOf(file)}});
 }
 
 ExitCode RunUnload(const Context& context, const NoOptions&) {

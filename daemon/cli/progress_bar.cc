@@ -46,7 +46,7 @@ void ProgressBar::Show(double fraction, const std::string& stage, const std::str
   const std::string details = fmt::format("{}  {}", stage, text);
   if (kind_ == Kind::kTerminal) {
     // One column is left free: a full line makes some terminals wrap.
-    Complain("\r\033[K" + DrawBar(fraction, details, Columns() - 1));
+    RedrawLine(DrawBar(fraction, details, Columns() - 1));
     std::fflush(stderr);
     drawn_ = true;
     return;

@@ -64,6 +64,8 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
   text += fmt::format(
       "store      {}{}\n", TextIn(store, "path"),
       failing ? Paint(colour_on, Colour::kRed, "  FAILING: nothing new is started") : "");
+  if (const std::string trouble = TextIn(ObjectIn(status, "dds"), "trouble"); !trouble.empty())
+    text += fmt::format("dds        {} {}\n", Paint(colour_on, Colour::kRed, "MISSING"), trouble);
   text += DescribeBuses(ListIn(status, "buses"), NumberIn(status, "bus_load_max"), options.buses,
                         colour_on);
   const Json& configuration = ObjectIn(status, "configuration");

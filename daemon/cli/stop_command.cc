@@ -89,12 +89,17 @@ ExitCode TellWhetherAllStand(const Context& context, const StopOptions& options)
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
   for (;;) {
     const auto moving = CountMoving(context, options.unit_id);
+    const bool over = std::chrono::steady_clock::now() >= give_up;
+    // A stop is let in where all places are taken, a question is not.
+    if (!moving && moving.error().error.code == ErrorCode::kFull && !over) {
+      std::this_thread::sleep_for(kLookEvery);
+      continue;
+    }
     if (!moving)
       return Report(context, Failure{ExitCode::kBroken,
                                      {moving.error().error.code,
                                       "stop sent; whether units stand is not known: " +
                                           moving.error().error.text}});
-    const bool over = std::chrono::steady_clock::now() >= give_up;
     if (*moving > 0 && !over) {
       std::this_thread::sleep_for(kLookEvery);
       continue;

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "daemon/control/printable.h"
+
 namespace focalfleet::cli {
 namespace {
 
@@ -33,7 +35,9 @@ void Flatten(const std::string& prefix, const Json& value,
 
 }  // namespace
 
-std::string AlignColumns(const std::vector<std::vector<std::string>>& rows) {
+std::string AlignColumns(std::vector<std::vector<std::string>> rows) {
+  for (auto& row : rows)
+    for (std::string& cell : row) cell = Printable(cell);
   std::vector<std::size_t> widths;
   for (const auto& row : rows) {
     widths.resize(std::max(widths.size(), row.size()));

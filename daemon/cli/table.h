@@ -16,7 +16,8 @@ std::string DescribeObject(const Json& object);
 /// Empty: "".
 std::string DescribeRows(const Json& rows, const std::vector<std::string>& first);
 
-/// Columns as wide as their widest cell, two blanks between; the last is not padded.
-std::string AlignColumns(const std::vector<std::vector<std::string>>& rows);
+/// Columns as wide as their widest cell, two blanks between; the last is not padded. A row stays
+/// one line, whatever its cells hold (control/printable.h).
+std::string AlignColumns(std::vector<std::vector<std::string>> rows);
 
 }  // namespace focalfleet::cli

@@ -1,6 +1,5 @@
 #include "daemon/control/line_client.h"
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -10,6 +9,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <thread>
 #include <utility>
 
 #include "daemon/control/unix_address.h"
@@ -37,17 +37,25 @@ Result<bool> WaitFor(int fd, short events, std::optional<DurationNs> silence_max
 
 }  // namespace
 
-Result<LineClient> LineClient::Connect(const std::string& path) {
+Result<LineClient> LineClient::Connect(const std::string& path, DurationNs patience) {
+  using Clock = std::chrono::steady_clock;
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
-  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  // Waiting is done where it can end: a connect that blocks waits without limit for a server whose
+  // backlog is full, and there is nothing to poll for.
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0)
     return Fail(ErrorCode::kUnavailable, std::string("no socket: ") + std::strerror(errno));
   LineClient client(fd, path);
-  if (::connect(fd, address.get(), address.length()) != 0)
-    return Fail(ErrorCode::kUnavailable, "nobody answers at " + path + ": " + std::strerror(errno));
-  // Waiting is done in poll, where it can end.
-  if (::fcntl(fd, F_SETFL, O_NONBLOCK) != 0)
-    return Fail(ErrorCode::kUnavailable, path + ": " + std::strerror(errno));
+  const auto end = Clock::now() + std::chrono::nanoseconds(patience.ns);
+  while (::connect(fd, address.get(), address.length()) != 0) {
+    if (errno == EINTR) continue;
+    if (errno != EAGAIN)
+      return Fail(ErrorCode::kUnavailable,
+                  "nobody answers at " + path + ": " + std::strerror(errno));
+    if (Clock::now() >= end)
+      return Fail(ErrorCode::kUnavailable, path + ": no connection is taken there in time");
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
   return client;
 }
 

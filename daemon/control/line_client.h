@@ -20,8 +20,9 @@ class LineClient {
     std::function<void(const Json&)> on_progress;         // may be empty
   };
 
-  /// Errors: kUnavailable, names the path: nobody listens there, or it may not be opened.
-  static Result<LineClient> Connect(const std::string& path);
+  /// Errors: kUnavailable, names the path: nobody listens there, it may not be opened, or whoever
+  /// listens has not taken a connection for `patience` (it hangs, or is stopped).
+  static Result<LineClient> Connect(const std::string& path, DurationNs patience = Seconds(10));
 
   LineClient(LineClient&& other) noexcept;
   LineClient& operator=(LineClient&& other) noexcept;

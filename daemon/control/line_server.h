@@ -5,19 +5,30 @@
 // under a temporary name and is renamed into place, so that nobody ever finds a file that does not
 // answer.
 //
-// Bounds: a line, the number of clients, and what may wait to be read by a client. One line of each
-// client is handed out a call, and none while much of the earlier answers waits: a client that asks
-// without reading stops itself. All descriptors sit in one inner epoll, so that an event loop
+// Bounds: a line, the number of clients, and what may wait to be read by a client. Clients take
+// turns, and none of their lines is taken while much of the earlier answers waits: a client that
+// asks without reading stops itself. All descriptors sit in one inner epoll, so that an event loop
 // watches a single one.
+//
+// A line may be urgent (`Options::urgent`). Then it is handed out before all others, from behind
+// other lines of its own client, too: up to ahead_bytes are read of what nobody has taken yet.
+// Nobody can keep such a line out:
+//   - Where all places are taken, a newcomer gets the place of the client that was idle longest.
+//   - Where none is idle, it gets one of the reserved places, and says what is urgent, or waits.
+//   - Each reserved place keeps a descriptor of its own, for when the process has none left.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "daemon/control/messages.h"
+#include "protocol/base/limits.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
@@ -28,7 +39,9 @@ using ClientId = std::uint64_t;
 
 struct IncomingLine {
   ClientId client = 0;
-  std::string text;  // without its newline
+  std::string text;        // without its newline
+  bool overtaken = false;  // an urgent line that came later was handed out before it
+  bool reserved = false;  // of a client in a reserved place, where only urgent lines are to be done
 };
 
 class LineServer {
@@ -41,7 +54,17 @@ class LineServer {
                                      << 20;  // more than this waits: no further line is taken
     std::size_t progress_bytes_max = std::size_t{64}
                                      << 10;  // more than this waits: progress is skipped
-    std::size_t clients_max = 64;
+    std::size_t clients_max = limits::kControlClients;
+    /// Which lines go before all others; asked about each complete line, so it must be quick. None:
+    /// nothing is urgent, and no place is reserved.
+    std::function<bool(std::string_view)> urgent = {};
+    std::size_t reserved_max = limits::kControlClientsReserved;
+    /// Read of each client beyond the line that is next, to find what is urgent: 1600 short
+    /// requests. With half of it a stop behind 800 of them waits for some answers; twice as much
+    /// costs twice the memory, 4 MiB for all clients.
+    std::size_t ahead_bytes = std::size_t{64} << 10;
+    /// After an accept that found no descriptor at all, nobody is accepted for so long.
+    std::chrono::milliseconds accept_pause{1000};
   };
 
   /// Errors: kRefused where a live server answers at `path`; kUnavailable where the path is no
@@ -57,8 +80,11 @@ class LineServer {
   /// Readable whenever Service has something to do.
   [[nodiscard]] int fd() const;
 
-  /// Accepts, reads, writes what goes without waiting, and appends at most one line of each client.
-  void Service(std::vector<IncomingLine>* lines);
+  /// Accepts, reads, writes what goes without waiting, and appends what is urgent: at most one line
+  /// of each client.
+  void Service(std::vector<IncomingLine>* urgent);
+  /// Another line; clients take turns. None: nothing is there, or nobody reads his answers.
+  std::optional<IncomingLine> Next();
 
   /// Queues the last answer to a line of this client. False: the client is gone (that is no fault).
   bool Answer(ClientId client, std::string_view line);

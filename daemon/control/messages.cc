@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -40,7 +42,33 @@ std::optional<std::uint64_t> UnsignedOf(const Json& value) {
   return value.get<std::uint64_t>();
 }
 
-Result<Json> ParseObject(std::string_view line) {
+/// Depth and number of values, told before any is made: a parser takes 60 bytes for a bracket.
+Status CheckShape(std::string_view line, std::size_t values_max) {
+  std::size_t depth = 0;
+  std::size_t values = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (in_text) {
+      i += c == '\\' ? 1u : 0u;  // what follows ends no text
+      in_text = c != '"';
+      continue;
+    }
+    in_text = c == '"';
+    if (c == ',' || c == '[' || c == '{') ++values;
+    if (c == '[' || c == '{') ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    if (depth > limits::kControlDepth)
+      return Malformed("lists and objects within one another, more than " +
+                       std::to_string(limits::kControlDepth) + " deep");
+    if (values > values_max)
+      return Malformed("more than " + std::to_string(values_max) + " values");
+  }
+  return {};
+}
+
+Result<Json> ParseObject(std::string_view line, std::size_t values_max) {
+  FOCALFLEET_TRY(CheckShape(line, values_max));
   Json json = Json::parse(line, nullptr, /*allow_exceptions=*/false);
   if (json.is_discarded()) return Malformed("not JSON");
   if (!json.is_object()) return Malformed("not an object");
@@ -69,12 +97,14 @@ ErrorCode CodeOf(std::string_view name) {
 }
 
 Result<ControlRequest> DecodeRequest(std::string_view line) {
-  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line));
+  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line, limits::kControlValues));
   ControlRequest request;
   FOCALFLEET_TRY_ASSIGN(request.id, IdOf(json));
   const Json* verb = Member(json, "verb");
   if (verb == nullptr || !verb->is_string()) return Malformed("'verb' must be a text");
   request.verb = verb->get<std::string>();
+  if (request.verb.size() > limits::kVerbBytes)
+    return Malformed("'verb' has more than " + std::to_string(limits::kVerbBytes) + " bytes");
   if (const auto args = json.find("args"); args != json.end()) {
     if (!args->is_object()) return Malformed("'args' must be an object");
     request.args = std::move(*args);
@@ -83,7 +113,7 @@ Result<ControlRequest> DecodeRequest(std::string_view line) {
 }
 
 Result<ControlAnswer> DecodeAnswer(std::string_view line) {
-  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line));
+  FOCALFLEET_TRY_ASSIGN(Json json, ParseObject(line, line.size()));
   ControlAnswer answer;
   FOCALFLEET_TRY_ASSIGN(answer.id, IdOf(json));
   if (const auto progress = json.find("progress"); progress != json.end()) {
@@ -151,15 +181,21 @@ Result<double> NumberArgument(const Json& args, const char* name) {
   return value->get<double>();
 }
 
-Result<std::string> TextArgument(const Json& args, const char* name) {
+Result<std::string> TextArgument(const Json& args, const char* name, std::size_t bytes_max) {
   const Json* value = Member(args, name);
   if (value == nullptr || !value->is_string()) return BadArgument(name, "a text");
-  return value->get<std::string>();
+  const auto& text = value->get_ref<const std::string&>();
+  if (text.size() > bytes_max)
+    return Fail(ErrorCode::kInvalid, std::string("argument '") + name + "' has " +
+                                         std::to_string(text.size()) + " bytes, at most " +
+                                         std::to_string(bytes_max) + " are taken");
+  return text;
 }
 
-Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise) {
+Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise,
+                                   std::size_t bytes_max) {
   if (Member(args, name) == nullptr) return otherwise;
-  return TextArgument(args, name);
+  return TextArgument(args, name, bytes_max);
 }
 
 Result<bool> FlagArgumentOr(const Json& args, const char* name, bool otherwise) {

@@ -5,7 +5,9 @@
 //             {"id":1,"ok":true,"result":{...}}                          the last one, or
 //             {"id":1,"ok":false,"error":{"code":"refused","text":"..."}}
 //
-// Everything here is total: any bytes give a request or an Error, and nothing throws.
+// Everything here is total: any bytes give a request or an Error, and nothing throws. What a line
+// may hold is bounded before it is parsed (limits::kControlDepth, kControlValues): on the core
+// thread a line must not cost more than its length is worth.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +16,15 @@
 #include <string_view>
 #include <vector>
 
+#include "protocol/base/limits.h"
 #include "protocol/base/result.h"
 
 namespace focalfleet {
 
 using Json = nlohmann::json;
 
-/// One request line at most; a targets file of 32,768 units is about 1 MiB.
+/// One request line at most; a targets file of 32,768 units is about 1 MiB, a model of as many is
+/// several.
 inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;
 
 struct ControlRequest {
@@ -57,9 +61,12 @@ std::string EncodeError(std::uint64_t id, const Error& error);
 Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name);
 Result<std::int64_t> IntegerArgument(const Json& args, const char* name);
 Result<double> NumberArgument(const Json& args, const char* name);
-Result<std::string> TextArgument(const Json& args, const char* name);
+/// A name, a reason. Errors: also where it is longer than `bytes_max`.
+Result<std::string> TextArgument(const Json& args, const char* name,
+                                 std::size_t bytes_max = limits::kTextBytes);
 /// Absent: `otherwise`.
-Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise);
+Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise,
+                                   std::size_t bytes_max = limits::kTextBytes);
 Result<bool> FlagArgumentOr(const Json& args, const char* name, bool otherwise);
 Result<std::uint64_t> UnsignedArgumentOr(const Json& args, const char* name,
                                          std::uint64_t otherwise);

@@ -2,7 +2,6 @@
 
 #include <dds/dds.h>
 
-#include <cstdlib>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -16,7 +15,7 @@ namespace {
 constexpr dds_duration_t kLease = DDS_MSECS(2000);
 
 struct Held {
-  dds_entity_t entity = 0;  // 0: Cyclone makes it by itself from $CYCLONEDDS_URI
+  dds_entity_t entity = 0;
   std::uint32_t users = 0;
 };
 struct Domains {
@@ -60,15 +59,11 @@ Result<Domain> Domain::Acquire(std::uint32_t id, const std::string& config_xml) 
   const std::lock_guard lock(domains.mutex);
   Held& held = domains.held[id];
   if (held.users == 0) {
-    const bool from_environment = config_xml.empty() && std::getenv("CYCLONEDDS_URI") != nullptr;
-    if (!from_environment) {
-      const char* xml = config_xml.empty() ? kLoopbackConfig : config_xml.c_str();
-      held.entity = dds_create_domain(id, xml);
-      if (held.entity < 0) {
-        return DdsFailure("set up the domain (see its own message on stderr)",
-                          std::exchange(held.entity, 0));
-      }
-    }
+    const char* xml = config_xml.empty() ? kLoopbackConfig : config_xml.c_str();
+    held.entity = dds_create_domain(id, xml);
+    if (held.entity < 0)
+      return DdsFailure("set up the domain (see its own message on stderr)",
+                        std::exchange(held.entity, 0));
   }
   ++held.users;
   Domain domain;

@@ -22,8 +22,9 @@ namespace focalfleet {
 
 struct DdsOptions {
   std::uint32_t domain = 0;
-  /// Cyclone's configuration as XML or as file:// URI. Empty: $CYCLONEDDS_URI, and where that is
-  /// not set the one of deploy/cyclonedds.xml, which speaks on the loopback interface only.
+  /// Cyclone's configuration as XML or as file:// URI. Empty: that of deploy/cyclonedds.xml, which
+  /// speaks on the loopback interface only. The environment is not asked: CYCLONEDDS_URI decides
+  /// where status goes only for a program that hands it over here.
   std::string config_xml;
 };
 

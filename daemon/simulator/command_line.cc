@@ -15,6 +15,7 @@
 #include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
 #include "daemon/control/line_client.h"
+#include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"
 #include "daemon/simulator/simulator.h"
 #include "sim/hall/spine.h"
@@ -34,7 +35,7 @@ constexpr const char* kExitCodes =
     "  4  nobody answers at the control socket";
 
 int Complain(const Error& error, ExitCode code) {
-  std::fprintf(stderr, "focalfleet-sim: %s\n", error.text.c_str());
+  std::fprintf(stderr, "focalfleet-sim: %s\n", PrintableLines(error.text).c_str());
   return static_cast<int>(code);
 }
 

@@ -19,6 +19,7 @@
 
 #include "daemon/clock.h"
 #include "daemon/control/line_server.h"
+#include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"
 #include "daemon/ports/simulated_port.h"
 #include "daemon/simulator/camera_door.h"
@@ -238,29 +239,35 @@ class Loop {
 
   void LetLook(HostInstant now) {
     if (const Status looked = parts_.camera->Serve(now, *parts_.world); !looked)
-      std::fprintf(stderr, "focalfleet-sim: %s\n", looked.error().text.c_str());
+      std::fprintf(stderr, "focalfleet-sim: %s\n", PrintableLines(looked.error().text).c_str());
   }
 
   void Answer() {
-    lines_.clear();
-    parts_.control->Service(&lines_);
-    for (const IncomingLine& line : lines_) {
-      const auto request = DecodeRequest(line.text);
-      if (!request) {
-        parts_.control->Answer(line.client, EncodeError(0, request.error()));
-        continue;
-      }
-      const auto result = verbs_.Do(*request);
-      parts_.control->Answer(line.client, result ? EncodeResult(request->id, *result)
-                                                 : EncodeError(request->id, result.error()));
+    parts_.control->Service(&urgent_);
+    std::size_t left = parts_.control->clients();  // lines of one turn
+    for (; left > 0; --left) {
+      const auto line = parts_.control->Next();
+      if (!line) return;
+      Answer(*line);
     }
+  }
+
+  void Answer(const IncomingLine& line) {
+    const auto request = DecodeRequest(line.text);
+    if (!request) {
+      parts_.control->Answer(line.client, EncodeError(0, request.error()));
+      return;
+    }
+    const auto result = verbs_.Do(*request);
+    parts_.control->Answer(line.client, result ? EncodeResult(request->id, *result)
+                                               : EncodeError(request->id, result.error()));
   }
 
   Parts parts_;
   Verbs verbs_;
   std::vector<ReceivedFrame> delivered_;
   std::vector<sim::WireFrame> carried_;
-  std::vector<IncomingLine> lines_;
+  std::vector<IncomingLine> urgent_;  // nothing is
 };
 
 }  // namespace

@@ -62,7 +62,8 @@ Result<std::vector<UnitId>> Verbs::Units(const Json& args) const {
 }
 
 Result<Json> Verbs::Truth(const Json& args) {
-  FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgumentOr(args, "targets_csv", ""));
+  FOCALFLEET_TRY_ASSIGN(const std::string text,
+                        TextArgumentOr(args, "targets_csv", "", kControlLineBytesMax));
   FOCALFLEET_TRY_ASSIGN(const std::string name, TextArgumentOr(args, "targets_name", "targets"));
   std::uint64_t begun_twice = 0;
   std::uint64_t at_work = 0;

@@ -562,6 +562,7 @@ void Repair::Improve(std::uint32_t unit) {
 /// Whoever waits to look does, one after the other; at most so many, then nobody waits any more.
 void Repair::Drain(int turns_most) {
   for (int turn = 0; !queue_.empty(); ++turn) {
+    if (IsAbandoned(q_.abandoned)) turns_most = 0;
     const std::uint32_t unit = queue_.front();
     queue_.pop_front();
     queued_[unit] = 0;
@@ -597,7 +598,7 @@ bool Repair::Tighten(std::uint32_t unit, double extend) {
 void Repair::Tighten() {
   if (q_.ledger != nullptr) return;  // power is what takes the time
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    if (IsGiven(i)) continue;
+    if (IsGiven(i) || IsAbandoned(q_.abandoned)) continue;
     for (const double extend : kTightenTo) {
       const double end_s =
           out_.paths[i][0].size() + out_.paths[i][1].size() == 0 ? 0 : out_.tracks[i].end_s();

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "fleet/plan/abandoned.h"
 #include "fleet/plan/candidates.h"
 #include "fleet/plan/power_ledger.h"
 #include "fleet/plan/scene.h"
@@ -45,6 +46,7 @@ struct ChoreographyRequest {
   Tolerance tolerance;
   double within_s = 0;  // the time that may be used without being noticed
   std::uint64_t seed = 1;
+  Abandoned abandoned = {};  // nobody looks for another way any more
 };
 
 /// Cost: O(n) for bounded neighbourhoods; a unit without conflicts costs one test a neighbour.

@@ -31,7 +31,8 @@ Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Po
                                        " cannot home: its neighbours find no way to step aside");
 }
 
-PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
+PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request,
+                        const PlanOptions& options) {
   PlanDone done{.job = job.job, .plan = Plan{}};
   Error refusal;
   std::vector<std::pair<PositionerIndex, std::vector<std::optional<Pose>>>> crowded;
@@ -48,7 +49,8 @@ PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request) {
   }
   if (!done.homing.empty()) return done;
   for (const auto& [unit, way] : crowded) {
-    done.plan = PlanWayFor(unit, way, request, job.options);
+    if (IsAbandoned(options.abandoned)) break;
+    done.plan = PlanWayFor(unit, way, request, options);
     if (done.plan) {
       done.homing = {unit};
       return done;
@@ -75,9 +77,12 @@ PlanDone PlanLateMove(const PlanJob& job, const Layout& layout, std::span<const 
   return done;
 }
 
-PlanDone PlanOf(const PlanJob& job, const PlanRequest& request) {
-  if (!job.to_home.empty()) return PlanHomingWave(job, request);
-  PlanDone done{.job = job.job, .plan = MakePlan(request, job.options)};
+PlanDone PlanOf(const PlanJob& job, const PlanRequest& request, const Abandoned& abandoned) {
+  PlanOptions options = job.options;
+  options.abandoned = abandoned;
+  if (!job.to_home.empty()) return PlanHomingWave(job, request, options);
+  PlanDone done{.job = job.job, .plan = MakePlan(request, options)};
+  // What is kept of the plan outlives whoever may abandon this job.
   if (done.plan)
     done.running = std::make_shared<const RunningPlan>(request, done.plan->moves, job.options);
   return done;
@@ -85,7 +90,8 @@ PlanDone PlanOf(const PlanJob& job, const PlanRequest& request) {
 
 }  // namespace
 
-PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives) {
+PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
+                    const Abandoned& abandoned) {
   if (job.late) return PlanLateMove(job, layout, drives);
   const PlanRequest request{.layout = &layout,
                             .drives = drives,
@@ -93,7 +99,7 @@ PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const Un
                             .targets = job.targets,
                             .frozen = job.frozen,
                             .offsets = job.offsets};
-  PlanDone done = PlanOf(job, request);
+  PlanDone done = PlanOf(job, request, abandoned);
   if (done.plan) {
     const PlanEstimate estimate = Estimate(*done.plan, layout, drives, MotorModel{});
     done.predicted = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};

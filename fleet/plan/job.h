@@ -11,6 +11,8 @@ namespace focalfleet {
 /// with nobody stepping aside (no two of them neighbours), else one of them with the moves that
 /// make way for it. Or a late move in one that is under way; its predicted makespan is its end,
 /// counted from the configuration's start signal.
-PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives);
+/// Abandoned, it ends soon, with kUnavailable for a plan.
+PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
+                    const Abandoned& abandoned = {});
 
 }  // namespace focalfleet

@@ -61,8 +61,6 @@ void PathSearch::SetUp(const Question& question) {
   nodes_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]), Node{});
   open_.clear();
   last_touched_ = 0;
-  reached_.clear();
-  reached_nodes_.clear();
 }
 
 Pose PathSearch::PoseOf(std::int32_t node) const {
@@ -161,6 +159,9 @@ std::optional<Pose> PathSearch::EndNear(const Pose& pose) const {
 }
 
 Way PathSearch::Find(const Question& question) {
+  reached_.clear();
+  reached_nodes_.clear();
+  if (IsAbandoned(abandoned_)) return {};
   SetUp(question);
   const std::int32_t start = -low_[0] * count_[1] - low_[1];
   if (ExactClearance(start) <= 0) return {};

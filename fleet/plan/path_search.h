@@ -8,9 +8,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "fleet/geometry/arm.h"
+#include "fleet/plan/abandoned.h"
 
 namespace focalfleet {
 
@@ -44,6 +46,8 @@ inline constexpr std::array kSearchGridsDeg{3.0, 1.0};
 
 class PathSearch {
  public:
+  explicit PathSearch(Abandoned abandoned = {}) : abandoned_(std::move(abandoned)) {}
+
   /// Where the way may go and where it shall end: any pose in `goal`; none: explore all that can be
   /// reached.
   struct Question {
@@ -57,8 +61,10 @@ class PathSearch {
   };
 
   /// Corners of the way, `from` first; the legs between them are clear of all blockers. Empty: none
-  /// on this grid. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180 / grid_deg).
+  /// on this grid, or abandoned. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180 /
+  /// grid_deg).
   Way Find(const Question& question);
+  [[nodiscard]] bool abandoned() const { return IsAbandoned(abandoned_); }
 
   /// All poses that the last Find reached, if it found no way; nearest first. Lifetime: until the
   /// next Find.
@@ -92,6 +98,7 @@ class PathSearch {
   [[nodiscard]] Way WithFewestCorners(const std::vector<Pose>& way) const;
   [[nodiscard]] std::optional<Waypoint> Leg(const Pose& from, const Pose& to) const;
 
+  Abandoned abandoned_;
   Question q_;
   std::int32_t step_[kAxisCount]{};
   std::int32_t low_[kAxisCount]{};  // grid index of the lowest pose within

@@ -46,7 +46,7 @@ class Planner {
         layout_(*request.layout),
         start_(StartsOf(request)),
         scene_(layout_, request.drives, request.start, request.offsets),
-        surroundings_(&scene_, start_),
+        surroundings_(&scene_, start_, options.abandoned),
         service_(request, scene_, start_),
         aside_(scene_.size(), 0),
         by_itself_(scene_.size(), 0),
@@ -62,6 +62,7 @@ class Planner {
   void Abandon(std::uint32_t unit, std::optional<NoWay> proof = std::nullopt);
   bool AbandonHopeless();
   bool LetStepAside(std::uint32_t stuck);
+  [[nodiscard]] Status CheckWanted() const;
   [[nodiscard]] double MeanNeighbours() const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   bool LeaveStuck();
@@ -178,6 +179,7 @@ void Planner::Abandon(std::uint32_t unit, std::optional<NoWay> proof) {
 bool Planner::AbandonHopeless() {
   bool any = false;
   for (const std::uint32_t i : stuck_) {
+    if (IsAbandoned(options_.abandoned)) return any;
     if (hopeful_[i] != 0) continue;
     std::optional<NoWay> proof;
     if (CanEver(service_, i, &surroundings_, &proof)) {
@@ -215,6 +217,11 @@ void Planner::GiveWay() {
   }
 }
 
+Status Planner::CheckWanted() const {
+  if (!IsAbandoned(options_.abandoned)) return {};
+  return Fail(ErrorCode::kUnavailable, "nobody wants the plan any more");
+}
+
 double Planner::MeanNeighbours() const {
   std::size_t sum = 0;
   for (std::uint32_t i = 0; i < scene_.size(); ++i) sum += scene_.neighbours(i).size();
@@ -230,7 +237,7 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<AxisPaths> paths(begin_with.begin(), begin_with.end());
   std::uint64_t fresh_starts = 0;
   double slack = 0;  // of the time with limits of power; 0: not known yet
-  for (int attempt = 0; attempt < kAttemptsMax; ++attempt) {
+  for (int attempt = 0; attempt < kAttemptsMax && !IsAbandoned(options_.abandoned); ++attempt) {
     service_.DropCollidingTargets();
     scene_.AllowFor(start_);
     scene_.AllowFor(service_.goals());
@@ -257,7 +264,8 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
                                  .ledger = ledger ? &*ledger : nullptr,
                                  .tolerance = tolerance,
                                  .within_s = within_s,
-                                 .seed = options_.seed + fresh_starts});
+                                 .seed = options_.seed + fresh_starts,
+                                 .abandoned = options_.abandoned});
     if (choreography_.starved) break;
     if (choreography_.in_conflict.empty()) {
       PlanOfChoreography();
@@ -361,6 +369,7 @@ Plan Planner::Finish() {
 Result<Plan> Planner::AmongGiven() {
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
   if (too_near_.empty() && AllAtOnce(request_.motions)) return Finish();
+  FOCALFLEET_TRY(CheckWanted());
   std::string text = "no way was found among the motions that are given";
   for (const std::uint32_t i : stuck_) text += ", unit " + UnitName(layout_, i);
   return Fail(ErrorCode::kRefused, text);
@@ -378,7 +387,9 @@ Result<Plan> Planner::Run() {
   // its accuracy: that a few stand too near must not lead to it.
   const Scene as_ruled = scene_;
   if (at_once && AllAtOnce(request_.motions)) return Finish();
+  FOCALFLEET_TRY(CheckWanted());
   if (at_once && options_.leave_stuck && LeaveStuck()) return Finish();
+  FOCALFLEET_TRY(CheckWanted());
   scene_ = as_ruled;
   std::vector<Piece> order;
   bool done = false;
@@ -388,6 +399,7 @@ Result<Plan> Planner::Run() {
     scene_.AllowFor(service_.goals());
     if (options_.lead_apart) scene_.LeadApart(start_);
     done = Attempt(&order);
+    FOCALFLEET_TRY(CheckWanted());
     if (!done) GiveWay();
   }
   if (!done) {

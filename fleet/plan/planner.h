@@ -14,6 +14,7 @@
 
 #include "fleet/knowledge.h"
 #include "fleet/layout.h"
+#include "fleet/plan/abandoned.h"
 #include "fleet/plan/plan.h"
 #include "fleet/plan/power_ledger.h"
 #include "protocol/base/result.h"
@@ -64,15 +65,16 @@ struct PlanOptions {
   /// With kSoonest, time that may be used without being noticed, where the bound is shorter.
   double within_s = 0;
   std::uint64_t seed = 1;
-  PowerLimits power = {};  // hard at every instant, for every skew and clock
-  MotorModel motor = {};   // what the motors draw
+  Abandoned abandoned = {};  // MakePlan then ends soon
+  PowerLimits power = {};    // hard at every instant, for every skew and clock
+  MotorModel motor = {};     // what the motors draw
 };
 
 /// A plan that serves every unit that can be served; the others are in Plan::unserved with the
 /// reason. Errors: kInvalid where starts collide (not with lead_apart) or targets do (not with
 /// leave_stuck), all pairs named, or an array has the wrong size; kRefused where limits of power or
-/// given motions leave no way. Cost: O(n) for bounded neighbourhoods, a fraction of a second for
-/// 5000 units; path searches come on top.
+/// given motions leave no way; kUnavailable where it was abandoned. Cost: O(n) for bounded
+/// neighbourhoods, a fraction of a second for 5000 units; path searches come on top.
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options);
 
 /// What MakePlan asks of its input, all collisions of starts and of targets named. Errors:

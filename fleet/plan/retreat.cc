@@ -67,7 +67,7 @@ Retreat::Retreat(const Scene* scene, std::span<const UnitDrive> drives, Surround
 }
 
 void Retreat::Run() {
-  for (;;) {
+  while (!surroundings_->search().abandoned()) {
     while (StraightRound()) DropArrived();
     if (waiting_.empty()) return;
     bool moved = false;
@@ -143,6 +143,7 @@ bool Retreat::StraightRound() {
 bool Retreat::GoAround(double grid_deg) {
   bool moved = false;
   for (const std::uint32_t i : waiting_) {
+    if (surroundings_->search().abandoned()) return moved;
     if (!Waits(i) || !scene_->HasCell(i)) continue;
     if (searched_deg_[i] > 0 && searched_deg_[i] <= grid_deg) continue;
     const Way way = WayIntoCell(i, grid_deg);
@@ -176,7 +177,7 @@ bool Retreat::MakeRoom() {
 }
 
 bool Retreat::MakeRoomFor(std::uint32_t unit, bool stay_in_cell) {
-  if (!scene_->HasCell(unit)) return false;
+  if (!scene_->HasCell(unit) || surroundings_->search().abandoned()) return false;
   bool moved = false;
   for (const NeighbourNeed& near : scene_->neighbours(unit)) {
     if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
@@ -226,7 +227,7 @@ bool Retreat::ShakeFree(std::uint32_t unit) {
   if (near.empty() || shakes_[unit] >= kShakesMax) return false;
   ++shakes_[unit];
   std::vector<std::pair<std::uint32_t, Way>> made;
-  for (int attempt = 0; attempt < kShakeTries; ++attempt) {
+  for (int attempt = 0; attempt < kShakeTries && !surroundings_->search().abandoned(); ++attempt) {
     made.clear();
     const int steps = 1 + attempt * kShakeSteps / kShakeTries;
     for (int step = 0; step < steps; ++step) {

@@ -31,7 +31,8 @@ struct Piece {
 class Surroundings {
  public:
   /// `start` outlives this. Shape: (n).
-  Surroundings(const Scene* scene, std::span<const Pose> start) : scene_(scene), start_(start) {}
+  Surroundings(const Scene* scene, std::span<const Pose> start, Abandoned abandoned = {})
+      : scene_(scene), start_(start), search_(std::move(abandoned)) {}
 
   enum class Who : std::uint8_t {
     kAll,

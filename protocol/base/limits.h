@@ -28,12 +28,20 @@ inline constexpr std::uint32_t kBadRowsTold = 20;          // of a table; the ot
 inline constexpr std::uint32_t kExposureBytes = 1u << 28;  // an image of the sensor and its spots
 inline constexpr std::uint32_t kExposureIdBytes = 64;      // a name, told in logs and alarms
 inline constexpr std::uint32_t kCameraFiles = 16'384;      // seen in the camera's folder at once
+inline constexpr std::uint32_t kControlClients = 64;
+inline constexpr std::uint32_t kControlClientsReserved = 8;  // beside them, for who says stop
+inline constexpr std::uint32_t kControlDepth = 16;  // of lists and objects within one another
+inline constexpr std::uint32_t kControlValues = 2 * kUnits;  // of a request, all lists together
+inline constexpr std::uint32_t kVerbBytes = 32;
+inline constexpr std::uint32_t kTextBytes =
+    255;  // reasons, names: what DDS carries (focalfleet.idl)
 
 // The largest focal plane in view (20,000 units at 100 a bus) fits with room.
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
 static_assert(kNodesPerBus < 255, "255 is the broadcast address");
 static_assert(kSensorsPerUnit <= 4 * 8, "four a frame, the part in three bits");
 static_assert(kSegmentsPerAxis <= 15, "4-bit count in StageBegin and Confirm");
+static_assert(kControlValues >= kUnits + 16, "a request that names every unit");
 static_assert(kSpotsPerExposure >= 2 * (kUnits + kFiducials), "a plate seen with as much dust");
 static_assert(kCsvRowBytes >= kUnits * 11, "faults.csv may name every unit in one cell");
 static_assert(kExposureBytes >= 11'000u * 11'000u * 2 + kSpotsPerExposure * 128,

@@ -7,8 +7,8 @@
 //   cov = place^2 I + sum over axes of t t' (angle^2 + var(rest)),  t = dplace / dangle,
 //   rest <- carry rest + N(0, rest^2) whenever the axis moves, N(0, rest^2) after a homing,
 // times factors of the unit and of the exposure. Place times these has a floor, by what places are
-// rounded to (place_steps.h). Rows count less (Huber) where the whitened length is beyond what noise
-// does; the filter believes them less, too.
+// rounded to (place_steps.h). Rows count less (Huber) where the whitened length is beyond what
+// noise does; the filter believes them less, too.
 // Source: Durbin and Koopman, Time Series Analysis by State Space Methods, chapter 4.
 #pragma once
 

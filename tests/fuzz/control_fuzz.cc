@@ -1,12 +1,20 @@
 // Any bytes as a line on a control socket, in both directions, which the first byte picks: a
 // message or an error, never more. What was read and is written again reads back the same; a
-// request becomes a command of units that exist, or is refused with words.
+// request becomes a command of units that exist, each once, with texts within their bounds, or is
+// refused with words. Or any bytes as a stream of lines, of which some are urgent: none is lost or
+// doubled, and whoever is overtaken says so. Or any bytes as a text for a terminal.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <set>
+#include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
+#include "daemon/control/line_buffer.h"
 #include "daemon/control/messages.h"
+#include "daemon/control/printable.h"
 #include "daemon/requested_command.h"
 #include "protocol/base/check.h"
 #include "tests/daemon/shell/small_fleet.h"
@@ -21,8 +29,14 @@ void CheckUnits(const Command& command) {
   std::visit(
       [&](const auto& what) {
         using What = std::decay_t<decltype(what)>;
+        if constexpr (requires { what.reason; })
+          FOCALFLEET_CHECK(what.reason.size() <= limits::kTextBytes);
+        if constexpr (requires { what.source; })
+          FOCALFLEET_CHECK(what.source.size() <= limits::kTextBytes);
         if constexpr (requires { what.units; }) {
           for (const PositionerIndex i : what.units) exists(i);
+          FOCALFLEET_CHECK(std::set(what.units.begin(), what.units.end()).size() ==
+                           what.units.size());
         } else if constexpr (std::is_same_v<What, StopCommand>) {
           if (what.unit) exists(*what.unit);
         } else if constexpr (std::is_same_v<What, MeasureCommand>) {
@@ -72,6 +86,52 @@ void TryAnswer(std::string_view line) {
   FOCALFLEET_CHECK(again->body == answer->body && again->error.code == answer->error.code);
 }
 
+bool IsUrgent(std::string_view line) { return line.starts_with('s'); }
+
+/// Pre: `text` is not empty; its first byte says in which pieces the rest comes.
+void TryStream(std::string_view text) {
+  const std::size_t piece = 1 + static_cast<unsigned char>(text[0]) % 16;
+  text.remove_prefix(1);
+  LineBuffer buffer;
+  std::vector<std::string> taken;
+  bool any_urgent = false;
+  for (std::size_t at = 0; at < text.size(); at += piece) {
+    buffer.Append(text.substr(at, piece));
+    while (auto line = buffer.TakeUrgent(IsUrgent)) {
+      any_urgent = true;
+      taken.push_back(std::move(*line));
+    }
+    // Somebody takes a line now and then; by now all that are urgent have been taken.
+    if (at / piece % 3 != 0) continue;
+    if (auto line = buffer.Take()) {
+      FOCALFLEET_CHECK(!IsUrgent(line->text) && (any_urgent || !line->overtaken));
+      taken.push_back(std::move(line->text));
+    }
+  }
+  while (auto line = buffer.Take()) taken.push_back(std::move(line->text));
+  FOCALFLEET_CHECK(!buffer.unseen());
+  std::vector<std::string> sent;
+  for (std::size_t end = text.find('\n'); end != std::string_view::npos; end = text.find('\n')) {
+    sent.emplace_back(text.substr(0, end));
+    text.remove_prefix(end + 1);
+  }
+  FOCALFLEET_CHECK(buffer.size() == text.size());
+  std::ranges::sort(sent);
+  std::ranges::sort(taken);
+  FOCALFLEET_CHECK(sent == taken);
+}
+
+void TryText(std::string_view text) {
+  const std::string clean = Printable(text);
+  for (const char c : clean)
+    FOCALFLEET_CHECK(static_cast<unsigned char>(c) >= 0x20 &&
+                     static_cast<unsigned char>(c) != 0x7f);
+  FOCALFLEET_CHECK(Printable(clean) == clean);
+  // What a JSON text says stays what it says.
+  const std::string line = Json(clean).dump();
+  FOCALFLEET_CHECK(Json::parse(PrintableJson(line)) == Json(clean));
+}
+
 }  // namespace
 }  // namespace focalfleet
 
@@ -79,9 +139,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size == 0) return 0;
   const std::string_view line(static_cast<const char*>(static_cast<const void*>(data + 1)),
                               size - 1);
-  if (data[0] % 2 == 0)
-    focalfleet::TryRequest(line);
-  else
-    focalfleet::TryAnswer(line);
+  switch (data[0] % 4) {
+    case 0:
+      focalfleet::TryRequest(line);
+      break;
+    case 1:
+      focalfleet::TryAnswer(line);
+      break;
+    case 2:
+      if (!line.empty()) focalfleet::TryStream(line);
+      break;
+    default:
+      focalfleet::TryText(line);
+  }
   return 0;
 }

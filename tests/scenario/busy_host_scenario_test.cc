@@ -17,7 +17,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kClockLimit = PlanOptions{}.clock_error;
+const double kClockLimit = PlanOptions{}.clock_error;
 
 /// What an alarm says of clocks or starts.
 std::vector<std::string> AlarmsOfTime(InProcessFleet& fleet) {

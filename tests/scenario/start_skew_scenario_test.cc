@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kAllowed_s = 2 * PlanOptions{}.start_skew_s;
+const double kAllowed_s = 2 * PlanOptions{}.start_skew_s;
 /// How often a state is looked at: a turn of the loop before and after.
 constexpr double kLook_s = 0.0004;
 

@@ -28,7 +28,7 @@ std::vector<std::string> Cells(const std::string& line) {
 
 /// Moves by arc, in order; rows that were not seen are left out.
 std::map<int, std::vector<Row>> Arcs(const std::string& folder) {
-  std::ifstream file(std::string(FOCALFLEET_MEASURED_MOVES) + "/" + folder + "/moves.csv");
+  std::ifstream file(FOCALFLEET_MEASURED_MOVES "/" + folder + "/moves.csv");
   EXPECT_TRUE(file.good()) << folder;
   std::map<int, std::vector<Row>> arcs;
   std::vector<std::string> names;

@@ -19,9 +19,8 @@ inline std::string Gzipped(std::string_view bytes) {
   stream.next_out = static_cast<Bytef*>(static_cast<void*>(out.data()));
   stream.avail_out = static_cast<uInt>(out.size());
   EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  out.resize(out.size() - stream.avail_out);
   deflateEnd(&stream);
-  return out;
+  return out.substr(0, stream.total_out);
 }
 
 }  // namespace focalfleet::testing

@@ -40,11 +40,27 @@ Process::~Process() {
 
 void Process::Signal(int number) const { kill(pid_, number); }
 
+namespace {
+
+int CodeOf(int status) {
+  return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+}  // namespace
+
 int Process::Wait() {
   int status = 0;
   if (waitpid(pid_, &status, 0) != pid_) return -1;
   pid_ = -1;
-  return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+  return CodeOf(status);
+}
+
+std::optional<int> Process::WaitFor(int limit_ms) {
+  int status = 0;
+  if (!WaitUntil([&] { return waitpid(pid_, &status, WNOHANG) == pid_; }, limit_ms))
+    return std::nullopt;
+  pid_ = -1;
+  return CodeOf(status);
 }
 
 bool Process::running() { return pid_ > 0 && kill(pid_, 0) == 0; }

@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,8 @@ class Process {
   void Signal(int number) const;
   /// Waits for its end: exit status, or 128 + signal.
   int Wait();
+  /// As Wait; none: it has not ended within `limit_ms`.
+  std::optional<int> WaitFor(int limit_ms);
   [[nodiscard]] bool running();
 
  private:

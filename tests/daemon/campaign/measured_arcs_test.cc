@@ -18,7 +18,7 @@ using testing::Contains;
 using testing::IsSupersetOf;
 
 sim::Campaign Measured(const std::string& arcs) {
-  const std::string folder = std::string(FOCALFLEET_MEASURED_MOVES) + "/" + arcs;
+  const std::string folder = FOCALFLEET_MEASURED_MOVES "/" + arcs;
   const std::string moves = ReadTextFile(folder + "/moves.csv").value();
   const std::string units = ReadTextFile(folder + "/units.csv").value();
   return ReadCampaign({.moves = moves, .units = units}).value();

@@ -1,6 +1,8 @@
 // The commands that speak to the daemon, as processes of their own, against scripted answers.
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
+#include "daemon/files/text_file.h"
 #include "tests/daemon/cli/fake_daemon.h"
 #include "tests/daemon/cli/program.h"
 
@@ -101,6 +103,81 @@ TEST_F(DaemonCommands, ApplySendsTheFileAndItsName) {
   EXPECT_EQ(requests_[0].args["fixed"], true);
   EXPECT_EQ(requests_[0].args["wait"], false);
   EXPECT_THAT(result.out, HasSubstr("configuration 7 accepted"));
+}
+
+TEST_F(DaemonCommands, ApplyCallsAFileByItsNameWhereItsPathIsTooLong) {
+  std::string folder = scratch_.path();
+  for (int i = 0; i < 4; ++i) {
+    folder += "/" + std::string(100, 'd');
+    ASSERT_EQ(mkdir(folder.c_str(), 0755), 0);
+  }
+  const std::string file = folder + "/t.csv";
+  ASSERT_TRUE(WriteFileAtomically(file, kTargets));
+  Ask({"apply", file}, {{"apply", {.result = Json{{"configuration", 7}}}}});
+  ASSERT_EQ(requests_.size(), 1u);
+  EXPECT_EQ(requests_[0].args["source"], "t.csv");
+}
+
+TEST_F(DaemonCommands, NothingThatADaemonSaysMovesTheCursorOrForgesALine) {
+  const std::string evil =
+      "x\n\x1b[2Jforged\xc2\x9b"
+      "31m";
+  Json status = Status();
+  status["version"] = status["store"]["path"] = status["configuration"]["source"] = evil;
+  status["dds"] = {{"trouble", evil}};
+  status["buses"][1]["trouble"] = evil;
+  const Json history = {{"configurations", {{{"id", 1}, {"source", evil}}}},
+                        {"alarms", {{{"id", 2}, {"text", evil}}}}};
+  const Json model = {{"in_force", {{"name", evil}, {"left_out", {evil}}}}};
+  Json failed = Configuration("done", 1, 1);
+  failed["source"] = failed["unserved"][0]["reason"] = evil;
+  const std::map<std::string, FakeAnswer> answers = {
+      {"status", {.result = status}},
+      {"history", {.result = history}},
+      {"unit", {.result = Json{{"disabled_reason", evil}}}},
+      {"model", {.result = model}},
+      {"apply", {.result = failed}},
+      {"stop", {.result = Json{{"text", evil}}}},
+      {"enable", {.result = tl::unexpected<Error>(Error{ErrorCode::kRefused, evil})}}};
+  const std::string file = scratch_.Put("t.csv", kTargets);
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"status"},
+                                             {"status", "--buses"},
+                                             {"history"},
+                                             {"unit", "1"},
+                                             {"model", "show"},
+                                             {"apply", file, "--wait"},
+                                             {"stop"},
+                                             {"enable", "1"},
+                                             {"status", "--json"},
+                                             {"enable", "1", "--json"}}) {
+    const auto result = Ask(words, answers);
+    const std::string said = result.out + result.err;
+    EXPECT_THAT(said, Not(HasSubstr("\x1b"))) << words[0];
+    EXPECT_THAT(said, Not(HasSubstr("\xc2\x9b"))) << words[0];
+    // The text of an error may have lines of its own.
+    EXPECT_TRUE(words[0] == "enable" || said.find("x\n") == std::string::npos) << said;
+    EXPECT_TRUE(words[0] == "stop" || said.find("forged") != std::string::npos) << said;
+  }
+  const auto json = Json::parse(Ask({"status", "--json"}, answers).out, nullptr, false);
+  EXPECT_EQ(json, status) << "what programs read is what was said";
+}
+
+TEST_F(DaemonCommands, NothingThatAFileHoldsMovesTheCursor) {
+  const std::string targets = scratch_.Put("t.csv", "unit_id,x_mm,y_mm,a\u202eb\n1,0.5,0.25,3\n");
+  const auto apply = Ask({"apply", targets}, {{"apply", {.result = Json{{"id", 7}}}}});
+  EXPECT_THAT(apply.err, HasSubstr("columns passed over: a\\u202eb"));
+  const std::string frames = scratch_.Put("c.log", "(1.0) can\u202e 00000001#00\n");
+  const auto decoded = Focalfleet({"can", "decode", frames});
+  EXPECT_THAT(apply.err + decoded.out + decoded.err, Not(HasSubstr("\u202e")));
+  EXPECT_THAT(decoded.out + decoded.err, HasSubstr("can\\u202e"));
+}
+
+TEST_F(DaemonCommands, StatusSaysThatDdsIsMissing) {
+  Json status = Status();
+  status["dds"] = {{"enabled", true}, {"trouble", "status: DDS: cannot set up the domain"}};
+  EXPECT_THAT(Ask({"status"}, {{"status", {.result = status}}}).out,
+              HasSubstr("dds        MISSING status: DDS: cannot set up the domain"));
 }
 
 TEST_F(DaemonCommands, ApplyTellsColumnsThatNobodyReads) {
@@ -438,6 +515,18 @@ TEST_F(DaemonCommands, AStopIsDoneWhenUnitsStand) {
   EXPECT_EQ(one.exit, 3);
   EXPECT_EQ(Json::parse(one.out, nullptr, false)["not_standing"], 1);
   EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 5) << "whether they stand is not known";
+}
+
+// Where all places are taken the daemon lets a stop in, and no question.
+TEST_F(DaemonCommands, AStopAsksAgainWhereTheDaemonHasNoPlaceForAQuestion) {
+  const auto all = Ask({"stop", "--within-s", "600"},
+                       {{"stop", {}}, {"status", {.full_first = 2, .result = Status()}}});
+  EXPECT_EQ(all.exit, 0) << all.err;
+  EXPECT_EQ(requests_.size(), 4u);
+  const auto never = Ask({"stop", "--within-s", "0"},
+                         {{"stop", {}}, {"status", {.full_first = 1000, .result = Status()}}});
+  EXPECT_EQ(never.exit, 5);
+  EXPECT_THAT(never.err, HasSubstr("whether units stand is not known: too many clients"));
 }
 
 TEST_F(DaemonCommands, StopPointsToTheDirectWayWhereNoDaemonAnswers) {

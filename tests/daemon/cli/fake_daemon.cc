@@ -34,10 +34,10 @@ void FakeDaemon::Serve() {
     std::array<pollfd, 2> polls{pollfd{server_->fd(), POLLIN, 0}, pollfd{quit_[0], POLLIN, 0}};
     poll(polls.data(), polls.size(), -1);
     if (polls[1].revents != 0) return;
-    std::vector<IncomingLine> lines;
-    server_->Service(&lines);
-    for (const IncomingLine& line : lines) {
-      if (!AnswerLine(line)) {
+    std::vector<IncomingLine> urgent;  // nothing is
+    server_->Service(&urgent);
+    while (const auto line = server_->Next()) {
+      if (!AnswerLine(*line)) {
         server_.reset();
         return;
       }
@@ -60,7 +60,12 @@ bool FakeDaemon::AnswerLine(const IncomingLine& line) {
     server_->Answer(line.client, EncodeError(request->id, {ErrorCode::kInvalid, "no such verb"}));
     return true;
   }
-  const FakeAnswer& answer = found->second;
+  FakeAnswer& answer = found->second;
+  if (answer.full_first > 0) {
+    --answer.full_first;
+    server_->Answer(line.client, EncodeError(request->id, {ErrorCode::kFull, "too many clients"}));
+    return true;
+  }
   for (const Json& progress : answer.progress) {
     server_->Progress(line.client, EncodeProgress(request->id, progress));
   }

@@ -18,6 +18,7 @@ namespace focalfleet::test {
 
 struct FakeAnswer {
   std::vector<Json> progress;
+  int full_first = 0;  // so many times there is no place, then comes the result
   Result<Json> result = Json::object();
   bool hang_up = false;  // closes everything instead of answering
 };

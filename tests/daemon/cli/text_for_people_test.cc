@@ -31,6 +31,11 @@ TEST(Table, FlattensObjectsAndAlignsRows) {
   EXPECT_EQ(cli::DescribeRows(Json{1, 2}, {}), "");
 }
 
+TEST(Table, ARowStaysOneLineOfText) {
+  EXPECT_EQ(cli::AlignColumns({{"a\nb", "\x1b[2J"}, {"c", "d"}}), "a\\nb  \\x1b[2J\nc     d");
+  EXPECT_EQ(cli::DescribeObject(Json{{"a", "b\nc  d"}}), "a  b\\nc  d");
+}
+
 TEST(TextFile, AcceptsUtf8AndNamesTheFirstByteThatIsNot) {
   const test::ScratchDirectory scratch;
   const std::string good = "# \xc2\xb5m \xe2\x82\xac \xf0\x9f\x94\xad\n1,2\n";

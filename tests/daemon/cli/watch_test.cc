@@ -12,6 +12,7 @@ namespace {
 
 using test::Focalfleet;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using testing::OwnDomain;
 
 UnitStatusValue UnitAt(std::uint32_t id, UnitPhase phase) {
@@ -82,6 +83,30 @@ TEST(Watch, OnceShowsTheWholeFleetToOneWhoJoinsLate) {
   EXPECT_EQ(text.exit, 0) << text.err;
   EXPECT_THAT(text.out, HasSubstr("focalfleetd 9.8.7"));
   EXPECT_THAT(text.out, HasSubstr("2, 2 enabled: 1 ready, 1 silent"));
+}
+
+TEST(Watch, NothingThatIsPublishedMovesTheCursor) {
+  const auto publisher = StatusPublisher::Create({.domain = OwnDomain(), .config_xml = ""});
+  ASSERT_TRUE(publisher) << publisher.error().text;
+  PublishFleet(publisher->get());
+  const std::string evil = "x\n\x1b[2Jforged";
+  FleetStatusValue fleet;
+  fleet.version = evil;
+  ConfigurationProgressValue configuration;
+  configuration.view.source = evil;
+  AlarmValue alarm;
+  alarm.row.id = 6;
+  alarm.row.text = evil;
+  ASSERT_TRUE((*publisher)->Publish(configuration));
+  ASSERT_TRUE((*publisher)->Publish(alarm));
+  ASSERT_TRUE((*publisher)->Publish(fleet));
+  (*publisher)->Flush();
+  const auto text =
+      Focalfleet({"watch", "--once", "--domain", std::to_string(OwnDomain()), "--wait", "20"});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_THAT(text.out, Not(HasSubstr("\x1b")));
+  EXPECT_THAT(text.out, Not(HasSubstr("\nforged")));
+  EXPECT_THAT(text.out, HasSubstr("focalfleetd x\\n\\x1b[2Jforged"));
 }
 
 TEST(Watch, TellsThatNobodyPublishes) {

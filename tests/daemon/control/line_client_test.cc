@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <thread>
 
 #include "daemon/control/line_server.h"
+#include "daemon/control/unix_address.h"
 #include "tests/daemon/control/scratch.h"
 
 namespace focalfleet {
@@ -33,9 +36,9 @@ class EchoServer {
     while (!end_) {
       pollfd poller{server_.fd(), POLLIN, 0};
       ::poll(&poller, 1, 10);
-      std::vector<IncomingLine> lines;
-      server_.Service(&lines);
-      for (const auto& line : lines) Answer(line);
+      std::vector<IncomingLine> urgent;  // nothing is
+      server_.Service(&urgent);
+      while (const auto line = server_.Next()) Answer(*line);
     }
   }
   void Answer(const IncomingLine& line) {
@@ -127,6 +130,22 @@ TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
   ASSERT_FALSE(broken);
   EXPECT_EQ(broken.error().code, ErrorCode::kUnavailable);
   EXPECT_FALSE(client.connected());
+}
+
+// As a daemon that is stopped: it listens, and takes nobody.
+TEST(LineClient, GivesUpOnAServerThatTakesNoConnection) {
+  const Scratch scratch;
+  const auto address = UnixAddress::Of(scratch / "s").value();
+  const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  ASSERT_EQ(::bind(listener, address.get(), address.length()), 0);
+  ASSERT_EQ(::listen(listener, 0), 0);
+  const auto first = LineClient::Connect(scratch / "s");
+  ASSERT_TRUE(first) << "in the backlog";
+  const auto second = LineClient::Connect(scratch / "s", Milliseconds(20));
+  ::close(listener);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(second.error().text, HasSubstr("no connection is taken there in time"));
 }
 
 }  // namespace

@@ -1,11 +1,16 @@
 #include "daemon/control/messages.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
+
+using ::testing::HasSubstr;
 
 TEST(ControlMessages, RequestSurvivesTheWay) {
   const ControlRequest sent{7, "apply", {{"source", "a.csv"}, {"wait", true}}};
@@ -50,6 +55,56 @@ TEST(ControlMessages, AnythingMalformedIsAnErrorNotACrash) {
     EXPECT_EQ(request.error().code, ErrorCode::kInvalid);
     EXPECT_FALSE(DecodeAnswer(line));
   }
+}
+
+TEST(ControlMessages, DepthIsBoundedBeforeAnythingIsParsed) {
+  const auto nested = [](std::size_t depth) {
+    return R"({"id":1,"verb":"x","args":{"a":)" + std::string(depth, '[') +
+           std::string(depth, ']') + "}}";
+  };
+  EXPECT_TRUE(DecodeRequest(nested(limits::kControlDepth - 2)));
+  for (const std::string& line :
+       {nested(limits::kControlDepth - 1), nested(1'000'000), std::string(16'000'000, '[')}) {
+    const auto request = DecodeRequest(line);
+    ASSERT_FALSE(request);
+    EXPECT_THAT(request.error().text, HasSubstr("more than 16 deep"));
+    EXPECT_FALSE(DecodeAnswer(line));
+  }
+}
+
+TEST(ControlMessages, BracketsAndEscapedQuotesInTextsAreNoDepth) {
+  const std::string brackets(100, '[');
+  const ControlRequest sent{1, "x", {{"a", brackets + "\"" + brackets + "\\"}}};
+  const auto received = DecodeRequest(EncodeRequest(sent));
+  ASSERT_TRUE(received) << received.error().text;
+  EXPECT_EQ(received->args, sent.args);
+}
+
+TEST(ControlMessages, TheNumberOfValuesOfARequestIsBounded) {
+  const auto list = [](std::size_t count) {
+    std::string line = R"({"id":1,"verb":"x","args":{"a":[1)";
+    for (std::size_t i = 1; i < count; ++i) line += ",1";
+    return line + "]}}";
+  };
+  EXPECT_TRUE(DecodeRequest(list(limits::kUnits)));
+  const auto many = DecodeRequest(list(limits::kControlValues + 1));
+  ASSERT_FALSE(many);
+  EXPECT_THAT(many.error().text, HasSubstr("more than 65536 values"));
+  EXPECT_FALSE(DecodeRequest(R"({"id":1,"verb":"x","args":{"a":[)" +
+                             std::string(2 * limits::kControlValues, '[')));
+}
+
+TEST(ControlMessages, TextsAreBounded) {
+  const auto verb = DecodeRequest(R"({"id":1,"verb":")" + std::string(100, 'v') + "\"}");
+  ASSERT_FALSE(verb);
+  EXPECT_THAT(verb.error().text, HasSubstr("'verb' has more than 32 bytes"));
+  const Json args = {{"reason", std::string(256, 'r')}};
+  const auto reason = TextArgument(args, "reason");
+  ASSERT_FALSE(reason);
+  EXPECT_EQ(reason.error().text, "argument 'reason' has 256 bytes, at most 255 are taken");
+  EXPECT_FALSE(TextArgumentOr(args, "reason", ""));
+  EXPECT_TRUE(TextArgument(args, "reason", 256));
+  EXPECT_TRUE(TextArgument({{"reason", std::string(255, 'r')}}, "reason"));
 }
 
 TEST(ControlMessages, TextThatIsNotUtf8AndNumbersThatAreNoneStillMakeALine) {

@@ -6,10 +6,14 @@
 
 #include <chrono>
 #include <cmath>
+#include <memory>
+#include <mutex>
 #include <thread>
+#include <vector>
 
 #include "tests/daemon/dds/client_process.h"
 #include "tests/daemon/dds/own_domain.h"
+#include "tests/daemon/dds/taken_ports.h"
 
 namespace focalfleet {
 namespace {
@@ -24,9 +28,9 @@ constexpr std::int64_t kSinceNs = 1'795'316'645'678'000'000;
 class CameraDdsTest : public ::testing::Test {
  protected:
   void Start(const std::vector<std::string>& words) {
-    auto port = CameraDds::Open({.domain = OwnDomain()}, kSensor);
-    ASSERT_TRUE(port) << port.error().text;
-    port_ = std::move(*port);
+    if (port_ == nullptr)
+      port_ = std::make_unique<CameraDds>(
+          CameraDds::Options{.dds = {.domain = OwnDomain(), .config_xml = {}}, .sensor = kSensor});
     std::vector<std::string> command{"/usr/bin/env", "CYCLONEDDS_URI=" LOOPBACK_URI, SPOT_SENDER,
                                      std::to_string(OwnDomain())};
     command.insert(command.end(), words.begin(), words.end());
@@ -87,12 +91,42 @@ TEST_F(CameraDdsTest, WhatIsNoExposureIsRefusedAndTheNextIsTaken) {
 }
 
 TEST_F(CameraDdsTest, NothingComesWhereNobodyAnswers) {
-  auto port = CameraDds::Open({.domain = OwnDomain()}, kSensor);
-  ASSERT_TRUE(port);
-  ASSERT_TRUE((*port)->Request(1, {kSinceNs}));
-  const auto nothing = (*port)->Take();
+  CameraDds port({.dds = {.domain = OwnDomain(), .config_xml = {}}, .sensor = kSensor});
+  ASSERT_TRUE(port.Request(1, {kSinceNs}));
+  const auto nothing = port.Take();
   ASSERT_TRUE(nothing);
   EXPECT_FALSE(*nothing);
+}
+
+TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
+  auto taken = std::make_unique<testing::TakenPorts>(OwnDomain());
+  std::mutex mutex;
+  std::vector<std::string> told;
+  port_ = std::make_unique<CameraDds>(
+      CameraDds::Options{.dds = {.domain = OwnDomain(), .config_xml = {}},
+                         .sensor = kSensor,
+                         .tell =
+                             [&](const std::string& text) {
+                               const std::lock_guard lock(mutex);
+                               told.push_back(text);
+                             },
+                         .rejoin_period = std::chrono::milliseconds(10)});
+  const auto asked = port_->Request(1, {kSinceNs});
+  ASSERT_FALSE(asked);
+  EXPECT_EQ(asked.error().code, ErrorCode::kUnavailable);
+  EXPECT_THAT(asked.error().text, HasSubstr("the DDS domain is not joined yet"));
+  const auto nothing = port_->Take();
+  EXPECT_TRUE(nothing && !*nothing);
+  taken.reset();
+  Start({"good"});  // it is ready when somebody listens
+  const auto good = Ask(2);
+  ASSERT_TRUE(good) << good.error().text;
+  ASSERT_TRUE(*good);
+  EXPECT_EQ((*good)->id, "good-2");
+  const std::lock_guard lock(mutex);
+  ASSERT_EQ(told.size(), 2u);
+  EXPECT_THAT(told[0], HasSubstr("DDS: cannot"));
+  EXPECT_EQ(told[1], "");
 }
 
 }  // namespace

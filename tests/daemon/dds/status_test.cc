@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <deque>
 #include <functional>
 #include <map>
 
@@ -11,6 +13,7 @@
 #include "focalfleet.h"
 #include "tests/daemon/dds/client_process.h"
 #include "tests/daemon/dds/own_domain.h"
+#include "tests/daemon/dds/taken_ports.h"
 
 namespace focalfleet {
 namespace {
@@ -370,6 +373,50 @@ TEST(Status, ADaemonThatEndsIsNoticed) {
   ASSERT_TRUE(TakeUntil(*reader, &seen, [&] { return reader->writer_alive(); }));
   EXPECT_EQ(talker.Finish(), 0);
   EXPECT_TRUE(TakeUntil(*reader, &seen, [&] { return !reader->writer_alive(); }));
+}
+
+// More than there were places for (docs/adr/0006). A hundred take a minute of both cores, most of
+// it for finding each other.
+TEST(Status, FortyReadersOnOneHostAllSeeEverything) {
+  auto publisher = MakePublisher();
+  ASSERT_EQ(publisher->Publish(Units(200)), 200u);
+  for (std::uint64_t id = 1; id <= 3; ++id) ASSERT_TRUE(publisher->Publish(Alarm(id)));
+  publisher->Flush();
+  std::deque<ClientProcess> readers;
+  for (int i = 0; i < 40; ++i)
+    readers.emplace_back(std::vector<std::string>{"/usr/bin/env", "CYCLONEDDS_URI=" LOOPBACK_URI,
+                                                  LATE_JOINER, std::to_string(OwnDomain()), "200",
+                                                  "3", "60000"});
+  for (ClientProcess& reader : readers) {
+    EXPECT_THAT(reader.Line(), HasSubstr("units=200 alarms=3 alarms_twice=0"));
+    EXPECT_EQ(reader.Finish(), 0);
+  }
+}
+
+TEST(Status, WithoutAFreePortJoiningFailsAndGoesLaterInTheSameProcess) {
+  {
+    const testing::TakenPorts taken(OwnDomain());
+    const auto publisher = StatusPublisher::Create(Options());
+    ASSERT_FALSE(publisher);
+    EXPECT_EQ(publisher.error().code, ErrorCode::kUnavailable);
+    EXPECT_FALSE(StatusPublisher::Create(Options())) << "and so it does again";
+  }
+  auto publisher = MakePublisher();
+  auto reader = MakeReader();
+  ASSERT_EQ(publisher->Publish(Units(10)), 10u);
+  publisher->Flush();
+  Seen seen;
+  EXPECT_TRUE(TakeUntil(*reader, &seen, [&] { return seen.units.size() == 10; }));
+}
+
+TEST(Status, TheEnvironmentDoesNotDecideWhereStatusGoes) {
+  ::setenv("CYCLONEDDS_URI",
+           "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='no_such_interface'/>"
+           "</Interfaces></General></Domain></CycloneDDS>",
+           1);
+  auto publisher = MakePublisher();
+  ::unsetenv("CYCLONEDDS_URI");
+  EXPECT_TRUE(publisher);
 }
 
 TEST(Status, WaitComesBackWithoutNews) {

@@ -45,6 +45,33 @@ TEST(RequestedCommand, MakesCommandsOfVerbs) {
   EXPECT_TRUE(Try(fleet, "home", {{"unit_ids", {1}}}));
 }
 
+TEST(RequestedCommand, TakesEachNamedUnitOnceAndNoMoreThanTheFleetHas) {
+  const SmallFleet fleet;
+  const auto twice = Try(fleet, "disable", {{"unit_ids", {3, 1, 3}}, {"reason", "stalls"}});
+  ASSERT_TRUE(twice) << twice.error().text;
+  EXPECT_EQ(std::get<EnableCommand>(twice->what).units, (std::vector<PositionerIndex>{{2}, {0}}));
+  EXPECT_EQ(std::get<HomeCommand>(Try(fleet, "home", {{"unit_ids", {2, 2}}})->what).units.size(),
+            1u);
+  const std::vector<std::uint32_t> many(4, 1);
+  EXPECT_THAT(ErrorOf(fleet, "home", {{"unit_ids", many}}),
+              HasSubstr("4 units are named, and there are 3"));
+}
+
+TEST(RequestedCommand, TextsThatAreKeptAreBounded) {
+  const SmallFleet fleet;
+  const std::string text(256, 'x');
+  EXPECT_THAT(ErrorOf(fleet, "disable", {{"unit_ids", {1}}, {"reason", text}}),
+              HasSubstr("argument 'reason' has 256 bytes, at most 255 are taken"));
+  const std::string targets =
+      "unit_id,theta_deg,phi_deg\n2,10,90\n" + std::string(1000, '#') + "\n";
+  EXPECT_THAT(ErrorOf(fleet, "apply", {{"source", text}, {"targets_csv", targets}}),
+              HasSubstr("argument 'source' has 256 bytes"));
+  EXPECT_TRUE(Try(fleet, "apply", {{"source", "t"}, {"targets_csv", targets}}))
+      << "a file is as long as a line may be";
+  EXPECT_THAT(ErrorOf(fleet, "params_set", {{"unit_id", 1}, {"axis", text}}),
+              HasSubstr("argument 'axis'"));
+}
+
 TEST(RequestedCommand, ResolvesTargets) {
   const SmallFleet fleet;
   const auto apply = Try(fleet, "apply",

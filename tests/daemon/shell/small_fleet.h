@@ -34,8 +34,8 @@ class SmallFleet {
       units[n].id = UnitId{n + 1};
       units[n].base_fp = {25.6 * n, 0};
       units[n].axis = {AxisGeometry{7.4, 0, 890, -190, 190}, AxisGeometry{7.4, 0, 890, 0, 190}};
-      units[n].bus = BusId{0};
-      units[n].node = NodeId{static_cast<std::uint8_t>(n + 1)};
+      units[n].bus = BusId{n / 100};
+      units[n].node = NodeId{static_cast<std::uint8_t>(n % 100 + 1)};
     }
     return Layout::Create(std::move(units), {}).value();
   }

@@ -311,7 +311,7 @@ TEST_F(Simulation, UnitsMisbehaveAsAskedUntilTheyBehaveAgain) {
   EXPECT_EQ(misbehave("13", {}).exit, 2);
   EXPECT_EQ(misbehave("13", {"--late", "nan"}).exit, 2);
   EXPECT_EQ(misbehave("13", {"--copies", "0"}).exit, 2);
-  EXPECT_EQ(misbehave("13", {"--foreign", "0"}).exit, 2);
+  EXPECT_EQ(misbehave("13", {"--foreign", "-1"}).exit, 2);
   const auto two = misbehave("11-12", {"--foreign", "5"});
   EXPECT_EQ(two.exit, 1);
   EXPECT_EQ(two.err, "focalfleet-sim: one serial number is one unit's; 2 are named\n");

@@ -161,7 +161,7 @@ TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
   Fit fit = FittedWith("backlash", Memory::kHold, facts);
   std::vector<std::uint32_t>& has = fit.model.terms[0].group_of_unit;
   std::fill(has.begin() + 1, has.end(), kNoGroup);
-  std::fill_n(fit.aside.begin(), campaign.first_row[1], 1);
+  std::fill_n(fit.weight.begin(), campaign.first_row[1], 0.0);
   const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "friction_windup")});
   EXPECT_THAT(next.moves, IsEmpty());
   EXPECT_THAT(next.untold, testing::ElementsAre(std::pair("backlash", "friction_windup")));

@@ -1,0 +1,55 @@
+// What one client has sent and nobody has taken yet, as lines. A line that is urgent may be taken
+// from behind others; the lines that it overtook say so when their turn comes.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace focalfleet {
+
+class LineBuffer {
+ public:
+  using Urgent = std::function<bool(std::string_view)>;
+  struct Line {
+    std::string text;        // without its newline
+    bool overtaken = false;  // an urgent line that came later was taken before it
+  };
+
+  /// So many bytes of lines one call of TakeUrgent looks at. Lines that only look urgent cost some
+  /// microseconds each to tell: 4 KiB are a hundred of them, a fifth of a millisecond a client.
+  /// Twice as much doubles what a hostile client costs a turn; half as much takes two turns for a
+  /// stop that stands behind a full buffer of short lines.
+  static constexpr std::size_t kLookBytes = 4096;
+
+  void Append(std::string_view bytes);
+  /// The first line, if it is complete.
+  std::optional<Line> Take();
+  /// The first complete line that `urgent` says yes to, wherever it stands. What stands before it
+  /// is overtaken.
+  std::optional<std::string> TakeUrgent(const Urgent& urgent);
+  /// All complete lines are: an urgent line of somebody else went ahead of them.
+  void Overtake();
+  void Clear() { *this = {}; }
+
+  [[nodiscard]] bool has_line() const { return line_end_ != std::string::npos; }
+  /// Of the first line, complete or not, without its newline.
+  [[nodiscard]] std::size_t first_bytes() const { return has_line() ? line_end_ : bytes_.size(); }
+  [[nodiscard]] std::size_t size() const { return bytes_.size(); }
+  /// TakeUrgent has not looked at all complete lines yet.
+  [[nodiscard]] bool unseen() const { return unseen_; }
+
+ private:
+  void Erase(std::size_t from, std::size_t count);
+
+  std::string bytes_;
+  std::size_t line_end_ = std::string::npos;  // of the first complete line
+  std::size_t looked_ = 0;                    // where the first line begins that is unseen
+  std::size_t searched_ = 0;                  // no newline from looked_ to here
+  std::size_t overtaken_ = 0;                 // lines that begin before this are
+  bool unseen_ = false;
+};
+
+}  // namespace focalfleet

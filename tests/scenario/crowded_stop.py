@@ -1,0 +1,144 @@
+#!/usr/bin/python3
+"""crowded_stop.py BIN [--units N] [--stops K]: how long `stop` takes on the control socket of a daemon that many others ask. A real
+focalfleetd with a simulated fleet in it; the others are a process of their own and ask again as soon as they are answered. Prints
+the times of K stops on a connection of their own beside each crowd. The exit code is 1 where one was not answered."""
+
+import argparse
+import json
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+PATIENCE_S = 120
+CONFIG = """
+[fleet]
+units = "units.csv"
+[dds]
+enabled = false
+[bus]
+port = "simulated"
+[log]
+level = "error"
+"""
+CROWDS = (("nobody", 0, ""), ("10 ask status", 10, "status"), ("10 ask state", 10, "state"), ("40 ask state", 40, "state"),
+          ("64 idle", 64, ""))
+
+
+def connect(path):
+    end = socket.socket(socket.AF_UNIX)
+    end.connect(path)
+    end.settimeout(PATIENCE_S)  # from here on: with one, a full backlog would be an error
+    return end
+
+
+def send(end, verb):
+    end.sendall(json.dumps({"id": 1, "verb": verb}).encode() + b"\n")
+
+
+def ask(end, verb):
+    send(end, verb)
+    answer = b""
+    while not answer.endswith(b"\n"):
+        piece = end.recv(1 << 20)
+        if not piece:
+            raise RuntimeError("hung up")
+        answer += piece
+    answer = json.loads(answer)
+    if not answer["ok"]:
+        raise RuntimeError(answer["error"]["text"])
+    return answer["result"]
+
+
+def be_crowd(path, count, verb):
+    """Does not return."""
+    ends = {}
+    ready = select.epoll()
+    for _ in range(count):
+        end = connect(path)
+        ends[end.fileno()] = end
+        ready.register(end.fileno(), select.EPOLLIN)
+        if verb:
+            send(end, verb)
+    print("here", flush=True)
+    while True:
+        for number, _ in ready.poll():
+            said = ends[number].recv(1 << 20)
+            if not said:
+                ready.unregister(number)  # it made room
+            elif verb and said.endswith(b"\n"):
+                send(ends[number], verb)
+
+
+def time_stops(path, count):
+    times_ms = []
+    with connect(path) as end:
+        for _ in range(count):
+            begin = time.perf_counter()
+            ask(end, "stop")
+            times_ms.append(1e3 * (time.perf_counter() - begin))
+            time.sleep(0.02)
+    return sorted(times_ms)
+
+
+def try_crowd(path, name, count, verb, stops):
+    crowd = None
+    if count:
+        crowd = subprocess.Popen([sys.executable, __file__, "--crowd", path, str(count), verb], stdout=subprocess.PIPE)
+        crowd.stdout.readline()
+    try:
+        ms = time_stops(path, stops)
+        print(f"{name:16} {ms[len(ms) // 2]:8.2f} {ms[len(ms) * 99 // 100]:8.2f} {ms[-1]:8.2f}", flush=True)
+        return True
+    except (RuntimeError, OSError) as error:
+        print(f"{name:16} NOT ANSWERED: {error}", flush=True)
+        return False
+    finally:
+        if crowd:
+            crowd.kill()
+            crowd.wait()
+
+
+def wait_until_ready(path, daemon):
+    until = time.monotonic() + PATIENCE_S
+    while time.monotonic() < until and daemon.poll() is None:
+        try:
+            with connect(path) as end:
+                status = ask(end, "status")
+            if status["phases"].get("ready") == status["units"]:
+                return
+        except OSError:
+            pass
+        time.sleep(0.1)
+    raise RuntimeError("the fleet does not become ready")
+
+
+def main():
+    if sys.argv[1:2] == ["--crowd"]:
+        be_crowd(sys.argv[2], int(sys.argv[3]), sys.argv[4])
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("bin")
+    parser.add_argument("--units", type=int, default=5000)
+    parser.add_argument("--stops", type=int, default=200)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run([f"{options.bin}/focalfleet", "-q", "layout", "hex", "--count", str(options.units), "--out", f"{folder}/units.csv"],
+                       check=True)
+        with open(f"{folder}/focalfleet.toml", "w") as config:
+            config.write(CONFIG)
+        daemon = subprocess.Popen([f"{options.bin}/focalfleetd", "--config", f"{folder}/focalfleet.toml"])
+        try:
+            wait_until_ready(f"{folder}/control.sock", daemon)
+            print(f"{'beside':16} {'p50_ms':>8} {'p99_ms':>8} {'most_ms':>8}")
+            answered = [try_crowd(f"{folder}/control.sock", *crowd, options.stops) for crowd in CROWDS]
+        finally:
+            daemon.send_signal(signal.SIGTERM)
+            daemon.wait()
+    return 0 if all(answered) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
