@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/campaign/compensation.h"
+#include "fleet/files/line_limit.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/targets.h"
 #include "protocol/base/limits.h"
@@ -93,6 +94,7 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   FOCALFLEET_TRY_ASSIGN(const std::string source, TextArgumentOr(args, "source", "targets"));
   FOCALFLEET_TRY_ASSIGN(const std::string csv,
                         TextArgument(args, "targets_csv", kControlLineBytesMax));
+  FOCALFLEET_TRY(CheckLines(csv, source, std::size_t{2} * limits::kUnits));
   FOCALFLEET_TRY_ASSIGN(const bool fixed, FlagArgumentOr(args, "fixed", false));
   // First, because it is the answer that the operator needs whatever is in the file.
   if (view.coordinator->busy())

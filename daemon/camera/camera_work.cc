@@ -28,6 +28,7 @@ ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& e
       if (findings) return {id, std::move(findings)};
       trouble = findings.error();
       options_.log("exposure " + (*taken)->id + " is not used: " + trouble.text);
+      if (std::chrono::steady_clock::now() >= give_up) return {id, tl::unexpected(trouble)};
       continue;
     }
     if (!taken) {

@@ -64,23 +64,30 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
 
 constexpr std::chrono::milliseconds kLookEvery{50};
 
-/// How many units may still move: all, or the one named. Errors: as Ask.
-tl::expected<std::uint64_t, Failure> CountMoving(const Context& context,
-                                                 const std::optional<std::uint32_t>& unit_id) {
-  constexpr std::array kMoving{"moving", "homing", "settling"};
-  const auto is_moving = [&](const std::string& phase) {
-    return std::ranges::find(kMoving, phase) != kMoving.end();
-  };
+struct NotStanding {
+  std::uint64_t moving = 0;     // as far as the daemon knows
+  std::uint64_t not_known = 0;  // they do not answer, or not yet
+};
+
+/// Of all units, or of the one named. Units that have never answered count where they are named:
+/// else a fleet with one broken unit could never be told to stand. Errors: as Ask.
+tl::expected<NotStanding, Failure> CountNotStanding(const Context& context,
+                                                    const std::optional<std::uint32_t>& unit_id) {
+  Json phases;
   if (unit_id) {
     const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", *unit_id}}});
     if (!unit) return tl::unexpected(unit.error());
-    return std::uint64_t{is_moving(TextIn(*unit, "phase")) ? 1u : 0u};
+    phases[TextIn(*unit, "phase")] = 1u;
+  } else {
+    const auto status = Ask(context, {.verb = "status"});
+    if (!status) return tl::unexpected(status.error());
+    phases = ObjectIn(*status, "phases");
   }
-  const auto status = Ask(context, {.verb = "status"});
-  if (!status) return tl::unexpected(status.error());
-  std::uint64_t moving = 0;
-  for (const char* phase : kMoving) moving += CountIn(ObjectIn(*status, "phases"), phase);
-  return moving;
+  NotStanding units;
+  for (const char* phase : {"moving", "homing", "settling"}) units.moving += CountIn(phases, phase);
+  for (const char* phase : {"silent", "identifying"}) units.not_known += CountIn(phases, phase);
+  if (unit_id) units.not_known += CountIn(phases, "absent");
+  return units;
 }
 
 /// What was asked for is that units stand; "sent" alone is not done.
@@ -88,32 +95,44 @@ ExitCode TellWhetherAllStand(const Context& context, const StopOptions& options)
   const auto give_up =
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
   for (;;) {
-    const auto moving = CountMoving(context, options.unit_id);
+    const auto units = CountNotStanding(context, options.unit_id);
     const bool over = std::chrono::steady_clock::now() >= give_up;
     // A stop is let in where all places are taken, a question is not.
-    if (!moving && moving.error().error.code == ErrorCode::kFull && !over) {
+    if (!units && units.error().error.code == ErrorCode::kFull && !over) {
       std::this_thread::sleep_for(kLookEvery);
       continue;
     }
-    if (!moving)
+    if (!units)
       return Report(context, Failure{ExitCode::kBroken,
-                                     {moving.error().error.code,
+                                     {units.error().error.code,
                                       "stop sent; whether units stand is not known: " +
-                                          moving.error().error.text}});
-    if (*moving > 0 && !over) {
+                                          units.error().error.text}});
+    const bool all_stand = units->moving == 0 && units->not_known == 0;
+    if (!all_stand && !over) {
       std::this_thread::sleep_for(kLookEvery);
       continue;
     }
-    if (context.json) PrintJson({{"text", "stop sent"}, {"not_standing", *moving}});
-    if (*moving == 0) {
-      Say(context, options.unit_id ? "it stands" : "all units stand, or do not answer");
+    if (context.json)
+      PrintJson({{"text", "stop sent"},
+                 {"not_standing", units->moving},
+                 {"not_known", units->not_known}});
+    if (all_stand) {
+      Say(context, options.unit_id ? "it stands" : "all units that have ever answered stand");
       return ExitCode::kOk;
     }
+    std::string trouble;
+    if (units->moving > 0)
+      trouble += fmt::format("{} did not confirm within {:g} s to stand",
+                             Count(units->moving, "unit", "units"), options.within_s);
+    if (units->not_known > 0)
+      trouble +=
+          fmt::format("{}{} not answer, so whether {} not known", trouble.empty() ? "" : "; ",
+                      Count(units->not_known, "unit does", "units do"),
+                      units->not_known == 1 ? "it stands is" : "they stand is");
     Complain(
-        fmt::format("focalfleet: {} did not confirm within {:g} s to stand: `focalfleet status`, "
-                    "`focalfleet stop` "
-                    "again, or `focalfleet stop --direct`\n",
-                    Count(*moving, "unit", "units"), options.within_s));
+        fmt::format("focalfleet: {}: `focalfleet status`, `focalfleet stop` again, or "
+                    "`focalfleet stop --direct`\n",
+                    trouble));
     return ExitCode::kSomeUnserved;
   }
 }

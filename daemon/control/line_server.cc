@@ -250,7 +250,9 @@ void LineServer::Impl::TellAndClose(int fd, const std::string& why) const {
 
 /// It has asked nothing that is still open, and nothing of it waits but what it does not read.
 bool LineServer::Impl::Idle(const Client& client) const {
-  if (client.open > 0 || Ready(client)) return false;
+  if (client.open > 0) return false;
+  if (!Listens(client)) return true;  // what it has sent is not taken until it reads
+  if (Ready(client)) return false;
   char unread = 0;  // that has come since the last look
   return ::recv(client.fd, &unread, 1, MSG_PEEK | MSG_DONTWAIT) <= 0;
 }

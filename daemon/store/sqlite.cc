@@ -30,6 +30,10 @@ ErrorCode CodeOf(int sqlite_code) {
 
 Status Statement::Failed(int code) {
   Error error = ErrorOf(db_, code);
+  // A file that is damaged refuses good rows, too: no row may be set aside for it.
+  const int primary = code & 0xff;
+  if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB || primary == SQLITE_ERROR)
+    error.code = ErrorCode::kUnavailable;
   sqlite3_reset(statement_.get());
   return tl::unexpected<Error>(std::move(error));
 }

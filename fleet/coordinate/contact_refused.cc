@@ -42,6 +42,8 @@ void Contact::StoreRefused(const RefusedRow& refused) {
   for (std::uint32_t n = 0; n < core_.units.size() && serial.value != 0 && !unit; ++n)
     if (core_.units[n].view.serial == serial) unit = PositionerIndex{n};
   const bool stands = unit && TellsOfAPlace(refused.row);
+  // An alarm about an alarm would be refused like it, and so on; the log has it.
+  if (std::holds_alternative<AlarmRow>(refused.row)) return;
   core_.Raise(
       Severity::kError, unit, {},
       "the store refuses the " + Describe(refused.row) + ": " + refused.why +

@@ -7,6 +7,7 @@
 #include <unordered_map>
 
 #include "fleet/files/csv.h"
+#include "fleet/files/line_limit.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -131,6 +132,7 @@ Result<Exposure> ReadSpots(std::string_view text, std::string file, const Sensor
     return Fail(ErrorCode::kInvalid,
                 Where(file, taken.line) + "taken_utc: not a time like 2026-11-22T03:04:05.678Z");
   exposure.taken_unix_ns = *unix_ns;
+  FOCALFLEET_TRY(CheckLines(text, file, std::size_t{2} * limits::kSpotsPerExposure));
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(text, std::move(file)));
   FOCALFLEET_TRY(table.Require({"spot_id", "x_px", "y_px", "flux"}));
   if (table.size() > limits::kSpotsPerExposure)

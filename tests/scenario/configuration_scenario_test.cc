@@ -640,6 +640,21 @@ TEST(Configuration, ACommandWhoseRowIsRefusedIsNotDone) {
   EXPECT_NE(fleet.LastReply(900)->error->text.find("NOT stored"), std::string::npos);
 }
 
+TEST(Configuration, AnAlarmThatTheStoreRefusesBegetsNoOther) {
+  InProcessFleet fleet(Small(49));
+  std::size_t refused = 0;
+  fleet.refuse = [&refused](const Row& row) {
+    const bool is_alarm = std::holds_alternative<AlarmRow>(row);
+    refused += is_alarm ? 1u : 0u;
+    return is_alarm;
+  };
+  fleet.world().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
+  fleet.Restart();
+  fleet.Run(Seconds(5));
+  EXPECT_GE(refused, 1u);
+  EXPECT_LE(refused, 3u) << "one of the unit, and none of that one";
+}
+
 TEST(Configuration, ExchangedCablesAreNamed) {
   InProcessFleet fleet(Small(47));
   fleet.ApplyRandom(47);

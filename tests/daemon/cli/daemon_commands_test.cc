@@ -514,6 +514,15 @@ TEST_F(DaemonCommands, AStopIsDoneWhenUnitsStand) {
                        {{"stop", {}}, {"unit", {.result = Json{{"phase", "moving"}}}}});
   EXPECT_EQ(one.exit, 3);
   EXPECT_EQ(Json::parse(one.out, nullptr, false)["not_standing"], 1);
+  moves["phases"] = {{"ready", 1}, {"silent", 2}, {"identifying", 1}, {"absent", 1}};
+  const auto silent =
+      Ask({"stop", "--within-s", "0"}, {{"stop", {}}, {"status", {.result = moves}}});
+  EXPECT_EQ(silent.exit, 3);
+  EXPECT_THAT(silent.err, HasSubstr("3 units do not answer, so whether they stand is not known"));
+  const auto absent = Ask({"stop", "17", "--within-s", "0", "--json"},
+                          {{"stop", {}}, {"unit", {.result = Json{{"phase", "absent"}}}}});
+  EXPECT_EQ(absent.exit, 3);
+  EXPECT_EQ(Json::parse(absent.out, nullptr, false)["not_known"], 1);
   EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 5) << "whether they stand is not known";
 }
 

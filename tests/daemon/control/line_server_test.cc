@@ -394,6 +394,25 @@ TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
   EXPECT_EQ(lines[0].text, "hello");
 }
 
+// What it sends on meanwhile is not taken before it reads, so it keeps no place.
+TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
+  const Scratch scratch;
+  auto server =
+      LineServer::Create(scratch / "s",
+                         {.output_bytes_pause = 10'000, .clients_max = 1, .reserved_max = 0})
+          .value();
+  Crowd crowd(scratch / "s", &server);
+  crowd.Add("state\n");
+  const auto asked = server.Next();
+  ASSERT_TRUE(asked);
+  server.Answer(asked->client, std::string(2'000'000, 'y'));
+  crowd[0].Send("state\n");
+  crowd.Add("hello\n");
+  const auto lines = Drain(&server);
+  ASSERT_EQ(lines.size(), 1u);
+  EXPECT_EQ(lines[0].text, "hello");
+}
+
 TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1}).value();

@@ -72,6 +72,12 @@ TEST(RequestedCommand, TextsThatAreKeptAreBounded) {
               HasSubstr("argument 'axis'"));
 }
 
+TEST(RequestedCommand, ATableOfTooManyLinesIsNotRead) {
+  const SmallFleet fleet;
+  EXPECT_THAT(ErrorOf(fleet, "apply", {{"targets_csv", std::string(70'000, '\n')}}),
+              HasSubstr("targets: 70000 lines are more than 65536"));
+}
+
 TEST(RequestedCommand, ResolvesTargets) {
   const SmallFleet fleet;
   const auto apply = Try(fleet, "apply",

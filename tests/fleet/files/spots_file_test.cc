@@ -31,6 +31,11 @@ TEST(SpotsFile, ReadsAnExposure) {
   EXPECT_EQ(exposure->spots[1].fwhm_px, 0);
 }
 
+TEST(SpotsFile, OfTooManyLinesIsNotRead) {
+  EXPECT_EQ(ErrorOf(kHead + std::string(300'000, '\n')),
+            "s.csv: 300002 lines are more than 262144");
+}
+
 TEST(SpotsFile, ReadsBackWhatItWrites) {
   const std::uint64_t seed = testing::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
