@@ -2,10 +2,15 @@
 // every unit and bus, and what is being done about it; it has no clock, thread, file, socket or
 // log. The shell polls, calls Step, and performs the effects in this order:
 //
-//   rows     -> store     one transaction for the batch; then Inputs::committed_through says so
-//   frames   -> buses     stop frames at once; the start signal is only emitted after the intent's
-//   commit plan_job -> planner   RunPlanJob on a thread of its own; the answer comes back as
-//   PlanDone changed  -> DDS       the last value wins
+//   rows      to the store:   one transaction a batch; Inputs::committed_through tells of it
+//   frames    to the buses:   in their order
+//   plan_job  to the planner: RunPlanJob on a thread of its own; PlanDone brings the answer
+//   exposure  to the camera:  ExposureDone brings the answer
+//   replies   to whoever sent the command
+//   changed   to DDS:         the newest value of each unit is enough
+//
+// Rows that a motion needs come first: a start signal is among the frames of a later step, when
+// the batch with its intent is durable. Frames that stop a unit wait for nothing.
 //
 // A configuration is a goal, pursued in rounds: plan from where everything stands, stage, confirm
 // by read-back, arm, commit the intent, start, watch. A unit that falls out at any step is named
@@ -408,6 +413,13 @@ class Coordinator {
               StoredFleet stored);
   ~Coordinator();
 
+  /// Takes in what has come since the last step and appends to `effects` what is to be done. Inputs
+  /// are taken in this order, each list from its front: notes, rows that the store refused, links,
+  /// frames, plans, exposures, commands; then everything that is due at `now`. So a command is
+  /// decided by what was heard in the same step, and a stop ends what an answer has just begun.
+  /// The same inputs in the same order give the same effects, to the bit. Pre: `now` is not before
+  /// that of the last step; `effects` is clear; frames are of buses of the layout. Cost: as many
+  /// units as are heard, commanded or due, and one pass over the units of a configuration.
   void Step(const Inputs& inputs, Effects* effects);
   /// The shell ends: what must still be written. Units that move finish by themselves.
   void End(HostInstant now, Effects* effects);
