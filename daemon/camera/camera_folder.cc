@@ -61,11 +61,14 @@ Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, Senso
     return Fail(folders.error().code, "camera folder " + path + ": " + folders.error().text);
   std::unique_ptr<CameraFolder> folder(
       new CameraFolder(std::move(path), std::move(*folders), sensor));
-  for (;;) {
-    FOCALFLEET_TRY_ASSIGN(const std::string name, folder->NextFile());
-    if (name.empty()) return folder;
-    folder->Refuse(name, "it was there before the daemon asked for anything");
-  }
+  const auto names = folder->folders_.camera.Names(limits::kCameraFiles);
+  // A folder that is too full is told when the first exposure is due; a fleet moves without it.
+  if (!names && names.error().code == ErrorCode::kFull) return folder;
+  if (!names) return tl::unexpected(names.error());
+  for (const std::string& name : *names)
+    if (KindOfName(name) != CameraFile::kNotOurs)
+      folder->Refuse(name, "it was there before the daemon asked for anything");
+  return folder;
 }
 
 Status CameraFolder::Request(std::uint64_t id, WallTime since) {

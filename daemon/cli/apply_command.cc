@@ -118,13 +118,16 @@ void AddApplyCommand(CommandLine* line) {
                     "Wait until the configuration is over, with its progress");
   command->add_flag("--fixed", options->fixed,
                     "Units that the file does not name may not step aside");
-  command
-      ->add_option("--correct", options->corrections,
-                   "Measure with the camera when all have arrived, and correct at most so often")
-      ->check(CLI::Range(0, 10));
+  CLI::Option* correct =
+      command
+          ->add_option(
+              "--correct", options->corrections,
+              "Measure with the camera when all have arrived, and correct at most so often")
+          ->check(CLI::Range(0, 10));
   command->add_option("--tolerance-um", options->tolerance_um, "Who is farther off is corrected")
       ->check(NumberBetween(0.1, 1e6))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(correct);
   OnChosen(line, command, options, RunApply);
 }
 

@@ -57,8 +57,9 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
   }
   Say(context, fmt::format("stop is on {} of {}; {} answered", sent,
                            Count(buses->size(), "bus", "buses"), Count(answered, "unit", "units")));
-  if (troubles.empty()) return ExitCode::kOk;
-  Complain(fmt::format("focalfleet: not stopped:{}\n", troubles));
+  if (troubles.empty() && answered > 0) return ExitCode::kOk;
+  if (answered == 0) Complain("focalfleet: no unit answered: whether they stand is not known\n");
+  if (!troubles.empty()) Complain(fmt::format("focalfleet: not stopped:{}\n", troubles));
   return ExitCode::kSomeUnserved;
 }
 
@@ -69,8 +70,8 @@ struct NotStanding {
   std::uint64_t not_known = 0;  // they do not answer, or not yet
 };
 
-/// Of all units, or of the one named. Units that have never answered count where they are named:
-/// else a fleet with one broken unit could never be told to stand. Errors: as Ask.
+/// Counts among all units, or looks at the one named. A unit that has never answered counts where
+/// it is named: else a fleet with one broken unit could never be told to stand. Errors: as Ask.
 tl::expected<NotStanding, Failure> CountNotStanding(const Context& context,
                                                     const std::optional<std::uint32_t>& unit_id) {
   Json phases;

@@ -41,10 +41,10 @@ class GuardedFolder {
   /// Never waits. Errors: kUnavailable: missing, unreadable; kInvalid: no regular file, larger than
   /// `bytes_max`, changed while it was read.
   [[nodiscard]] Result<std::string> Read(const std::string& name, std::size_t bytes_max) const;
-  /// The name is a file with `text`, or what it was before. Errors: kUnavailable, kFull.
+  /// The name is a file with `text`, or as it was before; after a loss of power it may be empty.
+  /// Errors: kUnavailable, kFull.
   [[nodiscard]] Status Write(const std::string& name, const std::string& text) const;
-  /// Replaces a file of that name in `to`; where a folder is called so the name gets a number.
-  /// Errors: kUnavailable.
+  /// Where `to` has something of that name already, the name gets a number. Errors: kUnavailable.
   [[nodiscard]] Status Move(const std::string& name, const GuardedFolder& to) const;
 
   /// The name as messages have it: with the path, without control characters.

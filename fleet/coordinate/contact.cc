@@ -637,6 +637,12 @@ Status Contact::Adopt(PositionerIndex i) {
                 core_.NameOf(i) + " has nothing to adopt: its phase is " + Name(view.phase));
   if (const auto place = core_.place_of.find(view.serial);
       place != core_.place_of.end() && place->second != i) {
+    const UnitView& there = core_.unit(place->second).view;
+    if (there.serial == view.serial && there.phase != kAbsent && there.phase != kSilent)
+      return Fail(ErrorCode::kRefused,
+                  core_.NameOf(place->second) + " answers with serial number " +
+                      std::to_string(view.serial.value) +
+                      ", too: which is which cannot be told; program one of them anew");
     // The hardware was moved here from another place; that place is empty now.
     core_.unit(place->second).view.bound_serial = {};
     core_.Note(BindingRow{core_.layout.unit(place->second).id, {}});

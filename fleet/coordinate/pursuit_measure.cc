@@ -166,7 +166,10 @@ void Pursuit::ExposureFailed(const Error& error) {
   core_.Raise(Severity::kError, {}, {},
               "configuration " + std::to_string(view_.id) + " is not measured: " + tried);
   view_.not_measured = tried;
-  if (look_ == Look::kOnly) failure_ = "not measured: " + tried;
+  if (look_ == Look::kOnly)
+    for (std::uint32_t n = 0; n < core_.units.size(); ++n)
+      if (core_.units[n].view.outcome == TargetOutcome::kPending)
+        SetOutcome({n}, TargetOutcome::kUnmeasured, "not measured: " + tried);
   FinishWhenDurable(look_ == Look::kOnly ? ConfigurationState::kFailed : ConfigurationState::kDone);
 }
 

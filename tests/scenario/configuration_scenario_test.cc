@@ -655,6 +655,22 @@ TEST(Configuration, AnAlarmThatTheStoreRefusesBegetsNoOther) {
   EXPECT_LE(refused, 3u) << "one of the unit, and none of that one";
 }
 
+TEST(Configuration, ASerialNumberThatAnswersElsewhereIsNotAdopted) {
+  InProcessFleet fleet(Small(50));
+  fleet.Run(Seconds(3));
+  const SerialNumber eight = fleet.coordinator().unit({8}).serial;
+  fleet.world().faults(fleet.id(7))->foreign_serial = eight;
+  fleet.Restart();
+  fleet.Run(Seconds(3));
+  fleet.Send({900, AdoptCommand{{7}}});
+  fleet.Run(Seconds(2));
+  ASSERT_TRUE(fleet.LastReply(900));
+  ASSERT_TRUE(fleet.LastReply(900)->error);
+  EXPECT_NE(fleet.LastReply(900)->error->text.find("answers with serial number"),
+            std::string::npos);
+  EXPECT_EQ(fleet.coordinator().unit({8}).bound_serial, eight);
+}
+
 TEST(Configuration, ExchangedCablesAreNamed) {
   InProcessFleet fleet(Small(47));
   fleet.ApplyRandom(47);

@@ -257,6 +257,8 @@ TEST(Measured, ALookThatFailsFindsNobody) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kFailed);
   EXPECT_EQ(fleet.coordinator().configuration().arrived, 0u);
+  EXPECT_EQ(fleet.coordinator().configuration().unmeasured,
+            fleet.coordinator().configuration().targeted);
   ExpectAccounted(fleet);
 }
 

@@ -14,6 +14,7 @@
 #include "daemon/files/text_file.h"
 #include "fleet/files/spots_file.h"
 #include "fleet/hex_layout.h"
+#include "protocol/base/limits.h"
 #include "tests/support/as_user.h"
 #include "tests/support/gzip.h"
 #include "tests/support/temporary_folder.h"
@@ -232,6 +233,16 @@ TEST_P(CameraFolderTest, AFolderThatIsMadeAnewIsLookedIntoFromTheNextRequest) {
   ASSERT_TRUE(folder_->Request(1, kSince));
   Put("x.csv", WriteSpots(Three("x")));
   EXPECT_EQ(TakenId(), "x");
+}
+
+TEST_P(CameraFolderTest, TooManyFilesHoldNoStartAndAreToldWhenAnExposureIsDue) {
+  fs::create_directories(File(""));
+  for (std::size_t n = 0; n <= limits::kCameraFiles; ++n)
+    std::ofstream(File("x" + std::to_string(n) + ".tmp"));
+  Open();
+  const auto taken = folder_->Take();
+  ASSERT_FALSE(taken);
+  EXPECT_THAT(taken.error().text, HasSubstr("clear it up"));
 }
 
 TEST_P(CameraFolderTest, WhatCannotBeMovedIsTakenOnceAndStays) {

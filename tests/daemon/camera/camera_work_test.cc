@@ -15,6 +15,7 @@ namespace {
 
 using testing::CameraField;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr std::int64_t kNowNs = 1'795'316'645'000'000'000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
@@ -43,18 +44,16 @@ class CameraWorkTest : public ::testing::Test {
         .tail_share = 0, .dead_share = 0, .slipping_share = 0, .disabled_share = 0, .swaps = 0};
     field_.Move(none);
     const sim::CameraTraits traits = testing::TestCamera(kRimMm);
-    CameraWorker::Options options{
-        .layout = &field_.layout(),
-        .site = {.model = testing::ModelOf(traits),
-                 .sensor = {traits.sensor_px.real(), traits.sensor_px.imag()},
-                 .fiducials = field_.fiducials(),
-                 .options = {}},
-        .patience = std::chrono::milliseconds(30),
-        .pause = std::chrono::milliseconds(1),
-        .now = [this] { return WallTime{now_ns_}; },
-        .log = [this](const std::string& text) { log_.push_back(text); }};
-    worker_ = std::make_unique<CameraWorker>(std::make_unique<ScriptedPort>(&exposures_),
-                                             std::move(options));
+    options_ = {.layout = &field_.layout(),
+                .site = {.model = testing::ModelOf(traits),
+                         .sensor = {traits.sensor_px.real(), traits.sensor_px.imag()},
+                         .fiducials = field_.fiducials(),
+                         .options = {}},
+                .patience = std::chrono::milliseconds(30),
+                .pause = std::chrono::milliseconds(1),
+                .now = [this] { return WallTime{now_ns_}; },
+                .log = [this](const std::string& text) { log_.push_back(text); }};
+    worker_ = std::make_unique<CameraWorker>(std::make_unique<ScriptedPort>(&exposures_), options_);
     work_.drives.assign(field_.layout().size(), UnitDrive{});
     for (std::uint32_t n = 0; n < field_.layout().size(); ++n) {
       const Unit& unit = field_.layout().units()[n];
@@ -99,6 +98,7 @@ class CameraWorkTest : public ::testing::Test {
   std::deque<Exposure> exposures_;
   std::vector<std::string> log_;
   CameraWork work_;
+  CameraWorker::Options options_;
   std::unique_ptr<CameraWorker> worker_;
 };
 
@@ -175,6 +175,33 @@ TEST_F(CameraWorkTest, AGoodExposureAfterABadOneIsTaken) {
   EXPECT_TRUE(Do().exposure);
   ASSERT_EQ(log_.size(), 1u);
   EXPECT_THAT(log_[0], HasSubstr("early"));
+}
+
+/// Gives an exposure of long ago, again and again, and counts.
+class ChatteringPort : public CameraPort {
+ public:
+  explicit ChatteringPort(Exposure exposure) : exposure_(std::move(exposure)) {}
+  Status Request(std::uint64_t, WallTime) override { return {}; }
+  Result<std::optional<Exposure>> Take() override {
+    constexpr int kPatience = 100'000;  // many times what the worker's lasts
+    if (++given_ > kPatience) return Fail(ErrorCode::kInvalid, "it was not given up");
+    exposure_.id = "chatter " + std::to_string(given_);
+    return std::optional(exposure_);
+  }
+
+ private:
+  Exposure exposure_;
+  int given_ = 0;
+};
+
+TEST_F(CameraWorkTest, ACameraThatSendsWhatCannotBeUsedIsWaitedForNoLonger) {
+  Exposure early = Take("early");
+  early.taken_unix_ns = now_ns_ - 2 * kSecondNs;
+  CameraWorker worker(std::make_unique<ChatteringPort>(early), options_);
+  const std::atomic<bool> ending{false};
+  const ExposureDone done = worker.Do(work_, ending);
+  ASSERT_FALSE(done.exposure);
+  EXPECT_THAT(done.exposure.error().text, Not(HasSubstr("not given up")));
 }
 
 TEST_F(CameraWorkTest, ADeadCameraIsWaitedForSoLongAndNoLonger) {

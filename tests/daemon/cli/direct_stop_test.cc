@@ -128,8 +128,10 @@ TEST_F(DirectStop, PutsTheStopOnEveryBusAndCountsAnswers) {
 }
 
 TEST_F(DirectStop, StopsOneUnitOnItsBusAlone) {
-  PlayedBus three(scratch_ / "bus3.sock", {NodeId{1}});
-  PlayedBus four(scratch_ / "bus4.sock", {NodeId{7}});
+  std::vector<NodeId> nodes;
+  for (std::uint8_t node = 1; node <= 60; ++node) nodes.push_back(NodeId{node});
+  PlayedBus three(scratch_ / "bus3.sock", nodes);
+  PlayedBus four(scratch_ / "bus4.sock", nodes);
   ASSERT_EQ(Focalfleet({"layout", "hex", "--count", "300", "--units-per-bus", "60", "--out",
                         scratch_ / "units.csv"})
                 .exit,
@@ -170,6 +172,14 @@ TEST_F(DirectStop, NamesABusThatDoesNotTakeIt) {
   EXPECT_EQ(result.exit, 3);
   EXPECT_THAT(result.err, HasSubstr("bus1.sock"));
   EXPECT_THAT(result.out, HasSubstr("1 of 2 buses"));
+}
+
+TEST_F(DirectStop, IsNotDoneWhereNoUnitAnswers) {
+  PlayedBus mute(scratch_ / "bus0.sock", {});
+  const auto result =
+      Focalfleet({"stop", "--direct", "--config", Config("[bus]\nunix_directory = \".\"\n")});
+  EXPECT_EQ(result.exit, 3);
+  EXPECT_THAT(result.err, HasSubstr("no unit answered: whether they stand is not known"));
 }
 
 TEST_F(DirectStop, TellsWhatIsWrongWithTheConfiguration) {

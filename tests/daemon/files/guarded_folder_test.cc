@@ -179,6 +179,13 @@ TEST_P(GuardedFolderTest, MovesWhateverItIsWithoutFollowingIt) {
   EXPECT_EQ(Text(In("aside/folder.1")), "a file now");
   EXPECT_TRUE(Exists(In("aside/folder/of theirs")));
   EXPECT_FALSE(folder_->Move("none", *aside));
+  for (const char* text : {"first", "second", "third"}) {
+    ASSERT_TRUE(folder_->Write("night", text));
+    ASSERT_TRUE(folder_->Move("night", *aside));
+  }
+  EXPECT_EQ(Text(In("aside/night")), "first");
+  EXPECT_EQ(Text(In("aside/night.1")), "second");
+  EXPECT_EQ(Text(In("aside/night.2")), "third");
 }
 
 TEST_P(GuardedFolderTest, ASubfolderIsNoLinkToOne) {

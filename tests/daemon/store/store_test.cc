@@ -651,6 +651,32 @@ TEST_F(StoreTest, DamagedPagesAreAnError) {
   }
 }
 
+TEST_F(StoreTest, ADamagedTableIsNoFaultOfTheRow) {
+  const std::vector<Row> rows = {AlarmRow{.id = 1, .text = "the first"}};
+  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(Path().c_str(), &db), SQLITE_OK);
+  const auto number = [&](const char* sql) {
+    sqlite3_stmt* statement = nullptr;
+    EXPECT_EQ(sqlite3_prepare_v2(db, sql, -1, &statement, nullptr), SQLITE_OK);
+    EXPECT_EQ(sqlite3_step(statement), SQLITE_ROW);
+    const std::int64_t value = sqlite3_column_int64(statement, 0);
+    sqlite3_finalize(statement);
+    return value;
+  };
+  const std::int64_t page = number("SELECT rootpage FROM sqlite_master WHERE name = 'alarm'");
+  const std::int64_t page_bytes = number("PRAGMA page_size");
+  sqlite3_close(db);
+  std::fstream file(Path(), std::ios::binary | std::ios::in | std::ios::out);
+  file.seekp((page - 1) * page_bytes);
+  file << std::string(static_cast<std::size_t>(page_bytes), '\xa5');
+  file.close();
+  const auto store = OpenStore();
+  ASSERT_TRUE(store);
+  const std::vector<Row> next = {AlarmRow{.id = 2, .text = "the second"}};
+  EXPECT_EQ(ErrorOf(store->Commit(next, kEight)).code, ErrorCode::kUnavailable);
+}
+
 TEST_F(StoreTest, AMissingFolderIsUnavailable) {
   EXPECT_EQ(ErrorOf(Store::Open(folder_.File("none/fleet.db"))).code, ErrorCode::kUnavailable);
   EXPECT_EQ(ErrorOf(StoreReader::Open(folder_.File("none.db"))).code, ErrorCode::kUnavailable);
