@@ -5,9 +5,9 @@
 // A stop goes before everything else that was read, in every turn, from behind other lines of its
 // client, too. In the turn that brings one no other line is handled, so that its frames are on the
 // buses before anything is reckoned for people; only behind a second one in a row are others heard.
-// What of other verbs is handled a turn is bounded by what it cost so far (kTurnBytes): then buses,
-// signals and the next stop are looked at first. Motions that a stop overtook are refused, because
-// who sent the stop meant those, too.
+// Requests of other verbs share a budget a turn (kTurnBytes); behind it, buses, signals and the
+// next stop are looked at first. Motions that a stop overtook are refused: the stop was meant for
+// them, too.
 #pragma once
 
 #include <cstdint>
@@ -46,8 +46,8 @@ class ControlDesk {
   /// millisecond. Half of it makes two turns of most answers to `status`; twice as much lets a stop
   /// wait a millisecond longer behind them. One `state` of 5000 units exceeds it by far.
   static constexpr std::size_t kTurnBytes = std::size_t{64} << 10;
-  /// What a line costs by itself, however short: some 20 us of parsing, system calls and
-  /// bookkeeping.
+  /// Cost of a line by itself, however short: some 20 us of parsing, system calls and bookkeeping,
+  /// as bytes.
   static constexpr std::size_t kLineBytes = 1024;
 
   /// A stop, as LineServer::Options::urgent wants it. One that is written more lavishly than
@@ -56,7 +56,7 @@ class ControlDesk {
 
   [[nodiscard]] int fd() const { return server_.fd(); }
 
-  /// One turn: reads requests, answers questions, appends commands.
+  /// Does a turn: reads requests, answers questions, appends commands.
   void Service(const FleetView& view, std::vector<Command>* commands);
   void Reply(const FleetView& view, const ReplyEffect& reply);
   /// Shows progress to those who wait, when it is time.

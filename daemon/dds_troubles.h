@@ -17,10 +17,10 @@ class DdsTroubles {
   /// `wake` is raised with each news; it outlives this.
   explicit DdsTroubles(const EventSignal* wake) : wake_(wake) {}
 
-  /// That `what` does not go, and why; an empty text: it goes again.
+  /// Reports that `what` does not work, and why; an empty text: it works again.
   void Tell(const std::string& what, const std::string& trouble);
 
-  /// What was told since the last call.
+  /// Takes the reports since the last call.
   std::vector<ShellNote> TakeNotes();
   /// All that lasts; empty: nothing.
   [[nodiscard]] std::string Summary() const;

@@ -16,8 +16,8 @@
 namespace focalfleet {
 namespace {
 
-/// One line an event, whatever is in its text: names of verbs, exposures and files come from
-/// outside.
+/// Makes each event one line, whatever is in its text: names of verbs, exposures and files come
+/// from outside.
 class OneLine : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {

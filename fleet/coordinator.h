@@ -133,7 +133,7 @@ struct ExposureDone {
   Result<ExposureFindings> exposure;
 };
 
-/// What the shell has to tell of itself; it becomes an alarm.
+/// A message of the shell about itself; it becomes an alarm.
 struct ShellNote {
   Severity severity = Severity::kInfo;
   std::string text;

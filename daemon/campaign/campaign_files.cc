@@ -78,7 +78,7 @@ CampaignUnit UnitOf(const Unit& unit, bool has_rail, bool has_bus) {
   return out;
 }
 
-// One row of moves.csv as it stands in the file, before the rows are sorted.
+// A row of moves.csv as it stands in the file, before the rows are sorted.
 struct MoveRow {
   std::size_t unit = 0;
   std::size_t at = 0;  // row of the table

@@ -23,7 +23,8 @@ struct Question {
 
 tl::expected<Json, Failure> Ask(const Context& context, const Question& question);
 
-/// What the daemon shall call a file: its path, or where that is longer than it keeps its name.
+/// The name by which the daemon is to call a file: its path, or the last part of a path that is
+/// longer than the daemon keeps.
 std::string SourceOf(const std::string& file);
 
 /// Members of an answer, total: what is missing or of another type is the default. Texts are fit

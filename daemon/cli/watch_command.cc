@@ -36,7 +36,7 @@ struct Picture {
 constexpr std::size_t kAlarmsShown = 8;
 constexpr std::size_t kUnitsShown = 12;
 
-// Whoever speaks on DDS is believed no further than this: its texts are made fit for a terminal.
+// Texts from DDS may come from any program on the network, so they are made fit for a terminal.
 void Absorb(const StatusUpdate& update, Picture* picture) {
   if (update.fleet) {
     picture->fleet = update.fleet;

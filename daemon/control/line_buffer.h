@@ -1,4 +1,4 @@
-// What one client has sent and nobody has taken yet, as lines. A line that is urgent may be taken
+// The lines that one client has sent and nobody has taken yet. A line that is urgent may be taken
 // from behind others; the lines that it overtook say so when their turn comes.
 #pragma once
 
@@ -18,10 +18,10 @@ class LineBuffer {
     bool overtaken = false;  // an urgent line that came later was taken before it
   };
 
-  /// So many bytes of lines one call of TakeUrgent looks at. Lines that only look urgent cost some
-  /// microseconds each to tell: 4 KiB are a hundred of them, a fifth of a millisecond a client.
-  /// Twice as much doubles what a hostile client costs a turn; half as much takes two turns for a
-  /// stop that stands behind a full buffer of short lines.
+  /// Limit of the bytes of lines that one call of TakeUrgent looks at. A line that only looks
+  /// urgent costs some microseconds to tell: 4 KiB are a hundred of them, a fifth of a millisecond
+  /// a client. Twice as much doubles what a hostile client costs a turn; half as much takes two
+  /// turns for a stop that stands behind a full buffer of short lines.
   static constexpr std::size_t kLookBytes = 4096;
 
   void Append(std::string_view bytes);
@@ -35,7 +35,7 @@ class LineBuffer {
   void Clear() { *this = {}; }
 
   [[nodiscard]] bool has_line() const { return line_end_ != std::string::npos; }
-  /// Of the first line, complete or not, without its newline.
+  /// Length of the first line, complete or not, without its newline.
   [[nodiscard]] std::size_t first_bytes() const { return has_line() ? line_end_ : bytes_.size(); }
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
   /// TakeUrgent has not looked at all complete lines yet.

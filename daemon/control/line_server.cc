@@ -248,7 +248,8 @@ void LineServer::Impl::TellAndClose(int fd, const std::string& why) const {
   ::close(fd);
 }
 
-/// It has asked nothing that is still open, and nothing of it waits but what it does not read.
+/// Whether a client may lose its place: it has asked nothing that is still open, and nothing that
+/// it sent waits, unless it does not read its answers.
 bool LineServer::Impl::Idle(const Client& client) const {
   if (client.open > 0) return false;
   if (!Listens(client)) return true;  // what it has sent is not taken until it reads
@@ -298,7 +299,7 @@ void LineServer::Impl::KeepSpares() {
   }
 }
 
-/// Who has a reserved place gets one of the others as soon as there is one.
+/// Clients in reserved places get one of the others as soon as there is one.
 void LineServer::Impl::PromoteReserved() {
   for (auto& [id, client] : clients_) {
     if (reserved_ == 0 || Taken(false) >= options_.clients_max) return;
@@ -381,8 +382,8 @@ void LineServer::Impl::Watch(ClientId id, Client* client) {
   ::epoll_ctl(epoll_, EPOLL_CTL_MOD, client->fd, &event);
 }
 
-/// One urgent line of each client. What others have in their way by then came before it, or as good
-/// as.
+/// Takes an urgent line of each client. Lines that other clients have sent by then count as earlier
+/// than it: the order of two sockets in one turn is not known.
 void LineServer::Impl::TakeUrgent(std::vector<IncomingLine>* urgent) {
   const std::size_t before = urgent->size();
   for (auto& [id, client] : clients_) {

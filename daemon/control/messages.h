@@ -23,7 +23,7 @@ namespace focalfleet {
 
 using Json = nlohmann::json;
 
-/// One request line at most; a targets file of 32,768 units is about 1 MiB, a model of as many is
+/// Limit of a request line; a targets file of 32,768 units is about 1 MiB, a model of as many is
 /// several.
 inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;
 

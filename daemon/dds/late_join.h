@@ -1,4 +1,4 @@
-// What speaks on DDS, whether its domain can be joined now or only later. Joining needs two UDP
+// A reader or writer of DDS whose domain can be joined now or only later. Joining needs two UDP
 // ports of its own among those that are left on this host (docs/adr/0006): where other programs
 // have taken them all, that is no reason not to move a fleet. The first attempt is made at once;
 // after a failure a thread tries again until it succeeds, and ends.

@@ -17,7 +17,7 @@ std::string_view TrimmedRight(std::string_view text) {
   return text.substr(0, text.find_last_not_of(' ') + 1);
 }
 
-/// One header and the size of what follows it.
+/// A header of the file and the size of the data that follow it.
 class Unit {
  public:
   /// Pre: `bytes` begins with the header.
@@ -87,7 +87,7 @@ class Unit {
     return bytes_.substr(card_ * kCardBytes, kCardBytes);
   }
   [[nodiscard]] std::string_view Key() const { return TrimmedRight(Card().substr(0, kKeyBytes)); }
-  /// Of a card with text: what stands between the quotes.
+  /// The text between the quotes of a card.
   [[nodiscard]] std::string_view Text() const {
     const std::string_view value = Card().substr(kValueAt);
     const std::size_t begin = value.find('\'');

@@ -13,9 +13,9 @@ namespace focalfleet {
 
 inline constexpr std::size_t kFitsBlockBytes = 2880;
 
-/// What stands behind the last unit with a header is not looked at. Errors: kInvalid: no FITS file,
-/// a header that does not end or lacks a mandatory card in its place, data that are cut short; says
-/// of which unit, from 0, after `name`.
+/// Checks all units with a header; bytes behind the last of them are not looked at. Errors:
+/// kInvalid: no FITS file, a header that does not end or lacks a mandatory card in its place, data
+/// that are cut short; names the unit, from 0, after `name`.
 Status CheckFitsStructure(std::string_view bytes, const std::string& name);
 
 }  // namespace focalfleet

@@ -82,7 +82,7 @@ PlanDone PlanOf(const PlanJob& job, const PlanRequest& request, const Abandoned&
   options.abandoned = abandoned;
   if (!job.to_home.empty()) return PlanHomingWave(job, request, options);
   PlanDone done{.job = job.job, .plan = MakePlan(request, options)};
-  // What is kept of the plan outlives whoever may abandon this job.
+  // The running plan is kept with options that nobody can abandon: it outlives the asker.
   if (done.plan)
     done.running = std::make_shared<const RunningPlan>(request, done.plan->moves, job.options);
   return done;

@@ -106,9 +106,14 @@ struct ExposureCount {
 // moved, and not by chance. Shape: (exposures).
 std::vector<char> FindCopies(const Exposures& exposures, const std::vector<Revisit>& revisits,
                              double step_mm, double share) {
+  // An exposure in a million is called a copy by chance; a campaign has 10 to 1000. Half and double
+  // of it move the least number of units that can show a copy by less than one.
   constexpr double kChance = 1e-6;
-  constexpr double kMoved_mm = 0.1;  // ten times what plays and stiction of this kind keep back
+  // Shorter moves may be kept back by play and stiction, some 10 um at the fibre, and rounded away.
+  // Half of either bound is still above those; double of it only leaves fewer rows that can tell.
+  constexpr double kMoved_mm = 0.1;
   constexpr double kSteps = 3;
+  // Two units may both be stuck; with double of it a copy is not seen where fewer than six moved.
   constexpr std::size_t kRowsMin = 3;
   const double far_mm = std::max(kMoved_mm, kSteps * step_mm);
   std::vector<ExposureCount> counts(exposures.size());

@@ -127,7 +127,7 @@ void TryText(std::string_view text) {
     FOCALFLEET_CHECK(static_cast<unsigned char>(c) >= 0x20 &&
                      static_cast<unsigned char>(c) != 0x7f);
   FOCALFLEET_CHECK(Printable(clean) == clean);
-  // What a JSON text says stays what it says.
+  // The value of a JSON text stays the same.
   const std::string line = Json(clean).dump();
   FOCALFLEET_CHECK(Json::parse(PrintableJson(line)) == Json(clean));
 }

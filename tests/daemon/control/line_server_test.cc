@@ -28,7 +28,7 @@ bool Readable(int fd) {
   return ::poll(&poller, 1, 0) == 1;
 }
 
-/// One turn: what is urgent, then one line of each client that has one.
+/// Does a turn: urgent lines, then a line of each client that has one.
 void Turn(LineServer* server, std::vector<IncomingLine>* lines) {
   server->Service(lines);
   for (std::size_t left = server->clients(); left > 0; --left)
@@ -394,7 +394,7 @@ TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
   EXPECT_EQ(lines[0].text, "hello");
 }
 
-// What it sends on meanwhile is not taken before it reads, so it keeps no place.
+// Lines that such a client sends are not taken before it reads, so they keep no place.
 TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
   const Scratch scratch;
   auto server =

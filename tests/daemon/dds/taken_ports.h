@@ -21,7 +21,7 @@ class TakenPorts {
       address.sin_addr.s_addr = htonl(INADDR_ANY);
       address.sin_port = htons(static_cast<std::uint16_t>(7410 + 250 * domain + k));
       const void* raw = &address;
-      // One that cannot be had is taken by somebody else already.
+      // A port that cannot be had is taken by somebody else already.
       static_cast<void>(::bind(fd, static_cast<const sockaddr*>(raw), sizeof address));
       sockets_.push_back(fd);
     }

@@ -93,7 +93,7 @@ TEST_F(FocalfleetdTest, EndsCleanlyOnSigterm) {
   EXPECT_THAT(Log(), HasSubstr("all is stored"));
 }
 
-/// What has to be true when a daemon has ended well, whatever it was doing.
+/// Checks all that has to be true when a daemon has ended well, whatever it was doing.
 class FocalfleetdEndTest : public FocalfleetdTest {
  protected:
   void ExpectEndOn(int signal, Process* daemon) const {

@@ -52,7 +52,7 @@ TEST(StatusOutlet, TellsTheWholeStateOnceItCanJoin) {
                        },
                        .tell = [&](const std::string& text) { told.push_back(text); },
                        .period = std::chrono::milliseconds(5)});
-  // What comes by and by, newest values last.
+  // Batches come one after the other, with the newest values last.
   StatusBatch first = Batch(1, 300, 1);
   first.fleet = FleetStatusValue{};
   first.fleet->units = 300;

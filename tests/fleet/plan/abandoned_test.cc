@@ -21,7 +21,7 @@ using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::Seed;
 using ::testing::HasSubstr;
 
-/// What a planner asks: false for so many times.
+/// An answer to the planner's question: false for so many times.
 struct Asked {
   std::size_t times = 0;
   std::optional<std::size_t> wanted_for;  // none: for ever
