@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "fleet/coordinate/contact.h"
 #include "fleet/coordinate/core.h"
-#include "fleet/coordinate/pursuit.h"
+#include "fleet/coordinate/executor.h"
+#include "fleet/coordinate/unit_session.h"
 #include "protocol/base/check.h"
 
 namespace focalfleet {
@@ -14,22 +14,22 @@ class Coordinator::Impl {
   Impl(const Layout* layout, std::vector<UnitDrive> drives, const CoordinatorConfig& config,
        StoredFleet stored)
       : core_(layout, std::move(drives), config, std::move(stored)),
-        contact_(&core_),
-        pursuit_(&core_, &contact_) {}
+        sessions_(&core_),
+        executor_(&core_, &sessions_) {}
 
   void Step(const Inputs& inputs, Effects* effects) {
     core_.BeginStep(inputs, effects);
-    pursuit_.EndThoseOfAnEarlierRun();
+    executor_.EndThoseOfAnEarlierRun();
     for (const ShellNote& note : inputs.notes) core_.Raise(note.severity, {}, {}, note.text);
-    for (const RefusedRow& refused : inputs.refused) contact_.StoreRefused(refused);
-    for (const LinkEvent& link : inputs.links) contact_.LinkChanged(link);
+    for (const RefusedRow& refused : inputs.refused) sessions_.StoreRefused(refused);
+    for (const LinkEvent& link : inputs.links) sessions_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
-    for (const PlanDone& plan : inputs.plans) pursuit_.OnPlan(plan);
-    for (const ExposureDone& exposure : inputs.exposures) pursuit_.OnExposure(exposure);
+    for (const PlanDone& plan : inputs.plans) executor_.OnPlan(plan);
+    for (const ExposureDone& exposure : inputs.exposures) executor_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
-    while (const auto due = core_.NextDue()) static_cast<void>(contact_.Service(*due));
-    pursuit_.Advance();
-    effects->wake_at = std::min(effects->wake_at, pursuit_.due());
+    while (const auto due = core_.NextDue()) static_cast<void>(sessions_.Service(*due));
+    executor_.Advance();
+    effects->wake_at = std::min(effects->wake_at, executor_.due());
     core_.EndStep();
   }
 
@@ -42,12 +42,12 @@ class Coordinator::Impl {
                      .committed_through = core_.committed_through,
                      .store_failing = core_.store_failing},
                     effects);
-    pursuit_.GiveUp();
+    executor_.GiveUp();
     if (!effects->rows.empty()) effects->batch = core_.next_batch++;
   }
 
   Core& core() { return core_; }
-  Pursuit& pursuit() { return pursuit_; }
+  ConfigurationExecutor& executor() { return executor_; }
 
  private:
   void Hear(const ReceivedFrame& received) {
@@ -70,13 +70,13 @@ class Coordinator::Impl {
     }
     const std::uint8_t sequence = heard->address.sequence;
     if (const auto* confirm = std::get_if<ConfirmReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kConfirm, sequence)) pursuit_.OnConfirm(*i, *confirm);
+      if (core_.Answers(*i, Function::kConfirm, sequence)) executor_.OnConfirm(*i, *confirm);
     } else if (const auto* arm = std::get_if<ArmReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kArm, sequence)) pursuit_.OnArm(*i, *arm);
+      if (core_.Answers(*i, Function::kArm, sequence)) executor_.OnArm(*i, *arm);
     } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kHome, sequence)) pursuit_.OnHomeReply(*i, *home);
+      if (core_.Answers(*i, Function::kHome, sequence)) executor_.OnHomeReply(*i, *home);
     } else {
-      contact_.Hear(*i, *heard, received.at);
+      sessions_.Hear(*i, *heard, received.at);
     }
   }
 
@@ -93,17 +93,17 @@ class Coordinator::Impl {
     }  // the others go on and answer when they are over
   }
 
-  Status Do(std::uint64_t request, const ApplyCommand& c) { return pursuit_.Apply(request, c); }
+  Status Do(std::uint64_t request, const ApplyCommand& c) { return executor_.Apply(request, c); }
   Status Do(std::uint64_t request, const RetargetCommand& c) {
-    return pursuit_.Retarget(request, c);
+    return executor_.Retarget(request, c);
   }
-  Status Do(std::uint64_t request, const HomeCommand& c) { return pursuit_.Home(request, c); }
-  Status Do(std::uint64_t request, const MeasureCommand&) { return pursuit_.Measure(request); }
+  Status Do(std::uint64_t request, const HomeCommand& c) { return executor_.Home(request, c); }
+  Status Do(std::uint64_t request, const MeasureCommand&) { return executor_.Measure(request); }
   Status Do(std::uint64_t, const StopCommand& c) {
     if (c.unit) {
-      pursuit_.StopUnit(*c.unit);
+      executor_.StopUnit(*c.unit);
     } else {
-      pursuit_.StopAll();
+      executor_.StopAll();
     }
     return {};
   }
@@ -115,13 +115,13 @@ class Coordinator::Impl {
       if (IsUnderWay(core_.unit(i).view.phase) || IsLoaded(core_.unit(i).view.phase))
         return Fail(ErrorCode::kRefused, core_.NameOf(i) + " takes part in a configuration now");
     }
-    contact_.Enable(c);
+    sessions_.Enable(c);
     return {};
   }
-  Status Do(std::uint64_t, const AdoptCommand& c) { return contact_.Adopt(c.unit); }
+  Status Do(std::uint64_t, const AdoptCommand& c) { return sessions_.Adopt(c.unit); }
   Status Do(std::uint64_t request, const WriteParameterCommand& c) {
-    if (pursuit_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
-    return contact_.WriteParameter(request, c);
+    if (executor_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
+    return sessions_.WriteParameter(request, c);
   }
 
   Status Do(std::uint64_t request, const KeepModelCommand& c) {
@@ -131,8 +131,8 @@ class Coordinator::Impl {
   }
 
   Core core_;
-  Contact contact_;
-  Pursuit pursuit_;
+  UnitSessions sessions_;
+  ConfigurationExecutor executor_;
 };
 
 void Effects::Clear() {
@@ -159,7 +159,7 @@ void Coordinator::End(HostInstant now, Effects* effects) { impl_->End(now, effec
 const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->core().unit(i).view; }
 
 UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const {
-  const auto course = impl_->pursuit().CourseOf(i);
+  const auto course = impl_->executor().CourseOf(i);
   const UnitView& view = unit(i);
   if (!course || view.phase != UnitPhase::kMoving) return view.knowledge;
   UnitKnowledge predicted;
@@ -178,9 +178,9 @@ const BusView& Coordinator::bus(BusId bus) const {
   return record->view;
 }
 
-const ConfigurationView& Coordinator::configuration() const { return impl_->pursuit().view(); }
+const ConfigurationView& Coordinator::configuration() const { return impl_->executor().view(); }
 std::span<const UnitDrive> Coordinator::drives() const { return impl_->core().drives; }
 const CoordinatorConfig& Coordinator::config() const { return impl_->core().config; }
-bool Coordinator::busy() const { return impl_->pursuit().busy(); }
+bool Coordinator::busy() const { return impl_->executor().busy(); }
 
 }  // namespace focalfleet

@@ -270,13 +270,14 @@ struct UnitView {
   UnitPhase phase = UnitPhase::kAbsent;
   UnitKnowledge knowledge;  // while it moves: the hull
   Pose offset{};            // its place less its own count of vectors (VectorRow::offset)
-  std::optional<SightingStatus> sighting;  // of the last exposure; none: it was not looked for
-  std::optional<double> error_um;          // from its target, as last measured
-  SightingSource source = SightingSource::kCamera;  // of that
-  CovarianceFp covariance;                          // of that; of its place, where it was put
-  std::optional<SpineReading> spine;                // of its sensors' last reading
-  SerialNumber serial;                              // that answers; 0: none yet
-  SerialNumber bound_serial;                        // that belongs here; 0: none yet
+  std::optional<MeasurementStatus>
+      measurement;                 // of the last exposure; none: it was not looked for
+  std::optional<double> error_um;  // from its target, as last measured
+  MeasurementSource source = MeasurementSource::kCamera;  // of that
+  CovarianceFp covariance;                                // of that; of its place, where it was put
+  std::optional<FibreCarrierReading> carrier;             // of its sensors' last reading
+  SerialNumber serial;                                    // that answers; 0: none yet
+  SerialNumber bound_serial;                              // that belongs here; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;
@@ -290,12 +291,12 @@ struct UnitView {
 
 /// How far apart the units of a round began, by their own clocks; of several rounds the widest.
 struct StartView {
-  std::uint32_t round = 0;  // 0: none yet
-  std::uint32_t begun = 0;  // units that were started
-  std::uint32_t told = 0;   // those of which it is known when they began
-  double skew_s = 0;        // from the first start to the last, the likeliest
-  double bound_s = 0;       // the true skew is within skew_s +- bound_s
-  double least_s = 0;       // and within these, both included
+  std::uint32_t round = 0;     // 0: none yet
+  std::uint32_t begun = 0;     // units that were started
+  std::uint32_t reported = 0;  // those of which it is known when they began
+  double skew_s = 0;           // from the first start to the last, the likeliest
+  double bound_s = 0;          // the true skew is within skew_s +- bound_s
+  double least_s = 0;          // and within these, both included
   double most_s = 0;
   double allowed_s = 0;  // that the plan was made for
   std::optional<PositionerIndex> first = {};
@@ -380,7 +381,7 @@ struct CoordinatorConfig {
   DurationNs poll_period =
       Milliseconds(1000);  // progress of each moving unit; health of each resting one x10
   /// From the end of a unit by itself to the stop of those that would come where it stands; what
-  /// plans are made with, unless reply_wait asks for more (fleet/coordinate/noticing.h).
+  /// plans are made with, unless reply_wait asks for more (fleet/coordinate/stall_detection.h).
   DurationNs notice = Milliseconds(1000);
   DurationNs clock_period = Milliseconds(500);
   DurationNs start_delay = Milliseconds(250);    // start frame to start instant, all buses
@@ -397,9 +398,10 @@ struct CoordinatorConfig {
   /// A configuration that is measured ends each axis' way with this last piece, in this direction,
   /// so that play and wind-up of a gear are always on one side. 0: as the way comes.
   std::array<double, kAxisCount> approach_deg = {-2, -2};
-  /// A correction that is not the last ends so far short of the target where it needed a run-up, so
-  /// that the last one is short and goes on in the same direction: a long way scatters, a short one
-  /// does not. Three times what a run-up there and back scatters by.
+  /// A correction that is not the last ends so far short of the target where it needed a
+  /// unidirectional approach, so that the last one is short and goes on in the same direction: a
+  /// long way scatters, a short one does not. Three times what a unidirectional approach there and
+  /// back scatters by.
   double creep_deg = 0.06;
   /// Standard deviation of where an axis ends, after a way that is long: after a way d it is that
   /// times sqrt(2 (1 - exp(-d / 360 deg))), as robots in service have it.

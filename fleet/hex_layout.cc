@@ -142,7 +142,8 @@ HexPlate MakeHexPlate(const HexLayoutOptions& options) {
     units[i].axis[Index(Axis::kPhi)] = {phi_arm_mm, 0, kGear, 0, kPhiMaxDeg};
     units[i].sensors = options.sensors;
     if (options.sensors > 0)
-      units[i].spine_mm = options.spine_mm > 0 ? options.spine_mm : 2 * (theta_arm_mm + phi_arm_mm);
+      units[i].carrier_mm =
+          options.carrier_mm > 0 ? options.carrier_mm : 2 * (theta_arm_mm + phi_arm_mm);
   }
   std::uint32_t rail = 0;
   std::uint32_t bus = 0;

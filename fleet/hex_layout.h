@@ -20,7 +20,7 @@ struct HexLayoutOptions {
   std::uint32_t units_per_rail = 500;
   std::uint32_t fiducials = 0;
   std::uint8_t sensors = 0;  // Hall sensors at each unit's joint
-  double spine_mm = 0;       // where it has any; 0: twice both arms
+  double carrier_mm = 0;     // where it has any; 0: twice both arms
 };
 
 /// SDSS-V's proportions: arms of 7.4 and 14.3 mm at 22.4 mm pitch, so that a fibre reaches its

@@ -20,7 +20,7 @@ constexpr double kClearanceShare = 0.012;  // of the pitch
 constexpr std::size_t kUnitsPerBus = 100;
 constexpr double kCoordinateMaxMm = 1e5;
 /// A joint that tilts 45 degrees takes the tip this share of its arms' length away.
-constexpr double kSpineOverArms = 1.4143;
+constexpr double kFibreCarrierOverArms = 1.4143;
 constexpr double kArmMaxMm = 1e4;
 constexpr double kNearestMinMm = 1e-3;
 
@@ -264,10 +264,11 @@ std::string FaultOf(const Unit& unit) {
     return "arm_half_width_mm " + Text(unit.arm_half_width_mm) + " is not a length between 0 and " +
            Text(kArmMaxMm);
   const double arms_mm = unit.theta().arm_mm + unit.phi().arm_mm;
-  const bool tilts = unit.spine_mm >= kSpineOverArms * arms_mm && unit.spine_mm <= kArmMaxMm;
+  const bool tilts =
+      unit.carrier_mm >= kFibreCarrierOverArms * arms_mm && unit.carrier_mm <= kArmMaxMm;
   if (unit.sensors > 0 && !tilts)
-    return "spine_mm " + Text(unit.spine_mm) + " is not a length between " +
-           Text(kSpineOverArms * arms_mm) + " (its joint tilts 45 degrees at most) and " +
+    return "spine_mm " + Text(unit.carrier_mm) + " is not a length between " +
+           Text(kFibreCarrierOverArms * arms_mm) + " (its joint tilts 45 degrees at most) and " +
            Text(kArmMaxMm);
   return {};
 }

@@ -46,10 +46,10 @@ struct Unit {
   RailId rail;
   BusId bus = kNoBus;
   NodeId node = kNoNode;
-  /// Hall sensors at the joint of its spine, and the spine's length to the fibre; 0: none. Its tilt
-  /// is then measured by itself (docs/hall.md).
+  /// Hall sensors at the joint of its fibre carrier, and the fibre carrier's length to the fibre;
+  /// 0: none. Its tilt is then measured by itself (docs/hall.md).
   std::uint8_t sensors = 0;
-  double spine_mm = 0;
+  double carrier_mm = 0;
   bool enabled = true;  // false: stands where it is, an obstacle
   // Places along the harness and grouping: kept for who asks, nothing in here depends on them.
   std::optional<std::uint32_t> rail_slot;

@@ -13,7 +13,7 @@
 
 #include "fleet/drive.h"
 #include "fleet/knowledge.h"
-#include "fleet/sighting.h"
+#include "fleet/measurement.h"
 #include "protocol/base/ids.h"
 #include "protocol/wire/messages.h"
 
@@ -89,7 +89,7 @@ struct MeasurementRow {
   std::uint64_t configuration = 0;
   SerialNumber serial;
   UnitId unit;
-  SightingStatus status = SightingStatus::kMissing;
+  MeasurementStatus status = MeasurementStatus::kMissing;
   std::optional<UnitId> other;  // that it is confused with
   double x_mm = 0;              // focal-plane frame
   double y_mm = 0;
@@ -99,8 +99,9 @@ struct MeasurementRow {
   std::optional<double> error_um;    // from there
   std::string target_id;             // as the configuration named it; empty: it did not
   std::optional<double> delay_s;     // end of its motion to the exposure; none: not known
-  SightingSource source = SightingSource::kCamera;
-  std::optional<SpineReading> spine = {};  // what its own sensors say, whoever is the source
+  MeasurementSource source = MeasurementSource::kCamera;
+  std::optional<FibreCarrierReading> carrier =
+      {};  // what its own sensors say, whoever is the source
 };
 
 struct BindingRow {  // which hardware sits at a place

@@ -35,15 +35,15 @@ struct FlawOf {
   const char* operator()(const MeasurementRow& row) const {
     if (row.serial.value == 0) return kNoSerial;
     if (!IsNumber(row.exposure) || !IsNumber(row.configuration)) return "its number is too large";
-    if (row.status > kLastSightingStatus) return "its status does not exist";
-    if (row.source > kLastSightingSource) return "its source does not exist";
+    if (row.status > kLastMeasurementStatus) return "its status does not exist";
+    if (row.source > kLastMeasurementSource) return "its source does not exist";
     const auto& [xx, xy, yy] = row.covariance;
     for (const double value :
          {row.x_mm, row.y_mm, xx, xy, yy, row.delay_s.value_or(0), row.error_um.value_or(0),
           row.target_fp ? row.target_fp->x_mm : 0, row.target_fp ? row.target_fp->y_mm : 0})
       if (!std::isfinite(value)) return "it is not finite";
     if (xx < 0 || yy < 0) return "its variance is negative";
-    return row.spine ? Flaw(*row.spine) : nullptr;
+    return row.carrier ? Flaw(*row.carrier) : nullptr;
   }
 
   const char* operator()(const IntentRow& row) const {
@@ -148,14 +148,14 @@ const char* Flaw(const TuningRow& row) {
   return nullptr;
 }
 
-const char* Flaw(const SpineReading& spine) {
-  if (spine.trusted && !spine.solved) return "it is trusted, and there is none";
-  if (!spine.solved) return nullptr;
-  for (const double angle_deg : spine.angles_deg)
+const char* Flaw(const FibreCarrierReading& carrier) {
+  if (carrier.trusted && !carrier.solved) return "it is trusted, and there is none";
+  if (!carrier.solved) return nullptr;
+  for (const double angle_deg : carrier.angles_deg)
     if (!(std::abs(angle_deg) <= 360)) return "its angle is no angle";
-  for (const double covariance_deg2 : spine.covariance_deg2)
+  for (const double covariance_deg2 : carrier.covariance_deg2)
     if (!std::isfinite(covariance_deg2)) return "its covariance is not finite";
-  const auto& c = spine.covariance_deg2;
+  const auto& c = carrier.covariance_deg2;
   return c[0] >= 0 && c[3] >= 0 && c[5] >= 0 ? nullptr : "its variance is negative";
 }
 

@@ -9,8 +9,8 @@
 
 namespace focalfleet {
 
-inline constexpr SightingStatus kLastSightingStatus = SightingStatus::kTooCoarse;
-inline constexpr SightingSource kLastSightingSource = SightingSource::kSensors;
+inline constexpr MeasurementStatus kLastMeasurementStatus = MeasurementStatus::kTooCoarse;
+inline constexpr MeasurementSource kLastMeasurementSource = MeasurementSource::kSensors;
 inline constexpr WaveMode kLastMode = WaveMode::kSevenSegment;
 inline constexpr IntentEnd kLastIntentEnd = IntentEnd::kHomed;
 inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState::kFailed;
@@ -19,7 +19,7 @@ inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCou
 
 // Each of these: nullptr, or what is wrong, for people.
 const char* Flaw(const AxisKnowledge& knowledge);
-const char* Flaw(const SpineReading& spine);
+const char* Flaw(const FibreCarrierReading& carrier);
 const char* Flaw(const TuningRow& row);
 const char* Flaw(const Row& row);
 

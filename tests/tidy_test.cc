@@ -41,7 +41,7 @@ const std::vector<Direction>& Directions() {
       // Plants effects with physics of its own; with the simulator's it would test the diagnosis
       // against itself.
       {"tests/hidden/",
-       {"protocol/", "fleet/", "sim/world", "sim/diagnosis/", "daemon/", "tests/"}},
+       {"protocol/", "fleet/", "sim/world", "sim/campaigns/diagnosis/", "daemon/", "tests/"}},
       {"tests/", {"protocol/", "fleet/", "sim/", "daemon/", "tests/"}},
   };
   return table;
@@ -431,18 +431,18 @@ TEST(TidyRules, DirectionIsCaughtBothWays) {
     return Found(IncludeDirection, from, "#include \"" + what + "\"\n");
   };
   EXPECT_EQ(include("protocol/a.h", "fleet/layout.h"), 1u);
-  EXPECT_EQ(include("fleet/a.cc", "sim/world.h"), 1u);
+  EXPECT_EQ(include("fleet/a.cc", "sim/world/world.h"), 1u);
   EXPECT_EQ(include("fleet/a.cc", "daemon/store/store.h"), 1u);
   EXPECT_EQ(include("fleet/a.cc", "layout.h"), 1u) << "not by its path from the root";
   EXPECT_EQ(include("sim/a.cc", "fleet/layout.h"), 1u);
   EXPECT_EQ(include("sim/a.cc", "tests/support/seed.h"), 1u);
   EXPECT_EQ(include("daemon/a.cc", "tests/support/seed.h"), 1u);
-  EXPECT_EQ(include("tests/hidden/a.cc", "sim/effects/backlash.h"), 1u);
-  EXPECT_EQ(include("tests/sim/a.cc", "sim/effects/backlash.h"), 0u);
+  EXPECT_EQ(include("tests/hidden/a.cc", "sim/campaigns/effects/backlash.h"), 1u);
+  EXPECT_EQ(include("tests/sim/a.cc", "sim/campaigns/effects/backlash.h"), 0u);
   EXPECT_EQ(include("fleet/a.cc", "protocol/base/ids.h"), 0u);
-  EXPECT_EQ(include("daemon/a.cc", "sim/world.h"), 0u);
+  EXPECT_EQ(include("daemon/a.cc", "sim/world/world.h"), 0u);
   EXPECT_EQ(include("daemon/dds/a.cc", "status.h"), 0u) << "generated";
-  EXPECT_EQ(Found(IncludeDirection, "fleet/a.cc", "// #include \"sim/world.h\"\n"), 0u);
+  EXPECT_EQ(Found(IncludeDirection, "fleet/a.cc", "// #include \"sim/world/world.h\"\n"), 0u);
 }
 
 TEST(TidyRules, EveryBanIsCaughtInEveryPureFolder) {

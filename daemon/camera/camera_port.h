@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "daemon/wall_time.h"
+#include "daemon/clock/wall_time.h"
 #include "fleet/camera/spots.h"
 
 namespace focalfleet {

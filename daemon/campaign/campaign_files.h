@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/campaign/campaign.h"
+#include "sim/campaigns/campaign/campaign.h"
 
 namespace focalfleet {
 

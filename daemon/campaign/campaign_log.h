@@ -12,7 +12,7 @@
 #include "fleet/kinematics.h"
 #include "fleet/layout.h"
 #include "protocol/base/result.h"
-#include "sim/campaign/campaign.h"
+#include "sim/campaigns/campaign/campaign.h"
 
 namespace focalfleet {
 

@@ -22,7 +22,7 @@
 #include "fleet/kinematics.h"
 #include "fleet/layout.h"
 #include "protocol/base/result.h"
-#include "sim/effects/pose_track.h"
+#include "sim/campaigns/effects/pose_track.h"
 
 namespace focalfleet {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sim/diagnosis/left_by.h"
-#include "sim/effects/empirical.h"
+#include "sim/campaigns/diagnosis/left_by.h"
+#include "sim/campaigns/effects/empirical.h"
 
 namespace focalfleet {
 namespace {
@@ -85,7 +85,7 @@ std::string NumberLine(std::string_view key, double value) {
 }
 
 // Where the campaign left the unit is told whole or not at all: a reader takes no part of it.
-bool IsTold(const sim::UnitLeft& left) {
+bool IsReported(const sim::UnitLeft& left) {
   const auto is_known = [](double deg) { return std::isfinite(deg); };
   return left.moved && std::ranges::all_of(left.pose_deg, is_known) &&
          std::ranges::all_of(left.added_deg, is_known);
@@ -205,7 +205,7 @@ std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names
     text += NumberLine("arm_theta_mm", unit.arm_mm[0]) + NumberLine("arm_phi_mm", unit.arm_mm[1]);
     text += NumberLine("theta_zero_deg", unit.zero_deg[0]) +
             NumberLine("phi_zero_deg", unit.zero_deg[1]);
-    if (IsTold(left[u]))
+    if (IsReported(left[u]))
       text += NumberLine("left_theta_deg", left[u].pose_deg[0]) +
               NumberLine("left_phi_deg", left[u].pose_deg[1]) +
               NumberLine("added_theta_deg", left[u].added_deg[0]) +

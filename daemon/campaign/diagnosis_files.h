@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "protocol/base/result.h"
-#include "sim/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/diagnosis.h"
 
 namespace focalfleet {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "daemon/report/page.h"
-#include "sim/diagnosis/next_moves.h"
+#include "sim/campaigns/diagnosis/next_moves.h"
 
 namespace focalfleet {
 namespace {

@@ -11,10 +11,10 @@
 #include <span>
 #include <vector>
 
-#include "sim/diagnosis/planted.h"
-#include "sim/diagnosis/static_geometry.h"
-#include "sim/effects/empirical.h"
-#include "sim/effects/registry.h"
+#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/diagnosis/static_geometry.h"
+#include "sim/campaigns/effects/empirical.h"
+#include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet {
 namespace {

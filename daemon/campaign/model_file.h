@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/diagnosis/left_by.h"
-#include "sim/diagnosis/model.h"
+#include "sim/campaigns/diagnosis/left_by.h"
+#include "sim/campaigns/diagnosis/model.h"
 
 namespace focalfleet {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/diagnosis/ahead.h"
+#include "sim/campaigns/diagnosis/ahead.h"
 
 namespace focalfleet {
 

@@ -46,7 +46,7 @@ void ShowProgress(ProgressBar* bar, const Json& progress) {
       fmt::format("{} of {} arrived", CountIn(progress, "arrived"), CountIn(progress, "targeted")));
 }
 
-ExitCode TellAccepted(const Context& context, const Json& result) {
+ExitCode ReportAccepted(const Context& context, const Json& result) {
   if (context.json) {
     PrintJson(result);
   } else {
@@ -58,7 +58,7 @@ ExitCode TellAccepted(const Context& context, const Json& result) {
   return ExitCode::kOk;
 }
 
-ExitCode TellSummary(const Context& context, const Json& configuration) {
+ExitCode ReportSummary(const Context& context, const Json& configuration) {
   if (context.json) {
     // What the configuration does not know of itself is the fleet's; without an answer it stays 0.
     const auto status = Ask(context, {.verb = "status"});
@@ -81,7 +81,7 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   }
   // What is wrong with the file the daemon tells; what it would pass over, only we can.
   if (const auto targets = ReadTargets(*text, options.file)) {
-    TellPassedOver(context, options.file, targets->ignored_columns);
+    ReportPassedOver(context, options.file, targets->ignored_columns);
   }
   if (options.wait) InstallInterruptNote();
   ProgressBar bar(context);
@@ -99,7 +99,7 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   const auto result = Ask(context, question);
   bar.End();
   if (!result) return Report(context, result.error());
-  return options.wait ? TellSummary(context, *result) : TellAccepted(context, *result);
+  return options.wait ? ReportSummary(context, *result) : ReportAccepted(context, *result);
 }
 
 }  // namespace

@@ -97,9 +97,9 @@ tl::expected<BelievedFleet, Failure> AskBelieved(const Context& context) {
 }
 
 bool IsCertainStatus(const std::string& status) {
-  for (std::size_t s = 0; s < kSightingStatusCount; ++s)
-    if (status == Name(static_cast<SightingStatus>(s)))
-      return IsCertain(static_cast<SightingStatus>(s));
+  for (std::size_t s = 0; s < kMeasurementStatusCount; ++s)
+    if (status == Name(static_cast<MeasurementStatus>(s)))
+      return IsCertain(static_cast<MeasurementStatus>(s));
   return false;
 }
 
@@ -186,7 +186,7 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
   if (!text) return Report(context, text.error());
   const auto list = ReadMoveList(*text, options.list, fleet->layout);
   if (!list) return Report(context, list.error());
-  TellPassedOver(context, options.list, list->ignored_columns);
+  ReportPassedOver(context, options.list, list->ignored_columns);
   const std::vector<ListedMove>& moves = list->moves;
   const auto asked = ConditionsAsked(*text, options.list);
   if (!asked) return Report(context, asked.error());

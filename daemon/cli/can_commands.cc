@@ -206,7 +206,7 @@ Result<Tally> DecodeAll(const Context& context, const std::string& name, std::is
 }
 
 /// Tells what the frames alone do not show.
-void TellTally(const Context& context, const std::string& name, const Tally& tally) {
+void ReportTally(const Context& context, const std::string& name, const Tally& tally) {
   if (context.quiet) return;
   if (tally.dropped != 0)
     Complain(fmt::format(
@@ -231,7 +231,7 @@ ExitCode RunCanDecode(const Context& context, const CanDecodeOptions& options) {
   }
   const auto tally = DecodeAll(context, name, from_stdin ? std::cin : file);
   if (!tally) return Report(context, tally.error());
-  TellTally(context, name, *tally);
+  ReportTally(context, name, *tally);
   if (tally->bad == 0) return ExitCode::kOk;
   return Report(context,
                 {ErrorCode::kInvalid,

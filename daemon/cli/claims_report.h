@@ -6,7 +6,7 @@
 
 #include "daemon/cli/context.h"
 #include "daemon/report/page.h"
-#include "sim/reproduction/claim.h"
+#include "sim/drive/reproduction/claim.h"
 
 namespace focalfleet::cli {
 

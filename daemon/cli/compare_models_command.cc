@@ -7,7 +7,7 @@
 
 #include "daemon/cli/measured_campaign.h"
 #include "daemon/cli/table.h"
-#include "sim/diagnosis/compare_models.h"
+#include "sim/campaigns/diagnosis/compare_models.h"
 
 namespace focalfleet::cli {
 namespace {

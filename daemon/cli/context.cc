@@ -90,15 +90,16 @@ void Say(const Context& context, std::string_view line) {
   }
 }
 
-void TellPassedOver(const Context& context, const std::string& file,
-                    const std::vector<std::string>& columns) {
+void ReportPassedOver(const Context& context, const std::string& file,
+                      const std::vector<std::string>& columns) {
   if (columns.empty() || context.quiet || context.json) return;
-  constexpr std::size_t kTold = 20;
-  const std::size_t told = std::min(columns.size(), kTold);
+  constexpr std::size_t kReported = 20;
+  const std::size_t reported = std::min(columns.size(), kReported);
   const std::string names = fmt::format(
-      "{}", fmt::join(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(told), ", "));
+      "{}",
+      fmt::join(columns.begin(), columns.begin() + static_cast<std::ptrdiff_t>(reported), ", "));
   const std::string more =
-      columns.size() > told ? fmt::format(" and {} more", columns.size() - told) : "";
+      columns.size() > reported ? fmt::format(" and {} more", columns.size() - reported) : "";
   Complain(fmt::format("focalfleet: {}: columns passed over: {}{}\n", file, names, more));
 }
 

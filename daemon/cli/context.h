@@ -53,8 +53,8 @@ void Say(const Context& context, std::string_view line);
 
 /// A misspelt column is one that nobody reads: it must not pass in silence. To stderr; nothing with
 /// --quiet or --json.
-void TellPassedOver(const Context& context, const std::string& file,
-                    const std::vector<std::string>& columns);
+void ReportPassedOver(const Context& context, const std::string& file,
+                      const std::vector<std::string>& columns);
 
 /// With --quiet the summary does not name the units that were not served, so stderr does; with
 /// --json the object does.

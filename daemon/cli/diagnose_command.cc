@@ -21,8 +21,8 @@
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "protocol/base/rng.h"
-#include "sim/diagnosis/planted.h"
-#include "sim/effects/registry.h"
+#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/cli/drive_options.h"
-#include "sim/scope/recording.h"
+#include "sim/drive/scope/recording.h"
 
 namespace focalfleet::cli {
 

@@ -131,7 +131,7 @@ ExitCode RunHallCalibrate(const Context& context, const HallCalibrateOptions& op
   if (!text) return Report(context, text.error());
   auto table = ReadPoses(*text, options.data, rig->sensors.size());
   if (!table) return Report(context, table.error());
-  TellPassedOver(context, options.data, table->passed_over);
+  ReportPassedOver(context, options.data, table->passed_over);
   const auto field = sim::MakeField(model->field);
   return Tell(context, options, sim::CalibrateSensors(CampaignOf(std::move(*table)), *rig, *field));
 }

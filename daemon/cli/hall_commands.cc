@@ -175,8 +175,8 @@ Json VerdictsJson(const std::vector<sim::SensorVerdict>& verdicts) {
   return list;
 }
 
-void TellEstimates(const Context& context, const HallOrientOptions& options,
-                   const sim::Estimates& estimates) {
+void ReportEstimates(const Context& context, const HallOrientOptions& options,
+                     const sim::Estimates& estimates) {
   std::map<std::string, std::size_t> statuses;
   std::size_t solved = 0;
   for (const sim::RowEstimate& row : estimates.rows) {
@@ -227,7 +227,7 @@ ExitCode RunHallOrient(const Context& context, const HallOrientOptions& options)
                                  .noise_T = options.noise_mT * 1e-3});
   if (const auto written = WriteFileAtomically(options.out, WriteEstimates(estimates)); !written)
     return Report(context, written.error());
-  TellEstimates(context, options, estimates);
+  ReportEstimates(context, options, estimates);
   return ExitCode::kOk;
 }
 

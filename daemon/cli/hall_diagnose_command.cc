@@ -77,7 +77,7 @@ ExitCode RunHallDiagnose(const Context& context, const HallDiagnoseOptions& opti
   if (!text) return Report(context, text.error());
   auto table = ReadPoses(*text, options.data, rig->sensors.size());
   if (!table) return Report(context, table.error());
-  TellPassedOver(context, options.data, table->passed_over);
+  ReportPassedOver(context, options.data, table->passed_over);
   const sim::HallCampaign campaign = CampaignOf(std::move(*table));
   const auto field = sim::MakeField(model.field);
   const sim::HallDiagnosis diagnosis = sim::DiagnoseHall(campaign, *rig, *field);

@@ -99,7 +99,7 @@ void AddLayoutCommand(CommandLine* line) {
                    "Hall sensors at each unit's joint: 6 or 8")
       ->check(CLI::IsMember({6, 8}));
   command
-      ->add_option("--spine-mm", options->hex.spine_mm,
+      ->add_option("--spine-mm", options->hex.carrier_mm,
                    "From such a joint to the fibre (default: twice both arms)")
       ->check(length);
   CLI::Option* fiducials = command

@@ -28,8 +28,8 @@ Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std:
                                                    .units_file = units_file,
                                                    .name = in.names.campaign},
                                                   &notes));
-  TellPassedOver(context, units_file, notes.ignored_of_units);
-  TellPassedOver(context, moves_file, notes.ignored_of_moves);
+  ReportPassedOver(context, units_file, notes.ignored_of_units);
+  ReportPassedOver(context, moves_file, notes.ignored_of_moves);
   if (notes.rows_out_of_order > 0)
     Say(context, fmt::format("note: {} of {} rows stand behind a later move of their unit: rows "
                              "were sorted",

@@ -8,8 +8,8 @@
 #include "daemon/campaign/model_file.h"
 #include "daemon/cli/context.h"
 #include "protocol/base/result.h"
-#include "sim/campaign/campaign.h"
-#include "sim/diagnosis/model.h"
+#include "sim/campaigns/campaign/campaign.h"
+#include "sim/campaigns/diagnosis/model.h"
 
 namespace focalfleet::cli {
 

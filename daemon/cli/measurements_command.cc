@@ -10,7 +10,7 @@
 #include "daemon/files/fits_table.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/csv.h"
-#include "fleet/sighting.h"
+#include "fleet/measurement.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -28,11 +28,11 @@ double NumberOrNan(const Json& row, const char* key) {
 /// Of a unit that was sent again after the exposure and not seen since: nobody knows its place.
 constexpr const char* kMovedSince = "moved_since";
 
-/// One bit a status, in the order of SightingStatus, then kMovedSince; docs/files.md.
+/// One bit a status, in the order of MeasurementStatus, then kMovedSince; docs/files.md.
 std::int64_t StatusBits(const std::string& status) {
-  if (status == kMovedSince) return std::int64_t{1} << kSightingStatusCount;
-  for (std::size_t bit = 0; bit < kSightingStatusCount; ++bit)
-    if (status == Name(static_cast<SightingStatus>(bit))) return std::int64_t{1} << bit;
+  if (status == kMovedSince) return std::int64_t{1} << kMeasurementStatusCount;
+  for (std::size_t bit = 0; bit < kMeasurementStatusCount; ++bit)
+    if (status == Name(static_cast<MeasurementStatus>(bit))) return std::int64_t{1} << bit;
   return 0;
 }
 

@@ -83,7 +83,7 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
   }
   // A misspelt column is one that nobody reads: it must not pass in silence.
   FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(text, files.units));
-  TellPassedOver(context, files.units, units.ignored_columns);
+  ReportPassedOver(context, files.units, units.ignored_columns);
   FOCALFLEET_TRY_ASSIGN(Layout layout, ReadLayout(text, files.units, std::move(options)));
   std::vector<UnitDrive> drives(layout.size());
   return OfflineFleet{std::move(layout), std::move(drives)};
@@ -99,7 +99,7 @@ Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
 namespace {
 
 /// What compensating changes of a request.
-struct Told {
+struct Reported {
   std::vector<Pose> offsets;  // Shape: (n)
   std::size_t compensated = 0;
   std::vector<PositionerIndex> beyond_range;
@@ -110,9 +110,9 @@ bool CanCount(const Unit& unit, const UnitDrive& drive, const Pose& place, const
 }
 
 /// From here on `state` and `targets` are places.
-Told TellByModel(const Compensation& compensation, const OfflineFleet& fleet, StatePoses* state,
-                 StatePoses* targets) {
-  Told told{
+Reported ReportByModel(const Compensation& compensation, const OfflineFleet& fleet,
+                       StatePoses* state, StatePoses* targets) {
+  Reported reported{
       .offsets = std::vector<Pose>(fleet.layout.size()), .compensated = 0, .beyond_range = {}};
   for (std::uint32_t i = 0; i < fleet.layout.size(); ++i) {
     const Unit& unit = fleet.layout.unit({i});
@@ -123,15 +123,15 @@ Told TellByModel(const Compensation& compensation, const OfflineFleet& fleet, St
         {i}, {.unit = &unit, .drive = &fleet.drives[i], .place = *stands}, *target);
     if (!offset) continue;
     if (!CanCount(unit, fleet.drives[i], *target, *offset)) {
-      told.beyond_range.push_back({i});
+      reported.beyond_range.push_back({i});
       target.reset();
       continue;
     }
-    ++told.compensated;
-    told.offsets[i] = *offset;
+    ++reported.compensated;
+    reported.offsets[i] = *offset;
     for (const Axis axis : kAxes) (*stands)[Index(axis)] += (*offset)[Index(axis)];
   }
-  return told;
+  return reported;
 }
 
 }  // namespace
@@ -140,14 +140,14 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
                                 const StatePoses& state, const PlanFiles& files) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(files.targets));
   FOCALFLEET_TRY_ASSIGN(const Targets targets, ReadTargets(text, files.targets));
-  TellPassedOver(context, files.targets, targets.ignored_columns);
+  ReportPassedOver(context, files.targets, targets.ignored_columns);
   FOCALFLEET_TRY_ASSIGN(StatePoses poses,
                         ResolveTargets(targets, fleet.layout, fleet.drives, KnowledgeOf(state)));
   StatePoses places = state;
-  Told told;
+  Reported reported;
   PlanOptions options = files.plan;
   if (files.compensation != nullptr) {
-    told = TellByModel(*files.compensation, fleet, &places, &poses);
+    reported = ReportByModel(*files.compensation, fleet, &places, &poses);
     // Two that stand clear by their counts may be nearer by the model.
     options.lead_apart = true;
   }
@@ -158,14 +158,14 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
   OfflinePlan made{.plan = {},
                    .targets = {},
                    .targeted = targets.rows.size(),
-                   .compensated = told.compensated,
-                   .beyond_range = std::move(told.beyond_range)};
+                   .compensated = reported.compensated,
+                   .beyond_range = std::move(reported.beyond_range)};
   auto plan = PlanOf({.layout = &fleet.layout,
                       .drives = fleet.drives,
                       .start = KnowledgeOf(places),
                       .targets = poses,
                       .frozen = frozen,
-                      .offsets = told.offsets},
+                      .offsets = reported.offsets},
                      options, files.sectors, &made.sectors);
   if (!plan) {
     return Fail(plan.error().code,

@@ -8,7 +8,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/report/page.h"
-#include "sim/reproduction/reproduce.h"
+#include "sim/drive/reproduction/reproduce.h"
 
 namespace focalfleet::cli {
 namespace {

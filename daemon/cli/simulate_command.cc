@@ -13,8 +13,8 @@
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/csv.h"
+#include "sim/drive/scope/recording.h"
 #include "sim/drive/start_study.h"
-#include "sim/scope/recording.h"
 
 namespace focalfleet::cli {
 namespace {

@@ -19,7 +19,7 @@
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 #include "protocol/base/rng.h"
-#include "sim/tuning/tuning.h"
+#include "sim/drive/tuning/tuning.h"
 
 namespace focalfleet::cli {
 namespace {
@@ -189,14 +189,14 @@ ExitCode TuneOne(const Context& context, const TuneOptions& options, const Drive
     margin_at_108 = MarginOf(setting, at);
   }
   if (context.json) {
-    Json told = TuningJson(*best);
-    told["margin_at_108"] = margin_at_108;
-    told["candidates"] = Json::array();
+    Json reported = TuningJson(*best);
+    reported["margin_at_108"] = margin_at_108;
+    reported["candidates"] = Json::array();
     for (const Candidate& candidate : candidates)
-      told["candidates"].push_back(TuningJson(candidate));
-    told["settings"] = SettingsJson(options.drive, given);
-    told["settings"].erase("repeat");
-    PrintJson(told);
+      reported["candidates"].push_back(TuningJson(candidate));
+    reported["settings"] = SettingsJson(options.drive, given);
+    reported["settings"].erase("repeat");
+    PrintJson(reported);
   }
   Say(context, Describe(*best, margin_at_108));
   return ExitCode::kOk;

@@ -16,7 +16,7 @@
 namespace focalfleet::cli {
 namespace {
 
-ExitCode TellConfiguration(const Context& context, const Json& configuration) {
+ExitCode ReportConfiguration(const Context& context, const Json& configuration) {
   Say(context, DescribeConfiguration(configuration, context.colour_out));
   const ExitCode exit = ExitCodeOf(configuration);
   if (exit == ExitCode::kSomeUnserved) NameUnserved(context, DescribeNotServed(configuration));
@@ -73,7 +73,7 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
     Say(context, "homing begins; `focalfleet status` shows how it goes");
     return ExitCode::kOk;
   }
-  return TellConfiguration(context, *answer);
+  return ReportConfiguration(context, *answer);
 }
 
 void AddHome(CommandLine* line) {
@@ -111,7 +111,7 @@ ExitCode RunMeasure(const Context& context, const MeasureOptions& options) {
     Say(context, "an exposure is asked for; `focalfleet status` shows what it finds");
     return ExitCode::kOk;
   }
-  return TellConfiguration(context, *answer);
+  return ReportConfiguration(context, *answer);
 }
 
 void AddMeasure(CommandLine* line) {

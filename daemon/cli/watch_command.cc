@@ -86,28 +86,29 @@ Json Counts(const FleetStatusValue& fleet) {
 
 Json JsonOf(const ConfigurationProgressValue& value) {
   const ConfigurationView& view = value.view;
-  return {{"time", ToIso8601(value.at)},
-          {"id", view.id},
-          {"source", view.source},
-          {"state", Name(view.state)},
-          {"round", view.round},
-          {"targeted", view.targeted},
-          {"arrived", view.arrived},
-          {"refused", view.refused},
-          {"failed", view.failed},
-          {"stopped", view.stopped},
-          {"unmeasured", view.unmeasured},
-          {"makespan_predicted_s", view.makespan_predicted_s},
-          {"makespan_s", view.makespan_s},
-          {"energy_J", view.energy_J},
-          {"peak_power_W", view.peak_power_W},
-          {"frames", view.frames},
-          {"starts", view.starts.begun},
-          {"starts_known", view.starts.told},
-          {"start_skew_s", view.starts.told > 0 ? Json(view.starts.skew_s) : Json(nullptr)},
-          {"start_skew_bound_s", view.starts.told > 0 ? Json(view.starts.bound_s) : Json(nullptr)},
-          {"upload_predicted_s", view.upload.predicted_s},
-          {"upload_s", view.upload.measured_s}};
+  return {
+      {"time", ToIso8601(value.at)},
+      {"id", view.id},
+      {"source", view.source},
+      {"state", Name(view.state)},
+      {"round", view.round},
+      {"targeted", view.targeted},
+      {"arrived", view.arrived},
+      {"refused", view.refused},
+      {"failed", view.failed},
+      {"stopped", view.stopped},
+      {"unmeasured", view.unmeasured},
+      {"makespan_predicted_s", view.makespan_predicted_s},
+      {"makespan_s", view.makespan_s},
+      {"energy_J", view.energy_J},
+      {"peak_power_W", view.peak_power_W},
+      {"frames", view.frames},
+      {"starts", view.starts.begun},
+      {"starts_known", view.starts.reported},
+      {"start_skew_s", view.starts.reported > 0 ? Json(view.starts.skew_s) : Json(nullptr)},
+      {"start_skew_bound_s", view.starts.reported > 0 ? Json(view.starts.bound_s) : Json(nullptr)},
+      {"upload_predicted_s", view.upload.predicted_s},
+      {"upload_s", view.upload.measured_s}};
 }
 
 Json JsonOf(const UnitStatusValue& unit) {

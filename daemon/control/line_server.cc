@@ -99,7 +99,7 @@ class LineServer::Impl {
   void Accept();
   bool AcceptOne();
   void Admit(int fd, bool reserved);
-  void TellAndClose(int fd, const std::string& why) const;
+  void ReportAndClose(int fd, const std::string& why) const;
   bool DropIdlest(bool reserved);
   void PauseAccepting();
   void ResumeAccepting();
@@ -226,7 +226,7 @@ bool LineServer::Impl::AcceptOne() {
   else if (Taken(true) < reserved_max() || DropIdlest(true))
     Admit(fd, true);
   else
-    TellAndClose(fd, "too many clients at " + path_ + ", and none of them is idle");
+    ReportAndClose(fd, "too many clients at " + path_ + ", and none of them is idle");
   return true;
 }
 
@@ -242,9 +242,9 @@ void LineServer::Impl::Admit(int fd, bool reserved) {
   if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) Drop(id);
 }
 
-void LineServer::Impl::TellAndClose(int fd, const std::string& why) const {
+void LineServer::Impl::ReportAndClose(int fd, const std::string& why) const {
   const std::string text = EncodeError(0, {ErrorCode::kFull, why}) + "\n";
-  [[maybe_unused]] const ssize_t told = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
+  [[maybe_unused]] const ssize_t reported = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
   ::close(fd);
 }
 
@@ -268,8 +268,8 @@ bool LineServer::Impl::DropIdlest(bool reserved) {
   if (idlest == clients_.end()) return false;
   // In the middle of an answer it is told nothing: that would be part of the answer.
   if (idlest->second.waiting() == 0)
-    TellAndClose(std::exchange(idlest->second.fd, -1),
-                 "too many clients at " + path_ + ": this one was idle longest");
+    ReportAndClose(std::exchange(idlest->second.fd, -1),
+                   "too many clients at " + path_ + ": this one was idle longest");
   Drop(idlest->first);
   return true;
 }
@@ -460,7 +460,7 @@ void LineServer::Impl::Remind() {
   });
   if (more == std::exchange(reminded_, more)) return;
   std::uint64_t count = 1;
-  [[maybe_unused]] const ssize_t told =
+  [[maybe_unused]] const ssize_t reported =
       more ? ::write(again_, &count, sizeof count) : ::read(again_, &count, sizeof count);
 }
 

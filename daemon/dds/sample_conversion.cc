@@ -9,7 +9,7 @@ namespace {
 
 // The codes that the IDL documents are our enumerators.
 static_assert(focalfleet_WITNESS_MEASURED == static_cast<int>(Witness::kMeasured));
-static_assert(focalfleet_SOURCE_SENSORS == static_cast<int>(SightingSource::kSensors));
+static_assert(focalfleet_SOURCE_SENSORS == static_cast<int>(MeasurementSource::kSensors));
 static_assert(focalfleet_PHASE_SILENT == static_cast<int>(UnitPhase::kSilent));
 static_assert(focalfleet_PHASE_MOVING == static_cast<int>(UnitPhase::kMoving));
 static_assert(focalfleet_STATE_HOST_LOST == static_cast<int>(UnitState::kHostLost));
@@ -24,7 +24,7 @@ static_assert(sizeof(focalfleet_FleetStatus::units_by_phase) / sizeof(std::uint3
 static_assert(sizeof(focalfleet_FleetStatus::units_by_witness) / sizeof(std::uint32_t) ==
               kWitnessCount);
 
-constexpr SightingSource kLastSource = SightingSource::kSensors;
+constexpr MeasurementSource kLastSource = MeasurementSource::kSensors;
 constexpr Witness kLastWitness = Witness::kMeasured;
 constexpr UnitPhase kLastPhase = static_cast<UnitPhase>(kUnitPhaseCount - 1);
 constexpr UnitState kLastUnitState = static_cast<UnitState>(kUnitStateCount - 1);
@@ -125,28 +125,28 @@ void ToSample(const UnitStatusValue& value, focalfleet_UnitStatus* sample) {
 }
 
 void ToSample(const UnitOrientationValue& value, focalfleet_UnitOrientation* sample) {
-  const SpineReading& spine = value.spine;
-  const auto number = [&](double known) { return spine.solved ? known : kNoNumber; };
+  const FibreCarrierReading& carrier = value.carrier;
+  const auto number = [&](double known) { return carrier.solved ? known : kNoNumber; };
   sample->time_ns = value.at.ns;
-  sample->alpha_deg = number(spine.angles_deg[0]);
-  sample->beta_deg = number(spine.angles_deg[1]);
-  sample->gamma_deg = number(spine.angles_deg[2]);
-  sample->cov_aa_deg2 = number(spine.covariance_deg2[0]);
-  sample->cov_ab_deg2 = number(spine.covariance_deg2[1]);
-  sample->cov_ag_deg2 = number(spine.covariance_deg2[2]);
-  sample->cov_bb_deg2 = number(spine.covariance_deg2[3]);
-  sample->cov_bg_deg2 = number(spine.covariance_deg2[4]);
-  sample->cov_gg_deg2 = number(spine.covariance_deg2[5]);
+  sample->alpha_deg = number(carrier.angles_deg[0]);
+  sample->beta_deg = number(carrier.angles_deg[1]);
+  sample->gamma_deg = number(carrier.angles_deg[2]);
+  sample->cov_aa_deg2 = number(carrier.covariance_deg2[0]);
+  sample->cov_ab_deg2 = number(carrier.covariance_deg2[1]);
+  sample->cov_ag_deg2 = number(carrier.covariance_deg2[2]);
+  sample->cov_bb_deg2 = number(carrier.covariance_deg2[3]);
+  sample->cov_bg_deg2 = number(carrier.covariance_deg2[4]);
+  sample->cov_gg_deg2 = number(carrier.covariance_deg2[5]);
   sample->x_fp_mm = value.x_fp_mm;
   sample->y_fp_mm = value.y_fp_mm;
   sample->var_x_mm2 = value.covariance.xx;
   sample->cov_xy_mm2 = value.covariance.xy;
   sample->var_y_mm2 = value.covariance.yy;
   sample->unit_id = value.unit.value;
-  sample->sensors_used = spine.used;
-  sample->witness = Code(spine.trusted ? Witness::kMeasured : Witness::kUnknown);
+  sample->sensors_used = carrier.used;
+  sample->witness = Code(carrier.trusted ? Witness::kMeasured : Witness::kUnknown);
   sample->source = Code(value.source);
-  CopyText(spine.verdict, sample->verdict);
+  CopyText(carrier.verdict, sample->verdict);
 }
 
 void ToSample(const BusStatusValue& value, focalfleet_BusStatus* sample) {
@@ -186,12 +186,12 @@ void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationP
   sample->energy_J = value.view.energy_J;
   sample->peak_power_W = value.view.peak_power_W;
   const StartView& starts = value.view.starts;
-  const bool known = starts.told > 0;
+  const bool known = starts.reported > 0;
   sample->start_skew_s = known ? starts.skew_s : kNoNumber;
   sample->start_skew_bound_s = known ? starts.bound_s : kNoNumber;
   sample->start_skew_allowed_s = known ? starts.allowed_s : kNoNumber;
   sample->starts = starts.begun;
-  sample->starts_known = starts.told;
+  sample->starts_known = starts.reported;
   PutUpload(value.view.upload, sample);
   sample->frames = value.view.frames;
   sample->round = value.view.round;
@@ -237,21 +237,21 @@ bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value) {
 }
 
 bool FromSample(const focalfleet_UnitOrientation& sample, UnitOrientationValue* value) {
-  SpineReading& spine = value->spine;
+  FibreCarrierReading& carrier = value->carrier;
   value->at = {sample.time_ns};
-  spine.solved = !std::isnan(sample.alpha_deg);
-  spine.angles_deg = {sample.alpha_deg, sample.beta_deg, sample.gamma_deg};
-  spine.covariance_deg2 = {sample.cov_aa_deg2, sample.cov_ab_deg2, sample.cov_ag_deg2,
-                           sample.cov_bb_deg2, sample.cov_bg_deg2, sample.cov_gg_deg2};
-  spine.used = sample.sensors_used;
-  spine.verdict = TextOf(sample.verdict);
+  carrier.solved = !std::isnan(sample.alpha_deg);
+  carrier.angles_deg = {sample.alpha_deg, sample.beta_deg, sample.gamma_deg};
+  carrier.covariance_deg2 = {sample.cov_aa_deg2, sample.cov_ab_deg2, sample.cov_ag_deg2,
+                             sample.cov_bb_deg2, sample.cov_bg_deg2, sample.cov_gg_deg2};
+  carrier.used = sample.sensors_used;
+  carrier.verdict = TextOf(sample.verdict);
   value->x_fp_mm = sample.x_fp_mm;
   value->y_fp_mm = sample.y_fp_mm;
   value->covariance = {sample.var_x_mm2, sample.cov_xy_mm2, sample.var_y_mm2};
   value->unit = {sample.unit_id};
   Witness witness = Witness::kUnknown;
   if (!Take(sample.witness, kLastWitness, &witness)) return false;
-  spine.trusted = witness == Witness::kMeasured;
+  carrier.trusted = witness == Witness::kMeasured;
   return Take(sample.source, kLastSource, &value->source);
 }
 
@@ -292,7 +292,7 @@ bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationPro
   value->view.makespan_s = sample.makespan_s;
   value->view.energy_J = sample.energy_J;
   value->view.peak_power_W = sample.peak_power_W;
-  value->view.starts = {.begun = sample.starts, .told = sample.starts_known};
+  value->view.starts = {.begun = sample.starts, .reported = sample.starts_known};
   if (sample.starts_known > 0) {
     value->view.starts.skew_s = sample.start_skew_s;
     value->view.starts.bound_s = sample.start_skew_bound_s;

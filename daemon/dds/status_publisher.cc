@@ -118,8 +118,8 @@ class StatusPublisher::Impl {
 
   Status Publish(const AlarmValue& alarm) {
     if (const char* flaw = Flaw(alarm)) return BadCode("alarm", alarm.row.id, flaw);
-    const auto same = [&alarm](const focalfleet_Alarm& told) {
-      return told.alarm_id == alarm.row.id;
+    const auto same = [&alarm](const focalfleet_Alarm& reported) {
+      return reported.alarm_id == alarm.row.id;
     };
     if (std::any_of(alarms_.begin(), alarms_.end(), same)) return {};
     ToSample(alarm, &alarms_.emplace_back());

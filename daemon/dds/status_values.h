@@ -8,7 +8,7 @@
 #include <limits>
 #include <string>
 
-#include "daemon/wall_time.h"
+#include "daemon/clock/wall_time.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
@@ -41,8 +41,8 @@ struct UnitStatusValue {
 struct UnitOrientationValue {
   UnitId unit;
   WallTime at;
-  SpineReading spine;  // verdict: at most 63 bytes are sent
-  SightingSource source = SightingSource::kCamera;
+  FibreCarrierReading carrier;  // verdict: at most 63 bytes are sent
+  MeasurementSource source = MeasurementSource::kCamera;
   double x_fp_mm = kNoNumber;  // the fibre as measured
   double y_fp_mm = kNoNumber;
   CovarianceFp covariance{kNoNumber, kNoNumber, kNoNumber};

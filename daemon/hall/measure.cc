@@ -7,7 +7,7 @@
 namespace focalfleet {
 namespace {
 
-using ByUnit = std::map<std::uint32_t, Sighting>;
+using ByUnit = std::map<std::uint32_t, Measurement>;
 
 bool CameraIsNeeded(const ExposureJob& job, const ByUnit& own) {
   for (std::uint32_t n = 0; n < job.wanted.size(); ++n) {
@@ -17,8 +17,8 @@ bool CameraIsNeeded(const ExposureJob& job, const ByUnit& own) {
   return job.wanted.empty() || own.empty();
 }
 
-Sighting Better(Sighting seen, Sighting own) {
-  seen.spine = own.spine;
+Measurement Better(Measurement seen, Measurement own) {
+  seen.carrier = own.carrier;
   if (!IsCertain(own.status)) return seen;
   const bool sharper = SigmaUm(own.covariance) < SigmaUm(seen.covariance);
   return !IsCertain(seen.status) || sharper ? std::move(own) : std::move(seen);
@@ -26,27 +26,27 @@ Sighting Better(Sighting seen, Sighting own) {
 
 }  // namespace
 
-ExposureDone MeasureUnits(const CameraWork& work, SpineWorker* spines, CameraWorker* camera,
-                          const std::atomic<bool>& ending) {
+ExposureDone MeasureUnits(const CameraWork& work, FibreCarrierWorker* carriers,
+                          CameraWorker* camera, const std::atomic<bool>& ending) {
   ByUnit own;
-  if (spines != nullptr)
-    for (Sighting& sighting : spines->Measure(work.job, work.drives))
-      own.emplace(sighting.unit.value, std::move(sighting));
-  ExposureFindings findings{.id = work.job.id, .sightings = {}, .camera = false};
+  if (carriers != nullptr)
+    for (Measurement& measurement : carriers->Measure(work.job, work.drives))
+      own.emplace(measurement.unit.value, std::move(measurement));
+  ExposureFindings findings{.id = work.job.id, .measurements = {}, .camera = false};
   if (camera != nullptr && CameraIsNeeded(work.job, own)) {
     ExposureDone seen = camera->Do(work, ending);
     if (!seen.exposure && own.empty()) return seen;
     if (seen.exposure) {
       findings = std::move(*seen.exposure);
-      for (Sighting& sighting : findings.sightings)
-        if (auto found = own.extract(sighting.unit.value))
-          sighting = Better(std::move(sighting), std::move(found.mapped()));
+      for (Measurement& measurement : findings.measurements)
+        if (auto found = own.extract(measurement.unit.value))
+          measurement = Better(std::move(measurement), std::move(found.mapped()));
     } else {
       findings.camera_trouble = seen.exposure.error().text;
     }
   }
-  for (auto& [unit, sighting] : own) findings.sightings.push_back(std::move(sighting));
-  std::ranges::sort(findings.sightings, {}, [](const Sighting& s) { return s.unit; });
+  for (auto& [unit, measurement] : own) findings.measurements.push_back(std::move(measurement));
+  std::ranges::sort(findings.measurements, {}, [](const Measurement& s) { return s.unit; });
   return {work.job.id, std::move(findings)};
 }
 

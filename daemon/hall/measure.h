@@ -6,13 +6,13 @@
 #include <atomic>
 
 #include "daemon/camera/camera_work.h"
-#include "daemon/hall/spine_work.h"
+#include "daemon/hall/fibre_carrier_work.h"
 
 namespace focalfleet {
 
 /// Either may be null. Errors of the answer: as the camera's, where no unit measured itself;
 /// otherwise its trouble is told in the findings, and takes only the others away.
-ExposureDone MeasureUnits(const CameraWork& work, SpineWorker* spines, CameraWorker* camera,
-                          const std::atomic<bool>& ending);
+ExposureDone MeasureUnits(const CameraWork& work, FibreCarrierWorker* carriers,
+                          CameraWorker* camera, const std::atomic<bool>& ending);
 
 }  // namespace focalfleet

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "sim/hall/spine.h"
+#include "sim/hall/fibre_carrier.h"
 
 namespace focalfleet {
 namespace {
@@ -75,7 +75,7 @@ std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
     description.base_y_mm = unit.base_fp.y_mm;
     description.enabled = unit.enabled;
     description.sensors = unit.sensors;
-    description.spine_mm = unit.spine_mm;
+    description.carrier_mm = unit.carrier_mm;
     for (const Axis axis : kAxes) {
       const AxisGeometry& from = unit.axis[Index(axis)];
       sim::AxisDescription& to = description.axis[Index(axis)];
@@ -95,9 +95,9 @@ std::shared_ptr<const sim::JointSensors> MakeJoints(const Layout& layout, std::u
   const bool any =
       std::ranges::any_of(layout.units(), [](const Unit& unit) { return unit.sensors > 0; });
   if (!any) return nullptr;
-  sim::SpineMake make{.seed = seed};
+  sim::FibreCarrierMake make{.seed = seed};
   if (spread == sim::Spread::kReal) make.gain_sd = 5e-4, make.offset_sd_V = 2e-4;
-  return std::make_shared<sim::SpineJoints>(make);
+  return std::make_shared<sim::FibreCarrierJoints>(make);
 }
 
 bool SimulatedLink::Look(const sim::World& world) {

@@ -11,11 +11,11 @@
 #include <unordered_map>
 #include <vector>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "daemon/ports/can_errors.h"
 #include "daemon/ports/pollable_port.h"
 #include "fleet/layout.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet {
 

@@ -43,25 +43,25 @@ struct Batch {
   }
 };
 
-struct Told {
+struct Reported {
   std::uint32_t dropped = 0;            // frames that found the receive queue full, in all
   std::optional<std::int64_t> wall_ns;  // when this one was taken in
 };
 
 /// What the kernel tells of a frame, where the socket asks for it.
-Told ReadControl(msghdr* header) {
-  Told told;
+Reported ReadControl(msghdr* header) {
+  Reported reported;
   for (cmsghdr* item = CMSG_FIRSTHDR(header); item != nullptr; item = CMSG_NXTHDR(header, item)) {
     if (item->cmsg_level != SOL_SOCKET) continue;
     if (item->cmsg_type == SO_RXQ_OVFL) {
-      std::memcpy(&told.dropped, CMSG_DATA(item), sizeof told.dropped);
+      std::memcpy(&reported.dropped, CMSG_DATA(item), sizeof reported.dropped);
     } else if (item->cmsg_type == SO_TIMESTAMPNS) {
       timespec at{};
       std::memcpy(&at, CMSG_DATA(item), sizeof at);
-      told.wall_ns = at.tv_sec * std::int64_t{1'000'000'000} + at.tv_nsec;
+      reported.wall_ns = at.tv_sec * std::int64_t{1'000'000'000} + at.tv_nsec;
     }
   }
-  return told;
+  return reported;
 }
 
 bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
@@ -71,7 +71,7 @@ struct Packet {
   const canfd_frame* raw = nullptr;
   std::size_t size = 0;  // bytes; 0: more than any frame has
   bool own = false;      // our own, come back
-  Told told;
+  Reported reported;
 };
 
 can_frame Classic(const canfd_frame& frame) {
@@ -89,8 +89,8 @@ struct Stamp {
 };
 
 HostInstant StampOf(const Packet& packet, const Stamp& stamp, const Aside* aside) {
-  if (aside == nullptr || !aside->stamps || !packet.told.wall_ns) return stamp.at;
-  return aside->stamps->At(*packet.told.wall_ns, stamp.clock);
+  if (aside == nullptr || !aside->stamps || !packet.reported.wall_ns) return stamp.at;
+  return aside->stamps->At(*packet.reported.wall_ns, stamp.clock);
 }
 
 /// Hands on what a group is made of.
@@ -111,7 +111,7 @@ void TakeApart(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFra
 
 void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* out,
           PortCounters* counters, Aside* aside) {
-  counters->lost = std::max<std::uint64_t>(counters->lost, packet.told.dropped);
+  counters->lost = std::max<std::uint64_t>(counters->lost, packet.reported.dropped);
   if (packet.own && aside != nullptr) {
     ++aside->confirmed;
     return;
@@ -250,7 +250,7 @@ BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<Recei
       Sort({.raw = &batch.frames[i],
             .size = (flags & MSG_TRUNC) == 0 ? message.msg_len : 0,
             .own = (flags & MSG_CONFIRM) != 0,
-            .told = ReadControl(&message.msg_hdr)},
+            .reported = ReadControl(&message.msg_hdr)},
            stamp, out, counters, aside);
     }
     total += count;

@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "daemon/ports/pollable_port.h"
 #include "protocol/link/frame_port.h"
 #include "protocol/wire/stage_group.h"

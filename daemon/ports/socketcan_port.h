@@ -13,7 +13,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "daemon/ports/can_errors.h"
 #include "daemon/ports/can_socket.h"
 #include "daemon/ports/link_recovery.h"

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "daemon/ports/pollable_port.h"
 #include "daemon/ports/watched_socket.h"
 

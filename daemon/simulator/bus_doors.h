@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "protocol/base/instants.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::simulator {
 

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "daemon/clock/wall_time.h"
 #include "daemon/files/text_file.h"
-#include "daemon/wall_time.h"
 #include "fleet/camera/spots.h"
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/spots_file.h"

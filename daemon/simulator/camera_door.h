@@ -11,7 +11,7 @@
 #include "protocol/base/instants.h"
 #include "protocol/base/result.h"
 #include "protocol/base/rng.h"
-#include "sim/camera/camera.h"
+#include "sim/world/camera/camera.h"
 
 namespace focalfleet::simulator {
 

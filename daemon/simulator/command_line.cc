@@ -18,7 +18,7 @@
 #include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"
 #include "daemon/simulator/simulator.h"
-#include "sim/hall/spine.h"
+#include "sim/hall/fibre_carrier.h"
 
 namespace focalfleet::simulator {
 namespace {
@@ -131,7 +131,7 @@ int SetBuses(const Given& given, const char* verb) {
 int WriteField(const Given& given) {
   std::string text = "theta_deg,phi_deg,b_T\n";
   constexpr int kStepDeg = 4;
-  const sim::SpineJoints joints({});
+  const sim::FibreCarrierJoints joints({});
   for (int theta = 0; theta <= 180; theta += kStepDeg)
     for (int phi = 0; phi < 360; phi += kStepDeg)
       text += fmt::format("{},{},{}\n", theta, phi,
@@ -140,7 +140,7 @@ int WriteField(const Given& given) {
   return written ? static_cast<int>(ExitCode::kOk) : Complain(written.error(), ExitCode::kRefused);
 }
 
-int TellTruth(const Given& given) {
+int ReportTruth(const Given& given) {
   Json args = Json::object();
   if (!given.targets.empty()) {
     const auto text = ReadTextFile(given.targets);
@@ -366,7 +366,7 @@ std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
   CLI::App* quit =
       AddSubcommand(app, given, "quit", "end the simulation; it writes its FLASH file");
 
-  return {{truth, [given] { return TellTruth(*given); }},
+  return {{truth, [given] { return ReportTruth(*given); }},
           {cut,
            [given] {
              Json args = Json::object();

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/fault_plan.h"
-#include "sim/unit_description.h"
+#include "sim/world/fault_plan.h"
+#include "sim/world/unit_description.h"
 
 namespace focalfleet::simulator {
 

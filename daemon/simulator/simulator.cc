@@ -17,7 +17,7 @@
 #include <span>
 #include <utility>
 
-#include "daemon/clock.h"
+#include "daemon/clock/clock.h"
 #include "daemon/control/line_server.h"
 #include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"

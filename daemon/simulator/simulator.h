@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocol/base/result.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::simulator {
 

@@ -6,7 +6,7 @@
 #include <variant>
 
 #include "fleet/files/csv.h"
-#include "sim/mechanism.h"
+#include "sim/world/mechanism.h"
 
 namespace focalfleet::simulator {
 namespace {

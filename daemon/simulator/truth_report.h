@@ -8,7 +8,7 @@
 
 #include "fleet/targets.h"
 #include "protocol/base/result.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::simulator {
 

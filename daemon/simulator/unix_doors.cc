@@ -88,8 +88,8 @@ void UnixDoors::Accept(std::size_t listener) {
     const int fd =
         ::accept4(listeners_[listener].fd, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC);
     if (fd < 0) {
-      if ((errno == EMFILE || errno == ENFILE) && !told_no_descriptors_) {
-        told_no_descriptors_ = true;
+      if ((errno == EMFILE || errno == ENFILE) && !reported_no_descriptors_) {
+        reported_no_descriptors_ = true;
         std::fprintf(stderr, "focalfleet-sim: no descriptors left for another client of %s\n",
                      listeners_[listener].path.c_str());
       }

@@ -61,7 +61,7 @@ class UnixDoors : public BusDoors {
   std::map<BusId, std::vector<std::uint32_t>> clients_of_bus_;
   std::map<std::uint32_t, Client> clients_;
   std::uint32_t next_client_ = 1;
-  bool told_no_descriptors_ = false;
+  bool reported_no_descriptors_ = false;
   std::vector<ReceivedFrame> received_;  // in this exchange
   std::vector<std::uint32_t> senders_;   // of these
 };

@@ -13,7 +13,7 @@
 #include "daemon/control/messages.h"
 #include "daemon/simulator/camera_door.h"
 #include "protocol/base/instants.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::simulator {
 

@@ -99,23 +99,23 @@ TuningRow ReadTuning(Cells& cells, int first) {
   return row;
 }
 
-std::optional<SpineReading> ReadSpine(Cells& cells, int first) {
+std::optional<FibreCarrierReading> ReadFibreCarrier(Cells& cells, int first) {
   if (cells.IsNull(first)) return std::nullopt;
-  SpineReading spine{.trusted = cells.Flag(first), .verdict = cells.Text(first + 1)};
-  spine.used = cells.Whole<std::uint16_t>(first + 2);
-  spine.solved = !cells.IsNull(first + 3);
+  FibreCarrierReading carrier{.trusted = cells.Flag(first), .verdict = cells.Text(first + 1)};
+  carrier.used = cells.Whole<std::uint16_t>(first + 2);
+  carrier.solved = !cells.IsNull(first + 3);
   int column = first + 3;
-  for (double& angle_deg : spine.angles_deg) {
-    if (spine.solved) angle_deg = cells.Real(column);
+  for (double& angle_deg : carrier.angles_deg) {
+    if (carrier.solved) angle_deg = cells.Real(column);
     ++column;
   }
-  for (double& covariance_deg2 : spine.covariance_deg2) {
-    if (spine.solved) covariance_deg2 = cells.Real(column);
+  for (double& covariance_deg2 : carrier.covariance_deg2) {
+    if (carrier.solved) covariance_deg2 = cells.Real(column);
     ++column;
   }
-  const char* flaw = Flaw(spine);
+  const char* flaw = Flaw(carrier);
   cells.Require(flaw == nullptr, flaw == nullptr ? "" : flaw);
-  return spine;
+  return carrier;
 }
 
 }  // namespace focalfleet::store_internal

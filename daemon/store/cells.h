@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/clock/wall_time.h"
 #include "daemon/store/sqlite.h"
-#include "daemon/wall_time.h"
 #include "fleet/knowledge.h"
 #include "fleet/records.h"
 #include "fleet/row_check.h"
@@ -76,7 +76,7 @@ ConfigurationRow ReadConfiguration(Cells& cells);
 TuningRow ReadTuning(Cells& cells, int first);
 /// trusted, verdict, used, three angles and six covariances, in this order from column `first` on;
 /// nothing where the first is NULL.
-std::optional<SpineReading> ReadSpine(Cells& cells, int first);
+std::optional<FibreCarrierReading> ReadFibreCarrier(Cells& cells, int first);
 
 /// The tables as the coordinator wants them, in one read transaction.
 Result<StoredFleet> LoadFleet(Connection& connection);

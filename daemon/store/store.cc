@@ -189,7 +189,7 @@ class RowWriter {
 
   Status operator()(const MeasurementRow& row) {
     const auto& [xx, xy, yy] = row.covariance;
-    if (row.spine) FOCALFLEET_TRY(WriteOrientation(row, *row.spine));
+    if (row.carrier) FOCALFLEET_TRY(WriteOrientation(row, *row.carrier));
     Statement& s = statements_.measurement;
     s.Bind(1, static_cast<std::int64_t>(row.exposure));
     s.Bind(2, row.unit.value);
@@ -401,21 +401,21 @@ class RowWriter {
     return s.Run();
   }
 
-  Status WriteOrientation(const MeasurementRow& row, const SpineReading& spine) {
+  Status WriteOrientation(const MeasurementRow& row, const FibreCarrierReading& carrier) {
     Statement& s = statements_.orientation;
     s.Bind(1, static_cast<std::int64_t>(row.exposure));
     s.Bind(2, row.unit.value);
     s.Bind(3, row.serial.value);
-    s.Bind(4, spine.trusted ? 1 : 0);
-    s.BindText(5, spine.verdict);
-    s.Bind(6, spine.used);
+    s.Bind(4, carrier.trusted ? 1 : 0);
+    s.BindText(5, carrier.verdict);
+    s.Bind(6, carrier.used);
     int column = 7;
-    for (const double angle_deg : spine.angles_deg) {
-      spine.solved ? s.BindReal(column, angle_deg) : s.BindNull(column);
+    for (const double angle_deg : carrier.angles_deg) {
+      carrier.solved ? s.BindReal(column, angle_deg) : s.BindNull(column);
       ++column;
     }
-    for (const double covariance_deg2 : spine.covariance_deg2) {
-      spine.solved ? s.BindReal(column, covariance_deg2) : s.BindNull(column);
+    for (const double covariance_deg2 : carrier.covariance_deg2) {
+      carrier.solved ? s.BindReal(column, covariance_deg2) : s.BindNull(column);
       ++column;
     }
     s.Bind(column, now_.ns);

@@ -20,7 +20,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/wall_time.h"
+#include "daemon/clock/wall_time.h"
 #include "fleet/records.h"
 #include "protocol/base/result.h"
 

@@ -193,7 +193,7 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
         row.unit = {cells.Whole<std::uint32_t>(1)};
         row.serial = cells.Serial(2);
         row.configuration = cells.Whole<std::uint64_t>(3);
-        row.status = cells.Code(4, kLastSightingStatus);
+        row.status = cells.Code(4, kLastMeasurementStatus);
         if (!cells.IsNull(5)) row.other = UnitId{cells.Whole<std::uint32_t>(5)};
         row.x_mm = cells.Real(6);
         row.y_mm = cells.Real(7);
@@ -208,8 +208,8 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
         cells.Require(row.covariance.xx >= 0 && row.covariance.yy >= 0, "its variance is negative");
         row.target_id = cells.Text(18);
         if (!cells.IsNull(19)) row.delay_s = cells.Real(19);
-        row.source = cells.Code(20, kLastSightingSource);
-        row.spine = ReadSpine(cells, 21);
+        row.source = cells.Code(20, kLastMeasurementSource);
+        row.carrier = ReadFibreCarrier(cells, 21);
         history.moved_since = cells.Whole<std::int64_t>(33) != 0;
         return history;
       });

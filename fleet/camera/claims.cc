@@ -43,7 +43,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   places->clear();
   const CovarianceFp as_before =
       Round(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
-  const double as_told =
+  const double as_reported =
       1 - options.did_not_move_share - options.strayed_share - options.missing_share;
   if (expectation.lost) {
     if (expectation.expected_fp)
@@ -54,7 +54,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   }
   if (!expectation.moved) {
     if (expectation.before_fp)
-      places->push_back({PlaceKind::kExpected, *expectation.before_fp, as_before, as_told});
+      places->push_back({PlaceKind::kExpected, *expectation.before_fp, as_before, as_reported});
     return;
   }
   if (expectation.before_fp)
@@ -67,7 +67,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   const auto& commanded = expectation.commanded;
   places->push_back({PlaceKind::kExpected, *expectation.expected_fp,
                      commanded ? at(*commanded) : Round(expectation.blind.place_sigma_mm),
-                     as_told});
+                     as_reported});
   if (!commanded || !expectation.before) return;
   const AxisAngles only_phi{expectation.before->theta_deg, commanded->phi_deg};
   const AxisAngles only_theta{commanded->theta_deg, expectation.before->phi_deg};

@@ -10,7 +10,7 @@
 
 #include "fleet/kinematics.h"
 #include "fleet/layout.h"
-#include "fleet/sighting.h"
+#include "fleet/measurement.h"
 
 namespace focalfleet {
 

@@ -11,8 +11,9 @@
 namespace focalfleet {
 namespace {
 
-// Of units in service (sim/spread.h): the zero angles are off by 0.5 degrees, arms by 57 um; once a
-// camera has put a unit, what is left is scale (0.3 % of a move), periodic error and the arms.
+// Of units in service (sim/world/spread.h): the zero angles are off by 0.5 degrees, arms by 57 um;
+// once a camera has put a unit, what is left is scale (0.3 % of a move), periodic error and the
+// arms.
 constexpr BlindError kNeverSeen{
     .theta_sigma_deg = 0.7, .phi_sigma_deg = 0.7, .place_sigma_mm = 0.06};
 constexpr BlindError kSeen{.theta_sigma_deg = 0.35, .phi_sigma_deg = 0.35, .place_sigma_mm = 0.04};
@@ -39,9 +40,9 @@ std::optional<AngleBox> BoxOf(const Unit& unit, const UnitDrive& drive,
 }
 
 /// An axis that stayed is believed where it was.
-Pose BelievedPose(const UnitSighting& seen, const Pose& now, const std::optional<Pose>& before) {
+Pose BelievedPose(const UnitMeasurement& seen, const Pose& now, const std::optional<Pose>& before) {
   Pose pose = now;
-  if (seen.status == SightingStatus::kDidNotMove && before)
+  if (seen.status == MeasurementStatus::kDidNotMove && before)
     for (const Axis axis : kAxes)
       if (seen.stayed[Index(axis)]) pose[Index(axis)] = (*before)[Index(axis)];
   return pose;
@@ -110,26 +111,27 @@ Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const
   if (!identified)
     return Fail(ErrorCode::kRefused,
                 std::string(Name(identified.error().reason)) + ": " + identified.error().text);
-  ExposureFindings findings{.id = id, .sightings = {}};
-  findings.sightings.reserve(layout.size());
+  ExposureFindings findings{.id = id, .measurements = {}};
+  findings.measurements.reserve(layout.size());
   for (std::uint32_t n = 0; n < layout.size(); ++n) {
-    const UnitSighting& seen = identified->units[n];
-    Sighting sighting{.unit = {n}, .status = seen.status, .other = {}, .place = {}};
-    if (seen.other != kNoUnit) sighting.other = seen.other;
+    const UnitMeasurement& seen = identified->units[n];
+    Measurement measurement{.unit = {n}, .status = seen.status, .other = {}, .place = {}};
+    if (seen.other != kNoUnit) measurement.other = seen.other;
     if (seen.spot != kNoSpot) {
-      sighting.x_mm = seen.at_fp.x_mm;
-      sighting.y_mm = seen.at_fp.y_mm;
+      measurement.x_mm = seen.at_fp.x_mm;
+      measurement.y_mm = seen.at_fp.y_mm;
       const double sigma_mm = std::sqrt((seen.covariance.xx + seen.covariance.yy) / 2);
-      sighting.covariance = seen.covariance;
+      measurement.covariance = seen.covariance;
       if (IsCertain(seen.status) && expectations[n].lost)
-        sighting.place = PoseOfLost(layout.units()[n], believed.drives[n], seen.at_fp,
-                                    expectations[n], sigma_mm);
+        measurement.place = PoseOfLost(layout.units()[n], believed.drives[n], seen.at_fp,
+                                       expectations[n], sigma_mm);
       else if (IsCertain(seen.status))
-        sighting.place = PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
-                                   BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
-                                   {.sigma_mm = sigma_mm});
+        measurement.place =
+            PlaceSeen(layout.units()[n], believed.drives[n], seen.at_fp,
+                      BelievedPose(seen, PlaceOf(believed.now[n]), believed.before[n]),
+                      {.sigma_mm = sigma_mm});
     }
-    findings.sightings.push_back(std::move(sighting));
+    findings.measurements.push_back(std::move(measurement));
   }
   return findings;
 }

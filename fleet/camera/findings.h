@@ -8,7 +8,7 @@
 
 #include "fleet/camera/identify.h"
 #include "fleet/knowledge.h"
-#include "fleet/sighting.h"
+#include "fleet/measurement.h"
 
 namespace focalfleet {
 
@@ -39,7 +39,7 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                                const UnitExpectation& expectation, double sigma_mm);
 
-/// One sighting a unit of the layout. A place is given where the status is certain and the arms
+/// One measurement a unit of the layout. A place is given where the status is certain and the arms
 /// reach it; of a unit of unknown place, where one pose alone is possible there (PoseOfLost). Cost:
 /// as Identify. Errors: kRefused: the exposure as a whole is not believed; the reason's name and
 /// its numbers.

@@ -25,7 +25,7 @@ class Matching {
         spots_(spots),
         search_{&request, &options, &spots, &grid},
         claims_(std::move(claims)),
-        sightings_(request.layout->size()),
+        measurements_(request.layout->size()),
         settled_(request.layout->size(), 0),
         is_free_(spots.at_fp.size(), 1) {
     for (std::size_t k = 0; k < is_free_.size(); ++k)
@@ -39,29 +39,29 @@ class Matching {
     TakeOutside();
     NameRivals();
     MarkBlends();
-    result->units = std::move(sightings_);
-    for (const UnitSighting& sighting : result->units)
-      ++result->count[static_cast<std::size_t>(sighting.status)];
+    result->units = std::move(measurements_);
+    for (const UnitMeasurement& measurement : result->units)
+      ++result->count[static_cast<std::size_t>(measurement.status)];
     for (std::uint32_t k = 0; k < is_free_.size(); ++k)
       if (is_free_[k] != 0) result->unexplained.push_back(k);
   }
 
  private:
-  void Give(std::uint32_t unit, std::uint32_t spot, SightingStatus status, double doubt) {
-    UnitSighting& sighting = sightings_[unit];
-    sighting.status = status;
-    sighting.spot = spot;
-    sighting.at_fp = spots_.at_fp[spot];
+  void Give(std::uint32_t unit, std::uint32_t spot, MeasurementStatus status, double doubt) {
+    UnitMeasurement& measurement = measurements_[unit];
+    measurement.status = status;
+    measurement.spot = spot;
+    measurement.at_fp = spots_.at_fp[spot];
     const double sigma_mm = std::hypot(options_.centroid_sigma_mm, spots_.sigma_mm[spot]);
-    sighting.covariance = {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm};
-    sighting.doubt = doubt;
+    measurement.covariance = {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm};
+    measurement.doubt = doubt;
     settled_[unit] = 1;
     is_free_[spot] = 0;
   }
 
   void LeaveAmbiguous(std::uint32_t unit, double doubt) {
-    sightings_[unit].status = SightingStatus::kAmbiguous;
-    sightings_[unit].doubt = doubt;
+    measurements_[unit].status = MeasurementStatus::kAmbiguous;
+    measurements_[unit].doubt = doubt;
     settled_[unit] = 1;
   }
 
@@ -87,9 +87,9 @@ class Matching {
           LeaveAmbiguous(trace.unit, 0.5);
           held_.push_back(trace.spot);
         } else {
-          Give(trace.unit, trace.spot, SightingStatus::kSwapped, 0);
+          Give(trace.unit, trace.spot, MeasurementStatus::kSwapped, 0);
         }
-        sightings_[trace.unit].other = {trace.other};
+        measurements_[trace.unit].other = {trace.other};
       }
     }
     for (const std::uint32_t spot : held_) is_free_[spot] = 0;
@@ -107,7 +107,7 @@ class Matching {
     for (const Decision& decision : decisions)
       if (decision.doubt > options_.doubt_max) LeaveAmbiguous(decision.unit, decision.doubt);
     for (const Claim& claim : open) {
-      const bool undecided = sightings_[claim.unit].status == SightingStatus::kAmbiguous;
+      const bool undecided = measurements_[claim.unit].status == MeasurementStatus::kAmbiguous;
       if (undecided && is_free_[claim.spot] != 0) {
         is_free_[claim.spot] = 0;
         held_.push_back(claim.spot);
@@ -121,12 +121,13 @@ class Matching {
     const bool known =
         decision.kind != PlaceKind::kAnywhere && decision.kind_doubt <= options_.motion_doubt_max;
     Give(decision.unit, decision.spot,
-         stayed && known ? SightingStatus::kDidNotMove : SightingStatus::kMeasured, decision.doubt);
-    UnitSighting& sighting = sightings_[decision.unit];
-    sighting.motion_is_known = known;
+         stayed && known ? MeasurementStatus::kDidNotMove : MeasurementStatus::kMeasured,
+         decision.doubt);
+    UnitMeasurement& measurement = measurements_[decision.unit];
+    measurement.motion_is_known = known;
     if (!stayed || !known) return;
-    sighting.stayed[Index(Axis::kTheta)] = decision.kind != PlaceKind::kPhiStayed;
-    sighting.stayed[Index(Axis::kPhi)] = decision.kind != PlaceKind::kThetaStayed;
+    measurement.stayed[Index(Axis::kTheta)] = decision.kind != PlaceKind::kPhiStayed;
+    measurement.stayed[Index(Axis::kPhi)] = decision.kind != PlaceKind::kThetaStayed;
   }
 
   [[nodiscard]] std::vector<std::uint32_t> Open() const {
@@ -158,15 +159,15 @@ class Matching {
       } else if (request_.expectations[decision.unit].lost &&
                  decision.doubt <= options_.doubt_max) {
         // Nobody knew where it was, so it did not stray: it is found.
-        Give(decision.unit, decision.spot, SightingStatus::kMeasured, decision.doubt);
-        sightings_[decision.unit].motion_is_known = false;
+        Give(decision.unit, decision.spot, MeasurementStatus::kMeasured, decision.doubt);
+        measurements_[decision.unit].motion_is_known = false;
       } else {
-        Give(decision.unit, decision.spot, SightingStatus::kStrayed, decision.doubt);
+        Give(decision.unit, decision.spot, MeasurementStatus::kStrayed, decision.doubt);
         Suspect(decision.unit, decision.spot);
       }
     }
     for (const Claim& claim : left)
-      if (sightings_[claim.unit].status == SightingStatus::kAmbiguous &&
+      if (measurements_[claim.unit].status == MeasurementStatus::kAmbiguous &&
           is_free_[claim.spot] != 0) {
         is_free_[claim.spot] = 0;
         held_.push_back(claim.spot);
@@ -178,12 +179,12 @@ class Matching {
     int found = 0;
     for (const SwapTrace& trace : traces_) {
       if (trace.unit != unit || trace.spot != spot) continue;
-      if (IsCertain(sightings_[trace.other].status)) continue;
+      if (IsCertain(measurements_[trace.other].status)) continue;
       ++found;
-      sightings_[unit].other = {trace.other};
+      measurements_[unit].other = {trace.other};
     }
-    if (found == 1) sightings_[unit].status = SightingStatus::kSwapSuspected;
-    if (found != 1) sightings_[unit].other = kNoUnit;
+    if (found == 1) measurements_[unit].status = MeasurementStatus::kSwapSuspected;
+    if (found != 1) measurements_[unit].other = kNoUnit;
   }
 
   void TakeOutside() {
@@ -197,18 +198,19 @@ class Matching {
         ++found;
         spot = s;
       });
-      if (found == 1) Give(unit, spot, SightingStatus::kOutsidePatrol, 0.5);
+      if (found == 1) Give(unit, spot, MeasurementStatus::kOutsidePatrol, 0.5);
     }
   }
 
   // For whoever looks into an ambiguity: one other unit near it that is undecided as well.
   void NameRivals() {
-    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
-      UnitSighting& sighting = sightings_[i];
-      if (sighting.status != SightingStatus::kAmbiguous || sighting.other != kNoUnit) continue;
+    for (std::uint32_t i = 0; i < measurements_.size(); ++i) {
+      UnitMeasurement& measurement = measurements_[i];
+      if (measurement.status != MeasurementStatus::kAmbiguous || measurement.other != kNoUnit)
+        continue;
       for (const PositionerIndex j : request_.layout->neighbours({i}))
-        if (sightings_[j.value].status == SightingStatus::kAmbiguous) {
-          sighting.other = j;
+        if (measurements_[j.value].status == MeasurementStatus::kAmbiguous) {
+          measurement.other = j;
           break;
         }
     }
@@ -217,18 +219,19 @@ class Matching {
   void MarkBlends() {
     const double width_px = MedianWidth();
     std::vector<std::uint32_t> holder(is_free_.size(), UINT32_MAX);
-    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
-      const UnitSighting& sighting = sightings_[i];
-      if (sighting.spot == kNoSpot) continue;
-      holder[sighting.spot] = i;
-      const Spot& spot = request_.exposure->spots[sighting.spot];
+    for (std::uint32_t i = 0; i < measurements_.size(); ++i) {
+      const UnitMeasurement& measurement = measurements_[i];
+      if (measurement.spot == kNoSpot) continue;
+      holder[measurement.spot] = i;
+      const Spot& spot = request_.exposure->spots[measurement.spot];
       const double flux = request_.expectations[i].flux;
       const bool wide = width_px > 0 && spot.fwhm_px > options_.blend_width_ratio * width_px;
       if (wide || (flux > 0 && spot.flux > options_.blend_flux_ratio * flux)) Blend(i);
     }
     // A unit that is not seen, expected where another's spot is: that spot may be both.
-    for (std::uint32_t i = 0; i < sightings_.size(); ++i) {
-      if (sightings_[i].status != SightingStatus::kMissing || !request_.expectations[i].expected_fp)
+    for (std::uint32_t i = 0; i < measurements_.size(); ++i) {
+      if (measurements_[i].status != MeasurementStatus::kMissing ||
+          !request_.expectations[i].expected_fp)
         continue;
       std::uint32_t with = kNoSpot;
       search_.grid->ForNear(*request_.expectations[i].expected_fp, options_.blend_mm,
@@ -236,9 +239,9 @@ class Matching {
                               if (holder[spot] != UINT32_MAX) with = spot;
                             });
       if (with == kNoSpot) continue;
-      Give(i, with, SightingStatus::kBlended, 0.5);
-      sightings_[i].other = {holder[with]};
-      sightings_[holder[with]].other = {i};
+      Give(i, with, MeasurementStatus::kBlended, 0.5);
+      measurements_[i].other = {holder[with]};
+      measurements_[holder[with]].other = {i};
       Blend(i);
       Blend(holder[with]);
     }
@@ -246,10 +249,10 @@ class Matching {
 
   // The centroid of two lights of any brightness is within their distance of each.
   void Blend(std::uint32_t unit) {
-    UnitSighting& sighting = sightings_[unit];
-    sighting.status = SightingStatus::kBlended;
-    sighting.covariance.xx += options_.blend_mm * options_.blend_mm / 4;
-    sighting.covariance.yy += options_.blend_mm * options_.blend_mm / 4;
+    UnitMeasurement& measurement = measurements_[unit];
+    measurement.status = MeasurementStatus::kBlended;
+    measurement.covariance.xx += options_.blend_mm * options_.blend_mm / 4;
+    measurement.covariance.yy += options_.blend_mm * options_.blend_mm / 4;
   }
 
   [[nodiscard]] double MedianWidth() const {
@@ -267,7 +270,7 @@ class Matching {
   const MappedSpots& spots_;
   ClaimSearch search_;
   Claims claims_;
-  std::vector<UnitSighting> sightings_;
+  std::vector<UnitMeasurement> measurements_;
   std::vector<char> settled_;
   std::vector<char> is_free_;
   std::vector<std::uint32_t> held_;  // spots over which units are undecided
@@ -342,7 +345,7 @@ std::optional<Refusal> Turned(const IdentificationRequest& request,
 
 }  // namespace
 
-const char* Name(SightingStatus status) {
+const char* Name(MeasurementStatus status) {
   constexpr const char* kNames[] = {
       "measured",       "did_not_move", "swapped", "strayed",         "swap_suspected", "blended",
       "outside_patrol", "ambiguous",    "missing", "sensors_doubted", "too_coarse"};

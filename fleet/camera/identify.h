@@ -25,14 +25,14 @@
 #include "fleet/camera/fiducials.h"
 #include "fleet/camera/plate_map.h"
 #include "fleet/camera/spots.h"
-#include "fleet/sighting.h"
+#include "fleet/measurement.h"
 
 namespace focalfleet {
 
 inline constexpr PositionerIndex kNoUnit{UINT32_MAX};
 
-struct UnitSighting {
-  SightingStatus status = SightingStatus::kMissing;
+struct UnitMeasurement {
+  MeasurementStatus status = MeasurementStatus::kMissing;
   std::uint32_t spot = kNoSpot;  // row of the exposure; kNoSpot: ambiguous or missing
   PointFp at_fp;                 // meaningless without a spot
   CovarianceFp covariance;       // centroid, map and air; of a blend also what it may be off
@@ -85,8 +85,8 @@ struct IdentificationRequest {
 };
 
 struct Identification {
-  std::vector<UnitSighting> units;  // Shape: (n), as the layout
-  std::array<std::uint32_t, kSightingStatusCount> count{};
+  std::vector<UnitMeasurement> units;  // Shape: (n), as the layout
+  std::array<std::uint32_t, kMeasurementStatusCount> count{};
   std::vector<std::uint32_t> unexplained;  // spots that are nobody's, rows of the exposure
   // The camera of this exposure against its model.
   double scale_change = 0;

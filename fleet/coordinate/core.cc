@@ -255,7 +255,7 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
         now + BitTime(kStopAloneFrames * LongestFrameBits(rates), config.bit_rate_bps));
   for (const PositionerIndex i : buses[bus].units) {
     if (node != kBroadcastNode && node != layout.unit(i).node) continue;
-    unit(i).told_to_stop = now;
+    unit(i).reported_to_stop = now;
     unit(i).runs_freely = false;
   }
 }
@@ -263,7 +263,8 @@ void Core::SendNow(std::size_t bus, const HostMessage& message, NodeId node) {
 bool Core::MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const {
   const UnitRecord& record = units[i.value];
   if (sequence != 0) return std::ranges::count(record.stop_sequences, sequence) > 0;
-  return record.told_to_stop.ns != INT64_MIN && now - record.told_to_stop < config.silence_limit;
+  return record.reported_to_stop.ns != INT64_MIN &&
+         now - record.reported_to_stop < config.silence_limit;
 }
 
 MoveId Core::TakeMoveId() {
@@ -360,13 +361,13 @@ Pose Core::NearestInReach(PositionerIndex i, const Pose& pose) const {
   return nearest;
 }
 
-void Core::See(PositionerIndex i, const Pose& place, SightingSource source) {
+void Core::See(PositionerIndex i, const Pose& place, MeasurementSource source) {
   UnitView& view = unit(i).view;
   const Pose believed = PlaceOf(view.knowledge);
   for (const Axis axis : kAxes)
     view.offset[Index(axis)] += place[Index(axis)] - believed[Index(axis)];
   Know(i, Exactly(Witness::kMeasured, place),
-       source == SightingSource::kCamera ? Origin::kCamera : Origin::kSensors);
+       source == MeasurementSource::kCamera ? Origin::kCamera : Origin::kSensors);
 }
 
 void Core::Expect(PositionerIndex i, const Pose& offset) {

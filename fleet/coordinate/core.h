@@ -1,7 +1,7 @@
 // The state that every procedure of the coordinator shares, and the few things that one can do with
 // it: change a unit's phase (by the table), ask a unit something (with a deadline and bounded
-// retries), note a row for the store, raise an alarm, wake up later. It decides nothing; contact.h
-// and pursuit.h decide, and tell each other what happened to a unit through `events`, never by
+// retries), note a row for the store, raise an alarm, wake up later. It decides nothing; sessions.h
+// and executor.h decide, and tell each other what happened to a unit through `events`, never by
 // calling back.
 //
 // Size: about 300 bytes a unit and 1 kB a bus; a step touches only the units that have something
@@ -44,7 +44,7 @@ struct Question {
 
 /// What has been read of a unit since it was last identified.
 struct Reading {
-  int step = 0;  // index of the next question, see contact.cc
+  int step = 0;  // index of the next question, see sessions.cc
   StatusReply status;
   Pose position{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
@@ -76,7 +76,7 @@ struct UnitRecord {
   HostInstant begun_by{INT64_MIN};
   HostInstant answered_asked{INT64_MIN};  // when the question answered last was asked
   ClockMap clock;
-  bool clock_told = false;  // that its clock is off by more than plans allow for
+  bool clock_reported = false;  // that its clock is off by more than plans allow for
   std::uint8_t protocol_version = kProtocolVersion;  // that it said last
   /// Its sensors, being read or as read last.
   struct Sensing {
@@ -99,8 +99,8 @@ struct UnitRecord {
   // Stops of ours, so that one of somebody else's is told from them.
   /// Of the last ones that it was asked for, newest first: answers may come late, and repeated.
   std::array<std::uint8_t, 4> stop_sequences{};
-  HostInstant told_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
-  bool runs_freely = false;             // set in motion, and not stopped by us since
+  HostInstant reported_to_stop{INT64_MIN};  // the last one past the queue, under sequence number 0
+  bool runs_freely = false;                 // set in motion, and not stopped by us since
 };
 
 struct BusRecord {
@@ -124,14 +124,14 @@ constexpr bool IsOfUpload(const CanFrame& frame) {
 }
 
 enum class UnitEventKind : std::uint8_t {
-  kReady,        // read anew, or its motion ended where it should: its knowledge is settled
-  kStopped,      // its motion ended before its end
-  kNeverBegan,   // did not start with the others
-  kUnheard,      // in motion, does not answer at once, or has not begun yet: may have ended
-  kEnded,        // in motion, says that it stands, not yet where
-  kLost,         // silent, restarted, foreign or faulty: not to be counted on
-  kForeignStop,  // it obeyed a stop that is not ours
-  kStartTold,    // when it began is known
+  kReady,          // read anew, or its motion ended where it should: its knowledge is settled
+  kStopped,        // its motion ended before its end
+  kNeverBegan,     // did not start with the others
+  kUnheard,        // in motion, does not answer at once, or has not begun yet: may have ended
+  kEnded,          // in motion, says that it stands, not yet where
+  kLost,           // silent, restarted, foreign or faulty: not to be counted on
+  kForeignStop,    // it obeyed a stop that is not ours
+  kStartReported,  // when it began is known
 };
 struct UnitEvent {
   PositionerIndex unit;
@@ -202,7 +202,7 @@ class Core {
   [[nodiscard]] Pose NearestInReach(PositionerIndex i, const Pose& pose) const;
   /// The camera or its own sensors found it at `place`, where its count had it elsewhere: the count
   /// is right from here on, but for the offset. Pre: it stands at one known place.
-  void See(PositionerIndex i, const Pose& place, SightingSource source);
+  void See(PositionerIndex i, const Pose& place, MeasurementSource source);
   /// A model has it that its place is so much more than its count. Pre: as See.
   void Expect(PositionerIndex i, const Pose& offset);
   /// Knowledge of a unit that is settled now: kept here and in the store.

@@ -5,7 +5,7 @@
 //   its hull mark clear, intent open, it began that    it ended by itself while nobody listened:
 //   reported mark clear, intent open, it did not       it never began: reported, if FLASH still
 //   says `from` no intent, FLASH equals the store         as good as before no intent, nothing
-//   stored                 first contact: reported anything else unknown: home it or measure it
+//   stored                 first sessions: reported anything else unknown: home it or measure it
 //
 // The interval is half an electrical turn wider than the hull: at power-on the field pulls the
 // rotor to the stored vector, at most that far.

@@ -24,18 +24,19 @@ class StartSkew {
 
   void Clear() { *this = {}; }
   void Add(PositionerIndex unit, const ClockMap::Instant& began) {
-    if (told_ == 0 || began.latest < surely_first_.began.latest) surely_first_ = {unit, began};
-    if (told_ == 0 || began.earliest > surely_last_.began.earliest) surely_last_ = {unit, began};
+    if (reported_ == 0 || began.latest < surely_first_.began.latest) surely_first_ = {unit, began};
+    if (reported_ == 0 || began.earliest > surely_last_.began.earliest)
+      surely_last_ = {unit, began};
     earliest_ = std::min(earliest_, began.earliest);
     latest_ = std::max(latest_, began.latest);
-    ++told_;
+    ++reported_;
     if (began.latest - began.earliest > kWellKnown) return;
     if (well_known_ == 0 || began.at < first_.began.at) first_ = {unit, began};
     if (well_known_ == 0 || began.at > last_.began.at) last_ = {unit, began};
     ++well_known_;
   }
 
-  [[nodiscard]] std::uint32_t told() const { return told_; }
+  [[nodiscard]] std::uint32_t reported() const { return reported_; }
   // Pre, of all below: told() > 0.
   struct Start {
     PositionerIndex unit;
@@ -58,7 +59,7 @@ class StartSkew {
   [[nodiscard]] DurationNs ThatIsWellKnown() const { return last_.began.at - first_.began.at; }
   [[nodiscard]] bool Proves() const { return well_known_ == 0 || least() > ThatIsWellKnown(); }
 
-  std::uint32_t told_ = 0;
+  std::uint32_t reported_ = 0;
   std::uint32_t well_known_ = 0;
   // Of these.
   Start first_;

@@ -11,7 +11,7 @@ namespace {
 constexpr std::size_t kTextMax = 400;  // of one row; a file's name and a cell may be long
 constexpr std::size_t kKindMax = 80;
 constexpr std::size_t kKindsCounted = 16;
-constexpr std::size_t kKindsTold = 5;
+constexpr std::size_t kKindsReported = 5;
 constexpr const char* kOther = "other reasons";
 
 // The text as a single line, not cut within a character of UTF-8.
@@ -31,7 +31,7 @@ std::string OneLine(std::string_view text, std::size_t size_max) {
 
 void BadRows::Add(std::string_view text, std::string_view kind) {
   ++count_;
-  if (told_.size() < limits::kBadRowsTold) told_.push_back(OneLine(text, kTextMax));
+  if (reported_.size() < limits::kBadRowsReported) reported_.push_back(OneLine(text, kTextMax));
   std::string named = OneLine(kind, kKindMax);
   if (of_kind_.size() >= kKindsCounted && of_kind_.find(named) == of_kind_.end()) named = kOther;
   ++of_kind_[named];
@@ -39,9 +39,9 @@ void BadRows::Add(std::string_view text, std::string_view kind) {
 
 Status BadRows::Check() const {
   if (empty()) return {};
-  std::string text = told_.front();
-  for (std::size_t k = 1; k < told_.size(); ++k) text += "\n  " + told_[k];
-  if (const std::size_t more = count_ - told_.size(); more > 0)
+  std::string text = reported_.front();
+  for (std::size_t k = 1; k < reported_.size(); ++k) text += "\n  " + reported_[k];
+  if (const std::size_t more = count_ - reported_.size(); more > 0)
     text += "\n  and " + std::to_string(more) + (more == 1 ? " more row" : " more rows") +
             "; all " + std::to_string(count_) + ": " + Totals();
   return Fail(ErrorCode::kInvalid, std::move(text));
@@ -55,7 +55,7 @@ std::string BadRows::Totals() const {
   std::string totals;
   std::size_t others = 0;  // some kinds, or what had no room among them
   for (std::size_t k = 0; k < kinds.size(); ++k) {
-    if (k >= kKindsTold || kinds[k].first == kOther) {
+    if (k >= kKindsReported || kinds[k].first == kOther) {
       others += kinds[k].second;
       continue;
     }

@@ -31,7 +31,7 @@ class BadRows {
  private:
   [[nodiscard]] std::string Totals() const;
 
-  std::vector<std::string> told_;
+  std::vector<std::string> reported_;
   std::size_t count_ = 0;
   std::map<std::string, std::size_t> of_kind_;
 };

@@ -8,7 +8,7 @@ using namespace std::string_view_literals;
 struct Format {
   std::string_view magic;
   std::size_t at;
-  const char* told;
+  const char* reported;
 };
 
 constexpr const char* kGzip = "compressed with gzip: unpack it first (gunzip)";
@@ -79,7 +79,7 @@ bool LooksLikeUtf16(std::string_view head) {
 std::optional<std::string> ForeignFormat(std::string_view bytes) {
   const std::string_view head = bytes.substr(0, 1024);
   for (const Format& format : kFormats)
-    if (Stands(format.magic, head, format.at)) return format.told;
+    if (Stands(format.magic, head, format.at)) return format.reported;
   if (Stands("PK\x03\x04"sv, head, 0) || Stands("PK\x05\x06"sv, head, 0)) return ZipText(head);
   // The word alone might be a column's name.
   if (Stands("PAR1"sv, head, 0) && bytes.size() > 8 && bytes.ends_with("PAR1"))

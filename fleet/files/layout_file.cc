@@ -50,7 +50,7 @@ Unit ReadUnit(CsvRow* row) {
   unit.group = IdIfAny(row, "group_id");
   unit.sensors = static_cast<std::uint8_t>(
       row->IntegerIfAny("hall_sensors", {0, limits::kSensorsPerUnit}).value_or(0));
-  unit.spine_mm = row->NumberIfAny("spine_mm").value_or(0);
+  unit.carrier_mm = row->NumberIfAny("spine_mm").value_or(0);
   unit.enabled = row->FlagIfAny("enabled").value_or(true);
   return unit;
 }
@@ -72,15 +72,15 @@ std::string LinePrefix(const UnitsFile& file, std::string_view text) {
 
 // Each line of a message by itself.
 std::string WithLines(const UnitsFile& file, std::string_view text) {
-  std::string told;
+  std::string reported;
   while (!text.empty()) {
     const std::size_t begin = std::min(text.find_first_not_of(' '), text.size());
     const std::size_t end = std::min(text.find('\n'), text.size() - 1) + 1;
     const std::string_view line = text.substr(begin, end - begin);
-    told.append(text.substr(0, begin)).append(LinePrefix(file, line)).append(line);
+    reported.append(text.substr(0, begin)).append(LinePrefix(file, line)).append(line);
     text.remove_prefix(end);
   }
-  return told;
+  return reported;
 }
 
 }  // namespace
@@ -169,7 +169,7 @@ std::string WriteUnits(std::span<const Unit> units) {
     if (sensors) {
       csv.Integer(unit.sensors);
       if (unit.sensors > 0) {
-        csv.Number(unit.spine_mm);
+        csv.Number(unit.carrier_mm);
       } else {
         csv.Missing();
       }

@@ -68,12 +68,12 @@ Status RequirePoses(const std::string& file, const Layout& layout,
   for (std::uint32_t i = 0; i < layout.size(); ++i) {
     const Unit& unit = layout.unit({i});
     if (poses[i] || (whose == WhoseState::kDisabled && unit.enabled)) continue;
-    if (++missing > limits::kBadRowsTold) continue;
+    if (++missing > limits::kBadRowsReported) continue;
     named += (missing > 1 ? ", " : "") + std::to_string(unit.id.value);
   }
   if (missing == 0) return {};
-  if (missing > limits::kBadRowsTold)
-    named += " and " + std::to_string(missing - limits::kBadRowsTold) + " more";
+  if (missing > limits::kBadRowsReported)
+    named += " and " + std::to_string(missing - limits::kBadRowsReported) + " more";
   return Fail(
       ErrorCode::kInvalid,
       file + ": no row for " + (whose == WhoseState::kDisabled ? "disabled " : std::string()) +

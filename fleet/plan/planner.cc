@@ -5,15 +5,15 @@
 #include <iterator>
 
 #include "fleet/plan/bounds.h"
-#include "fleet/plan/choreography.h"
 #include "fleet/plan/guarantee.h"
-#include "fleet/plan/lone_way.h"
-#include "fleet/plan/midway.h"
+#include "fleet/plan/in_cell_planner.h"
+#include "fleet/plan/local_search.h"
 #include "fleet/plan/objective.h"
-#include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
 #include "fleet/plan/schedule.h"
+#include "fleet/plan/sequential_planner.h"
 #include "fleet/plan/service.h"
+#include "fleet/plan/single_unit_feasibility.h"
 
 namespace focalfleet {
 namespace {
@@ -66,7 +66,7 @@ class Planner {
   [[nodiscard]] double MeanNeighbours() const;
   bool AllAtOnce(std::span<const AxisPaths> begin_with);
   bool LeaveStuck();
-  void PlanOfChoreography();
+  void PlanOfLocalSearch();
   void TracksOfPlan();
   void ServeTheRest();
   Plan Finish();
@@ -85,7 +85,7 @@ class Planner {
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
-  Choreography choreography_;                   // tracks of plan_
+  LocalSearchResult local_search_;              // tracks of plan_
   Plan plan_;
 };
 
@@ -130,14 +130,14 @@ bool Planner::Attempt(std::vector<Piece>* order) {
   std::vector<std::uint8_t> by_cell = movers_;
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     if (by_itself_[i] != 0) by_cell[i] = 0;
-  Retreat in(&scene_, request_.drives, &surroundings_, start_, by_cell);
+  SequentialPlanner in(&scene_, request_.drives, &surroundings_, start_, by_cell);
   in.Run();
-  Retreat out(&scene_, request_.drives, &surroundings_, service_.goals(), by_cell);
+  SequentialPlanner out(&scene_, request_.drives, &surroundings_, service_.goals(), by_cell);
   out.Run();
   stuck_ = in.stuck();
   stuck_.insert(stuck_.end(), out.stuck().begin(), out.stuck().end());
   if (stuck_.empty()) {
-    Midway turn(&scene_, request_.drives, &surroundings_, in.poses(), out.poses());
+    InCellPlanner turn(&scene_, request_.drives, &surroundings_, in.poses(), out.poses());
     turn.Run();
     stuck_ = turn.stuck();
     *order = in.pieces();
@@ -254,33 +254,33 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
       if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
       within_s = std::min(std::max(within_s, power_s) * slack, kOffsetMaxS);
     }
-    choreography_ = Choreograph({.scene = &scene_,
-                                 .drives = request_.drives,
-                                 .from = start_,
-                                 .to = service_.goals(),
-                                 .movable = may_move,
-                                 .begin_with = paths,
-                                 .given = request_.given,
-                                 .ledger = ledger ? &*ledger : nullptr,
-                                 .tolerance = tolerance,
-                                 .within_s = within_s,
-                                 .seed = options_.seed + fresh_starts,
-                                 .abandoned = options_.abandoned});
-    if (choreography_.starved) break;
-    if (choreography_.in_conflict.empty()) {
-      PlanOfChoreography();
+    local_search_ = SearchLocally({.scene = &scene_,
+                                   .drives = request_.drives,
+                                   .from = start_,
+                                   .to = service_.goals(),
+                                   .movable = may_move,
+                                   .begin_with = paths,
+                                   .given = request_.given,
+                                   .ledger = ledger ? &*ledger : nullptr,
+                                   .tolerance = tolerance,
+                                   .within_s = within_s,
+                                   .seed = options_.seed + fresh_starts,
+                                   .abandoned = options_.abandoned});
+    if (local_search_.starved) break;
+    if (local_search_.in_conflict.empty()) {
+      PlanOfLocalSearch();
       return true;
     }
     // Some may have no way at all: they stay, and the others are asked again.
-    stuck_ = choreography_.in_conflict;
+    stuck_ = local_search_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return !service_.is_movable(i); });
     if (AbandonHopeless()) continue;
     // The others may need more time within limits of power, or other luck.
     if (ledger) slack *= 1.1;
     if (ledger ? slack > kSlackMost : ++fresh_starts > kFreshStarts) break;
-    if (!options_.power.any()) paths = choreography_.paths;
+    if (!options_.power.any()) paths = local_search_.paths;
   }
-  choreography_ = {};
+  local_search_ = {};
   return false;
 }
 
@@ -307,10 +307,10 @@ bool Planner::LeaveStuck() {
   return false;
 }
 
-void Planner::PlanOfChoreography() {
+void Planner::PlanOfLocalSearch() {
   plan_ = {};
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {
-    const AxisPaths& paths = choreography_.paths[i];
+    const AxisPaths& paths = local_search_.paths[i];
     if (paths[0].size() + paths[1].size() == 0) continue;
     UnitPlan unit{.unit = {i},
                   .from = start_[i],
@@ -324,16 +324,16 @@ void Planner::PlanOfChoreography() {
 }
 
 void Planner::TracksOfPlan() {
-  choreography_.tracks.clear();
+  local_search_.tracks.clear();
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    choreography_.tracks.push_back(scene_.is_place(i) ? Track(scene_.arm(i), start_[i]) : Track());
+    local_search_.tracks.push_back(scene_.is_place(i) ? Track(scene_.arm(i), start_[i]) : Track());
   for (const UnitPlan& move : plan_.moves) {
     const std::uint32_t i = move.unit.value;
-    choreography_.tracks[i] = Track(scene_.arm(i), request_.drives[i], move.from, move.path);
+    local_search_.tracks[i] = Track(scene_.arm(i), request_.drives[i], move.from, move.path);
   }
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
     for (const NeighbourNeed& near : scene_.neighbours(i))
-      if (i < near.unit) choreography_.without_notice.emplace_back(i, near.unit);
+      if (i < near.unit) local_search_.without_notice.emplace_back(i, near.unit);
 }
 
 /// Those that found no turn in the order go among the others as these are planned.
@@ -353,12 +353,12 @@ Plan Planner::Finish() {
   Tolerance plain = proven;
   plain.notice_s = 0;
   FindFollowers({.scene = &scene_,
-                 .tracks = choreography_.tracks,
+                 .tracks = local_search_.tracks,
                  .tolerance = proven,
-                 .without_notice = choreography_.without_notice,
+                 .without_notice = local_search_.without_notice,
                  .notice_s = options_.notice_s},
                 &plan_);
-  plan_.tightest = FindTightest(scene_, choreography_.tracks, plain, kTightest);
+  plan_.tightest = FindTightest(scene_, local_search_.tracks, plain, kTightest);
   plan_.too_near = too_near_;
   plan_.bound_s = TimeBoundS(service_);
   plan_.unserved = service_.NotServed();
@@ -416,7 +416,7 @@ Result<Plan> Planner::Run() {
   FOCALFLEET_TRY_ASSIGN(
       plan_, Schedule(pieces, scene_, request_.drives, options_, ledger ? &*ledger : nullptr));
   if (at_once && too_near_.empty() && !stuck_for_order_.empty()) ServeTheRest();
-  if (choreography_.tracks.empty()) TracksOfPlan();
+  if (local_search_.tracks.empty()) TracksOfPlan();
   return Finish();
 }
 

@@ -2,10 +2,10 @@
 // time.
 //
 // The idea: all go at once, straight, and who would meet somebody goes later or another way, within
-// the time that the slowest unit needs anyhow (choreography.h, docs/adr/0007). Where units stand so
+// the time that the slowest unit needs anyhow (local search.h, docs/adr/0007). Where units stand so
 // close that this finds no end, an order is found in which they could go one at a time, and is run
-// in parallel under one rule (retreat.h, midway.h, schedule.h, docs/adr/0003). Either way every
-// pair is proven clear as the segments are sent, for every start skew and clock.
+// in parallel under one rule (sequential planner.h, in_cell.h, schedule.h, docs/adr/0003). Either
+// way every pair is proven clear as the segments are sent, for every start skew and clock.
 #pragma once
 
 #include <optional>

@@ -13,8 +13,8 @@
 #include "fleet/plan/plan.h"
 #include "fleet/plan/planner.h"
 #include "fleet/plan/power_ledger.h"
-#include "fleet/plan/retreat.h"
 #include "fleet/plan/scene.h"
+#include "fleet/plan/sequential_planner.h"
 
 namespace focalfleet {
 

@@ -18,8 +18,8 @@
 #include <utility>
 
 #include "sim/drive/bridge.h"
+#include "sim/drive/motor/shaft.h"
 #include "sim/drive/svpwm.h"
-#include "sim/motor/shaft.h"
 
 namespace focalfleet::sim {
 

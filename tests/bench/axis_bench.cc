@@ -10,9 +10,9 @@
 #include <ctime>
 #include <vector>
 
-#include "sim/axis/axis.h"
 #include "sim/drive/reduced_drive.h"
 #include "sim/drive/steady.h"
+#include "sim/world/axis/axis.h"
 #include "tests/bench/options.h"
 
 namespace {

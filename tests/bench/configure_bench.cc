@@ -1,9 +1,9 @@
 // CPU time of the host's side of one configuration, units and planner not counted: what the
-// coordinator, codec and outboxes of all buses take from the plan to the last unit's arrival, on
-// virtual time, against the simulated fleet in the same process. The host's calls alone are between
-// the two readings of the thread's clock; what these cost themselves stands in the last column and
-// is in the figures. Beside each size a loop of known work, so that figures of a busy machine can
-// be read.
+// coordinator, codec and transmit queues of all buses take from the plan to the last unit's
+// arrival, on virtual time, against the simulated fleet in the same process. The host's calls alone
+// are between the two readings of the thread's clock; what these cost themselves stands in the last
+// column and is in the figures. Beside each size a loop of known work, so that figures of a busy
+// machine can be read.
 //   configure_bench [--units 0] [--runs 5] [--per-bus 100]    0: 500, 1000, 2000 and 5000 units
 #include <algorithm>
 #include <cmath>
@@ -14,13 +14,13 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/outbox.h"
+#include "daemon/loop/transmit_queue.h"
 #include "fleet/coordinator.h"
 #include "fleet/hex_layout.h"
 #include "fleet/kinematics.h"
 #include "fleet/plan/job.h"
 #include "fleet/targets.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 #include "tests/bench/options.h"
 
 namespace {
@@ -99,7 +99,7 @@ class Run {
             Layout::Create(MakeHexLayout({.count = count, .units_per_bus = per_bus}), {}).value()),
         drives_(count),
         ports_(layout_.buses().size()),
-        outboxes_(layout_.buses().size()) {
+        transmit_queues_(layout_.buses().size()) {
     const auto start = Draw("start");
     sim::WorldConfig config;
     for (std::uint32_t n = 0; n < count; ++n)
@@ -147,9 +147,10 @@ class Run {
                         .plans = plans,
                         .committed_through = committed_},
                        &effects_);
-    for (const OutFrame& out : effects_.frames) outboxes_[out.bus.value].Put(out.frame, now_);
-    for (std::size_t bus = 0; bus < outboxes_.size(); ++bus)
-      if (outboxes_[bus].size() > 0) outboxes_[bus].Flush(&ports_[bus], now_);
+    for (const OutFrame& out : effects_.frames)
+      transmit_queues_[out.bus.value].Put(out.frame, now_);
+    for (std::size_t bus = 0; bus < transmit_queues_.size(); ++bus)
+      if (transmit_queues_[bus].size() > 0) transmit_queues_[bus].Flush(&ports_[bus], now_);
     const double taken = CpuSeconds() - begin;
     if (counting_) {
       figures_.whole_s += taken;
@@ -171,7 +172,7 @@ class Run {
   Layout layout_;
   std::vector<UnitDrive> drives_;
   std::vector<Taking> ports_;  // by bus, which are numbered from 0
-  std::vector<Outbox> outboxes_;
+  std::vector<TransmitQueue> transmit_queues_;
   std::unique_ptr<sim::World> world_;
   std::unique_ptr<Coordinator> coordinator_;
   HostInstant now_ = kBegin;

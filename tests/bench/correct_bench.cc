@@ -16,7 +16,7 @@
 #include "fleet/plan/planner.h"
 #include "fleet/targets.h"
 #include "protocol/base/check.h"
-#include "sim/spread.h"
+#include "sim/world/spread.h"
 #include "tests/scenario/in_process_fleet.h"
 
 namespace focalfleet::testing {

@@ -116,7 +116,7 @@ int Run(int argc, char** argv) {
   std::printf("%d exposures of %d units, %zu fiducials, air %.1f um; refused %d\n", exposures,
               units, field.fiducials().size(), traits.air.sigma_mm * 1e3, refused);
   for (std::size_t k = 0; k < all.count.size(); ++k)
-    std::printf("  %-15s %10u\n", Name(static_cast<SightingStatus>(k)), all.count[k]);
+    std::printf("  %-15s %10u\n", Name(static_cast<MeasurementStatus>(k)), all.count[k]);
   std::printf(
       "wrong and not flagged %u; wrong story %u; wrong and flagged %u; healthy, visible "
       "and not certain %u\n",

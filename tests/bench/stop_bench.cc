@@ -1,10 +1,10 @@
 // How long a stop of all takes on buses at their limit: from the command to the end of arbitration
 // of the last bus' stop frame, in frame times of the simulated bit clock. The real coordinator
-// uploads to every unit through the daemon's outboxes and simulated ports; a second host polls so
-// that no bit is left, and units answer everything several times over. The stop is one broadcast a
-// bus; what comes behind it (loaded units are asked to disarm) ends no motion. Ends with 1 where a
-// stop took more than two frame times, or a bus was not saturated: simulated time, so no matter of
-// the machine.
+// uploads to every unit through the daemon's transmit queues and simulated ports; a second host
+// polls so that no bit is left, and units answer everything several times over. The stop is one
+// broadcast a bus; what comes behind it (loaded units are asked to disarm) ends no motion. Ends
+// with 1 where a stop took more than two frame times, or a bus was not saturated: simulated time,
+// so no matter of the machine.
 //   stop_bench [--buses 50] [--units-per-bus 100] [--stops 200] [--seed 1]
 #include <algorithm>
 #include <cstdio>
@@ -13,7 +13,7 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/outbox.h"
+#include "daemon/loop/transmit_queue.h"
 #include "daemon/ports/simulated_port.h"
 #include "fleet/hex_layout.h"
 #include "fleet/plan/job.h"
@@ -62,7 +62,7 @@ class StopBench {
     coordinator_ =
         std::make_unique<Coordinator>(&layout_, drives_, CoordinatorConfig{}, StoredFleet{});
     for (const BusId bus : layout_.buses())
-      lines_.push_back({bus, std::make_unique<SimulatedPort>(fleet_, bus), Outbox()});
+      lines_.push_back({bus, std::make_unique<SimulatedPort>(fleet_, bus), TransmitQueue()});
     while (!AllReady()) Turn();
     for (const Unit& unit : layout_.units())
       fleet_->world().faults(unit.id)->copies = kAnswerCopies;
@@ -99,7 +99,7 @@ class StopBench {
   struct Line {
     BusId bus;
     std::unique_ptr<SimulatedPort> port;
-    Outbox outbox;
+    TransmitQueue transmit_queue;
   };
 
   [[nodiscard]] bool AllReady() const {
@@ -160,9 +160,10 @@ class StopBench {
     committed_ = std::max(committed_, effects_.batch);
     job_ = effects_.plan_job;
     for (const OutFrame& out : effects_.frames)
-      std::ranges::lower_bound(lines_, out.bus, {}, &Line::bus)->outbox.Put(out.frame, now_);
+      std::ranges::lower_bound(lines_, out.bus, {}, &Line::bus)
+          ->transmit_queue.Put(out.frame, now_);
     for (Line& line : lines_) {
-      if (line.outbox.size() > 0) line.outbox.Flush(line.port.get(), now_);
+      if (line.transmit_queue.size() > 0) line.transmit_queue.Flush(line.port.get(), now_);
       if (saturating_) Poll(line.bus);
     }
   }

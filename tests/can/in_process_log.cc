@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/config.h"
-#include "daemon/fleet_setup.h"
 #include "daemon/ports/simulated_port.h"
+#include "daemon/process/config.h"
+#include "daemon/process/fleet_setup.h"
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "fleet/plan/job.h"

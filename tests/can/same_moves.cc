@@ -176,11 +176,11 @@ void CompareMove(const Moved& stored, const OverheardUnit& unit, const Overheard
     Complain(who, "`done` at " + Text(stood) + ", stored " + Text(stored.stood));
 }
 
-using Told = std::set<std::pair<BusNode, std::uint16_t>>;  // moves that the store has, too
+using Reported = std::set<std::pair<BusNode, std::uint16_t>>;  // moves that the store has, too
 
-Told CompareStoreWithBus(const std::vector<Moved>& moves, const BusStory& story,
-                         const std::map<std::int64_t, BusNode>& places) {
-  Told told;
+Reported CompareStoreWithBus(const std::vector<Moved>& moves, const BusStory& story,
+                             const std::map<std::int64_t, BusNode>& places) {
+  Reported reported;
   for (const Moved& stored : moves) {
     const std::string who = "unit " + std::to_string(stored.unit_id);
     const auto place = places.find(stored.unit_id);
@@ -196,16 +196,16 @@ Told CompareStoreWithBus(const std::vector<Moved>& moves, const BusStory& story,
       Complain(who, "move " + std::to_string(stored.move) + " was never staged on the bus");
       continue;
     }
-    told.insert({place->second, id});
+    reported.insert({place->second, id});
     CompareMove(stored, unit->second, heard->second);
   }
-  return told;
+  return reported;
 }
 
-void CompareBusWithStore(const BusStory& story, const Told& told) {
+void CompareBusWithStore(const BusStory& story, const Reported& reported) {
   for (const auto& [where, unit] : story.units)
     for (const auto& [id, move] : unit.moves)
-      if (!move.started_us.empty() && told.count({where, id}) == 0)
+      if (!move.started_us.empty() && reported.count({where, id}) == 0)
         Complain(where.first + " node " + std::to_string(where.second),
                  "move " + std::to_string(id) + " was started, and the store does not know it");
 }
@@ -242,8 +242,8 @@ int Run(const std::vector<std::string>& arguments) {
     Complain("log", std::to_string(log->foreign) + " frames that are not ours");
 
   const auto moves = ReadMoves(database);
-  const Told told = CompareStoreWithBus(moves, story, places);
-  CompareBusWithStore(story, told);
+  const Reported reported = CompareStoreWithBus(moves, story, places);
+  CompareBusWithStore(story, reported);
   const std::size_t standing = CompareStandings(database, story);
   if (moves.empty()) Complain("store", "no moves at all");
   if (standing != places.size())

@@ -209,17 +209,18 @@ TEST(ResolveTargets, TellsAllBadRowsAtOnce) {
   const Fleet fleet = Hex(7);
   const Unit& other = fleet.layout.unit({1});
   const double toward = std::atan2(other.base_fp.y_mm, other.base_fp.x_mm) * 57.29578;
-  const std::string told =
+  const std::string reported =
       ErrorOf(fleet, {Row(99, PointFp{0, 0}, 2), Row(3, PointFp{300, 0}, 3),
                       Row(2, TargetAngles{toward + 180, 0}, 4), Row(2, PointFp{0, 0}, 5),
                       Row(1, TargetAngles{toward, 0}, 6), Row(4, TargetAngles{0, 270}, 7)});
-  EXPECT_THAT(told, ::testing::MatchesRegex(
-                        "night.csv:2: unit 99: unknown unit[^\n]*\n"
-                        "  night.csv:3: unit 3: x_mm 300.0000[^\n]*out of patrol[^\n]*\n"
-                        "  night.csv:5: unit 2: named twice, first in line 4\n"
-                        "  night.csv:7: unit 4: phi_deg 270.0000 is out of its range[^\n]*\n"
-                        "  night.csv:6: unit 1: its target collides with that of unit 2 in line "
-                        "4[^\n]*"));
+  EXPECT_THAT(reported,
+              ::testing::MatchesRegex(
+                  "night.csv:2: unit 99: unknown unit[^\n]*\n"
+                  "  night.csv:3: unit 3: x_mm 300.0000[^\n]*out of patrol[^\n]*\n"
+                  "  night.csv:5: unit 2: named twice, first in line 4\n"
+                  "  night.csv:7: unit 4: phi_deg 270.0000 is out of its range[^\n]*\n"
+                  "  night.csv:6: unit 1: its target collides with that of unit 2 in line "
+                  "4[^\n]*"));
 }
 
 TEST(ResolveTargets, CountsWhatItDoesNotTellByItsReason) {

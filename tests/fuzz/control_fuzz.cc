@@ -15,9 +15,9 @@
 #include "daemon/control/line_buffer.h"
 #include "daemon/control/messages.h"
 #include "daemon/control/printable.h"
-#include "daemon/requested_command.h"
+#include "daemon/verbs/requested_command.h"
 #include "protocol/base/check.h"
-#include "tests/daemon/shell/small_fleet.h"
+#include "tests/daemon/verbs/small_fleet.h"
 
 namespace focalfleet {
 namespace {
@@ -44,7 +44,7 @@ void CheckUnits(const Command& command) {
         } else if constexpr (std::is_same_v<What, ApplyCommand>) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
         } else if constexpr (std::is_same_v<What, KeepModelCommand>) {
-          FOCALFLEET_CHECK(false);  // made by the desk itself
+          FOCALFLEET_CHECK(false);  // made by the request handler itself
         } else {
           exists(what.unit);
         }

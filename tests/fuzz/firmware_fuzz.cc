@@ -11,7 +11,7 @@
 #include "protocol/base/check.h"
 #include "protocol/base/limits.h"
 #include "protocol/wire/codec.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::sim {
 namespace {

@@ -15,8 +15,8 @@
 #include "daemon/hall/field_model_file.h"
 #include "daemon/hall/hall_tables.h"
 #include "protocol/base/check.h"
+#include "sim/hall/fibre_carrier.h"
 #include "sim/hall/orient.h"
-#include "sim/hall/spine.h"
 
 namespace focalfleet {
 namespace {
@@ -67,7 +67,7 @@ void TryModel(std::string_view text) {
 
 void TryCounts(std::string_view bytes) {
   static const sim::OrientationSolver solver(
-      sim::SpineRig(kSensors), sim::MakeField(sim::SurfaceParameters{.amplitude_T = 0.08}));
+      sim::FibreCarrierRig(kSensors), sim::MakeField(sim::SurfaceParameters{.amplitude_T = 0.08}));
   std::array<std::uint16_t, kSensors> counts{};
   std::memcpy(counts.data(), bytes.data(), std::min(bytes.size(), sizeof counts));
   const sim::HallReading reading =

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/config.h"
+#include "daemon/process/config.h"
 #include "daemon/simulator/memory_file.h"
 #include "protocol/base/check.h"
 

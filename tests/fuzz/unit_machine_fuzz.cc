@@ -18,7 +18,7 @@
 #include "protocol/base/limits.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/stage_group.h"
-#include "sim/unit/unit_machine.h"
+#include "sim/world/unit/unit_machine.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -52,7 +52,7 @@ class Bench {
   void Give(const CanFrame& frame) {
     const bool powered = machine_.powered();
     const auto request = DecodeHost(frame);
-    Outbox out;
+    TransmitQueue out;
     machine_.OnFrame(frame, now_, &out);
     const bool to_it =
         request && (request->address.node == kNode || request->address.node == kBroadcastNode);
@@ -81,7 +81,7 @@ class Bench {
     }
     const auto entries = UnpackGroup(group);
     const bool powered = machine_.powered();
-    Outbox out;
+    TransmitQueue out;
     machine_.OnGroup(group, now_, &out);
     FOCALFLEET_CHECK(out.frames().size() <= (powered && entries ? entries->count : 0u));
     for (const CanFrame& answer : out.frames()) {
@@ -92,7 +92,7 @@ class Bench {
   }
   /// What an honest host does: reads back, then arms by the digest that it read.
   void ArmWhatIsHeld(MoveId move) {
-    Outbox out;
+    TransmitQueue out;
     machine_.OnFrame(Encode(HostMessage{Confirm{move}}, {kNode, 3}), now_, &out);
     if (out.frames().empty()) return;
     const auto reply = DecodeUnit(out.frames()[0]);
@@ -104,7 +104,7 @@ class Bench {
     const BoardInstant until = now_ + pause;
     for (int i = 0; i < 8 && machine_.deadline() <= until; ++i) {
       now_ = std::max(now_, machine_.deadline());
-      Outbox out;
+      TransmitQueue out;
       machine_.OnTime(now_, &out);
       for (const CanFrame& said : out.frames()) {
         const auto message = DecodeUnit(said);
@@ -116,7 +116,7 @@ class Bench {
     now_ = std::max(now_, until);
   }
   void Trip(FaultCode code, Axis axis) {
-    Outbox out;
+    TransmitQueue out;
     machine_.RaiseFault({code, axis}, now_, &out);
     CheckAll();
   }

@@ -212,7 +212,7 @@ TEST(HiddenKey, WhatAStuckUnitHasIsNotVisible) {
   EXPECT_EQ(lambda_of(500), 0);  // all of them
 }
 
-TEST(HiddenKey, MissingColumnsAreTold) {
+TEST(HiddenKey, MissingColumnsAreReported) {
   Wishes wishes;
   wishes.cause = "gravity_sag";
   wishes.units = 8;

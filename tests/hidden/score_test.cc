@@ -187,13 +187,13 @@ TEST(HiddenScore, GainIsHeldAgainstTheOracles) {
   ExpectShare(score, "axis", 2, 2);
 }
 
-TEST(HiddenScore, MissingColumnsMustBeTold) {
+TEST(HiddenScore, MissingColumnsMustBeReported) {
   Json effect = Effect("gravity_sag", 500);
   effect["missing_columns"] = {"elevation_deg"};
   const Json key = KeyOf("single", {effect});
-  Json told = ReportOf("unknown", {});
-  told["not_testable"] = {{{"cause", "gravity_sag"}, {"why", "no elevation_deg"}}};
-  const Score score = ScoreCases({CaseOf(key, told), CaseOf(key, ReportOf("unknown", {}))});
+  Json reported = ReportOf("unknown", {});
+  reported["not_testable"] = {{{"cause", "gravity_sag"}, {"why", "no elevation_deg"}}};
+  const Score score = ScoreCases({CaseOf(key, reported), CaseOf(key, ReportOf("unknown", {}))});
   ExpectShare(score, "not_testable", 1, 2);
   ExpectShare(score, "exact_100", 0, 0);
 }

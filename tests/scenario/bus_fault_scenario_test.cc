@@ -95,7 +95,7 @@ TEST(BusFaults, ABabblingUnitTakesOnlyItsBus) {
   ExpectAllArriveNow(&fleet, 33);
 }
 
-TEST(BusFaults, BusOffInMidMotionIsToldWithItsCauseAndTheBusComesBack) {
+TEST(BusFaults, BusOffInMidMotionIsReportedWithItsCauseAndTheBusComesBack) {
   InProcessFleet fleet({.count = kUnits, .seed = 34});
   fleet.Run(Seconds(2));
   const BusId sick = fleet.layout().buses()[2];

@@ -81,7 +81,7 @@ TEST(BusyHost, WhatItSaysOfClocksAndStartsIsTrueWhereverItIsHeldUp) {
     fleet.Run(Seconds(1));
     const StartView& said = fleet.coordinator().configuration().starts;
     // Of several rounds the widest is told; the last one is at hand.
-    if (fleet.coordinator().configuration().round == said.round && said.told == said.begun) {
+    if (fleet.coordinator().configuration().round == said.round && said.reported == said.begun) {
       const double true_s = TrueSkew_s(fleet, fleet.world().Truth(0).last_move);
       EXPECT_LE(said.least_s, true_s + 1e-9);
       EXPECT_GE(said.most_s, true_s - 1e-9);

@@ -256,7 +256,7 @@ TEST(Configuration, DeadBusTakesOnlyItsUnits) {
 }
 
 // A controller warns, goes passive, then off in mid-move, and comes back.
-TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
+TEST(Configuration, EveryStepOfALinkIsReportedWithItsCauseAndOnlyOffLosesUnits) {
   InProcessFleet fleet(Small(23));
   const BusId sick = fleet.layout().buses()[2];
   const auto phases = [&](UnitPhase phase) {
@@ -270,17 +270,18 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
   const auto of_bus =
       static_cast<int>(std::ranges::count(fleet.layout().units(), sick, &Unit::bus));
   fleet.Run(Seconds(2));
-  fleet.TellLink({sick, LinkState::kUp, "the controller warns of errors (bit error)"});
-  fleet.TellLink({sick, LinkState::kPassive, "the controller is error-passive (bit error)"});
+  fleet.ReportLink({sick, LinkState::kUp, "the controller warns of errors (bit error)"});
+  fleet.ReportLink({sick, LinkState::kPassive, "the controller is error-passive (bit error)"});
   fleet.ApplyRandom(23);
   RunIntoMotion(&fleet, Seconds(2));
   EXPECT_GT(phases(UnitPhase::kMoving), 0) << "a passive controller still carries frames";
   fleet.world().KillBus(sick);
-  fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off (no acknowledgement)"});
+  fleet.ReportLink({sick, LinkState::kOff, "the controller is bus-off (no acknowledgement)"});
   fleet.Run(Milliseconds(10));
   EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
-  fleet.TellLink({sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
-  fleet.TellLink({sick, LinkState::kDown, "the interface is down"});
+  fleet.ReportLink(
+      {sick, LinkState::kOff, "the controller is bus-off; no privilege to restart it"});
+  fleet.ReportLink({sick, LinkState::kDown, "the interface is down"});
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.ExpectStoreTellsTheTruth("while the bus is off");
   const std::string name = "bus " + std::to_string(sick.value);
@@ -296,7 +297,7 @@ TEST(Configuration, EveryStepOfALinkIsToldWithItsCauseAndOnlyOffLosesUnits) {
   EXPECT_NE(Unserved(fleet).find("it cannot be reached: " + name + " is off"), std::string::npos)
       << Unserved(fleet);
   fleet.world().ReviveBus(sick);
-  fleet.TellLink({sick, LinkState::kUp, ""});
+  fleet.ReportLink({sick, LinkState::kUp, ""});
   fleet.Run(Seconds(10));
   EXPECT_EQ(phases(UnitPhase::kReady), of_bus);
   fleet.ApplyRandom(24);
@@ -313,7 +314,7 @@ TEST(Configuration, UnitsBehindAPassiveControllerKeepTheirHost) {
   };
   const std::uint64_t passive_before = sent(0);
   const std::uint64_t up_before = sent(1);
-  fleet.TellLink({fleet.layout().buses()[0], LinkState::kPassive, ""});
+  fleet.ReportLink({fleet.layout().buses()[0], LinkState::kPassive, ""});
   fleet.Run(Seconds(20));
   const auto passive = static_cast<double>(sent(0) - passive_before);
   const auto up = static_cast<double>(sent(1) - up_before);

@@ -13,9 +13,9 @@
 #include "fleet/drive_power.h"
 #include "fleet/estimate.h"
 #include "protocol/base/rng.h"
-#include "sim/axis/field_path.h"
 #include "sim/drive/start_study.h"
 #include "sim/drive/steady.h"
+#include "sim/world/axis/field_path.h"
 #include "tests/fleet/plan/planning.h"
 #include "tests/support/seed.h"
 

@@ -42,7 +42,7 @@ class HallFleet : public ::testing::Test {
                    ("focalfleet_hall_" + std::to_string(getpid()) +
                     ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
     std::filesystem::create_directories(directory_);
-    Write("model.toml", WriteHallModel(FittedSpineModel()));
+    Write("model.toml", WriteHallModel(FittedFibreCarrierModel()));
   }
   void Configure(std::uint32_t units, const std::string& bus) {
     layout_.emplace(Layout::Create(MakeHexLayout({.count = units, .sensors = 8}), {}).value());
@@ -108,21 +108,21 @@ class HallFleet : public ::testing::Test {
   std::optional<Process> daemon_;
 };
 
-using Spines = std::map<std::uint32_t, SpineReading>;
+using FibreCarriers = std::map<std::uint32_t, FibreCarrierReading>;
 
-bool Agree(const SpineReading& told, const SpineReading& in_store) {
-  return told.verdict == in_store.verdict && told.trusted == in_store.trusted &&
-         (!in_store.solved || (told.angles_deg == in_store.angles_deg &&
-                               told.covariance_deg2 == in_store.covariance_deg2));
+bool Agree(const FibreCarrierReading& reported, const FibreCarrierReading& in_store) {
+  return reported.verdict == in_store.verdict && reported.trusted == in_store.trusted &&
+         (!in_store.solved || (reported.angles_deg == in_store.angles_deg &&
+                               reported.covariance_deg2 == in_store.covariance_deg2));
 }
 
 // The newest orientation of each unit, once they are what the store has: topics are told when there
 // is time, the last values last.
-Spines ReadOrientations(StatusReader* reader, const Spines& in_store) {
-  Spines told;
+FibreCarriers ReadOrientations(StatusReader* reader, const FibreCarriers& in_store) {
+  FibreCarriers reported;
   const auto agrees = [&](const auto& entry) {
-    const auto found = told.find(entry.first);
-    return found != told.end() && Agree(found->second, entry.second);
+    const auto found = reported.find(entry.first);
+    return found != reported.end() && Agree(found->second, entry.second);
   };
   const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(kPatienceMs);
   StatusUpdate update;
@@ -131,9 +131,9 @@ Spines ReadOrientations(StatusReader* reader, const Spines& in_store) {
     EXPECT_TRUE(reader->Take(&update));
     EXPECT_EQ(update.malformed, 0u);
     for (const UnitOrientationValue& value : update.orientations)
-      told[value.unit.value] = value.spine;
+      reported[value.unit.value] = value.carrier;
   }
-  return told;
+  return reported;
 }
 
 TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
@@ -154,7 +154,8 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
     EXPECT_EQ(round.at("by_sensors"), round.at("measured"));
     std::printf("%s\n", round.dump().c_str());
   }
-  // Every unit that rests is measured; 4 % slip or are dead, 8.5 % are off scale (sim/spread.h).
+  // Every unit that rests is measured; 4 % slip or are dead, 8.5 % are off scale
+  // (sim/world/spread.h).
   EXPECT_GE(rounds[2].at("measured").get<std::uint32_t>(), 490u)
       << Ask("status", Json::object()).value_or(Json{}).dump();
   EXPECT_GE(rounds[2].at("within_tolerance").get<std::uint32_t>(), 430u);
@@ -165,15 +166,15 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
   ASSERT_TRUE(rows) << rows.error().text;
   ASSERT_EQ(rows->size(), kUnits);
   std::uint32_t stored = 0;
-  Spines spine_of;
+  FibreCarriers carrier_of;
   for (const auto& [row, at, moved_since] : *rows) {
-    ASSERT_TRUE(row.spine) << row.unit.value;
-    EXPECT_EQ(row.source, SightingSource::kSensors);
-    spine_of[row.unit.value] = *row.spine;
-    if (row.status != SightingStatus::kMeasured) continue;
+    ASSERT_TRUE(row.carrier) << row.unit.value;
+    EXPECT_EQ(row.source, MeasurementSource::kSensors);
+    carrier_of[row.unit.value] = *row.carrier;
+    if (row.status != MeasurementStatus::kMeasured) continue;
     ++stored;
-    EXPECT_EQ(row.spine->verdict, "ok");
-    EXPECT_GT(row.spine->covariance_deg2[0], 0);
+    EXPECT_EQ(row.carrier->verdict, "ok");
+    EXPECT_GT(row.carrier->covariance_deg2[0], 0);
     EXPECT_GT(row.covariance.xx * row.covariance.yy, row.covariance.xy * row.covariance.xy);
   }
   EXPECT_GE(stored, 490u);
@@ -189,11 +190,11 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
   options.dds = {OwnDomain(), {}};
   auto joined = StatusReader::Create(options);
   ASSERT_TRUE(joined) << joined.error().text;
-  const Spines told = ReadOrientations(joined->get(), spine_of);
-  ASSERT_EQ(told.size(), kUnits);
-  for (const auto& [unit, spine] : told)
-    EXPECT_TRUE(Agree(spine, spine_of.at(unit)))
-        << unit << ": " << spine.verdict << ", " << spine.angles_deg[0] << " deg";
+  const FibreCarriers reported = ReadOrientations(joined->get(), carrier_of);
+  ASSERT_EQ(reported.size(), kUnits);
+  for (const auto& [unit, carrier] : reported)
+    EXPECT_TRUE(Agree(carrier, carrier_of.at(unit)))
+        << unit << ": " << carrier.verdict << ", " << carrier.angles_deg[0] << " deg";
   daemon_->Signal(SIGTERM);
   EXPECT_EQ(daemon_->Wait(), 0);
 }
@@ -247,18 +248,18 @@ TEST_F(HallFleet, WhoseSensorLiesIsNamedInTheStore) {
   for (const Liar& liar : kLiars) liar_of[liar.unit] = &liar;
   std::size_t judged = 0;
   for (const auto& [row, at, moved_since] : *rows) {
-    ASSERT_TRUE(row.spine) << row.unit.value;
+    ASSERT_TRUE(row.carrier) << row.unit.value;
     const auto found = liar_of.find(row.unit.value);
     if (found == liar_of.end()) {
-      EXPECT_EQ(row.spine->verdict, "ok") << row.unit.value;
+      EXPECT_EQ(row.carrier->verdict, "ok") << row.unit.value;
       continue;
     }
     ++judged;
-    std::printf("unit %u: %s\n", row.unit.value, row.spine->verdict.c_str());
-    EXPECT_EQ(row.status == SightingStatus::kMeasured, found->second->measured);
+    std::printf("unit %u: %s\n", row.unit.value, row.carrier->verdict.c_str());
+    EXPECT_EQ(row.status == MeasurementStatus::kMeasured, found->second->measured);
     // One or two readings tell who, and not always how.
     const std::string who = "bad v" + std::to_string(found->second->sensor);
-    EXPECT_THAT(row.spine->verdict, ::testing::AnyOf(found->second->named, who, "cannot tell"));
+    EXPECT_THAT(row.carrier->verdict, ::testing::AnyOf(found->second->named, who, "cannot tell"));
   }
   EXPECT_EQ(judged, std::size(kLiars));
 }

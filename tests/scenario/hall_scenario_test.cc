@@ -16,12 +16,14 @@ namespace {
 
 class HallScenario : public ::testing::Test {
  protected:
-  static void SetUpTestSuite() { model_ = std::make_unique<HallModelFile>(FittedSpineModel()); }
+  static void SetUpTestSuite() {
+    model_ = std::make_unique<HallModelFile>(FittedFibreCarrierModel());
+  }
   static void TearDownTestSuite() { model_.reset(); }
 
   void Make(const InProcessFleet::Options& options) {
     fleet_ = std::make_unique<InProcessFleet>(options);
-    auto worker = SpineWorker::Create(fleet_->layout(), *model_, {});
+    auto worker = FibreCarrierWorker::Create(fleet_->layout(), *model_, {});
     ASSERT_TRUE(worker) << worker.error().text;
     worker_ = std::move(*worker);
     fleet_->measurer = [this](const ExposureJob& job) {
@@ -37,7 +39,7 @@ class HallScenario : public ::testing::Test {
   }
 
   std::unique_ptr<InProcessFleet> fleet_;
-  std::unique_ptr<SpineWorker> worker_;
+  std::unique_ptr<FibreCarrierWorker> worker_;
   static std::unique_ptr<HallModelFile> model_;
 };
 std::unique_ptr<HallModelFile> HallScenario::model_;
@@ -81,17 +83,17 @@ TEST_F(HallScenario, WhoseSensorLiesIsNamedAndStaysAsItReports) {
   ASSERT_TRUE(fleet_->RunUntilIdle());
   for (const std::uint32_t liar : {3u, 4u}) {
     const UnitView& view = fleet_->coordinator().unit({liar});
-    EXPECT_EQ(view.sighting, SightingStatus::kSensorsDoubted);
+    EXPECT_EQ(view.measurement, MeasurementStatus::kSensorsDoubted);
     EXPECT_EQ(view.knowledge[0].witness, Witness::kReported);
     EXPECT_FALSE(view.error_um);
-    EXPECT_NE(view.outcome_reason.find(view.spine->verdict), std::string::npos);
+    EXPECT_NE(view.outcome_reason.find(view.carrier->verdict), std::string::npos);
     EXPECT_TRUE(HasAlarm(*fleet_, "unit " + std::to_string(fleet_->id(liar).value) +
                                       " is not measured by its sensors: "));
     std::printf("unit %u: %s\n", liar, view.outcome_reason.c_str());
   }
   const UnitView& without = fleet_->coordinator().unit({5});
   EXPECT_EQ(without.knowledge[0].witness, Witness::kMeasured);
-  EXPECT_EQ(without.spine->verdict, "missing v7");
+  EXPECT_EQ(without.carrier->verdict, "missing v7");
   const MeasuredRound& last = fleet_->coordinator().configuration().measured.back();
   EXPECT_EQ(last.measured, 38u);
   EXPECT_EQ(last.unknown, 2u);

@@ -33,7 +33,7 @@ sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDriv
                                  .base_y_mm = unit.base_fp.y_mm,
                                  .axis = {},
                                  .sensors = unit.sensors,
-                                 .spine_mm = unit.spine_mm,
+                                 .carrier_mm = unit.carrier_mm,
                                  .enabled = unit.enabled};
   for (const Axis axis : kAxes) {
     const AxisGeometry& g = unit.axis[Index(axis)];
@@ -174,24 +174,25 @@ ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
                                                                   .reported = job.reported,
                                                                   .drives = drives_});
   ExposureFindings exposure{
-      .id = job.id, .sightings = {}, .after_request_s = options_.exposure_delay.seconds()};
+      .id = job.id, .measurements = {}, .after_request_s = options_.exposure_delay.seconds()};
   for (std::uint32_t n = 0; n < layout_->size(); ++n) {
     const sim::UnitTruth truth = world_->Truth(n);
     const double noise_mm = 1e-3 * options_.centroid_sigma_um;
-    Sighting sighting{.unit = {n},
-                      .status = SightingStatus::kMeasured,
-                      .other = {},
-                      .x_mm = truth.x_mm + noise_mm * camera_noise_.Normal(),
-                      .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
-                      .covariance = RoundCovariance(options_.centroid_sigma_um),
-                      .place = {}};
-    const PointFp seen{sighting.x_mm, sighting.y_mm};
+    Measurement measurement{.unit = {n},
+                            .status = MeasurementStatus::kMeasured,
+                            .other = {},
+                            .x_mm = truth.x_mm + noise_mm * camera_noise_.Normal(),
+                            .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
+                            .covariance = RoundCovariance(options_.centroid_sigma_um),
+                            .place = {}};
+    const PointFp seen{measurement.x_mm, measurement.y_mm};
     if (IsPlace(job.expected[n]))
-      sighting.place = PlaceSeen(layout_->units()[n], drives_[n], seen, PlaceOf(job.expected[n]));
+      measurement.place =
+          PlaceSeen(layout_->units()[n], drives_[n], seen, PlaceOf(job.expected[n]));
     else
-      sighting.place = PoseOfLost(layout_->units()[n], drives_[n], seen, expected[n],
-                                  options_.centroid_sigma_um * 1e-3);
-    exposure.sightings.push_back(sighting);
+      measurement.place = PoseOfLost(layout_->units()[n], drives_[n], seen, expected[n],
+                                     options_.centroid_sigma_um * 1e-3);
+    exposure.measurements.push_back(measurement);
   }
   return {job.id, std::move(exposure)};
 }

@@ -18,7 +18,7 @@
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
 #include "protocol/base/rng.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 #include "tests/support/memory_store.h"
 
 namespace focalfleet::testing {
@@ -66,7 +66,7 @@ class InProcessFleet {
   /// What the port of a bus tells of its link, beside what it tells of its controller by itself.
   /// Frames pass all the same: only what the coordinator makes of it is tried; KillBus is the other
   /// half.
-  void TellLink(LinkEvent event) { links_.push_back(std::move(event)); }
+  void ReportLink(LinkEvent event) { links_.push_back(std::move(event)); }
 
   /// A frame that no unit sent, heard with the next step.
   void Hear(const ReceivedFrame& frame) { heard_.push_back(frame); }

@@ -113,15 +113,16 @@ TEST(Measured, CorrectionsThatNobodySawAreUnmeasured) {
 }
 
 TEST(Measured, UnitsThatTheCameraDoesNotFindHaveNotArrived) {
-  constexpr SightingStatus kUnsure[] = {SightingStatus::kStrayed,       SightingStatus::kSwapped,
-                                        SightingStatus::kSwapSuspected, SightingStatus::kBlended,
-                                        SightingStatus::kAmbiguous,     SightingStatus::kMissing,
-                                        SightingStatus::kOutsidePatrol};
+  constexpr MeasurementStatus kUnsure[] = {
+      MeasurementStatus::kStrayed,       MeasurementStatus::kSwapped,
+      MeasurementStatus::kSwapSuspected, MeasurementStatus::kBlended,
+      MeasurementStatus::kAmbiguous,     MeasurementStatus::kMissing,
+      MeasurementStatus::kOutsidePatrol};
   InProcessFleet fleet(WithCamera(7));
   fleet.camera_fault = [&](ExposureDone* done) {
     for (std::size_t k = 0; k < std::size(kUnsure); ++k) {
-      done->exposure->sightings[2 * k].status = kUnsure[k];
-      done->exposure->sightings[2 * k].place.reset();
+      done->exposure->measurements[2 * k].status = kUnsure[k];
+      done->exposure->measurements[2 * k].place.reset();
     }
   };
   fleet.ApplyRandomMeasured(3, {.corrections = 1, .tolerance_um = 100});

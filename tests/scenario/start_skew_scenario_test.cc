@@ -79,8 +79,8 @@ TEST(StartSkew, IsMeasuredAsItIs) {
     ASSERT_TRUE(fleet.RunUntilIdle());
     const StartView& said = fleet.coordinator().configuration().starts;
     EXPECT_EQ(said.round, 1u);
-    EXPECT_EQ(said.told, said.begun);
-    EXPECT_EQ(said.told, truth.count);
+    EXPECT_EQ(said.reported, said.begun);
+    EXPECT_EQ(said.reported, truth.count);
     EXPECT_NEAR(said.skew_s, truth.skew_s(), said.bound_s + kLook_s);
     EXPECT_LE(said.least_s, said.skew_s);
     EXPECT_LE(said.skew_s, said.most_s);
@@ -98,7 +98,7 @@ TEST(StartSkew, IsMeasuredAsItIs) {
 }
 
 // A controller that holds its frames up: all units of one bus begin late.
-TEST(StartSkew, BeyondTheToleranceIsToldAndPlannedWithNextTime) {
+TEST(StartSkew, BeyondTheToleranceIsReportedAndPlannedWithNextTime) {
   const std::uint64_t seed = TestSeed(31);
   InProcessFleet fleet({.count = 61, .units_per_bus = 20, .seed = seed});
   fleet.Run(Seconds(15));
@@ -146,11 +146,11 @@ TEST(StartSkew, BeyondTheToleranceIsToldAndPlannedWithNextTime) {
   EXPECT_EQ(Troubles(fleet).size(), 1u);
 }
 
-TEST(StartSkew, AClockThatIsTooFarOffIsTold) {
+TEST(StartSkew, AClockThatIsTooFarOffIsReported) {
   const std::uint64_t seed = TestSeed(41);
   InProcessFleet fleet({.count = 7, .units_per_bus = 7, .seed = seed, .clock_error_max = 0.012});
   fleet.Run(Seconds(60));
-  std::uint32_t told = 0;
+  std::uint32_t reported = 0;
   std::uint32_t off = 0;
   for (std::uint32_t n = 0; n < 7; ++n) {
     const ClockView& clock = fleet.coordinator().unit({n}).clock;
@@ -160,11 +160,11 @@ TEST(StartSkew, AClockThatIsTooFarOffIsTold) {
   }
   for (const AlarmRow& alarm : Troubles(fleet)) {
     EXPECT_THAT(alarm.text, HasSubstr("'s clock is off by "));
-    ++told;
+    ++reported;
   }
   EXPECT_GT(off, 0u);
-  EXPECT_GE(told, off);  // once each
-  EXPECT_LE(told, 7u);
+  EXPECT_GE(reported, off);  // once each
+  EXPECT_LE(reported, 7u);
 }
 
 // ---- the SYNC line
@@ -232,7 +232,7 @@ TEST(StartSkew, OfFiftyBusesWithAHundredUnitsEachIsWithinWhatPlansAllowFor) {
   const std::uint32_t moved = truth.count;
   EXPECT_GE(moved, 4900u);
   EXPECT_EQ(said.begun, moved);
-  EXPECT_EQ(said.told, said.begun);
+  EXPECT_EQ(said.reported, said.begun);
   EXPECT_NEAR(said.skew_s, truth.skew_s(), said.bound_s + kLook_s);
   EXPECT_LE(said.least_s, truth.skew_s() + kLook_s);
   EXPECT_GE(said.most_s, truth.skew_s() - kLook_s);

@@ -31,7 +31,7 @@ bool RunUntilUploading(InProcessFleet* fleet) {
 
 // Writes to a link fail in the middle of an upload, whether its port says so or not; it comes back.
 TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
-  for (const bool told : {false, true}) {
+  for (const bool reported : {false, true}) {
     InProcessFleet fleet({.count = 60, .units_per_bus = 20, .seed = 80});
     fleet.Run(Seconds(5));
     const BusId dead = fleet.layout().buses()[1];
@@ -39,7 +39,7 @@ TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
     ASSERT_TRUE(RunUntilUploading(&fleet));
     fleet.Run(Milliseconds(2));
     fleet.world().KillBus(dead);
-    if (told) fleet.TellLink({dead, LinkState::kDown, "write failed"});
+    if (reported) fleet.ReportLink({dead, LinkState::kDown, "write failed"});
     ASSERT_TRUE(fleet.RunUntilIdle());
     for (std::uint32_t n = 0; n < 60; ++n)
       if (fleet.layout().units()[n].bus == dead) {
@@ -48,7 +48,7 @@ TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
       }
     EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 25u) << Unserved(fleet);
     fleet.world().ReviveBus(dead);
-    if (told) fleet.TellLink({dead, LinkState::kUp, ""});
+    if (reported) fleet.ReportLink({dead, LinkState::kUp, ""});
     fleet.Run(Seconds(10));
     fleet.ApplyRandom(81);
     ASSERT_TRUE(fleet.RunUntilIdle());

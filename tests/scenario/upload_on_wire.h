@@ -10,7 +10,7 @@
 #include "protocol/wire/codec.h"
 #include "protocol/wire/frame_bits.h"
 #include "protocol/wire/stage_group.h"
-#include "sim/world.h"
+#include "sim/world/world.h"
 
 namespace focalfleet::testing {
 

@@ -80,13 +80,13 @@ void CameraField::Move(const FieldTroubles& troubles) {
   DrawSwaps(troubles);
   for (std::uint32_t i = 0; i < units_.size(); ++i) {
     PlantedUnit& unit = units_[i];
-    const AxisAngles told =
+    const AxisAngles reported =
         unit.fate == PlantedFate::kSwapped ? units_[unit.swapped_with].commanded : unit.commanded;
     const double tail = rng_.Uniform() < troubles.tail_share ? rng_.Uniform(3, 30) : 1;
     const double share[] = {unit.fate == PlantedFate::kSlipping ? rng_.Uniform() : 1,
                             unit.fate == PlantedFate::kSlipping ? rng_.Uniform() : 1};
     const double from[] = {unit.before.theta_deg, unit.before.phi_deg};
-    const double to[] = {told.theta_deg, told.phi_deg};
+    const double to[] = {reported.theta_deg, reported.phi_deg};
     double ends[2];
     for (std::size_t k = 0; k < kAxisCount; ++k) {
       const double error = tail * troubles.blind_sigma_deg * rng_.Normal();
@@ -224,7 +224,7 @@ class Judging {
 
  private:
   void JudgeUnit(std::uint32_t i) {
-    const UnitSighting& said = result_.units[i];
+    const UnitMeasurement& said = result_.units[i];
     const PlantedUnit& truth = field_.units()[i];
     if (!IsCertain(said.status) && visible_[i] != 0 && truth.fate == PlantedFate::kHealthy)
       ++judgement_.lost;
@@ -245,11 +245,11 @@ class Judging {
     ++judgement_.placed;
   }
 
-  [[nodiscard]] bool StoryHolds(std::uint32_t i, const UnitSighting& said) const {
+  [[nodiscard]] bool StoryHolds(std::uint32_t i, const UnitMeasurement& said) const {
     const PlantedUnit& truth = field_.units()[i];
-    if (said.status == SightingStatus::kSwapped)
+    if (said.status == MeasurementStatus::kSwapped)
       return truth.fate == PlantedFate::kSwapped && said.other.value == truth.swapped_with;
-    if (said.status == SightingStatus::kDidNotMove) return said.stayed == truth.stayed;
+    if (said.status == MeasurementStatus::kDidNotMove) return said.stayed == truth.stayed;
     // Measured where its move ends: it is there, whatever brought it.
     return std::abs(field_.PlaceOf(i, truth.commanded) - truth.place_mm) < kAlikeMm ||
            !said.motion_is_known;
@@ -258,7 +258,7 @@ class Judging {
   void JudgePair(std::uint32_t a, std::uint32_t b) {
     ++judgement_.pairs;
     const auto names = [this](std::uint32_t unit, std::uint32_t other) {
-      return result_.units[unit].status == SightingStatus::kSwapped &&
+      return result_.units[unit].status == MeasurementStatus::kSwapped &&
              result_.units[unit].other.value == other;
     };
     const auto alike = [this](std::uint32_t unit) {
@@ -266,7 +266,7 @@ class Judging {
                       field_.units()[unit].place_mm) < kAlikeMm;
     };
     const auto suspects = [this](std::uint32_t unit, std::uint32_t other) {
-      return result_.units[unit].status == SightingStatus::kSwapSuspected &&
+      return result_.units[unit].status == MeasurementStatus::kSwapSuspected &&
              result_.units[unit].other.value == other;
     };
     if (suspects(a, b) || suspects(b, a)) ++judgement_.pairs_suspected;

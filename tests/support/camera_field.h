@@ -13,8 +13,8 @@
 #include "fleet/hex_layout.h"
 #include "fleet/layout.h"
 #include "protocol/base/rng.h"
-#include "sim/camera/camera.h"
-#include "sim/mechanism.h"
+#include "sim/world/camera/camera.h"
+#include "sim/world/mechanism.h"
 
 namespace focalfleet::testing {
 
@@ -81,7 +81,7 @@ CameraModel ModelOf(const sim::CameraTraits& traits);
 Exposure ExposureOf(const sim::Image& image, std::string id);
 
 struct Judgement {
-  std::array<std::uint32_t, kSightingStatusCount> count{};
+  std::array<std::uint32_t, kMeasurementStatusCount> count{};
   std::uint32_t wrong = 0;        // certain, and the spot is not lit by the unit's fibre
   std::uint32_t wrong_story = 0;  // certain, its spot, but moved / did not move / swapped is false
   std::uint32_t flagged_wrong = 0;  // has a spot that is not its, and says that it is not certain

@@ -3,14 +3,14 @@
 #pragma once
 
 #include "daemon/hall/field_model_file.h"
+#include "sim/hall/fibre_carrier.h"
 #include "sim/hall/field_fit.h"
-#include "sim/hall/spine.h"
 
 namespace focalfleet::testing {
 
-inline HallModelFile FittedSpineModel() {
+inline HallModelFile FittedFibreCarrierModel() {
   constexpr int kStepDeg = 4;
-  const sim::SpineJoints joints({});
+  const sim::FibreCarrierJoints joints({});
   sim::FieldMap map;
   for (int theta = 0; theta <= 180; theta += kStepDeg)
     for (int phi = 0; phi < 360; phi += kStepDeg)

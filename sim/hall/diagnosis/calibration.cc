@@ -24,8 +24,8 @@ constexpr std::size_t kFarOffMost = 8;  // one in so many; more is structure
 constexpr double kFollows = 5;          // standard deviations of a gain that is none of chance
 constexpr double kContradicts = 3;      // times what the median sensor leaves
 constexpr double kLeast_V = 1e-6;
-constexpr double kTold_rad = 10 * kRadPerDeg;  // a place less certain than this is not known
-constexpr double kGainTold = 0.5;
+constexpr double kReported_rad = 10 * kRadPerDeg;  // a place less certain than this is not known
+constexpr double kGainReported = 0.5;
 
 struct Own {
   std::vector<std::size_t> parameters;  // gain, offset, east, north
@@ -200,7 +200,8 @@ SensorFit CalibrateOne(const HallForward& forward, const HallCampaign& campaign,
   out.status = CalibrationStatus::kStuck;
   if (std::abs(gain) < kFollows * sd_gain_alone || std::abs(gain) < 1e-4) return out;
   out.status = CalibrationStatus::kUndetermined;
-  if (!sd || (*sd)[0] > kGainTold * std::abs(gain) || (*sd)[2] > kTold_rad || (*sd)[3] > kTold_rad)
+  if (!sd || (*sd)[0] > kGainReported * std::abs(gain) || (*sd)[2] > kReported_rad ||
+      (*sd)[3] > kReported_rad)
     return out;
   out.status = CalibrationStatus::kOk;
   out.shift = {found(2), found(3)};

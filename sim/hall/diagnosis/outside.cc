@@ -14,20 +14,20 @@ constexpr double kHalfRange_V = 2.5;
 
 }  // namespace
 
-double PoseFunction(int function, const Orientation& told) {
+double PoseFunction(int function, const Orientation& reported) {
   switch (function) {
     case 0:
       return 1;
     case 1:
-      return told.alpha_rad;
+      return reported.alpha_rad;
     case 2:
-      return told.beta_rad;
+      return reported.beta_rad;
     case 3:
-      return told.gamma_rad;
+      return reported.gamma_rad;
     case 4:
-      return told.alpha_rad * told.alpha_rad;
+      return reported.alpha_rad * reported.alpha_rad;
     default:
-      return told.beta_rad * told.beta_rad;
+      return reported.beta_rad * reported.beta_rad;
   }
 }
 

@@ -39,7 +39,7 @@ struct OutsideEffect {
 
 std::vector<OutsideEffect> OutsideEffects(std::size_t sensors, bool has_temperature);
 
-double PoseFunction(int function, const Orientation& told);
+double PoseFunction(int function, const Orientation& reported);
 
 /// What an effect's slope depends on.
 struct OutsideMoment {

@@ -119,12 +119,12 @@ double HallForward::One(const Eigen::VectorXd& p, const Reading& reading) const 
 }
 
 Orientation HallForward::Misread(const Eigen::VectorXd& p, std::size_t row) const {
-  const Orientation& told = campaign_.poses[row];
-  Orientation truly = told;
+  const Orientation& reported = campaign_.poses[row];
+  Orientation truly = reported;
   double* angles[] = {&truly.alpha_rad, &truly.beta_rad, &truly.gamma_rad};
   for (const std::size_t k : pose_effects_)
     *angles[layout_.effects[k].angle] += p[static_cast<Eigen::Index>(layout_.effect(k))] *
-                                         PoseFunction(layout_.effects[k].function, told);
+                                         PoseFunction(layout_.effects[k].function, reported);
   return truly;
 }
 

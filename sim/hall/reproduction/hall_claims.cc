@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "protocol/base/rng.h"
+#include "sim/drive/reproduction/parts.h"
 #include "sim/hall/closed_form.h"
 #include "sim/hall/reproduction/hall_parts.h"
-#include "sim/reproduction/parts.h"
 
 namespace focalfleet::sim::reproduction {
 namespace {

@@ -4,8 +4,8 @@
 // come near to the paper's; what rests on that choice is `fitted`.
 #pragma once
 
+#include "sim/drive/reproduction/claim.h"
 #include "sim/hall/magnet_array.h"
-#include "sim/reproduction/claim.h"
 
 namespace focalfleet::sim {
 

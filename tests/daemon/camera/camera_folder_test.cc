@@ -235,7 +235,7 @@ TEST_P(CameraFolderTest, AFolderThatIsMadeAnewIsLookedIntoFromTheNextRequest) {
   EXPECT_EQ(TakenId(), "x");
 }
 
-TEST_P(CameraFolderTest, TooManyFilesHoldNoStartAndAreToldWhenAnExposureIsDue) {
+TEST_P(CameraFolderTest, TooManyFilesHoldNoStartAndAreReportedWhenAnExposureIsDue) {
   fs::create_directories(File(""));
   for (std::size_t n = 0; n <= limits::kCameraFiles; ++n)
     std::ofstream(File("x" + std::to_string(n) + ".tmp"));

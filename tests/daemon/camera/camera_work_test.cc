@@ -107,17 +107,17 @@ TEST_F(CameraWorkTest, PutsEachUnitWhereItIs) {
   const ExposureDone done = Do();
   ASSERT_TRUE(done.exposure) << done.exposure.error().text;
   EXPECT_EQ(done.id, 5u);
-  ASSERT_EQ(done.exposure->sightings.size(), 300u);
+  ASSERT_EQ(done.exposure->measurements.size(), 300u);
   std::uint32_t placed = 0;
-  for (const Sighting& sighting : done.exposure->sightings) {
-    if (!sighting.place) continue;
+  for (const Measurement& measurement : done.exposure->measurements) {
+    if (!measurement.place) continue;
     ++placed;
-    const Unit& unit = field_.layout().unit(sighting.unit);
-    const std::complex<double> truth = field_.units()[sighting.unit.value].place_mm;
-    EXPECT_LT(std::hypot(sighting.x_mm - truth.real(), sighting.y_mm - truth.imag()), 0.015);
+    const Unit& unit = field_.layout().unit(measurement.unit);
+    const std::complex<double> truth = field_.units()[measurement.unit.value].place_mm;
+    EXPECT_LT(std::hypot(measurement.x_mm - truth.real(), measurement.y_mm - truth.imag()), 0.015);
     // The place in vectors is where the camera saw it, to half a vector of each axis.
-    const PointFp at = FibreAt(unit, UnitDrive{}, *sighting.place);
-    EXPECT_LT(std::hypot(at.x_mm - sighting.x_mm, at.y_mm - sighting.y_mm), 0.004);
+    const PointFp at = FibreAt(unit, UnitDrive{}, *measurement.place);
+    EXPECT_LT(std::hypot(at.x_mm - measurement.x_mm, at.y_mm - measurement.y_mm), 0.004);
   }
   EXPECT_GE(placed, 295u);
 }

@@ -299,18 +299,18 @@ TEST(SpotsFits, AHeaderWithoutAMandatoryCardIsRefused) {
   file.Keys();
   const std::string bytes = file.Bytes();
   const std::size_t table = bytes.find("XTENSION");
-  for (const auto& [key, told] : {std::pair("BITPIX  =", "BITPIX is not in its place"),
-                                  {"NAXIS   =", "NAXIS is not in its place"},
-                                  {"NAXIS1  =", "the length of an axis is not in its place"},
-                                  {"NAXIS2  =", "the length of an axis is not in its place"},
-                                  {"PCOUNT  =", "PCOUNT or GCOUNT is not in its place"},
-                                  {"GCOUNT  =", "PCOUNT or GCOUNT is not in its place"},
-                                  {"TFIELDS =", "TFIELDS is not in its place"},
-                                  {"END     ", "its header does not end"}}) {
+  for (const auto& [key, reported] : {std::pair("BITPIX  =", "BITPIX is not in its place"),
+                                      {"NAXIS   =", "NAXIS is not in its place"},
+                                      {"NAXIS1  =", "the length of an axis is not in its place"},
+                                      {"NAXIS2  =", "the length of an axis is not in its place"},
+                                      {"PCOUNT  =", "PCOUNT or GCOUNT is not in its place"},
+                                      {"GCOUNT  =", "PCOUNT or GCOUNT is not in its place"},
+                                      {"TFIELDS =", "TFIELDS is not in its place"},
+                                      {"END     ", "its header does not end"}}) {
     std::string without = bytes;
     without.replace(without.find(key, table), 8, "HISTORY ");
     EXPECT_EQ(ErrorOf(ParseSpotsFits(without, "s.fits", kSensor)),
-              "s.fits: unit 1: " + std::string(told));
+              "s.fits: unit 1: " + std::string(reported));
   }
 }
 

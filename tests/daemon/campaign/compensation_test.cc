@@ -10,9 +10,9 @@
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/hex_layout.h"
 #include "protocol/base/rng.h"
-#include "sim/diagnosis/planted.h"
-#include "sim/effects/empirical.h"
-#include "sim/effects/registry.h"
+#include "sim/campaigns/diagnosis/planted.h"
+#include "sim/campaigns/effects/empirical.h"
+#include "sim/campaigns/effects/registry.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
@@ -206,9 +206,9 @@ TEST(Compensation, OffsetsMakeTheWayBetweenPlacesThatOfTheCount) {
                                     .offset = before};
     const auto offset = compensation.OffsetFor({n}, stand, target);
     ASSERT_TRUE(offset);
-    const AxisAngles told =
+    const AxisAngles reported =
         AnglesOf(unit, drive, {target[0] - (*offset)[0], target[1] - (*offset)[1]});
-    const auto fibre_fp = compensation.FibreAfter({n}, told);
+    const auto fibre_fp = compensation.FibreAfter({n}, reported);
     ASSERT_TRUE(fibre_fp);
     const PointFp wanted = FibreAt(unit, drive, target);
     // A vector is 4 mdeg: at most half of one of each axis is left.

@@ -7,7 +7,7 @@
 
 #include "daemon/campaign/move_list.h"
 #include "fleet/hex_layout.h"
-#include "sim/diagnosis/planted.h"
+#include "sim/campaigns/diagnosis/planted.h"
 
 namespace focalfleet {
 namespace {

@@ -18,8 +18,8 @@
 #include "daemon/campaign/model_file.h"
 #include "daemon/campaign/next_moves_file.h"
 #include "fleet/files/layout_file.h"
-#include "tests/sim/campaign/odd_places.h"
-#include "tests/sim/diagnosis/planted_campaign.h"
+#include "tests/sim/campaigns/campaign/odd_places.h"
+#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
 
 namespace focalfleet {
 namespace {
@@ -220,8 +220,8 @@ TEST_P(OddCampaign, IsDiagnosedInNumbers) {
   for (const nlohmann::json& cause : report["causes"])
     for (const char* number : {"amplitude", "rms_um", "delta_log_likelihood", "predicted_gain_um"})
       EXPECT_TRUE(cause[number].is_number()) << cause;
-  const bool is_told = diagnosis.verdict != sim::Verdict::kInsufficient;
-  EXPECT_EQ(report["gain"]["rms_after_um"].is_number(), is_told) << report["gain"];
+  const bool is_reported = diagnosis.verdict != sim::Verdict::kInsufficient;
+  EXPECT_EQ(report["gain"]["rms_after_um"].is_number(), is_reported) << report["gain"];
 }
 
 TEST_P(OddCampaign, LeavesAModelThatIsReadAndPredicts) {

@@ -8,8 +8,8 @@
 #include "daemon/campaign/diagnosis_files.h"
 #include "daemon/campaign/diagnosis_page.h"
 #include "daemon/campaign/model_file.h"
-#include "sim/effects/empirical.h"
-#include "tests/sim/diagnosis/planted_campaign.h"
+#include "sim/campaigns/effects/empirical.h"
+#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
 
 namespace focalfleet {
 namespace {
@@ -61,7 +61,7 @@ TEST(ModelFile, KeepsTheShapeOfEachUnit) {
   const sim::Campaign campaign =
       sim::Planted({{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.moves = 80});
   const sim::Diagnosis diagnosis = sim::Verdicts(campaign);
-  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Told(diagnosis);
+  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Reported(diagnosis);
   ASSERT_EQ(diagnosis.model.terms[0].form.shape_of_unit.size(), campaign.units.size());
   const std::string text = WriteModel(diagnosis, kNames, campaign);
   const auto read = ReadModelFile(text, "model.toml", campaign.units);

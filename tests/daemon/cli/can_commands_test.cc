@@ -122,7 +122,7 @@ TEST(CanDecodeCommand, TellsErrorFramesInWordsAndFramesThatAreMissing) {
   EXPECT_EQ(objects[3], Json({{"interface", "can0"}, {"dropped", 3}, {"dropped_total", 4}}));
 }
 
-TEST(CanDecodeCommand, ACompressedLogIsToldOnce) {
+TEST(CanDecodeCommand, ACompressedLogIsReportedOnce) {
   const ScratchDirectory scratch;
   const std::string log = scratch.Put("bus.log.gz", std::string("\x1f\x8b\x08\0\n\n\n\n", 8));
   for (const bool from_stdin : {false, true}) {

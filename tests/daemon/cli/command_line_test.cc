@@ -112,10 +112,10 @@ TEST(CommandLine, AnAnswerThatStdoutDoesNotTakeIsNotDone) {
 TEST(CommandLine, WrongUsageIsJsonWhereJsonWasAskedFor) {
   const auto result = Focalfleet({"--json", "unit", "not-a-number"});
   EXPECT_EQ(result.exit, 2);
-  const Json told = Json::parse(result.out, nullptr, false);
-  ASSERT_TRUE(told.is_object()) << result.out;
-  EXPECT_EQ(told["exit"], 2);
-  EXPECT_EQ(told["error"]["code"], "invalid");
+  const Json reported = Json::parse(result.out, nullptr, false);
+  ASSERT_TRUE(reported.is_object()) << result.out;
+  EXPECT_EQ(reported["exit"], 2);
+  EXPECT_EQ(reported["error"]["code"], "invalid");
 }
 
 TEST(CommandLine, GlobalOptionsStandBeforeOrAfterTheCommand) {

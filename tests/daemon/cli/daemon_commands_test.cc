@@ -192,8 +192,8 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
   const auto result = Apply({"--wait", "--json"}, {.result = Configuration("done", 2, 0)});
   EXPECT_EQ(result.exit, 0) << result.err;
   EXPECT_THAT(result.err, IsEmpty());
-  const Json told = Json::parse(result.out, nullptr, false);
-  ASSERT_TRUE(told.is_object()) << result.out;
+  const Json reported = Json::parse(result.out, nullptr, false);
+  ASSERT_TRUE(reported.is_object()) << result.out;
   const Json expected{{"configuration", 7},
                       {"state", "done"},
                       {"units", 2},
@@ -225,7 +225,7 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
                       {"bus_load_max", 0.375},
                       {"unserved", Json::array()}};
-  EXPECT_EQ(told, expected);
+  EXPECT_EQ(reported, expected);
 }
 
 TEST_F(DaemonCommands, ApplyWaitTellsUploadAndStarts) {
@@ -261,7 +261,7 @@ TEST_F(DaemonCommands, QuietStillNamesUnservedUnits) {
   EXPECT_THAT(json.out, HasSubstr("no answer"));
 }
 
-TEST_F(DaemonCommands, ManyUnservedUnitsAreToldByReason) {
+TEST_F(DaemonCommands, ManyUnservedUnitsAreReportedByReason) {
   Json configuration = Configuration("done", 0, 0);
   configuration["unserved"] = Json::array();
   for (std::uint32_t id = 1; id <= 320; ++id) {
@@ -309,10 +309,10 @@ TEST_F(DaemonCommands, WhatNobodyMeasuredIsNotDone) {
   EXPECT_THAT(text.out, HasSubstr("0 of 2 units arrived, 0 refused, 0 failed, 2 unmeasured\n"));
   EXPECT_THAT(text.out, HasSubstr("not measured: 3 exposures could not be used"));
   const auto json = Apply({"--wait", "--json"}, {.result = configuration});
-  const Json told = Json::parse(json.out, nullptr, false);
-  EXPECT_EQ(told["unmeasured"], 2);
-  EXPECT_EQ(told["not_measured"], configuration["not_measured"]);
-  EXPECT_EQ(told["unserved"][1]["outcome"], "unmeasured");
+  const Json reported = Json::parse(json.out, nullptr, false);
+  EXPECT_EQ(reported["unmeasured"], 2);
+  EXPECT_EQ(reported["not_measured"], configuration["not_measured"]);
+  EXPECT_EQ(reported["unserved"][1]["outcome"], "unmeasured");
 }
 
 TEST_F(DaemonCommands, AStoppedConfigurationIsOneLineAndNoListOfItsUnits) {
@@ -455,15 +455,15 @@ TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
 }
 
 TEST_F(DaemonCommands, StatusTellsTheTimeSoFarOfAConfigurationUnderWay) {
-  const auto told = [&](const std::string& state, double makespan_s) {
+  const auto reported = [&](const std::string& state, double makespan_s) {
     Json status = Status();
     status["configuration"] = Configuration(state, 0, 0);
     status["configuration"]["makespan_s"] = makespan_s;
     return Ask({"status"}, {{"status", {.result = status}}}).out;
   };
-  EXPECT_THAT(told("uploading", 0), HasSubstr("makespan - (predicted 12.5 s)"));
-  EXPECT_THAT(told("moving", 3.25), HasSubstr("makespan 3.2 s so far (predicted 12.5 s)"));
-  EXPECT_THAT(told("done", 13), HasSubstr("makespan 13.0 s (predicted 12.5 s)"));
+  EXPECT_THAT(reported("uploading", 0), HasSubstr("makespan - (predicted 12.5 s)"));
+  EXPECT_THAT(reported("moving", 3.25), HasSubstr("makespan 3.2 s so far (predicted 12.5 s)"));
+  EXPECT_THAT(reported("done", 13), HasSubstr("makespan 13.0 s (predicted 12.5 s)"));
 }
 
 TEST_F(DaemonCommands, AQuestionThatIsNotAnsweredMeansThatNoDaemonIsThere) {
@@ -643,9 +643,9 @@ TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToLeaveThemOut) {
   EXPECT_EQ(refused.exit, 1);
   EXPECT_THAT(refused.err, HasSubstr("2 (theta interval, phi reported)"));
   EXPECT_THAT(scratch_.List(), Not(::testing::Contains("s.csv")));
-  const auto told =
+  const auto reported =
       Ask({"state", "--out", scratch_ / "s.csv", "--allow-unknown"}, {{"state", {.result = rows}}});
-  EXPECT_EQ(told.exit, 3);
+  EXPECT_EQ(reported.exit, 3);
   EXPECT_EQ(test::Slurp(scratch_ / "s.csv"),
             "unit_id,theta_deg,phi_deg\n1,-1.5,179.25\n# unit 2 left out: theta interval, phi "
             "reported\n");

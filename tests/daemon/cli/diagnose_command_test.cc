@@ -40,20 +40,20 @@ TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
   const auto result =
       Focalfleet({"diagnose", today, "--model", old_model, "--against", new_model, "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out);
-  EXPECT_EQ(told["verdict"], "B is better");
-  EXPECT_LT(told["difference"]["ci95_um"][1], 0);
-  EXPECT_EQ(told["rows"], 480);
-  EXPECT_EQ(told["a"]["name"], "then-extended");
-  EXPECT_FALSE(told["a"]["fitted_to_these_moves"]);
-  EXPECT_TRUE(told["b"]["fitted_to_these_moves"]);
-  ASSERT_EQ(told["notes"].size(), 1u) << told["notes"];
-  EXPECT_THAT(std::string(told["notes"][0]), HasSubstr("B was fitted to these very moves"));
-  ASSERT_GE(told["terms"].size(), 1u);
-  EXPECT_EQ(told["terms"][0]["cause"], "gear_scale");
-  EXPECT_EQ(told["terms"][0]["in"], "both");
-  EXPECT_GT(told["terms"][0]["difference_sigmas"], 3);
-  EXPECT_EQ(told["geometry"].size(), 5u);
+  const Json reported = Json::parse(result.out);
+  EXPECT_EQ(reported["verdict"], "B is better");
+  EXPECT_LT(reported["difference"]["ci95_um"][1], 0);
+  EXPECT_EQ(reported["rows"], 480);
+  EXPECT_EQ(reported["a"]["name"], "then-extended");
+  EXPECT_FALSE(reported["a"]["fitted_to_these_moves"]);
+  EXPECT_TRUE(reported["b"]["fitted_to_these_moves"]);
+  ASSERT_EQ(reported["notes"].size(), 1u) << reported["notes"];
+  EXPECT_THAT(std::string(reported["notes"][0]), HasSubstr("B was fitted to these very moves"));
+  ASSERT_GE(reported["terms"].size(), 1u);
+  EXPECT_EQ(reported["terms"][0]["cause"], "gear_scale");
+  EXPECT_EQ(reported["terms"][0]["in"], "both");
+  EXPECT_GT(reported["terms"][0]["difference_sigmas"], 3);
+  EXPECT_EQ(reported["geometry"].size(), 5u);
 
   // The same seed gives the same interval, another one nearly.
   const auto again =
@@ -62,8 +62,8 @@ TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
   const auto reseeded = Focalfleet(
       {"diagnose", today, "--model", old_model, "--against", new_model, "--seed", "7", "--json"});
   const Json other = Json::parse(reseeded.out);
-  EXPECT_NE(other["difference"]["ci95_um"], told["difference"]["ci95_um"]);
-  EXPECT_EQ(other["difference"]["rms_um"], told["difference"]["rms_um"]);
+  EXPECT_NE(other["difference"]["ci95_um"], reported["difference"]["ci95_um"]);
+  EXPECT_EQ(other["difference"]["rms_um"], reported["difference"]["rms_um"]);
 }
 
 TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
@@ -82,7 +82,7 @@ TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
   EXPECT_EQ(Json::parse(itself.out)["verdict"], "no difference that these data show");
 }
 
-TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreTold) {
+TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreReported) {
   const ScratchDirectory scratch;
   const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
   const std::string bad = scratch.Put("bad.toml", "[[effect]]\ncause = \"moods\"\n");

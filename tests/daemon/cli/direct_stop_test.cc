@@ -114,10 +114,10 @@ TEST_F(DirectStop, PutsTheStopOnEveryBusAndCountsAnswers) {
       Focalfleet({"stop", "--direct", "--json", "--config",
                   Config("[bus]\nport = \"unix\"\nunix_directory = \".\"\n[nonsense]\nx = 1\n")});
   EXPECT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["sent"], 2);
-  EXPECT_EQ(told["units_answered"], 3);
-  EXPECT_THAT(told["buses"][0]["bus"].get<std::string>(), HasSubstr("bus3.sock"));
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["sent"], 2);
+  EXPECT_EQ(reported["units_answered"], 3);
+  EXPECT_THAT(reported["buses"][0]["bus"].get<std::string>(), HasSubstr("bus3.sock"));
   for (PlayedBus* bus : {&three, &eleven}) {
     const auto heard = bus->End();
     EXPECT_THAT(heard, Not(IsEmpty()));

@@ -75,15 +75,15 @@ void ExpectBand(const Json& band) {
 }
 
 TEST_F(EstimateCommand, AllModesStandSideBySideWithLimits) {
-  const Json told = EstimateJson({"--from", state_});
-  EXPECT_EQ(told["units"], 37);
-  EXPECT_EQ(told["served"], 37);
-  ExpectBand(told["makespan_s"]);
-  ASSERT_EQ(told["modes"].size(), 3u);
-  EXPECT_EQ(told["modes"][0]["mode"], "asymmetric");
-  EXPECT_EQ(told["modes"][1]["mode"], "five_segment");
-  EXPECT_EQ(told["modes"][2]["mode"], "seven_segment");
-  for (const Json& mode : told["modes"]) {
+  const Json reported = EstimateJson({"--from", state_});
+  EXPECT_EQ(reported["units"], 37);
+  EXPECT_EQ(reported["served"], 37);
+  ExpectBand(reported["makespan_s"]);
+  ASSERT_EQ(reported["modes"].size(), 3u);
+  EXPECT_EQ(reported["modes"][0]["mode"], "asymmetric");
+  EXPECT_EQ(reported["modes"][1]["mode"], "five_segment");
+  EXPECT_EQ(reported["modes"][2]["mode"], "seven_segment");
+  for (const Json& mode : reported["modes"]) {
     EXPECT_EQ(mode["stalls"], false);
     ASSERT_EQ(mode["rails"].size(), 2u);
     double rails_J = 0;
@@ -93,7 +93,8 @@ TEST_F(EstimateCommand, AllModesStandSideBySideWithLimits) {
     }
     for (const char* key : {"energy_J", "mean_power_W", "peak_power_W"}) ExpectBand(mode[key]);
     EXPECT_NEAR(rails_J / Of(mode["energy_J"]), 1, 1e-6);
-    EXPECT_NEAR(Of(mode["mean_power_W"]) * Of(told["makespan_s"]) / Of(mode["energy_J"]), 1, 1e-9);
+    EXPECT_NEAR(Of(mode["mean_power_W"]) * Of(reported["makespan_s"]) / Of(mode["energy_J"]), 1,
+                1e-9);
   }
 }
 
@@ -112,8 +113,8 @@ TEST_F(EstimateCommand, AgreesWithThePlanThatWouldBeSent) {
 
 TEST_F(EstimateCommand, TheCurveHoldsTheEnergyOfEachRailAndMode) {
   const std::string out = scratch_ / "curve.csv";
-  const Json told = EstimateJson({"--from", state_, "--out", out});
-  EXPECT_EQ(told["out"], out);
+  const Json reported = EstimateJson({"--from", state_, "--out", out});
+  EXPECT_EQ(reported["out"], out);
   const auto table = CsvTable::Parse(Slurp(out), out);
   ASSERT_TRUE(table) << table.error().text;
   ASSERT_TRUE(table->Require({"t_s", "rail", "power_W", "mode"}));
@@ -132,7 +133,7 @@ TEST_F(EstimateCommand, TheCurveHoldsTheEnergyOfEachRailAndMode) {
   }
   EXPECT_EQ(energy_J.size(), 9u);
   for (const auto& [key, at] : last) EXPECT_EQ(at.second, 0) << key.first << " " << key.second;
-  for (const Json& mode : told["modes"]) {
+  for (const Json& mode : reported["modes"]) {
     const auto name = mode["mode"].get<std::string>();
     EXPECT_NEAR((energy_J[{name, "total"}]), Of(mode["energy_J"]), 1e-6);
     for (const Json& rail : mode["rails"]) {
@@ -143,9 +144,9 @@ TEST_F(EstimateCommand, TheCurveHoldsTheEnergyOfEachRailAndMode) {
 }
 
 TEST_F(EstimateCommand, StartsWithAllArmsFoldedWhereNoStateIsGiven) {
-  const Json told = EstimateJson();
-  EXPECT_EQ(told["served"], 37);
-  EXPECT_NE(Of(told["makespan_s"]), Of(EstimateJson({"--from", state_})["makespan_s"]));
+  const Json reported = EstimateJson();
+  EXPECT_EQ(reported["served"], 37);
+  EXPECT_NE(Of(reported["makespan_s"]), Of(EstimateJson({"--from", state_})["makespan_s"]));
 }
 
 TEST_F(EstimateCommand, TakesVoltageAndTimerCounts) {
@@ -187,15 +188,16 @@ TEST_F(EstimateCommand, TellsWhatTheCommandsOfAModelTake) {
   const std::string from = scratch_.Put("s.csv", StateOf(0, 150));
   targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,-100,150\n");
   const Json nominal = EstimateJson({"--from", from});
-  const Json told = EstimateJson({"--from", from, "--model", model});
+  const Json reported = EstimateJson({"--from", from, "--model", model});
   EXPECT_TRUE(nominal["model"].is_null());
-  EXPECT_EQ(told["served"], 1);
-  EXPECT_EQ(told["model"]["name"], "night-extended");
-  EXPECT_EQ(told["model"]["compensated"], 1);
-  EXPECT_EQ(told["model"]["left_out"], Json::array({"start_skew"}));
+  EXPECT_EQ(reported["served"], 1);
+  EXPECT_EQ(reported["model"]["name"], "night-extended");
+  EXPECT_EQ(reported["model"]["compensated"], 1);
+  EXPECT_EQ(reported["model"]["left_out"], Json::array({"start_skew"}));
   // Time goes with the way of the count; so does energy, as the motor turns at the same speed.
-  EXPECT_NEAR(Of(nominal["makespan_s"]) / Of(told["makespan_s"]), 1.01, 2e-4);
-  EXPECT_NEAR(Of(nominal["modes"][0]["energy_J"]) / Of(told["modes"][0]["energy_J"]), 1.01, 2e-4);
+  EXPECT_NEAR(Of(nominal["makespan_s"]) / Of(reported["makespan_s"]), 1.01, 2e-4);
+  EXPECT_NEAR(Of(nominal["modes"][0]["energy_J"]) / Of(reported["modes"][0]["energy_J"]), 1.01,
+              2e-4);
   // A unit that its campaign did not measure is told its target.
   targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n2,-100,150\n");
   EXPECT_EQ(Of(EstimateJson({"--from", from, "--model", model})["makespan_s"]),
@@ -209,10 +211,10 @@ TEST_F(EstimateCommand, NamesUnitsThatTheModelWouldSendBeyondTheirRange) {
   EXPECT_EQ(EstimateJson({"--from", from})["served"], 2);
   const auto result = Estimate({"--from", from, "--model", model, "--json"});
   EXPECT_EQ(result.exit, 3) << result.err << result.out;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["served"], 1);
-  EXPECT_EQ(told["model"]["compensated"], 0);
-  EXPECT_EQ(told["model"]["beyond_range"], Json::array({1}));
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["served"], 1);
+  EXPECT_EQ(reported["model"]["compensated"], 0);
+  EXPECT_EQ(reported["model"]["beyond_range"], Json::array({1}));
   const std::string text = Estimate({"--from", from, "--model", model}).out;
   EXPECT_THAT(text, HasSubstr("night-extended: 0 of 2 targets compensated; not compensated: "
                               "start_skew"));
@@ -228,8 +230,8 @@ TEST_F(EstimateCommand, SaysWhichArmsMayTouchByAModel) {
   const std::string from = scratch_.Put("s.csv", state);
   targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,60,150\n5,100,150\n");
   ExpectRefused({"--from", from}, 1, "the starts of units 1 and 5 are 1.5804 mm apart");
-  const Json told = Json::parse(Estimate({"--from", from, "--model", model, "--json"}).out);
-  EXPECT_THAT(told["model"]["too_near"].get<std::string>(),
+  const Json reported = Json::parse(Estimate({"--from", from, "--model", model, "--json"}).out);
+  EXPECT_THAT(reported["model"]["too_near"].get<std::string>(),
               HasSubstr("the starts of units 1 and 5 are"));
   EXPECT_THAT(Estimate({"--from", from, "--model", model}).out,
               HasSubstr("they may touch, and are led apart"));
@@ -292,8 +294,8 @@ TEST_F(EstimateCommand, NamesTheAxesThatWouldNotStartByWhatTheStoreKnows) {
         ParameterRow{{7001}, Axis::kPhi, Parameter::kRepeat, 30, Origin::kTuning}};
     ASSERT_TRUE((*store)->Commit(rows, WallTime{1}));
   }
-  const Json told = EstimateJson({"--store", path, "--mode", "asymmetric"});
-  const Json& below = told["modes"][0]["below_critical"];
+  const Json reported = EstimateJson({"--store", path, "--mode", "asymmetric"});
+  const Json& below = reported["modes"][0]["below_critical"];
   ASSERT_EQ(below.size(), 1u) << below.dump();
   EXPECT_EQ(below[0]["unit_id"], 1);
   EXPECT_EQ(below[0]["axis"], "theta");
@@ -359,8 +361,8 @@ TEST_F(EstimateCommand, NamesUnitsThatAreNotServedAndEndsWithThree) {
   EXPECT_THAT(Estimate().out, HasSubstr("unit 1: disabled"));
   const auto result = Estimate({"--json"});
   EXPECT_EQ(result.exit, 3) << result.err << result.out;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["unserved"][0]["unit_id"], 1);
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["unserved"][0]["unit_id"], 1);
 }
 
 }  // namespace

@@ -71,7 +71,7 @@ class ForeignFiles : public ::testing::Test {
   std::string plan_ = scratch_ / "plan.csv";
 };
 
-TEST_F(ForeignFiles, AnIndexWithoutANameIsToldOnce) {
+TEST_F(ForeignFiles, AnIndexWithoutANameIsReportedOnce) {
   for (std::string* file : {&units_, &targets_}) {
     const std::string before = *file;
     Put(file, WithIndex(Slurp(before)));
@@ -113,14 +113,14 @@ TEST_F(ForeignFiles, FlagsAreReadAsPandasAndAstropyWriteThem) {
   }));
   const auto result = Plan({"--json"});
   EXPECT_EQ(result.exit, 3) << result.err;  // every seventh is disabled and has a target
-  const Json told = Json::parse(result.out);
-  const Json& unserved = told["unserved"];
+  const Json reported = Json::parse(result.out);
+  const Json& unserved = reported["unserved"];
   EXPECT_EQ(std::count_if(unserved.begin(), unserved.end(),
                           [](const Json& one) { return one["why"] == "disabled"; }),
             8);
 }
 
-TEST_F(ForeignFiles, AllBadRowsAreToldAtOnce) {
+TEST_F(ForeignFiles, AllBadRowsAreReportedAtOnce) {
   Put(&targets_, Changed(Slurp(targets_), [](std::size_t k, const std::string& line) {
     if (k == 0 || k % 10 != 9) return line;
     return line.substr(0, line.find(',')) + ",999,0";
@@ -133,9 +133,9 @@ TEST_F(ForeignFiles, AllBadRowsAreToldAtOnce) {
     EXPECT_THAT(lines[k], HasSubstr(targets_ + ":" + std::to_string(10 * (k + 1)) + ": unit "));
     EXPECT_THAT(lines[k], HasSubstr("out of patrol"));
   }
-  const Json told = Json::parse(result.out);
-  EXPECT_EQ(told["error"]["code"], "invalid");
-  EXPECT_EQ(Lines(told["error"]["text"].get<std::string>()).size(), 6u);
+  const Json reported = Json::parse(result.out);
+  EXPECT_EQ(reported["error"]["code"], "invalid");
+  EXPECT_EQ(Lines(reported["error"]["text"].get<std::string>()).size(), 6u);
   EXPECT_THAT(scratch_.List(), Not(Contains("plan.csv")));
 }
 
@@ -157,12 +157,12 @@ TEST_F(ForeignFiles, WhatIsNoTextIsCalledByItsName) {
       {"PK\x03\x04[Content_Types].xml"s, "this is a spreadsheet"},
       {"\xff\xfeu\0n\0"s, "this is text in UTF-16"},
   };
-  for (const auto& [bytes, told] : cases) {
+  for (const auto& [bytes, reported] : cases) {
     const std::string good = targets_;
     Put(&targets_, bytes);
     const auto result = Plan();
     EXPECT_EQ(result.exit, 1);
-    EXPECT_THAT(result.err, HasSubstr("changed: "s + told));
+    EXPECT_THAT(result.err, HasSubstr("changed: "s + reported));
     targets_ = good;
   }
 }
@@ -184,7 +184,7 @@ TEST_F(ForeignFiles, AStateThatLacksAUnitIsRefusedByWhoPlansFromIt) {
   EXPECT_EQ(Draw("3", {"--from", state_, "--out", scratch_ / "t3.csv"}).exit, 0);
 }
 
-TEST_F(ForeignFiles, ACampaignWithColumnsOfWordsIsDiagnosedAndTheyAreToldOnce) {
+TEST_F(ForeignFiles, ACampaignWithColumnsOfWordsIsDiagnosedAndTheyAreReportedOnce) {
   const std::string folder = scratch_ / "night";
   ASSERT_EQ(Focalfleet({"simulate", "campaign", "--out", folder, "--units", "12", "--moves", "12",
                         "--seed", "1"})
@@ -199,13 +199,14 @@ TEST_F(ForeignFiles, ACampaignWithColumnsOfWordsIsDiagnosedAndTheyAreToldOnce) {
       }));
   const auto result = Focalfleet({"diagnose", folder, "--out", scratch_ / "report"});
   EXPECT_EQ(result.exit, 0) << result.err;
-  std::vector<std::string> told = Lines(result.err);
-  std::erase_if(told, [](const std::string& line) {
+  std::vector<std::string> reported = Lines(result.err);
+  std::erase_if(reported, [](const std::string& line) {
     return line.find("columns passed over") == std::string::npos;  // the progress
   });
-  EXPECT_THAT(told, ElementsAre("focalfleet: " + moves +
-                                ": columns passed over: column 1 (no name), pos_id, note (not all "
-                                "numbers: 'arc' in line 2)"));
+  EXPECT_THAT(reported,
+              ElementsAre("focalfleet: " + moves +
+                          ": columns passed over: column 1 (no name), pos_id, note (not all "
+                          "numbers: 'arc' in line 2)"));
   EXPECT_THAT(Focalfleet({"diagnose", folder, "--out", scratch_ / "again", "-q"}).err, IsEmpty());
 }
 

@@ -53,9 +53,9 @@ class OfflineCommands : public ::testing::Test {
     const ProgramResult result = Plan(scratch_.Put("bad.csv", text), {"--json"});
     EXPECT_EQ(result.exit, 1) << text;
     EXPECT_THAT(result.err, HasSubstr(complaint)) << text;
-    const Json told = Json::parse(result.out, nullptr, false);
-    ASSERT_TRUE(told.is_object()) << result.out;
-    EXPECT_THAT(told["error"]["text"].get<std::string>(), HasSubstr(complaint));
+    const Json reported = Json::parse(result.out, nullptr, false);
+    ASSERT_TRUE(reported.is_object()) << result.out;
+    EXPECT_THAT(reported["error"]["text"].get<std::string>(), HasSubstr(complaint));
     EXPECT_THAT(scratch_.List(), ElementsAre("bad.csv", "state.csv", "units.csv")) << text;
   }
 
@@ -76,8 +76,8 @@ TEST_F(OfflineCommands, LayoutTakesGearsAndArms) {
   const auto result = Focalfleet({"layout", "hex", "--count", "3", "--gear", "900", "800",
                                   "--arm-mm", "8", "--out", scratch_ / "g.csv", "--json"});
   EXPECT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["units"], 3);
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["units"], 3);
   const auto layout = ReadLayout(Slurp(scratch_ / "g.csv"), "g.csv", {});
   ASSERT_TRUE(layout) << layout.error().text;
   EXPECT_EQ(layout->unit({2}).theta().gear, 900);
@@ -193,17 +193,17 @@ TEST_F(OfflineCommands, PlanServesADrawnConfigurationAndTellsTheSummary) {
   const auto result = Plan(targets, {"--json"});
   ASSERT_EQ(result.exit, 0) << result.err << result.out;
   EXPECT_THAT(result.err, IsEmpty());
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["units"], 37);
-  EXPECT_EQ(told["targeted"], 37);
-  EXPECT_EQ(told["served"], 37);
-  EXPECT_EQ(told["unserved"], Json::array());
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["units"], 37);
+  EXPECT_EQ(reported["targeted"], 37);
+  EXPECT_EQ(reported["served"], 37);
+  EXPECT_EQ(reported["unserved"], Json::array());
   for (const char* key : {"makespan_s", "energy_J", "peak_power_W", "cpu_s"}) {
-    EXPECT_GT(told[key].get<double>(), 0) << key;
+    EXPECT_GT(reported[key].get<double>(), 0) << key;
   }
   const auto rows = ReadPlan(Slurp(plan_), plan_);
   ASSERT_TRUE(rows) << rows.error().text;
-  EXPECT_EQ(told["rows"], rows->size());
+  EXPECT_EQ(reported["rows"], rows->size());
 
   double last_s = 0;
   double energy_J = 0;
@@ -211,10 +211,10 @@ TEST_F(OfflineCommands, PlanServesADrawnConfigurationAndTellsTheSummary) {
     last_s = std::max(last_s, row.t1_s);
     energy_J += row.power_W * (row.t1_s - row.t0_s);
   }
-  EXPECT_NEAR(told["makespan_s"].get<double>(), last_s, 1e-6);
-  EXPECT_NEAR(told["energy_J"].get<double>(), energy_J, 1e-6 * energy_J);
-  ASSERT_FALSE(told["rails"].empty());
-  EXPECT_GT(told["rails"][0]["peak_power_W"].get<double>(), 0);
+  EXPECT_NEAR(reported["makespan_s"].get<double>(), last_s, 1e-6);
+  EXPECT_NEAR(reported["energy_J"].get<double>(), energy_J, 1e-6 * energy_J);
+  ASSERT_FALSE(reported["rails"].empty());
+  EXPECT_GT(reported["rails"][0]["peak_power_W"].get<double>(), 0);
 }
 
 TEST_F(OfflineCommands, PlanSavesEnergyLowersThePeakOrEvensPowerOut) {
@@ -225,7 +225,9 @@ TEST_F(OfflineCommands, PlanSavesEnergyLowersThePeakOrEvensPowerOut) {
     EXPECT_EQ(result.exit, 0) << result.err;
     return Json::parse(result.out, nullptr, false);
   };
-  const auto number = [](const Json& told, const char* key) { return told[key].get<double>(); };
+  const auto number = [](const Json& reported, const char* key) {
+    return reported[key].get<double>();
+  };
   const Json soonest = planned({"--json"});
   EXPECT_EQ(soonest["objective"], "soonest");
   EXPECT_GE(number(soonest, "peak_power_most_W"), number(soonest, "peak_power_W"));
@@ -257,9 +259,9 @@ TEST_F(OfflineCommands, PlanBySectorsServesAll) {
   ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
   const auto result = Plan(targets, {"--sectors", "3", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["served"], 37);
-  EXPECT_EQ(told["sectors"], 3);
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["served"], 37);
+  EXPECT_EQ(reported["sectors"], 3);
   const auto refused = Plan(targets, {"--sectors", "38"});
   EXPECT_EQ(refused.exit, 1);
   EXPECT_THAT(refused.err, HasSubstr("38 sectors: between 1 and 37 are possible"));
@@ -270,12 +272,12 @@ TEST_F(OfflineCommands, PlanInStagesSaysWhereToMeasureAndWhatItCosts) {
   ASSERT_EQ(Draw({"--seed", "2", "--from", state_, "--out", targets}).exit, 0);
   const auto result = Plan(targets, {"--stall-tolerant", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  const Json& stages = told["guarantee"]["stages_s"];
+  const Json reported = Json::parse(result.out, nullptr, false);
+  const Json& stages = reported["guarantee"]["stages_s"];
   ASSERT_GT(stages.size(), 1u);
   EXPECT_EQ(stages[0], 0.0);
-  EXPECT_LT(stages.back().get<double>(), told["makespan_s"].get<double>());
-  EXPECT_GT(told["makespan_s"].get<double>(), told["bound_s"].get<double>());
+  EXPECT_LT(stages.back().get<double>(), reported["makespan_s"].get<double>());
+  EXPECT_GT(reported["makespan_s"].get<double>(), reported["bound_s"].get<double>());
   EXPECT_THAT(Plan(targets, {"--stall-tolerant"}).out,
               HasSubstr("measure all units before 0.00, "));
   EXPECT_EQ(Plan(targets, {"--stall-tolerant", "--sectors", "2"}).exit, 1);
@@ -318,14 +320,14 @@ TEST_F(OfflineCommands, PlanNamesADisabledTargetAndEndsWithThree) {
   const auto result =
       Plan(scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n1,0,180\n"), {"--json"});
   EXPECT_EQ(result.exit, 3) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["unserved"],
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["unserved"],
             Json::parse(R"([{"unit_id":1,"why":"disabled","by":null,"proof":null}])"));
   const auto quiet = Plan(scratch_ / "t.csv", {"-q"});
   EXPECT_EQ(quiet.exit, 3);
   EXPECT_THAT(quiet.out, IsEmpty());
   EXPECT_THAT(quiet.err, HasSubstr("unit 1: disabled"));
-  EXPECT_EQ(told["served"], 0);
+  EXPECT_EQ(reported["served"], 0);
   EXPECT_THAT(scratch_.List(), Contains("plan.csv"));
 }
 
@@ -370,7 +372,7 @@ TEST_F(OfflineCommands, ARefusedPlanLeavesTheOldFileAsItWas) {
   EXPECT_EQ(Slurp(old), "old\n");
 }
 
-TEST_F(OfflineCommands, AFullDiskAndAMissingFolderAreToldAndLeaveNothing) {
+TEST_F(OfflineCommands, AFullDiskAndAMissingFolderAreReportedAndLeaveNothing) {
   const std::string targets = scratch_.Put("t.csv", "unit_id,x_mm,y_mm\n1,1,1\n");
   plan_ = "/dev/full";
   const auto full = Plan(targets, {"--json"});
@@ -424,7 +426,7 @@ TEST_F(OfflineCommands, ReadsPipesThatHaveAWriterAndRefusesNamedOnes) {
   EXPECT_THAT(named.err, HasSubstr("pipe: a named pipe; give a file, or /dev/stdin"));
 }
 
-TEST_F(OfflineCommands, AMisspeltColumnOfUnitsIsTold) {
+TEST_F(OfflineCommands, AMisspeltColumnOfUnitsIsReported) {
   std::string text = Slurp(units_);
   text.replace(text.find("enabled"), 7, "enabld");
   const auto result = Focalfleet({"targets", "--units", scratch_.Put("u.csv", text), "--seed", "1",

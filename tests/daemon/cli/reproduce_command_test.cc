@@ -19,9 +19,9 @@ TEST(ReproduceCommand, WritesEveryClaimWithItsStatusAndAPage) {
   const auto result =
       Focalfleet({"reproduce", "--out", scratch / "claims", "--start-sets", "C", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out);
+  const Json reported = Json::parse(result.out);
   const Json claims = Json::parse(Slurp(scratch / "claims/claims.json"));
-  EXPECT_EQ(claims, told["claims"]);
+  EXPECT_EQ(claims, reported["claims"]);
   EXPECT_GT(claims.size(), 40u);
   std::set<std::string> statuses;
   for (const Json& claim : claims) {

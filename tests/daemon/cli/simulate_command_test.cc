@@ -26,7 +26,7 @@ class SimulateDrive : public ::testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return Focalfleet(words);
   }
-  Json Told(std::vector<std::string> more) {
+  Json Reported(std::vector<std::string> more) {
     more.emplace_back("--json");
     const ProgramResult result = Simulate(std::move(more));
     EXPECT_EQ(result.exit, 0) << result.err;
@@ -90,10 +90,10 @@ TEST_F(SimulateDrive, TheReportShowsThePapersPictures) {
 }
 
 TEST_F(SimulateDrive, TheSameTwiceIsTheSameBytes) {
-  const Json first = Told(kBench);
+  const Json first = Reported(kBench);
   const std::string wave = Slurp(out_ + "/wave.csv");
   const std::string page = Slurp(out_ + "/report.html");
-  EXPECT_EQ(Told(kBench), first);
+  EXPECT_EQ(Reported(kBench), first);
   EXPECT_EQ(Slurp(out_ + "/wave.csv"), wave);
   EXPECT_EQ(Slurp(out_ + "/report.html"), page);
 }
@@ -119,8 +119,9 @@ TEST_F(SimulateDrive, RotationThatWouldNotStartIsSaid) {
 }
 
 TEST_F(SimulateDrive, FromRestTheRotorStartsAtRest) {
-  const Json told = Told({"--repeat", "60", "--load", "fleet", "--from-rest", "--turns", "1"});
-  EXPECT_EQ(told["in_step"], true);
+  const Json reported =
+      Reported({"--repeat", "60", "--load", "fleet", "--from-rest", "--turns", "1"});
+  EXPECT_EQ(reported["in_step"], true);
   const auto table = CsvTable::Parse(Slurp(out_ + "/wave.csv"), "wave.csv");
   ASSERT_TRUE(table);
   CsvRow row(*table, 0);
@@ -129,13 +130,14 @@ TEST_F(SimulateDrive, FromRestTheRotorStartsAtRest) {
 }
 
 TEST_F(SimulateDrive, SettingsReachTheMotor) {
-  const Json told = Told({"--repeat", "8", "--v-bus", "9", "--set", "C", "--resistance-ohm", "20",
-                          "--dead-time-ns", "0", "--turns", "1", "--sample-ns", "100"});
-  EXPECT_EQ(told["settings"]["resistance_ohm"], 20);
-  EXPECT_NEAR(told["limit_reachable_A"].get<double>(), 2 * 9 / (3 * 20.0), 1e-12);
-  EXPECT_NEAR(told["limit_linear_A"].get<double>(), 9 / std::sqrt(3) / 20, 1e-12);
-  EXPECT_EQ(told["samples"], 26667);
-  EXPECT_LT(told["peak_A"].get<double>(), 0.3);
+  const Json reported =
+      Reported({"--repeat", "8", "--v-bus", "9", "--set", "C", "--resistance-ohm", "20",
+                "--dead-time-ns", "0", "--turns", "1", "--sample-ns", "100"});
+  EXPECT_EQ(reported["settings"]["resistance_ohm"], 20);
+  EXPECT_NEAR(reported["limit_reachable_A"].get<double>(), 2 * 9 / (3 * 20.0), 1e-12);
+  EXPECT_NEAR(reported["limit_linear_A"].get<double>(), 9 / std::sqrt(3) / 20, 1e-12);
+  EXPECT_EQ(reported["samples"], 26667);
+  EXPECT_LT(reported["peak_A"].get<double>(), 0.3);
 }
 
 TEST_F(SimulateDrive, ImpossibleSettingsAreRefusedWithTheReason) {

@@ -40,12 +40,12 @@ class TuneCommand : public ::testing::Test {
 TEST_F(TuneCommand, FindsThePapersCriticalRepeat) {
   const ProgramResult result = Tune({"--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["critical"], 37);
-  EXPECT_EQ(told["critical_reduced"], 37);
-  EXPECT_GT(told["repeat"].get<int>(), 50);
-  EXPECT_NEAR(told["margin"].get<double>(), 0.5, 0.02);
-  EXPECT_NEAR(told["margin_at_108"].get<double>(), 0.88, 0.03);
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["critical"], 37);
+  EXPECT_EQ(reported["critical_reduced"], 37);
+  EXPECT_GT(reported["repeat"].get<int>(), 50);
+  EXPECT_NEAR(reported["margin"].get<double>(), 0.5, 0.02);
+  EXPECT_NEAR(reported["margin_at_108"].get<double>(), 0.88, 0.03);
 }
 
 TEST_F(TuneCommand, RefusesWhatThePeakCheckForbids) {
@@ -58,11 +58,11 @@ TEST_F(TuneCommand, RefusesWhatThePeakCheckForbids) {
 TEST_F(TuneCommand, ChoosesTheBestOfTheRails) {
   const ProgramResult result = Tune({"--minimise", "time", "--rails", "1.8,3", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["candidates"].size(), 6u);
-  EXPECT_EQ(told["v_bus_V"], 3);
-  for (const Json& candidate : told["candidates"])
-    EXPECT_GE(candidate["move_s"].get<double>(), told["move_s"].get<double>());
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["candidates"].size(), 6u);
+  EXPECT_EQ(reported["v_bus_V"], 3);
+  for (const Json& candidate : reported["candidates"])
+    EXPECT_GE(candidate["move_s"].get<double>(), reported["move_s"].get<double>());
 }
 
 TEST_F(TuneCommand, AFleetIsTunedByItsLoadsAndTheRefusedAreNamed) {
@@ -140,9 +140,9 @@ TEST_F(TuneCommand, TheStoreTakesWhatWasTunedWithItsOrigin) {
 TEST_F(TuneCommand, WithoutAMarginThereIsNoneAndNotLessThanNone) {
   const ProgramResult result = Tune({"--margin", "0", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
-  const Json told = Json::parse(result.out, nullptr, false);
-  EXPECT_EQ(told["repeat"], told["critical"]);
-  EXPECT_EQ(told["margin"].get<double>(), 0);
+  const Json reported = Json::parse(result.out, nullptr, false);
+  EXPECT_EQ(reported["repeat"], reported["critical"]);
+  EXPECT_EQ(reported["margin"].get<double>(), 0);
   MakeUnits();
   ASSERT_EQ(
       Tune({"--margin", "0", "--units", units_, "--load-spread", "0.02", "--out", tuned_}).exit, 0);
@@ -164,7 +164,7 @@ TEST_F(TuneCommand, AFleetGetsTheVoltageOfEachRailAndTheModeOfEachUnit) {
     return Json::parse(result.out, nullptr, false);
   };
   for (const char* what : {"time", "energy"}) {
-    const Json told = best(what);
+    const Json reported = best(what);
     const auto table = CsvTable::Parse(Slurp(tuned_), tuned_);
     ASSERT_TRUE(table) << table.error().text;
     const auto cell = [&](std::size_t row, const char* column) {
@@ -186,7 +186,7 @@ TEST_F(TuneCommand, AFleetGetsTheVoltageOfEachRailAndTheModeOfEachUnit) {
     const char* const figure = what == std::string("time") ? "move_s" : "move_J";
     EXPECT_GE(std::stod(cell(3, figure)), 0.995 * alone[figure].get<double>());
     EXPECT_LE(std::stod(cell(3, figure)), 1.1 * alone[figure].get<double>());
-    EXPECT_GE(told["choices"].size(), 1u);
+    EXPECT_GE(reported["choices"].size(), 1u);
   }
 }
 

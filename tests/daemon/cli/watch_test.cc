@@ -69,15 +69,15 @@ TEST(Watch, OnceShowsTheWholeFleetToOneWhoJoinsLate) {
 
   const auto json = Focalfleet({"watch", "--once", "--json", "--domain", domain, "--wait", "20"});
   ASSERT_EQ(json.exit, 0) << json.err;
-  const Json told = Json::parse(json.out, nullptr, false);
-  ASSERT_TRUE(told.is_object()) << json.out;
-  EXPECT_EQ(told["fleet"]["version"], "9.8.7");
-  EXPECT_EQ(told["fleet"]["phases"], (Json{{"ready", 1}, {"silent", 1}}));
-  ASSERT_EQ(told["units"].size(), 2u);
-  EXPECT_EQ(told["units"][1]["unit_id"], 2);
-  EXPECT_EQ(told["units"][1]["phase"], "silent");
-  EXPECT_EQ(told["units"][0]["theta_low_deg"], 1.5);
-  EXPECT_TRUE(told["units"][0]["x_mm"].is_null());
+  const Json reported = Json::parse(json.out, nullptr, false);
+  ASSERT_TRUE(reported.is_object()) << json.out;
+  EXPECT_EQ(reported["fleet"]["version"], "9.8.7");
+  EXPECT_EQ(reported["fleet"]["phases"], (Json{{"ready", 1}, {"silent", 1}}));
+  ASSERT_EQ(reported["units"].size(), 2u);
+  EXPECT_EQ(reported["units"][1]["unit_id"], 2);
+  EXPECT_EQ(reported["units"][1]["phase"], "silent");
+  EXPECT_EQ(reported["units"][0]["theta_low_deg"], 1.5);
+  EXPECT_TRUE(reported["units"][0]["x_mm"].is_null());
 
   const auto text = Focalfleet({"watch", "--once", "--domain", domain, "--wait", "20"});
   EXPECT_EQ(text.exit, 0) << text.err;

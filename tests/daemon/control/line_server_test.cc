@@ -341,7 +341,7 @@ bool Ended(const RawClient& client, std::string* said) {
   return ended;
 }
 
-TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsToldWhy) {
+TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 3}).value();
   Crowd crowd(scratch / "s", &server);
@@ -451,7 +451,7 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
   EXPECT_FALSE(Ended(crowd[0], &said)) << "who has something open keeps its place";
 }
 
-TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsTold) {
+TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 20}).value();
   Crowd crowd(scratch / "s", &server);

@@ -101,14 +101,14 @@ TEST_F(CameraDdsTest, NothingComesWhereNobodyAnswers) {
 TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
   auto taken = std::make_unique<testing::TakenPorts>(OwnDomain());
   std::mutex mutex;
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
   port_ = std::make_unique<CameraDds>(
       CameraDds::Options{.dds = {.domain = OwnDomain(), .config_xml = {}},
                          .sensor = kSensor,
                          .tell =
                              [&](const std::string& text) {
                                const std::lock_guard lock(mutex);
-                               told.push_back(text);
+                               reported.push_back(text);
                              },
                          .rejoin_period = std::chrono::milliseconds(10)});
   const auto asked = port_->Request(1, {kSinceNs});
@@ -124,9 +124,9 @@ TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
   ASSERT_TRUE(*good);
   EXPECT_EQ((*good)->id, "good-2");
   const std::lock_guard lock(mutex);
-  ASSERT_EQ(told.size(), 2u);
-  EXPECT_THAT(told[0], HasSubstr("DDS: cannot"));
-  EXPECT_EQ(told[1], "");
+  ASSERT_EQ(reported.size(), 2u);
+  EXPECT_THAT(reported[0], HasSubstr("DDS: cannot"));
+  EXPECT_EQ(reported[1], "");
 }
 
 }  // namespace

@@ -175,7 +175,7 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   configuration.view.peak_power_W = 12.5;
   configuration.view.frames = 90'000;
   configuration.view.starts = {
-      .begun = 5000, .told = 4998, .skew_s = 0.002, .bound_s = 0.0005, .allowed_s = 0.04};
+      .begun = 5000, .reported = 4998, .skew_s = 0.002, .bound_s = 0.0005, .allowed_s = 0.04};
   configuration.view.upload = {
       .bits_predicted = 4'500'000, .bits = 4'600'000, .predicted_s = 0.09, .measured_s = 0.092};
   ASSERT_TRUE(publisher->Publish(fleet));
@@ -200,7 +200,7 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   EXPECT_EQ(seen.configuration->view.arrived, 4999u);
   EXPECT_EQ(seen.configuration->view.frames, 90'000u);
   EXPECT_EQ(seen.configuration->view.starts.begun, 5000u);
-  EXPECT_EQ(seen.configuration->view.starts.told, 4998u);
+  EXPECT_EQ(seen.configuration->view.starts.reported, 4998u);
   EXPECT_EQ(seen.configuration->view.starts.skew_s, 0.002);
   EXPECT_EQ(seen.configuration->view.starts.bound_s, 0.0005);
   EXPECT_EQ(seen.configuration->view.starts.allowed_s, 0.04);
@@ -273,7 +273,7 @@ TEST(Status, TextIsCutAtItsBoundBetweenCharacters) {
   EXPECT_EQ(seen.alarm_values[3].row.text, std::string(255, 'c'));
 }
 
-TEST(Status, AnAlarmIsToldOnceAndOldOnesNotToLateJoiners) {
+TEST(Status, AnAlarmIsReportedOnceAndOldOnesNotToLateJoiners) {
   constexpr std::uint64_t kAlarms = StatusPublisher::kAlarmsKept + 300;
   auto publisher = MakePublisher();
   auto early = MakeReader();

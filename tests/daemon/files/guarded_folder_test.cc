@@ -104,11 +104,11 @@ TEST_P(GuardedFolderTest, ReadsRegularFilesAndNothingElse) {
 }
 
 TEST_P(GuardedFolderTest, AFileThatChangesWhileItIsReadIsNotTaken) {
-  const char* told = "changed while it was read: write it under another ending, then rename it";
+  const char* reported = "changed while it was read: write it under another ending, then rename it";
   // The kernel's own files say that they hold nothing.
   const auto kernel = GuardedFolder::Open("/proc/self");
   ASSERT_TRUE(kernel);
-  EXPECT_THAT(kernel->Read("status", kMax).error().text, HasSubstr(told));
+  EXPECT_THAT(kernel->Read("status", kMax).error().text, HasSubstr(reported));
   ASSERT_TRUE(folder_->Write("x", std::string(kMax, 'x')));
   const Descriptor file(open(In("x").c_str(), O_WRONLY | O_CLOEXEC));
   std::atomic<bool> seen{false};
@@ -120,7 +120,7 @@ TEST_P(GuardedFolderTest, AFileThatChangesWhileItIsReadIsNotTaken) {
     if (const auto read = folder_->Read("x", kMax); !read) error = read.error().text;
   seen = true;
   writer.join();
-  EXPECT_THAT(error, HasSubstr(told));
+  EXPECT_THAT(error, HasSubstr(reported));
   EXPECT_TRUE(folder_->Read("x", kMax)) << "it rests";
 }
 
@@ -210,7 +210,7 @@ TEST_P(GuardedFolderTest, TheFolderItselfMayBeTheOperatorsLink) {
   EXPECT_FALSE(GuardedFolder::Open(Beside("secret")));
 }
 
-TEST_P(GuardedFolderTest, AFullDiskIsToldAndLeavesNothing) {
+TEST_P(GuardedFolderTest, AFullDiskIsReportedAndLeavesNothing) {
   ASSERT_TRUE(folder_->Write("x", "before"));
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
@@ -226,7 +226,7 @@ TEST_P(GuardedFolderTest, AFullDiskIsToldAndLeavesNothing) {
   EXPECT_THAT(folder_->Names(10).value(), ElementsAre("x"));
 }
 
-TEST_P(GuardedFolderTest, AFolderThatMayNotBeWrittenIsTold) {
+TEST_P(GuardedFolderTest, AFolderThatMayNotBeWrittenIsReported) {
   ASSERT_TRUE(folder_->Write("x", "1"));
   const auto aside = folder_->Subfolder("aside").value();
   std::filesystem::permissions(
@@ -240,7 +240,7 @@ TEST_P(GuardedFolderTest, AFolderThatMayNotBeWrittenIsTold) {
   }
 }
 
-TEST_P(GuardedFolderTest, AFileThatIsNotOursToReadIsTold) {
+TEST_P(GuardedFolderTest, AFileThatIsNotOursToReadIsReported) {
   ASSERT_TRUE(folder_->Write("x", "1"));
   std::filesystem::permissions(In("x"), std::filesystem::perms::none);
   EXPECT_THAT(ReadError("x"), HasSubstr(GetParam() == 0 ? "read: 1" : "Permission denied"));

@@ -124,7 +124,7 @@ TEST(CanNetlink, AVirtualInterfaceHasNoBitTiming) {
   EXPECT_EQ(link->state, std::nullopt);
 }
 
-TEST(CanNetlink, TheKernelsRefusalIsTold) {
+TEST(CanNetlink, TheKernelsRefusalIsReported) {
   const auto refusal = Answer().Put(std::int32_t{-ENODEV}).Put(nlmsghdr{}).Message(NLMSG_ERROR);
   const auto link = ReadLink(refusal);
   ASSERT_FALSE(link);

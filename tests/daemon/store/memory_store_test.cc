@@ -41,22 +41,23 @@ class RowSource {
                          .move = Move(),
                          .origin = Code(kLastOrigin)};
       case 1:
-        return MeasurementRow{.exposure = Id(),
-                              .configuration = Id(),
-                              .serial = Serial(),
-                              .unit = Unit(),
-                              .status = Code(kLastSightingStatus),
-                              .other = {},
-                              .x_mm = Real(),
-                              .y_mm = Real(),
-                              .covariance = {Real(), Real(), Real()},
-                              .place = {},
-                              .target_fp = PointFp{Real(), Real()},
-                              .error_um = Real(),
-                              .target_id = {},
-                              .delay_s = Real(),
-                              .source = Code(kLastSightingSource),
-                              .spine = rng_.Below(2) == 0 ? std::nullopt : std::optional(Spine())};
+        return MeasurementRow{
+            .exposure = Id(),
+            .configuration = Id(),
+            .serial = Serial(),
+            .unit = Unit(),
+            .status = Code(kLastMeasurementStatus),
+            .other = {},
+            .x_mm = Real(),
+            .y_mm = Real(),
+            .covariance = {Real(), Real(), Real()},
+            .place = {},
+            .target_fp = PointFp{Real(), Real()},
+            .error_um = Real(),
+            .target_id = {},
+            .delay_s = Real(),
+            .source = Code(kLastMeasurementSource),
+            .carrier = rng_.Below(2) == 0 ? std::nullopt : std::optional(FibreCarrier())};
       case 2:
         return IntentRow{.configuration = Id(),
                          .serial = Serial(),
@@ -139,11 +140,12 @@ class RowSource {
     const std::int32_t low = std::max(Place(), -1000);
     return {Witness::kInterval, low, Odd() ? low - 1 : low + 10};
   }
-  SpineReading Spine() {
-    SpineReading spine{.used = 3, .solved = rng_.Below(2) == 0, .trusted = rng_.Below(4) == 0};
-    spine.angles_deg = {Real(), Real(), Odd() ? 400.0 : 1.0};
-    spine.covariance_deg2 = {Real(), Real(), Real(), Real(), Real(), Real()};
-    return spine;
+  FibreCarrierReading FibreCarrier() {
+    FibreCarrierReading carrier{
+        .used = 3, .solved = rng_.Below(2) == 0, .trusted = rng_.Below(4) == 0};
+    carrier.angles_deg = {Real(), Real(), Odd() ? 400.0 : 1.0};
+    carrier.covariance_deg2 = {Real(), Real(), Real(), Real(), Real(), Real()};
+    return carrier;
   }
 
   Rng rng_;

@@ -27,7 +27,7 @@ struct Failure {
   const char* name;
   int sqlite_code;
   bool lasting;
-  ErrorCode told;
+  ErrorCode reported;
 };
 
 class StoreFaults : public StoreTest, public ::testing::WithParamInterface<Failure> {
@@ -49,7 +49,7 @@ TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
     disk_.Heal();
     if (!failed) break;
     ASSERT_FALSE(status) << "operation " << n;  // every one of them matters
-    EXPECT_EQ(status.error().code, GetParam().told) << status.error().text;
+    EXPECT_EQ(status.error().code, GetParam().reported) << status.error().text;
     EXPECT_EQ(BatchIn(*store->Load(), kSerials), held) << "operation " << n;
     // The disk is well again, and so is the store.
     ++held;

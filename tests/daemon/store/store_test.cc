@@ -385,7 +385,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
 
 struct Garbage {
   const char* sql;
-  const char* told;
+  const char* reported;
 };
 
 class StoreGarbage : public StoreTest, public ::testing::WithParamInterface<Garbage> {};
@@ -402,7 +402,7 @@ TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
   const auto fleet = store->Load();
   ASSERT_FALSE(fleet);
   EXPECT_EQ(fleet.error().code, ErrorCode::kInvalid);
-  EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().told));
+  EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().reported));
   // The store is not stuck in the read.
   testing::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
 }
@@ -458,7 +458,7 @@ TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
                      .configuration = 3,
                      .serial = {7001},
                      .unit = {12},
-                     .status = SightingStatus::kDidNotMove,
+                     .status = MeasurementStatus::kDidNotMove,
                      .other = UnitId{9},
                      .x_mm = 1.0 / 3,
                      .y_mm = -2e-7,
@@ -489,7 +489,7 @@ TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
   EXPECT_EQ(back.place, row.place);
   EXPECT_EQ((*read)[1].row.target_id, "");
   EXPECT_FALSE((*read)[1].row.delay_s);
-  EXPECT_FALSE(back.spine);
+  EXPECT_FALSE(back.carrier);
   row.covariance.yy = -1;
   EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{row}, {6}));
 }
@@ -498,36 +498,36 @@ TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithWhoeverMeasured) {
   MeasurementRow row{.exposure = 8,
                      .serial = {7001},
                      .unit = {12},
-                     .status = SightingStatus::kTooCoarse,
+                     .status = MeasurementStatus::kTooCoarse,
                      .other = {},
                      .place = {},
                      .target_fp = {},
                      .error_um = {},
                      .target_id = {},
                      .delay_s = {},
-                     .source = SightingSource::kSensors};
-  row.spine = SpineReading{.angles_deg = {1.0 / 3, -20.0 / 7, 0.1},
-                           .covariance_deg2 = {1e-5 / 3, -1e-6, 2e-7, 3e-5 / 7, 0, 1e-4},
-                           .used = 0xf7,
-                           .solved = true,
-                           .trusted = true,
-                           .verdict = "missing v4"};
+                     .source = MeasurementSource::kSensors};
+  row.carrier = FibreCarrierReading{.angles_deg = {1.0 / 3, -20.0 / 7, 0.1},
+                                    .covariance_deg2 = {1e-5 / 3, -1e-6, 2e-7, 3e-5 / 7, 0, 1e-4},
+                                    .used = 0xf7,
+                                    .solved = true,
+                                    .trusted = true,
+                                    .verdict = "missing v4"};
   MeasurementRow lying = row;
   lying.serial = {7002};
   lying.unit = {13};
-  lying.status = SightingStatus::kSensorsDoubted;
-  lying.spine = SpineReading{.used = 0x7, .verdict = "too few sensors"};
+  lying.status = MeasurementStatus::kSensorsDoubted;
+  lying.carrier = FibreCarrierReading{.used = 0x7, .verdict = "too few sensors"};
   testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
   const auto read = OpenReader()->Measurements(8);
   ASSERT_TRUE(read) << read.error().text;
   ASSERT_EQ(read->size(), 2u);
-  EXPECT_EQ((*read)[0].row.source, SightingSource::kSensors);
-  EXPECT_EQ((*read)[0].row.status, SightingStatus::kTooCoarse);
-  EXPECT_EQ((*read)[0].row.spine, row.spine);
-  EXPECT_EQ((*read)[1].row.spine, lying.spine);
-  lying.spine->trusted = true;
+  EXPECT_EQ((*read)[0].row.source, MeasurementSource::kSensors);
+  EXPECT_EQ((*read)[0].row.status, MeasurementStatus::kTooCoarse);
+  EXPECT_EQ((*read)[0].row.carrier, row.carrier);
+  EXPECT_EQ((*read)[1].row.carrier, lying.carrier);
+  lying.carrier->trusted = true;
   EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{lying}, {6})) << "trusted, and there is none";
-  row.spine->covariance_deg2[3] = -1;
+  row.carrier->covariance_deg2[3] = -1;
   EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{row}, {6}));
 }
 

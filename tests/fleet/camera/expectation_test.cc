@@ -7,7 +7,7 @@
 
 #include "fleet/hex_layout.h"
 #include "protocol/base/rng.h"
-#include "sim/mechanism.h"
+#include "sim/world/mechanism.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {

@@ -62,7 +62,7 @@ class Identify : public ::testing::Test {
     return result ? "" : Name(result.error().reason);
   }
 
-  static std::uint32_t Count(const Identification& seen, SightingStatus status) {
+  static std::uint32_t Count(const Identification& seen, MeasurementStatus status) {
     return seen.count[static_cast<std::size_t>(status)];
   }
 
@@ -90,7 +90,7 @@ TEST_F(Identify, AHealthyFleetIsMeasuredWithinItsErrors) {
   field_.Move(kNoTroubles);
   const Identification seen = See();
   const Judgement judged = testing::Judge(field_, image_, seen);
-  EXPECT_GE(Count(seen, SightingStatus::kMeasured), 216u);
+  EXPECT_GE(Count(seen, MeasurementStatus::kMeasured), 216u);
   EXPECT_EQ(judged.wrong + judged.wrong_story, 0u);
   EXPECT_LT(std::sqrt(judged.squared_mm2 / judged.placed / 2), 0.006);
   EXPECT_EQ(seen.fiducials_used, 24u);
@@ -122,7 +122,7 @@ TEST_F(Identify, DarkFibresAreMissingAndDustIsNobodys) {
   const auto seen = Ask(field_.Expectations());
   ASSERT_TRUE(seen);
   for (const std::uint32_t dark : {5u, 40u, 200u}) {
-    EXPECT_EQ(seen->units[dark].status, SightingStatus::kMissing);
+    EXPECT_EQ(seen->units[dark].status, MeasurementStatus::kMissing);
     EXPECT_EQ(seen->units[dark].spot, kNoSpot);
   }
   ASSERT_EQ(seen->unexplained.size(), 1u);
@@ -146,7 +146,7 @@ TEST_F(Identify, WhoDidNotMoveIsNamedWithItsAxes) {
   const Identification seen = See();
   const auto stayed = [&](std::uint32_t i) { return seen.units[i].stayed; };
   for (const std::uint32_t i : {both, theta, phi})
-    EXPECT_EQ(seen.units[i].status, SightingStatus::kDidNotMove) << Name(seen.units[i].status);
+    EXPECT_EQ(seen.units[i].status, MeasurementStatus::kDidNotMove) << Name(seen.units[i].status);
   EXPECT_EQ(stayed(both), (std::array<bool, 2>{true, true}));
   EXPECT_EQ(stayed(theta), (std::array<bool, 2>{true, false}));
   EXPECT_EQ(stayed(phi), (std::array<bool, 2>{false, true}));
@@ -161,7 +161,7 @@ TEST_F(Identify, AStayThatALargeErrorExplainsAsWellIsNotClaimed) {
   unit.place_mm = field_.PlaceOf(i, {unit.commanded.theta_deg - 0.6,
                                      unit.before.phi_deg * 0.9 + unit.commanded.phi_deg * 0.1});
   const Identification seen = See();
-  EXPECT_EQ(seen.units[i].status, SightingStatus::kMeasured) << Name(seen.units[i].status);
+  EXPECT_EQ(seen.units[i].status, MeasurementStatus::kMeasured) << Name(seen.units[i].status);
   EXPECT_FALSE(seen.units[i].motion_is_known);
   ASSERT_NE(seen.units[i].spot, kNoSpot);
   EXPECT_EQ(image_.light[seen.units[i].spot], std::vector<std::uint32_t>{i});
@@ -173,7 +173,7 @@ TEST_F(Identify, AMoveTooShortToTellIsMeasuredAndSaysSo) {
   field_.units()[8].commanded.phi_deg += 0.05;
   field_.units()[8].place_mm = field_.PlaceOf(8, field_.units()[8].before);
   const Identification seen = See();
-  EXPECT_EQ(seen.units[8].status, SightingStatus::kMeasured);
+  EXPECT_EQ(seen.units[8].status, MeasurementStatus::kMeasured);
   EXPECT_FALSE(seen.units[8].motion_is_known);
 }
 
@@ -184,7 +184,7 @@ TEST_F(Identify, AUnitThatStoppedOnItsWayHasStrayed) {
   unit.place_mm = field_.PlaceOf(i, {unit.before.theta_deg * 0.4 + unit.commanded.theta_deg * 0.6,
                                      unit.before.phi_deg * 0.4 + unit.commanded.phi_deg * 0.6});
   const Identification seen = See();
-  EXPECT_EQ(seen.units[i].status, SightingStatus::kStrayed);
+  EXPECT_EQ(seen.units[i].status, MeasurementStatus::kStrayed);
   ASSERT_NE(seen.units[i].spot, kNoSpot);
   EXPECT_EQ(image_.light[seen.units[i].spot], std::vector<std::uint32_t>{i});
   EXPECT_FALSE(IsCertain(seen.units[i].status));
@@ -197,7 +197,7 @@ TEST_F(Identify, AUnitOfUnknownPlaceIsFoundByElimination) {
   Picture(field_.Sources());
   const auto seen = Ask(expectations);
   ASSERT_TRUE(seen);
-  EXPECT_EQ(seen->units[30].status, SightingStatus::kStrayed);
+  EXPECT_EQ(seen->units[30].status, MeasurementStatus::kStrayed);
   ASSERT_NE(seen->units[30].spot, kNoSpot);
   EXPECT_EQ(image_.light[seen->units[30].spot], std::vector<std::uint32_t>{30});
 }
@@ -215,7 +215,7 @@ TEST_F(Identify, TwoThatStrayedIntoACommonAreaAreAmbiguous) {
   field_.units()[b].place_mm = (pa + pb) / 2.0 + across * Complex(-1.5, -3);
   const Identification seen = See();
   for (const std::uint32_t i : {a, b}) {
-    EXPECT_EQ(seen.units[i].status, SightingStatus::kAmbiguous) << Name(seen.units[i].status);
+    EXPECT_EQ(seen.units[i].status, MeasurementStatus::kAmbiguous) << Name(seen.units[i].status);
     EXPECT_EQ(seen.units[i].spot, kNoSpot);
   }
   EXPECT_EQ(seen.units[a].other.value, b);
@@ -243,7 +243,7 @@ TEST_F(Identify, ThreeThatExchangedInARingAreNamed) {
         field_.PlaceOf(ring[k], field_.units()[ring[(k + 1) % 3]].commanded);
   const Identification seen = See();
   for (int k = 0; k < 3; ++k) {
-    EXPECT_EQ(seen.units[ring[k]].status, SightingStatus::kSwapped)
+    EXPECT_EQ(seen.units[ring[k]].status, MeasurementStatus::kSwapped)
         << Name(seen.units[ring[k]].status);
     EXPECT_EQ(seen.units[ring[k]].other.value, ring[(k + 1) % 3]);
   }
@@ -259,9 +259,10 @@ TEST_F(Identify, HalfAnExchangeIsASuspicion) {
   Picture(sources);
   const auto seen = Ask(field_.Expectations());
   ASSERT_TRUE(seen);
-  EXPECT_EQ(seen->units[a].status, SightingStatus::kSwapSuspected) << Name(seen->units[a].status);
+  EXPECT_EQ(seen->units[a].status, MeasurementStatus::kSwapSuspected)
+      << Name(seen->units[a].status);
   EXPECT_EQ(seen->units[a].other.value, b);
-  EXPECT_EQ(seen->units[b].status, SightingStatus::kMissing);
+  EXPECT_EQ(seen->units[b].status, MeasurementStatus::kMissing);
 }
 
 TEST_F(Identify, ExchangedUnitsOfEqualCommandsCannotBeSeen) {
@@ -270,8 +271,8 @@ TEST_F(Identify, ExchangedUnitsOfEqualCommandsCannotBeSeen) {
   units[10].commanded = units[90].commanded;
   units[10].place_mm = field_.PlaceOf(10, units[90].commanded);
   const Identification seen = See();
-  EXPECT_EQ(seen.units[10].status, SightingStatus::kMeasured);
-  EXPECT_EQ(seen.units[90].status, SightingStatus::kMeasured);
+  EXPECT_EQ(seen.units[10].status, MeasurementStatus::kMeasured);
+  EXPECT_EQ(seen.units[90].status, MeasurementStatus::kMeasured);
 }
 
 TEST_F(Identify, TwoFibresInOneSpotAreBlended) {
@@ -291,8 +292,8 @@ TEST_F(Identify, TwoFibresInOneSpotAreBlended) {
   }
   const Identification seen = See();
   for (const std::uint32_t i : {a, b})
-    EXPECT_TRUE(seen.units[i].status == SightingStatus::kBlended ||
-                seen.units[i].status == SightingStatus::kAmbiguous)
+    EXPECT_TRUE(seen.units[i].status == MeasurementStatus::kBlended ||
+                seen.units[i].status == MeasurementStatus::kAmbiguous)
         << Name(seen.units[i].status);
 }
 
@@ -303,7 +304,7 @@ TEST_F(Identify, ASpotOfDoubleLightIsBlended) {
   Picture(sources);
   const auto seen = Ask(field_.Expectations());
   ASSERT_TRUE(seen);
-  EXPECT_EQ(seen->units[60].status, SightingStatus::kBlended) << Name(seen->units[60].status);
+  EXPECT_EQ(seen->units[60].status, MeasurementStatus::kBlended) << Name(seen->units[60].status);
   EXPECT_GT(seen->units[60].covariance.xx, 0.05 * 0.05);
 }
 
@@ -315,7 +316,7 @@ TEST_F(Identify, ASpotOutOfReachIsSaid) {
                      field_.layout().unit({i}).base_fp.y_mm);
   field_.units()[i].place_mm = base + base / std::abs(base) * 17.1;
   const Identification seen = See();
-  EXPECT_EQ(seen.units[i].status, SightingStatus::kOutsidePatrol) << Name(seen.units[i].status);
+  EXPECT_EQ(seen.units[i].status, MeasurementStatus::kOutsidePatrol) << Name(seen.units[i].status);
 }
 
 TEST_F(Identify, EverythingAtOnceIsNeverWrongUnseen) {
@@ -347,7 +348,7 @@ TEST_F(Identify, MissingFalseAndExtraFiducialsAreBorne) {
   ASSERT_TRUE(seen) << seen.error().text;
   EXPECT_EQ(seen->fiducials_missing, 5u);
   EXPECT_EQ(seen->fiducials_false, 1u);
-  EXPECT_GE(Count(*seen, SightingStatus::kMeasured), 215u);
+  EXPECT_GE(Count(*seen, MeasurementStatus::kMeasured), 215u);
 }
 
 TEST_F(Identify, UnitsThatStandStillHelp) {
@@ -450,7 +451,7 @@ TEST_F(Identify, AFleetOfWhichNobodyMovedIsNotAnotherField) {
   for (std::uint32_t i = 0; i < field_.units().size(); ++i)
     field_.units()[i].place_mm = field_.PlaceOf(i, field_.units()[i].before);
   const Identification seen = See();
-  EXPECT_GE(Count(seen, SightingStatus::kDidNotMove), 205u);
+  EXPECT_GE(Count(seen, MeasurementStatus::kDidNotMove), 205u);
 }
 
 TEST_F(Identify, AnyNoiseOfSpotsIsAnAnswerOrARefusal) {
@@ -470,10 +471,10 @@ TEST_F(Identify, AnyNoiseOfSpotsIsAnAnswerOrARefusal) {
     const auto result = Ask(field_.Expectations());
     if (!result) continue;
     std::vector<int> uses(exposure_.spots.size(), 0);
-    for (const UnitSighting& unit : result->units) {
+    for (const UnitMeasurement& unit : result->units) {
       if (unit.spot == kNoSpot) continue;
       ASSERT_LT(unit.spot, exposure_.spots.size());
-      if (unit.status != SightingStatus::kBlended) {
+      if (unit.status != MeasurementStatus::kBlended) {
         EXPECT_EQ(++uses[unit.spot], 1);
       }
       EXPECT_TRUE(std::isfinite(unit.at_fp.x_mm) && unit.covariance.xx > 0);

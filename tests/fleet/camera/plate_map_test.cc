@@ -8,7 +8,7 @@
 #include "fleet/camera/camera_model.h"
 #include "fleet/camera/cholesky.h"
 #include "protocol/base/rng.h"
-#include "sim/camera/turbulence.h"
+#include "sim/world/camera/turbulence.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {

@@ -43,9 +43,9 @@ TEST(ClockMap, TruthIsAlwaysWithinTheBounds) {
       EXPECT_LE(rate.least, clock.rate - 1);
       EXPECT_GE(rate.most, clock.rate - 1);
       const HostInstant then = now - Seconds(rng.Uniform(0, 4));
-      const ClockMap::Instant told = map.TimeOf(clock.Ticks(then));
-      EXPECT_LE(told.earliest, then);
-      EXPECT_GE(told.latest, then);
+      const ClockMap::Instant reported = map.TimeOf(clock.Ticks(then));
+      EXPECT_LE(reported.earliest, then);
+      EXPECT_GE(reported.latest, then);
     }
   }
 }
@@ -58,9 +58,9 @@ TEST(ClockMap, ComesToKnowTheRateAndTheTimeWell) {
   EXPECT_NEAR(map.rate().error, 0.0031, 3e-6);
   EXPECT_LT(map.rate().bound, 50e-6);
   const HostInstant then{Seconds(79).ns};
-  const ClockMap::Instant told = map.TimeOf(clock.Ticks(then));
-  EXPECT_LT(told.bound(), Microseconds(500));
-  EXPECT_LT(std::abs((told.at - then).ns), Microseconds(150).ns);
+  const ClockMap::Instant reported = map.TimeOf(clock.Ticks(then));
+  EXPECT_LT(reported.bound(), Microseconds(500));
+  EXPECT_LT(std::abs((reported.at - then).ns), Microseconds(150).ns);
 }
 
 TEST(ClockMap, OneReadingTellsNothingOfTheRate) {
@@ -71,10 +71,10 @@ TEST(ClockMap, OneReadingTellsNothingOfTheRate) {
   EXPECT_NEAR(map.rate().error, 0, 1e-12);
   EXPECT_NEAR(map.rate().bound, ClockMap::kRateErrorMax, 1e-12);
   // A second ago by a clock of which only so much is known.
-  const ClockMap::Instant told = map.TimeOf(clock.Ticks({Seconds(2).ns}));
-  EXPECT_GT(told.bound(), Milliseconds(15));
-  EXPECT_LE(told.earliest, HostInstant{Seconds(2).ns});
-  EXPECT_GE(told.latest, HostInstant{Seconds(2).ns});
+  const ClockMap::Instant reported = map.TimeOf(clock.Ticks({Seconds(2).ns}));
+  EXPECT_GT(reported.bound(), Milliseconds(15));
+  EXPECT_LE(reported.earliest, HostInstant{Seconds(2).ns});
+  EXPECT_GE(reported.latest, HostInstant{Seconds(2).ns});
 }
 
 TEST(ClockMap, ARestartedUnitHasAnotherClock) {

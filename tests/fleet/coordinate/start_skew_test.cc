@@ -15,7 +15,7 @@ TEST(StartSkew, WideStartsProveNothingAndMakeNothingLikely) {
   StartSkew skew;
   skew.Add({1}, Began(0, 10, 100));
   skew.Add({2}, Began(20, 90, 120));
-  EXPECT_EQ(skew.told(), 2u);
+  EXPECT_EQ(skew.reported(), 2u);
   EXPECT_EQ(skew.least(), Milliseconds(0));
   EXPECT_EQ(skew.likely(), Milliseconds(0));
   EXPECT_EQ(skew.most(), Milliseconds(120));
@@ -64,7 +64,7 @@ TEST(StartSkew, OneStartAloneIsNoSkew) {
   EXPECT_EQ(skew.least(), Milliseconds(0));
   EXPECT_EQ(skew.likely(), Milliseconds(0));
   skew.Clear();
-  EXPECT_EQ(skew.told(), 0u);
+  EXPECT_EQ(skew.reported(), 0u);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ using ::testing::StartsWith;
 
 std::string Row(int k) { return "t.csv:" + std::to_string(k) + ": wrong"; }
 
-std::string Told(const BadRows& bad) {
+std::string Reported(const BadRows& bad) {
   const Status checked = bad.Check();
   return checked ? "" : checked.error().text;
 }
@@ -25,22 +25,22 @@ TEST(BadRows, OneIsOneLine) {
   EXPECT_TRUE(bad.empty());
   EXPECT_TRUE(bad.Check());
   bad.Add("t.csv:2: unit 1: unknown unit", "unknown unit");
-  EXPECT_EQ(Told(bad), "t.csv:2: unit 1: unknown unit");
+  EXPECT_EQ(Reported(bad), "t.csv:2: unit 1: unknown unit");
   EXPECT_EQ(bad.Check().error().code, ErrorCode::kInvalid);
 }
 
-TEST(BadRows, TwentyAreToldAndTheOthersCountedByTheirKind) {
+TEST(BadRows, TwentyAreReportedAndTheOthersCountedByTheirKind) {
   BadRows bad;
   for (int k = 1; k <= 20; ++k) bad.Add(Row(k), "out of patrol");
-  std::string text = Told(bad);
+  std::string text = Reported(bad);
   EXPECT_THAT(text, StartsWith("t.csv:1: wrong\n  t.csv:2: wrong\n"));
   EXPECT_THAT(text, HasSubstr("\n  t.csv:20: wrong"));
   EXPECT_THAT(text, Not(HasSubstr("more")));
   bad.Add(Row(21), "unknown unit");
-  EXPECT_THAT(Told(bad),
+  EXPECT_THAT(Reported(bad),
               HasSubstr("\n  and 1 more row; all 21: out of patrol (20), unknown unit (1)"));
   for (int k = 22; k <= 3407; ++k) bad.Add(Row(k), "unknown unit");
-  text = Told(bad);
+  text = Reported(bad);
   EXPECT_THAT(text, HasSubstr("\n  and 3387 more rows; all 3407: unknown unit (3387), out of "
                               "patrol (20)"));
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 20);
@@ -49,13 +49,13 @@ TEST(BadRows, TwentyAreToldAndTheOthersCountedByTheirKind) {
 TEST(BadRows, CellsNeitherMakeLinesNorFillTheText) {
   BadRows bad;
   bad.Add("t.csv:2: 'a\nt.csv:3: forged\x1b[2J'", "a\nb");
-  EXPECT_EQ(Told(bad), "t.csv:2: 'a?t.csv:3: forged?[2J'");
+  EXPECT_EQ(Reported(bad), "t.csv:2: 'a?t.csv:3: forged?[2J'");
   BadRows long_ones;
   for (int k = 0; k < 1000; ++k)
     long_ones.Add("t.csv:2: " + std::string(100'000, 'x'),
                   std::to_string(k) + std::string(100'000, 'y'));
-  EXPECT_LT(Told(long_ones).size(), 12'000u);
-  EXPECT_THAT(Told(long_ones), HasSubstr("other reasons"));
+  EXPECT_LT(Reported(long_ones).size(), 12'000u);
+  EXPECT_THAT(Reported(long_ones), HasSubstr("other reasons"));
   BadRows umlauts;
   for (const std::size_t shift : {std::size_t{0}, std::size_t{1}})
     umlauts.Add(std::string(shift, 'x') + std::string(400, '\xc3'), "");  // no whole character
@@ -67,16 +67,16 @@ TEST(BadRows, CellsNeitherMakeLinesNorFillTheText) {
             return text;
           }(),
       "");
-  EXPECT_THAT(Told(umlauts), HasSubstr("\xc3\xa4..."));
+  EXPECT_THAT(Reported(umlauts), HasSubstr("\xc3\xa4..."));
 }
 
-TEST(BadRows, ALogIsToldTheFirstAndHowManyFollow) {
+TEST(BadRows, ALogIsReportedTheFirstAndHowManyFollow) {
   BadRows bad;
   bad.Add(Row(1), "");
-  EXPECT_EQ(FirstRow(Told(bad)), "t.csv:1: wrong");
+  EXPECT_EQ(FirstRow(Reported(bad)), "t.csv:1: wrong");
   bad.Add(Row(2), "");
   bad.Add(Row(3), "");
-  EXPECT_EQ(FirstRow(Told(bad)), "t.csv:1: wrong (and 2 more)");
+  EXPECT_EQ(FirstRow(Reported(bad)), "t.csv:1: wrong (and 2 more)");
 }
 
 }  // namespace

@@ -138,7 +138,7 @@ TEST(Csv, LimitsColumnsAndTheLengthOfARow) {
   EXPECT_EQ(ErrorOf("# " + long_cell + "\na\n1\n"), "") << "a comment may be long";
 }
 
-TEST(Csv, ReadersAreToldOfAllRowsThatTheyRejected) {
+TEST(Csv, ReadersAreReportedOfAllRowsThatTheyRejected) {
   const CsvTable table = Parsed("a,b\n1,x\n2,2\n3,y\n4,4\n");
   std::vector<double> good;
   const Status read = table.ReadRows([&](CsvRow& row) {

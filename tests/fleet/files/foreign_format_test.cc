@@ -49,13 +49,13 @@ TEST(ForeignFormat, SaysWhatItIsAndWhatToDo) {
       {"\0u\0n\0i\0t\0_"s, "UTF-16", "save it as UTF-8"},
   };
   for (const auto& c : cases) {
-    const auto told = ForeignFormat(c.bytes);
-    ASSERT_TRUE(told) << c.what;
-    EXPECT_THAT(*told, HasSubstr(c.what));
-    EXPECT_THAT(*told, HasSubstr(c.to_do));
+    const auto reported = ForeignFormat(c.bytes);
+    ASSERT_TRUE(reported) << c.what;
+    EXPECT_THAT(*reported, HasSubstr(c.what));
+    EXPECT_THAT(*reported, HasSubstr(c.to_do));
     const auto table = CsvTable::Parse(c.bytes, "t.csv");
     ASSERT_FALSE(table);
-    EXPECT_EQ(table.error().text, "t.csv: this is " + *told);
+    EXPECT_EQ(table.error().text, "t.csv: this is " + *reported);
   }
 }
 

@@ -49,7 +49,7 @@ struct Row {
   ByAxis from_deg{};
   ByAxis cmd_deg{};
   bool rehomed = false;
-  bool exposed = true;  // false: a run-up that nobody photographed
+  bool exposed = true;  // false: a unidirectional approach that nobody photographed
   double delay_s = 0;   // since this unit last stood still
   double temp_C = 0;    // true
   double v_bus_V = 0;

@@ -18,7 +18,7 @@ struct Step {
     kRunUp
   } kind = Kind::kTarget;
   std::size_t axis = kTheta;
-  double by_deg = 0;  // ladder, arc, run-up
+  double by_deg = 0;  // ladder, arc, unidirectional approach
   double at = -1;     // arc: share of the range, else by_deg
   double drive = 1;
   double movers = 1;   // share of a rail's units

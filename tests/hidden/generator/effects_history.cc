@@ -1,5 +1,5 @@
 // What lies between rotor and arm and remembers where it came from. Each is integrated along the
-// whole way of every move, run-ups included, in steps far below its own scale.
+// whole way of every move, unidirectional approaches included, in steps far below its own scale.
 #include <algorithm>
 #include <cmath>
 

@@ -35,7 +35,7 @@ constexpr std::array<ColumnKind, 21> kOptional = {{
      "%.2f"},
     {"rehomed", [](const C& c, const M&, std::size_t r) { return c.rows[r].rehomed ? 1.0 : 0.0; },
      "%.0f", false},
-    {"temp_C", [](const C&, const M& m, std::size_t r) { return m.told_temp_C[r]; }, "%.2f"},
+    {"temp_C", [](const C&, const M& m, std::size_t r) { return m.reported_temp_C[r]; }, "%.2f"},
     {"v_bus_V", [](const C& c, const M&, std::size_t r) { return c.rows[r].v_bus_V; }, "%.4f"},
     {"elevation_deg",
      [](const C& c, const M&, std::size_t r) { return ExposureOf(c, r).elevation_deg; }, "%.3f"},
@@ -109,8 +109,8 @@ std::string Moves(const Spec& spec, const Campaign& campaign, const Measurement&
   for (const ColumnKind* column : columns) (text += ',') += column->name;
   text += '\n';
   for (std::size_t r = 0; r < campaign.rows.size(); ++r) {
-    const ByAxis& from = measured.told_from_deg[r];
-    const ByAxis& cmd = measured.told_cmd_deg[r];
+    const ByAxis& from = measured.reported_from_deg[r];
+    const ByAxis& cmd = measured.reported_cmd_deg[r];
     Append(&text, "%d,%zu,%.4f,%.4f,%.4f,%.4f", UnitOf(campaign, r).id,
            r / campaign.unit_count() + 1, from[kTheta], cmd[kTheta], from[kPhi], cmd[kPhi]);
     if (measured.seen[r] != 0) {

@@ -148,8 +148,8 @@ class Recorder {
     const std::size_t count = 1 + rng->Below(4);
     const double turn_deg = rng->Uniform() < 0.5 ? 360 : -360;
     for (std::size_t m = from; m < std::min(from + count, campaign_.move_count()); ++m) {
-      out_->told_cmd_deg[m * units + unit][kTheta] += turn_deg;
-      out_->told_from_deg[m * units + unit][kTheta] += m > from ? turn_deg : 0;
+      out_->reported_cmd_deg[m * units + unit][kTheta] += turn_deg;
+      out_->reported_from_deg[m * units + unit][kTheta] += m > from ? turn_deg : 0;
     }
   }
 
@@ -196,20 +196,20 @@ Measurement Measure(const Spec& spec, const Scene& scene, const Truth& truth,
   out.tells.resize(rows);
   out.bad.assign(rows, 0);
   out.blank.assign(rows, 0);
-  out.told_from_deg.resize(rows);
-  out.told_cmd_deg.resize(rows);
-  out.told_temp_C.resize(rows);
+  out.reported_from_deg.resize(rows);
+  out.reported_cmd_deg.resize(rows);
+  out.reported_temp_C.resize(rows);
   out.noise.actuation_deg = truth.actuation_sigma_deg;
   for (std::size_t r = 0; r < rows; ++r) {
     const Row& row = campaign.rows[r];
     out.place_mm[r] = places[r % units][r / units];
     out.seen[r] = out.tells[r] = row.exposed ? 1 : 0;
-    out.told_from_deg[r] = row.from_deg;
-    out.told_cmd_deg[r] = row.cmd_deg;
-    out.told_temp_C[r] = row.temp_C;
+    out.reported_from_deg[r] = row.from_deg;
+    out.reported_cmd_deg[r] = row.cmd_deg;
+    out.reported_temp_C[r] = row.temp_C;
     for (const Effect& effect : effects)
       if (effect.kind->cause == "sensor_bias")
-        out.told_temp_C[r] += effect.Amount(r % units) * (row.temp_C - campaign.temp_mean_C);
+        out.reported_temp_C[r] += effect.Amount(r % units) * (row.temp_C - campaign.temp_mean_C);
   }
   Recorder recorder(spec, scene, &out);
   recorder.Noise();

@@ -17,9 +17,9 @@ struct Measurement {
   std::vector<char> seen;
   std::vector<char> tells;  // seen, and not of a stuck unit, which shows nothing of what is planted
   std::vector<char> bad;  // an outlier, a stuck or swapped unit: nothing that an oracle should fit
-  std::vector<ByAxis> told_from_deg;
-  std::vector<ByAxis> told_cmd_deg;
-  std::vector<double> told_temp_C;
+  std::vector<ByAxis> reported_from_deg;
+  std::vector<ByAxis> reported_cmd_deg;
+  std::vector<double> reported_temp_C;
   std::vector<std::uint32_t> blank;  // bit c: covariate cell c is empty
   std::vector<int> troubled_unit_ids;
   std::vector<std::string> also_true;  // causes that a nuisance makes true

@@ -227,10 +227,10 @@ void CountForeign(const Case& c, Tally* tally) {
   tally->Share(std::string("unknown_named_beside") + strength, sure);
   if (!c.says_unknown || effect.lambda < 250) return;
   const bool right = std::any_of(
-      c.unknown_covariates.begin(), c.unknown_covariates.end(), [&](const std::string& told) {
+      c.unknown_covariates.begin(), c.unknown_covariates.end(), [&](const std::string& reported) {
         return std::any_of(
             effect.covariates.begin(), effect.covariates.end(),
-            [&](const std::string& name) { return told.find(name) != std::string::npos; });
+            [&](const std::string& name) { return reported.find(name) != std::string::npos; });
       });
   tally->Share("unknown_covariate", right);
 }

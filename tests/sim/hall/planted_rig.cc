@@ -193,14 +193,16 @@ struct Angles {
   double alpha_deg, beta_deg, gamma_deg;
 };
 // Where the rotor stands when it is told to be somewhere.
-Angles Truly(const PlantedPose& told, double alpha_before_deg, const std::vector<Planted>& causes) {
-  Angles truly{told.alpha_deg, told.beta_deg, told.gamma_deg};
+Angles Truly(const PlantedPose& reported, double alpha_before_deg,
+             const std::vector<Planted>& causes) {
+  Angles truly{reported.alpha_deg, reported.beta_deg, reported.gamma_deg};
   for (const Planted& planted : causes) {
-    if (planted.cause == "pose_scale") truly.alpha_deg += planted.size * told.alpha_deg;
+    if (planted.cause == "pose_scale") truly.alpha_deg += planted.size * reported.alpha_deg;
     if (planted.cause == "play")
-      truly.alpha_deg += told.alpha_deg > alpha_before_deg ? planted.size / 2 : -planted.size / 2;
+      truly.alpha_deg +=
+          reported.alpha_deg > alpha_before_deg ? planted.size / 2 : -planted.size / 2;
     if (planted.cause == "cogging")
-      truly.gamma_deg += planted.size * std::cos(8 * told.gamma_deg * kDeg);
+      truly.gamma_deg += planted.size * std::cos(8 * reported.gamma_deg * kDeg);
   }
   return truly;
 }
@@ -229,7 +231,7 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
     const auto turned = [](const Angles& at) {
       return RotationMatrix(at.alpha_deg * kDeg, at.beta_deg * kDeg, at.gamma_deg * kDeg);
     };
-    const Mat told = turned({pose.alpha_deg, pose.beta_deg, pose.gamma_deg});
+    const Mat reported = turned({pose.alpha_deg, pose.beta_deg, pose.gamma_deg});
     const Mat truly = turned(Truly(pose, alpha_before_deg, causes));
     const Mat beside = turned({pose.alpha_deg, pose.beta_deg, pose.gamma_deg + 0.01});
     alpha_before_deg = pose.alpha_deg;
@@ -240,7 +242,7 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
       return 25 * field(BackTurned(m, place), BackTurned(m, direction));
     };
     for (std::size_t k = 0; k < nominal.size(); ++k) {
-      const double clean_V = read(told, law, nominal[k], Vec{});
+      const double clean_V = read(reported, law, nominal[k], Vec{});
       const std::size_t next = (k + 1) % nominal.size();
       const Moment at{k, pose.temp_C, static_cast<double>(row) / static_cast<double>(plan.rows),
                       read(truly, wrong, made.sensors[next], made.centre), pose.alpha_deg * kDeg};

@@ -1,0 +1,56 @@
+// All buses as the event loop sees them: what came in, what changed, what has to go out. One line
+// is a port with its transmit queue; only lines with something to do are touched.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/clock/clock.h"
+#include "daemon/loop/transmit_queue.h"
+#include "daemon/ports/pollable_port.h"
+#include "daemon/status/status_json.h"
+#include "fleet/coordinator.h"
+
+namespace focalfleet {
+
+class BusLines {
+ public:
+  /// `buses` and `ports` belong together, in ascending order of the buses.
+  BusLines(std::vector<BusId> buses, std::vector<std::unique_ptr<PollablePort>> ports);
+
+  [[nodiscard]] std::size_t size() const { return lines_.size(); }
+  [[nodiscard]] int fd(std::size_t line) const { return lines_[line].port->fd(); }
+  void MarkReady(std::size_t line) { lines_[line].ready = true; }
+
+  /// Receives on every line that is ready or due, and notes links that changed, or
+  /// have something else the matter. The first call notes all links.
+  void Receive(HostInstant now, std::vector<ReceivedFrame>* frames, std::vector<LinkEvent>* links);
+
+  void Put(const OutFrame& frame, HostInstant decided_at);
+  /// Offers what waits to the ports. Each line gets its own reading of the clock, for its start
+  /// signals.
+  void Flush(const HostClock& clock);
+
+  /// When some line wants Receive or Flush though nothing happens.
+  [[nodiscard]] HostInstant wake_at(HostInstant now, const HostClock& clock) const;
+  [[nodiscard]] std::vector<ShellFacts::Bus> Facts() const;
+  [[nodiscard]] const std::string& trouble(BusId bus) const;
+  [[nodiscard]] const std::string& name(BusId bus) const;
+
+ private:
+  struct Line {
+    BusId bus;
+    std::unique_ptr<PollablePort> port;
+    TransmitQueue transmit_queue;
+    bool ready = true;
+    bool reported = false;  // the coordinator knows of the link at all
+    LinkState last = LinkState::kUp;
+    std::string trouble;  // as last told
+  };
+  [[nodiscard]] std::size_t IndexOf(BusId bus) const;
+
+  std::vector<Line> lines_;
+};
+
+}  // namespace focalfleet

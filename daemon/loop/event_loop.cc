@@ -1,0 +1,309 @@
+#include "daemon/loop/event_loop.h"
+
+#include <pthread.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/epoll.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace focalfleet {
+namespace {
+
+// What an epoll event is about: the number of a bus line, or one of these.
+constexpr std::uint64_t kRequests = std::uint64_t{1} << 32;
+constexpr std::uint64_t kThreads = kRequests + 1;
+constexpr std::uint64_t kTimer = kRequests + 2;
+constexpr std::uint64_t kSignals = kRequests + 3;
+
+sigset_t OurSignals() {
+  sigset_t set;
+  sigemptyset(&set);
+  for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
+  return set;
+}
+
+spdlog::level::level_enum LevelOf(Severity severity) {
+  switch (severity) {
+    case Severity::kInfo:
+      return spdlog::level::info;
+    case Severity::kWarning:
+      return spdlog::level::warn;
+    case Severity::kError:
+      return spdlog::level::err;
+  }
+  return spdlog::level::err;
+}
+
+/// Most alarms name their unit or bus themselves.
+std::string TextOf(const AlarmRow& alarm) {
+  std::string where;
+  if (alarm.bus) where = "bus " + std::to_string(alarm.bus->value);
+  if (alarm.unit) where = "unit " + std::to_string(alarm.unit->value);
+  return where.empty() || alarm.text.starts_with(where) ? alarm.text : where + ": " + alarm.text;
+}
+
+void LogRow(const AlarmRow& alarm) {
+  spdlog::log(LevelOf(alarm.severity), "alarm {}: {}", alarm.id, TextOf(alarm));
+}
+void LogRow(const ConfigurationRow& row) {
+  spdlog::info(
+      "configuration {} ({}) is {}: {} targeted, {} arrived, {} refused, {} failed, {} stopped, "
+      "{} unmeasured, makespan {:.1f} s of {:.1f} s predicted",
+      row.id, row.source, Name(row.state), row.targeted, row.arrived, row.refused, row.failed,
+      row.stopped, row.unmeasured, row.makespan_s, row.makespan_predicted_s);
+}
+void LogRow(const EnableRow& row) {
+  spdlog::info("unit {} {}{}", row.unit.value, row.enabled ? "enabled" : "disabled: ", row.reason);
+}
+void LogRow(const BindingRow& row) {
+  spdlog::debug("unit {} is serial {}", row.unit.value, row.serial.value);
+}
+template <class T>
+void LogRow(const T&) {}
+
+}  // namespace
+
+void EventLoop::BlockSignals() {
+  const sigset_t set = OurSignals();
+  ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
+  ::signal(SIGPIPE, SIG_IGN);
+}
+
+Result<std::unique_ptr<EventLoop>> EventLoop::Create(const Parts& parts) {
+  std::unique_ptr<EventLoop> loop(new EventLoop(parts));
+  FOCALFLEET_TRY(loop->Open());
+  return loop;
+}
+
+EventLoop::~EventLoop() {
+  for (const int fd : {epoll_, timer_, signals_})
+    if (fd >= 0) ::close(fd);
+}
+
+Status EventLoop::Open() {
+  const sigset_t set = OurSignals();
+  epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
+  timer_ = ::timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
+  signals_ = ::signalfd(-1, &set, SFD_NONBLOCK | SFD_CLOEXEC);
+  if (epoll_ < 0 || timer_ < 0 || signals_ < 0)
+    return Fail(ErrorCode::kUnavailable,
+                std::string("no descriptors left: ") + std::strerror(errno));
+  for (std::size_t line = 0; line < parts_.lines->size(); ++line)
+    if (parts_.lines->fd(line) >= 0) FOCALFLEET_TRY(Watch(parts_.lines->fd(line), line));
+  FOCALFLEET_TRY(Watch(parts_.handler->fd(), kRequests));
+  FOCALFLEET_TRY(Watch(parts_.threads->fd(), kThreads));
+  FOCALFLEET_TRY(Watch(timer_, kTimer));
+  return Watch(signals_, kSignals);
+}
+
+Status EventLoop::Watch(int fd, std::uint64_t what) {
+  epoll_event event{EPOLLIN, {.u64 = what}};
+  if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) == 0) return {};
+  return Fail(ErrorCode::kUnavailable, std::string("cannot watch: ") + std::strerror(errno));
+}
+
+void EventLoop::Run() {
+  effects_.wake_at = HostInstant{0};  // the first step is due at once
+  while (!stopping_) {
+    Wait();
+    ServeSync();
+    Gather();
+    if (StepIsDue()) {
+      Step();
+      Perform();
+    }
+    parts_.lines->Flush(parts_.clock);
+    Tell();
+  }
+  effects_.Clear();
+  parts_.coordinator->End(now_, &effects_);
+  LogChanges();
+  if (!effects_.rows.empty()) parts_.store->Commit(effects_.batch, std::move(effects_.rows));
+}
+
+void EventLoop::Wait() {
+  now_ = parts_.clock.Now();
+  HostInstant wake = std::min(
+      {effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock), parts_.handler->wake_at()});
+  if (parts_.scheduler != nullptr) wake = std::min(wake, parts_.scheduler->wake_at());
+  if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
+  if (wake <= now_) return;
+  ArmTimer(wake);
+  DispatchReady(-1);
+}
+
+void EventLoop::DispatchReady(int timeout_ms) {
+  std::array<epoll_event, 128> events;
+  const int count =
+      ::epoll_wait(epoll_, events.data(), static_cast<int>(events.size()), timeout_ms);
+  for (int i = 0; i < count; ++i) Dispatch(events[static_cast<std::size_t>(i)].data.u64);
+}
+
+// Before anything else is done: the edge is what an instant is told by.
+void EventLoop::ServeSync() {
+  if (parts_.sync == nullptr) return;
+  const std::string trouble = parts_.sync->Serve(parts_.clock.Now());
+  if (!trouble.empty()) spdlog::error("SYNC {}", trouble);
+}
+
+void EventLoop::ArmTimer(HostInstant at) {
+  const std::int64_t ns = at == kNever ? 0 : parts_.clock.ToMonotonic(at);  // 0 disarms
+  if (ns == timer_set_ns_) return;
+  timer_set_ns_ = ns;
+  itimerspec when{};
+  when.it_value = {.tv_sec = ns / 1'000'000'000, .tv_nsec = ns % 1'000'000'000};
+  ::timerfd_settime(timer_, TFD_TIMER_ABSTIME, &when, nullptr);
+}
+
+void EventLoop::Dispatch(std::uint64_t what) {
+  if (what < kRequests) {
+    parts_.lines->MarkReady(what);
+  } else if (what == kRequests) {
+    requests_ready_ = true;
+  } else if (what == kThreads) {
+    parts_.threads->Clear();
+  } else if (what == kSignals) {
+    ReadSignals();
+  } else if (what == kTimer) {
+    std::uint64_t expirations = 0;
+    [[maybe_unused]] const ssize_t got = ::read(timer_, &expirations, sizeof expirations);
+    timer_set_ns_ = 0;
+  }
+}
+
+void EventLoop::ReadSignals() {
+  signalfd_siginfo info{};
+  while (::read(signals_, &info, sizeof info) == sizeof info) {
+    if (info.ssi_signo == SIGHUP) continue;  // nothing to read anew while units may move
+    spdlog::info("{} received, ending", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
+    stopping_ = true;
+  }
+}
+
+void EventLoop::Gather() {
+  // Whatever is there at `now_` is heard in this turn. Else units would pass for silent whose
+  // answers wait, where the host was held up on its way here.
+  now_ = parts_.clock.Now();
+  DispatchReady(0);
+  frames_.clear();
+  links_.clear();
+  commands_.clear();
+  plans_.clear();
+  exposures_.clear();
+  parts_.lines->Receive(now_, &frames_, &links_);
+  while (auto plan = parts_.planner->Take()) plans_.push_back(std::move(*plan));
+  while (auto done = parts_.camera != nullptr ? parts_.camera->Take() : std::nullopt)
+    exposures_.push_back(std::move(*done));
+  if (parts_.troubles != nullptr) notes_ = parts_.troubles->TakeNotes();
+  if (std::exchange(requests_ready_, false)) parts_.handler->Service(View(), &commands_);
+}
+
+bool EventLoop::StepIsDue() const {
+  return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
+         !exposures_.empty() || !notes_.empty() ||
+         parts_.store->committed_through() != committed_through_ ||
+         parts_.store->failing() != store_failing_ || now_ >= effects_.wake_at;
+}
+
+void EventLoop::Step() {
+  // In this order: a batch that comes through in between is then only told a step later.
+  store_failing_ = parts_.store->failing();
+  committed_through_ = parts_.store->committed_through();
+  const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
+  effects_.Clear();
+  parts_.coordinator->Step({.now = now_,
+                            .frames = frames_,
+                            .links = links_,
+                            .commands = commands_,
+                            .plans = plans_,
+                            .exposures = exposures_,
+                            .notes = notes_,
+                            .committed_through = committed_through_,
+                            .store_failing = store_failing_,
+                            .refused = refused},
+                           &effects_);
+  ++steps_;
+}
+
+void EventLoop::Perform() {
+  LogChanges();
+  ReportModel();
+  if (!effects_.rows.empty()) {
+    last_batch_ = effects_.batch;
+    parts_.store->Commit(effects_.batch, std::move(effects_.rows));
+  }
+  for (const OutFrame& frame : effects_.frames) parts_.lines->Put(frame, now_);
+  if (effects_.sync_at && parts_.sync != nullptr) parts_.sync->Plan(*effects_.sync_at);
+  if (effects_.plan_job) {
+    const auto drives = parts_.coordinator->drives();
+    PlannerWork work{std::move(*effects_.plan_job), {drives.begin(), drives.end()}};
+    if (!parts_.planner->Submit(&work)) spdlog::error("plan job {} found no room", work.job.job);
+  }
+  if (effects_.exposure && parts_.camera != nullptr) {
+    const auto drives = parts_.coordinator->drives();
+    CameraWork work{std::move(*effects_.exposure), {drives.begin(), drives.end()}};
+    if (!parts_.camera->Submit(&work)) spdlog::error("exposure {} found no room", work.job.id);
+  }
+  for (const ReplyEffect& reply : effects_.replies) parts_.handler->Reply(View(), reply);
+  if (parts_.scheduler != nullptr) parts_.scheduler->Changed(effects_.changed);
+}
+
+// A model predicts from how a unit came to where it rests. A count that began anew, or other
+// hardware, is not what it was measured on.
+void EventLoop::ReportModel() {
+  Compensation* compensation = parts_.handler->models().compensation();
+  if (compensation == nullptr) return;
+  const auto forget = [&](SerialNumber serial) {
+    for (const PositionerIndex i : effects_.changed)
+      if (parts_.coordinator->unit(i).serial == serial) compensation->Forget(i);
+  };
+  for (const Row& row : effects_.rows) {
+    if (const auto* end = std::get_if<IntentEndRow>(&row); end && end->end == IntentEnd::kHomed)
+      forget(end->serial);
+    if (const auto* vector = std::get_if<VectorRow>(&row);
+        vector && (vector->origin == Origin::kOperator || vector->origin == Origin::kFound))
+      forget(vector->serial);
+    if (const auto* binding = std::get_if<BindingRow>(&row);
+        binding && binding->replaced.value != 0)
+      if (const auto i = parts_.layout->Find(binding->unit)) compensation->Forget(*i);
+  }
+  for (const PositionerIndex i : effects_.changed) NoteRest(View(), i, compensation);
+}
+
+void EventLoop::Tell() {
+  parts_.store->HandOver();
+  parts_.handler->ShowProgress(View());
+  if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
+  StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_failing_);
+  if (!parts_.store->Publish(&status)) parts_.scheduler->GiveBack(status, *parts_.layout);
+}
+
+void EventLoop::LogChanges() {
+  for (const LinkEvent& link : links_) {
+    const std::string& trouble = parts_.lines->trouble(link.bus);
+    spdlog::log(link.state == LinkState::kUp ? spdlog::level::info : spdlog::level::warn,
+                "bus {} ({}) is {}{}{}", link.bus.value, parts_.lines->name(link.bus),
+                Name(link.state), trouble.empty() ? "" : ": ", trouble);
+  }
+  for (const Row& row : effects_.rows) std::visit([](const auto& what) { LogRow(what); }, row);
+}
+
+FleetView EventLoop::View() const {
+  return {.layout = parts_.layout,
+          .coordinator = parts_.coordinator,
+          .now = now_,
+          .at = WallTime::Now(),
+          .compensation = std::as_const(*parts_.handler).models().compensation()};
+}
+
+}  // namespace focalfleet

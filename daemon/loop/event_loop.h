@@ -1,0 +1,106 @@
+// The core thread. It waits until something is there (frames, requests, a plan, a commit, a signal)
+// or due, gives it all to the coordinator in one Step, and performs what comes back: rows to the
+// store's thread, frames to the buses, a plan job to the planner's thread, an exposure to the
+// camera's, replies to the request handler, status to the scheduler. It never waits for any of
+// them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "daemon/camera/camera_work.h"
+#include "daemon/clock/clock.h"
+#include "daemon/loop/bus_lines.h"
+#include "daemon/loop/event_signal.h"
+#include "daemon/loop/job_thread.h"
+#include "daemon/loop/store_thread.h"
+#include "daemon/loop/sync_pulse.h"
+#include "daemon/status/dds_troubles.h"
+#include "daemon/status/status_scheduler.h"
+#include "daemon/verbs/request_handler.h"
+#include "fleet/coordinator.h"
+
+namespace focalfleet {
+
+struct PlannerWork {
+  PlanJob job;
+  std::vector<UnitDrive> drives;
+};
+using PlannerThread = JobThread<PlannerWork, PlanDone>;
+using CameraThread = JobThread<CameraWork, ExposureDone>;
+
+class EventLoop {
+ public:
+  /// All outlive the loop.
+  struct Parts {
+    const Layout* layout = nullptr;
+    Coordinator* coordinator = nullptr;
+    BusLines* lines = nullptr;
+    RequestHandler* handler = nullptr;
+    PlannerThread* planner = nullptr;
+    CameraThread* camera = nullptr;  // measures; none: neither camera nor sensors
+    StoreThread* store = nullptr;
+    StatusScheduler* scheduler = nullptr;  // none: DDS is off
+    SyncPulse* sync = nullptr;             // none: no SYNC line
+    DdsTroubles* troubles = nullptr;       // none: nobody speaks DDS
+    const EventSignal* threads = nullptr;  // raised by planner, camera, store
+    HostClock clock;
+  };
+
+  /// From now on SIGTERM, SIGINT and SIGHUP come as data. Call before the first thread starts.
+  static void BlockSignals();
+
+  /// Errors: kUnavailable: no descriptors left.
+  static Result<std::unique_ptr<EventLoop>> Create(const Parts& parts);
+  EventLoop(const EventLoop&) = delete;
+  EventLoop& operator=(const EventLoop&) = delete;
+  ~EventLoop();
+
+  /// Returns when SIGTERM or SIGINT came.
+  void Run();
+
+  [[nodiscard]] std::uint64_t steps() const { return steps_; }
+
+ private:
+  explicit EventLoop(const Parts& parts) : parts_(parts) {}
+  Status Open();
+  Status Watch(int fd, std::uint64_t what);
+  void Wait();
+  void ArmTimer(HostInstant at);
+  void DispatchReady(int timeout_ms);
+  void Dispatch(std::uint64_t what);
+  void ReadSignals();
+  void Gather();
+  [[nodiscard]] bool StepIsDue() const;
+  void Step();
+  void ServeSync();
+  void Perform();
+  void Tell();
+  void ReportModel();
+  void LogChanges();
+  [[nodiscard]] FleetView View() const;
+
+  Parts parts_;
+  int epoll_ = -1;
+  int timer_ = -1;
+  int signals_ = -1;
+  std::int64_t timer_set_ns_ = 0;
+  bool stopping_ = false;
+  bool requests_ready_ = false;
+
+  HostInstant now_;
+  std::vector<ReceivedFrame> frames_;
+  std::vector<LinkEvent> links_;
+  std::vector<Command> commands_;
+  std::vector<PlanDone> plans_;
+  std::vector<ExposureDone> exposures_;
+  std::vector<ShellNote> notes_;
+  std::uint64_t committed_through_ = 0;  // as the coordinator knows it
+  bool store_failing_ = false;
+  Effects effects_;
+  std::uint64_t last_batch_ = 0;
+  std::uint64_t steps_ = 0;
+};
+
+}  // namespace focalfleet

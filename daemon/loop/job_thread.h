@@ -1,0 +1,82 @@
+// What takes longer than a bus may wait (a plan, an exposure) is done on a thread of its own, one
+// job after the other. A job carries all that it needs as values; the answer comes back through a
+// queue.
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "daemon/loop/event_signal.h"
+#include "daemon/loop/spsc_queue.h"
+
+namespace focalfleet {
+
+template <class Job, class Answer>
+class JobThread {
+ public:
+  /// `ending` turns true while a job is done that nobody waits for any more.
+  using Work = std::function<Answer(const Job&, const std::atomic<bool>& ending)>;
+
+  /// `done` is raised when an answer is there; it outlives the thread. Errors: kUnavailable: no
+  /// descriptors left.
+  static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done) {
+    FOCALFLEET_TRY_ASSIGN(EventSignal wake, EventSignal::Create());
+    return std::unique_ptr<JobThread>(new JobThread(std::move(work), done, std::move(wake)));
+  }
+  JobThread(const JobThread&) = delete;
+  JobThread& operator=(const JobThread&) = delete;
+  /// Waits for the job that is being done.
+  ~JobThread() {
+    ending_ = true;
+    wake_.Raise();
+    thread_.join();
+  }
+
+  /// False: too many jobs wait (the coordinator has one at a time); `job` is untouched.
+  [[nodiscard]] bool Submit(Job* job) {
+    if (answers_.size() + jobs_.size() >= kJobs || !jobs_.Push(job)) return false;
+    wake_.Raise();
+    return true;
+  }
+  std::optional<Answer> Take() { return answers_.Pop(); }
+
+ private:
+  static constexpr std::size_t kJobs = 8;
+
+  JobThread(Work work, const EventSignal* done, EventSignal wake)
+      : work_(std::move(work)),
+        done_(done),
+        wake_(std::move(wake)),
+        jobs_(kJobs),
+        // A job is only taken while its answer has room, so an answer always has.
+        answers_(2 * kJobs),
+        thread_([this] { Run(); }) {}
+
+  void Run() {
+    while (!ending_) {
+      auto job = jobs_.Pop();
+      if (!job) {
+        wake_.Wait(std::nullopt);
+        continue;
+      }
+      Answer answer = work_(*job, ending_);
+      [[maybe_unused]] const bool had_room = answers_.Push(&answer);
+      done_->Raise();
+    }
+  }
+
+  Work work_;
+  const EventSignal* done_;
+  EventSignal wake_;
+  SpscQueue<Job> jobs_;
+  SpscQueue<Answer> answers_;
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+}  // namespace focalfleet

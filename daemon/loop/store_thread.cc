@@ -1,0 +1,194 @@
+#include "daemon/loop/store_thread.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "fleet/row_check.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::size_t kBatches = 1024;
+constexpr std::size_t kStatuses = 4;
+constexpr std::size_t kRowsPerTransaction = 65'536;
+constexpr std::chrono::milliseconds kPublishAgain{50};
+/// Alarms of the thread itself (the store fails, so they are not stored) are numbered apart from
+/// the stored ones.
+constexpr std::uint64_t kOwnAlarms = std::uint64_t{1} << 63;
+
+}  // namespace
+
+Result<std::unique_ptr<StoreThread>> StoreThread::Create(Sinks sinks,
+                                                         const EventSignal* progressed) {
+  FOCALFLEET_TRY_ASSIGN(EventSignal wake, EventSignal::Create());
+  return std::unique_ptr<StoreThread>(
+      new StoreThread(std::move(sinks), progressed, std::move(wake)));
+}
+
+StoreThread::StoreThread(Sinks sinks, const EventSignal* progressed, EventSignal wake)
+    : sinks_(std::move(sinks)),
+      progressed_(progressed),
+      wake_(std::move(wake)),
+      batches_(kBatches),
+      statuses_(kStatuses),
+      thread_([this] { Run(); }) {}
+
+StoreThread::~StoreThread() {
+  if (thread_.joinable()) static_cast<void>(Finish());
+}
+
+// ---- the giving thread
+
+void StoreThread::Commit(std::uint64_t batch, std::vector<Row> rows) {
+  held_.push_back({batch, batch, std::move(rows), WallTime::Now()});
+  HandOver();
+}
+
+void StoreThread::HandOver() {
+  bool any = false;
+  while (!held_.empty() && batches_.Push(&held_.front())) {
+    held_.pop_front();
+    any = true;
+  }
+  if (any) wake_.Raise();
+}
+
+bool StoreThread::Publish(StatusBatch* status) {
+  if (!statuses_.Push(status)) return false;
+  wake_.Raise();
+  return true;
+}
+
+std::vector<RefusedRow> StoreThread::TakeRefused() {
+  const std::lock_guard lock(refused_lock_);
+  return std::exchange(refused_, {});
+}
+
+Status StoreThread::Finish() {
+  ending_ = true;
+  while (!held_.empty() && !failing_) {
+    HandOver();
+    std::this_thread::yield();
+  }
+  wake_.Raise();
+  thread_.join();
+  if (!failing_ && held_.empty()) return {};
+  return tl::unexpected<Error>(last_error_);
+}
+
+// ---- the thread
+
+void StoreThread::Run() {
+  for (;;) {
+    const bool ending = ending_;  // read before the queues: what was given before it is seen below
+    Gather();
+    const bool committed = TryCommit();
+    PublishReady();
+    if (committed && batches_.size() > 0) continue;
+    // At the end one more attempt is all that a broken disk gets.
+    if (ending && (Idle() || failing_)) return;
+    if (attempted_)
+      wake_.Wait(std::clamp(std::chrono::ceil<std::chrono::milliseconds>(
+                                retry_at_ - std::chrono::steady_clock::now()),
+                            std::chrono::milliseconds(1), sinks_.retry_period));
+    else
+      wake_.Wait(publish_again_ || status_ ? std::optional(kPublishAgain) : std::nullopt);
+  }
+}
+
+bool StoreThread::Idle() const {
+  return open_.rows.empty() && batches_.size() == 0 && statuses_.size() == 0 && !status_;
+}
+
+/// Adds what waits to the open batch, unless that has failed already: then it must stay what it
+/// was.
+void StoreThread::Gather() {
+  while (!attempted_ && open_.rows.size() < kRowsPerTransaction) {
+    auto next = batches_.Pop();
+    if (!next) return;
+    if (open_.rows.empty()) {
+      open_ = std::move(*next);
+      continue;
+    }
+    open_.number = next->number;
+    open_.rows.insert(open_.rows.end(), std::make_move_iterator(next->rows.begin()),
+                      std::make_move_iterator(next->rows.end()));
+  }
+}
+
+bool StoreThread::TryCommit() {
+  if (open_.rows.empty()) return true;
+  if (attempted_ && !ending_ && std::chrono::steady_clock::now() < retry_at_) return false;
+  for (std::size_t k = open_.rows.size(); k-- > 0;)
+    if (const char* const flaw = Flaw(open_.rows[k])) SetAside(k, flaw);
+  while (!open_.rows.empty()) {
+    std::size_t refused = open_.rows.size();
+    const Status done = sinks_.commit(open_.rows, open_.at, &refused);
+    if (done) break;
+    const bool for_ever = done.error().code == ErrorCode::kInvalid && refused < open_.rows.size();
+    if (!for_ever) {
+      NoteFailure(done.error());
+      return false;
+    }
+    SetAside(refused, done.error().text);
+  }
+  for (const Row& row : open_.rows)
+    if (const auto* alarm = std::get_if<AlarmRow>(&row)) sinks_.alarm({open_.at, *alarm});
+  open_.rows.clear();
+  attempted_ = false;
+  committed_through_ = open_.number;
+  if (failing_.exchange(false) && sinks_.log_info)
+    sinks_.log_info("the store can be written again");
+  progressed_->Raise();
+  return true;
+}
+
+/// The rest of its batch goes on without the row; whoever reads committed_through() finds it told.
+void StoreThread::SetAside(std::size_t row, const std::string& why) {
+  const auto at = open_.rows.begin() + static_cast<std::ptrdiff_t>(row);
+  sinks_.log_error("the store refuses the " + Describe(*at) + ": " + why + "; it is set aside");
+  {
+    const std::lock_guard lock(refused_lock_);
+    refused_.push_back({open_.first, open_.number, std::move(*at), why});
+  }
+  open_.rows.erase(at);
+}
+
+void StoreThread::NoteFailure(const Error& error) {
+  last_error_ = error;
+  attempted_ = true;
+  retry_at_ = std::chrono::steady_clock::now() + sinks_.retry_period;
+  if (failing_.exchange(true)) return;
+  const std::string text = "the store cannot be written, nothing new is started: " + error.text;
+  sinks_.log_error(text);
+  // Numbered by the time, so that a restarted daemon does not reuse a number.
+  const WallTime now = WallTime::Now();
+  const std::uint64_t id = kOwnAlarms + static_cast<std::uint64_t>(now.ns) / 1000 + own_alarms_++;
+  sinks_.alarm(
+      {now, {.id = id, .severity = Severity::kError, .unit = {}, .bus = {}, .text = text}});
+  progressed_->Raise();
+}
+
+void StoreThread::PublishReady() {
+  if (publish_again_) publish_again_ = sinks_.publish({});
+  for (;;) {
+    if (!status_) status_ = statuses_.Pop();
+    if (!status_) return;
+    if (committed_through_ < status_->after_batch) {
+      // The fleet's own line says that the store fails; it alone may go ahead.
+      if (failing_ && status_->fleet) {
+        StatusBatch ahead;
+        ahead.fleet = std::move(status_->fleet);
+        ahead.fleet->store_failing = true;
+        status_->fleet.reset();
+        publish_again_ = sinks_.publish(ahead) || publish_again_;
+      }
+      return;
+    }
+    publish_again_ = sinks_.publish(*status_) || publish_again_;
+    status_.reset();
+  }
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,311 @@
+#include "daemon/process/daemon.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <memory>
+#include <utility>
+
+#include "daemon/camera/camera_dds.h"
+#include "daemon/camera/camera_folder.h"
+#include "daemon/hall/measure.h"
+#include "daemon/loop/event_loop.h"
+#include "daemon/process/bounded_end.h"
+#include "daemon/process/fleet_setup.h"
+#include "daemon/process/log.h"
+#include "daemon/status/buffered_status_publisher.h"
+#include "daemon/status/dds_troubles.h"
+#include "daemon/store/store.h"
+#include "fleet/plan/job.h"
+
+namespace focalfleet {
+namespace {
+
+double ProcessCpuSeconds() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+/// From the last turn of the loop until planner, camera and buses have ended; then the process goes
+/// without them. A planner looks at least every 0.1 s whether it is wanted, a camera every 20 ms; a
+/// driver that restarts a controller takes up to a second. Half of it leaves such a driver behind
+/// for nothing; twice as much makes the end of a daemon with a dead camera take longer than the
+/// 2 s that docs/cli.md promises.
+constexpr std::chrono::milliseconds kEndWithin{1000};
+
+/// What the store's thread counts, for the core thread to show.
+struct SharedCounters {
+  std::atomic<std::uint64_t> transactions{0};
+  std::atomic<std::uint64_t> rows{0};
+};
+
+DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
+  return {.domain = dds.domain, .config_xml = dds.config.empty() ? "" : "file://" + dds.config};
+}
+
+class Daemon {
+ public:
+  explicit Daemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
+
+  Status Start();
+  /// Until SIGTERM or SIGINT. Errors: rows could not be stored.
+  Status Run();
+  /// Something hangs and still uses this, which must not be taken down then.
+  [[nodiscard]] bool left() const { return left_; }
+
+ private:
+  Status End();
+  Status StartThreads();
+  StoreThread::Sinks StoreSinks();
+  Status OpenRequestHandler();
+  void OpenStatus();
+  Status OpenCamera();
+  ShellFacts Facts() const;
+
+  DaemonConfig config_;
+  HostClock clock_;
+  WallTime started_ = WallTime::Now();
+  SharedCounters counters_;
+  std::unique_ptr<Layout> layout_;
+  std::unique_ptr<Store> store_;
+  std::unique_ptr<EventSignal> signal_;
+  std::unique_ptr<DdsTroubles> dds_troubles_;
+  std::unique_ptr<BufferedStatusPublisher> publisher_;  // none: DDS is off
+  std::unique_ptr<StatusScheduler> scheduler_;
+  std::unique_ptr<CameraWorker> camera_worker_;         // none: there is no camera
+  std::unique_ptr<FibreCarrierWorker> carrier_worker_;  // none: no unit measures itself
+  std::unique_ptr<Coordinator> coordinator_;
+  std::unique_ptr<BusLines> lines_;
+  std::unique_ptr<StoreThread> store_thread_;
+  std::unique_ptr<PlannerThread> planner_;
+  std::unique_ptr<CameraThread> camera_;  // none: nobody can measure
+  std::unique_ptr<RequestHandler> handler_;
+  std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
+  std::unique_ptr<EventLoop> loop_;
+  std::unique_ptr<BoundedEnd> ending_;
+  bool left_ = false;
+};
+
+Status Daemon::Start() {
+  FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
+  signal_ = std::make_unique<EventSignal>(std::move(signal));
+  dds_troubles_ = std::make_unique<DdsTroubles>(signal_.get());
+  FOCALFLEET_TRY_ASSIGN(Layout layout, LoadLayout(config_.fleet));
+  layout_ = std::make_unique<Layout>(std::move(layout));
+  FOCALFLEET_TRY_ASSIGN(store_, Store::Open(config_.store.path));
+  FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
+  FOCALFLEET_TRY(OpenRequestHandler());
+  FOCALFLEET_TRY_ASSIGN(auto ports, OpenPorts(config_, *layout_, clock_));
+  FOCALFLEET_TRY_ASSIGN(auto sync, OpenSync(config_.sync));
+  if (sync != nullptr)
+    sync_ = std::make_unique<SyncPulse>(std::move(sync),
+                                        SyncPulse::Options{.late_most = config_.timing.sync_lead});
+  const auto buses = layout_->buses();
+  lines_ =
+      std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
+  FOCALFLEET_TRY(OpenCamera());
+  FOCALFLEET_TRY_ASSIGN(carrier_worker_, OpenFibreCarriers(config_.hall, *layout_));
+  OpenStatus();
+  coordinator_ = std::make_unique<Coordinator>(
+      layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
+      std::move(stored));
+  return StartThreads();
+}
+
+Status Daemon::OpenRequestHandler() {
+  FOCALFLEET_TRY_ASSIGN(LineServer server, LineServer::Create(config_.control.socket,
+                                                              {.urgent = &RequestHandler::IsStop}));
+  handler_ = std::make_unique<RequestHandler>(
+      std::move(server),
+      RequestHandler::Options{.progress_period = clock_.Real(Milliseconds(200)),
+                              .facts = [this] { return Facts(); },
+                              .log = [](const std::string& text) { spdlog::info("{}", text); },
+                              .store_path = config_.store.path,
+                              .layout = layout_.get()});
+  if (const Status restored = handler_->RestoreModel(); !restored)
+    spdlog::error("no model is in force: {}", restored.error().text);
+  return {};
+}
+
+void Daemon::OpenStatus() {
+  const bool speaks = config_.dds.enabled || config_.camera.dds;
+  if (speaks && std::getenv("CYCLONEDDS_URI") != nullptr)
+    spdlog::warn("CYCLONEDDS_URI is set and is not used: dds.config says where status goes, {}",
+                 config_.dds.config.empty() ? "the loopback interface only" : config_.dds.config);
+  if (!config_.dds.enabled) return;
+  publisher_ = std::make_unique<BufferedStatusPublisher>(LateJoin<StatusPublisher>::Options{
+      .join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
+      .tell = [this](const std::string& trouble) { dds_troubles_->Tell("status", trouble); }});
+  scheduler_ = std::make_unique<StatusScheduler>(
+      layout_->size(),
+      StatusScheduler::Options{
+          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = started_},
+      clock_);
+}
+
+Status Daemon::OpenCamera() {
+  if (!config_.camera.present()) return {};
+  FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
+  std::unique_ptr<CameraPort> port;
+  if (config_.camera.dds) {
+    port = std::make_unique<CameraDds>(CameraDds::Options{
+        .dds = DdsOptionsOf(config_.dds), .sensor = site.sensor, .tell = [this](const auto& text) {
+          dds_troubles_->Tell("the camera", text);
+        }});
+  } else {
+    FOCALFLEET_TRY_ASSIGN(port, CameraFolder::Open(config_.camera.directory, site.sensor));
+  }
+  camera_worker_ = std::make_unique<CameraWorker>(
+      std::move(port),
+      CameraWorker::Options{
+          .layout = layout_.get(),
+          .site = std::move(site),
+          .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
+          .speed = config_.clock.speed,
+          .log = [](const std::string& text) { spdlog::warn("{}", text); }});
+  return {};
+}
+
+StoreThread::Sinks Daemon::StoreSinks() {
+  StoreThread::Sinks sinks;
+  sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
+    Status done = store_->Commit(rows, at, refused);
+    counters_.transactions = store_->counters().transactions;
+    counters_.rows = store_->counters().rows;
+    return done;
+  };
+  sinks.publish = [this](const StatusBatch& status) {
+    return publisher_ != nullptr && publisher_->Publish(status);
+  };
+  sinks.alarm = [this](const AlarmValue& alarm) {
+    if (publisher_ != nullptr) publisher_->Publish(alarm);
+  };
+  sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
+  sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
+  return sinks;
+}
+
+Status Daemon::StartThreads() {
+  FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
+  FOCALFLEET_TRY_ASSIGN(
+      planner_,
+      PlannerThread::Create(
+          [layout = layout_.get()](const PlannerWork& work, const std::atomic<bool>& ending) {
+            return RunPlanJob(work.job, *layout, work.drives, [&ending] { return ending.load(); });
+          },
+          signal_.get()));
+  if (camera_worker_ != nullptr || carrier_worker_ != nullptr) {
+    FOCALFLEET_TRY_ASSIGN(camera_,
+                          CameraThread::Create(
+                              [this](const CameraWork& work, const std::atomic<bool>& ending) {
+                                return MeasureUnits(work, carrier_worker_.get(),
+                                                    camera_worker_.get(), ending);
+                              },
+                              signal_.get()));
+  }
+  FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
+                                                  .coordinator = coordinator_.get(),
+                                                  .lines = lines_.get(),
+                                                  .handler = handler_.get(),
+                                                  .planner = planner_.get(),
+                                                  .camera = camera_.get(),
+                                                  .store = store_thread_.get(),
+                                                  .scheduler = scheduler_.get(),
+                                                  .sync = sync_.get(),
+                                                  .troubles = dds_troubles_.get(),
+                                                  .threads = signal_.get(),
+                                                  .clock = clock_}));
+  return {};
+}
+
+Status Daemon::Run() {
+  spdlog::info("focalfleetd {} is ready: {} units on {} buses, store {}, control {}", Version(),
+               layout_->size(), layout_->buses().size(), config_.store.path,
+               config_.control.socket);
+  loop_->Run();
+  if (coordinator_->busy())
+    spdlog::warn(
+        "configuration {} was under way: units that move finish by themselves and are asked at the "
+        "next start",
+        coordinator_->configuration().id);
+  return End();
+}
+
+/// In this order: nothing more goes to the buses, the last rows are stored, clients and readers are
+/// told, the store is whole by itself and free for the next daemon, the socket is gone. What may
+/// hang ends meanwhile, or is left.
+Status Daemon::End() {
+  ending_ = std::make_unique<BoundedEnd>(
+      std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
+                                    {"the planner", [this] { planner_.reset(); }},
+                                    {"the camera", [this] { camera_.reset(); }}});
+  const Status stored = store_thread_->Finish();
+  handler_->Close();
+  publisher_.reset();
+  store_.reset();
+  handler_.reset();
+  const std::vector<std::string> left = ending_->Wait(kEndWithin);
+  left_ = !left.empty();
+  if (left_)
+    spdlog::warn("{} did not end within {} ms and {} left behind", fmt::join(left, ", "),
+                 kEndWithin.count(), left.size() == 1 ? "is" : "are");
+  if (stored)
+    spdlog::info("ended, all is stored");
+  else
+    spdlog::error("ended with rows that could not be stored: {}", stored.error().text);
+  return stored;
+}
+
+ShellFacts Daemon::Facts() const {
+  ShellFacts facts;
+  facts.version = Version();
+  facts.started = started_;
+  facts.store_path = config_.store.path;
+  facts.store_failing = store_thread_->failing();
+  facts.batches_waiting = store_thread_->waiting();
+  facts.store.transactions = counters_.transactions;
+  facts.store.rows = counters_.rows;
+  facts.dds_enabled = publisher_ != nullptr;
+  facts.dds_trouble = dds_troubles_->Summary();
+  if (publisher_ != nullptr) {
+    facts.dds_samples = publisher_->samples();
+    facts.dds_bytes = publisher_->bytes();
+  }
+  facts.steps = loop_->steps();
+  facts.cpu_s = ProcessCpuSeconds();
+  facts.buses = lines_->Facts();
+  return facts;
+}
+
+}  // namespace
+
+const char* Version() { return FOCALFLEET_VERSION; }
+
+DaemonEnd RunDaemon(const DaemonConfig& config) {
+  EventLoop::BlockSignals();
+  if (Status open = OpenLog(config.log); !open) return {std::move(open)};
+  auto daemon = std::make_unique<Daemon>(config);
+  Status ended = daemon->Start();
+  if (ended) ended = daemon->Run();
+  const bool left = daemon->left();
+  if (left) static_cast<void>(daemon.release());  // what hangs still uses it
+  return {std::move(ended), left};
+}
+
+Result<std::string> CheckDaemon(const DaemonConfig& config) {
+  FOCALFLEET_TRY_ASSIGN(const Layout layout, LoadLayout(config.fleet));
+  FOCALFLEET_TRY(CheckInterfaces(config, layout));
+  if (config.camera.present()) FOCALFLEET_TRY(LoadCameraSite(config.camera));
+  FOCALFLEET_TRY(OpenFibreCarriers(config.hall, layout));
+  return "# " + std::to_string(layout.size()) + " units on " +
+         std::to_string(layout.buses().size()) + " buses\n" + EffectiveConfig(config);
+}
+
+}  // namespace focalfleet

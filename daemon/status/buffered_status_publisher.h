@@ -1,0 +1,92 @@
+// The way of status to DDS, on the store's thread: what the publisher does not take now (a reader
+// lags) is kept, newest values only, and offered again. As long as the domain cannot be joined,
+// that is everything: whoever reads then gets the whole state at once, and the newest alarms.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "daemon/dds/late_join.h"
+#include "daemon/dds/status_publisher.h"
+#include "daemon/loop/store_thread.h"
+
+namespace focalfleet {
+
+class BufferedStatusPublisher {
+ public:
+  explicit BufferedStatusPublisher(LateJoin<StatusPublisher>::Options options)
+      : joined_(std::move(options)) {}
+
+  /// True: some units still wait to be taken, and may be soon.
+  bool Publish(const StatusBatch& status);
+  void Publish(const AlarmValue& alarm);
+
+  // Any thread.
+  [[nodiscard]] std::uint64_t samples() const { return samples_; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+
+ private:
+  /// The newest value of each unit or bus that is not told yet.
+  template <class Value>
+  class Newest {
+   public:
+    void Keep(const std::vector<Value>& values) {
+      if (values_.empty()) {  // as a rule: all was taken
+        values_ = values;
+        return;
+      }
+      if (place_of_.size() != values_.size())
+        for (std::size_t i = 0; i < values_.size(); ++i) place_of_[KeyOf(values_[i])] = i;
+      for (const Value& value : values) {
+        const auto [it, is_new] = place_of_.emplace(KeyOf(value), values_.size());
+        if (is_new)
+          values_.push_back(value);
+        else
+          values_[it->second] = value;
+      }
+    }
+    /// The first `count` are told.
+    void DropFirst(std::size_t count) {
+      values_.erase(values_.begin(), values_.begin() + static_cast<std::ptrdiff_t>(count));
+      place_of_.clear();
+    }
+    [[nodiscard]] const std::vector<Value>& values() const { return values_; }
+
+   private:
+    static std::uint32_t KeyOf(const BusStatusValue& value) { return value.bus.value; }
+    template <class OfUnit>
+    static std::uint32_t KeyOf(const OfUnit& value) {
+      return value.unit.value;
+    }
+    std::vector<Value> values_;
+    std::unordered_map<std::uint32_t, std::size_t> place_of_;  // in values_; empty: not made yet
+  };
+
+  void Keep(const StatusBatch& status);
+  template <class Value>
+  void Tell(Newest<Value>* kept);
+  template <class Value>
+  void Tell(std::optional<Value>* kept);
+  void ReportAlarms();
+  void Note(const Status& status);
+  void Count();
+
+  LateJoin<StatusPublisher> joined_;
+  Newest<UnitStatusValue> units_;
+  Newest<UnitOrientationValue> orientations_;
+  Newest<BusStatusValue> buses_;
+  std::optional<FleetStatusValue> fleet_;
+  std::optional<ConfigurationProgressValue> configuration_;
+  std::deque<AlarmValue> alarms_;
+  std::string last_error_;
+  std::atomic<std::uint64_t> samples_{0};
+  std::atomic<std::uint64_t> bytes_{0};
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,43 @@
+// What is shown of the fleet, taken out of the coordinator as plain values, so that other threads
+// may have them.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "daemon/clock/wall_time.h"
+#include "daemon/dds/status_values.h"
+#include "fleet/coordinator.h"
+
+namespace focalfleet {
+
+class Compensation;
+
+/// What a snapshot is taken of.
+struct FleetView {
+  const Layout* layout = nullptr;
+  const Coordinator* coordinator = nullptr;
+  HostInstant now;
+  WallTime at;
+  const Compensation* compensation = nullptr;  // none: commands go as they are
+};
+
+/// The lesser of both axes: a unit is known no better than its worse axis.
+Witness WitnessOf(const UnitKnowledge& knowledge);
+
+/// Moving units are shown where the plan has them now.
+UnitStatusValue SnapshotUnit(const FleetView& view, PositionerIndex i);
+/// Nothing where its sensors were never read.
+std::optional<UnitOrientationValue> SnapshotOrientation(const FleetView& view, PositionerIndex i);
+BusStatusValue SnapshotBus(const FleetView& view, BusId bus);
+
+struct FleetCounts {
+  std::uint32_t enabled = 0;
+  std::array<std::uint32_t, kUnitPhaseCount> by_phase{};
+  std::array<std::uint32_t, kWitnessCount> by_witness{};
+};
+/// Cost: one pass over the units.
+FleetCounts CountFleet(const FleetView& view);
+double HighestBusLoad(const FleetView& view);
+
+}  // namespace focalfleet

@@ -1,0 +1,328 @@
+#include "daemon/verbs/request_handler.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "daemon/verbs/requested_command.h"
+#include "fleet/files/bad_rows.h"
+#include "protocol/base/limits.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::uint64_t kHistoryRowsMax = 1000;
+
+AxisAngles CountOf(const FleetView& view, PositionerIndex i, const Pose& place) {
+  const Pose& offset = view.coordinator->unit(i).offset;
+  return AnglesOf(view.layout->unit(i), view.coordinator->drives()[i.value],
+                  {place[0] - offset[0], place[1] - offset[1]});
+}
+
+/// The newest value of each axis and parameter; `history` is newest first.
+Json NewestOf(const std::vector<ParameterHistory>& history) {
+  std::vector<ParameterHistory> newest;
+  for (const ParameterHistory& entry : history) {
+    const bool known = std::ranges::any_of(newest, [&](const ParameterHistory& other) {
+      return other.row.axis == entry.row.axis && other.row.parameter == entry.row.parameter;
+    });
+    if (!known) newest.push_back(entry);
+  }
+  return HistoryJson(newest);
+}
+
+/// The newest of each axis; `history` is newest first.
+Json NewestOf(const std::vector<TuningHistory>& history) {
+  std::vector<TuningHistory> newest;
+  for (const TuningHistory& entry : history)
+    if (std::ranges::none_of(
+            newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
+      newest.push_back(entry);
+  return HistoryJson(newest);
+}
+
+bool HasMoved(const ConfigurationView& configuration) {
+  return configuration.started != kNever || configuration.makespan_s > 0;
+}
+
+/// What all units count that rest.
+void NoteRests(const FleetView& view, Compensation* compensation) {
+  if (compensation == nullptr) return;
+  for (std::uint32_t n = 0; n < view.layout->size(); ++n) NoteRest(view, {n}, compensation);
+}
+
+}  // namespace
+
+void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation) {
+  const UnitView& unit = view.coordinator->unit(i);
+  if (unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) return;
+  compensation->Rests(i, CountOf(view, i, PlaceOf(unit.knowledge)));
+}
+
+void RequestHandler::Service(const FleetView& view, std::vector<Command>* commands) {
+  stops_.clear();
+  server_.Service(&stops_);
+  for (const IncomingLine& line : stops_) Handle(view, line, commands);
+  // A flood of stops must not keep everybody else out, so every second turn is for all.
+  stopped_ = !stops_.empty() && !stopped_;
+  if (stopped_) return;
+  spent_bytes_ = 0;
+  while (spent_bytes_ < kTurnBytes) {
+    const auto line = server_.Next();
+    if (!line) return;
+    spent_bytes_ += kLineBytes + line->text.size();
+    Handle(view, *line, commands);
+  }
+}
+
+bool RequestHandler::IsStop(std::string_view line) {
+  constexpr std::size_t kBytesMax = 512;
+  if (line.size() > kBytesMax || line.find("\"stop\"") == std::string_view::npos) return false;
+  const auto request = DecodeRequest(line);
+  return request && request->verb == "stop";
+}
+
+void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
+                            std::vector<Command>* commands) {
+  const auto request = DecodeRequest(line.text);
+  Pending pending{.client = line.client, .id = request ? request->id : 0};
+  if (!request) return Answer(pending, tl::unexpected<Error>(request.error()));
+  if (line.reserved && request->verb != "stop")
+    return Answer(pending,
+                  Fail(ErrorCode::kFull, "too many clients, only stop is taken: all " +
+                                             std::to_string(limits::kControlClients) +
+                                             " places have requests open, try again later"));
+  if (request->verb == "state") {
+    // Spliced in as text; the frame around it is the one that EncodeResult makes.
+    std::string answer = EncodeResult(request->id, nullptr);
+    const std::size_t place = answer.find("null");
+    answer.replace(place, 4, StateText(view));
+    return Send(line.client, answer);
+  }
+  if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
+  pending.pursues =
+      request->verb == "apply" || request->verb == "home" || request->verb == "measure";
+  pending.retargets = request->verb == "retarget";
+  if (line.overtaken && (pending.pursues || pending.retargets))
+    return Answer(pending, Fail(ErrorCode::kRefused,
+                                "a stop that came before " + request->verb +
+                                    " was begun went ahead of it; command it again if it is still "
+                                    "wanted"));
+  const auto wait = FlagArgumentOr(request->args, "wait", false);
+  if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
+  pending.wait = *wait && pending.pursues;
+  auto change = ChangeModel(view, *request);
+  auto command = change ? std::move(*change) : CommandOf(*request, view);
+  if (!command) {
+    options_.log(request->verb + " refused: " + FirstRow(command.error().text));
+    return Answer(pending, tl::unexpected<Error>(command.error()));
+  }
+  options_.log(request->verb + " commanded");
+  pending.note = NoteOn(view, *command);
+  command->request = next_request_++;
+  pending_.emplace(command->request, pending);
+  waiting_ += pending.wait ? 1u : 0u;
+  commands->push_back(std::move(*command));
+}
+
+std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
+                                                const ControlRequest& request) {
+  if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
+  if (request.verb == "unit") return AskUnit(view, request);
+  if (request.verb == "params") return AskParameters(view, request);
+  if (request.verb == "history") return AskHistory(view, request);
+  if (request.verb == "measurements") return AskMeasurements(view, request);
+  if (request.verb == "model") return Result<Json>(models_.Show(kHistoryRowsMax));
+  return std::nullopt;
+}
+
+Result<Json> RequestHandler::AskUnit(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  return UnitJson(view, i);
+}
+
+Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  const UnitView& unit = view.coordinator->unit(i);
+  const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kHistoryRowsMax));
+  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kHistoryRowsMax));
+  const Json known = UnitJson(view, i);
+  Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
+  for (const char* axis : {"theta", "phi"})
+    for (const char* name : {"counter1", "repeat", "subdivision"})
+      drive[std::string(axis) + "_" + name] = known[axis][name];
+  return Json{{"unit_id", view.layout->unit(i).id.value},
+              {"serial", serial.value},
+              {"drive", std::move(drive)},  // what holds now, whether stored or by default
+              {"parameters", NewestOf(history)},
+              {"tuning", NewestOf(tunings)},
+              {"tuning_history", HistoryJson(tunings)},
+              {"history", HistoryJson(history)}};
+}
+
+Result<Json> RequestHandler::AskHistory(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "limit", 20));
+  const auto limit = static_cast<std::uint32_t>(std::min(asked, kHistoryRowsMax));
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  if (!request.args.contains("unit_id")) {
+    FOCALFLEET_TRY_ASSIGN(const auto configurations, reader->Configurations(limit));
+    FOCALFLEET_TRY_ASSIGN(const auto alarms, reader->Alarms(limit));
+    return Json{{"configurations", HistoryJson(configurations)}, {"alarms", HistoryJson(alarms)}};
+  }
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
+  const UnitId id = view.layout->unit(i).id;
+  FOCALFLEET_TRY_ASSIGN(const auto moves, reader->Moves(id, limit));
+  FOCALFLEET_TRY_ASSIGN(const auto places, reader->Units(id, limit));
+  return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+}
+
+/// {exposure?}: the newest of the last configuration without it.
+Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const ControlRequest& request) {
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
+  if (exposure == 0) {
+    FOCALFLEET_TRY_ASSIGN(const auto last,
+                          reader->LastExposure(view.coordinator->configuration().id));
+    if (!last) return Fail(ErrorCode::kRefused, "the last configuration was not measured");
+    exposure = *last;
+  }
+  FOCALFLEET_TRY_ASSIGN(const auto rows, reader->Measurements(exposure));
+  if (rows.empty())
+    return Fail(ErrorCode::kRefused, "there is no exposure " + std::to_string(exposure));
+  return Json{{"exposure", exposure}, {"measurements", HistoryJson(rows)}};
+}
+
+std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view,
+                                                           const ControlRequest& request) {
+  const auto change = [&]() -> Result<ModelRow> {
+    if (request.verb == "model_unload") return models_.Unload();
+    if (request.verb == "model_rollback")
+      return models_.Rollback([this](const std::string& sha256) -> Result<std::string> {
+        FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+        return reader->ModelText(sha256);
+      });
+    FOCALFLEET_TRY_ASSIGN(const std::string text,
+                          TextArgument(request.args, "model_toml", kControlLineBytesMax));
+    FOCALFLEET_TRY_ASSIGN(const std::string source,
+                          TextArgumentOr(request.args, "source", "model.toml"));
+    return models_.Load(text, source);
+  };
+  if (request.verb != "model_load" && request.verb != "model_unload" &&
+      request.verb != "model_rollback")
+    return std::nullopt;
+  // A change is numbered after those that the store has.
+  const Status known = models_.changes_known() ? Status() : TakeModelChanges();
+  auto row = known ? change() : Result<ModelRow>(tl::unexpected<Error>(known.error()));
+  if (!row) return Result<Command>(tl::unexpected<Error>(std::move(row).error()));
+  if (const Status forgot = ForgetStrangers(); !forgot)
+    options_.log("model: " + forgot.error().text);
+  NoteRests(view, models_.compensation());
+  Command command;
+  command.what = KeepModelCommand{std::move(*row)};
+  return command;
+}
+
+Status RequestHandler::TakeModelChanges() {
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(auto changes, reader->Models(kHistoryRowsMax));
+  models_.TakeChanges(std::move(changes));
+  return {};
+}
+
+Status RequestHandler::RestoreModel() {
+  FOCALFLEET_TRY(TakeModelChanges());
+  if (models_.newest_sha256().empty()) return {};
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const std::string text, reader->ModelText(models_.newest_sha256()));
+  FOCALFLEET_TRY(models_.Restore(text));
+  return ForgetStrangers();
+}
+
+Status RequestHandler::ForgetStrangers() {
+  Compensation* const model = models_.compensation();
+  if (model == nullptr) return {};
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+  FOCALFLEET_TRY_ASSIGN(const auto counted_anew, reader->CountedAnewSince(models_.since()));
+  for (const UnitId id : counted_anew)
+    if (const auto i = options_.layout->Find(id)) model->Forget(*i);
+  FOCALFLEET_TRY_ASSIGN(const auto bindings, reader->Bindings());
+  for (const auto& [id, serial] : bindings) {
+    const auto i = options_.layout->Find(id);
+    if (i && model->serial(*i).value != 0 && model->serial(*i) != serial) model->Forget(*i);
+  }
+  return {};
+}
+
+/// Adopted hardware is not driven by the model of what sat there before, and the operator is told.
+std::string RequestHandler::NoteOn(const FleetView& view, const Command& command) const {
+  const auto* adopt = std::get_if<AdoptCommand>(&command.what);
+  if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
+    return "";
+  return "; the model in force (" + models_.name() +
+         ") was measured on the robot before it, so its commands go without one";
+}
+
+Result<StoreReader*> RequestHandler::Reader() {
+  if (reader_ == nullptr) {
+    FOCALFLEET_TRY_ASSIGN(reader_, StoreReader::Open(options_.store_path));
+  }
+  return reader_.get();
+}
+
+void RequestHandler::Answer(const Pending& pending, const Result<Json>& result) {
+  Send(pending.client,
+       result ? EncodeResult(pending.id, *result) : EncodeError(pending.id, result.error()));
+}
+
+void RequestHandler::Send(ClientId client, const std::string& answer) {
+  spent_bytes_ += answer.size();
+  server_.Answer(client, answer);
+}
+
+void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
+  const auto it = pending_.find(reply.request);
+  if (it == pending_.end()) return;
+  const Pending pending = it->second;
+  // The first word on a configuration is that it began; who waits wants the last.
+  it->second.began = true;
+  if (!reply.last && (pending.wait || pending.retargets)) return;
+  pending_.erase(it);
+  waiting_ -= pending.wait ? 1u : 0u;
+  if (reply.error) {
+    options_.log("refused or failed: " + reply.error->text);
+    if (pending.retargets && pending.began)
+      return Answer(pending, Json{{"goes", false}, {"text", reply.error->text}});
+    // An error means that nothing happened. What failed on the way is a summary with a reason.
+    if (!pending.began || !HasMoved(view.coordinator->configuration()))
+      return Answer(pending, tl::unexpected<Error>(*reply.error));
+    Json summary = ConfigurationJson(view);
+    summary["error"] = reply.error->text;
+    return Answer(pending, summary);
+  }
+  if (pending.retargets) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
+  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text + pending.note}});
+  if (!pending.wait)
+    return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});
+  Answer(pending, ConfigurationJson(view));
+}
+
+void RequestHandler::ShowProgress(const FleetView& view) {
+  if (waiting_ == 0 || view.now < progress_at_) return;
+  progress_at_ = view.now + options_.progress_period;
+  const Json progress = ProgressJson(view);
+  for (const auto& [request, pending] : pending_)
+    if (pending.wait) server_.Progress(pending.client, EncodeProgress(pending.id, progress));
+}
+
+void RequestHandler::Close() {
+  for (const auto& [request, pending] : pending_)
+    Answer(pending,
+           Fail(ErrorCode::kUnavailable,
+                "the daemon ends; what moves goes on by itself and is read at the next start"));
+  pending_.clear();
+  waiting_ = 0;
+  reader_.reset();
+}
+
+}  // namespace focalfleet

@@ -1,0 +1,55 @@
+// All at once: every unit goes straight to its target, and where two would meet, one of them goes
+// later or another way round, within the time that the slowest unit needs anyhow.
+//
+// Most units need far less time than the slowest one, so there is room to wait in. The repair is
+// local and greedy: a unit in conflict looks through its candidates (candidates.h) for the one that
+// meets the fewest others as these go now; whom it still meets must look next. A pair that keeps
+// meeting weighs more each time, which drives the search out of dead ends (breakout local search,
+// Morris 1993; repair instead of construction as in MAPF-LNS2, Li et al. 2022). Every choice is
+// tested as a motion in time (track.h), so nothing has to be proven afterwards.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "fleet/plan/abandoned.h"
+#include "fleet/plan/candidates.h"
+#include "fleet/plan/power_ledger.h"
+#include "fleet/plan/scene.h"
+#include "fleet/plan/track.h"
+
+namespace focalfleet {
+
+struct LocalSearchResult {
+  /// Shape: (n). Empty paths: the unit stands.
+  std::vector<AxisPaths> paths;
+  std::vector<Track> tracks;
+  std::vector<std::uint32_t> in_conflict;  // ascending; empty: clear of each other at all times
+  bool starved = false;  // the limits of power leave somebody no time at all: nothing was tried
+  /// Pairs that are clear, but not with notice. Lower index first, sorted.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> without_notice;
+};
+
+struct LocalSearchRequest {
+  const Scene* scene = nullptr;
+  std::span<const UnitDrive> drives;      // Shape: (n)
+  std::span<const Pose> from;             // Shape: (n)
+  std::span<const Pose> to;               // Shape: (n)
+  std::span<const std::uint8_t> movable;  // Shape: (n); others stand
+  std::span<const AxisPaths> begin_with;  // Shape: (n), or empty: straight ways
+  /// Shape: (n), or empty: nobody. Non-zero: goes as `begin_with` says, whatever the others do; its
+  /// power is somebody else's to count. Two such units are not tested against each other.
+  std::span<const std::uint8_t> given = {};
+  PowerLedger* ledger = nullptr;  // empty at first; null: power has no limit
+  Tolerance tolerance;
+  double within_s = 0;  // the time that may be used without being noticed
+  std::uint64_t seed = 1;
+  Abandoned abandoned = {};  // nobody looks for another way any more
+};
+
+/// Cost: O(n) for bounded neighbourhoods; a unit without conflicts costs one test a neighbour.
+LocalSearchResult SearchLocally(const LocalSearchRequest& request);
+
+}  // namespace focalfleet

@@ -1,0 +1,137 @@
+#include "sim/campaigns/diagnosis/both_axes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "sim/campaigns/diagnosis/multi_start.h"
+#include "sim/campaigns/diagnosis/select.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// The best of a cause's templates on each axis.
+struct AxisPair {
+  std::size_t theta = kNoTerm, phi = kNoTerm;
+  double evidence = 0;  // of both; what they share counts twice
+};
+
+void TakeBetter(std::size_t k, const std::vector<Evidence>& evidences, std::size_t* best) {
+  if (*best == kNoTerm || evidences[k].evidence > evidences[*best].evidence) *best = k;
+}
+
+using PairsByCause = std::map<std::string_view, AxisPair>;
+
+// Of the causes that have one on each axis.
+PairsByCause AllPairs(const ScorePass& pass, const Templates& templates,
+                      const std::vector<Evidence>& evidences, double kept_min) {
+  PairsByCause by_cause;
+  for (std::size_t k = 0; k < templates.size(); ++k) {
+    if (!(pass.scores[k].kept > kept_min * pass.scores[k].raw)) continue;
+    AxisPair& pair = by_cause[templates[k].effect->cause];
+    if (templates[k].axis == EffectAxis::kTheta) TakeBetter(k, evidences, &pair.theta);
+    if (templates[k].axis == EffectAxis::kPhi) TakeBetter(k, evidences, &pair.phi);
+  }
+  std::erase_if(by_cause, [](const auto& of_cause) {
+    return of_cause.second.theta == kNoTerm || of_cause.second.phi == kNoTerm;
+  });
+  for (auto& [cause, pair] : by_cause)
+    pair.evidence = evidences[pair.theta].evidence + evidences[pair.phi].evidence;
+  return by_cause;
+}
+
+// Of other causes those that are worth a trial, the best first. Beside what the other axis does,
+// which is noise to either, a pair's evidence may be next to nothing: the own cause's pair says how
+// much it can be, or where it has none, the term itself.
+std::vector<AxisPair> PromisingPairs(const PairsByCause& pairs, const Templates& templates,
+                                     const std::vector<Evidence>& evidences, const Effect* own) {
+  constexpr double kNear = 0.5;  // of the own one's evidence
+  double evidence = 0;
+  if (const auto of_own = pairs.find(own->cause); of_own != pairs.end())
+    evidence = of_own->second.evidence;
+  else
+    for (std::size_t k = 0; k < templates.size(); ++k)
+      if (templates[k].effect == own) evidence = std::max(evidence, evidences[k].evidence);
+  std::vector<AxisPair> promising;
+  for (const auto& [cause, pair] : pairs)
+    if (cause != own->cause && pair.evidence > std::max(kNear * evidence, 0.0))
+      promising.push_back(pair);
+  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::evidence);
+  return promising;
+}
+
+// In place of the shapes that `without` has not.
+PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
+  constexpr int kRounds = 3;
+  PairTrial trial{.cause = theta.form.effect->cause, .fit = without};
+  trial.fit.model.terms.push_back(theta);
+  trial.fit.model.terms.push_back(phi);
+  StepFit(&trial.fit);
+  SettleFit(&trial.fit, kRounds);
+  trial.behind = BetterBy(fit, trial.fit);
+  // What it explains more at no price, and what chance gives to the parameters that it has more.
+  constexpr double kSigmas = 3, kNoiseOfNoise = 1.2;  // of many, as of each: tails are heavy
+  constexpr double kFew = 2;
+  const double more = std::max(CountParameters(trial.fit) - CountParameters(fit), 0.0);
+  const double explains = PriceOf(trial.fit) - PriceOf(fit) - trial.behind;
+  trial.beyond_chance = explains > kNoiseOfNoise * (more + kSigmas * std::sqrt(2 * more));
+  trial.behind_by_likelihood = more <= kFew ? -explains : trial.behind;
+  return trial;
+}
+
+// As the term has it: an amplitude of each unit, where the units' may differ.
+Evidence OfEachUnit(Evidence evidence, const ModelTerm& as) {
+  evidence.sharing = Sharing::kUnit;
+  evidence.scattered = false, evidence.spread = 0;
+  for (std::size_t unit = 0; unit < evidence.has.size(); ++unit)
+    evidence.has[unit] = as.group_of_unit[unit] == kNoGroup ? 0 : 1;
+  return evidence;
+}
+
+std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const ModelTerm& term,
+                                  const ScorePass& pass, const Templates& templates,
+                                  const std::vector<Evidence>& evidences, const FleetGroups& groups,
+                                  double kept_min) {
+  constexpr std::size_t kMost = 6;
+  std::vector<PairTrial> trials;
+  for (const AxisPair& pair : PromisingPairs(AllPairs(pass, templates, evidences, kept_min),
+                                             templates, evidences, term.form.effect)) {
+    if (trials.size() >= kMost) break;
+    const Evidence &theta = evidences[pair.theta], &phi = evidences[pair.phi];
+    const auto take = [&](const Evidence& on_theta, const Evidence& on_phi) {
+      trials.push_back(Tried(fit, without, MakeTerm(templates[pair.theta], on_theta, groups),
+                             MakeTerm(templates[pair.phi], on_phi, groups)));
+      trials.back().log_p = std::max(theta.log_p, phi.log_p);
+    };
+    take(theta, phi);
+    // Either axis alone may show too little of its units to be of each.
+    if (term.sharing == Sharing::kUnit &&
+        (theta.sharing != Sharing::kUnit || phi.sharing != Sharing::kUnit))
+      take(OfEachUnit(theta, term), OfEachUnit(phi, term));
+  }
+  return trials;
+}
+
+}  // namespace
+
+std::vector<PairTrial> TryPairs(const Fit& fit, std::size_t term, const ScorePass& pass,
+                                const Templates& templates, const std::vector<Evidence>& evidences,
+                                const FleetGroups& groups, double kept_min) {
+  const ModelTerm& own = fit.model.terms[term];
+  if (own.form.axis != EffectAxis::kBoth) return {};
+  // Two shapes of one cause may stand for what another does plainly.
+  Fit without = fit;
+  const bool was_alone =
+      std::erase_if(without.model.terms, [&](const ModelTerm& other) {
+        return other.form.effect == own.form.effect && other.form.axis == own.form.axis;
+      }) == 1;
+  UpdateResiduals(&without);
+  if (was_alone) return TryAgainst(fit, without, own, pass, templates, evidences, groups, kept_min);
+  const ScorePass anew = ScoreTemplates(without, templates);
+  std::vector<Evidence> assessed(templates.size());
+  for (std::size_t k = 0; k < templates.size(); ++k)
+    assessed[k] = Assess(anew.scores[k], templates[k], groups);
+  return TryAgainst(fit, without, own, anew, templates, assessed, groups, kept_min);
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,42 @@
+// Shapes that suit the data. What comes near the best is taken to its own best shape between the
+// listed ones before anyone decides; and where a shape is each unit's own, as a damaged tooth sits
+// elsewhere in each gear, each unit gets the one that its residuals like best and pays for the
+// choice (evidence.h).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "sim/campaigns/diagnosis/evidence.h"
+
+namespace focalfleet::sim {
+
+/// A template whose shape is being refined.
+struct CandidateShape {
+  Template form;
+  double gap = 0;  // to the shapes that are tried beside it; 0: none are
+};
+
+/// The best templates of the causes that come near the best of all, `best`: an index, or kNoTerm.
+/// Shapes: pass and evidences (templates). `kept_min`: share of a signature that must be left of it
+/// beside geometry and model.
+std::vector<CandidateShape> CandidateShapesOf(const ScorePass& pass,
+                                              const std::vector<Evidence>& evidences,
+                                              const Templates& templates, std::size_t best,
+                                              double kept_min);
+
+/// The effects that have own shapes, with the best of the listed ones for each unit, one for each
+/// axis, memory and form, where the evidence for them, each unit's choice paid for, is more than
+/// `evidence_min`.
+std::vector<CandidateShape> OwnShapes(const ScorePass& pass, const Templates& templates,
+                                      const CampaignFacts& facts, const FleetGroups& groups,
+                                      double evidence_min);
+
+/// Those that differ from `form` in their shapes alone.
+Templates KindOf(const Template& form, const Templates& library);
+
+/// Takes each candidate shape to the shape between the listed ones that the data like best.
+void RefineCandidateShapes(const Fit& fit, const FleetGroups& groups,
+                           std::vector<CandidateShape>* candidate_shapes);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,139 @@
+// The verdict on a campaign: what the simulation gets wrong, by name. docs/diagnosis.md has the
+// fields as programs read them. Everything is a function of the campaign, the options and nothing
+// else: the same data give the same verdict, at any number of threads.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/campaigns/campaign/place_steps.h"
+#include "sim/campaigns/diagnosis/ahead.h"
+#include "sim/campaigns/diagnosis/model.h"
+
+namespace focalfleet::sim {
+
+struct CauseFound {
+  std::string cause;
+  std::vector<std::string> candidates;  // the cause itself first
+  // Who leaves nearly the same trace, and is behind by the likelihood alone: where the model leaves
+  // something unexplained, that decides nothing.
+  std::vector<std::string> behind;
+  std::vector<std::string> cannot_be;         // names that these data exclude, whatever is not told
+  std::vector<std::string> misfit_artefacts;  // what its shape leaves looks like these, by name
+  std::string axis;
+  std::string scope;
+  std::vector<std::uint32_t> units;
+  bool all_units = false;
+  double amplitude = 0;
+  std::string amplitude_unit;
+  double ci95[2] = {0, 0};
+  double size_um = 0;  // rms at the fibre
+  double delta_log_likelihood = 0;
+  // The same shared out, by unit id, by the squares of what it does to each fibre; empty: it is
+  // not.
+  std::map<std::uint32_t, double> evidence_of_unit;
+  double predicted_gain_um = 0;
+  std::string shape;      // of the template, in words
+  std::string paragraph;  // for the operator
+};
+
+/// By its name, which is its only candidate so far.
+inline CauseFound CauseNamed(std::string_view name) {
+  return {.cause = std::string(name), .candidates = {std::string(name)}};
+}
+
+/// An empirical term that the model has for what no cause explains (patch.h).
+struct Patched {
+  std::string term;    // "empirical_curve" or "empirical_ripple"
+  double size_um = 0;  // rms at the fibre
+};
+
+struct UnknownFound {
+  std::string covariate;
+  std::string channel;  // where it shows: "theta angle", "x" ...
+  double p_value = 0;
+  double size_um = 0;
+  double delta_log_likelihood = 0;  // of the structure, as if it were a cause
+  std::optional<Patched> patched = std::nullopt;
+};
+
+struct OutliersFound {
+  std::size_t rows = 0;
+  std::vector<std::uint32_t> units;
+  std::map<std::string, std::size_t> why;  // rows by reason
+};
+
+/// NaN: not known, as where nothing could be held out.
+struct HeldOutGain {
+  static constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  double rms_before_um = kNotKnown, rms_after_um = kNotKnown;
+  double mad_before_um = kNotKnown, mad_after_um = kNotKnown;
+  double noise_floor_um = kNotKnown;
+  double explained_share = kNotKnown;
+  std::string held_out;
+};
+
+/// How far the proposed moves set a cause and its rival apart: chi-square (next_moves.h).
+struct Prospect {
+  std::string cause, rival;
+  double d = 0;
+};
+
+/// The moves to make next, and what is to be had from them.
+struct NextMoves {
+  std::vector<ProposedMove> moves;
+  std::vector<Prospect> prospects;
+  std::vector<std::pair<std::string, std::string>>
+      untold;  // cause and rival that moves do not tell
+};
+
+enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };
+std::string_view Name(Verdict verdict);
+
+struct Diagnosis {
+  Verdict verdict = Verdict::kInsufficient;
+  std::string insufficient;  // what is missing
+  std::vector<CauseFound> causes;
+  std::vector<UnknownFound> unknown;
+  std::vector<NotTestable> not_testable;
+  OutliersFound outliers;
+  HeldOutGain gain;
+  std::size_t rows = 0, units = 0, moves = 0;
+  PlaceSteps steps;
+  bool steps_limit = false;          // they are wider than the noise
+  std::vector<std::string> remarks;  // on what is odd in the data (remarks.h)
+  CampaignModel model;               // the extended one
+  // Ids of units of which the fit has made no such unit as the table describes: the model has the
+  // table's geometry, and no effects of theirs.
+  std::vector<std::uint32_t> without_geometry;
+  NextMoves next;
+  // Residuals in um, for pictures. Shape: (rows); NaN where nothing was measured.
+  std::vector<double> x_before_um, y_before_um, x_after_um, y_after_um;
+};
+
+struct DiagnoseOptions {
+  std::uint64_t seed = 1;
+  double family_wise = 0.01;
+  std::vector<std::string> leave_out;     // causes that the library shall not have
+  std::vector<const Effect*> also;        // effects beside the library
+  std::uint64_t shuffle_library = 0;      // not 0: another order of its templates
+  const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
+  bool patch = false;                     // empirical terms for what is unknown
+  bool with_gain = true;
+  bool with_next_moves = true;
+  ParallelFor parallel = OneAfterTheOther();
+  std::function<void(double share, std::string_view stage)> progress = [](double,
+                                                                          std::string_view) {};
+};
+
+/// Pre: Validate(campaign).
+Diagnosis Diagnose(const Campaign& campaign, const DiagnoseOptions& options);
+
+}  // namespace focalfleet::sim

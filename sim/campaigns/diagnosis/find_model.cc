@@ -1,0 +1,115 @@
+#include "sim/campaigns/diagnosis/find_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sim/campaigns/diagnosis/homings.h"
+#include "sim/campaigns/diagnosis/image.h"
+#include "sim/campaigns/diagnosis/multi_start.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kUndecided = 6;  // 2 d ln L between two ways to read the temperatures
+
+// What units do all alike moves the image, and its motion passes for what they do: found first, it
+// may need fewer causes beside it. True: the fit is that one now.
+bool TryImageFirst(const Templates& templates, const DiagnoseOptions& options,
+                   const SelectionRule& rule, Fit* fit, ImageFound* image, Selection* selection) {
+  Fit anew = *fit;
+  anew.model.terms.clear();
+  anew.model.events.clear();
+  anew.model.exposures.clear();
+  UpdateResiduals(&anew);
+  StepFit(&anew);
+  SettleFit(&anew, 3);
+  ImageFound first = AddImageTerms(&anew, options.family_wise);
+  if (!first.moves) return false;
+  Selection again = SelectMultiStart(templates, rule, &anew);
+  if (BetterBy(anew, *fit) <= 0) return false;
+  again.kept_share = std::move(selection->kept_share);
+  *fit = std::move(anew);
+  *image = std::move(first);
+  *selection = std::move(again);
+  return true;
+}
+
+// The terms, steps, zeros of homings and motion of the image that explain the data.
+Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
+                    const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
+  Selection selection = SelectMultiStart(templates, rule, fit);
+  ImageFound image = AddImageTerms(fit, options.family_wise);
+  const auto tell_homings = [&] {
+    if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
+  };
+  if (!image.moves) {
+    tell_homings();
+    return selection;
+  }
+  // What the image's motion hid, or what stood in for it.
+  std::vector<double> kept = std::move(selection.kept_share);
+  const bool has_terms = !fit->model.terms.empty();
+  selection = Select(templates, rule, fit);
+  selection.kept_share = std::move(kept);
+  if (has_terms) TryImageFirst(templates, options, rule, fit, &image, &selection);
+  tell_homings();
+  if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
+  if (image.cause && !IsLeftOut(options, image.cause->cause)) {
+    std::erase_if(image.cause->candidates,
+                  [&](const std::string& name) { return IsLeftOut(options, name); });
+    diagnosis->causes.push_back(std::move(*image.cause));
+  }
+  AddDriftAsRival(image.drift_um, *fit, &selection);
+  return selection;
+}
+
+}  // namespace
+
+bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause) {
+  return std::find(options.leave_out.begin(), options.leave_out.end(), cause) !=
+         options.leave_out.end();
+}
+
+double RmsOf(const Fit& fit) {
+  double sum = 0, count = 0;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.weight[row] > 0.5)
+      sum += fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row], count += 1;
+  return count > 0 ? std::sqrt(sum / count) : 0;
+}
+
+Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
+                    const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
+                    Diagnosis* diagnosis) {
+  if (truth == nullptr) return FindTerms(templates, options, rule, fit, diagnosis);
+  Diagnosis corrected = *diagnosis;
+  Selection selection = FindTerms(templates, options, rule, fit, diagnosis);
+  const auto cannot = [&](const char* why) {
+    diagnosis->not_testable.push_back(
+        {std::string(kSensorBias), std::string("sensors are suspect, ") + why});
+    return selection;
+  };
+  Fit by_others = StartFit(truth->facts, corrected.model, fit->aside, options.parallel);
+  Selection again = FindTerms(templates, options, rule, &by_others, &corrected);
+  if (!ReadsTemperature(by_others.model)) return cannot("but nothing goes with the temperature");
+  const double better = NegativeBic(by_others) - NegativeBic(*fit);
+  if (better < -kUndecided) return selection;
+  const bool is_better = better > kUndecided;
+  if (!is_better && truth->owner == Owner::kUnit) return cannot("and these moves do not decide");
+  CauseFound cause = SensorCause(by_others, *truth, *fit->facts, is_better && !truth->are_half);
+  const double rms_um = RmsOf(by_others);
+  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+  if (is_better) {
+    cause.delta_log_likelihood = better / 2;
+    *fit = std::move(by_others);
+    *diagnosis = std::move(corrected);
+    selection = std::move(again);
+  }
+  diagnosis->causes.push_back(std::move(cause));
+  return selection;
+}
+
+}  // namespace focalfleet::sim

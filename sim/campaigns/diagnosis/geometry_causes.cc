@@ -1,0 +1,216 @@
+#include "sim/campaigns/diagnosis/geometry_causes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/campaigns/diagnosis/chances.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kSizeMin_um = 1;  // tables are rounded, and shared terms leave a trace in it
+
+struct Group {
+  const char* cause;
+  const char* axis;
+  const char* unit;
+  std::vector<Index> at;  // of the six static parameters
+};
+const std::vector<Group>& Groups() {
+  static const std::vector<Group> groups = {{"zero_offset", "theta", "deg", {4}},
+                                            {"zero_offset", "phi", "deg", {5}},
+                                            {"base_offset", "none", "mm", {0, 1}},
+                                            {"arm_length", "theta", "mm", {2}},
+                                            {"arm_length", "phi", "mm", {3}}};
+  return groups;
+}
+
+struct UnitOffset {
+  std::size_t unit;
+  StaticVector offset;
+  StaticMatrix covariance;
+};
+
+std::vector<UnitOffset> Offsets(const Fit& fit) {
+  std::vector<UnitOffset> offsets;
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    std::size_t used = 0;
+    const Campaign& campaign = *fit.facts->campaign;
+    for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
+      if (fit.weight[row] > 0) ++used;
+    if (used < 4) continue;
+    const CampaignUnit& a = fit.model.units[unit];
+    const CampaignUnit& b = campaign.units[unit];
+    UnitOffset out{unit, {}, StaticCovariance(fit, unit)};
+    out.offset << a.base_x_mm - b.base_x_mm, a.base_y_mm - b.base_y_mm, a.arm_mm[0] - b.arm_mm[0],
+        a.arm_mm[1] - b.arm_mm[1], std::remainder(a.zero_deg[0] - b.zero_deg[0], 360.0),
+        std::remainder(a.zero_deg[1] - b.zero_deg[1], 360.0);
+    offsets.push_back(out);
+  }
+  return offsets;
+}
+
+// What all bases share is the image's, where the image moves: its mean place is in nobody's table.
+void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
+  constexpr std::size_t kUnitsMin = 6;
+  if (fit.model.exposures.empty() || offsets->size() < kUnitsMin) return;
+  Eigen::Matrix4d normal = Eigen::Matrix4d::Identity() * 1e-12;
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  const auto columns = [&](const UnitOffset& one) {
+    const CampaignUnit& unit = fit.facts->campaign->units[one.unit];
+    const double x = unit.base_x_mm / fit.facts->radius_mm;
+    const double y = unit.base_y_mm / fit.facts->radius_mm;
+    Eigen::Matrix<double, 2, 4> j;
+    j << 1, 0, -y, x, 0, 1, x, y;
+    return j;
+  };
+  for (const UnitOffset& one : *offsets) {
+    const auto j = columns(one);
+    const double weight = 2 / one.covariance.topLeftCorner<2, 2>().trace();
+    normal += weight * j.transpose() * j;
+    right += weight * j.transpose() * one.offset.head<2>();
+  }
+  const Eigen::Vector4d common = normal.ldlt().solve(right);
+  for (UnitOffset& one : *offsets) one.offset.head<2>() -= columns(one) * common;
+}
+
+// What is left unexplained when only the parameters outside `rest` may differ.
+double Left(const UnitOffset& unit, const std::vector<Index>& rest) {
+  const auto n = static_cast<Index>(rest.size());
+  if (n == 0) return 0;
+  VectorXd d(n);
+  MatrixXd c(n, n);
+  for (Index i = 0; i < n; ++i) {
+    d[i] = unit.offset[rest[static_cast<std::size_t>(i)]];
+    for (Index j = 0; j < n; ++j)
+      c(i, j) =
+          unit.covariance(rest[static_cast<std::size_t>(i)], rest[static_cast<std::size_t>(j)]);
+  }
+  return d.dot(c.ldlt().solve(d));
+}
+
+// rms of the group's offset at the fibre, um.
+double SizeAtFibre(const UnitOffset& unit, const Group& group, const CampaignUnit& geometry) {
+  double square = 0;
+  for (const Index at : group.at) {
+    double lever_mm = 1;
+    if (at == 4) lever_mm = std::hypot(geometry.arm_mm[0], geometry.arm_mm[1]) * kRadians;
+    if (at == 5) lever_mm = geometry.arm_mm[1] * kRadians;
+    square += unit.offset[at] * unit.offset[at] * lever_mm * lever_mm;
+  }
+  return 1e3 * std::sqrt(square);
+}
+
+struct GroupTest {
+  double log_p = 0;
+  double gained = 0;
+  std::vector<std::size_t> which;  // of the offsets: those that have it
+};
+
+GroupTest TestGroup(const std::vector<UnitOffset>& offsets, const std::vector<Index>& rest,
+                    const Group& group, double family_wise) {
+  std::vector<Index> without;
+  for (const Index at : rest)
+    if (std::find(group.at.begin(), group.at.end(), at) == group.at.end()) without.push_back(at);
+  const auto dof = static_cast<double>(group.at.size());
+  const auto n = static_cast<double>(offsets.size());
+  GroupTest test;
+  double sum = 0, best = 0;
+  // A unit's noise is known to some 15 % from its own rows.
+  constexpr double kOwnNoise = 1.3;
+  for (std::size_t k = 0; k < offsets.size(); ++k) {
+    const double gained = std::max(Left(offsets[k], rest) - Left(offsets[k], without), 0.0);
+    const double log_p = LogChiSquareTail(gained / kOwnNoise, dof);
+    sum += gained;
+    best = std::min(best, log_p);
+    if (LogLeastOf(log_p, n * 5) < std::log(family_wise))
+      test.which.push_back(k), test.gained += gained;
+  }
+  // The fleet as a whole: noise of the noise estimate grows with the number of units.
+  constexpr double kNoiseOfNoise = 1.1;
+  const double all = LogChiSquareTail(sum / kNoiseOfNoise, dof * n);
+  test.log_p = std::min(all, LogLeastOf(best, n)) + std::log(10.0);
+  if (test.which.empty() || all + std::log(10.0) < std::log(family_wise)) {
+    if (static_cast<double>(test.which.size()) > 0.5 * n || test.which.empty()) {
+      test.which.clear();
+      for (std::size_t k = 0; k < offsets.size(); ++k) test.which.push_back(k);
+      test.gained = sum;
+    }
+  }
+  return test;
+}
+
+CauseFound Report(const Fit& fit, const std::vector<UnitOffset>& offsets, const Group& group,
+                  const GroupTest& test) {
+  CauseFound cause;
+  cause.cause = group.cause;
+  cause.candidates = {group.cause};
+  cause.axis = group.axis;
+  cause.scope = "unit";
+  cause.amplitude_unit = group.unit;
+  cause.delta_log_likelihood = test.gained / 2;
+  cause.all_units = test.which.size() == offsets.size();
+  double square = 0, size = 0, variance = 0;
+  for (const std::size_t k : test.which) {
+    const UnitOffset& unit = offsets[k];
+    cause.units.push_back(fit.model.units[unit.unit].id);
+    for (const Index at : group.at) {
+      square += unit.offset[at] * unit.offset[at];
+      variance += unit.covariance(at, at);
+    }
+    const double um = SizeAtFibre(unit, group, fit.model.units[unit.unit]);
+    size += um * um;
+  }
+  const auto n = static_cast<double>(std::max<std::size_t>(test.which.size(), 1));
+  cause.amplitude = std::sqrt(square / n);
+  if (test.which.size() == 1 && group.at.size() == 1)
+    cause.amplitude = offsets[test.which[0]].offset[group.at[0]];
+  const double sigma = std::sqrt(variance / n) / std::sqrt(n);
+  cause.ci95[0] = cause.amplitude - 1.96 * sigma;
+  cause.ci95[1] = cause.amplitude + 1.96 * sigma;
+  cause.size_um = std::sqrt(size / n);
+  cause.shape =
+      cause.all_units && offsets.size() > 1 ? "each unit its own; the amplitude is their rms" : "";
+  cause.paragraph = "The unit's geometry differs from units.csv: take the fitted value.";
+  return cause;
+}
+
+}  // namespace
+
+std::vector<CauseFound> FindGeometryCauses(const Fit& fit, double family_wise) {
+  std::vector<UnitOffset> offsets = Offsets(fit);
+  TakeOffTheImage(fit, &offsets);
+  std::vector<CauseFound> causes;
+  if (offsets.empty()) return causes;
+  std::vector<Index> rest = {0, 1, 2, 3, 4, 5};
+  std::vector<char> used(Groups().size(), 0);
+  for (;;) {
+    std::size_t best = Groups().size();
+    GroupTest best_test;
+    double best_rate = 0;
+    for (std::size_t g = 0; g < Groups().size(); ++g) {
+      if (used[g] != 0) continue;
+      GroupTest test = TestGroup(offsets, rest, Groups()[g], family_wise);
+      const double rate = test.gained / static_cast<double>(Groups()[g].at.size());
+      if (test.log_p > std::log(family_wise) || rate <= best_rate) continue;
+      best = g, best_rate = rate, best_test = std::move(test);
+    }
+    if (best == Groups().size()) break;
+    used[best] = 1;
+    std::erase_if(rest, [&](Index at) {
+      const auto& group = Groups()[best].at;
+      return std::find(group.begin(), group.end(), at) != group.end();
+    });
+    CauseFound cause = Report(fit, offsets, Groups()[best], best_test);
+    if (cause.size_um >= kSizeMin_um) causes.push_back(std::move(cause));
+  }
+  return causes;
+}
+
+}  // namespace focalfleet::sim

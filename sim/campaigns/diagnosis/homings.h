@@ -1,0 +1,22 @@
+// Zeros that differ from homing to homing: how much, and the cause that they are. fit.h frees them,
+// multi_start.h says whether they are worth it.
+#pragma once
+
+#include <cmath>
+
+#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/fit.h"
+
+namespace focalfleet::sim {
+
+/// Rms over the moves, and what it does at the fibre.
+struct HomingScatter {
+  double rms_deg[2] = {0, 0};
+  double um[2] = {0, 0};
+  [[nodiscard]] double both_um() const { return std::hypot(um[0], um[1]); }
+};
+/// Pre: zeros are free.
+HomingScatter ScatterOfHomings(const Fit& fit);
+CauseFound HomingCause(const Fit& fit);
+
+}  // namespace focalfleet::sim

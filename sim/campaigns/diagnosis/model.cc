@@ -1,0 +1,188 @@
+#include "sim/campaigns/diagnosis/model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "sim/campaigns/effects/empirical.h"
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kChunksMax = 32;
+
+void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
+               PoseErrors* errors) {
+  for (const EventTerm& event : model.events) {
+    if (event.unit != unit) continue;
+    for (std::size_t i = event.row - track.first_row; i < track.moves; ++i) {
+      const bool first = i == event.row - track.first_row;
+      if (!first && (!event.stays || track.restarts[i] != 0)) break;
+      errors->angle_deg[event.axis][i] += event.step_deg;
+    }
+  }
+}
+
+// Why nobody can say what the term does in these moves; empty: it can be said.
+std::string WhyUntold(const Template& form, const CampaignFacts& facts) {
+  const bool empirical = FindEmpirical(form.effect->cause) != nullptr;
+  std::string_view missing = MissingCovariate(*form.effect, facts);
+  if (empirical && !facts.Has(form.covariate)) missing = form.covariate;
+  if (!missing.empty()) return "column " + std::string(missing) + " is missing";
+  if (empirical) return {};
+  // What a form needs beyond its effect's columns is known to its list.
+  return IsOffered(form, facts) ? "" : "these units or moves have no such part";
+}
+
+}  // namespace
+
+std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model) {
+  std::vector<NotTestable> left_out;
+  std::erase_if(model->terms, [&](const ModelTerm& term) {
+    const std::string why = WhyUntold(term.form, facts);
+    if (!why.empty()) left_out.push_back({std::string(term.form.effect->cause), why});
+    return !why.empty();
+  });
+  return left_out;
+}
+
+ParallelFor OneAfterTheOther() {
+  return [](std::size_t chunks, const std::function<void(std::size_t)>& work) {
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) work(chunk);
+  };
+}
+
+std::span<const double> ModelTerm::AmplitudeOf(std::size_t unit) const {
+  const std::uint32_t group = group_of_unit[unit];
+  if (group == kNoGroup) return {};
+  return std::span(amplitude).subspan(group * form.columns, form.columns);
+}
+
+std::string_view Name(Sharing sharing) {
+  switch (sharing) {
+    case Sharing::kRail:
+      return "rail";
+    case Sharing::kBus:
+      return "bus";
+    case Sharing::kFleet:
+      return "fleet";
+    case Sharing::kUnit:
+      break;
+  }
+  return "unit";
+}
+
+AmplitudeSummary Summarise(const ModelTerm& term) {
+  const std::size_t c = term.form.columns;
+  double mean = 0, square = 0, weight = 0;
+  std::set<std::uint32_t> groups;
+  for (const std::uint32_t group : term.group_of_unit)
+    if (group != kNoGroup) groups.insert(group);
+  for (const std::uint32_t group : groups) {
+    double s = 0, sigma2 = 0;
+    for (std::size_t k = 0; k < c; ++k) {
+      const double a = term.amplitude[group * c + k];
+      s += a * a;
+      sigma2 += term.sigma[group * c + k] * term.sigma[group * c + k] / static_cast<double>(c);
+    }
+    const double w = 1 / std::max(sigma2, 1e-30);
+    mean += w * (c == 1 ? term.amplitude[group] : 0);
+    square += w * s, weight += w;
+  }
+  if (!(weight > 0)) return {};
+  const double rms = std::sqrt(square / weight);
+  return {c == 1 && std::abs(mean / weight) > 0.3 * rms ? mean / weight : rms,
+          1 / std::sqrt(weight)};
+}
+
+std::vector<UnitChunk> ChunksOf(std::size_t units) {
+  const std::size_t chunks = std::min(units, kChunksMax);
+  std::vector<UnitChunk> out;
+  for (std::size_t k = 0; k < chunks; ++k)
+    out.push_back({units * k / chunks, units * (k + 1) / chunks});
+  return out;
+}
+
+std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& track) {
+  std::vector<Homing> homings;
+  if (model.homing_zero_deg[kTheta].empty()) return homings;
+  for (const std::size_t axis : {kTheta, kPhi})
+    for (std::size_t begin = 0; begin < track.moves;) {
+      const std::size_t end = EndOfHistory(track, begin);
+      homings.push_back({axis, begin, end});
+      begin = end;
+    }
+  return homings;
+}
+
+std::size_t MovesWithEvents(const CampaignModel& model) {
+  std::set<std::size_t> rows;
+  for (const EventTerm& event : model.events) rows.insert(event.row);
+  return rows.size();
+}
+
+void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors) {
+  errors->Reset(track.moves);
+  for (std::size_t i = homing.begin; i < homing.end; ++i) errors->angle_deg[homing.axis][i] = 1;
+}
+
+void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
+                   PoseErrors* errors) {
+  for (const ModelTerm& term : model.terms) {
+    const std::span<const double> amplitude = term.AmplitudeOf(unit);
+    if (!amplitude.empty()) term.form.effect->apply(track, term.form, amplitude, errors);
+  }
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    if (model.homing_zero_deg[axis].empty()) continue;
+    for (std::size_t i = 0; i < track.moves; ++i)
+      errors->angle_deg[axis][i] += model.homing_zero_deg[axis][track.first_row + i];
+  }
+  AddEvents(model, unit, track, errors);
+}
+
+UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit) {
+  UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
+  if (std::ranges::find(model.events, unit, &EventTerm::unit) == model.events.end()) return track;
+  PoseErrors stands;
+  stands.Reset(track.moves);
+  AddEvents(model, unit, track, &stands);
+  TurnPoses({stands.angle_deg[kTheta], stands.angle_deg[kPhi]}, &track);
+  return track;
+}
+
+Places Predict(const CampaignModel& model, const CampaignFacts& facts,
+               const ParallelFor& parallel) {
+  const std::size_t rows = facts.campaign->rows();
+  Places places{std::vector<double>(rows), std::vector<double>(rows)};
+  const std::vector<UnitChunk> chunks = ChunksOf(model.units.size());
+  parallel(chunks.size(), [&](std::size_t chunk) {
+    PoseErrors errors;
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      const UnitTrack track = TrackOf(model, facts, unit);
+      errors.Reset(track.moves);
+      AddPoseErrors(model, unit, track, &errors);
+      CampaignUnit bent = model.units[unit];
+      for (std::size_t i = 0; i < track.moves; ++i) {
+        for (const std::size_t axis : {kTheta, kPhi})
+          bent.arm_mm[axis] = model.units[unit].arm_mm[axis] + errors.arm_mm[axis][i];
+        const PlacePoint place =
+            PlaceOf(bent, track.cmd_deg[kTheta][i] + errors.angle_deg[kTheta][i],
+                    track.cmd_deg[kPhi][i] + errors.angle_deg[kPhi][i]);
+        const std::size_t row = track.first_row + i;
+        places.x_mm[row] = place.x_mm + errors.x_mm[i];
+        places.y_mm[row] = place.y_mm + errors.y_mm[i];
+        if (model.exposures.empty()) continue;
+        const ExposureTerm& image = model.exposures[facts.exposures.of_row[row]];
+        const double x = place.x_mm, y = place.y_mm;
+        places.x_mm[row] +=
+            image.shift_x_um * 1e-3 + image.scale_ppm * 1e-6 * x - image.turn_urad * 1e-6 * y;
+        places.y_mm[row] +=
+            image.shift_y_um * 1e-3 + image.scale_ppm * 1e-6 * y + image.turn_urad * 1e-6 * x;
+      }
+    }
+  });
+  return places;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,127 @@
+// The extended model of a campaign: fitted static geometry of each unit, and the effects that were
+// accepted, each with its amplitudes. It predicts where every fibre stands after every move: the
+// simulation with its effects.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/campaigns/campaign/campaign.h"
+#include "sim/campaigns/effects/effect.h"
+
+namespace focalfleet::sim {
+
+/// Runs work(0) .. work(chunks - 1), in any order and on any threads; each chunk by itself is
+/// deterministic and results are merged in the order of the chunks.
+using ParallelFor =
+    std::function<void(std::size_t chunks, const std::function<void(std::size_t)>& work)>;
+ParallelFor OneAfterTheOther();
+
+/// At which level the amplitudes are the same.
+enum class Sharing { kUnit, kRail, kBus, kFleet };
+std::string_view Name(Sharing sharing);
+
+inline constexpr std::uint32_t kNoGroup = UINT32_MAX;
+
+/// An effect in the model. Units that do not have it are in no group.
+struct ModelTerm {
+  Template form;
+  Sharing sharing = Sharing::kFleet;
+  std::vector<std::uint32_t> group_of_unit;  // Shape: (units); groups are 0 .. groups - 1
+  std::vector<double> amplitude;             // Shape: (groups, columns), flat
+  std::vector<double> sigma;                 // standard deviation of each amplitude
+  double spread = 0;  // standard deviation of the units' amplitudes, a prior; 0: none
+
+  [[nodiscard]] std::size_t groups() const { return amplitude.size() / form.columns; }
+  /// {} where the unit does not have it.
+  [[nodiscard]] std::span<const double> AmplitudeOf(std::size_t unit) const;
+};
+
+/// All amplitudes of a term as one number: their mean over groups by certainty, where it has a
+/// sign, else their root mean square.
+struct AmplitudeSummary {
+  double value = 0;
+  double sigma = 0;  // 0: nothing is known of it
+};
+AmplitudeSummary Summarise(const ModelTerm& term);
+
+/// Shift and turn of the whole image at one exposure. Frame: plate, about its centre.
+struct ExposureTerm {
+  double shift_x_um = 0;
+  double shift_y_um = 0;
+  double turn_urad = 0;
+  double scale_ppm = 0;
+};
+
+/// A step of one axis at one move that stays until the unit is homed (or for that move alone).
+struct EventTerm {
+  std::size_t unit = 0;
+  std::size_t row = 0;  // of the campaign
+  std::size_t axis = kTheta;
+  bool stays = true;
+  double step_deg = 0;
+};
+
+struct CampaignModel {
+  std::string name = "nominal";
+  std::vector<CampaignUnit> units;  // with the fitted geometry
+  std::vector<ModelTerm> terms;
+  std::vector<ExposureTerm> exposures;  // empty, or Shape: (exposures)
+  std::vector<EventTerm> events;
+  // Zeros that differ from homing to homing: per row, what is added to the angle. Empty: none.
+  std::vector<double> homing_zero_deg[2];
+  double homing_spread_deg[2] = {0, 0};  // their standard deviation, a prior
+};
+
+/// Moves that an event happened in: one that was lost has an event of each axis.
+std::size_t MovesWithEvents(const CampaignModel& model);
+
+/// One axis from a homing to the next.
+struct Homing {
+  std::size_t axis = kTheta;
+  std::size_t begin = 0, end = 0;  // moves of the track
+};
+/// Those whose zero the model leaves free: theta's, then phi's; none where zeros are the same after
+/// each homing.
+std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& track);
+/// One degree on the axis while the homing lasts. `errors` is reset.
+void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors);
+
+/// The pose errors of one unit by all terms, events and homings of the model.
+void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
+                   PoseErrors* errors);
+
+/// What these data cannot say anything of.
+struct NotTestable {
+  std::string cause;
+  std::string why;
+};
+
+/// Takes out the terms that this campaign cannot be predicted with: it lacks a column, or its units
+/// and moves have no such part. Returns which, and why.
+std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model);
+
+struct Places {
+  std::vector<double> x_mm;  // Shape: (rows)
+  std::vector<double> y_mm;
+};
+
+/// A unit's moves at the poses that its steps have put it in: a lost command may be half a turn,
+/// and what a place says of the geometry is another thing there.
+UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit);
+
+/// Where the model says that every fibre stands after every move.
+Places Predict(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel);
+
+/// Chunks of units that depend on their number alone.
+struct UnitChunk {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+std::vector<UnitChunk> ChunksOf(std::size_t units);
+
+}  // namespace focalfleet::sim

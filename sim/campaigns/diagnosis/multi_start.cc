@@ -1,0 +1,76 @@
+#include "sim/campaigns/diagnosis/multi_start.h"
+
+#include <algorithm>
+#include <numbers>
+
+#include "sim/campaigns/diagnosis/events.h"
+#include "sim/campaigns/diagnosis/homings.h"
+
+namespace focalfleet::sim {
+namespace {
+
+double BicByNoise(Fit fit, const Noise& noise) {
+  fit.noise = noise;
+  UpdateWeights(&fit);
+  return NegativeBic(fit);
+}
+
+// With and without steps in single units' angles; the better fit for its price.
+Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  Fit stepped = *fit;
+  const bool has_events = AddEvents(&stepped) > 0;
+  Selection selection = Select(templates, rule, fit);
+  if (!has_events) return selection;
+  // What a cause does to a few moves looks like steps until the cause is known.
+  Fit explained = *fit;
+  if (AddEvents(&explained) == 0) return selection;
+  Selection again = Select(templates, rule, &stepped);
+  // A step is a large claim about one move: it has to be worth more than its price. So is a cause.
+  constexpr double kClearly = 20, kEach = 10, kCause = 20;
+  const auto terms = [](const Fit& one) { return static_cast<double>(one.model.terms.size()); };
+  const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model)) -
+                       kCause * std::max(terms(*fit) - terms(stepped), 0.0);
+  const double better = BetterBy(stepped, *fit);
+  if (better <= price) return selection;
+  *fit = std::move(stepped);
+  return again;
+}
+
+// Zeros that differ from homing to homing, where they are worth their number. The terms are then
+// and steps are chosen anew: what was one homing's zero may have passed for something else.
+void TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
+                Fit* fit) {
+  constexpr double kBetterBy = 20;
+  Fit freed = *fit;
+  FreeHomings(&freed);
+  if (NegativeBic(freed) < NegativeBic(*fit) + kBetterBy) return;
+  // Many homings of a few moves each follow what noise does to these.
+  constexpr double kOfNoise = 0.25;
+  if (ScatterOfHomings(freed).both_um() < kOfNoise * std::numbers::sqrt2 * freed.noise.typical_um)
+    return;
+  freed.model.terms.clear();
+  freed.model.events.clear();
+  UpdateResiduals(&freed);
+  FreeHomings(&freed);
+  Selection again = SelectWithEvents(templates, rule, &freed);
+  if (NegativeBic(freed) < NegativeBic(*fit) + kBetterBy) return;
+  *fit = std::move(freed);
+  *selection = std::move(again);
+}
+
+}  // namespace
+
+double BetterBy(const Fit& fit, const Fit& than) {
+  double sum = 0;
+  for (const Noise* noise : {&fit.noise, &than.noise})
+    sum += BicByNoise(fit, *noise) - BicByNoise(than, *noise);
+  return sum / 2;
+}
+
+Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit) {
+  Selection selection = SelectWithEvents(templates, rule, fit);
+  if (fit->facts->homings > 0) TryHomings(templates, rule, &selection, fit);
+  return selection;
+}
+
+}  // namespace focalfleet::sim

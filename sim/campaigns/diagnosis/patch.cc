@@ -1,0 +1,105 @@
+#include "sim/campaigns/diagnosis/patch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "sim/campaigns/diagnosis/image.h"
+#include "sim/campaigns/diagnosis/image_followed.h"
+#include "sim/campaigns/diagnosis/screen.h"
+#include "sim/campaigns/diagnosis/select.h"
+#include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/effects/empirical.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kSizeMinUm = 0.05;    // less is no misfit worth a term, however certain
+constexpr double kSpreadMaxDeg = 0.3;  // of units' own amplitudes, where nothing else holds them
+
+bool IsSame(const Template& a, const Template& b) {
+  constexpr double kApart = 0.3;  // orders that are nearer are one ripple, found again
+  return a.effect == b.effect && a.axis == b.axis && a.form == b.form &&
+         a.covariate == b.covariate &&
+         (a.effect == &EmpiricalCurve() || std::abs(a.shape - b.shape) < kApart);
+}
+
+// The look, with amplitudes for all of its curve.
+ModelTerm PatchOf(const ModelTerm& look, const CampaignFacts& facts) {
+  ModelTerm term = look;
+  if (look.form.effect == &EmpiricalCurve()) {
+    term.form = WholeCurve(look.form, facts);
+  } else {
+    char order[48];
+    std::snprintf(order, sizeof order, "ripple of order %.4g", look.form.shape);
+    term.form.label = order;
+  }
+  term.amplitude.assign(look.groups() * term.form.columns, 0);
+  term.sigma.assign(term.amplitude.size(), 0);
+  // One unit's rows may not tell all cosines apart.
+  if (term.sharing == Sharing::kUnit && !(term.spread > 0)) term.spread = kSpreadMaxDeg;
+  return term;
+}
+
+void Refit(Fit* fit) {
+  StepFit(fit);
+  SettleFit(fit, 2);
+}
+
+// The image's shifts as curves over the column that they follow; what else moves stays in the
+// image's own terms.
+bool PatchImage(const PatchRule& rule, UnknownFound* reported, Fit* fit) {
+  const FilledColumn* column = fit->facts->Find(reported->covariate);
+  if (column == nullptr || !column->varies()) return false;
+  fit->model.exposures.clear();
+  for (const int channel : {kPlaceX, kPlaceY}) {
+    ModelTerm look;
+    look.form = {.effect = &EmpiricalCurve(), .form = channel, .covariate = reported->covariate};
+    look.group_of_unit.assign(fit->model.units.size(), 0);
+    look.amplitude = {0};
+    fit->model.terms.push_back(PatchOf(look, *fit->facts));
+  }
+  UpdateResiduals(fit);
+  Refit(fit);
+  AddImageTerms(fit, rule.family_wise);
+  // Steps of the image may have gone, the curves are the last.
+  const std::size_t terms = fit->model.terms.size();
+  reported->patched = {std::string(EmpiricalCurve().cause),
+                       std::hypot(SizeOf(*fit, fit->model.terms[terms - 2]),
+                                  SizeOf(*fit, fit->model.terms[terms - 1]))};
+  return true;
+}
+
+}  // namespace
+
+std::vector<UnknownFound> PatchStructures(const PatchRule& rule,
+                                          std::vector<UnknownFound>* reported, Fit* fit) {
+  std::size_t added = 0;
+  for (UnknownFound& one : *reported)
+    if (added == 0 && one.channel.starts_with(kImageShift) && PatchImage(rule, &one, fit))
+      added += 2;
+  std::vector<UnknownFound> seen;
+  while (auto structure = FindStructure(*fit, rule.family_wise, rule.seed)) {
+    if (!rule.matters(structure->reported)) break;
+    seen.push_back(structure->reported);
+    const bool again =
+        std::any_of(fit->model.terms.begin(), fit->model.terms.end(),
+                    [&](const ModelTerm& term) { return IsSame(term.form, structure->term.form); });
+    if (again || added >= kPatchTermsMax) break;
+    const CampaignModel without = fit->model;
+    fit->model.terms.push_back(PatchOf(structure->term, *fit->facts));
+    Refit(fit);
+    const double size_um = SizeOf(*fit, fit->model.terms.back());
+    if (size_um < kSizeMinUm) {
+      fit->model = without;
+      UpdateResiduals(fit);
+      SettleFit(fit, 2);
+      break;
+    }
+    seen.back().patched = {std::string(structure->term.form.effect->cause), size_um};
+    ++added;
+  }
+  return seen;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,50 @@
+// A made-up campaign with chosen effects in it, for tests, load and demonstration: units on a
+// hexagonal lattice, a diagnostic campaign (long and short moves both ways, single axes and both,
+// few and many movers, several drive levels, delays and temperatures), places measured with noise.
+// The physics are those of the library; a test of the diagnosis that must not share them plants its
+// own (tests/hidden).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "protocol/base/result.h"
+#include "sim/campaigns/campaign/campaign.h"
+#include "sim/campaigns/diagnosis/ahead.h"
+
+namespace focalfleet::sim {
+
+struct PlantedEffect {
+  std::string cause;
+  double amplitude = 0;     // in the effect's unit
+  std::string axis;         // empty: the first that the effect has
+  double unit_share = 1;    // of the units that have it
+  double unit_scatter = 0;  // relative, of the units' own amplitudes
+  // Index among the effect's templates on that axis. -1: the first, or where shapes are units' own
+  // (as damaged teeth are), one of the first's kind for each.
+  int form = -1;
+};
+
+struct PlantedOptions {
+  std::size_t units = 60;
+  std::size_t moves = 60;
+  std::uint64_t seed = 1;
+  double noise_um = 3;           // one coordinate of a measured place
+  double rest_noise_deg = 0.01;  // of each axis, anew at each of its moves, held until the next
+  double zero_offset_deg = 0;    // of the true geometry against the table, and so below
+  double base_offset_mm = 0;
+  double arm_offset_mm = 0;
+  double outlier_share = 0;  // rows that lie anywhere within 2 mm
+  double lost_share = 0;     // rows that were not seen
+  double homing_share = 0;   // of a unit's moves that begin with a homing
+  bool pinion = true;        // gears of 337.36 x 45/17, else 337.36
+  std::vector<PlantedEffect> effects;
+  std::vector<PlateMove> next;  // made after the others, by the same units
+};
+
+/// Of the causes that no effect is, those of planted_faults.h, too; camera pixels are told where
+/// centroid_bias is planted. Errors: kInvalid: an effect, axis or shape that there is not.
+Result<Campaign> PlantCampaign(const PlantedOptions& options);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,318 @@
+#include "sim/campaigns/diagnosis/rotors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+
+#include "sim/campaigns/diagnosis/angle_errors.h"
+#include "sim/campaigns/diagnosis/chances.h"
+#include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/effects/harmonic.h"
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr std::string_view kCogging = "cogging", kImbalance = "phase_imbalance";
+
+// One way to turn a rotor: the error in electrical radians by the wave's phase in radians, and its
+// strength where the drive is 1.
+struct Way {
+  std::string_view cause;
+  double harmonic;  // of the motor's turn
+  double falls;     // with this power of the drive
+  double (*error)(double harmonic, double wave_rad, double strength);
+};
+
+double Straight(double, double wave_rad, double strength) { return strength * std::sin(wave_rad); }
+
+double OfDetent(double harmonic, double wave_rad, double strength) {
+  return kRadians * DetentError(harmonic, wave_rad / kRadians, strength);
+}
+
+// Ellipse and shifted circle: the field is 1 + strength exp(-i wave) in its own frame.
+double OfField(double, double wave_rad, double strength) {
+  return std::atan2(-strength * std::sin(wave_rad), 1 + strength * std::cos(wave_rad));
+}
+
+// The lost voltage points to the middle of the sixth of a turn that the field is in.
+double OfDeadTime(double harmonic, double wave_rad, double strength) {
+  const double within = std::remainder(wave_rad, 2 * std::numbers::pi) / harmonic;
+  return std::atan2(strength * std::sin(within), 1 - strength * std::cos(within));
+}
+
+constexpr Way kWays[] = {
+    {kCogging, 1, 1, OfDetent},   {kCogging, 2, 1, OfDetent},   {kCogging, 4, 1, OfDetent},
+    {kCogging, 6, 1, OfDetent},   {kCogging, 1, 1, Straight},   {kCogging, 2, 1, Straight},
+    {kCogging, 4, 1, Straight},   {kCogging, 6, 1, Straight},   {kCogging, 1, 2, Straight},
+    {kCogging, 2, 2, Straight},   {kCogging, 4, 2, Straight},   {kCogging, 6, 2, Straight},
+    {kImbalance, 1, 1, OfField},  {kImbalance, 2, 0, OfField},  {kImbalance, 6, 1, OfDeadTime},
+    {kImbalance, 1, 1, Straight}, {kImbalance, 2, 0, Straight}, {kImbalance, 6, 1, Straight}};
+
+// The angle errors of one unit's axis, and what they depend on.
+struct RotorRow {
+  double error_deg;  // of the axis
+  double sigma_deg;
+  double motor_deg;  // commanded; without whole turns
+  double drive;      // of the move that brought the axis here
+};
+struct Rotor {
+  double gear = 1;
+  std::vector<RotorRow> rows;
+};
+
+Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
+  constexpr double kDriveLeast = 0.05;
+  const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
+  const std::span<const double> drive = track.Column("drive_amplitude");
+  // What a rotor came to rest with stays until the axis moves again.
+  constexpr std::size_t kNever = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> moved(track.moves, kNever);
+  std::size_t last = kNever;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i]) last = kNever;
+    if (track.step_deg[axis][i] != 0) last = i;
+    moved[i] = last;
+  }
+  Rotor rotor{.gear = track.unit->gear[axis]};
+  const double noise_deg = std::hypot(fit.noise.angle_deg[axis], fit.noise.rest_deg[axis]);
+  const double factor = std::max(fit.noise.unit_factor[unit], 1.0);
+  for (const AngleRow& row : AngleErrors(fit, track, axis)) {
+    const std::size_t at = moved[row.move];
+    if (at == kNever) continue;
+    rotor.rows.push_back(
+        {row.error_deg, factor * std::hypot(row.sigma_deg(1e-3 * fit.noise.place_um), noise_deg),
+         360 * HarmonicPhase(track, axis, at, rotor.gear), std::max(drive[at], kDriveLeast)});
+  }
+  return rotor;
+}
+
+// -2 ln L of the rows by outlier-proof density, with a zero of their own.
+double CostOf(const Rotor& rotor, const Way& way, double strength, double phase_rad,
+              std::vector<double>* left) {
+  left->clear();
+  double sum = 0, weights = 0;
+  for (const RotorRow& row : rotor.rows) {
+    const double wave = way.harmonic * row.motor_deg * kRadians + phase_rad;
+    const double at_drive = strength / std::pow(row.drive, way.falls);
+    const double error = way.error(way.harmonic, wave, at_drive) / kRadians / rotor.gear;
+    const double weight = 1 / (row.sigma_deg * row.sigma_deg);
+    left->push_back(row.error_deg - error);
+    sum += weight * left->back(), weights += weight;
+  }
+  double cost = 0;
+  for (std::size_t k = 0; k < left->size(); ++k) {
+    const double off = ((*left)[k] - sum / weights) / rotor.rows[k].sigma_deg;
+    cost += 2 * MinusLogDensity(off * off);
+  }
+  return cost;
+}
+
+// The least cost over strength and phase: a grid, then smaller and smaller steps about the best.
+double LeastCost(const Rotor& rotor, const Way& way) {
+  constexpr double kLow = 0.03, kRatio = 1.5;
+  constexpr int kStrengths = 10, kPhases = 24, kHalvings = 6;
+  std::vector<double> left;
+  double best = std::numeric_limits<double>::infinity(), log_strength = 0, phase = 0;
+  const auto look = [&](double log_s, double p) {
+    const double cost = CostOf(rotor, way, std::exp(log_s), p, &left);
+    if (cost >= best) return false;
+    best = cost, log_strength = log_s, phase = p;
+    return true;
+  };
+  for (int s = 0; s < kStrengths; ++s)
+    for (int p = 0; p < kPhases; ++p)
+      look(std::log(kLow) + s * std::log(kRatio), 2 * std::numbers::pi * p / kPhases);
+  double step_log = std::log(kRatio) / 2, step_phase = std::numbers::pi / kPhases;
+  for (int halving = 0; halving < kHalvings; ++halving, step_log /= 2, step_phase /= 2)
+    for (bool better = true; better;) {
+      const double log_s = log_strength, p = phase;
+      better = look(log_s + step_log, p) || look(log_s - step_log, p) ||
+               look(log_s, p + step_phase) || look(log_s, p - step_phase);
+    }
+  return best;
+}
+
+bool IsOfRotor(const ModelTerm& term, std::size_t axis) {
+  return (term.form.effect->cause == kCogging || term.form.effect->cause == kImbalance) &&
+         AxisIndex(term.form) == axis;
+}
+
+// The term of the axis that does most; kNoTerm: it has none.
+std::size_t StrongestOf(const Fit& fit, std::size_t axis, std::vector<double>* square_um2) {
+  std::size_t strongest = kNoTerm;
+  double most_um = 0;
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    if (!IsOfRotor(fit.model.terms[t], axis)) continue;
+    TermTrace trace = TraceOf(fit, fit.model.terms[t]);
+    if (strongest != kNoTerm && trace.rms_um <= most_um) continue;
+    strongest = t, most_um = trace.rms_um, *square_um2 = std::move(trace.square_um2);
+  }
+  return strongest;
+}
+
+// Whether it turns rotors by so much, electrically.
+bool IsFar(const Fit& fit, std::size_t term, double far_deg) {
+  const ModelTerm& of = fit.model.terms[term];
+  return std::abs(Summarise(of).value) * MedianGear(fit.model, AxisIndex(of.form)) >= far_deg;
+}
+
+// The way of a cause that suits best, all units by the same, and its cost.
+struct BestWay {
+  const Way* way = nullptr;
+  double cost = std::numeric_limits<double>::infinity();
+};
+BestWay BestWayOf(std::string_view cause, const std::vector<Rotor>& rotors,
+                  const ParallelFor& parallel) {
+  const std::size_t count = rotors.size();
+  std::vector<double> cost(std::size(kWays) * count);
+  parallel(cost.size(), [&](std::size_t k) {
+    if (kWays[k / count].cause == cause) cost[k] = LeastCost(rotors[k % count], kWays[k / count]);
+  });
+  BestWay best;
+  for (std::size_t k = 0; k < std::size(kWays); ++k) {
+    if (kWays[k].cause != cause) continue;
+    const auto from = cost.begin() + static_cast<std::ptrdiff_t>(k * count);
+    const double sum = std::accumulate(from, from + static_cast<std::ptrdiff_t>(count), 0.0);
+    if (sum < best.cost) best = {&kWays[k], sum};
+  }
+  return best;
+}
+
+// The rotors that are turned most.
+std::vector<Rotor> TakeRotors(const Fit& fit, std::size_t axis,
+                              const std::vector<double>& square_um2) {
+  constexpr std::size_t kMost = 24;
+  Fit without = fit;
+  std::erase_if(without.model.terms, [&](const ModelTerm& term) { return IsOfRotor(term, axis); });
+  UpdateResiduals(&without);
+  std::vector<std::size_t> units;
+  for (std::size_t unit = 0; unit < square_um2.size(); ++unit)
+    if (square_um2[unit] > 0) units.push_back(unit);
+  std::ranges::stable_sort(units, std::ranges::greater{},
+                           [&](std::size_t unit) { return square_um2[unit]; });
+  units.resize(std::min(units.size(), kMost));
+  std::vector<Rotor> rotors;
+  for (const std::size_t unit : units) rotors.push_back(RotorOf(without, unit, axis));
+  return rotors;
+}
+
+// Whether one way is better for sure: beyond chance, and by a quarter of what it leaves itself
+// above noise, for that is no scatter but a misfit. A detent of order 1 and a circle beside the
+// origin are one curve.
+bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
+  constexpr double kOfNormal = 1.15;    // mean of 2 MinusLogDensity of a normal number's square
+  constexpr double kClearly = 15;       // -2 ln L
+  constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
+  constexpr double kOfMisfit = 0.25;
+  if (a.way->harmonic == 1 && b.way->harmonic == 1) return false;
+  double rows = 0;
+  for (const Rotor& rotor : rotors) rows += static_cast<double>(rotor.rows.size());
+  const double of_noise = kOfNormal * rows, least = std::min(a.cost, b.cost);
+  const double dispersion = std::max(1.0, least / of_noise);
+  const double misfit = std::max(least - of_noise, 0.0);
+  return dispersion <= kDispersionMax &&
+         std::abs(a.cost - b.cost) >= std::max(kClearly * dispersion, kOfMisfit * misfit);
+}
+
+// Beside the term at `at` the axis' other waves of either cause go: they are what its shape left.
+// Returns where the term is then.
+std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
+  const std::size_t axis = AxisIndex(fit->model.terms[at].form);
+  for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
+    if (t == at || !IsOfRotor(fit->model.terms[t], axis)) continue;
+    fit->model.terms.erase(fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t));
+    selection->accepted.erase(selection->accepted.begin() + static_cast<std::ptrdiff_t>(t));
+    if (t < at) --at;
+  }
+  return at;
+}
+
+// The same units with the bent wave of another cause, which has its own rivals. False: it has none
+// in these data.
+bool Exchange(const Templates& templates, const SelectionRule& rule, const Way& way, std::size_t at,
+              Fit* fit, Selection* selection) {
+  constexpr int kRounds = 2;
+  const EffectAxis axis = fit->model.terms[at].form.axis;
+  const Templates forms = ListTemplates(*FindEffect(way.cause), *fit->facts);
+  const Template* bent = nullptr;
+  for (const Template& form : forms)
+    if (form.axis == axis && form.shape == way.harmonic &&
+        (bent == nullptr || form.columns > bent->columns))
+      bent = &form;
+  if (bent == nullptr) return false;
+  at = LeaveAlone(at, fit, selection);
+  ModelTerm& term = fit->model.terms[at];
+  const std::size_t groups = term.groups();
+  term.form = *bent;
+  term.amplitude.assign(groups * bent->columns, 0);
+  term.sigma.assign(groups * bent->columns, 0);
+  UpdateResiduals(fit);
+  StepFit(fit);
+  SettleFit(fit, kRounds);
+  selection->accepted[at].rivals = FindRivals(templates, rule, *fit, at);
+  return true;
+}
+
+}  // namespace
+
+double MedianGear(const CampaignModel& model, std::size_t axis) {
+  std::vector<double> gears;
+  for (const CampaignUnit& unit : model.units) gears.push_back(unit.gear[axis]);
+  return Median(std::move(gears));
+}
+
+double DetentError(double harmonic, double wave_deg, double detent) {
+  // The lag that is nearest to none: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to
+  // its first zero.
+  const double wave = wave_deg * kRadians;
+  const auto excess = [&](double lag) {
+    return std::sin(lag) - detent * std::sin(wave - harmonic * lag);
+  };
+  const double sign = std::sin(wave) >= 0 ? 1 : -1;
+  const double step = 0.25 / std::max(harmonic, 1.0);
+  double low = 0, high = 0;
+  while (sign * excess(sign * high) < 0 && high < std::numbers::pi / 2) low = high, high += step;
+  constexpr int kHalvings = 24;
+  for (int i = 0; i < kHalvings; ++i) {
+    const double middle = (low + high) / 2;
+    (sign * excess(sign * middle) < 0 ? low : high) = middle;
+  }
+  return -sign * (low + high) / 2 / kRadians;
+}
+
+RotorsReportedBy SettleRotors(const Templates& templates, const SelectionRule& rule,
+                              const std::vector<std::string>& left_out, Fit* fit,
+                              Selection* selection) {
+  constexpr double kFar_deg = 8;  // electrical: less is a sine by either
+  RotorsReportedBy reported;
+  if (!fit->facts->Has("drive_amplitude")) return reported;
+  for (const std::string_view name : {kCogging, kImbalance})
+    if (std::ranges::find(left_out, name) != left_out.end()) return reported;
+  for (const std::size_t axis : {std::size_t{kTheta}, std::size_t{kPhi}}) {
+    std::vector<double> square_um2;
+    const std::size_t at = StrongestOf(*fit, axis, &square_um2);
+    if (at == kNoTerm || !IsFar(*fit, at, kFar_deg)) continue;
+    const std::vector<Rotor> rotors = TakeRotors(*fit, axis, square_um2);
+    const BestWay cogging = BestWayOf(kCogging, rotors, fit->parallel);
+    const BestWay field = BestWayOf(kImbalance, rotors, fit->parallel);
+    if (!IsClear(cogging, field, rotors)) continue;
+    const Way& way = cogging.cost < field.cost ? *cogging.way : *field.way;
+    if (fit->model.terms[at].form.effect->cause != way.cause &&
+        !Exchange(templates, rule, way, at, fit, selection))
+      continue;
+    reported[axis] = way.cause;
+    for (std::size_t t = 0; t < fit->model.terms.size(); ++t)
+      if (IsOfRotor(fit->model.terms[t], axis) &&
+          fit->model.terms[t].form.effect->cause == way.cause)
+        std::erase_if(selection->accepted[t].rivals, [](const Rival& rival) {
+          return rival.cause == kCogging || rival.cause == kImbalance;
+        });
+  }
+  return reported;
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,109 @@
+#include "sim/campaigns/diagnosis/screen.h"
+
+#include <cmath>
+
+#include "sim/campaigns/diagnosis/select.h"
+#include "sim/campaigns/diagnosis/term_trace.h"
+#include "sim/campaigns/effects/empirical.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Of the family-wise rate: the screen's; and where what is left is little, of the residuals: what
+// names leave by their shapes is never quite nothing.
+constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
+// Of a look beside the model: a name is often nearly what is there, and the screen looks for what
+// little it leaves.
+constexpr double kKeptMin = 0.012;
+
+// Of the rotor behind the gear, where all units have the same.
+void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<double>* orders) {
+  const std::vector<CampaignUnit>& units = facts.campaign->units;
+  const double gear = units.front().gear[axis];
+  for (const CampaignUnit& unit : units)
+    if (unit.gear[axis] != gear) return;
+  for (const double harmonic : {1.0, 2.0, 6.0}) orders->push_back(harmonic * gear);
+}
+
+// The ripple's order between the listed ones that explains most, and how it stands then.
+Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template& ripple,
+                       Evidence* evidence) {
+  constexpr int kEitherSide = 4;
+  constexpr double kStep = 0.1;
+  Templates tried;
+  for (int k = -kEitherSide; k <= kEitherSide; ++k) {
+    tried.push_back(ripple);
+    tried.back().shape += k * kStep;
+  }
+  const ScorePass pass = ScoreTemplates(fit, tried);
+  Template best = ripple;
+  for (std::size_t k = 0; k < tried.size(); ++k) {
+    Evidence one = Assess(pass.scores[k], tried[k], groups);
+    if (one.evidence > evidence->evidence) *evidence = std::move(one), best = tried[k];
+  }
+  return best;
+}
+
+}  // namespace
+
+Templates ScreenTemplates(const CampaignFacts& facts) {
+  Templates looks;
+  for (const auto& [name, column] : facts.columns) {
+    if (!column.varies() || name == "sigma_um" || name == "rehomed" || name == "pixel_x" ||
+        name == "pixel_y")
+      continue;
+    for (int channel = 0; channel < kEmpiricalChannels; ++channel)
+      for (std::size_t cosine = 1; cosine <= kEmpiricalCosines; ++cosine)
+        looks.push_back({.effect = &EmpiricalCurve(),
+                         .axis = EffectAxis::kNone,
+                         .form = channel,
+                         .shape = static_cast<double>(cosine),
+                         .label = "curve",
+                         .covariate = name});
+  }
+  std::vector<double> orders;
+  for (double order = 2; order <= 16; order += 0.5) orders.push_back(order);
+  for (double order = 17; order <= 60; order += 1) orders.push_back(order);
+  for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi}) {
+    std::vector<double> all = orders;
+    AddRotorOrders(facts, axis == EffectAxis::kTheta ? kTheta : kPhi, &all);
+    for (const double order : all)
+      looks.push_back({.effect = &EmpiricalRipple(),
+                       .axis = axis,
+                       .columns = 2,
+                       .shape = order,
+                       .label = "ripple",
+                       .covariate = std::string(kCommand[axis == EffectAxis::kTheta ? 0 : 1])});
+  }
+  return looks;
+}
+
+std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, std::uint64_t seed) {
+  const Templates looks = ScreenTemplates(*fit.facts);
+  if (looks.empty()) return std::nullopt;
+  const FleetGroups groups = GroupsOf(*fit.facts);
+  const ScorePass pass = ScoreTemplates(fit, looks);
+  const double tests = EffectiveTests(pass.scores, looks, seed);
+  const Best best =
+      FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise, kKeptMin);
+  if (best.at == kNoTerm) return std::nullopt;
+  Evidence evidence = best.evidence;
+  const Template look = looks[best.at].effect == &EmpiricalRipple()
+                            ? WithFineOrder(fit, groups, looks[best.at], &evidence)
+                            : looks[best.at];
+  Fit stepped = fit;
+  stepped.model.terms.push_back(MakeTerm(look, evidence, groups));
+  StepFit(&stepped);
+  const double size_um = SizeOf(stepped, stepped.model.terms.back());
+  if (size_um < kLittle * fit.noise.typical_um &&
+      best.log_p_family > std::log(kShareOfLittle * family_wise))
+    return std::nullopt;
+  return StructureLeft{{.covariate = look.covariate,
+                        .channel = std::string(ChannelOf(look)),
+                        .p_value = std::exp(best.log_p_family),
+                        .size_um = size_um,
+                        .delta_log_likelihood = evidence.chi_square / 2},
+                       stepped.model.terms.back()};
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,45 @@
+#include "sim/campaigns/diagnosis/shared_walk.h"
+
+#include <algorithm>
+
+#include "sim/campaigns/diagnosis/screen.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kRemembers = 0.3;  // of a rest error
+
+// Of an axis whose noise remembers: that hides what this axis does, and nothing else.
+bool IsOfSuchAxis(const UnknownFound& reported, const Noise& noise) {
+  return (reported.channel.starts_with("theta") && noise.carry[kTheta] >= kRemembers) ||
+         (reported.channel.starts_with("phi") && noise.carry[kPhi] >= kRemembers);
+}
+
+}  // namespace
+
+std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, std::uint64_t seed) {
+  constexpr double kClearly = 20;
+  constexpr int kCurves = 3, kRounds = 2;  // curves: a step is no smooth one
+  if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembers) return std::nullopt;
+  Fit forgetful = fit;
+  forgetful.noise = {
+      .least_um = fit.noise.least_um, .may_carry = false, .unit_factor = fit.noise.unit_factor};
+  UpdateNoise(&forgetful);
+  UpdateWeights(&forgetful);
+  SettleFit(&forgetful, kRounds);
+  std::optional<UnknownFound> clearest;
+  for (int k = 0; k < kCurves; ++k) {
+    const auto left = FindStructure(forgetful, family_wise, seed);
+    if (!left || left->term.sharing != Sharing::kFleet || !IsOfSuchAxis(left->reported, fit.noise))
+      break;
+    if (!clearest) clearest = left->reported;
+    forgetful.model.terms.push_back(left->term);
+    StepFit(&forgetful);
+    SettleFit(&forgetful, kRounds);
+    // Each by its own noise: that is what differs.
+    if (NegativeBic(forgetful) > NegativeBic(fit) + kClearly) return clearest;
+  }
+  return std::nullopt;
+}
+
+}  // namespace focalfleet::sim

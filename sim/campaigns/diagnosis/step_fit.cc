@@ -1,0 +1,289 @@
+// The Gauss-Newton step of fit.h.
+#include <algorithm>
+#include <cmath>
+
+#include "sim/campaigns/diagnosis/fit.h"
+
+namespace focalfleet::sim {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// One unit's equations: its own unknowns (geometry, own amplitudes, homings), and the shared ones
+// that reach it.
+struct UnitEquations {
+  MatrixXd own;                  // columns
+  VectorXd prior, value;         // weight of the prior of each unknown, and how far off it stands
+  std::vector<Index> shared_at;  // which shared unknowns
+  MatrixXd shared;               // columns
+  VectorXd y;
+};
+
+void AppendColumn(const VectorXd& column, MatrixXd* columns) {
+  columns->conservativeResize(column.size(), columns->cols() + 1);
+  columns->col(columns->cols() - 1) = column;
+}
+
+// An unknown of the unit's own: its column, the weight of its prior, how far off it stands.
+void AppendOwn(const VectorXd& column, double prior, double value, UnitEquations* eq) {
+  AppendColumn(column, &eq->own);
+  eq->prior.conservativeResize(eq->own.cols());
+  eq->value.conservativeResize(eq->own.cols());
+  eq->prior[eq->own.cols() - 1] = prior;
+  eq->value[eq->own.cols() - 1] = value;
+}
+
+void AppendHomings(const Fit& fit, const WhiteUnit& white, UnitEquations* eq) {
+  PoseErrors errors;
+  VectorXd column(white.y.size());
+  for (const Homing& homing : FreeHomingsOf(fit.model, white.track)) {
+    ApplyHoming(white.track, homing, &errors);
+    WhiteDisplacement(white, errors, column.data());
+    const double spread = std::max(fit.model.homing_spread_deg[homing.axis], 1e-6);
+    AppendOwn(column, 1 / (spread * spread),
+              fit.model.homing_zero_deg[homing.axis][white.track.first_row + homing.begin], eq);
+  }
+}
+
+UnitEquations MakeEquations(const Fit& fit, std::size_t unit, const WhiteUnit& white,
+                            const std::vector<Index>& shared_begin) {
+  UnitEquations eq;
+  eq.y = white.y;
+  eq.own = white.geometry;
+  eq.prior = StaticPriorWeights();
+  eq.value = ToVector(fit.model.units[unit]) - ToVector(fit.facts->campaign->units[unit]);
+  eq.shared.resize(white.y.size(), 0);
+  PoseErrors errors;
+  VectorXd column(white.y.size());
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
+    const ModelTerm& term = fit.model.terms[t];
+    const std::uint32_t group = term.group_of_unit[unit];
+    if (group == kNoGroup) continue;
+    for (std::size_t c = 0; c < term.form.columns; ++c) {
+      ApplyColumn(white.track, term.form, c, 1, &errors);
+      WhiteDisplacement(white, errors, column.data());
+      if (term.sharing == Sharing::kUnit) {
+        AppendOwn(column, term.spread > 0 ? 1 / (term.spread * term.spread) : 0,
+                  term.amplitude[group * term.form.columns + c], &eq);
+      } else {
+        AppendColumn(column, &eq.shared);
+        eq.shared_at.push_back(shared_begin[t] + static_cast<Index>(group * term.form.columns + c));
+      }
+    }
+  }
+  AppendHomings(fit, white, &eq);
+  return eq;
+}
+
+struct UnitSolution {
+  Eigen::LDLT<MatrixXd> own;
+  VectorXd right;  // of the own unknowns
+  MatrixXd cross;  // own x shared
+  std::vector<Index> shared_at;
+  bool used = false;
+};
+
+struct SharedSystem {
+  MatrixXd normal;
+  VectorXd right;
+};
+
+UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
+  UnitSolution solution;
+  MatrixXd normal = eq.own.transpose() * eq.own;
+  normal.diagonal() += eq.prior;
+  // What neither data nor prior hold must not move.
+  normal.diagonal().array() += 1e-12;
+  solution.right = eq.own.transpose() * eq.y - eq.prior.cwiseProduct(eq.value);
+  solution.own.compute(normal);
+  solution.cross = eq.own.transpose() * eq.shared;
+  solution.shared_at = eq.shared_at;
+  solution.used = true;
+  if (!eq.shared_at.empty()) {
+    const MatrixXd gone = solution.own.solve(solution.cross);
+    const MatrixXd block = eq.shared.transpose() * eq.shared - solution.cross.transpose() * gone;
+    const VectorXd right = eq.shared.transpose() * eq.y - gone.transpose() * solution.right;
+    for (std::size_t a = 0; a < eq.shared_at.size(); ++a) {
+      const auto ia = static_cast<Index>(a);
+      shared->right[eq.shared_at[a]] += right[ia];
+      for (std::size_t b = 0; b < eq.shared_at.size(); ++b)
+        shared->normal(eq.shared_at[a], eq.shared_at[b]) += block(ia, static_cast<Index>(b));
+    }
+  }
+  return solution;
+}
+
+// A unit's own data may well pull its amplitude beyond what can be; the other unknowns then make up
+// for the rest in the next round.
+void Advance(double step, const Effect& effect, double* amplitude) {
+  const auto [low, high] = RangeOfAmplitude(effect);
+  *amplitude = std::clamp(*amplitude + step, low, high);
+}
+
+void TakeOwn(const VectorXd& step, const VectorXd& sigma, std::size_t unit, Fit* fit) {
+  AddStatic(step.head<6>(), &fit->model.units[unit]);
+  Index at = kStaticColumns;
+  for (ModelTerm& term : fit->model.terms) {
+    const std::uint32_t group = term.group_of_unit[unit];
+    if (term.sharing != Sharing::kUnit || group == kNoGroup) continue;
+    for (std::size_t c = 0; c < term.form.columns; ++c, ++at) {
+      Advance(step[at], *term.form.effect, &term.amplitude[group * term.form.columns + c]);
+      term.sigma[group * term.form.columns + c] = sigma[at];
+    }
+  }
+  if (fit->model.homing_zero_deg[kTheta].empty()) return;
+  const UnitTrack track = MakeTrack(*fit->facts, unit, fit->model.units[unit]);
+  for (const Homing& homing : FreeHomingsOf(fit->model, track)) {
+    for (std::size_t i = homing.begin; i < homing.end; ++i)
+      fit->model.homing_zero_deg[homing.axis][track.first_row + i] += step[at];
+    ++at;
+  }
+}
+
+}  // namespace
+
+void StepFit(Fit* fit) {
+  const std::size_t units = fit->model.units.size();
+  std::vector<Index> shared_begin;
+  Index shared_count = 0;
+  for (const ModelTerm& term : fit->model.terms) {
+    shared_begin.push_back(shared_count);
+    if (term.sharing != Sharing::kUnit) shared_count += static_cast<Index>(term.amplitude.size());
+  }
+  const std::vector<UnitChunk> chunks = ChunksOf(units);
+  std::vector<UnitSolution> solutions(units);
+  std::vector<SharedSystem> parts(chunks.size());
+  fit->parallel(chunks.size(), [&](std::size_t chunk) {
+    parts[chunk] = {MatrixXd::Zero(shared_count, shared_count), VectorXd::Zero(shared_count)};
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      if (!fit->UsesUnit(unit)) continue;
+      const WhiteUnit white = Whiten(*fit, unit);
+      if (white.moves.size() < 3) continue;
+      solutions[unit] = Eliminate(MakeEquations(*fit, unit, white, shared_begin), &parts[chunk]);
+    }
+  });
+  VectorXd shared = VectorXd::Zero(shared_count);
+  VectorXd shared_sigma = VectorXd::Zero(shared_count);
+  if (shared_count > 0) {
+    SharedSystem all{MatrixXd::Zero(shared_count, shared_count), VectorXd::Zero(shared_count)};
+    for (const SharedSystem& part : parts) all.normal += part.normal, all.right += part.right;
+    all.normal.diagonal().array() += 1e-12;
+    const Eigen::LDLT<MatrixXd> solver(all.normal);
+    shared = solver.solve(all.right);
+    shared_sigma = solver.solve(MatrixXd::Identity(shared_count, shared_count))
+                       .diagonal()
+                       .cwiseMax(0)
+                       .cwiseSqrt();
+  }
+  for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
+    ModelTerm& term = fit->model.terms[t];
+    if (term.sharing == Sharing::kUnit) continue;
+    for (std::size_t k = 0; k < term.amplitude.size(); ++k) {
+      Advance(shared[shared_begin[t] + static_cast<Index>(k)], *term.form.effect,
+              &term.amplitude[k]);
+      term.sigma[k] = shared_sigma[shared_begin[t] + static_cast<Index>(k)];
+    }
+  }
+  fit->parallel(chunks.size(), [&](std::size_t chunk) {
+    for (std::size_t unit = chunks[chunk].begin; unit < chunks[chunk].end; ++unit) {
+      const UnitSolution& solution = solutions[unit];
+      if (!solution.used) continue;
+      VectorXd right = solution.right;
+      for (std::size_t a = 0; a < solution.shared_at.size(); ++a)
+        right -= solution.cross.col(static_cast<Index>(a)) * shared[solution.shared_at[a]];
+      const VectorXd step = solution.own.solve(right);
+      const Index n = step.size();
+      const VectorXd sigma =
+          solution.own.solve(MatrixXd::Identity(n, n)).diagonal().cwiseMax(0).cwiseSqrt();
+      TakeOwn(step, sigma, unit, fit);
+    }
+  });
+  UpdateResiduals(fit);
+}
+
+void SettleFit(Fit* fit, int rounds) {
+  for (int round = 0; round < rounds; ++round) {
+    UpdateNoise(fit);
+    UpdateWeights(fit);
+    StepFit(fit);
+  }
+  UpdateNoise(fit);
+  UpdateWeights(fit);
+}
+
+void FreeHomings(Fit* fit) {
+  constexpr double kWide_deg = 60;
+  constexpr int kRounds = 6;
+  const std::size_t rows = fit->facts->campaign->rows();
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    fit->model.homing_zero_deg[axis].assign(rows, 0);
+    fit->model.homing_spread_deg[axis] = kWide_deg;
+  }
+  SettleFit(fit, kRounds);
+  for (const std::size_t axis : {kTheta, kPhi}) {
+    double square = 0;
+    for (const double zero : fit->model.homing_zero_deg[axis]) square += zero * zero;
+    fit->model.homing_spread_deg[axis] = 2 * std::sqrt(square / static_cast<double>(rows)) + 0.001;
+  }
+  SettleFit(fit, 3);
+}
+
+double CountParameters(const Fit& fit) {
+  double parameters = 2 * static_cast<double>(MovesWithEvents(fit.model));
+  constexpr double kOfImage = 4;  // shifts, scale and turn of an exposure
+  parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
+  const std::size_t freed = fit.model.homing_zero_deg[kTheta].empty() ? 0 : fit.model.units.size();
+  for (std::size_t unit = 0; unit < freed; ++unit) {
+    // One zero of each axis is the geometry's.
+    const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
+    const auto homings = static_cast<double>(FreeHomingsOf(fit.model, track).size());
+    parameters += std::max(homings - 2, 0.0);
+  }
+  for (const ModelTerm& term : fit.model.terms) {
+    for (std::size_t k = 0; k < term.amplitude.size(); ++k)
+      if (term.sigma[k] > 0) parameters += 1;
+    for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
+      if (term.group_of_unit[unit] != kNoGroup &&
+          term.form.shape_of_unit.contains(fit.model.units[unit].id))
+        parameters += 1;
+  }
+  return parameters;
+}
+
+double PriceOf(const Fit& fit) {
+  double values = 0;
+  for (std::size_t row = 0; row < fit.weight.size(); ++row)
+    if (fit.Used(row)) values += 2;
+  return CountParameters(fit) * std::log(std::max(values, 2.0));
+}
+
+double NegativeBic(const Fit& fit) {
+  double log_density = 0;
+  for (std::size_t unit = 0; unit < fit.model.units.size(); ++unit) {
+    const WhiteUnit white = Whiten(fit, unit);
+    for (std::size_t k = 0; k < white.moves.size(); ++k) {
+      const auto at = static_cast<Index>(2 * k);
+      const double* w = white.filter[k].w;
+      const double weight = fit.weight[white.track.first_row + white.moves[k]];
+      const double square = white.y.segment(at, 2).squaredNorm() / weight;
+      log_density += std::log(std::max((w[0] * w[2] - w[1] * w[1]) / weight, 1e-300)) -
+                     MinusLogDensity(square);
+    }
+  }
+  return 2 * log_density - PriceOf(fit);
+}
+
+StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit) {
+  const WhiteUnit white = Whiten(fit, unit);
+  std::vector<Index> none(fit.model.terms.size(), 0);
+  const UnitEquations eq = MakeEquations(fit, unit, white, none);
+  MatrixXd normal = eq.own.transpose() * eq.own;
+  normal.diagonal() += eq.prior;
+  normal.diagonal().array() += 1e-12;
+  const Index n = normal.rows();
+  return normal.ldlt().solve(MatrixXd::Identity(n, n)).topLeftCorner<6, 6>();
+}
+
+}  // namespace focalfleet::sim

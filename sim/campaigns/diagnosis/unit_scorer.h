@@ -1,0 +1,109 @@
+// One unit in a pass over all templates: its whitened rows, what its own unknowns span, and the
+// residuals as each look sees them. A look leaves one term of the model out, or none. Templates'
+// columns stand in lanes, eight side by side.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "sim/campaigns/diagnosis/lanes.h"
+#include "sim/campaigns/diagnosis/score.h"
+
+namespace focalfleet::sim {
+
+/// Orthonormal columns, by modified Gram-Schmidt done twice; dependent ones are left out.
+class Basis {
+ public:
+  explicit Basis(Eigen::Index rows) : columns_(rows, 0) {}
+  void Add(Eigen::VectorXd column) {
+    const double before = column.norm();
+    if (!(before > 0)) return;
+    Remove(&column);
+    Remove(&column);
+    const double after = column.norm();
+    constexpr double kDependent = 1e-7;  // of the column's length: the rest is rounding
+    if (after < kDependent * before) return;
+    columns_.conservativeResize(Eigen::NoChange, columns_.cols() + 1);
+    columns_.col(columns_.cols() - 1) = column / after;
+  }
+  template <class Columns>
+  void Remove(Columns* columns) const {
+    if (columns_.cols() == 0) return;
+    const auto parts = (columns_.transpose() * *columns).eval();
+    columns->noalias() -= columns_ * parts;
+  }
+  [[nodiscard]] Eigen::Index size() const { return columns_.cols(); }
+  [[nodiscard]] const Eigen::MatrixXd& columns() const { return columns_; }
+
+ private:
+  Eigen::MatrixXd columns_;
+};
+
+/// Where the templates' columns stand: whole templates, those of one column first.
+struct Placed {
+  std::size_t form = 0;
+  std::size_t lane = 0;
+};
+struct Block {
+  std::vector<Placed> forms;
+  bool single = true;  // all of one column
+};
+
+std::vector<Block> PlaceInLanes(const Templates& templates);
+
+/// Which of the terms' shared columns stand beside the templates in a look without one term.
+struct SharedColumns {
+  std::vector<Eigen::Index> begin_of_term;  // kNone: its amplitudes are units' own
+  Eigen::Index count = 0;
+  std::vector<std::vector<Eigen::Index>> of_look;
+  static constexpr Eigen::Index kNone = -1;
+};
+
+SharedColumns ListShared(const std::vector<ModelTerm>& terms,
+                         std::span<const std::size_t> withouts);
+
+/// One unit as each of the looks sees it. What differs between looks is which term is left out; the
+/// rows and their whitening are the same.
+class UnitScorer {
+ public:
+  /// What the unit's own unknowns span, and the shared columns beside it.
+  struct Plane {
+    Basis basis;
+    Eigen::MatrixXd shared;
+  };
+  struct UnitLook {
+    std::size_t plane = 0;
+    Eigen::VectorXd y, target;
+    bool usable = false;
+  };
+
+  UnitScorer(const Fit& fit, std::size_t unit, std::span<const std::size_t> withouts,
+             const SharedColumns& shared);
+
+  [[nodiscard]] const WhiteUnit& white() const { return white_; }
+  [[nodiscard]] const std::vector<Plane>& planes() const { return planes_; }
+  [[nodiscard]] const std::vector<UnitLook>& looks() const { return looks_; }
+  [[nodiscard]] bool usable() const;
+
+  /// The templates' whitened columns.
+  void MakeSignatures(const Templates& templates, const Block& block, std::vector<Lanes>* rows);
+
+ private:
+  void MakeColumns(std::size_t t, Eigen::Index shared_begin);
+  void MakeHomings();
+  [[nodiscard]] Plane PlaneWithout(std::size_t without) const;
+  UnitLook LookWithout(std::size_t without, std::size_t plane);
+
+  const Fit& fit_;
+  std::size_t unit_;
+  WhiteUnit white_;
+  std::vector<Eigen::MatrixXd> own_;  // Shape: (terms): columns of units' own amplitudes
+  Eigen::MatrixXd shared_, homings_;
+  std::vector<Plane> planes_;
+  std::vector<UnitLook> looks_;
+  PoseErrors errors_;
+};
+
+}  // namespace focalfleet::sim

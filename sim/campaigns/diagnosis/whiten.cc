@@ -1,0 +1,150 @@
+#include "sim/campaigns/diagnosis/whiten.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/diagnosis/rest_filter.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+constexpr double kMicrons = 1e3;  // a millimetre
+constexpr double kHuber = 3;      // whitened length from which a row counts less
+constexpr double kFar = 5;        // and from which it counts for ever less
+
+// Huber's, and from kFar on less and less: a row far away says nothing of the rest.
+double WeightOf(double square) {
+  if (square <= kHuber * kHuber) return 1;
+  return square <= kFar * kFar ? kHuber / std::sqrt(square) : kHuber * kFar / square;
+}
+
+// The used rows and what an axis' turn does at each.
+WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
+  WhiteUnit white;
+  white.track = TrackOf(fit.model, *fit.facts, unit);
+  const UnitTrack& track = white.track;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const std::size_t row = track.first_row + i;
+    const bool used =
+        anew ? fit.aside[row] == 0 && std::isfinite(fit.x_um[row]) : fit.weight[row] > 0;
+    if (!used) continue;
+    white.moves.push_back(i);
+    const double per = kRadians * kMicrons;
+    white.turn_um.insert(white.turn_um.end(),
+                         {-(track.elbow_y_mm[i] + track.reach_y_mm[i]) * per,
+                          (track.elbow_x_mm[i] + track.reach_x_mm[i]) * per,
+                          -track.reach_y_mm[i] * per, track.reach_x_mm[i] * per});
+  }
+  return white;
+}
+
+// The gains of all rows, and the whitened residuals. Weights: the fit's, or made here.
+void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, WhiteUnit* white) {
+  const UnitTrack& track = white->track;
+  RestFilter filter(fit.noise, fit.noise.unit_factor[unit]);
+  white->y.resize(static_cast<Eigen::Index>(2 * white->moves.size()));
+  white->filter.reserve(white->moves.size());
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < white->moves.size(); ++k) {
+    const std::size_t i = white->moves[k], row = track.first_row + i;
+    for (; next <= i; ++next)
+      filter.Move(track.restarts[next] != 0, track.step_deg[0][next] != 0,
+                  track.step_deg[1][next] != 0);
+    const double exposure = fit.noise.exposure_factor.empty()
+                                ? 1
+                                : fit.noise.exposure_factor[fit.facts->exposures.of_row[row]];
+    filter.See(&white->turn_um[4 * k], exposure);
+    double square = filter.SquareLength(fit.x_um[row], fit.y_um[row]);
+    double weight = fit.weight[row];
+    if (made != nullptr) {
+      weight = WeightOf(square);
+      made->push_back(weight);
+    }
+    white->filter.push_back(filter.Take(weight));
+    const auto at = static_cast<Eigen::Index>(2 * k);
+    filter.Whiten(white->filter.back(), &white->turn_um[4 * k], fit.x_um[row], fit.y_um[row],
+                  &white->y[at]);
+  }
+}
+
+}  // namespace
+
+void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+                 double* xy_um) {
+  double theta = 0, phi = 0;  // what the rows so far told of the rest errors
+  for (std::size_t k = 0; k < filter.size(); ++k) {
+    const RowFilter& f = filter[k];
+    const double* t = &turn_um[4 * k];
+    theta *= f.keep[0], phi *= f.keep[1];
+    double* xy = xy_um + 2 * k;
+    const double dx = xy[0] - t[0] * theta - t[2] * phi;
+    const double dy = xy[1] - t[1] * theta - t[3] * phi;
+    theta += f.gain[0] * dx + f.gain[1] * dy;
+    phi += f.gain[2] * dx + f.gain[3] * dy;
+    xy[0] = f.w[0] * dx + f.w[1] * dy;
+    xy[1] = f.w[1] * dx + f.w[2] * dy;
+  }
+}
+
+void WhiteUnit::Apply(double* xy_um) const { ApplyFilter(filter, turn_um, xy_um); }
+
+Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
+  const UnitTrack& track = white.track;
+  Eigen::MatrixXd out(static_cast<Eigen::Index>(2 * white.moves.size()), kStaticColumns);
+  const double arm[2] = {track.unit->arm_mm[0], track.unit->arm_mm[1]};
+  for (std::size_t k = 0; k < white.moves.size(); ++k) {
+    const std::size_t i = white.moves[k];
+    const double* t = &white.turn_um[4 * k];
+    const double columns[6][2] = {
+        {kMicrons, 0},
+        {0, kMicrons},
+        {kMicrons * track.elbow_x_mm[i] / arm[0], kMicrons * track.elbow_y_mm[i] / arm[0]},
+        {kMicrons * track.reach_x_mm[i] / arm[1], kMicrons * track.reach_y_mm[i] / arm[1]},
+        {t[0], t[1]},
+        {t[2], t[3]}};
+    const auto at = static_cast<Eigen::Index>(2 * k);
+    for (Eigen::Index c = 0; c < 6; ++c) out(at, c) = columns[c][0], out(at + 1, c) = columns[c][1];
+  }
+  return out;
+}
+
+WhiteUnit Whiten(const Fit& fit, std::size_t unit) {
+  WhiteUnit white = Begin(fit, unit, false);
+  RunFilter(fit, unit, nullptr, &white);
+  white.geometry = GeometryDisplacements(white);
+  for (Eigen::Index c = 0; c < white.geometry.cols(); ++c)
+    white.Apply(white.geometry.col(c).data());
+  return white;
+}
+
+WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weights) {
+  weights->clear();
+  WhiteUnit white = Begin(fit, unit, true);
+  RunFilter(fit, unit, weights, &white);
+  return white;
+}
+
+void Displacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
+  const UnitTrack& track = white.track;
+  const double per_arm[2] = {kMicrons / track.unit->arm_mm[0], kMicrons / track.unit->arm_mm[1]};
+  for (std::size_t k = 0; k < white.moves.size(); ++k) {
+    const std::size_t i = white.moves[k];
+    const double* t = &white.turn_um[4 * k];
+    const double a = errors.angle_deg[0][i], b = errors.angle_deg[1][i];
+    const double m = errors.arm_mm[0][i] * per_arm[0], n = errors.arm_mm[1][i] * per_arm[1];
+    out[2 * k] = kMicrons * errors.x_mm[i] + t[0] * a + t[2] * b + m * track.elbow_x_mm[i] +
+                 n * track.reach_x_mm[i];
+    out[2 * k + 1] = kMicrons * errors.y_mm[i] + t[1] * a + t[3] * b + m * track.elbow_y_mm[i] +
+                     n * track.reach_y_mm[i];
+  }
+}
+
+void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
+  Displacement(white, errors, out);
+  white.Apply(out);
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,85 @@
+// One unit's residuals as numbers of variance one that know nothing of each other. An axis that has
+// come to rest a little off stays there until it moves again, so that errors of neighbouring
+// exposures are alike: what the places before have told of the two rest errors is taken off each
+// place (a Kalman filter along the unit's moves), and what is left is divided by its spread.
+//
+// Noise of one measured place:
+//   cov = place^2 I + sum over axes of t t' (angle^2 + var(rest)),  t = dplace / dangle,
+//   rest <- carry rest + N(0, rest^2) whenever the axis moves, N(0, rest^2) after a homing,
+// times factors of the unit and of the exposure. Place times these has a floor, by what places are
+// rounded to (place_steps.h). Rows count less (Huber) where the whitened length is beyond what
+// noise does; the filter believes them less, too.
+// Source: Durbin and Koopman, Time Series Analysis by State Space Methods, chapter 4.
+#pragma once
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "sim/campaigns/campaign/place_steps.h"
+#include "sim/campaigns/diagnosis/model.h"
+
+namespace focalfleet::sim {
+
+struct Noise {
+  double place_um = 1;
+  double least_um = kNoiseLeast_um;     // that a place's own noise can be, of any unit and exposure
+  double angle_deg[2] = {0, 0};         // anew at each exposure
+  double rest_deg[2] = {0, 0};          // anew at each move of the axis, held until the next
+  double carry[2] = {0, 0};             // share of it that the next move takes along, 0..1
+  bool may_carry = true;                // whether that is sought
+  std::vector<double> unit_factor;      // Shape: (units)
+  std::vector<double> exposure_factor;  // Shape: (exposures), or empty: all 1; of place_um
+  bool fitted = false;                  // where a new search begins near
+  double typical_um = 0;                // size of the residuals that it was fitted to
+};
+
+struct Fit;
+
+/// How one used row is whitened: y = w (r - t'e), e <- keep .* e before and + gain (r - t'e) after.
+struct RowFilter {
+  double w[3];     // symmetric root of the inverse covariance: xx, xy, yy; per um
+  double gain[4];  // of theta by x, y, of phi by x, y; degrees per um
+  double keep[2];  // of the rest errors, since the used row before
+};
+
+struct WhiteUnit {
+  UnitTrack track;
+  std::vector<std::size_t> moves;  // indices of the used moves in the track
+  std::vector<RowFilter> filter;   // Shape: (moves)
+  std::vector<double> turn_um;     // Shape: (moves, 4): d place / d theta, d phi; um per degree
+  Eigen::VectorXd y;               // residuals; Shape: (2 moves)
+  Eigen::MatrixXd geometry;        // d place / d (base, arms, zeros), per mm and degree
+
+  /// Whitens a displacement given in um, interleaved x and y, in place. Shape: (2 moves).
+  void Apply(double* xy_um) const;
+};
+
+/// The same for the rows of a filter. Shapes: filter (n), turn_um (n, 4), xy_um (2 n).
+void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
+                 double* xy_um);
+
+/// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
+/// place: an outlier costs the logarithm of its distance, so that its noise does not decide.
+inline constexpr double kPlaceFreedom = 5;
+/// Less what all places have in common.
+inline double MinusLogDensity(double square) {
+  return (kPlaceFreedom + 2) / 2 * std::log1p(square / kPlaceFreedom);
+}
+
+/// Rows with the weights that the fit has.
+WhiteUnit Whiten(const Fit& fit, std::size_t unit);
+/// The same with all weights 1, and only y: what the rows' weights are made from.
+/// `weights` gets the Huber weight of each used row; the filter uses them as it goes.
+WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weights);
+
+/// The displacements that static geometry makes, in um per mm and degree, and that pose errors
+/// make, in um. Shapes: (2 moves, 6), (2 moves).
+Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white);
+void Displacement(const WhiteUnit& white, const PoseErrors& errors, double* out);
+
+/// The displacement that pose errors make, whitened. Shape: (2 moves).
+void WhiteDisplacement(const WhiteUnit& white, const PoseErrors& errors, double* out);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,112 @@
+// Command quantisation: commands are rounded.
+#include <array>
+#include <cmath>
+
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+enum class Step { kDegrees, kMotorTurns, kBits };
+enum class Rounding { kNearest, kCutMove, kDown };
+/// A template's form is its index: model files have it.
+struct Form {
+  Step step;
+  Rounding rounding;
+  std::string_view name;
+};
+constexpr std::array kForms = {
+    Form{Step::kDegrees, Rounding::kNearest, "step, deg,"},
+    Form{Step::kDegrees, Rounding::kCutMove, "moves are cut; step, deg,"},
+    Form{Step::kMotorTurns, Rounding::kNearest, "steps a motor turn:"},
+    Form{Step::kBits, Rounding::kNearest, "bits a turn:"},
+    Form{Step::kBits, Rounding::kCutMove, "moves are cut; bits a turn:"},
+    Form{Step::kDegrees, Rounding::kDown, "rounded down; step, deg,"},
+    Form{Step::kBits, Rounding::kDown, "rounded down; bits a turn:"},
+};
+
+std::vector<double> ShapesOf(Step step) {
+  if (step == Step::kMotorTurns) return {1, 4, 24, 96};
+  if (step == Step::kBits) return {9, 10, 11, 12, 13, 14};
+  return {0.01, 0.02, 0.025, 0.04, 0.05, 0.08, 0.1, 0.2, 0.25, 0.4, 0.5, 0.8, 1, 1.6, 2};
+}
+
+double Step_deg(const Form& form, double shape, double gear) {
+  if (form.step == Step::kMotorTurns) return 360 / (shape * gear);
+  return form.step == Step::kBits ? 360 / std::exp2(shape) : shape;
+}
+
+void List(const CampaignFacts&, Templates* out) {
+  for (std::size_t k = 0; k < kForms.size(); ++k)
+    ListGrid({.shapes = ShapesOf(kForms[k].step),
+              .shape_name = kForms[k].name,
+              .form = static_cast<int>(k)},
+             out);
+}
+
+// Any whole number of hundredths, and bits beyond the usual.
+void Glance(Templates* out) {
+  constexpr int kHundredthsMax = 200;
+  std::vector<double> hundredths, bits;
+  for (int k = 1; k <= kHundredthsMax; ++k) hundredths.push_back(k / 100.0);
+  for (const double k : {7, 8, 15, 16, 17}) bits.push_back(k);
+  for (std::size_t k = 0; k < kForms.size(); ++k) {
+    if (kForms[k].rounding == Rounding::kCutMove || kForms[k].step == Step::kMotorTurns) continue;
+    ListGrid({.shapes = kForms[k].step == Step::kBits ? bits : hundredths,
+              .shape_name = kForms[k].name,
+              .form = static_cast<int>(k)},
+             out);
+  }
+}
+
+// A step of any size.
+void OfPeriod(double period_deg, Templates* out) {
+  for (std::size_t k = 0; k < kForms.size(); ++k)
+    if (kForms[k].step == Step::kDegrees && kForms[k].rounding != Rounding::kCutMove)
+      ListGrid({.shapes = {period_deg}, .shape_name = kForms[k].name, .form = static_cast<int>(k)},
+               out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const Form& kind = kForms[static_cast<std::size_t>(form.form)];
+  const std::optional<double> shape = ShapeOf(form, track.unit->id);
+  if (!shape || !(*shape > 0)) return;
+  const double step_deg = Step_deg(kind, *shape, track.unit->gear[axis]);
+  double behind_deg = 0;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    if (track.restarts[i]) behind_deg = 0;
+    const double q = track.cmd_deg[axis][i];
+    const double move = track.step_deg[axis][i];
+    behind_deg += std::trunc(move / step_deg) * step_deg - move;
+    const bool down = kind.rounding == Rounding::kDown;
+    const double steps = down ? std::floor(q / step_deg) : std::round(q / step_deg);
+    const double error = kind.rounding == Rounding::kCutMove ? behind_deg : steps * step_deg - q;
+    errors->angle_deg[axis][i] += amplitude[0] * error;
+  }
+}
+
+}  // namespace
+
+Effect MakeCommandQuantisation() {
+  return {.cause = "command_quantisation",
+          .amplitude_unit = "steps",
+          .prior_size = 1,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "The command is rounded (or cut, or rounded down) to a step of the controller, so "
+              "that the error is a saw-tooth of the command. It adds up if each move is rounded "
+              "by itself.",
+          .list = List,
+          .apply = Apply,
+          .glance = Glance,
+          .of_period = OfPeriod,
+          .own_shape = true,
+          .amplitude_low = 0,
+          .amplitude_high = 1.5,
+          .amplitude_least = 0.5};
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,45 @@
+// Hard stop: the axis runs into its end before the table says so.
+#include <algorithm>
+#include <vector>
+
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+void List(const CampaignFacts&, Templates* out) {
+  const std::vector<double> begins_deg = {1, 2, 4, 7, 10, 13, 16, 20};
+  ListGrid({.shapes = begins_deg, .shape_name = "upper end; begins before it by, deg,"}, out);
+  ListGrid({.shapes = begins_deg, .shape_name = "lower end; begins before it by, deg,", .form = 1},
+           out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const CampaignUnit& unit = *track.unit;
+  for (std::size_t i = 0; i < track.moves; ++i) {
+    const double q = track.cmd_deg[axis][i];
+    const double beyond_deg = form.form == 0 ? -std::max(q - (unit.max_deg[axis] - form.shape), 0.0)
+                                             : std::max(unit.min_deg[axis] + form.shape - q, 0.0);
+    errors->angle_deg[axis][i] += amplitude[0] * beyond_deg;
+  }
+}
+
+}  // namespace
+
+Effect MakeHardStop() {
+  return {.cause = "hard_stop",
+          .amplitude_unit = "deg/deg",
+          .prior_size = 1,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "Near an end of its range the axis is held back: the stop, or the clearance "
+              "before it, begins earlier than the table says. Narrow the range of this unit.",
+          .list = List,
+          .apply = Apply,
+          .continuous_shape = true};
+}
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,93 @@
+// Start skew: units late in the start order are still moving.
+#include <algorithm>
+
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+// Of the templates.
+enum Form {
+  kStraight,       // the missing way grows with the slot, from a share of the slots on
+  kStraightEarly,  // the same, in exposures that do not wait for the end of a move
+  kBraking,        // whoever is cut while it brakes misses little: its speed falls to nothing
+};
+
+void List(const CampaignFacts& facts, Templates* out) {
+  const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
+  const std::vector<double> shapes = {0, 0.25, 0.5, 0.75};
+  ListGrid({.axes = axes,
+            .memories = {Memory::kHold, Memory::kNow},
+            .shapes = shapes,
+            .shape_name = "from this share of the slots:"},
+           out);
+  ListGrid({.axes = axes,
+            .memories = {Memory::kHold, Memory::kNow},
+            .shapes = {0.25, 0.5, 1},
+            .shape_name = "cut while braking, over this share of the slots:",
+            .form = kBraking},
+           out);
+  // Whoever waits longer than that sees the end of every move.
+  if (facts.Has("delay_s") && facts.Find("delay_s")->varies())
+    ListGrid({.axes = axes,
+              .memories = {Memory::kNow},
+              .shapes = shapes,
+              .shape_name = "in exposures within a second; from this share of the slots:",
+              .form = kStraightEarly},
+             out);
+}
+
+// Slots are shares from 0 to 1. From below 0 on, a skew is a play for all, and two of them cancel.
+bool Shows(const Template& form, const CampaignFacts&) {
+  if (form.form == kBraking) return form.shape > 0 && form.shape <= 1;
+  return form.shape >= 0 && form.shape < 1;
+}
+
+// What is missing of a move that is cut `late` before its end, of what the last in the order
+// misses: the square of the time while it brakes, then straight on.
+double MissingOfBraking(double late, double braking) {
+  const double missing = late < braking ? late * late / (2 * braking) : late - braking / 2;
+  return missing / (1 - braking / 2);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  constexpr double kEarly_s = 1;
+  const std::span<const double> slot = track.Column("bus_slot");
+  const double last = std::max(track.facts->Find("bus_slot")->high, 1.0);
+  std::span<const double> delay;
+  if (form.form == kStraightEarly) delay = track.Column("delay_s");
+  for (const std::size_t axis : AxesOf(form)) {
+    const std::span<const double> step = track.step_deg[axis];
+    AddRemembered(
+        track, axis, form.memory,
+        [&](std::size_t i) {
+          if (form.form == kStraightEarly && delay[i] > kEarly_s) return 0.0;
+          const double missing = form.form == kBraking
+                                     ? MissingOfBraking((slot[i] + 1) / (last + 1), form.shape)
+                                     : std::max(slot[i] / last - form.shape, 0.0);
+          return -amplitude[0] * Direction(step[i]) * missing;
+        },
+        &errors->angle_deg[axis]);
+  }
+}
+
+}  // namespace
+
+Effect MakeStartSkew() {
+  return {.cause = "start_skew",
+          .amplitude_unit = "deg",
+          .prior_size = 0.05,
+          .owner = Owner::kBus,
+          .needs = {"bus_slot"},
+          .paragraph =
+              "Units that the bus starts late are not yet there when the exposure begins, or "
+              "their move is cut: the error is against the motion and grows with the place in "
+              "the start order. Wait for the last one.",
+          .list = List,
+          .apply = Apply,
+          .continuous_shape = true,
+          .shows = Shows};
+}
+
+}  // namespace focalfleet::sim

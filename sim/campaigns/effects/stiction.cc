@@ -1,0 +1,67 @@
+// Stiction: small moves are lost.
+#include <cmath>
+#include <iterator>
+
+#include "sim/campaigns/effects/registry.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr double kStays = 0.15;  // of the wind-up at which the arm breaks loose
+
+void List(const CampaignFacts&, Templates* out) {
+  constexpr double kThresholds_deg[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2};
+  ListGrid({.memories = {Memory::kNow, Memory::kHold, Memory::kChain},
+            .shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
+            .shape_name = "below, deg,"},
+           out);
+  // The arm stays until the command is a threshold away from it, then it jumps there.
+  ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
+            .shape_name = "jumps from, deg,",
+            .form = 1},
+           out);
+  // The same, and it stops before it is there: some wind-up stays.
+  ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
+            .shape_name = "jumps, but not home, from, deg,",
+            .form = 2},
+           out);
+}
+
+void Apply(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
+           PoseErrors* errors) {
+  const std::size_t axis = AxisIndex(form);
+  const std::span<const double> step = track.step_deg[axis];
+  double behind_deg = 0;
+  AddRemembered(
+      track, axis, form.memory,
+      [&](std::size_t i) {
+        if (form.form == 0) return std::abs(step[i]) < form.shape ? -amplitude[0] * step[i] : 0.0;
+        if (track.restarts[i]) behind_deg = 0;
+        behind_deg += step[i];
+        if (std::abs(behind_deg) >= form.shape)
+          behind_deg = form.form == 2 ? kStays * std::copysign(form.shape, behind_deg) : 0;
+        return -amplitude[0] * behind_deg;
+      },
+      &errors->angle_deg[axis]);
+}
+
+}  // namespace
+
+Effect MakeStiction() {
+  return {.cause = "stiction",
+          .amplitude_unit = "share of the move",
+          .prior_size = 1,
+          .owner = Owner::kUnit,
+          .needs = {},
+          .paragraph =
+              "Moves shorter than a threshold are swallowed by static friction: the arm stays "
+              "where it was. Avoid short corrections, or overshoot and come back.",
+          .list = List,
+          .apply = Apply,
+          .continuous_shape = true,
+          .amplitude_low = 0,
+          .amplitude_high = 1.2,
+          .amplitude_least = 0.3};
+}
+
+}  // namespace focalfleet::sim

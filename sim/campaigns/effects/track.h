@@ -1,0 +1,92 @@
+// What an effect may look at: the moves of one unit in their order with the conditions of each
+// (UnitTrack), and what is the same for the whole campaign (CampaignFacts). Both are made once from
+// a campaign; a track reads the facts' columns, no copies.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sim/campaigns/campaign/campaign.h"
+
+namespace focalfleet::sim {
+
+/// One covariate without gaps. A missing value is what the exposure's other units say where they
+/// agree, else between the unit's own values before and behind; where it has none, the median.
+struct FilledColumn {
+  std::vector<double> values;  // Shape: (rows)
+  std::vector<float> rank;     // Shape: (rows): share of the rows below, 0..1
+  double low = 0;
+  double high = 0;
+  double mean = 0;
+  double first = 0;
+  double missing_share = 0;
+  [[nodiscard]] bool varies() const { return high > low; }
+};
+
+/// Columns that are computed, with names that no table has.
+inline constexpr std::string_view kCommand[] = {"theta_cmd_deg", "phi_cmd_deg"};
+inline constexpr std::string_view kFrom[] = {"theta_from_deg", "phi_from_deg"};
+inline constexpr std::string_view kStep[] = {"theta step", "phi step"};
+inline constexpr std::string_view kOrder = "move order";
+inline constexpr std::string_view kGradientX = "temperature gradient x";
+inline constexpr std::string_view kGradientY = "temperature gradient y";
+inline constexpr std::string_view kRailMotors = "motors in motion on the rail";  // harness.h
+inline constexpr std::string_view kSharedMotors = "motors behind shared harness";
+inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";
+inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
+// Only where arms come near each other (arm_gap.h).
+inline constexpr std::string_view kArmGap = "gap to the next arm";
+inline constexpr std::string_view kArmGapSide = "side of the next arm";
+inline constexpr double kThickestArm = 0.3;  // of the pitch
+
+struct CampaignFacts {
+  const Campaign* campaign = nullptr;
+  Exposures exposures;
+  std::map<std::string, FilledColumn, std::less<>> columns;
+  std::vector<char> restarts;       // Shape: (rows): the unit's history begins anew here
+  std::vector<double> step_deg[2];  // Shape: (rows): as commanded, wraps of whole turns undone
+  double radius_mm = 0;     // of the plate: farthest base from the frame's origin; at least 1
+  double pitch_mm = 0;      // median distance to the nearest base; 0 with one unit
+  std::size_t homings = 0;  // restarts that are not a unit's first row
+
+  [[nodiscard]] const FilledColumn* Find(std::string_view name) const;
+  [[nodiscard]] bool Has(std::string_view name) const { return Find(name) != nullptr; }
+};
+
+/// Pre: the campaign is valid and outlives the facts.
+CampaignFacts MakeFacts(const Campaign& campaign);
+
+struct UnitTrack {
+  const CampaignFacts* facts = nullptr;
+  const CampaignUnit* unit = nullptr;  // with the geometry that is believed now
+  std::size_t first_row = 0;
+  std::size_t moves = 0;
+  std::span<const double> cmd_deg[2];
+  std::span<const double> from_deg[2];
+  std::span<const double> step_deg[2];
+  std::span<const char> restarts;
+  // At the commanded pose, or where TurnPoses says that the axes stand, relative to the base: the
+  // elbow, and the fibre relative to the elbow.
+  std::vector<double> elbow_x_mm, elbow_y_mm, reach_x_mm, reach_y_mm;
+  std::vector<double> fibre_x_mm, fibre_y_mm;  // on the plate
+
+  /// Values of a column for this unit's moves. Pre: facts->Has(name).
+  [[nodiscard]] std::span<const double> Column(std::string_view name) const;
+};
+
+/// One past the last move of the history (from homing to homing) that `move` belongs to.
+std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
+
+/// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
+UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);
+
+/// The poses of axes that stand off from what they were commanded by these. Shapes: (moves).
+void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,27 @@
+// Where the fibre truly is. Two rotations, one inside the other, as products of unit complex
+// numbers; the geometry is what was built, which its maker's table need not say.
+#pragma once
+
+#include <array>
+#include <complex>
+
+#include "protocol/base/ids.h"
+#include "sim/world/unit_description.h"
+
+namespace focalfleet::sim {
+
+/// As built. Units: mm, degrees. Frame: focal plane, counter-clockwise from the sky side.
+struct Mechanism {
+  std::complex<double> base_mm;
+  std::array<double, kAxisCount> arm_mm{};
+  std::array<double, kAxisCount> zero_deg{};
+};
+
+/// Built exactly to its description.
+Mechanism BuiltAsDescribed(const UnitDescription& description);
+
+/// The fibre with the axes at these output angles. Frame: focal plane, mm.
+std::complex<double> FibreAt(const Mechanism& mechanism,
+                             const std::array<double, kAxisCount>& angle_deg);
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,69 @@
+// How units differ from their description. Nominal: not at all, but for the phase of the load over
+// a turn and the clock. Real: the spread measured on robots in service (a focal plane of 5000,
+// 2021): backlash 1.4-1.6 deg, periodic error 0.1 deg, step scatter 0.09-0.14 deg, scale sd 0.3
+// %, 8.5 % of units off scale, 4 % slipping or dead, arms sd 57 um, zero angles sd 0.5 deg. Every
+// draw has a stream of its own by (seed, purpose, unit id), so that a unit keeps its character when
+// others come or go.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "sim/world/axis/axis.h"
+#include "sim/world/mechanism.h"
+#include "sim/world/unit_description.h"
+
+namespace focalfleet::sim {
+
+/// Nominal: quantisation and load-angle lag. Real: also the spread measured on robots in service.
+enum class Spread : std::uint8_t { kNominal, kReal };
+
+/// What is true of one unit and does not change.
+struct UnitTraits {
+  std::array<AxisTraits, kAxisCount> axis;
+  Mechanism mechanism;
+  UnitClock clock;
+};
+
+/// One way in which the units differ from their description, for tests of what finds it: that of a
+/// cause of docs/diagnosis.md, drawn for each unit with a size of its own.
+enum class PlantedCause : std::uint8_t {
+  kZeroOffset,    // zero angle, standard deviation in degrees
+  kArmLength,     // standard deviation in mm
+  kGearScale,     // standard deviation, a share
+  kBacklash,      // full width in degrees, the same for all
+  kEccentricity,  // amplitude in degrees, the same for all; the phase is the unit's own
+};
+inline constexpr std::array<const char*, 5> kPlantedCauseNames{
+    "zero_offset", "arm_length", "gear_scale", "backlash", "eccentricity"};
+struct PlantedTrait {
+  PlantedCause cause = PlantedCause::kZeroOffset;
+  std::array<bool, kAxisCount> on_axis{true, true};
+  double size = 0;
+};
+
+struct TraitsOptions {
+  std::uint64_t seed = 1;
+  Spread spread = Spread::kNominal;
+  double clock_error_max = 0;
+  std::int32_t subdivision = 96;
+  std::vector<PlantedTrait> planted = {};  // on top of the spread
+};
+UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& options);
+
+/// Whole vectors between range's ends and home as the factory writes them: home is phi's upper and
+/// theta's lower end.
+struct FactoryRange {
+  std::int32_t min_position = 0;
+  std::int32_t max_position = 0;
+  std::int32_t home_position = 0;
+};
+FactoryRange FactoryRangeOf(const AxisDescription& axis, Axis which, std::int32_t subdivision);
+
+/// Where the axes stand at first: as described, or folded back: theta in the middle of its range,
+/// phi as near to phi + phi_zero = 180 degrees as it gets; of a disabled unit anywhere with phi +
+/// phi_zero >= 120.
+std::array<double, kAxisCount> FirstPoseDeg(const UnitDescription& description, std::uint64_t seed);
+
+}  // namespace focalfleet::sim

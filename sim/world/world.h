@@ -1,0 +1,176 @@
+// The simulated fleet: every unit on every bus, on virtual time. It is what is true in a test. The
+// host speaks to it in frames alone; the truth (shaft angles, fibre positions) is for tests and
+// reports, and nothing that the coordinator may look at.
+//
+// It runs from event to event (a frame's end, a motion's begin or end, a host given up), never in
+// steps of time: motion in between is a closed form. 5000 units at rest cost nothing but the frames
+// they are sent.
+//
+//   world.Inject(bus, frame, now);                 the host's controller takes a frame
+//   world.AdvanceTo(t, &received);                 what the host hears up to and including t, in
+//   order world.NextEvent()                              when the world would next do something by
+//   itself
+//
+// One controller per bus on the host's side, with a mailbox for every waiting frame: of the frames
+// that wait anywhere on a bus the lowest identifier goes first, and of equal ones the first come.
+// An `arm` therefore passes an upload that still waits; begin, segments and read-back of an upload
+// keep their order by their identifiers.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "protocol/base/ids.h"
+#include "protocol/base/instants.h"
+#include "protocol/base/result.h"
+#include "protocol/link/frame_port.h"
+#include "sim/world/axis/axis_memory.h"
+#include "sim/world/bus/bus.h"
+#include "sim/world/fault_plan.h"
+#include "sim/world/faults.h"
+#include "sim/world/spread.h"
+#include "sim/world/unit/flash.h"
+#include "sim/world/unit/joint_sensors.h"
+#include "sim/world/unit_description.h"
+
+namespace focalfleet::sim {
+
+/// What outlives the process: as found by a later run.
+struct UnitMemory {
+  UnitId id;
+  Flash flash;
+  std::array<AxisMemory, kAxisCount> axis;
+};
+
+struct WorldConfig {
+  std::vector<UnitDescription> units;
+  std::uint64_t seed = 1;
+  Spread spread = Spread::kNominal;
+  std::vector<PlantedTrait> planted = {};  // on top of it
+  std::uint32_t bit_rate_bps = 1'000'000;
+  HostInstant start{0};  // power-on of all units
+  FactoryDrive drive;
+  double clock_error_max = 50e-6;              // of each unit's clock, drawn evenly from -max..max
+  DurationNs answer_delay = Microseconds(30);  // a frame heard to its answer in the mailbox
+  /// False where a real bus arbitrates and takes its time: frames pass at once, in order.
+  bool bit_clock = true;
+  std::vector<UnitMemory> memory;  // of an earlier run, matched by unit id
+  /// From the bus-off of a bus' host controller to its restart; kNever: it waits for RestartHost.
+  DurationNs host_restart = Milliseconds(1000);
+  /// Of units with sensors at their joint; none: there are no such units.
+  std::shared_ptr<const JointSensors> joint_sensors = {};
+  std::vector<PlannedFault> faults;  // by the clock, from `start` on
+};
+
+/// How a CAN controller stands.
+struct Controller {
+  Confinement state = Confinement::kActive;
+  bool warns = false;
+  std::uint32_t transmit_errors = 0;
+  std::uint32_t receive_errors = 0;
+};
+
+/// True things about one unit, at World::now().
+struct UnitTruth {
+  UnitId id;
+  std::array<double, kAxisCount> angle_deg{};  // of the output shaft
+  std::array<double, kAxisCount>
+      vectors{};  // the same in vectors from the axis' zero, with fractions
+  std::array<std::int32_t, kAxisCount>
+      applied{};    // what its firmware believes: the vector applied now
+  double x_mm = 0;  // fibre, focal-plane frame
+  double y_mm = 0;
+  UnitState state = UnitState::kRest;
+  FaultCode fault = FaultCode::kNone;
+  bool powered = true;
+  bool interrupted = false;
+  std::uint32_t moves_begun = 0;
+  MoveId last_move;
+  std::uint32_t begun_twice = 0;  // a move begun that was begun before: must stay 0
+  HostInstant began = kNever;     // its last motion; kNever: none in this run
+  double clock_error = 0;         // its clock's seconds a second of the world's, less 1
+};
+
+/// One frame as the wire carried it, for whoever listens beside the host.
+struct WireFrame {
+  BusId bus;
+  HostInstant at;  // its end
+  CanFrame frame;
+  bool from_unit = false;
+  std::uint32_t client = 0;  // who injected it, where it is not from a unit
+};
+
+class World {
+ public:
+  /// Says what is wrong with the units (bus, node or id used twice, range the wrong way round ...).
+  static Status Validate(const WorldConfig& config);
+
+  /// Pre: Validate(config) is well.
+  explicit World(WorldConfig config);
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+  ~World();
+
+  /// The host's frame waits for the bus from `at` on (now, where `at` has passed). False: no
+  /// mailbox left, the bus is dead or there is none of that number; the frame is lost and counted.
+  bool Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32_t client = 0);
+
+  /// Lets time pass. Appends what the host hears to `delivered`, and every frame of every bus to
+  /// `wire` where that is given, both in order of time.
+  void AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
+                 std::vector<WireFrame>* wire = nullptr);
+
+  /// kNever: only a frame from the host can make something happen.
+  [[nodiscard]] HostInstant NextEvent() const;
+  [[nodiscard]] HostInstant now() const;
+
+  /// An edge of the SYNC line, which goes to every unit of every bus; at now().
+  void PulseSync();
+
+  // ---- chance and violence; all at now()
+
+  void PowerCut(UnitId unit);  // at once, whatever it does
+  void PowerOn(UnitId unit);
+  void KillBus(BusId bus);  // what waits is lost
+  void ReviveBus(BusId bus);
+  [[nodiscard]] bool dead(BusId bus) const;
+  void StickBus(BusId bus);  // dominant, until it is released
+  void ReleaseBus(BusId bus);
+  void RestartHost(BusId bus);   // its controller, if it is bus-off
+  void ThrowHostOff(BusId bus);  // as after a short circuit
+  void Unplug(UnitId unit);      // from its bus; it keeps its power
+  void Plug(UnitId unit);
+  /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
+  void Babble(UnitId unit, const std::optional<CanFrame>& frame);
+  /// Frames that wait or are on their way on this bus.
+  [[nodiscard]] std::size_t waiting(BusId bus) const;
+  void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
+  /// Nothing where there is no such unit.
+  [[nodiscard]] UnitFaults* faults(UnitId unit);
+  [[nodiscard]] BusFaults* faults(BusId bus);
+
+  // ---- truth
+
+  [[nodiscard]] std::span<const UnitDescription> units() const;
+  [[nodiscard]] std::span<const BusId> buses() const;  // ascending
+  [[nodiscard]] std::optional<std::size_t> Find(UnitId unit) const;
+  [[nodiscard]] UnitTruth Truth(std::size_t row) const;  // row in units()
+  [[nodiscard]] UnitTruth Truth(UnitId unit) const;      // Pre: it exists
+  [[nodiscard]] const Flash& flash(UnitId unit) const;   // Pre: it exists
+  [[nodiscard]] const BusCounters& counters(BusId bus) const;
+  [[nodiscard]] Controller controller(BusId bus) const;    // the host's. Pre: there is such a bus
+  [[nodiscard]] Controller controller(UnitId unit) const;  // Pre: it exists
+  /// FLASH and mechanics of all units at now(), as a later run would find them.
+  [[nodiscard]] std::vector<UnitMemory> Memory() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+  FaultSchedule schedule_;
+};
+
+}  // namespace focalfleet::sim

@@ -1,0 +1,250 @@
+#include "daemon/loop/store_thread.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <mutex>
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Everything that the thread did, in order, and a disk that can be broken.
+class Disk {
+ public:
+  StoreThread::Sinks Sinks() {
+    return {
+        .commit = [this](std::span<const Row> rows, WallTime, std::size_t* refused) -> Status {
+          const std::lock_guard lock(mutex_);
+          ++attempts_;
+          if (broken_) return Fail(ErrorCode::kFull, "no space");
+          for (*refused = 0; *refused < rows.size(); ++*refused)
+            if (TextOf(rows[*refused]) == "poison")
+              return Fail(ErrorCode::kInvalid, "it contradicts what is stored");
+          std::string text = "commit";
+          for (const Row& row : rows) text += " " + TextOf(row);
+          Log(std::move(text));
+          return {};
+        },
+        .publish =
+            [this](const StatusBatch& status) {
+              const std::lock_guard lock(mutex_);
+              const bool failing = status.fleet && status.fleet->store_failing;
+              if (!status.units.empty() || status.fleet)
+                Log("publish " + std::to_string(status.units.size()) + (failing ? " failing" : ""));
+              return false;
+            },
+        .alarm =
+            [this](const AlarmValue& alarm) {
+              const std::lock_guard lock(mutex_);
+              Log("alarm " + alarm.row.text);
+            },
+        .log_error = [](const std::string&) {},
+        .retry_period = std::chrono::milliseconds(5)};
+  }
+  void Break(bool broken) {
+    const std::lock_guard lock(mutex_);
+    broken_ = broken;
+  }
+  std::vector<std::string> log() {
+    const std::lock_guard lock(mutex_);
+    return log_;
+  }
+  int attempts() {
+    const std::lock_guard lock(mutex_);
+    return attempts_;
+  }
+
+ private:
+  static std::string TextOf(const Row& row) {
+    if (const auto* alarm = std::get_if<AlarmRow>(&row)) return alarm->text;
+    if (const auto* enable = std::get_if<EnableRow>(&row)) return enable->reason;
+    return "?";
+  }
+  void Log(std::string text) { log_.push_back(std::move(text)); }
+
+  std::mutex mutex_;
+  bool broken_ = false;
+  int attempts_ = 0;
+  std::vector<std::string> log_;
+};
+
+std::vector<Row> Named(const std::string& name) {
+  return {EnableRow{.unit = UnitId{1}, .enabled = true, .reason = name}};
+}
+StatusBatch UnitsAfter(std::uint64_t batch, std::size_t units, bool with_fleet = false) {
+  StatusBatch status{.after_batch = batch};
+  status.units.resize(units);
+  if (with_fleet) status.fleet.emplace();
+  return status;
+}
+
+/// Sleeps until the thread says that something changed, as the event loop does. A hang ends as a
+/// failure.
+template <class Predicate>
+bool Await(const EventSignal& progressed, const Predicate& done) {
+  for (int i = 0; i < 1000; ++i) {
+    if (done()) return true;
+    pollfd poller{progressed.fd(), POLLIN, 0};
+    ::poll(&poller, 1, 10);
+    progressed.Clear();
+  }
+  return done();
+}
+
+TEST(StoreThread, CommitsInOrderAndSaysHowFar) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  EXPECT_EQ(thread->committed_through(), 0u);
+  for (std::uint64_t b = 1; b <= 100; ++b) thread->Commit(b, Named(std::to_string(b)));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 100; }));
+  ASSERT_TRUE(thread->Finish());
+  std::string all;
+  for (const std::string& line : disk.log()) all += line.substr(6);
+  std::string expected;
+  for (int b = 1; b <= 100; ++b) expected += " " + std::to_string(b);
+  EXPECT_EQ(all, expected);
+}
+
+TEST(StoreThread, KeepsABatchThatCannotBeWrittenAndTriesAgain) {
+  Disk disk;
+  disk.Break(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("one"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  thread->Commit(2, Named("two"));
+  EXPECT_TRUE(Await(progressed, [&] { return disk.attempts() >= 3; }));
+  EXPECT_EQ(thread->committed_through(), 0u);
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 2; }));
+  EXPECT_FALSE(thread->failing());
+  ASSERT_TRUE(thread->Finish());
+  const auto log = disk.log();
+  ASSERT_EQ(log.size(), 3u);
+  EXPECT_THAT(log[0], HasSubstr("alarm the store cannot be written"));
+  EXPECT_THAT(log[0], HasSubstr("no space"));
+  EXPECT_EQ(log[1], "commit one");
+  EXPECT_EQ(log[2], "commit two");
+}
+
+TEST(StoreThread, SetsAsideARowThatCanNeverBeWrittenAndGoesOn) {
+  Disk disk;
+  disk.Break(true);  // so that all of it becomes one transaction
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("first"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  std::vector<Row> rows = Named("two");
+  rows.push_back(Named("poison")[0]);
+  rows.push_back(VectorRow{});  // flawed: it has no serial number
+  rows.push_back(Named("three")[0]);
+  thread->Commit(2, rows);
+  thread->Commit(3, Named("four"));
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 3; }));
+  const std::vector<RefusedRow> refused = thread->TakeRefused();
+  ASSERT_EQ(refused.size(), 2u);
+  for (const RefusedRow& row : refused) {
+    EXPECT_LE(row.first_batch, 2u);
+    EXPECT_GE(row.last_batch, 2u);
+  }
+  EXPECT_TRUE(std::holds_alternative<VectorRow>(refused[0].row));
+  EXPECT_TRUE(std::holds_alternative<EnableRow>(refused[1].row));
+  EXPECT_TRUE(thread->TakeRefused().empty());
+  EXPECT_FALSE(thread->failing());
+  ASSERT_TRUE(thread->Finish());
+  std::string all;
+  for (const std::string& line : disk.log())
+    if (line.starts_with("commit")) all += line.substr(6);
+  EXPECT_EQ(all, " first two three four");
+}
+
+TEST(StoreThread, ABatchOfRefusedRowsAloneIsOverToo) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("poison"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  EXPECT_EQ(thread->TakeRefused().size(), 1u);
+  EXPECT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {
+  Disk disk;
+  disk.Break(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("one"));
+  StatusBatch status = UnitsAfter(1, 3, /*with_fleet=*/true);
+  ASSERT_TRUE(thread->Publish(&status));
+  EXPECT_TRUE(Await(progressed, [&] { return disk.log().size() >= 2; }));
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] { return thread->committed_through() == 1; }));
+  ASSERT_TRUE(thread->Finish());
+  const auto log = disk.log();
+  ASSERT_EQ(log.size(), 4u);
+  EXPECT_EQ(log[1], "publish 0 failing") << "that the store fails is told at once";
+  EXPECT_EQ(log[2], "commit one");
+  EXPECT_EQ(log[3], "publish 3");
+}
+
+TEST(StoreThread, AnAlarmIsReportedOnceAfterItIsStored) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(
+      1, {AlarmRow{.id = 4, .severity = Severity::kError, .unit = {}, .bus = {}, .text = "hot"}});
+  ASSERT_TRUE(thread->Finish());
+  EXPECT_EQ(disk.log(), (std::vector<std::string>{"commit hot", "alarm hot"}));
+}
+
+TEST(StoreThread, MoreBatchesThanTheQueueHoldsAreAllWritten) {
+  Disk disk;
+  disk.Break(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  constexpr std::uint64_t kMany = 3000;
+  thread->Commit(1, Named("x"));
+  EXPECT_TRUE(Await(progressed, [&] { return thread->failing(); }));
+  for (std::uint64_t b = 2; b <= kMany; ++b) thread->Commit(b, Named("x"));
+  EXPECT_EQ(thread->waiting(), kMany - 1) << "the thread takes nothing more while it fails";
+  disk.Break(false);
+  EXPECT_TRUE(Await(progressed, [&] {
+    thread->HandOver();
+    return thread->committed_through() == kMany;
+  }));
+  ASSERT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, RefusesStatusWhenItIsBehind) {
+  Disk disk;
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  int taken = 0;
+  for (int i = 0; i < 100; ++i) {
+    StatusBatch status = UnitsAfter(/*batch=*/99, 1);  // a batch that has not come yet
+    taken += thread->Publish(&status) ? 1 : 0;
+    if (taken < i) break;
+  }
+  EXPECT_LT(taken, 10);
+  thread->Commit(99, Named("late"));
+  ASSERT_TRUE(thread->Finish());
+}
+
+TEST(StoreThread, ABrokenDiskAtTheEndIsSaid) {
+  Disk disk;
+  disk.Break(true);
+  const auto progressed = EventSignal::Create().value();
+  const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
+  thread->Commit(1, Named("lost"));
+  const auto ended = thread->Finish();
+  ASSERT_FALSE(ended);
+  EXPECT_EQ(ended.error().code, ErrorCode::kFull);
+}
+
+}  // namespace
+}  // namespace focalfleet

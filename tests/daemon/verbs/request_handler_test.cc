@@ -1,0 +1,193 @@
+#include "daemon/verbs/request_handler.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "daemon/control/line_client.h"
+#include "protocol/base/limits.h"
+#include "tests/daemon/control/raw_client.h"
+#include "tests/daemon/control/scratch.h"
+#include "tests/daemon/verbs/small_fleet.h"
+
+namespace focalfleet {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string Line(std::uint64_t id, const std::string& verb, const Json& args = Json::object()) {
+  return EncodeRequest({id, verb, args}) + "\n";
+}
+
+/// A request handler, and the clients before it; its turns are taken one by one.
+class RequestHandlerTest : public ::testing::Test {
+ protected:
+  explicit RequestHandlerTest(std::uint32_t units = 3)
+      : fleet_(units),
+        handler_(LineServer::Create(scratch_ / "s", {.urgent = &RequestHandler::IsStop}).value(),
+                 {.facts = [] { return ShellFacts{}; },
+                  .log = [this](const std::string& text) { log_ += text + "\n"; },
+                  .store_path = scratch_ / "none.db",
+                  .layout = &fleet_.layout()}) {}
+
+  RawClient& Add(const std::string& says = "") {
+    RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
+    client.Send(says);
+    return client;
+  }
+  std::size_t Turn() {
+    const std::size_t before = commands_.size();
+    handler_.Service(fleet_.View(), &commands_);
+    return commands_.size() - before;
+  }
+  void TurnUntilQuiet() {
+    for (int i = 0; i < 100'000 && Waits(); ++i) Turn();
+  }
+  [[nodiscard]] bool Waits() const {
+    pollfd poller{handler_.fd(), POLLIN, 0};
+    return ::poll(&poller, 1, 0) == 1;
+  }
+  [[nodiscard]] std::size_t Stops() const {
+    return static_cast<std::size_t>(std::ranges::count_if(commands_, [](const Command& command) {
+      return std::holds_alternative<StopCommand>(command.what);
+    }));
+  }
+
+  const Scratch scratch_;
+  SmallFleet fleet_;
+  std::string log_;
+  RequestHandler handler_;
+  std::vector<std::unique_ptr<RawClient>> clients_;
+  std::vector<Command> commands_;
+};
+
+TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
+  for (int i = 0; i < 10; ++i) Add(Line(1, "status"));
+  Turn();  // takes them in, in turns of its own size
+  TurnUntilQuiet();
+  for (auto& client : clients_) {
+    static_cast<void>(client->Receive());
+    client->Send(Line(2, "status"));
+  }
+  Add();
+  TurnUntilQuiet();
+  for (auto& client : clients_) static_cast<void>(client->Receive());
+  for (std::size_t i = 0; i < 10; ++i) clients_[i]->Send(Line(3, "status"));
+  clients_[10]->Send(Line(3, "stop"));
+  EXPECT_EQ(Turn(), 1u);
+  EXPECT_EQ(Stops(), 1u);
+  for (std::size_t i = 0; i < 10; ++i)
+    EXPECT_EQ(clients_[i]->Receive(), "") << "no question before the stop is on the buses";
+  TurnUntilQuiet();
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_THAT(clients_[i]->Receive(), HasSubstr(R"("id":3)"));
+}
+
+TEST_F(RequestHandlerTest, AFloodOfStopsKeepsNobodyOut) {
+  std::string flood;
+  for (std::uint64_t id = 1; id <= 200; ++id) flood += Line(id, "stop");
+  Add();
+  Add();
+  TurnUntilQuiet();
+  clients_[0]->Send(flood);
+  clients_[1]->Send(Line(1, "status"));
+  Turn();
+  Turn();
+  EXPECT_THAT(clients_[1]->Receive(), HasSubstr(R"("ok":true)")) << "the second turn is for all";
+  TurnUntilQuiet();
+  EXPECT_EQ(Stops(), 200u);
+}
+
+class BusyRequestHandlerTest : public RequestHandlerTest {
+ protected:
+  BusyRequestHandlerTest() : RequestHandlerTest(500) {}
+};
+
+TEST_F(BusyRequestHandlerTest, OneCostlyQuestionIsAllOfATurn) {
+  ASSERT_GT(StateText(fleet_.View()).size(), RequestHandler::kTurnBytes);
+  for (int i = 0; i < 40; ++i) {
+    Add();
+    Turn();
+  }
+  TurnUntilQuiet();
+  for (auto& client : clients_) client->Send(Line(1, "state"));
+  for (int turn = 1; turn <= 40; ++turn) {
+    Turn();
+    std::size_t answered = 0;
+    for (auto& client : clients_) answered += client->Receive().empty() ? 0u : 1u;
+    ASSERT_EQ(answered, 1u) << "in turn " << turn;
+  }
+}
+
+TEST_F(BusyRequestHandlerTest, CheapLinesShareATurnWithinItsBudget) {
+  const std::size_t answer = EncodeResult(1, UnitJson(fleet_.View(), {0})).size();
+  const std::size_t line = Line(1, "unit", {{"unit_id", 1}}).size() - 1;
+  const std::size_t most =
+      RequestHandler::kTurnBytes / (answer + line + RequestHandler::kLineBytes) + 1;
+  Add();
+  TurnUntilQuiet();
+  std::string many;
+  for (int i = 0; i < 500; ++i) many += Line(1, "unit", {{"unit_id", 1}});
+  clients_[0]->Send(many);
+  Turn();
+  const std::string answers = clients_[0]->Receive();
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(answers, '\n')), most);
+  EXPECT_TRUE(Waits());
+}
+
+TEST_F(RequestHandlerTest, AMotionThatAStopOvertookIsRefused) {
+  const Json apply = {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,10,90\n"}};
+  Add();
+  Add();
+  TurnUntilQuiet();
+  clients_[1]->Send(Line(5, "apply", apply));
+  clients_[0]->Send(Line(1, "apply", apply) + Line(2, "home", {{"unit_ids", {1}}}) +
+                    Line(3, "disable", {{"unit_ids", {1}}, {"reason", "stalls"}}) +
+                    Line(4, "stop") + Line(6, "home", {{"unit_ids", {2}}}));
+  TurnUntilQuiet();
+  ASSERT_EQ(commands_.size(), 3u);
+  EXPECT_TRUE(std::holds_alternative<StopCommand>(commands_[0].what));
+  EXPECT_TRUE(std::holds_alternative<EnableCommand>(commands_[1].what));
+  EXPECT_TRUE(std::holds_alternative<HomeCommand>(commands_[2].what)) << "it came after the stop";
+  const std::string reported = clients_[0]->Receive();
+  EXPECT_THAT(reported, HasSubstr("a stop that came before apply was begun went ahead of it"));
+  EXPECT_THAT(reported, HasSubstr("a stop that came before home was begun went ahead of it"));
+  EXPECT_THAT(clients_[1]->Receive(), HasSubstr("went ahead of it")) << "of another client, too";
+}
+
+TEST_F(RequestHandlerTest, WhereAllPlacesAreBusyOnlyStopIsTaken) {
+  for (std::uint32_t i = 0; i < limits::kControlClients; ++i) {
+    Add(Line(1, "adopt", {{"unit_id", 1}}));  // stays open: nobody steps the coordinator
+    TurnUntilQuiet();
+  }
+  Add(Line(7, "status"));
+  TurnUntilQuiet();
+  const std::string reported = clients_.back()->Receive();
+  EXPECT_THAT(reported, HasSubstr("too many clients, only stop is taken"));
+  EXPECT_THAT(reported, HasSubstr(R"("id":7)"));
+  EXPECT_EQ(Stops(), 0u);
+  clients_.back()->Send(Line(8, "stop"));
+  TurnUntilQuiet();
+  EXPECT_EQ(Stops(), 1u);
+  Add(R"({"id":1,"verb":"\u0073top"})"
+      "\n");
+  TurnUntilQuiet();
+  EXPECT_EQ(Stops(), 2u) << "written otherwise it is a stop all the same";
+}
+
+TEST(RequestHandler, KnowsAStopFromEverythingElse) {
+  EXPECT_TRUE(RequestHandler::IsStop(R"({"id":1,"verb":"stop"})"));
+  EXPECT_TRUE(RequestHandler::IsStop(R"({"args":{"unit_id":3},"id":1,"verb":"stop"})"));
+  EXPECT_TRUE(RequestHandler::IsStop(R"( { "verb" : "stop" , "id" : 7 } )"));
+  EXPECT_FALSE(RequestHandler::IsStop(R"({"id":1,"verb":"status","args":{"a":"stop"}})"));
+  EXPECT_FALSE(RequestHandler::IsStop(R"({"verb":"stop"})")) << "no request at all";
+  EXPECT_FALSE(RequestHandler::IsStop(R"("stop")"));
+  EXPECT_FALSE(RequestHandler::IsStop(""));
+}
+
+}  // namespace
+}  // namespace focalfleet

@@ -1,0 +1,91 @@
+// Planted campaigns and told verdicts for the tests of the diagnosis.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "protocol/base/rng.h"
+#include "sim/campaigns/diagnosis/diagnosis.h"
+#include "sim/campaigns/diagnosis/fit.h"
+#include "sim/campaigns/diagnosis/planted.h"
+
+namespace focalfleet::sim {
+
+inline Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions options = {}) {
+  options.units = options.units == 60 ? 24 : options.units;
+  options.effects = std::move(effects);
+  auto campaign = PlantCampaign(options);
+  EXPECT_TRUE(campaign) << campaign.error().text;
+  return *campaign;
+}
+
+/// What no effect of the library does: every fibre turned about its base, as if the theta angle of
+/// that row were off.
+inline void TurnTheta(const std::function<double(std::size_t row)>& off_deg, Campaign* campaign) {
+  for (std::size_t unit = 0; unit < campaign->units.size(); ++unit)
+    for (std::size_t row = campaign->first_row[unit]; row < campaign->first_row[unit + 1]; ++row) {
+      const double off = off_deg(row) * std::numbers::pi / 180;
+      const CampaignUnit& base = campaign->units[unit];
+      const double x = campaign->x_mm[row] - base.base_x_mm;
+      const double y = campaign->y_mm[row] - base.base_y_mm;
+      campaign->x_mm[row] = base.base_x_mm + std::cos(off) * x - std::sin(off) * y;
+      campaign->y_mm[row] = base.base_y_mm + std::sin(off) * x + std::cos(off) * y;
+    }
+}
+
+/// The fibres of two units under each other's name. Pre: as many moves of both.
+inline void ExchangePlaces(std::size_t a, std::size_t b, Campaign* campaign) {
+  for (std::vector<double>* place : {&campaign->x_mm, &campaign->y_mm}) {
+    const auto at = [&](std::size_t k) {
+      return place->begin() + static_cast<std::ptrdiff_t>(campaign->first_row[k]);
+    };
+    std::swap_ranges(at(a), at(a + 1), at(b));
+  }
+}
+
+/// A theta angle that follows the air's humidity, bent, up to 0.12 degrees.
+inline Campaign Damp(std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+  const Exposures exposures = FindExposures(campaign);
+  Rng rng = Rng::Stream(seed, "humidity");
+  std::vector<double> of_exposure(exposures.size());
+  for (double& humidity : of_exposure) humidity = rng.Uniform(20, 90);
+  Covariate column{.name = "humidity_pct", .values = {}};
+  for (std::size_t row = 0; row < campaign.rows(); ++row)
+    column.values.push_back(of_exposure[exposures.of_row[row]]);
+  TurnTheta([&](std::size_t row) { return 0.12 * std::pow((column.values[row] - 20) / 70, 2); },
+            &campaign);
+  campaign.covariates.push_back(std::move(column));
+  return campaign;
+}
+
+/// Geometry alone, as a diagnosis starts. The facts outlive the fit.
+inline Fit StaticFit(const CampaignFacts& facts) {
+  CampaignModel model;
+  model.units = facts.campaign->units;
+  return StartFit(facts, model, std::vector<char>(facts.campaign->rows(), 0), OneAfterTheOther());
+}
+
+inline Diagnosis Verdicts(const Campaign& campaign, DiagnoseOptions options = {}) {
+  options.with_gain = false;
+  return Diagnose(campaign, options);
+}
+
+inline std::string Reported(const Diagnosis& diagnosis) {
+  std::string text(Name(diagnosis.verdict));
+  for (const CauseFound& cause : diagnosis.causes) {
+    text += "; " + cause.cause + " " + cause.axis + " " + cause.scope + " " +
+            std::to_string(cause.amplitude);
+    for (const std::string& candidate : cause.candidates) text += " " + candidate;
+  }
+  for (const UnknownFound& unknown : diagnosis.unknown) text += "; against " + unknown.covariate;
+  return text;
+}
+
+}  // namespace focalfleet::sim

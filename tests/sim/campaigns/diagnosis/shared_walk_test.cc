@@ -1,0 +1,62 @@
+// What all units do together while their noise remembers, against walks of each by itself.
+#include "sim/campaigns/diagnosis/shared_walk.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/sim/campaigns/diagnosis/planted_campaign.h"
+
+namespace focalfleet::sim {
+namespace {
+
+constexpr std::size_t kMoves = 120;
+
+// Theta of all units stands off by what is given for the exposure.
+Campaign Together(const std::function<double(double share_of_night)>& off_deg, std::uint64_t seed) {
+  Campaign campaign = Planted({}, {.moves = kMoves, .seed = seed});
+  const Exposures exposures = FindExposures(campaign);
+  TurnTheta(
+      [&](std::size_t row) { return off_deg(static_cast<double>(exposures.of_row[row]) / kMoves); },
+      &campaign);
+  return campaign;
+}
+
+TEST(SharedWalk, AZeroThatAllUnitsDriftByIsNotNoise) {
+  for (const std::uint64_t seed : {3u, 4u, 5u}) {
+    SCOPED_TRACE(seed);
+    const Diagnosis diagnosis =
+        Verdicts(Together([](double share) { return 0.05 * share * share; }, seed));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Reported(diagnosis);
+  }
+}
+
+TEST(SharedWalk, NorOneThatStepsOnce) {
+  for (const std::uint64_t seed : {3u, 4u, 5u}) {
+    SCOPED_TRACE(seed);
+    const Diagnosis diagnosis =
+        Verdicts(Together([](double share) { return share > 0.6 ? 0.03 : 0; }, seed));
+    EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << Reported(diagnosis);
+  }
+}
+
+TEST(SharedWalk, WalksOfTheirOwnAreNoise) {
+  for (const std::uint64_t seed : {3u, 4u, 5u}) {
+    SCOPED_TRACE(seed);
+    Campaign campaign = Planted({}, {.moves = kMoves, .seed = seed});
+    Rng rng = Rng::Stream(seed, "walks");
+    std::vector<double> off_deg(campaign.rows());
+    for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+      double walk = 0;
+      for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
+        if (campaign.cmd_deg[kTheta][row] != campaign.from_deg[kTheta][row])
+          walk += 0.01 * rng.Normal();
+        off_deg[row] = walk;
+      }
+    }
+    TurnTheta([&](std::size_t row) { return off_deg[row]; }, &campaign);
+    const Diagnosis diagnosis = Verdicts(campaign);
+    EXPECT_TRUE(diagnosis.unknown.empty()) << Reported(diagnosis);
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet::sim

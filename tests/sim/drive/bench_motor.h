@@ -1,0 +1,13 @@
+// The motor of all benches: finding its pull-in speed takes an integration, so it is made once.
+#pragma once
+
+#include "sim/world/axis/motor.h"
+
+namespace focalfleet::sim::testing {
+
+inline const Motor& BenchMotor() {
+  static const Motor motor({}, {});
+  return motor;
+}
+
+}  // namespace focalfleet::sim::testing
