@@ -1,0 +1,191 @@
+// Rules of pages against code: a page names files that exist, and the two pages that follow a way
+// through the code name functions that the headers beside them declare.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <iterator>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "tests/tidy/repository.h"
+
+namespace focalfleet::tidy {
+namespace {
+
+// Pages that follow a way through the code: all of their functions stand beside a file.
+constexpr std::string_view kWays[] = {"docs/way_of_a_move.md", "docs/way_of_a_campaign.md"};
+
+constexpr std::string_view kFolders[] = {"protocol/", "fleet/", "sim/",   "daemon/",
+                                         "tests/",    "docs/",  "deploy/"};
+constexpr std::string_view kEndings[] = {".h", ".cc", ".c", ".md", ".py", ".toml", ".idl"};
+
+bool IsPathCharacter(char c) {
+  return IsWordCharacter(c) || std::string_view("/.-").find(c) != std::string_view::npos;
+}
+
+// Paths from the repository's root: a known folder first, and a file's ending, or a `/`, last.
+std::vector<std::string> PathsOf(const std::string& line) {
+  std::vector<std::string> paths;
+  for (std::size_t i = 0; i < line.size();) {
+    std::size_t end = i;
+    while (end < line.size() && IsPathCharacter(line[end])) ++end;
+    std::string word = line.substr(i, end - i);
+    i = end + 1;
+    while (EndsWith(word, ".")) word.pop_back();  // the end of a sentence
+    const auto begins = [&](std::string_view folder) { return StartsWith(word, folder); };
+    const auto ends = [&](std::string_view ending) { return EndsWith(word, ending); };
+    if (std::any_of(std::begin(kFolders), std::end(kFolders), begins) &&
+        (EndsWith(word, "/") || std::any_of(std::begin(kEndings), std::end(kEndings), ends)))
+      paths.push_back(word);
+  }
+  return paths;
+}
+
+bool Exists(const Files& files, const std::string& path) {
+  return std::any_of(files.begin(), files.end(), [&](const File& file) {
+    return file.path == path || (EndsWith(path, "/") && StartsWith(file.path, path));
+  });
+}
+
+Complaints PagesNameFilesThatExist(const Files& files) {
+  Complaints out;
+  for (const File& page : files) {
+    if (!EndsWith(page.path, ".md") || page.path == "CHANGELOG.md") continue;
+    const auto lines = Lines(page.text);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      for (const std::string& path : PathsOf(lines[i]))
+        if (!Exists(files, path)) out.push_back(At(page, i, "there is no " + path));
+  }
+  return out;
+}
+
+// Names of functions and types: in backquotes, in parts joined by `::`, each with a capital first.
+// What stands in parentheses behind a name does not count.
+std::vector<std::string> NamesOf(const std::string& line) {
+  std::vector<std::string> names;
+  for (std::size_t open = line.find('`'); open != std::string::npos;) {
+    const std::size_t close = line.find('`', open + 1);
+    if (close == std::string::npos) break;
+    std::string name = line.substr(open + 1, close - open - 1);
+    name = name.substr(0, name.find('('));
+    const bool is_name = std::all_of(name.begin(), name.end(),
+                                     [](char c) { return IsWordCharacter(c) || c == ':'; });
+    const bool has_capital = !name.empty() && name[0] >= 'A' && name[0] <= 'Z';
+    const bool has_small =
+        std::any_of(name.begin(), name.end(), [](char c) { return c >= 'a' && c <= 'z'; });
+    if (is_name && has_capital && has_small) names.push_back(name);
+    open = line.find('`', close + 1);
+  }
+  return names;
+}
+
+// Whether the text has `word(`, or `word` behind struct, class or using.
+bool Declares(const std::string& text, const std::string& word) {
+  for (std::size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) {
+    const std::size_t end = at + word.size();
+    if (at > 0 && IsWordCharacter(text[at - 1])) continue;
+    if (end < text.size() && IsWordCharacter(text[end])) continue;
+    if (end < text.size() && text[end] == '(') return true;
+    for (const std::string_view before : {"struct ", "class ", "using "})
+      if (at >= before.size() && text.compare(at - before.size(), before.size(), before) == 0)
+        return true;
+  }
+  return false;
+}
+
+bool DeclaresAllParts(const std::string& text, const std::string& name) {
+  for (std::size_t begin = 0; begin < name.size();) {
+    const std::size_t end = std::min(name.find("::", begin), name.size());
+    if (!Declares(text, name.substr(begin, end - begin))) return false;
+    begin = end + 2;
+  }
+  return true;
+}
+
+// The code of a file without its comments: a name that only a comment has is not declared.
+std::string CodeOf(const File& file) {
+  std::string code;
+  for (const SplitLine& line : SplitLines(file.text)) code += line.code + "\n";
+  return code;
+}
+
+// A block is a row of a table, or the lines of a paragraph joined.
+std::vector<std::pair<std::size_t, std::string>> BlocksOf(const File& page) {
+  std::vector<std::pair<std::size_t, std::string>> blocks;
+  bool joins = false;
+  const auto lines = Lines(page.text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const bool is_row = StartsWith(lines[i], "|");
+    const bool is_item = StartsWith(lines[i], "- ");
+    if (joins && !lines[i].empty() && !is_row && !is_item)
+      blocks.back().second += " " + lines[i];
+    else if (!lines[i].empty())
+      blocks.emplace_back(i, lines[i]);
+    joins = !lines[i].empty() && !is_row;
+  }
+  return blocks;
+}
+
+Complaints WaysNameFunctionsThatExist(const Files& files) {
+  Complaints out;
+  for (const File& page : files) {
+    if (std::find(std::begin(kWays), std::end(kWays), page.path) == std::end(kWays)) continue;
+    for (const auto& [line, block] : BlocksOf(page)) {
+      const auto paths = PathsOf(block);
+      for (const std::string& name : NamesOf(block)) {
+        const bool declared = std::any_of(files.begin(), files.end(), [&](const File& file) {
+          return std::find(paths.begin(), paths.end(), file.path) != paths.end() &&
+                 DeclaresAllParts(CodeOf(file), name);
+        });
+        if (!declared) out.push_back(At(page, line, "no file beside it declares " + name));
+      }
+    }
+  }
+  return out;
+}
+
+Complaints WaysAreThere(const Files& files) {
+  Complaints out;
+  for (const std::string_view way : kWays)
+    if (!Exists(files, std::string(way))) out.push_back("there is no " + std::string(way));
+  return out;
+}
+
+TEST(Tidy, PagesNameFilesThatExist) { ExpectNone(PagesNameFilesThatExist(Tree())); }
+TEST(Tidy, WaysNameFunctionsThatExist) {
+  ExpectNone(WaysAreThere(Tree()));
+  ExpectNone(WaysNameFunctionsThatExist(Tree()));
+}
+
+TEST(TidyRules, FilesThatDoNotExistAreCaught) {
+  const auto complaints = [](const std::string& text) {
+    return PagesNameFilesThatExist({{"docs/a.md", text}, {"fleet/plan/plan.h", ""}}).size();
+  };
+  EXPECT_EQ(complaints("See fleet/plan/plan.h.\n"), 0u);
+  EXPECT_EQ(complaints("See `fleet/plan/` and docs/a.md\n"), 0u);
+  EXPECT_EQ(complaints("See fleet/plan/plane.h.\n"), 1u);
+  EXPECT_EQ(complaints("| a | fleet/plans/, docs/b.md |\n"), 2u);
+  EXPECT_EQ(complaints("A topic focalfleet/exposure, a folder build/bin\n"), 0u);
+}
+
+TEST(TidyRules, FunctionsThatDoNotExistAreCaught) {
+  const auto complaints = [](const std::string& text) {
+    const std::string header =
+        "/// As Apply(2).\nclass Executor {\n  Status Begin(int goal);\n};\nstruct Plan {};\n";
+    return WaysNameFunctionsThatExist({{"docs/way_of_a_move.md", text}, {"fleet/e.h", header}})
+        .size();
+  };
+  EXPECT_EQ(complaints("| `Plan` | `Executor::Begin` | fleet/e.h |\n"), 0u);
+  EXPECT_EQ(complaints("| `Begin(goal)` | fleet/e.h | `done`, `x.csv` |\n"), 0u);
+  EXPECT_EQ(complaints("`Begin` of\nfleet/e.h begins.\n"), 0u) << "a paragraph";
+  EXPECT_EQ(complaints("| `Executor::Starts` | fleet/e.h |\n"), 1u) << "a wrong function";
+  EXPECT_EQ(complaints("| `Executer::Begin` | fleet/e.h |\n"), 1u) << "a wrong class";
+  EXPECT_EQ(complaints("| `Apply` | fleet/e.h |\n"), 1u) << "only a comment has it";
+  EXPECT_EQ(complaints("| `Begin` | fleet/f.h |\n"), 1u) << "another file";
+  EXPECT_EQ(complaints("| `Begin` | |\n"), 1u) << "no file";
+}
+
+}  // namespace
+}  // namespace focalfleet::tidy
