@@ -1,9 +1,10 @@
-// Rules of pages against code: a page names files that exist, and the two pages that follow a way
-// through the code name functions that the headers beside them declare.
+// Rules of pages against code: a page names files and tests that exist, and the two pages that
+// follow a way through the code name functions that the headers beside them declare.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <iterator>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -61,22 +62,36 @@ Complaints PagesNameFilesThatExist(const Files& files) {
   return out;
 }
 
-// Names of functions and types: in backquotes, in parts joined by `::`, each with a capital first.
-// What stands in parentheses behind a name does not count.
-std::vector<std::string> NamesOf(const std::string& line) {
-  std::vector<std::string> names;
+bool IsCapital(const std::string& text, std::size_t at) {
+  return at < text.size() && text[at] >= 'A' && text[at] <= 'Z';
+}
+
+// The quoted words of a line: texts in backquotes, up to a parenthesis, that consist of word
+// characters, points and colons.
+std::vector<std::string> QuotedWordsOf(const std::string& line) {
+  std::vector<std::string> words;
   for (std::size_t open = line.find('`'); open != std::string::npos;) {
     const std::size_t close = line.find('`', open + 1);
     if (close == std::string::npos) break;
-    std::string name = line.substr(open + 1, close - open - 1);
-    name = name.substr(0, name.find('('));
-    const bool is_name = std::all_of(name.begin(), name.end(),
-                                     [](char c) { return IsWordCharacter(c) || c == ':'; });
-    const bool has_capital = !name.empty() && name[0] >= 'A' && name[0] <= 'Z';
-    const bool has_small =
-        std::any_of(name.begin(), name.end(), [](char c) { return c >= 'a' && c <= 'z'; });
-    if (is_name && has_capital && has_small) names.push_back(name);
+    std::string word = line.substr(open + 1, close - open - 1);
+    word = word.substr(0, word.find('('));
+    const bool is_plain = std::all_of(word.begin(), word.end(), [](char c) {
+      return IsWordCharacter(c) || c == ':' || c == '.';
+    });
+    if (is_plain && !word.empty()) words.push_back(std::move(word));
     open = line.find('`', close + 1);
+  }
+  return words;
+}
+
+// Names of functions and types: quoted words that begin with a capital, in parts joined by `::`.
+std::vector<std::string> NamesOf(const std::string& line) {
+  std::vector<std::string> names;
+  for (const std::string& word : QuotedWordsOf(line)) {
+    const bool has_small =
+        std::any_of(word.begin(), word.end(), [](char c) { return c >= 'a' && c <= 'z'; });
+    if (IsCapital(word, 0) && has_small && word.find('.') == std::string::npos)
+      names.push_back(word);
   }
   return names;
 }
@@ -146,6 +161,49 @@ Complaints WaysNameFunctionsThatExist(const Files& files) {
   return out;
 }
 
+// Names of all tests, as Suite.Name.
+std::set<std::string> TestsOf(const Files& files) {
+  std::set<std::string> tests;
+  for (const File& file : files) {
+    if (!EndsWith(file.path, ".cc")) continue;
+    for (std::size_t at = file.text.find("TEST"); at != std::string::npos;
+         at = file.text.find("TEST", at + 1)) {
+      const std::size_t open = file.text.find('(', at);
+      const std::size_t close = file.text.find(')', at);
+      if (open > at + 6 || close == std::string::npos || open > close) continue;
+      std::string name;
+      for (const char c : file.text.substr(open + 1, close - open - 1)) {
+        if (IsWordCharacter(c)) name += c;
+        if (c == ',') name += '.';
+      }
+      tests.insert(name);
+    }
+  }
+  return tests;
+}
+
+// Words in backquotes of the form Suite.Name, or .Name for the suite before it.
+Complaints PagesNameTestsThatExist(const Files& files) {
+  const std::set<std::string> tests = TestsOf(files);
+  Complaints out;
+  for (const File& page : files) {
+    if (!StartsWith(page.path, "docs/")) continue;
+    std::string suite;
+    const auto lines = Lines(page.text);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      for (const std::string& word : QuotedWordsOf(lines[i])) {
+        const std::size_t dot = word.find('.');
+        if (dot == std::string::npos || !IsCapital(word, dot + 1)) continue;
+        if (dot != 0 && !IsCapital(word, 0)) continue;
+        if (dot != 0) suite = word.substr(0, dot);
+        const std::string test = suite + word.substr(dot);
+        if (tests.count(test) == 0) out.push_back(At(page, i, "there is no test " + test));
+      }
+    }
+  }
+  return out;
+}
+
 Complaints WaysAreThere(const Files& files) {
   Complaints out;
   for (const std::string_view way : kWays)
@@ -157,6 +215,18 @@ TEST(Tidy, PagesNameFilesThatExist) { ExpectNone(PagesNameFilesThatExist(Tree())
 TEST(Tidy, WaysNameFunctionsThatExist) {
   ExpectNone(WaysAreThere(Tree()));
   ExpectNone(WaysNameFunctionsThatExist(Tree()));
+}
+
+TEST(Tidy, PagesNameTestsThatExist) { ExpectNone(PagesNameTestsThatExist(Tree())); }
+
+TEST(TidyRules, TestsThatDoNotExistAreCaught) {
+  const auto complaints = [](const std::string& text) {
+    const std::string tests = "TEST(Bus, Stops) {}\nTEST_F(BusFixture,\n       Starts) {}\n";
+    return PagesNameTestsThatExist({{"docs/a.md", text}, {"tests/a_test.cc", tests}}).size();
+  };
+  EXPECT_EQ(complaints("`Bus.Stops`, `BusFixture.Starts`\n"), 0u);
+  EXPECT_EQ(complaints("`Bus.Stops`,\n`.Starts`\n"), 1u) << "of the suite before it";
+  EXPECT_EQ(complaints("`Bus.Goes`, `bus.Goes`, `Bus.goes`, `Bus.Goes*`\n"), 1u);
 }
 
 TEST(TidyRules, FilesThatDoNotExistAreCaught) {
