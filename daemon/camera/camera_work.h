@@ -1,5 +1,5 @@
-// CameraWork does what the camera's thread owes to one ExposureJob. It asks for an exposure, waits
-// for one that may answer, and assigns its spots to units.
+// CameraWork does what the camera's thread owes to one ExposureJob. The thread asks for an
+// exposure, waits for one that may answer, and assigns its spots to units.
 //
 // An exposure that may not answer is too early, doubled, of another field, or no exposure at all.
 // Each is written to the log, and the wait goes on. When the time is up, the last reason is the

@@ -1,8 +1,9 @@
 // The two tables of a campaign (docs/files.md) are moves.csv and units.csv. This header turns their
 // text into values and back.
 //
-// sim/ has no tables and fleet/ has no campaigns, so the conversion stands here. fleet parses the
-// units' table (fleet/files/layout_file.h); here it only becomes the plain values that sim/ takes.
+// sim/ has no tables and fleet/ has no campaigns, so the conversion stands here. The layer fleet
+// parses the units' table (fleet/files/layout_file.h); here it only becomes the plain values that
+// sim/ takes.
 #pragma once
 
 #include <cstddef>

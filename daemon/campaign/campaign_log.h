@@ -17,7 +17,7 @@
 
 namespace focalfleet {
 
-/// One unit in one move. Angles are in degrees of the axes, as the unit counts them.
+/// A unit in one move. Angles are in degrees of the axes, as the unit counts them.
 struct LoggedMove {
   UnitId unit;
   std::int64_t move = 0;

@@ -79,7 +79,7 @@ std::string NumberList(std::span<const double> values, int digits = kDigits) {
   return text + "]";
 }
 
-// One line of TOML; empty where the number is not known.
+// A line of TOML; empty where the number is not known.
 std::string NumberLine(std::string_view key, double value) {
   return std::isfinite(value) ? fmt::format("{} = {:.{}g}\n", key, value, kDigits) : "";
 }
@@ -100,8 +100,8 @@ std::string EmpiricalText(const sim::Template& form) {
   std::vector<double> values, ranks;
   for (const sim::RankKnot& knot : form.knots)
     values.push_back(knot.value), ranks.push_back(knot.rank);
-  // Nine digits of a time since 1970 resolve only ten seconds, and knots must ascend. So knots are
-  // written to the last digit.
+  // Nine digits of a time since 1970 resolve only ten seconds, and knots must ascend. Knots are
+  // therefore written to the last digit.
   constexpr int kAllDigits = 17;
   return text + "knot_values = " + NumberList(values, kAllDigits) +
          "\nknot_ranks = " + NumberList(ranks) + "\n";

@@ -1,6 +1,7 @@
-// These are the files that `focalfleet diagnose` writes for programs. report.json holds the fields
-// of docs/diagnosis.md. model.toml holds the extended model: the fitted geometry, and every
-// accepted effect with its amplitudes, their uncertainty and the campaign they came from.
+// These are the files that `focalfleet diagnose` writes for programs. The file report.json holds
+// the fields of docs/diagnosis.md. The file model.toml holds the extended model: the fitted
+// geometry, and every accepted effect with its amplitudes, their uncertainty and the campaign they
+// came from.
 //
 // A number that is not known is null in the report and absent from the model. ReadModelFile reads
 // every model.

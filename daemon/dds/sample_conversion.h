@@ -1,5 +1,5 @@
-// SampleConversion converts between this project's values and the types that idlc generates. It
-// checks every code in both directions. Text is shortened to its bound without cutting a UTF-8
+// SampleConversion converts between this project's values and the types that idlc generates. Every
+// code is checked in both directions. Text is shortened to its bound without cutting a UTF-8
 // character. The way out allocates nothing.
 #pragma once
 

@@ -1,6 +1,6 @@
-// StatusReader is the receiving end, for `focalfleet watch` and tests. It returns what arrived
-// since the last call, in this project's own values. A sample with a code outside its enum is
-// counted and dropped, never shown as something else.
+// StatusReader is the receiving end, for `focalfleet watch` and tests. Take returns the samples
+// that arrived since the last call, in this project's own values. A sample with a code outside its
+// enum is counted and dropped, never shown as something else.
 #pragma once
 
 #include <chrono>

@@ -2,8 +2,8 @@
 // The columns have the same names as in this project's CSV files.
 //
 // Tables are read from memory. The sizes that a file states are checked against the bytes that are
-// there. cfitsio's extended file names can run filters and fetch URLs, so cfitsio never sees a name
-// from outside.
+// there. The extended file names of cfitsio can run filters and fetch URLs, so cfitsio never sees a
+// name from outside.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// HallModelFile is model.toml of a Hall rig. It holds the fitted field and what is known of the
-// rig: gains, offsets, sensor positions, the rotor's centre and temperature. Each has its
+// HallModelFile is model.toml of a Hall rig. The file holds the fitted field and what is known of
+// the rig: gains, offsets, sensor positions, the rotor's centre and temperature. Each has its
 // uncertainty where it has one.
 //
 // `hall fit` writes the field, `hall diagnose` writes both. `hall orient` and `hall diagnose

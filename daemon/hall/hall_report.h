@@ -3,8 +3,8 @@
 //
 // Voltages are converted to sizes at the fibre in two steps. A voltage corresponds to the tilt that
 // changes a sensor's voltage as much (rms over sensors and poses). A tilt corresponds to the
-// displacement at the end of an arm. So every value in um is a voltage times one number, and the
-// report gives both.
+// displacement at the end of an arm. Every value in um is therefore a voltage times one number, and
+// the report gives both.
 #pragma once
 
 #include <nlohmann/json.hpp>

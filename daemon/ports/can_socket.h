@@ -1,6 +1,6 @@
 // OpenInterface opens a CAN_RAW socket for a port. The socket is bound to one interface, never
-// waits and receives only the frames of the other side. It reports the controller's errors, and the
-// kernel stamps its frames on arrival.
+// waits and receives only the frames of the other side. The socket reports the controller's errors,
+// and the kernel stamps its frames on arrival.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // PollablePort is what the event loop needs of a port beyond FramePort. Its one descriptor is
-// watched for as long as the port lives, whatever the port closes and opens behind it. It also
-// gives the instant at which it must be called though nothing arrived: to connect again, or because
-// a simulated bus goes on by itself.
+// watched for as long as the port lives, whatever the port closes and opens behind it. The port
+// also gives the instant at which it must be called though nothing arrived: to connect again, or
+// because a simulated bus goes on.
 #pragma once
 
 #include <cstdint>

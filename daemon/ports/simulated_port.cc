@@ -42,7 +42,7 @@ Result<std::shared_ptr<SimulatedFleet>> SimulatedFleet::Create(sim::WorldConfig 
   return std::shared_ptr<SimulatedFleet>(new SimulatedFleet(std::move(config), clock));
 }
 
-// The world may still stand at its last event, before the frame is sent. So the clock gives the
+// The world may still stand at its last event, before the frame is sent, so the clock gives the
 // time.
 bool SimulatedFleet::Inject(BusId bus, const CanFrame& frame) {
   return world_.Inject(bus, frame, clock_ ? clock_->Now() : world_.now());

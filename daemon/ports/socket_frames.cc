@@ -66,7 +66,7 @@ Reported ReadControl(msghdr* header) {
 
 bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
 
-/// One packet that was read.
+/// A packet that was read.
 struct Packet {
   const canfd_frame* raw = nullptr;
   std::size_t size = 0;  // bytes; 0: more than any frame has

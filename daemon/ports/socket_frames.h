@@ -51,9 +51,9 @@ struct WallAhead {
 WallAhead ReadWallAhead();
 
 /// FrameStamps gives the time at which the kernel received a frame, on the host's clock. The kernel
-/// stamps with the wall clock, which may step. So a stamp counts only where two conditions hold. It
-/// lies between the readings of the socket before and after the frame, and both clocks ran alike
-/// between these. Otherwise the frame gets the time at which it was read: late, and never too
+/// stamps with the wall clock, which may step. A stamp therefore counts only where two conditions
+/// hold: it lies between the readings of the socket before and after the frame, and both clocks ran
+/// alike between these. Otherwise the frame gets the time at which it was read: late, and never too
 /// early.
 class FrameStamps {
  public:
@@ -85,7 +85,7 @@ class FrameStamps {
   HostInstant now_;
 };
 
-/// What a CAN_RAW socket delivers beside the frames of other nodes.
+/// Aside is what a CAN_RAW socket delivers beside the frames of other nodes.
 struct Aside {
   std::vector<can_frame> errors;
   std::size_t confirmed = 0;          // our own frames that came back

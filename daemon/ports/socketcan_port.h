@@ -1,4 +1,4 @@
-// SocketCanPort is one bus on a SocketCAN interface: can0 of an adapter, or vcan0. It uses a
+// SocketCanPort is one bus on a SocketCAN interface: can0 of an adapter, or vcan0. The port uses a
 // CAN_RAW socket, never waits and works in batches. At most three of its frames are below the
 // socket (transmit_window.h). Its frames are looped back to other sockets of this host (candump
 // sees them).

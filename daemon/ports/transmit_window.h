@@ -1,11 +1,11 @@
 // TransmitWindow counts the host's frames below the socket: in the interface's queue, in the
 // controller, on the wire. A stop can overtake nothing there, so frames wait above, where it can.
-// At most three are below, and the third place is reserved for a stop. So at most two frames are
-// ahead of a stop: the one on the wire and one more, 2 x 160 bits. Where bus.can_fd is on, they are
-// 2 groups of staging frames, each counted as one frame, of up to 393 us.
+// At most three are below, and the third place is reserved for a stop. At most two frames are
+// therefore ahead of a stop: the one on the wire and one more, 2 x 160 bits. Where bus.can_fd is
+// on, they are 2 groups of staging frames, each counted as one frame, of up to 393 us.
 //
-// Two frames keep a bus busy. One is on the wire (131 us and more at 1 Mbit/s for 8 bytes). The
-// host has this time to learn that the one before has left and to hand down the next.
+// Two frames keep a bus busy. The first is on the wire (131 us and more at 1 Mbit/s for 8 bytes).
+// The host has this time to learn that the one before has left and to hand down the next.
 //
 // Three sources are combined; the most pessimistic one holds:
 //   confirmations  a driver that echoes gives each frame back when it has left (IFF_ECHO)
@@ -13,8 +13,8 @@
 //   bit clock      a frame cannot have left before its bits have; where a controller does not echo
 //
 // A virtual interface without a queue passes a frame on while it takes it. The window hands ever
-// more frames at once to an interface that was never seen to hold any, until it holds one.
-// The class is pure: time, bits and charges are arguments.
+// more frames at once to an interface that was never seen to hold any, until it holds one. The
+// class is pure: time, bits and charges are arguments.
 #pragma once
 
 #include <cstddef>

@@ -55,7 +55,7 @@ std::vector<std::string> Split(const std::string& text, char separator) {
   return pieces;
 }
 
-/// All that any subcommand takes, as CLI11 fills it in.
+/// The options of all subcommands, as CLI11 fills them in.
 struct Given {
   SimulatorOptions run;
   std::string spread = "nominal";
@@ -82,7 +82,7 @@ struct Given {
   bool json = false;
 };
 
-/// Asks the running simulation; `on_result` says what came of it.
+/// Sends a request to the running simulation; `on_result` reports its result.
 int Ask(const Given& given, const ControlRequest& request,
         const std::function<int(const Json&)>& on_result) {
   auto client = LineClient::Connect(given.control);
@@ -459,7 +459,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   AddRunOptions(&app, &given);
   const std::vector<Subcommand> subcommands = AddSubcommands(&app, &given);
-  // The one library here that throws; what it throws ends here.
+  // CLI11 is the only library here that throws; its exceptions end here.
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

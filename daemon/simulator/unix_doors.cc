@@ -18,9 +18,10 @@
 namespace focalfleet::simulator {
 namespace {
 
-/// More frames than this wait on a bus: its clients are not read until half of them are through.
+/// Limit of waiting frames on a bus. Beyond it the clients of the bus are not read until half of
+/// them are through.
 constexpr std::size_t kPauseFrames = 2048;
-/// Some seconds of a saturated bus; who is so far behind does not read at all.
+/// Some seconds of a saturated bus; a client so far behind does not read at all.
 constexpr std::size_t kClientFramesMax = 65'536;
 constexpr std::uint64_t kListenerTag = std::uint64_t{1} << 32;
 
@@ -147,7 +148,7 @@ void UnixDoors::Write(Client* client) {
     client->waiting.erase(client->waiting.begin(),
                           client->waiting.begin() + static_cast<std::ptrdiff_t>(sent.taken));
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return;
-    // Gone: that is found, and cleared away, when it is next read.
+    // The client is gone; the next read finds that and clears it away.
     if (sent.error != 0) return client->waiting.clear();
   }
 }

@@ -1,7 +1,7 @@
 "use strict";
 
-// The plan as typed arrays, and where everything is at a time. Axis 2u is theta of the unit in
-// place u of the layout, 2u + 1 its phi. Names carry their units, as in the program.
+// Motion holds the plan as typed arrays, and the position of everything at a time. Axis 2u is theta
+// of the unit in place u of the layout, 2u + 1 its phi. Names carry their units, as in the program.
 
 const kDegree = Math.PI / 180;
 
@@ -71,11 +71,11 @@ class Motion {
     this.joinRows(data.rows_count);
     this.findBlockers();
 
-    // At `t_s`, as setTime leaves them.
+    // The state at `t_s`, as setTime leaves it.
     this.t_s = NaN;
     this.theta_deg = new Float64Array(this.count).fill(NaN);
     this.phi_deg = new Float64Array(this.count).fill(NaN);
-    this.elbow_x = new Float64Array(this.count).fill(NaN);  // NaN: nobody knows
+    this.elbow_x = new Float64Array(this.count).fill(NaN);  // NaN: not known
     this.elbow_y = new Float64Array(this.count).fill(NaN);
     this.fibre_x = new Float64Array(this.count).fill(NaN);
     this.fibre_y = new Float64Array(this.count).fill(NaN);
@@ -84,8 +84,8 @@ class Motion {
     this.setTime(0);
   }
 
-  // Which rows are whose; a row begins where the one before it ended, the first where the axis
-  // stood.
+  // Finds the rows of each axis. A row begins where the previous one ended, the first where the
+  // axis stood.
   joinRows(rows_count) {
     const {units, rows} = this;
     rows.from_deg = new Float64Array(rows_count);
@@ -110,7 +110,7 @@ class Motion {
     }
   }
 
-  // Units that are named as being in the way of another.
+  // Finds the units that are named as being in the way of another.
   findBlockers() {
     this.isBlocker = new Uint8Array(this.count);
     for (let u = 0; u < this.count; ++u) {
