@@ -1,4 +1,5 @@
-// hall calibrate: gain, offset and place of each sensor, from poses and a field that are known.
+// The command hall calibrate finds gain, offset and position of each sensor, from known poses and a
+// known field.
 
 #include <fmt/format.h>
 
@@ -85,7 +86,7 @@ struct Sum {
   [[nodiscard]] double Rms() const { return count > 0 ? std::sqrt(squares / count) : 0; }
 };
 
-// Errors: of the output file.
+// Reports the result. Errors: of the output file.
 ExitCode Tell(const Context& context, const HallCalibrateOptions& options,
               const std::vector<SensorFit>& fits) {
   Json sensors = Json::array();

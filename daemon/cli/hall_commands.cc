@@ -1,5 +1,6 @@
-// hall: orientation of ball joints from Hall sensors. fit: a field map to a model; orient: voltages
-// to orientations. calibrate, diagnose and reproduce have files of their own.
+// The commands hall give the orientation of ball joints from Hall sensors. The command hall fit
+// makes a model of a field map; hall orient turns voltages into orientations. The commands
+// calibrate, diagnose and reproduce have files of their own.
 
 #include <fmt/format.h>
 
@@ -48,7 +49,7 @@ Json ParametersJson(const sim::FieldParameters& parameters) {
   return {{"terms", std::get<std::vector<sim::SphericalTerm>>(parameters).size()}};
 }
 
-// Points at which a sensor of +-0.1 T stands at the end of its range.
+// The number of points at which a sensor of +-0.1 T stands at the end of its range.
 std::size_t Saturated(const sim::FieldMap& map) {
   const double range_T = sim::SensorElectronics{}.range_T();
   std::size_t count = 0;

@@ -1,5 +1,5 @@
-// targets: a random configuration in which everything is clear, for load tests and for a first
-// state.
+// The command targets makes a random configuration without collisions, for load tests and for a
+// first state.
 
 #include <fmt/format.h>
 
@@ -25,7 +25,7 @@ struct TargetsOptions {
 
 using Poses = std::vector<std::optional<Pose>>;
 
-// Disabled units stand where the state says; without it they are drawn, too.
+// Disabled units stand at their poses of the state; without a state they are drawn, too.
 Result<Poses> Standing(const TargetsOptions& options, const OfflineFleet& fleet) {
   Poses standing(fleet.layout.size());
   if (options.from.empty()) return standing;

@@ -1,4 +1,4 @@
-// home, disable, enable, adopt, params: what an operator does to single units.
+// The commands home, measure, disable, enable, adopt and params act on single units.
 
 #include <fmt/format.h>
 
@@ -23,7 +23,7 @@ ExitCode ReportConfiguration(const Context& context, const Json& configuration) 
   return exit;
 }
 
-// The answer as it is, or `done` for people.
+// Prints the answer with --json, else `done`.
 ExitCode Tell(const Context& context, const tl::expected<Json, Failure>& answer,
               const std::string& done) {
   if (!answer) return Report(context, answer.error());
@@ -141,7 +141,8 @@ ExitCode RunDisable(const Context& context, const EnableOptions& options) {
 
 constexpr std::chrono::milliseconds kLookEvery{50};
 
-/// The units that are still in fault when the daemon has had time to clear it. Errors: as Ask.
+/// The units that are still in fault when the daemon has had time to clear it.
+/// Errors: as Ask.
 tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(const Context& context,
                                                                const EnableOptions& options) {
   const auto give_up =
@@ -241,12 +242,13 @@ ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
                   {"axis", options.axis},
                   {"parameter", options.name},
                   {"value", *options.value}};
-  // The unit has the last word: it may hold another value than the one asked for.
+  // The unit decides: it may hold another value than the requested one.
   const auto answer = Ask(context, {.verb = "params_set", .args = args});
   return Tell(context, answer, answer ? TextIn(*answer, "text") : "");
 }
 
-// What was stored or set, then what holds by default, narrowed to one axis and name where given.
+// The rows of stored or set parameters, then those of the defaults, narrowed to one axis and name
+// where given.
 Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   Json rows = Json::array();
   const auto wanted = [&](const std::string& axis, const std::string& name) {
@@ -273,7 +275,7 @@ Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   return rows;
 }
 
-// What the last tuning found, for people; empty where the unit was never tuned.
+// The result of the last tuning, for human readers; empty where the unit was never tuned.
 std::string DescribeTuning(const Json& answer, const ParamsOptions& options) {
   Json rows = Json::array();
   for (Json row : ListIn(answer, "tuning")) {
