@@ -1,11 +1,11 @@
-// The coordinator under units that may say anything at any time, operators who may ask for
-// anything, links that come and go, and kill -9. Records of 12 bytes: what happens (1), to whom
-// (1), how long after (1), a number (1), data (8). Three puppets on two buses answer as units do
-// until they are told otherwise, so that a record may go wrong deep within a configuration.
-// Whatever comes:
+// The test runs the coordinator under units that may answer anything at any time and operators who
+// may ask for anything. Links come and go, and the host may be killed (kill -9). The input is
+// records of 12 bytes: event (1), unit or bus (1), delay (1), a number (1), data (8). Three simple
+// units on two buses answer correctly until a record changes that, so a record may go wrong deep
+// within a configuration. For any input:
 //
-//   every frame that it sends is well formed and for a unit that exists, or for all;
-//   a start is only said when the intent of every puppet that holds its move is durable;
+//   every frame that the coordinator sends is well formed and for a unit that exists, or for all;
+//   a start is only sent when the intent of every unit that holds its move is durable;
 //   it asks to be woken later than now, and never asks for ever in one instant.
 #include <array>
 #include <cstddef>
@@ -30,7 +30,7 @@ constexpr std::size_t kRecord = 12;
 constexpr std::size_t kRecordsMax = 60;
 constexpr std::uint32_t kUnits = 3;
 constexpr int kStepsPerRecord = 400;
-constexpr std::uint64_t kCommitSteps = 5;  // a start that does not wait for its intent is seen
+constexpr std::uint64_t kCommitSteps = 5;  // exposes a start before its durable intent
 
 Layout ThreeInARow() {
   std::vector<Unit> units(kUnits);
@@ -44,7 +44,7 @@ Layout ThreeInARow() {
   return Layout::Create(std::move(units), {}).value();
 }
 
-/// Says what a unit would say, and moves in no time.
+/// Answers as a unit would, and moves in no time.
 struct Puppet {
   NodeId node;
   SerialNumber serial;
@@ -55,7 +55,7 @@ struct Puppet {
   bool interrupted = false;
   bool restarted = true;
   bool silent = false;
-  bool keeps_done = false;  // says nothing at the end of a motion
+  bool keeps_done = false;  // sends nothing at the end of a motion
   MoveId begun;
   StagedMove staged;
   std::uint8_t asked = 0;  // the last sequence number
@@ -250,7 +250,7 @@ class Theatre {
     }
   }
 
-  /// Any identifier bits and bytes, on any bus.
+  /// Sends any identifier bits and bytes, on any bus.
   void SayAnything(std::uint32_t who, const std::uint8_t* record) {
     CanFrame frame;
     std::memcpy(&frame.id, record + 4, 4);
@@ -259,7 +259,7 @@ class Theatre {
     std::memcpy(frame.data.data(), record + 4, 8);
     heard_.push_back({layout_.units()[who].bus, now_, frame});
   }
-  /// A function's own form, with the sequence number that the host waits for, and any bytes.
+  /// Sends a function's own form, with the sequence number that the host waits for, and any bytes.
   void SayAnAnswer(std::uint32_t who, const std::uint8_t* record) {
     const auto function = static_cast<Function>(record[3] % kFunctionCount);
     const std::uint8_t sequence = (record[3] & 0x40u) != 0 ? 0 : puppets_[who].asked;
