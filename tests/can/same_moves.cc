@@ -1,7 +1,7 @@
-// same_moves CANDUMP_LOG DATABASE UNITS_CSV INTERFACE...: what was said on the buses and what the
-// store remembers must be the same moves, for every unit and in both directions. The log is decoded
-// with protocol/ alone, the database read with plain SQL; interfaces stand in ascending order of
-// bus_id. Ends with 0 where they agree.
+// same_moves CANDUMP_LOG DATABASE UNITS_CSV INTERFACE... compares the moves on the buses with those
+// in the store, for every unit and in both directions. The log is decoded with protocol/ alone, the
+// database read with plain SQL. Interfaces stand in ascending order of bus_id. The exit code is 0
+// where they agree.
 #include <sqlite3.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@ namespace {
 
 using Pair = std::array<std::int64_t, kAxisCount>;
 
-// What the store's tables mean (docs of daemon/store/schema.cc): how an intent ended.
+// Codes of the store's tables (docs of daemon/store/schema.cc): how an intent ended.
 constexpr std::int64_t kEndArrived = 0;
 
 int complaints = 0;
@@ -50,7 +50,7 @@ struct Moved {
   Pair from{};
   Pair to{};
   std::int64_t end = -1;  // -1: open
-  Pair stood{};           // where it ended
+  Pair stood{};           // position at its end
 };
 
 struct Standing {
