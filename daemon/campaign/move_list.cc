@@ -67,9 +67,8 @@ std::vector<Stance> Arcs(std::size_t count) {
 
 Result<ListedMove> AtRandom(const Layout& layout, const std::vector<UnitDrive>& drives,
                             std::int64_t id, std::uint64_t seed) {
-  const std::vector<std::optional<Pose>> nobody_stands(layout.size());
-  FOCALFLEET_TRY_ASSIGN(const auto drawn,
-                        DrawConfiguration(layout, drives, nobody_stands, Rng(seed)));
+  const std::vector<std::optional<Pose>> none_fixed(layout.size());
+  FOCALFLEET_TRY_ASSIGN(const auto drawn, DrawConfiguration(layout, drives, none_fixed, Rng(seed)));
   ListedMove move{.id = id, .rows = {}};
   for (std::uint32_t n = 0; n < layout.size(); ++n) {
     const Unit& unit = layout.units()[n];

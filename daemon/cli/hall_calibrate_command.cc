@@ -87,8 +87,8 @@ struct Sum {
 };
 
 // Reports the result. Errors: of the output file.
-ExitCode Tell(const Context& context, const HallCalibrateOptions& options,
-              const std::vector<SensorFit>& fits) {
+ExitCode ReportCalibration(const Context& context, const HallCalibrateOptions& options,
+                           const std::vector<SensorFit>& fits) {
   Json sensors = Json::array();
   Sum before, held_out;
   std::size_t calibrated = 0;
@@ -134,7 +134,8 @@ ExitCode RunHallCalibrate(const Context& context, const HallCalibrateOptions& op
   if (!table) return Report(context, table.error());
   ReportPassedOver(context, options.data, table->passed_over);
   const auto field = sim::MakeField(model->field);
-  return Tell(context, options, sim::CalibrateSensors(CampaignOf(std::move(*table)), *rig, *field));
+  return ReportCalibration(context, options,
+                           sim::CalibrateSensors(CampaignOf(std::move(*table)), *rig, *field));
 }
 
 }  // namespace

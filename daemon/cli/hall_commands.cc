@@ -144,22 +144,22 @@ std::string Sentence(const sim::SensorVerdict& verdict) {
   if (!verdict.or_else.empty())
     return fmt::format("one sensor contradicts the others, cannot tell which: {} or {}",
                        NamesOf(verdict.sensors, " and "), NamesOf(verdict.or_else, " or "));
-  const std::string who = NamesOf(verdict.sensors, " and ");
+  const std::string sensor_names = NamesOf(verdict.sensors, " and ");
   switch (verdict.fault) {
     case sim::SensorFault::kMissing:
-      return who + " is missing in every row";
+      return sensor_names + " is missing in every row";
     case sim::SensorFault::kStuck:
-      return who + " is stuck: left out";
+      return sensor_names + " is stuck: left out";
     case sim::SensorFault::kSwapped:
-      return who + " are swapped: exchanged";
+      return sensor_names + " are swapped: exchanged";
     case sim::SensorFault::kGain:
-      return who + " is off in gain: left out";
+      return sensor_names + " is off in gain: left out";
     case sim::SensorFault::kOffset:
-      return who + " is off by an offset: left out";
+      return sensor_names + " is off by an offset: left out";
     case sim::SensorFault::kBad:
-      return who + " contradicts the others, cannot tell how: left out";
+      return sensor_names + " contradicts the others, cannot tell how: left out";
   }
-  return who;
+  return sensor_names;
 }
 
 Json VerdictsJson(const std::vector<sim::SensorVerdict>& verdicts) {

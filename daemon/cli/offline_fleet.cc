@@ -89,10 +89,11 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
   return OfflineFleet{std::move(layout), std::move(drives)};
 }
 
-Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet, WhoseState whose) {
+Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
+                             WhoseState required) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
   FOCALFLEET_TRY_ASSIGN(StatePoses poses, ReadState(text, path, fleet.layout, fleet.drives));
-  FOCALFLEET_TRY(RequirePoses(path, fleet.layout, poses, whose));
+  FOCALFLEET_TRY(RequirePoses(path, fleet.layout, poses, required));
   return poses;
 }
 

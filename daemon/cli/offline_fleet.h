@@ -56,9 +56,10 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files);
 
 using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
 
-/// The poses of the units that `whose` selects, and of others that the file names.
+/// The poses of the units that `required` selects, and of others that the file names.
 /// Errors: as LoadFleet; also a selected unit that the file does not name.
-Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet, WhoseState whose);
+Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
+                             WhoseState required);
 
 struct PlanFiles {
   std::string targets;

@@ -95,7 +95,7 @@ tl::expected<NotStanding, Failure> CountNotStanding(const Context& context,
 
 /// Waits until the units stand and reports the result: a stop that was sent is not yet a stop that
 /// was done.
-ExitCode TellWhetherAllStand(const Context& context, const StopOptions& options) {
+ExitCode ReportWhetherAllStand(const Context& context, const StopOptions& options) {
   const auto give_up =
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
   for (;;) {
@@ -155,7 +155,7 @@ ExitCode RunStop(const Context& context, const StopOptions& options) {
   }
   Say(context, options.unit_id ? fmt::format("unit {}: stop sent", *options.unit_id)
                                : "stop sent to all units");
-  return TellWhetherAllStand(context, options);
+  return ReportWhetherAllStand(context, options);
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ ExitCode ReportConfiguration(const Context& context, const Json& configuration) 
 }
 
 // Prints the answer with --json, else `done`.
-ExitCode Tell(const Context& context, const tl::expected<Json, Failure>& answer,
-              const std::string& done) {
+ExitCode PrintAnswer(const Context& context, const tl::expected<Json, Failure>& answer,
+                     const std::string& done) {
   if (!answer) return Report(context, answer.error());
   if (context.json) PrintJson(*answer);
   Say(context, done);
@@ -133,10 +133,11 @@ struct EnableOptions {
 };
 
 ExitCode RunDisable(const Context& context, const EnableOptions& options) {
-  return Tell(context,
-              Ask(context, {.verb = "disable",
-                            .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
-              fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
+  return PrintAnswer(
+      context,
+      Ask(context,
+          {.verb = "disable", .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
+      fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
 }
 
 constexpr std::chrono::milliseconds kLookEvery{50};
@@ -207,7 +208,7 @@ ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
       fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id);
   if (const std::string text = answer ? TextIn(*answer, "text") : ""; text.starts_with("done"))
     done += text.substr(4);
-  return Tell(context, answer, done);
+  return PrintAnswer(context, answer, done);
 }
 
 void AddAdopt(CommandLine* line) {
@@ -244,7 +245,7 @@ ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
                   {"value", *options.value}};
   // The unit decides: it may hold another value than the requested one.
   const auto answer = Ask(context, {.verb = "params_set", .args = args});
-  return Tell(context, answer, answer ? TextIn(*answer, "text") : "");
+  return PrintAnswer(context, answer, answer ? TextIn(*answer, "text") : "");
 }
 
 // The rows of stored or set parameters, then those of the defaults, narrowed to one axis and name

@@ -278,7 +278,7 @@ void Draw(const Context& context, const Picture& picture, bool over) {
 
 // ---- the loop
 
-ExitCode NobodyPublishes(const Context& context, const WatchOptions& options, bool seen) {
+ExitCode ReportNoPublisher(const Context& context, const WatchOptions& options, bool seen) {
   return Report(
       context,
       {ErrorCode::kUnavailable,
@@ -305,8 +305,8 @@ ExitCode Loop(const Context& context, const WatchOptions& options, StatusReader*
     }
     Absorb(update, &picture);
     const bool late = steady_clock::now() - begun > patience;
-    if (late && !picture.fleet) return NobodyPublishes(context, options, reader->writer_seen());
-    if (picture.fleet && !reader->writer_alive()) return NobodyPublishes(context, options, true);
+    if (late && !picture.fleet) return ReportNoPublisher(context, options, reader->writer_seen());
+    if (picture.fleet && !reader->writer_alive()) return ReportNoPublisher(context, options, true);
     if (options.once) {
       // Late values are omitted: waiting for them might never end.
       if (!picture.fleet || (!late && !WholeFleetIsThere(picture))) continue;

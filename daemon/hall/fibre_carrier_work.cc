@@ -75,16 +75,16 @@ FibreCarrierWorker::Looked FibreCarrierWorker::Look(PositionerIndex i, const sim
   FibreCarrierReading& carrier = looked.carrier;
   carrier.used = static_cast<std::uint16_t>(reading.used);
   carrier.verdict = Unused(row, reading);
-  const auto say = [&](const std::string& what) {
+  const auto add_verdict = [&](const std::string& what) {
     carrier.verdict += (carrier.verdict.empty() ? "" : "; ") + what;
   };
   if (std::popcount(reading.used) < kSensorsMin) {
-    say("too few sensors");
+    add_verdict("too few sensors");
     return looked;
   }
   const std::vector<sim::OrientationFit> fits = solver.Solve(reading);
   if (fits.empty()) {
-    say("no orientation found");
+    add_verdict("no orientation found");
     return looked;
   }
   const double noise_T2 = options_.noise_T * options_.noise_T;
@@ -123,9 +123,9 @@ FibreCarrierWorker::Looked FibreCarrierWorker::Look(PositionerIndex i, const sim
       carrier.covariance_deg2[entry++] =
           best->unit_covariance[a][b] * noise_T2 * kDegPerRad * kDegPerRad;
   looked.tip = tip_of(*best);
-  if (good > 1 && near != 1) say("ambiguous");
+  if (good > 1 && near != 1) add_verdict("ambiguous");
   carrier.trusted = !contradicts && (good == 1 || near == 1);
-  if (contradicts) say("cannot tell");  // Examine may find the sensor
+  if (contradicts) add_verdict("cannot tell");  // Examine may find the sensor
   if (carrier.verdict.empty()) carrier.verdict = "ok";
   return looked;
 }

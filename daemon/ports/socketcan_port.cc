@@ -177,7 +177,7 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return taken;
     if (sent.error != 0) {
       Lose(std::string("cannot send: ") + std::strerror(sent.error));
-      lost_untold_ = true;
+      lost_unreported_ = true;
       return taken;
     }
   }
@@ -217,7 +217,7 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   if (!socket_.open()) {
     // The loop must see the link as down before it is up again: frames that waited for it are
     // outdated.
-    if (std::exchange(lost_untold_, false))
+    if (std::exchange(lost_unreported_, false))
       retry_at_ = now + options_.clock.Real(options_.retry_period);
     if (now < retry_at_) return;
     static_cast<void>(Open());  // the trouble is what failed

@@ -87,7 +87,7 @@ class SocketCanPort : public PollablePort {
   LinkState state_ = LinkState::kDown;
   bool found_ = false;
   bool was_up_ = false;               // at any time
-  bool lost_untold_ = false;          // lost in Send; no Receive has run since
+  bool lost_unreported_ = false;      // lost in Send; no Receive has run since
   HostInstant retry_at_{0};           // while there is no socket
   HostInstant look_at_ = kNever;      // next look at the state of a controller that is not well
   HostInstant waits_since_ = kNever;  // monotonic: start of the wait for outstanding confirmations

@@ -25,7 +25,7 @@ constexpr std::size_t kPauseFrames = 2048;
 constexpr std::size_t kClientFramesMax = 65'536;
 constexpr std::uint64_t kListenerTag = std::uint64_t{1} << 32;
 
-bool SomebodyAnswers(const UnixAddress& address) {
+bool HasListener(const UnixAddress& address) {
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
   const bool answered = ::connect(fd, address.get(), address.length()) == 0 || errno == EAGAIN;
@@ -65,7 +65,7 @@ UnixDoors::~UnixDoors() {
 
 Status UnixDoors::Listen(const std::string& path, BusId bus) {
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
-  if (SomebodyAnswers(address))
+  if (HasListener(address))
     return Fail(ErrorCode::kRefused, path + " is in use: another simulation answers there");
   ::unlink(path.c_str());
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
