@@ -32,8 +32,8 @@ struct ModelFile {
 /// The model in `text` for the units of a campaign.
 /// Errors: kInvalid with file and line: the text is no TOML, or a key is missing or wrong. An
 /// effect that the library does not have, or not in that axis, form, memory and number of columns,
-/// is kInvalid too. Two more cases are kInvalid: amplitudes that are not as many as the units or
-/// beyond the range of their effect, and arms or bases of another unit.
+/// is kInvalid too. Two more cases are kInvalid: amplitudes of a wrong number or beyond the range
+/// of their effect, and arms or bases of another unit.
 Result<ModelFile> ReadModelFile(std::string_view text, const std::string& file,
                                 const std::vector<sim::CampaignUnit>& units);
 

@@ -52,8 +52,8 @@ std::string Complaint(const CLI::App& app, const CLI::ParseError& error) {
 }
 
 // Fills standard streams that the caller closed. Otherwise an opened file would get the number of a
-// closed stream, and messages would end in it. /dev/null, opened in the wrong direction, takes and
-// gives nothing.
+// closed stream, and messages would end in it. The file /dev/null, opened in the wrong direction,
+// takes and gives nothing.
 void HoldStandardStreams() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(fd, F_GETFD) >= 0) continue;

@@ -1,5 +1,5 @@
-// These functions are shared by the commands on a measured campaign: its folder, the models that
-// they are given, and the threads that they run on.
+// The commands on a measured campaign share these functions: they read its folder and the given
+// models, and run the work on threads.
 #pragma once
 
 #include <string>

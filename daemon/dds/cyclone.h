@@ -1,6 +1,5 @@
-// This header holds what publisher and reader share of Cyclone DDS. It has the domain with its
-// configuration, entities that delete themselves, the topics' names, and the QoS that both ends ask
-// for.
+// Publisher and reader share these parts of Cyclone DDS: the domain with its configuration,
+// entities that delete themselves, the topics' names, and the QoS of both ends.
 #pragma once
 
 #include <cstdint>

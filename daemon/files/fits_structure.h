@@ -1,7 +1,7 @@
 // CheckFitsStructure checks the skeleton of a FITS file: headers that end, sizes that are numbers,
-// data that are complete. cfitsio trusts the mandatory cards of a header. With one of them broken
-// it sizes arrays by undefined memory. The cards are therefore checked against the standard before
-// cfitsio sees them.
+// data that are complete. The library cfitsio trusts the mandatory cards of a header. With one of
+// them broken it sizes arrays by undefined memory. The cards are therefore checked against the
+// standard before cfitsio sees them.
 #pragma once
 
 #include <cstdint>

@@ -106,8 +106,8 @@ tl::expected<std::string, int> ReadAll(int fd, std::size_t bytes_max) {
 }
 
 Result<std::string> ReadFile(const std::string& path) {
-  // The open call does not wait for a writer, which may never come. /dev/stdin is not opened anew:
-  // its file may be half read, or a socket.
+  // The open call does not wait for a writer, which may never come. The file /dev/stdin is not
+  // opened anew: its data may be half read, or a socket.
   const Descriptor file(path == "/dev/stdin"
                             ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
                             : open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));

@@ -1,5 +1,6 @@
-// HallReport writes the results of a Hall rig's diagnosis: report.json (docs/hall.md; the fields of
-// every diagnosis), report.html, the extended model, and the poses to make next.
+// HallReport writes the results of a Hall rig's diagnosis: report.json, report.html, the extended
+// model, and the poses to make next. The fields of report.json are those of every diagnosis
+// (docs/hall.md).
 //
 // Voltages are converted to sizes at the fibre in two steps. A voltage corresponds to the tilt that
 // changes a sensor's voltage as much (rms over sensors and poses). A tilt corresponds to the

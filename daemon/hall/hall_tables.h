@@ -1,6 +1,6 @@
 // These functions read and write the tables of a Hall rig as CSV: field maps, sensors, voltages and
-// poses in; orientations out. docs/hall.md has the columns. Angles are degrees in files and radians
-// here.
+// poses in; orientations out. The page docs/hall.md has the columns. Angles are degrees in files
+// and radians here.
 #pragma once
 
 #include <limits>

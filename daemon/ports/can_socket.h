@@ -39,8 +39,8 @@ using InterfaceOpener =
 /// bytes. 0 where the kernel does not report them.
 std::size_t BytesBelow(int socket);
 
-/// Frames sent from now on overtake those of other programs (and our earlier ones) that wait in an
-/// interface's queue with bands. pfifo_fast, the usual queue, has bands.
+/// Frames sent from now on overtake those of other programs (and earlier ones of this one) that
+/// wait in an interface's queue with bands. The usual queue, pfifo_fast, has bands.
 void SetUrgent(int socket, bool urgent);
 
 }  // namespace focalfleet

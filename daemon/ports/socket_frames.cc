@@ -70,7 +70,7 @@ bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
 struct Packet {
   const canfd_frame* raw = nullptr;
   std::size_t size = 0;  // bytes; 0: more than any frame has
-  bool own = false;      // our own frame, echoed
+  bool own = false;      // the host's own frame, echoed
   Reported reported;
 };
 

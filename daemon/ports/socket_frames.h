@@ -51,10 +51,9 @@ struct WallAhead {
 WallAhead ReadWallAhead();
 
 /// FrameStamps gives the time at which the kernel received a frame, on the host's clock. The kernel
-/// stamps with the wall clock, which may step. A stamp therefore counts only where two conditions
-/// hold: it lies between the readings of the socket before and after the frame, and both clocks ran
-/// alike between these. Otherwise the frame gets the time at which it was read: late, and never too
-/// early.
+/// stamps with the wall clock, which may step. A stamp therefore counts only between the readings
+/// of the socket before and after the frame, and only where both clocks ran alike between these.
+/// Otherwise the frame gets the time at which it was read: late, and never too early.
 class FrameStamps {
  public:
   /// Pre: no frame can have arrived yet.
@@ -88,7 +87,7 @@ class FrameStamps {
 /// Aside is what a CAN_RAW socket delivers beside the frames of other nodes.
 struct Aside {
   std::vector<can_frame> errors;
-  std::size_t confirmed = 0;          // our own frames that came back
+  std::size_t confirmed = 0;          // own frames that came back
   std::optional<FrameStamps> stamps;  // set: the kernel stamps frames. To be kept
   bool only_units = false;            // drop frames of other hosts
   bool groups = false;                // CAN FD frames may arrive

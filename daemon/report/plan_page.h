@@ -1,7 +1,7 @@
-// PlanPage shows a plan: the focal plane with every arm, played in time; the power of each rail;
-// the pairs of units that come nearest to each other. The page is one file of HTML like Page, but
-// with a script. The script fetches nothing (the page's policy forbids it), so the page works from
-// a disk, an archive or a mail.
+// PlanPage shows a plan. The page has the focal plane with every arm, played in time, the power of
+// each rail, and the pairs of units that come nearest to each other. The page is one file of HTML
+// like Page, but with a script. The script fetches nothing (the page's policy forbids it), so the
+// page works from a disk, an archive or a mail.
 //
 // The motion on the page is the rows of plan.csv, to the bit: angles linear in time within a row.
 // The powers are those of the rows too, so the curves equal Estimate's. Sizes in base64: a row is

@@ -1,8 +1,8 @@
 // bare_can_loop INTERFACE... is the least that a program can do that hears frames on several CAN
 // interfaces and answers each: wait, read one, write one. A second process asks, with 16 questions
 // under way on each interface, so that there is always something to read. The program runs until
-// SIGTERM. At the end it prints one line of JSON: the frames that passed (both ways) and the CPU
-// time of the answering process alone.
+// SIGTERM. At the end the program prints one line of JSON. The line has the frames that passed
+// (both ways) and the CPU time of the answering process alone.
 #define _GNU_SOURCE
 #include <linux/can.h>
 #include <linux/can/raw.h>

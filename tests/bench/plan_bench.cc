@@ -1,11 +1,10 @@
-// This bench plans from random configuration to random configuration and prints one line for each:
-// makespan over the lower bound, CPU seconds, and units that were not served. The independent
-// checker runs on request. A summary stands at the end.
+// This bench plans from random configuration to random configuration. Each gives one line: makespan
+// over the lower bound, CPU seconds, and units that were not served. The independent checker runs
+// on request. A summary stands at the end.
 //   plan_bench --layout 0 --units 5000 --configurations 100 --seed 1 --check 1
 // --beside retract: the least time of the method of other systems: all fold into their cells, all
-// rotate, all extend, each when the last one has ended, if no unit ever met another.
-// --plot FILE: the distribution of both, SVG. --objective 1, 2, 3: least energy, least peak, even
-// power.
+// rotate, all extend, each when the last one has ended, if no unit ever met another. --plot FILE:
+// the distribution of both, SVG. --objective 1, 2, 3: least energy, least peak, even power.
 // --layout 0 hexagonal, 1 the plate of the file FOCALFLEET_DESI_UNITS names, 2 SDSS-like.
 #include <sys/resource.h>
 

@@ -1,8 +1,8 @@
 // These tests run SocketCanPort on a controller that does not give frames back. The driver is the
 // kernel's own slcan driver, with this test as the controller at the other end of the serial line.
-// The controller takes every frame at once and needs the frame's bits for it, one after the other,
-// as a controller with a deep memory does. Frames that it has not finished are below the socket.
-// The clock of the wire is the test's, so a guest that is late changes nothing.
+// The controller takes every frame at once and sends their bits one after the other, as a
+// controller with a deep memory does. Frames that it has not finished are below the socket. The
+// clock of the wire is the test's, so a guest that is late changes nothing.
 #include <gtest/gtest.h>
 #include <net/if.h>
 #include <poll.h>

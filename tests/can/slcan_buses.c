@@ -1,6 +1,6 @@
 // slcan_buses COUNT emulates COUNT CAN controllers behind serial lines (slcan), each on a bus of
-// its own with the units of vcanN. To the kernel a controller is a real one: it has bit timing,
-// states, error counters and a driver, and it can be pulled out of the machine. The program prints
+// its own with the units of vcanN. To the kernel a controller is a real one. Each has bit timing,
+// states, error counters and a driver, and can be pulled out of the machine. The program prints
 // "ready" and then the messages of the drivers.
 //
 // Commands on stdin, one a line; bus N of 0..COUNT-1:

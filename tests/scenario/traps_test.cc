@@ -1,6 +1,7 @@
-// These tests cover known problems of earlier fleets, beyond wrong answers
-// (wrong_answers_test.cc): dead links, ends and restarts of the host, stops, disabled units, and
-// checks before frames are sent. docs/peers.md names each problem beside its test.
+// These tests cover known problems of earlier fleets other than wrong answers
+// (wrong_answers_test.cc). They are dead links, ends and restarts of the host, stops, disabled
+// units, and checks before frames are sent. The page docs/peers.md names each problem beside its
+// test.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // In these tests units refuse, stay silent, answer late or under another number, or give false
 // answers. Such an answer is never taken for success, never holds up the other units, and is always
-// named. docs/peers.md gives the fault of an earlier system that each test stands for.
+// named. The page docs/peers.md gives the fault of an earlier system that each test stands for.
 #include <gtest/gtest.h>
 
 #include <algorithm>
