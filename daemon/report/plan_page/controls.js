@@ -145,7 +145,7 @@ class PlanPage {
     this.redraw();
   }
 
-  /** -1: none. */
+  /** Selects a unit by its place in the layout; -1: none. */
   select(u) {
     this.plate.selected = u;
     byId("unit-hint").hidden = u >= 0;
@@ -227,7 +227,7 @@ class PlanPage {
     this.redraw();
   }
 
-  /** plan.html#t=12.5&unit=17: a place and a moment that one can send to somebody. */
+  /** Shows the place and moment of a link: plan.html#t=12.5&unit=17. */
   goWhereTheAddressSays() {
     const wanted = new URLSearchParams(location.hash.slice(1));
     const t_s = Number(wanted.get("t"));

@@ -41,7 +41,7 @@ class Curves {
 
   railColour(place) { return this.colours[`s${place % 7}`]; }
 
-  /** What stands above each other: curves with their colours and limits, and the space for them. */
+  /** The panels from top to bottom: curves with their colours and limits, and their space. */
   panels() {
     const {top, bottom, between} = kCurveMargins_px;
     const {total, rails} = this.power;

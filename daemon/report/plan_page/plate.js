@@ -96,7 +96,7 @@ class Plate {
     this.scaleAll = this.scale;
   }
 
-  /** What lies under (x, y) stays there. Units: px. */
+  /** Zooms; the point under (x, y) stays there. Units: px. */
   zoom(factor, x_px = this.width / 2, y_px = this.height / 2) {
     const x = this.plateX(x_px);
     const y = this.plateY(y_px);
@@ -236,8 +236,8 @@ class Plate {
   }
 
   /**
-   * Paints (stroke or fill) a piece of path for each visible unit for which `add` says that it made
-   * one.
+   * Paints (stroke or fill) a piece of path for each visible unit for which `add` returns that it
+   * made one.
    */
   paintUnits(paint, add) {
     const {context} = this;
@@ -403,7 +403,7 @@ class Plate {
     }
   }
 
-  /** Text that is legible on anything. */
+  /** Draws text that is legible on any background. */
   label(text, x_px, y_px, colour = this.colours.ink) {
     const {context} = this;
     context.lineJoin = "round";
@@ -491,7 +491,7 @@ class Plate {
   }
 }
 
-/** A clearance for people: "+12.3 um", signed, because 0 is just clear. */
+/** A clearance as text: "+12.3 um", signed, because 0 is just clear. */
 function micrometres(mm) {
   const um = 1000 * mm;
   const digits = Math.abs(um) < 100 ? 1 : 0;
