@@ -15,7 +15,8 @@ using namespace dds_internal;
 
 namespace {
 
-// A camera that sends more between two looks loses the oldest: only the newest may answer anyway.
+// A camera that sends more samples between two calls of Take loses the oldest ones. The loss does
+// no harm: only the newest may answer the request.
 constexpr std::int32_t kDepth = 8;
 
 Result<Exposure> FromSample(const focalfleet_Exposure& sample, const SensorLimits& sensor) {
@@ -57,12 +58,12 @@ class CameraDds::Impl {
     const focalfleet_ExposureRequest sample{.since_ns = since.ns, .exposure = id};
     const dds_return_t code = dds_write(writer_, &sample);
     if (code < 0) return DdsFailure("ask for an exposure", code);
-    dds_write_flush(writer_);  // a publisher in the process packs what all writers write
+    dds_write_flush(writer_);  // needed because the process batches what all writers write
     return {};
   }
 
   Result<std::optional<Exposure>> Take() {
-    void* samples[1] = {nullptr};  // asks for a loan
+    void* samples[1] = {nullptr};  // null asks Cyclone for a loan
     dds_sample_info_t info;
     const dds_return_t count = dds_take(reader_, samples, &info, 1, 1);
     if (count < 0) return DdsFailure("take an exposure", count);

@@ -1,8 +1,9 @@
-// A camera behind two DDS topics (daemon/dds/focalfleet.idl): we ask by
-// focalfleet/exposure_request, it answers by focalfleet/exposure. What was sent before the daemon
-// listened never comes. Samples are held to what files are held to (CheckSpots); Cyclone has
-// refused those that are no Exposure at all, without a word. Until the domain can be joined, no
-// exposure is taken, and the answer says why.
+// CameraDds reaches a camera through two DDS topics (daemon/dds/focalfleet.idl). The daemon asks on
+// focalfleet/exposure_request; the camera answers on focalfleet/exposure.
+//
+// Samples sent before the daemon listened are never received. Samples are checked by the rules for
+// files (CheckSpots). Cyclone has already dropped, without a message, samples that are no Exposure
+// at all. Until the domain can be joined no exposure is taken, and the answer gives the reason.
 #pragma once
 
 #include <chrono>
@@ -20,7 +21,8 @@ class CameraDds : public CameraPort {
   struct Options {
     DdsOptions dds;
     SensorLimits sensor;
-    std::function<void(const std::string& trouble)> tell = [](const std::string&) {};  // LateJoin's
+    std::function<void(const std::string& trouble)> tell = [](const std::string&) {};  // as
+                                                                                       // LateJoin's
     std::chrono::milliseconds rejoin_period{5000};
   };
   explicit CameraDds(Options options);

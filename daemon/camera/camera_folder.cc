@@ -31,7 +31,7 @@ bool EndsInOneOf(std::string_view name, const std::array<std::string_view, kCoun
   return std::ranges::any_of(endings, [&](std::string_view end) { return name.ends_with(end); });
 }
 
-/// The name, shortened so that ".reason" fits behind it.
+/// `name`, shortened so that ".reason" still fits behind it.
 std::string ReasonName(const std::string& name) {
   constexpr std::size_t kStemMax = 240;
   return name.substr(0, kStemMax) + ".reason";
@@ -62,7 +62,7 @@ Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, Senso
   std::unique_ptr<CameraFolder> folder(
       new CameraFolder(std::move(path), std::move(*folders), sensor));
   const auto names = folder->folders_.camera.Names(limits::kCameraFiles);
-  // A folder that is too full is told when the first exposure is due; a fleet moves without it.
+  // A folder that is too full is reported when the first exposure is due: a fleet moves without it.
   if (!names && names.error().code == ErrorCode::kFull) return folder;
   if (!names) return tl::unexpected(names.error());
   for (const std::string& name : *names)
@@ -72,7 +72,7 @@ Result<std::unique_ptr<CameraFolder>> CameraFolder::Open(std::string path, Senso
 }
 
 Status CameraFolder::Request(std::uint64_t id, WallTime since) {
-  // The path may lead elsewhere by now: cleared up, mounted anew.
+  // The path may lead elsewhere by now: the folder may have been cleared up or mounted anew.
   FOCALFLEET_TRY_ASSIGN(folders_, OpenAll(path_));
   return folders_.camera.Write(kRequest, "{\"exposure\": " + std::to_string(id) +
                                              ", \"since_utc\": \"" + UtcOf(since.ns) + "\"}\n");
@@ -91,7 +91,7 @@ Result<std::optional<Exposure>> CameraFolder::Take() {
     return ParseExposure(std::move(bytes), folder.Shown(name), sensor_);
   }();
   if (!exposure) {
-    if (!folder.IdentityOf(name)) return std::optional<Exposure>();  // taken back meanwhile
+    if (!folder.IdentityOf(name)) return std::optional<Exposure>();  // the camera took it back
     Refuse(name, exposure.error().text);
     return tl::unexpected(exposure.error());
   }
@@ -99,7 +99,8 @@ Result<std::optional<Exposure>> CameraFolder::Take() {
   return std::optional(std::move(*exposure));
 }
 
-/// The first by name, so that a camera that counts is taken in its order; empty: none.
+/// The first file by name, so that the files of a camera that counts are taken in its order. Empty:
+/// there is none.
 Result<std::string> CameraFolder::NextFile() {
   FOCALFLEET_TRY_ASSIGN(const auto names, folders_.camera.Names(limits::kCameraFiles));
   std::erase_if(stays_, [&](const auto& stays) {

@@ -1,19 +1,22 @@
-// A camera behind a folder: we ask by request.json, it answers by a file of spots.
+// CameraFolder reaches a camera through a folder. The daemon asks by request.json; the camera
+// answers by a file of spots.
 //
 //   request.json   {"exposure": 12, "since_utc": "2026-11-22T03:04:05.678Z"}, replaced as a whole
 //   <name>.csv     one exposure (docs/files.md), or <name>.fits (.fit, .fts), or these packed as
-//                  <name>.csv.gz; to be put there as a whole, too: written under an ending such as
+//                  <name>.csv.gz; also to be put there as a whole: written under an ending such as
 //                  .part, and renamed
-//   taken/         where we move each file that we have read
-//   refused/       ... and each that is no exposure, with <file>.reason beside it
+//   taken/         the daemon moves each file here that it has read
+//   refused/       and each file here that is no exposure, with <file>.reason beside it
 //
-// Tables and archives that are none of these are refused by their ending. All other names are left
-// alone: they may be what a camera is writing.
+// Tables and archives with any other ending are refused by their ending. All other names are left
+// alone: a camera may be writing them.
 //
-// Files that lie there when the daemon starts are set aside as refused: they answer nothing.
+// Files that lie in the folder when the daemon starts are set aside as refused, since they answer
+// no request.
 //
-// The camera may be another user, and broken or hostile (daemon/files/guarded_folder.h). Nothing of
-// it is removed: what cannot be moved stays, and is looked at again when it has changed.
+// The camera may run as another user, and may be broken or hostile (daemon/files/guarded_folder.h).
+// Nothing of it is deleted. A file that cannot be moved stays, and is looked at again when it has
+// changed.
 #pragma once
 
 #include <map>
@@ -28,14 +31,15 @@ namespace focalfleet {
 
 enum class CameraFile : std::uint8_t {
   kSpots,
-  kForeign,  // people take it for one: told, not passed over
+  kForeign,  // easily mistaken for an exposure: reported, not skipped
   kNotOurs,
 };
 CameraFile KindOfName(std::string_view name);
 
 class CameraFolder : public CameraPort {
  public:
-  /// Makes the folder where it is missing. Errors: kUnavailable, names it.
+  /// Makes the folder where it is missing.
+  /// Errors: kUnavailable, with the folder's path.
   static Result<std::unique_ptr<CameraFolder>> Open(std::string path, SensorLimits sensor);
 
   Status Request(std::uint64_t id, WallTime since) override;
@@ -58,7 +62,7 @@ class CameraFolder : public CameraPort {
   std::string path_;
   Folders folders_;
   SensorLimits sensor_;
-  std::map<std::string, FileIdentity> stays_;  // could not be moved
+  std::map<std::string, FileIdentity> stays_;  // files that could not be moved
 };
 
 }  // namespace focalfleet

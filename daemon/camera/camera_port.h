@@ -1,5 +1,6 @@
-// Where spots come from. The daemon asks for an exposure and takes whatever spot lists come; what
-// it may use of them it decides itself (fleet/camera). Nothing that comes through here is trusted.
+// CameraPort is the source of spot lists. The daemon asks for an exposure and takes each list that
+// arrives; fleet/camera decides which of them is used. Nothing that comes through this port is
+// trusted.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +20,9 @@ class CameraPort {
 
   /// Asks for an exposure that begins no earlier than `since`. Errors: kUnavailable.
   virtual Status Request(std::uint64_t id, WallTime since) = 0;
-  /// The next exposure that has come; nothing: none. Never waits. Errors: what came is no exposure
-  /// (kInvalid), or nothing can come at all (kUnavailable); the next may be good.
+  /// The next exposure that has arrived; empty where none has. Never waits.
+  /// Errors: kInvalid: the data received is no exposure; kUnavailable: nothing can arrive at all.
+  /// The next call may succeed.
   virtual Result<std::optional<Exposure>> Take() = 0;
 };
 

@@ -14,7 +14,7 @@ constexpr std::size_t kSeenMax = 1000;  // exposures; a night has a few hundred
 
 ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& ending) {
   const std::uint64_t id = work.job.id;
-  // All units rest by now, so whatever is taken from here on shows them at rest.
+  // All units are at rest by now, so each exposure from here on shows them at rest.
   const WallTime since = options_.now();
   if (const Status asked = port_->Request(id, since); !asked)
     return {id, tl::unexpected(asked.error())};

@@ -1,6 +1,9 @@
-// What the camera's thread does for one ExposureJob: ask, wait for an exposure that may answer,
-// look who is who. An exposure that may not (too early, doubled, another field, no exposure at all)
-// is said to the log and waited past; when the time is up, the last reason is the answer.
+// CameraWork does what the camera's thread owes to one ExposureJob. The thread asks for an
+// exposure, waits for one that may answer, and assigns its spots to units.
+//
+// An exposure that may not answer is too early, doubled, of another field, or no exposure at all.
+// Each is written to the log, and the wait goes on. When the time is up, the last reason is the
+// answer.
 #pragma once
 
 #include <atomic>
@@ -28,15 +31,16 @@ class CameraWorker {
     CameraSite site;
     std::chrono::milliseconds patience{30'000};  // real time, from the request
     std::chrono::milliseconds pause{20};         // between two looks
-    double speed = 1;                            // of the host's clock, to real time
+    double speed = 1;                            // of the host's clock, relative to real time
     std::function<WallTime()> now = &WallTime::Now;
     std::function<void(const std::string&)> log = [](const std::string&) {};
   };
   CameraWorker(std::unique_ptr<CameraPort> port, Options options)
       : port_(std::move(port)), options_(std::move(options)) {}
 
-  /// Errors of the answer: kRefused: what came was not believed; kUnavailable: nothing came, or
-  /// `ending`.
+  /// The answer to one job.
+  /// Errors in the answer: kRefused: an exposure came and was not believed; kUnavailable: nothing
+  /// came, or `ending` is set.
   ExposureDone Do(const CameraWork& work, const std::atomic<bool>& ending);
 
  private:

@@ -1,5 +1,5 @@
-// An exposure as a camera hands it over: spots.csv or a FITS table, either of them perhaps packed
-// by gzip. The first bytes decide, whatever the file is called.
+// ParseExposure reads an exposure as a camera delivers it: spots.csv or a FITS table, either of
+// them perhaps packed by gzip. The first bytes decide the format, whatever the file is called.
 #pragma once
 
 #include <string>
@@ -9,8 +9,9 @@
 
 namespace focalfleet {
 
-/// Errors: kInvalid, after `name`: as those of ReadSpots, ParseSpotsFits, Gunzip (at most
-/// limits::kExposureBytes) and CheckText.
+/// The exposure in `bytes`.
+/// Errors: kInvalid, with `name` in front: as those of ReadSpots, ParseSpotsFits, CheckText and
+/// Gunzip (at most limits::kExposureBytes).
 Result<Exposure> ParseExposure(std::string bytes, const std::string& name,
                                const SensorLimits& sensor);
 

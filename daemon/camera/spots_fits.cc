@@ -21,8 +21,8 @@ Result<std::string> TextKey(const FitsTable& table, const std::string& path, con
               path + ": key " + name + " is neither a text nor a whole number");
 }
 
-/// Numbers of a column, whatever it holds them as; nothing where it is not there. Errors: kInvalid:
-/// it holds text.
+/// The numbers of a column of any numeric type; empty where the table has no such column.
+/// Errors: kInvalid: the column holds text.
 Result<std::vector<double>> Numbers(const FitsTable& table, const std::string& path,
                                     const char* name) {
   const FitsColumn* column = table.Find(name);
@@ -74,7 +74,7 @@ Result<Exposure> ParseSpotsFits(std::string bytes, const std::string& name,
   fwhm.resize(ids.size(), 0);
   exposure.spots.reserve(ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    // Not measured, as an empty cell of spots.csv.
+    // NaN means not measured, as an empty cell of spots.csv does.
     const double width_px = std::isnan(fwhm[i]) ? 0 : fwhm[i];
     exposure.spots.push_back({ids[i], x[i], y[i], flux[i], width_px});
   }

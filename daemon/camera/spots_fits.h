@@ -1,7 +1,9 @@
-// One exposure as a FITS binary table: columns SPOT_ID, X_PX, Y_PX, FLUX and perhaps FWHM_PX, keys
-// EXPID and DATE-OBS, which say what `# exposure_id` and `# taken_utc` say in spots.csv. The first
-// table with these columns is meant; other columns of it, images and tables before it do not
-// matter. Keys may stand in the primary header, EXPID may be a whole number.
+// ParseSpotsFits reads one exposure from a FITS binary table. Its columns are SPOT_ID, X_PX, Y_PX,
+// FLUX and perhaps FWHM_PX. Its keys EXPID and DATE-OBS give what `# exposure_id` and `# taken_utc`
+// give in spots.csv.
+//
+// The first table with these columns is read. Other columns of it are ignored, and so are images
+// and tables before it. Keys may stand in the primary header; EXPID may be a whole number.
 #pragma once
 
 #include <string>
@@ -11,7 +13,8 @@
 
 namespace focalfleet {
 
-/// As ReadSpots, of a file's bytes. Errors: kInvalid; names `name` and column, key or row.
+/// The exposure in a file's bytes, as ReadSpots gives it.
+/// Errors: kInvalid; names `name` and the column, key or row.
 Result<Exposure> ParseSpotsFits(std::string bytes, const std::string& name,
                                 const SensorLimits& sensor);
 

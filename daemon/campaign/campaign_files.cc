@@ -36,8 +36,8 @@ constexpr std::array<std::string_view, 2> kFlagColumns = {"rehomed", "from_measu
 constexpr std::string_view kTimeColumn = "t_s";
 constexpr std::array<std::string_view, 3> kModes = {"asymmetric", "five_segment", "seven_segment"};
 
-// Columns of numbers that docs/files.md names, with the values that they can have. A word in one of
-// them is a slip, not another meaning.
+// Columns of numbers that docs/files.md names, each with the values that it may have. A word in one
+// of them is an error, not another kind of column.
 struct CovariateBounds {
   std::string_view column;
   double low;
@@ -130,10 +130,10 @@ std::string TwiceText(std::uint32_t id, std::int64_t move, int line) {
          " twice, first in line " + std::to_string(line);
 }
 
-/// The columns of moves.csv beside those that must be there. Values stand in the order of the file.
+/// The columns of moves.csv beyond the required ones. Values stand in the order of the file.
 class MoreColumns {
  public:
-  /// Says of each column whether it is read, by its name and, where nobody knows that, by its
+  /// Decides of each column whether it is read: by its name or, where the name is not known, by its
   /// cells.
   explicit MoreColumns(const CsvTable& table) {
     for (std::size_t column = 0; column < table.columns().size(); ++column) {
@@ -155,7 +155,7 @@ class MoreColumns {
     if (modes_) modes_->values.push_back(ModeOf(row));
   }
 
-  /// In the order of `rows`.
+  /// Adds the columns to `campaign`, with values in the order of `rows`.
   void TakeInto(Campaign* campaign, const std::vector<MoveRow>& rows) {
     const auto in_order = [&](auto* values) {
       auto sorted = *values;
@@ -169,7 +169,7 @@ class MoreColumns {
     campaign->word_columns.push_back(std::move(*modes_));
   }
 
-  /// The values of a column of numbers in the order of the file; null where there is none.
+  /// The values of a numeric column in the order of the file; null where there is no such column.
   [[nodiscard]] const std::vector<double>* Find(std::string_view name) const {
     const auto found = std::ranges::find(covariates_, name, &sim::Covariate::name);
     return found == covariates_.end() ? nullptr : &found->values;
@@ -184,8 +184,9 @@ class MoreColumns {
   static bool IsFlag(std::string_view name) { return std::ranges::count(kFlagColumns, name) > 0; }
   static bool IsKnown(std::string_view name) { return IsFlag(name) || BoundsOf(name) != nullptr; }
 
-  /// Empty where all cells are numbers or flags. A column of words is told by its name; where words
-  /// stand among numbers one of them may be a slip, so the first is told.
+  /// Why the column is ignored; empty where all its cells are numbers or flags. For a column of
+  /// words the message names the column. Where words stand among numbers one of them may be an
+  /// error, so the message names the first word.
   static std::string ReasonToPassOver(const CsvTable& table, std::size_t column) {
     const std::string name = table.Shown(column);
     if (!table.HasName(column)) return name;
@@ -253,7 +254,7 @@ Result<std::vector<MoveRow>> ReadMoveRows(const CsvTable& table, const UnitsFile
   return rows;
 }
 
-// Rows by unit, and those of one unit as its moves were made.
+// Rows sorted by unit, and for each unit in the order in which its moves were made.
 std::vector<MoveRow> InOrder(const std::vector<MoveRow>& rows, const MoreColumns& more,
                              TableNotes* notes) {
   const std::vector<double>* times_s = more.Find(kTimeColumn);
@@ -291,7 +292,7 @@ void TakeRows(const std::vector<MoveRow>& rows, const UnitsFile& units, bool has
   campaign->first_row.push_back(campaign->move_id.size());
 }
 
-/// Which hardware stood at each place, where units.csv says so.
+/// Reads which hardware stood at each place, where units.csv gives it.
 Status ReadSerials(const CampaignTables& tables, Campaign* campaign) {
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(tables.units, tables.units_file));
   if (!table.Find("serial")) return {};

@@ -1,7 +1,9 @@
-// The two tables of a campaign (docs/files.md): moves.csv and units.csv, text to values and back.
-// sim/ knows no tables and fleet/ no campaigns, so that the door between them stands here. The
-// units' table is fleet's (fleet/files/layout_file.h); here it is only turned into the plain
-// values that sim/ takes.
+// The two tables of a campaign (docs/files.md) are moves.csv and units.csv. This header turns their
+// text into values and back.
+//
+// sim/ has no tables and fleet/ has no campaigns, so the conversion stands here. The layer fleet
+// parses the units' table (fleet/files/layout_file.h); here it only becomes the plain values that
+// sim/ takes.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +16,7 @@
 
 namespace focalfleet {
 
-/// One table each, with the names that error messages call them.
+/// The text of both tables, with the names that error messages use for them.
 struct CampaignTables {
   std::string_view moves;
   std::string_view units;
@@ -23,22 +25,22 @@ struct CampaignTables {
   std::string name = "campaign";
 };
 
-/// Notes on the tables, which are no errors.
+/// Notes on the tables that are no errors.
 struct TableNotes {
-  // Columns that nobody reads, as messages call them; where words stand among the numbers of one,
-  // with the line of the first.
+  // Columns that are not read, as messages name them. Where words stand among the numbers of a
+  // column, the line of the first word is given too.
   std::vector<std::string> ignored_of_moves;
   std::vector<std::string> ignored_of_units;
   std::size_t rows_out_of_order = 0;  // of moves.csv, behind a later move of their unit
 };
 
-/// A unit that has moves must stand in units.csv; one that has none is left out. Rows may stand in
-/// any order (move_order.h). A column of moves.csv that nobody knows is a covariate where it holds
-/// numbers or flags alone. `notes`: if wanted. Errors: kInvalid with file:line: column: reason, of
-/// all rows.
+/// The campaign in both tables. A unit that has moves must stand in units.csv; a unit without moves
+/// is left out. Rows may stand in any order (move_order.h). An unknown column of moves.csv is a
+/// covariate where it holds numbers or flags alone. `notes` may be null.
+/// Errors: kInvalid with file:line: column: reason, of all rows.
 Result<sim::Campaign> ReadCampaign(const CampaignTables& tables, TableNotes* notes = nullptr);
 
-/// Every column; reads back equal.
+/// moves.csv with every column; reading it back gives an equal campaign.
 std::string WriteMoves(const sim::Campaign& campaign);
 std::string WriteCampaignUnits(const sim::Campaign& campaign);
 

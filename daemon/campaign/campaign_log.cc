@@ -10,7 +10,7 @@ namespace {
 constexpr double kMovedDeg = 1e-9;
 constexpr double kTunedAmplitude = 1;
 
-/// Added where it is not there yet.
+/// The index of `word` in `words`, to which it is added where it is missing.
 int IndexOf(const std::string& word, std::vector<std::string>* words) {
   const auto found = std::find(words->begin(), words->end(), word);
   const auto index = static_cast<int>(found - words->begin());
@@ -47,7 +47,7 @@ sim::CampaignUnit DescribeUnit(const Unit& unit) {
 
 namespace {
 
-/// The hardware that made all these moves; 0: not known, or it was replaced in between.
+/// The hardware that made all these moves; 0: not known, or replaced in between.
 SerialNumber SerialOf(const std::vector<LoggedMove>& moves) {
   const SerialNumber first = moves.front().serial;
   const bool same =

@@ -1,5 +1,6 @@
-// What a campaign collects while it runs: after each move, where the coordinator believed every
-// unit before and after, and where the camera saw it. Becomes the folder of docs/files.md.
+// CampaignLog collects the moves of a campaign while it runs. For each unit and move it keeps where
+// the coordinator believed the unit before and after, and where the camera measured it. The log
+// becomes the folder of docs/files.md.
 #pragma once
 
 #include <array>
@@ -16,7 +17,7 @@
 
 namespace focalfleet {
 
-/// One unit in one move. Angles in degrees of the axes as the unit counts them.
+/// A unit in one move. Angles are in degrees of the axes, as the unit counts them.
 struct LoggedMove {
   UnitId unit;
   std::int64_t move = 0;
@@ -25,34 +26,34 @@ struct LoggedMove {
   double x_mm = 0;  // NaN: not seen, or not certain
   double y_mm = 0;
   double sigma_um = 0;  // NaN likewise
-  double t_s = 0;       // of the exposure, since the first
-  double delay_s = 0;   // end of its motion to the exposure; NaN: not known
-  // How it is driven.
+  double t_s = 0;       // of the exposure, since the first exposure
+  double delay_s = 0;   // from the end of its motion to the exposure; NaN: not known
+  // Drive parameters of the unit.
   double v_bus_V = 0;
   double counter1 = 0;
   double repeat = 0;
   std::string mode;
-  SerialNumber serial = {};  // that made the move; 0: not known
+  SerialNumber serial = {};  // of the hardware that made the move; 0: not known
 };
 
-/// What the layout says of a unit, as campaigns have it.
+/// A unit of the layout, in the form that campaigns use.
 sim::CampaignUnit DescribeUnit(const Unit& unit);
 
 class CampaignLog {
  public:
   explicit CampaignLog(const Layout* layout) : layout_(layout) {}
 
-  /// All units of one move, those too that stayed.
+  /// Adds one move. Pre: `units` holds all units, those that stayed too.
   void Add(const std::vector<LoggedMove>& units);
-  /// Covariates: all of docs/files.md but `temp_C` and `elevation_deg`, which nobody tells us, and
-  /// `rehomed`, which no move of a campaign is. Units are driven at the tuned level:
-  /// drive_amplitude is 1.
+  /// The campaign collected so far. Its covariates are all of docs/files.md except three: the
+  /// daemon does not receive `temp_C` and `elevation_deg`, and no move of a campaign is `rehomed`.
+  /// Units are driven at the tuned level, so drive_amplitude is 1.
   [[nodiscard]] sim::Campaign Campaign(const std::string& name) const;
 
  private:
   const Layout* layout_;
-  std::map<std::uint32_t, std::vector<LoggedMove>> of_unit_;                // by id
-  std::map<std::pair<std::int64_t, std::uint32_t>, std::uint32_t> movers_;  // move, rail
+  std::map<std::uint32_t, std::vector<LoggedMove>> of_unit_;                // by unit id
+  std::map<std::pair<std::int64_t, std::uint32_t>, std::uint32_t> movers_;  // by move and rail
 };
 
 }  // namespace focalfleet

@@ -42,7 +42,7 @@ json UnknownJson(const sim::UnknownFound& found) {
   return unknown;
 }
 
-// Null: none was found.
+// The JSON of `steps`; null where no steps were found.
 json StepsJson(const sim::PlaceSteps& steps) {
   json both = json::array();
   for (const double step_mm : {steps.x_mm, steps.y_mm})
@@ -79,19 +79,20 @@ std::string NumberList(std::span<const double> values, int digits = kDigits) {
   return text + "]";
 }
 
-// A line of TOML; none where the number is not known.
+// A line of TOML; empty where the number is not known.
 std::string NumberLine(std::string_view key, double value) {
   return std::isfinite(value) ? fmt::format("{} = {:.{}g}\n", key, value, kDigits) : "";
 }
 
-// Where the campaign left the unit is told whole or not at all: a reader takes no part of it.
+// The state in which the campaign left a unit is written whole or not at all, since a reader
+// accepts no part of it.
 bool IsReported(const sim::UnitLeft& left) {
   const auto is_known = [](double deg) { return std::isfinite(deg); };
   return left.moved && std::ranges::all_of(left.pose_deg, is_known) &&
          std::ranges::all_of(left.added_deg, is_known);
 }
 
-// Where an empirical term acts, and the knots that a curve is read through.
+// Where an empirical term acts, and the knots through which its curve is read.
 std::string EmpiricalText(const sim::Template& form) {
   std::string text = "covariate = " + Quoted(form.covariate) + "\n";
   text += "channel = " + Quoted(sim::ChannelOf(form)) + "\n";
@@ -99,13 +100,15 @@ std::string EmpiricalText(const sim::Template& form) {
   std::vector<double> values, ranks;
   for (const sim::RankKnot& knot : form.knots)
     values.push_back(knot.value), ranks.push_back(knot.rank);
-  // To the last digit: of times since 1970 nine digits are ten seconds, and knots must ascend.
+  // Nine digits of a time since 1970 resolve only ten seconds, and knots must ascend. Knots are
+  // therefore written to the last digit.
   constexpr int kAllDigits = 17;
   return text + "knot_values = " + NumberList(values, kAllDigits) +
          "\nknot_ranks = " + NumberList(ranks) + "\n";
 }
 
-// What the term could be, as found now or, if it was not, as the model before says; else none.
+// Rival causes of the term, as this diagnosis found them. If it did not find the cause, those that
+// the model before lists; empty: none.
 std::vector<std::string> CandidatesOf(const std::string& name, const sim::Diagnosis& diagnosis,
                                       const ReportNames& names) {
   const auto found = std::ranges::find(diagnosis.causes, name, &sim::CauseFound::cause);
@@ -141,11 +144,11 @@ std::string TermText(const sim::ModelTerm& term, const sim::Diagnosis& diagnosis
     if (!term.form.shape_of_unit.empty()) shapes.push_back(*shape);
     amplitude.insert(amplitude.end(), own.begin(), own.end());
     const std::size_t at = term.group_of_unit[u] * term.form.columns;
-    // 0: nothing is known of it.
+    // 0 means that nothing is known of it.
     for (std::size_t c = 0; c < term.form.columns; ++c)
       sigma.push_back(std::isfinite(term.sigma[at + c]) ? term.sigma[at + c] : 0);
   }
-  if (units.empty()) return {};  // nobody has it any more
+  if (units.empty()) return {};  // no unit has it any more
   text += fmt::format("columns = {}\n", term.form.columns);
   text += "units = " + NumberList(units) + "\n";
   if (!shapes.empty()) text += "shapes = " + NumberList(shapes) + "\n";

@@ -1,7 +1,10 @@
-// What `focalfleet diagnose` leaves behind for programs: report.json (the fields of
-// docs/diagnosis.md) and model.toml (the extended model: fitted geometry, and every accepted
-// effect with its amplitudes, their uncertainty and the campaign they came from). A number that is
-// not known is null in the report and absent from the model; ReadModelFile reads every model.
+// These are the files that `focalfleet diagnose` writes for programs. The file report.json holds
+// the fields of docs/diagnosis.md. The file model.toml holds the extended model: the fitted
+// geometry, and every accepted effect with its amplitudes, their uncertainty and the campaign they
+// came from.
+//
+// A number that is not known is null in the report and absent from the model. ReadModelFile reads
+// every model.
 #pragma once
 
 #include <map>
@@ -19,7 +22,8 @@ struct ReportNames {
   std::string model_before = "nominal";
   std::string model_after = "extended";
   std::string campaign;
-  /// What causes of the model before could be, too, by cause: what it explains is not asked again.
+  /// Rival causes of each cause in the model before, by cause. The diagnosis does not ask again for
+  /// what that model explains.
   std::map<std::string, std::vector<std::string>> candidates_before;
 };
 
@@ -28,10 +32,11 @@ nlohmann::json ReportJson(const sim::Diagnosis& diagnosis, const ReportNames& na
 std::string WriteModel(const sim::Diagnosis& diagnosis, const ReportNames& names,
                        const sim::Campaign& campaign);
 
-/// The verdict in one sentence, for people.
+/// The verdict in one sentence, for human readers.
 std::string VerdictSentence(const sim::Diagnosis& diagnosis);
 
-/// A number for people with so many decimals, or significant digits; "?" where it is not known.
+/// `value` for human readers, with the given number of decimals or significant digits; "?" where it
+/// is not known.
 std::string Decimals(double value, int decimals);
 std::string Significant(double value, int digits);
 

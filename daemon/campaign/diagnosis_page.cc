@@ -67,7 +67,7 @@ void AddGain(const Diagnosis& diagnosis, report::Page* page) {
        .horizontal = {{gain.noise_floor_um, "noise"}}}));
 }
 
-// x against y of at most kPointsMax rows.
+// A scatter plot of x against y, of at most kPointsMax rows.
 void AddScatter(const std::vector<double>& x, const std::vector<double>& y, std::size_t stride,
                 std::vector<double>* to_x, std::vector<double>* to_y) {
   for (std::size_t row = 0; row < x.size(); row += stride)
@@ -129,7 +129,7 @@ std::string PercentOf(double share) {
   return share < 0.001 ? "below 0.1 %" : fmt::format("{:.1f} %", 100 * share);
 }
 
-// What is to be had from further moves, pair by pair.
+// The table of what further moves would decide, pair by pair.
 void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
   page->Heading("Moves to make next");
   if (next.prospects.empty() && next.untold.empty()) {

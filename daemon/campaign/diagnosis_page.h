@@ -1,6 +1,7 @@
-// report.html of a diagnosis, for people: the verdict in its first sentence, then the causes with
-// what to do about them, residuals over the plate and against the columns before and after, the
-// gain on held-out moves, what could not be tested, and the moves to make next.
+// DiagnosisPage is report.html of a diagnosis, for human readers. Its first sentence is the
+// verdict. Then come the causes, each with its remedy, and the residuals over the plate and against
+// the columns, before and after. Last come the gain on held-out moves, what could not be tested,
+// and the moves to make next.
 #pragma once
 
 #include <string>

@@ -126,14 +126,14 @@ class ModelReader {
   }
 
   static bool IsPossible(const sim::Effect& effect, double amplitude) {
-    constexpr double kDigits = 1e-6;  // that a file rounds by
+    constexpr double kDigits = 1e-6;  // relative rounding of numbers in a file
     const auto [low, high] = sim::RangeOfAmplitude(effect);
     return amplitude >= low - kDigits * std::abs(low) &&
            amplitude <= high + kDigits * std::abs(high);
   }
 
-  // Does its effect offer it at all? What an effect lists depends on the columns, units and moves
-  // that there are: this campaign has all of them.
+  // True where the library's effect offers this form. An effect lists forms by the columns, units
+  // and moves that there are; this test campaign has all of them.
   static bool IsOfTheLibrary(const sim::Template& form) {
     static const Result<sim::Campaign> whole = sim::PlantCampaign({});
     static const sim::CampaignFacts facts = sim::MakeFacts(whole.value());
@@ -210,7 +210,7 @@ class ModelReader {
 
   using GroupNumbers = std::map<std::vector<double>, std::uint32_t>;
 
-  /// A shared amplitude stands in the file once for each unit: who has the same is of one group.
+  /// The file repeats a shared amplitude for each unit. Units with equal amplitudes form one group.
   static void AddUnit(std::size_t unit, std::span<const double> amplitude,
                       std::span<const double> sigma, GroupNumbers* groups, sim::ModelTerm* term) {
     std::vector<double> key(amplitude.begin(), amplitude.end());
@@ -224,7 +224,7 @@ class ModelReader {
     term->sigma.insert(term->sigma.end(), sigma.begin(), sigma.end());
   }
 
-  /// Where each unit has a shape of its own.
+  /// Reads the shapes where each unit has a shape of its own.
   Status ReadShapes(const toml::table& table, const std::vector<double>& ids,
                     sim::Template* form) const {
     if (!table.contains("shapes")) return {};

@@ -13,17 +13,17 @@
 namespace focalfleet {
 namespace {
 
-// Clear of the stops, so that a unit's own zero angles leave room.
+// The margin keeps moves clear of the stops, and leaves room for a unit's own zero angles.
 constexpr double kMarginDeg = 3;
 constexpr double kLadderDeg[] = {0.1, 0.2, 0.4, 1, 2, 4, 10};
 
-/// Where all units point, in the plate's frame: elbow direction, and phi from stretched.
+/// The pose of all units in the plate's frame: elbow direction, and phi from stretched.
 struct Stance {
   double theta_fp_deg = 0;
   double phi_fp_deg = 150;
 };
 
-/// The angles at which the unit comes nearest to that.
+/// The angles at which the unit comes nearest to the stance.
 TargetAngles AnglesFor(const Unit& unit, const Stance& stance) {
   const auto within = [](double deg, const AxisGeometry& axis) {
     return std::clamp(deg, axis.min_deg + kMarginDeg, axis.max_deg - kMarginDeg);
@@ -67,9 +67,8 @@ std::vector<Stance> Arcs(std::size_t count) {
 
 Result<ListedMove> AtRandom(const Layout& layout, const std::vector<UnitDrive>& drives,
                             std::int64_t id, std::uint64_t seed) {
-  const std::vector<std::optional<Pose>> nobody_stands(layout.size());
-  FOCALFLEET_TRY_ASSIGN(const auto drawn,
-                        DrawConfiguration(layout, drives, nobody_stands, Rng(seed)));
+  const std::vector<std::optional<Pose>> none_fixed(layout.size());
+  FOCALFLEET_TRY_ASSIGN(const auto drawn, DrawConfiguration(layout, drives, none_fixed, Rng(seed)));
   ListedMove move{.id = id, .rows = {}};
   for (std::uint32_t n = 0; n < layout.size(); ++n) {
     const Unit& unit = layout.units()[n];
@@ -94,7 +93,7 @@ std::vector<ListedMove> Diagnostic(const Layout& layout, std::size_t count) {
     stance.*axis += rung % 4 < 2 ? step : -step;
     moves.push_back(Everybody(layout, id(), stance));
   }
-  // Shares of the units, to and fro: what depends on how many move at once.
+  // Alternating shares of the units show effects that depend on how many units move at once.
   constexpr std::size_t kEvery[] = {1, 2, 4, 50};
   for (std::size_t i = 0; moves.size() < count; ++i) {
     const std::size_t every = kEvery[i / 2 % std::size(kEvery)];

@@ -1,6 +1,6 @@
-// CAMPAIGN.csv: the moves that a campaign is to make, `move_id, unit_id, theta_deg, phi_deg`, one
-// row a unit that is sent. Moves are made in the order of their numbers; who is not named in one
-// stays where it is.
+// CAMPAIGN.csv lists the moves that a campaign is to make: `move_id, unit_id, theta_deg, phi_deg`,
+// one row for each unit that is sent. Moves are made in the order of their numbers. A unit that a
+// move does not name stays where it is.
 #pragma once
 
 #include <cstdint>
@@ -23,13 +23,14 @@ struct MoveList {
   std::vector<ListedMove> moves;             // ascending by id
   std::vector<std::string> ignored_columns;  // not known
 };
-/// Errors: kInvalid with file:line: a column missing; of all rows a value missing, a unit twice in
-/// one move, or one that the layout has not; nothing to do.
+/// The list in `text`.
+/// Errors: kInvalid with file:line: a column is missing or there is nothing to do; of all rows: a
+/// value is missing, a unit stands twice in one move, or the layout does not have the unit.
 Result<MoveList> ReadMoveList(std::string_view text, std::string file, const Layout& layout);
 std::string WriteMoveList(const std::vector<ListedMove>& moves);
 
 enum class CampaignKind : std::uint8_t {
-  kSurvey,      // configurations at random, as a night has them
+  kSurvey,      // random configurations, as in a night
   kArcs,        // one axis after the other over its range and back, all units in parallel
   kDiagnostic,  // arcs, a ladder of reversals on each axis, shares of units, repeats
 };
@@ -41,8 +42,8 @@ struct MakeMovesOptions {
   std::uint64_t seed = 1;
 };
 /// A list of moves. In arcs and ladders all units stand alike, as translated copies of each other,
-/// so that nobody comes near anybody; each is kept within the ranges of its own axes. Errors: as
-/// DrawConfiguration's.
+/// so no unit comes near another. Each unit is kept within the ranges of its own axes.
+/// Errors: as DrawConfiguration's.
 Result<std::vector<ListedMove>> MakeMoves(const Layout& layout,
                                           const std::vector<UnitDrive>& drives,
                                           const MakeMovesOptions& options);

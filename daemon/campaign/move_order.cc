@@ -10,7 +10,7 @@
 namespace focalfleet {
 namespace {
 
-// Stable, so that rows that compare as equal keep the order that they stand in.
+// A stable sort: rows that compare as equal keep their order in the file.
 template <class Key>
 std::vector<std::size_t> Sorted(std::size_t rows, const Key& key) {
   std::vector<std::size_t> order(rows);
@@ -47,7 +47,7 @@ void TimeByMovesBefore(std::vector<MoveKey>* keys) {
   }
 }
 
-// Rows that stand behind a later move of their unit.
+// Counts rows that stand behind a later move of their unit.
 std::size_t CountOutOfOrder(const std::vector<MoveKey>& keys) {
   std::unordered_map<std::size_t, const MoveKey*> latest;
   std::size_t count = 0;

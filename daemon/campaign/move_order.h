@@ -1,5 +1,6 @@
-// The order in which the moves of a table were made (docs/files.md): of one unit by `t_s` where it
-// is given, else by `move_id`. Rows may stand in any order, as those out of a database do.
+// OrderMoves gives the order in which the moves of a table were made (docs/files.md). The moves of
+// one unit are ordered by `t_s` where it is given, else by `move_id`. Rows may stand in any order,
+// as rows from a database do.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 
 namespace focalfleet {
 
-/// A row of moves.csv, as far as its place in time goes.
+/// The part of a row of moves.csv that decides its place in time.
 struct MoveKey {
   std::size_t unit = 0;
   std::int64_t move = 0;
@@ -16,12 +17,13 @@ struct MoveKey {
 };
 
 struct MoveOrder {
-  std::vector<std::size_t> rows;  // by unit, and of one unit as its moves were made
+  std::vector<std::size_t> rows;  // by unit; the rows of one unit in the order of its moves
   std::size_t out_of_order = 0;   // rows that stand behind a later move of their unit
 };
 
-/// A row without a time has that of its exposure, if another row tells it, else that of the unit's
-/// move before it by number. Equal times: by number. Pre: a unit has a move once.
+/// The order of `keys`. A row without a time takes the time of its exposure, if another row gives
+/// it, else that of the unit's previous move by number. Equal times are ordered by number.
+/// Pre: a unit has each move at most once.
 MoveOrder OrderMoves(std::vector<MoveKey> keys);
 
 }  // namespace focalfleet

@@ -12,7 +12,7 @@
 namespace focalfleet {
 namespace {
 
-/// A column, and the value that asks for nothing: NaN, any.
+/// A column with the value that asks for nothing. NaN: any value is asked for.
 struct Condition {
   const char* column;
   double nothing;
@@ -63,7 +63,7 @@ Result<std::vector<sim::PlateMove>> ReadNextMoves(std::string_view text, std::st
                                                   const std::vector<sim::CampaignUnit>& units) {
   FOCALFLEET_TRY_ASSIGN(const CsvTable table, CsvTable::Parse(text, std::move(file)));
   FOCALFLEET_TRY(table.Require({"move_id", "unit_id", "theta_deg", "phi_deg"}));
-  std::map<std::int64_t, std::size_t> place;  // of a unit
+  std::map<std::int64_t, std::size_t> place;  // of a unit, by id
   for (std::size_t u = 0; u < units.size(); ++u) place[units[u].id] = u;
   std::map<std::int64_t, sim::PlateMove> moves;
   FOCALFLEET_TRY(table.ReadRows([&](CsvRow& row) {

@@ -1,4 +1,5 @@
-// SHA-256 of text, by which a report says from which bytes it was made. Source: FIPS 180-4.
+// Sha256Hex is the SHA-256 of text. A report states by it from which bytes it was made. Source:
+// FIPS 180-4.
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 
 namespace focalfleet {
 
-/// 64 hexadecimal digits.
+/// The digest as 64 hexadecimal digits.
 std::string Sha256Hex(std::string_view bytes);
 
 }  // namespace focalfleet

@@ -1,4 +1,4 @@
-// apply FILE [--wait] [--fixed] [--correct N]: hands a targets file to the daemon.
+// The command apply FILE [--wait] [--fixed] [--correct N] sends a targets file to the daemon.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -21,11 +21,11 @@ struct ApplyOptions {
   std::string file;
   bool wait = false;
   bool fixed = false;
-  std::optional<std::uint32_t> corrections;  // none: the camera is left alone
+  std::optional<std::uint32_t> corrections;  // empty: no corrections by the camera
   double tolerance_um = 10;
 };
 
-// Ctrl-C ends the waiting, not the motion; whoever presses it must know that.
+// Ctrl-C ends the waiting, not the motion; the note tells the operator so.
 void InstallInterruptNote() {
   struct sigaction action {};
   action.sa_handler = [](int) {
@@ -60,7 +60,8 @@ ExitCode ReportAccepted(const Context& context, const Json& result) {
 
 ExitCode ReportSummary(const Context& context, const Json& configuration) {
   if (context.json) {
-    // What the configuration does not know of itself is the fleet's; without an answer it stays 0.
+    // The daemon's status supplies what the configuration does not state of itself; without an
+    // answer these fields stay 0.
     const auto status = Ask(context, {.verb = "status"});
     PrintJson(ApplySummary(configuration, status ? *status : Json::object()));
   }
@@ -79,7 +80,8 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
                             fmt::format("{}: {} bytes; the daemon takes at most {}", options.file,
                                         text->size(), kControlLineBytesMax / 2)});
   }
-  // What is wrong with the file the daemon tells; what it would pass over, only we can.
+  // The daemon reports errors in the file. Only this program can report the columns that are
+  // ignored.
   if (const auto targets = ReadTargets(*text, options.file)) {
     ReportPassedOver(context, options.file, targets->ignored_columns);
   }

@@ -1,4 +1,4 @@
-// campaign make, campaign run: moves that are made to be measured, for diagnosis.
+// The commands campaign make and campaign run make moves that are to be measured, for diagnosis.
 
 #include <fmt/format.h>
 
@@ -63,7 +63,7 @@ struct RunOptions {
   std::string out;
 };
 
-/// Where the daemon believes a unit that is at a place, and how it drives it.
+/// The position where the daemon believes a unit at rest, and the drive of the unit.
 struct Believed {
   AxisAngles angles;
   double v_bus_V = 0;
@@ -84,7 +84,8 @@ tl::expected<BelievedFleet, Failure> AskBelieved(const Context& context) {
     if (std::isfinite(theta) && std::isfinite(phi) && theta == NumberIn(row, "theta_high_deg") &&
         phi == NumberIn(row, "phi_high_deg"))
       fleet[static_cast<std::uint32_t>(CountIn(row, "unit_id"))] = {
-          // As the unit counts: what the camera or a model adds to it changes from time to time.
+          // Angles are those that the unit counts: corrections by the camera or a model change from
+          // time to time.
           .angles = {theta - NumberIn(row, "theta_offset_deg"),
                      phi - NumberIn(row, "phi_offset_deg")},
           .v_bus_V = NumberIn(row, "v_bus_V", std::nan("")),
@@ -111,7 +112,7 @@ std::vector<LoggedMove> RowsOf(const ListedMove& move, const BelievedFleet& befo
   std::vector<LoggedMove> rows;
   for (const auto& [id, to] : after) {
     const auto from = before.find(id);
-    if (from == before.end()) continue;  // it was not at a place: no row says anything of it
+    if (from == before.end()) continue;  // its position was not known: no row describes it
     LoggedMove row{.unit = {id},
                    .move = move.id,
                    .from = from->second.angles,
@@ -145,13 +146,14 @@ Status WriteFolder(const std::string& folder, const sim::Campaign& campaign) {
 
 constexpr int kUnmeasuredInARowMax = 3;
 
-/// What came of one move.
+/// The result of one move.
 struct MadeMove {
-  std::optional<Json> measured;  // the daemon's answer to `measurements`; none: nothing was seen
-  std::size_t unserved = 0;      // units that did not make the move, or that nobody saw
+  std::optional<Json> measured;  // the daemon's answer to `measurements`; empty: nothing was seen
+  std::size_t unserved = 0;      // units that did not make the move, or were not seen
 };
 
-/// One move, with its exposure. Errors: as Ask; kBroken: it was stopped, so no other may follow.
+/// Makes one move, with its exposure.
+/// Errors: as Ask; kBroken: the move was stopped, so no other may follow.
 tl::expected<MadeMove, Failure> MakeMove(const Context& context, const ListedMove& move,
                                          const std::string& source, ProgressBar* bar,
                                          const std::string& stage) {
@@ -229,10 +231,10 @@ ExitCode RunCampaign(const Context& context, const RunOptions& options) {
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     const auto after = AskBelieved(context);
     if (!after) return Report(context, after.error());
-    // What nobody saw was made all the same: its rows are there, without places.
+    // A move that was not seen was still made: its rows are there, without positions.
     log.Add(RowsOf(move, *before, *after, made->measured.value_or(Json::object()), t_s));
     before = after;
-    // After each move, so that what was measured is kept whatever comes.
+    // The folder is written after each move, so that measurements are kept whatever happens later.
     const auto written = WriteFolder(options.out, log.Campaign(options.list));
     if (!written) return Report(context, written.error());
   }

@@ -1,4 +1,4 @@
-// can decode: what candump wrote, in words.
+// The command can decode explains in words what candump wrote.
 
 #include <fmt/format.h>
 
@@ -28,7 +28,7 @@ std::string HexData(const Frame& frame) {
   return text;
 }
 
-/// The rule that it breaks; null where it breaks none.
+/// The rule that the frame breaks; null where it breaks none.
 const char* Broken(const CanFrame& frame) {
   const auto host = DecodeHost(frame);
   if (host) return nullptr;
@@ -102,7 +102,8 @@ std::string TextOf(const CandumpLine& line) {
   return text + "\n";
 }
 
-/// One line for each frame of a group, as if it had come alone; one for a group that is none.
+/// Prints a line for each frame of a group, as if it had come alone; a single line where the group
+/// is invalid.
 void PrintGroup(const Context& context, const CandumpLine& line) {
   const auto entries = UnpackGroup(*line.group);
   if (!entries) {
@@ -135,11 +136,11 @@ struct Tally {
   std::uint64_t lines = 0;
   std::uint64_t bad = 0;
   std::uint64_t first_bad = 0;
-  std::uint64_t passed_over = 0;  // words of candump that are about no frame
+  std::uint64_t passed_over = 0;  // words of candump that describe no frame
   std::int64_t dropped = 0;       // frames, as candump counted them
 };
 
-/// The error frame that the words of the next lines are about.
+/// The error frame that the words of the next lines describe.
 struct ErrorFrame {
   std::string time;
   std::string interface;
@@ -173,7 +174,7 @@ void PrintNote(const Context& context, const CandumpNote& note, const ErrorFrame
   }
 }
 
-// Line by line and each told at once, so that candump may run on before it in a pipe.
+// Each line is decoded and printed at once, so that candump may keep running before it in a pipe.
 Result<Tally> DecodeAll(const Context& context, const std::string& name, std::istream& in) {
   Tally tally;
   ErrorFrame error_frame;
@@ -205,7 +206,7 @@ Result<Tally> DecodeAll(const Context& context, const std::string& name, std::is
   return tally;
 }
 
-/// Tells what the frames alone do not show.
+/// Reports what the frames alone do not show.
 void ReportTally(const Context& context, const std::string& name, const Tally& tally) {
   if (context.quiet) return;
   if (tally.dropped != 0)

@@ -20,7 +20,7 @@ constexpr ClaimStatus kStatuses[] = {ClaimStatus::kReproduced, ClaimStatus::kOrd
                                      ClaimStatus::kFitted, ClaimStatus::kDisagrees,
                                      ClaimStatus::kNotTestable};
 
-// What is not finite is null, as JSON has no other word.
+// A number that is not finite becomes null, as JSON has no other form for it.
 Json Numbers(const std::vector<double>& numbers) {
   const auto one = [](double number) {
     return std::isfinite(number) ? Json(number) : Json(nullptr);

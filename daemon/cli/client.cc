@@ -13,7 +13,7 @@
 namespace focalfleet::cli {
 namespace {
 
-// Progress comes several times a second; a daemon that is silent for so long hangs.
+// Progress arrives several times a second; a daemon that is silent for this long hangs.
 constexpr DurationNs kHangs = Seconds(120);
 
 bool ChangesNothing(const std::string& verb) {
@@ -41,7 +41,8 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
   auto answer = client->Call(question.verb, question.args, options);
   if (answer) return std::move(*answer);
   if (client->connected()) {
-    // "Unavailable" from a daemon that listens: it began, and something that it needs gave way.
+    // "Unavailable" from a daemon that listens means that the work began and a resource failed on
+    // the way.
     const bool broken = answer.error().code == ErrorCode::kUnavailable;
     return tl::unexpected<Failure>(
         Failure{broken ? ExitCode::kBroken : ExitCode::kRefused, answer.error()});

@@ -1,7 +1,6 @@
-// One request to the daemon, and what its failure means to the caller: nobody there is exit code
-// 4, an answer that says no is 1. Where the connection breaks or stays silent after the request
-// went out, a mere question ends with 4, too; a command ends with 5, because nobody can say then
-// whether it took effect.
+// Ask sends one request to the daemon and maps a failure to an exit code. No daemon gives 4, a
+// refusal gives 1. The connection may break or stay silent after the request went out. A mere
+// question then ends with 4, too. A command ends with 5, because its effect is not known.
 #pragma once
 
 #include <functional>
@@ -16,19 +15,19 @@ namespace focalfleet::cli {
 struct Question {
   std::string verb;
   Json args = Json::object();
-  bool long_lasting = false;  // answered when the motion is over; progress says until then that
+  bool long_lasting = false;  // answered when the motion is over; until then progress shows that
                               // the daemon lives
   std::function<void(const Json&)> on_progress;
 };
 
 tl::expected<Json, Failure> Ask(const Context& context, const Question& question);
 
-/// The name by which the daemon is to call a file: its path, or the last part of a path that is
+/// The name that the daemon uses for a file: its path, or the last part of a path that is
 /// longer than the daemon keeps.
 std::string SourceOf(const std::string& file);
 
-/// Members of an answer, total: what is missing or of another type is the default. Texts are fit
-/// for a terminal (control/printable.h).
+/// Members of an answer. The functions are total: a member that is missing or of another type gives
+/// the default. Texts are safe for a terminal (control/printable.h).
 double NumberIn(const Json& object, const char* key, double otherwise = 0);
 std::uint64_t CountIn(const Json& object, const char* key);
 std::string TextIn(const Json& object, const char* key);

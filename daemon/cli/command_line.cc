@@ -27,12 +27,12 @@ void AddGlobalOptions(CommandLine* line) {
       ->type_name("FILE");
 }
 
-// What never asks a daemon ends with kRefused where its answer cannot be told.
+// Commands that never ask a daemon. They end with kRefused where their answer cannot be written.
 constexpr std::array<std::string_view, 11> kOffline = {
     "can",  "completion", "diagnose", "estimate", "hall", "layout",
     "plan", "reproduce",  "simulate", "targets",  "tune"};
 
-/// The deepest command of the tree that the line named.
+/// The deepest command of the tree that the command line named.
 const CLI::App& Chosen(const CLI::App& app) {
   const CLI::App* chosen = &app;
   while (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
@@ -51,8 +51,9 @@ std::string Complaint(const CLI::App& app, const CLI::ParseError& error) {
   return error.what();
 }
 
-// A file that is opened must not get the number of a standard stream that the caller closed: what
-// is said there would end in it. /dev/null the wrong way round takes and gives nothing.
+// Fills standard streams that the caller closed. Otherwise an opened file would get the number of a
+// closed stream, and messages would end in it. The file /dev/null, opened in the wrong direction,
+// takes and gives nothing.
 void HoldStandardStreams() {
   for (const int fd : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     if (fcntl(fd, F_GETFD) >= 0) continue;
@@ -61,13 +62,13 @@ void HoldStandardStreams() {
   }
 }
 
-/// Whether the result file goes to stdout.
+/// True if the result file goes to stdout.
 bool OutIsStdout(const CLI::App& app) {
   const CLI::Option* out = Chosen(app).get_option_no_throw("--out");
   return out != nullptr && out->count() == 1 && out->results().front() == "-";
 }
 
-/// `exit`, unless the answer did not get out.
+/// `exit`, unless the answer could not be written.
 int AfterOutput(const CommandLine& line, ExitCode exit) {
   const bool good = exit == ExitCode::kOk || exit == ExitCode::kSomeUnserved;
   if (OutputError() == 0 || !good) return static_cast<int>(exit);
@@ -150,7 +151,7 @@ int Main(int argc, char** argv) {
   try {
     line->app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    // CLI11 speaks in exceptions; help and version are exceptions, too, with exit code 0.
+    // CLI11 reports by exceptions; help and version are exceptions, too, with exit code 0.
     if (error.get_exit_code() == 0) {
       std::ostringstream text;
       line->app.exit(error, text, text);

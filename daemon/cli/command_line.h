@@ -1,6 +1,7 @@
-// The tree of commands, built once. Help, the parser, the tab completion and the tests all read
-// this one tree, so that nothing about the command line is written down twice. A command's callback
-// only remembers what to run; it runs after the whole line has been parsed and found right.
+// CommandLine is the tree of commands, built once. Help, the parser, the tab completion and the
+// tests all read this one tree, so nothing about the command line is written twice. A command's
+// callback only stores what to run. The command runs after the whole line has been parsed and found
+// valid.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -23,12 +24,13 @@ struct CommandLine {
 /// The complete tree.
 std::unique_ptr<CommandLine> MakeCommandLine();
 
-/// Parses and runs. Errors: the exit code; the reason is on stderr.
+/// Parses the command line and runs the command. Returns the exit code; the reason of a failure is
+/// on stderr.
 int Main(int argc, char** argv);
 
-// ---- for the files that add commands
+// ---- Functions for the files that add commands
 
-/// Options of a command in a block of their own on the heap, for as long as the tree lives.
+/// A command's options in a block of their own on the heap, which lives as long as the tree.
 template <class Options>
 void OnChosen(CommandLine* line, CLI::App* command, std::shared_ptr<Options> options,
               ExitCode (*run)(const Context&, const Options&)) {
@@ -39,11 +41,11 @@ void OnChosen(CommandLine* line, CLI::App* command, std::shared_ptr<Options> opt
 
 CLI::App* AddCommand(CLI::App* parent, const char* name, const char* what, const char* examples);
 
-/// A file that is read. Its readability is checked by the command: a missing file is bad input (1),
-/// not usage (2).
+/// Adds the name of a file that is read. The command itself checks that the file is readable: a
+/// missing file is bad input (1), not usage (2).
 CLI::Option* AddFile(CLI::App* command, const char* name, std::string* path, const char* what);
 
-/// Words of which the value must be one; completion offers them.
+/// Restricts the value to one of the words; completion offers them.
 CLI::Option* OneOf(CLI::Option* option, const std::vector<std::string>& words);
 
 /// A finite number of the range; CLI::Range lets a nan pass and prints 309 digits.

@@ -12,7 +12,7 @@
 namespace focalfleet::cli {
 namespace {
 
-/// One side, as it was given.
+/// One of the two models, as the command line gives it.
 struct Side {
   std::string letter;
   std::string file;  // empty: none was given

@@ -1,4 +1,5 @@
-// diagnose --against: which of two models predicts a campaign better, and how they differ.
+// The command diagnose --against compares two models: which one predicts a campaign better, and how
+// they differ.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 namespace focalfleet::cli {
 namespace {
 
-// The type name that help shows says what the value is: FILE, {one,of}, TEXT, INT ...
+// The type name that help shows gives the kind of value: FILE, {one,of}, TEXT, INT ...
 CompletionValue ValueOf(const CLI::Option& option) {
   if (option.get_items_expected_max() == 0) return {};
   const std::string type = option.get_type_name();
@@ -68,7 +68,7 @@ std::string ShellQuote(std::string_view text) {
   return quoted + "'";
 }
 
-// One word for the shell's tables: @file, @any, or the words themselves.
+// The value as one word for the shell's tables: @file, @any, or the words themselves.
 std::string Spell(const CompletionValue& value) {
   switch (value.kind) {
     case CompletionValue::Kind::kNone:
@@ -85,7 +85,7 @@ std::string Spell(const CompletionValue& value) {
 
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-// `word:what` as zsh's _describe reads it; bash has no place for the description.
+// The text `word:what` as zsh's _describe reads it; bash has no place for the description.
 std::string Described(const std::string& word, const std::string& what, bool with_descriptions) {
   if (!with_descriptions) return word;
   std::string escaped;
@@ -139,8 +139,8 @@ std::string Tables(const std::vector<CompletionNode>& nodes, bool zsh) {
   return script;
 }
 
-// Where the cursor stands: walks the words before it, passes over the values of options, and counts
-// arguments.
+// Finds the cursor's place in the tree: walks the words before it, skips the values of options, and
+// counts arguments.
 constexpr const char* kBashLogic = R"bash(
 _focalfleet() {
   local IFS=$' \t\n'

@@ -1,7 +1,7 @@
-// Tab completion for bash and zsh, written from the tree of commands itself: a new command or
-// option is completed as soon as it exists. The script holds three tables, by the path of a command
-// ("params", "layout hex"): its subcommands, its options, and what may follow an option or stand as
-// an argument.
+// Tab completion for bash and zsh is generated from the tree of commands itself. A new command or
+// option is therefore completed as soon as it exists. The script holds three tables, by the path of
+// a command ("params", "layout hex"). They list its subcommands, its options, and what may follow
+// an option or stand as an argument.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,7 +10,7 @@
 
 namespace focalfleet::cli {
 
-/// What the word after an option, or an argument, may be.
+/// The permitted values of the word after an option, or of an argument.
 struct CompletionValue {
   enum class Kind { kNone, kFile, kWords, kAny } kind = Kind::kNone;
   std::vector<std::string> words;
@@ -22,18 +22,18 @@ struct CompletionNode {
     std::string what;
   };
   struct OptionEntry {
-    std::vector<std::string> names;  // "--out", "-q"
+    std::vector<std::string> names;  // such as "--out", "-q"
     std::string what;
     CompletionValue value;  // kNone: a flag
   };
-  std::string path;  // "" for the program, "layout hex"
+  std::string path;  // "" for the program, or such as "layout hex"
   std::vector<Word> commands;
   std::vector<OptionEntry> options;        // its own, then those of the commands above it
   std::vector<CompletionValue> arguments;  // in order
   bool last_repeats = false;               // the last argument takes any number of words
 };
 
-/// All commands, the program first, children after their parent.
+/// All commands in order: the program first, children after their parent.
 std::vector<CompletionNode> WalkCommands(const CLI::App& app);
 
 std::string BashCompletion(const CLI::App& app);

@@ -14,7 +14,8 @@
 namespace focalfleet::cli {
 namespace {
 
-// Reasons that few units share are told unit by unit; the others as one line a reason.
+// Reasons shared by at most this many units are listed unit by unit. More units give one line for
+// each reason.
 constexpr std::size_t kUnitsShownSingly = 3;
 constexpr std::size_t kReasonsShown = 20;
 constexpr std::size_t kUnitsOfReasonShown = 5;
@@ -30,8 +31,8 @@ std::string ReasonOf(const Json& unit) {
 
 bool IsDigit(char c) { return c >= '0' && c <= '9'; }
 
-/// A reason taken apart at its numbers: "12.3 um from unit 7" is {"", " um from unit ", ""} and
-/// {"12.3", "7"}.
+/// A reason split at its numbers: "12.3 um from unit 7" is {"", " um from unit ", ""} and {"12.3",
+/// "7"}.
 struct TakenApart {
   std::vector<std::string> words;
   std::vector<std::string> numbers;
@@ -57,7 +58,7 @@ TakenApart TakeApart(const std::string& text) {
 /// Units whose reasons differ by their numbers alone.
 struct Alike {
   TakenApart first;
-  std::vector<std::pair<std::string, std::string>> range;  // of each number, as text
+  std::vector<std::pair<std::string, std::string>> range;  // of each number: lowest, highest
   std::vector<std::size_t> members;                        // rows of the unserved
 
   void Add(std::size_t row, const TakenApart& parts) {
@@ -85,7 +86,7 @@ struct Alike {
   }
 };
 
-/// The most frequent reason first, else in the order of the units.
+/// The groups, the most frequent reason first, else in the order of the units.
 std::vector<Alike> GroupByReason(const Json& unserved) {
   std::map<std::vector<std::string>, std::size_t> group_of;
   std::vector<Alike> groups;
@@ -115,7 +116,8 @@ std::string DescribeGroup(const Json& unserved, const Alike& group) {
                      group.members.size() > ids.size() ? ", ..." : "", group.Text());
 }
 
-/// What is known of it: nothing before the upload, nothing of the starts before units told.
+/// The text on upload and starts, as far as known: nothing before the upload, nothing on starts
+/// before units have reported.
 std::string DescribeUploadAndStarts(const Json& c) {
   std::string text;
   if (NumberIn(c, "upload_s") > 0) {
@@ -135,7 +137,7 @@ std::string DescribeUploadAndStarts(const Json& c) {
   return text;
 }
 
-/// A line an exposure: blind, then after each correction.
+/// A line for each exposure: the first before any correction, then one after each correction.
 std::string DescribeMeasured(const Json& c) {
   std::string text;
   std::size_t correction = 0;
@@ -192,7 +194,7 @@ std::string DescribeConfiguration(const Json& configuration, bool colour_on) {
     if (const std::uint64_t count = CountIn(c, rarer); count > 0)
       text += fmt::format(", {} {}", count, rarer);
   text += '\n';
-  // Nothing has begun where it is 0, and nothing was predicted.
+  // 0 means that nothing has begun, and that nothing was predicted.
   const auto span = [&](const char* key) {
     return NumberIn(c, key) > 0 || over ? Shown(c, key, "s", 1) : "-";
   };
@@ -217,7 +219,7 @@ std::string DescribeStage(const Json& progress) {
 }
 
 std::string DescribeNotServed(const Json& configuration) {
-  // A stop of all is told by its counts: nothing is wrong with the units that it cut short.
+  // The counts alone describe a stop of all: the units that it cut short are not at fault.
   const bool stopped = TextIn(configuration, "state") == "stopped";
   Json unserved = Json::array();
   for (const Json& unit : ListIn(configuration, "unserved"))
@@ -257,7 +259,7 @@ Json ApplySummary(const Json& configuration, const Json& status) {
   summary["not_measured"] = configuration.value("not_measured", Json(nullptr));
   summary["bus_load_max"] =
       NumberIn(configuration, "bus_load_max", NumberIn(status, "bus_load_max"));
-  // Only where it failed on the way: the reason.
+  // The reason is printed only where the configuration failed on the way.
   if (const std::string error = TextIn(configuration, "error"); !error.empty()) {
     summary["error"] = {{"code", "unavailable"}, {"text", error}};
   }

@@ -13,7 +13,7 @@
 namespace focalfleet::cli {
 namespace {
 
-int output_error = 0;  // as standard output itself: one a process
+int output_error = 0;  // one a process, as standard output itself
 
 void Write(std::string_view text) {
   const bool written =
@@ -23,7 +23,7 @@ void Write(std::string_view text) {
 
 constexpr std::array kCodes = {"\033[0m", "\033[32m", "\033[33m", "\033[31m", "\033[1m"};
 
-/// Lines of text; of all else that moves a terminal, the colours that Paint makes are left.
+/// The text as lines, without any terminal control but the colours that Paint makes.
 std::string ForTerminal(std::string_view text) {
   std::string out;
   while (!text.empty()) {
@@ -69,7 +69,7 @@ void PrintScreen(std::string_view text) { Write("\033[H\033[2J" + ForTerminal(te
 
 int OutputError() { return output_error; }
 
-// Not fmt::print, which throws where the stream takes nothing.
+// fmt::print is not used: it throws where the stream accepts nothing.
 void Complain(std::string_view text) {
   const std::string clean = ForTerminal(text);
   std::fwrite(clean.data(), 1, clean.size(), stderr);

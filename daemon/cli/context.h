@@ -1,5 +1,5 @@
-// What every command shares: where the daemon listens and how to speak to the caller. One rule for
-// output: stdout carries the answer (with --json exactly one JSON object), stderr carries
+// Context is shared by all commands: the daemon's socket, and how to write to the caller. Output
+// has one rule. stdout carries the answer (with --json exactly one JSON object), stderr carries
 // everything else.
 #pragma once
 
@@ -23,10 +23,10 @@ struct Context {
   bool colour_err = false;
   bool terminal_out = false;
   bool terminal_err = false;
-  bool stdout_is_file = false;  // --out -: what is said beside it goes to stderr
+  bool stdout_is_file = false;  // with --out -: other messages go to stderr
 
   [[nodiscard]] std::string SocketPath() const;
-  /// Looks at the terminals and NO_COLOR.
+  /// Determines from the terminals and NO_COLOR whether colours are used.
   void LookAtTerminals();
 };
 
@@ -37,22 +37,23 @@ std::string Paint(bool colour_on, Colour colour, std::string_view text);
 /// Writes to stdout, at once: lines of text and the colours of Paint, whatever `text` holds
 /// (control/printable.h).
 void PrintText(std::string_view text);
-/// As PrintText, in place of all that the terminal shows.
+/// Writes as PrintText, in place of all that the terminal shows.
 void PrintScreen(std::string_view text);
-/// errno of the first text that stdout did not take, else 0. Main tells it: an answer that nobody
-/// got is not done.
+/// errno of the first text that stdout refused, else 0. Main reports it: an answer that was not
+/// written is a failure.
 int OutputError();
 
-/// Writes to stderr what PrintText would. Where that takes nothing, there is nobody to tell.
+/// Writes as PrintText, to stderr. A failure to write is ignored, since no stream is left for a
+/// report.
 void Complain(std::string_view text);
-/// As Complain, in place of the line that the cursor is in.
+/// Writes as Complain, in place of the line that the cursor is in.
 void RedrawLine(std::string_view text);
 
 /// Writes to stdout; nothing with --quiet or --json.
 void Say(const Context& context, std::string_view line);
 
-/// A misspelt column is one that nobody reads: it must not pass in silence. To stderr; nothing with
-/// --quiet or --json.
+/// Names ignored columns on stderr: a misspelt column would otherwise be ignored without a message.
+/// Nothing with --quiet or --json.
 void ReportPassedOver(const Context& context, const std::string& file,
                       const std::vector<std::string>& columns);
 
@@ -60,15 +61,16 @@ void ReportPassedOver(const Context& context, const std::string& file,
 /// --json the object does.
 void NameUnserved(const Context& context, std::string_view lines);
 
-/// The one JSON object of a command that was called with --json. Text that is not UTF-8 is
-/// replaced.
+/// Prints the single JSON object of a command that was called with --json. Text that is not UTF-8
+/// is replaced.
 void PrintJson(const Json& object);
 
-/// Tells why, on stderr and with --json also as {"error":{code,text},"exit":n} on stdout.
+/// Reports the reason of a failure on stderr, and with --json also as
+/// {"error":{code,text},"exit":n} on stdout. Returns its exit code.
 ExitCode Report(const Context& context, const Failure& failure);
 ExitCode Report(const Context& context, const Error& error, ExitCode exit = ExitCode::kRefused);
 
-/// 1 unit, 2 units.
+/// The number with its noun: 1 unit, 2 units.
 std::string Count(std::uint64_t n, const char* singular, const char* plural);
 
 }  // namespace focalfleet::cli

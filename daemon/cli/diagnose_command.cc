@@ -1,6 +1,6 @@
-// diagnose: what the simulation gets wrong about a measured campaign, by name; with --against,
-// which of two models predicts it better. simulate campaign: a made-up campaign with chosen effects
-// in it.
+// The command diagnose names what the simulation gets wrong about a measured campaign. With
+// --against it shows which of two models predicts the campaign better. The command simulate
+// campaign makes an artificial campaign with chosen effects.
 
 #include <fmt/format.h>
 
@@ -31,7 +31,7 @@ struct DiagnoseCommandOptions {
   std::string campaign;
   std::string out;
   std::uint64_t seed = 1;
-  int threads = 0;  // 0: as many as the machine has
+  int threads = 0;  // 0: all cores of the machine
   std::vector<std::string> leave_out;
   std::uint64_t shuffle = 0;
   std::string model;
@@ -58,7 +58,7 @@ Status WriteReport(const std::filesystem::path& out, const MeasuredCampaign& in,
                                      WriteNextMoves(in.campaign.units, diagnosis.next.moves)));
   FOCALFLEET_TRY(
       WriteFileAtomically(out / "report.html", DiagnosisPage(in.campaign, diagnosis, in.names)));
-  // Last: where it is, all is.
+  // report.json is written last: where it exists, all files exist.
   return WriteFileAtomically(out / "report.json",
                              report.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
@@ -79,7 +79,8 @@ std::string CauseTable(const sim::Diagnosis& diagnosis) {
   return AlignColumns(rows);
 }
 
-// Where the model has empirical terms, what for.
+// A table of the findings that the model's empirical terms patch without explaining them; empty
+// where there are none.
 std::string PatchTable(const sim::Diagnosis& diagnosis) {
   std::vector<std::vector<std::string>> rows = {
       {"patched, not explained", "in", "against", "um rms"}};
@@ -90,7 +91,7 @@ std::string PatchTable(const sim::Diagnosis& diagnosis) {
   return rows.size() == 1 ? "" : AlignColumns(rows);
 }
 
-// What goes together on the command line. Empty: it does.
+// The error where options do not go together on the command line; empty where they do.
 std::string WrongUsage(const DiagnoseCommandOptions& options) {
   if (options.against.empty())
     return options.out.empty() ? "--out is required (or --against, to compare two models)" : "";
@@ -167,7 +168,7 @@ struct SimulateCampaignOptions {
   std::string out;
 };
 
-// The moves of a measured campaign, with the places where the model says that they end. What was
+// The moves of a measured campaign, with the positions that the model predicts. A position that was
 // not seen stays so.
 Result<sim::Campaign> Predicted(const Context& context, const SimulateCampaignOptions& options) {
   FOCALFLEET_TRY_ASSIGN(MeasuredCampaign measured, ReadMeasuredCampaign(context, options.of));
@@ -183,13 +184,13 @@ Result<sim::Campaign> Predicted(const Context& context, const SimulateCampaignOp
     campaign.x_mm[row] = measure(places.x_mm[row]);
     campaign.y_mm[row] = measure(places.y_mm[row]);
   }
-  // What the camera said of its own places is not true of these.
+  // The camera's statements on its own positions are not true of these.
   std::erase_if(campaign.covariates,
                 [](const sim::Covariate& column) { return column.name == "sigma_um"; });
   return campaign;
 }
 
-// The campaign, and with `next` the moves of that list after it.
+// The campaign and, with `next`, the moves of that list after it.
 Result<sim::Campaign> Simulate(sim::PlantedOptions planted, const std::string& next) {
   FOCALFLEET_TRY_ASSIGN(sim::Campaign campaign, sim::PlantCampaign(planted));
   if (next.empty()) return campaign;

@@ -32,7 +32,7 @@ HostInstant Now() {
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(since).count()};
 }
 
-// ---- the configuration
+// ---- The configuration
 
 struct BusPlace {
   BusId bus;
@@ -128,8 +128,8 @@ struct Aim {
   NodeId node = kBroadcastNode;
 };
 
-// One unit: its bus alone. Interfaces stand in the order of ascending bus ids; a socket's name says
-// its bus.
+// Selects the bus of one unit. Interfaces stand in the order of ascending bus ids; a socket's name
+// gives its bus.
 Result<Aim> AimAtUnit(const toml::table& table, UnitId id, const std::string& config, Aim all) {
   const std::string path =
       BesideConfig(config, table["fleet"]["units"].value_or(std::string("units.csv")));
@@ -154,10 +154,10 @@ Result<Aim> AimAt(const toml::table& table, const DirectStopRequest& request) {
   return AimAtUnit(table, *request.unit, request.config, std::move(all));
 }
 
-// ---- the buses
+// ---- The buses
 
 struct OpenBus {
-  std::unique_ptr<PollablePort> port;  // none: it could not be opened
+  std::unique_ptr<PollablePort> port;  // null: it could not be opened
   std::set<NodeId> answered;
   bool sent = false;
 };

@@ -21,7 +21,7 @@ constexpr std::array<ModeWord, 3> kModeWords = {{{WaveMode::kAsymmetric, "asymme
                                                  {WaveMode::kFiveSegment, "five-segment"},
                                                  {WaveMode::kSevenSegment, "seven-segment"}}};
 
-constexpr double kLoadMax_uNm = 1000;  // a hundred times what the motor gives at 9 V
+constexpr double kLoadMax_uNm = 1000;  // a hundred times the motor's torque at 9 V
 constexpr int kSubdivisionMax = 6144;
 
 std::optional<double> NumberIn(const std::string& text) {
@@ -84,7 +84,7 @@ CLI::Validator PositiveNumberUpTo(double high, const std::string& why) {
 WaveMode ModeOf(const std::string& word) {
   for (const ModeWord& mode : kModeWords)
     if (word == mode.word) return mode.mode;
-  return WaveMode::kAsymmetric;  // the parser took no other word
+  return WaveMode::kAsymmetric;  // the parser accepts no other word
 }
 
 const char* WordOf(WaveMode mode) { return kModeWords[static_cast<std::size_t>(mode)].word; }
@@ -168,8 +168,8 @@ Result<DriveChoice> ChoiceOf(const DriveOptions& options) {
                            .rise_s = options.rise_ns * 1e-9,
                            .fall_s = options.fall_ns * 1e-9,
                            .dead_time_s = options.dead_time_ns * 1e-9};
-  // Beyond these the drive's model does not hold: currents that settle slower than vectors change,
-  // a rotor that turns about between two switching edges.
+  // Beyond these limits the drive's model does not hold: currents settle slower than vectors
+  // change, or the rotor reverses between two switching edges.
   const sim::MotorParameters& motor = choice.setting.motor;
   if (const double tau_s = motor.inductance_H / motor.resistance_ohm; tau_s > kTimeConstantMax_s)
     return Fail(ErrorCode::kInvalid,

@@ -1,5 +1,6 @@
-// Options of the commands that simulate a motor on its bridge: which motor, which load, which
-// voltage and timer counts. What no drive can be is refused with a reason before anything runs.
+// DriveOptions are the options of the commands that simulate a motor on its bridge: motor, load,
+// voltage and timer counts. Values that are impossible for a drive are refused with a reason before
+// anything runs.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -13,13 +14,13 @@
 
 namespace focalfleet::cli {
 
-/// The bridge's switches bear no more.
+/// The highest voltage that the bridge's switches tolerate.
 inline constexpr double kBridgeMax_V = 12;
 
 struct DriveOptions {
-  // The set with which paper 1's waves are reproduced; on starts at 1.8 V all sets agree.
+  // This set reproduces the waves of paper 1; on starts at 1.8 V all sets agree.
   std::string set = "9";
-  std::string load = "bare";  // or `fleet`, or uNm
+  std::string load = "bare";  // or `fleet`, or a number of uNm
   std::optional<double> resistance_ohm;
   std::optional<double> inductance_uH;
   std::optional<double> flux_mWb;
@@ -33,28 +34,29 @@ struct DriveOptions {
   std::string mode = "asymmetric";
 };
 
-/// --set, --load and what replaces single parameters of the set.
+/// Adds --set, --load and the options that replace single parameters of the set.
 void AddMotorOptions(CLI::App* command, DriveOptions* options);
-/// --v-bus, the bridge's times and --counter1, --subdivision, --mode.
+/// Adds --v-bus, the bridge's times and --counter1, --subdivision, --mode.
 void AddBridgeOptions(CLI::App* command, DriveOptions* options);
 void AddRepeatOption(CLI::App* command, DriveOptions* options);
 
-/// A number above 0; `why` ends the sentence about one that is too high.
+/// A number above 0; `why` ends the message about a number that is too high.
 CLI::Validator PositiveNumberUpTo(double high, const std::string& why = "");
 
 WaveMode ModeOf(const std::string& word);
 const char* WordOf(WaveMode mode);
-/// All words that --mode takes.
+/// All words that --mode accepts.
 std::vector<std::string> ModeWords();
 
 struct DriveChoice {
   sim::Drive::Setting setting;
   sim::Modulation modulation;
 };
-/// Errors: kInvalid: values that do not go together, a load that is no load.
+/// The drive that the options describe.
+/// Errors: kInvalid: values that do not go together, or an invalid load.
 Result<DriveChoice> ChoiceOf(const DriveOptions& options);
 
-/// Every number of the choice, with units.
+/// All numbers of the choice, with units.
 Json SettingsJson(const DriveOptions& options, const DriveChoice& choice);
 
 }  // namespace focalfleet::cli

@@ -39,7 +39,7 @@ struct Curve {
   Numbers y;
 };
 
-// Mean of the samples of each carrier period.
+// The mean of the samples in each carrier period.
 template <class Value>
 Curve CarrierMeans(const std::vector<DriveSample>& samples, double carrier_s, Value value) {
   Curve curve;
@@ -134,7 +134,7 @@ std::vector<report::Reference> LimitLines(const CurrentLimits& limits, bool both
   return lines;
 }
 
-// Two carrier periods about the highest current that was sampled.
+// A plot of two carrier periods about the highest sampled current.
 void PeakClose(const sim::Recording& recording, const CurrentLimits& limits, double carrier_s,
                report::Page* page) {
   const auto highest = [](const DriveSample& sample) {

@@ -1,5 +1,5 @@
-// A recorded drive as pictures, those of paper 1's Figs. 12, 13, 15 and 17 and two that its bench
-// had no probe for: torque and lag.
+// DriveReport shows a recorded drive as plots. They are those of paper 1's Figs. 12, 13, 15 and 17,
+// and two for which its bench had no probe: torque and lag.
 #pragma once
 
 #include <string>
@@ -11,10 +11,10 @@
 
 namespace focalfleet::cli {
 
-/// Limits that paper 1 and the circuit set to a phase current. Units: A.
+/// The limits of a phase current by paper 1 and by the circuit. Units: A.
 struct CurrentLimits {
   double linear_A = 0;     // V / (sqrt3 r): the largest linear fundamental, paper 1's limit
-  double reachable_A = 0;  // 2 V / (3 r): one leg against two, for ever
+  double reachable_A = 0;  // 2 V / (3 r): one leg against two, in steady state
 };
 CurrentLimits LimitsOf(const sim::Drive::Setting& setting);
 

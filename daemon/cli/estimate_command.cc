@@ -1,5 +1,5 @@
-// estimate: what moving to a configuration takes and draws, per wave mode side by side. Nothing
-// moves, and no plan is written.
+// The command estimate shows the time and power of moving to a configuration, for each wave mode
+// side by side. Nothing moves, and no plan is written.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -29,7 +29,7 @@ struct EstimateOptions {
   std::string from;  // empty: all arms folded
   bool fixed = false;
   std::string mode;   // empty: all
-  UnitDrive drive;    // both axes as the first; of every unit that was not tuned in `store`
+  UnitDrive drive;    // both axes as the first; for each unit that was not tuned in `store`
   std::string store;  // empty: none
   std::string model;  // empty: none
   std::string out;    // empty: none
@@ -125,7 +125,7 @@ Result<Estimated> MakeEstimate(const Context& context, const EstimateOptions& op
                             DescribeDrive(drive), MotorModel{}.load_torque_Nm * 1e6));
   }
   if (!any_starts) {
-    // They would turn if somebody brought them up to speed; nobody does.
+    // These motors would turn if they were brought up to speed, but they have to start from rest.
     const BelowCritical& first = estimated.modes.front().starts.below.front();
     return Fail(
         ErrorCode::kInvalid,
@@ -320,7 +320,7 @@ void AddEstimateCommand(CommandLine* line) {
   command->add_option("--counter1", axis.counter1, "Timer counts of a carrier period, V_counter1")
       ->check(CLI::Range(1, 65'535).description(""))
       ->capture_default_str();
-  // Through a wider type: a byte would be read as a character.
+  // The option uses a wider type: a byte would be read as a character.
   command
       ->add_option_function<unsigned>(
           "--repeat",

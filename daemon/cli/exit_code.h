@@ -1,4 +1,5 @@
-// What the shell of an operator gets to know: six numbers, the same for every command.
+// ExitCode holds the exit codes that an operator's shell receives: six numbers, the same for every
+// command.
 #pragma once
 
 #include "protocol/base/result.h"
@@ -14,7 +15,7 @@ enum class ExitCode : int {
   kBroken = 5,        // stopped or failed on the way
 };
 
-/// Why a command ends without having done what it was asked for.
+/// The reason why a command ends without having done its work.
 struct Failure {
   ExitCode exit = ExitCode::kRefused;
   Error error;

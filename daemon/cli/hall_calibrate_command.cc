@@ -1,4 +1,5 @@
-// hall calibrate: gain, offset and place of each sensor, from poses and a field that are known.
+// The command hall calibrate finds gain, offset and position of each sensor, from known poses and a
+// known field.
 
 #include <fmt/format.h>
 
@@ -85,9 +86,9 @@ struct Sum {
   [[nodiscard]] double Rms() const { return count > 0 ? std::sqrt(squares / count) : 0; }
 };
 
-// Errors: of the output file.
-ExitCode Tell(const Context& context, const HallCalibrateOptions& options,
-              const std::vector<SensorFit>& fits) {
+// Reports the result. Errors: of the output file.
+ExitCode ReportCalibration(const Context& context, const HallCalibrateOptions& options,
+                           const std::vector<SensorFit>& fits) {
   Json sensors = Json::array();
   Sum before, held_out;
   std::size_t calibrated = 0;
@@ -133,7 +134,8 @@ ExitCode RunHallCalibrate(const Context& context, const HallCalibrateOptions& op
   if (!table) return Report(context, table.error());
   ReportPassedOver(context, options.data, table->passed_over);
   const auto field = sim::MakeField(model->field);
-  return Tell(context, options, sim::CalibrateSensors(CampaignOf(std::move(*table)), *rig, *field));
+  return ReportCalibration(context, options,
+                           sim::CalibrateSensors(CampaignOf(std::move(*table)), *rig, *field));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// hall: orientation of ball joints from Hall sensors. fit: a field map to a model; orient: voltages
-// to orientations. calibrate, diagnose and reproduce have files of their own.
+// The commands hall give the orientation of ball joints from Hall sensors. The command hall fit
+// makes a model of a field map; hall orient turns voltages into orientations. The commands
+// calibrate, diagnose and reproduce have files of their own.
 
 #include <fmt/format.h>
 
@@ -48,7 +49,7 @@ Json ParametersJson(const sim::FieldParameters& parameters) {
   return {{"terms", std::get<std::vector<sim::SphericalTerm>>(parameters).size()}};
 }
 
-// Points at which a sensor of +-0.1 T stands at the end of its range.
+// The number of points at which a sensor of +-0.1 T stands at the end of its range.
 std::size_t Saturated(const sim::FieldMap& map) {
   const double range_T = sim::SensorElectronics{}.range_T();
   std::size_t count = 0;
@@ -143,22 +144,22 @@ std::string Sentence(const sim::SensorVerdict& verdict) {
   if (!verdict.or_else.empty())
     return fmt::format("one sensor contradicts the others, cannot tell which: {} or {}",
                        NamesOf(verdict.sensors, " and "), NamesOf(verdict.or_else, " or "));
-  const std::string who = NamesOf(verdict.sensors, " and ");
+  const std::string sensor_names = NamesOf(verdict.sensors, " and ");
   switch (verdict.fault) {
     case sim::SensorFault::kMissing:
-      return who + " is missing in every row";
+      return sensor_names + " is missing in every row";
     case sim::SensorFault::kStuck:
-      return who + " is stuck: left out";
+      return sensor_names + " is stuck: left out";
     case sim::SensorFault::kSwapped:
-      return who + " are swapped: exchanged";
+      return sensor_names + " are swapped: exchanged";
     case sim::SensorFault::kGain:
-      return who + " is off in gain: left out";
+      return sensor_names + " is off in gain: left out";
     case sim::SensorFault::kOffset:
-      return who + " is off by an offset: left out";
+      return sensor_names + " is off by an offset: left out";
     case sim::SensorFault::kBad:
-      return who + " contradicts the others, cannot tell how: left out";
+      return sensor_names + " contradicts the others, cannot tell how: left out";
   }
-  return who;
+  return sensor_names;
 }
 
 Json VerdictsJson(const std::vector<sim::SensorVerdict>& verdicts) {

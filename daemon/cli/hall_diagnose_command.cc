@@ -1,4 +1,4 @@
-// hall diagnose: what poses with known orientation say about the model of the Hall sensors.
+// The command hall diagnose tests the model of the Hall sensors with poses of known orientation.
 
 #include <fmt/format.h>
 
@@ -22,7 +22,8 @@ struct HallDiagnoseOptions {
   double arm_mm = 8;
 };
 
-// The paper's surface for its 3D array; its amplitude is free in every diagnosis, so any will do.
+// The model is the paper's surface for its 3D array. Its amplitude is free in every diagnosis, so
+// any value will do.
 HallModelFile PaperModel() {
   return {.name = "surface 21 deg",
           .origin = "the paper's 3D array",
@@ -41,7 +42,7 @@ Status WriteAll(const std::filesystem::path& out, const sim::HallDiagnosis& diag
   FOCALFLEET_TRY(WriteFileAtomically(out / "next_moves.csv", WriteNextPoses(diagnosis)));
   FOCALFLEET_TRY(
       WriteFileAtomically(out / "report.html", HallReportPage(diagnosis, campaign, names)));
-  // Last: where it is, all is.
+  // report.json is written last: where it exists, all files exist.
   return WriteFileAtomically(
       out / "report.json",
       HallReportJson(diagnosis, names).dump(2, ' ', false, Json::error_handler_t::replace) + "\n");

@@ -1,4 +1,5 @@
-// What the hall commands share: which sensors there are, and reading what they read.
+// HallSensorOptions and these functions are shared by the hall commands: the sensors, and the files
+// that the commands read.
 #pragma once
 
 #include <optional>
@@ -13,15 +14,17 @@
 namespace focalfleet::cli {
 
 struct HallSensorOptions {
-  std::string sensors;             // file; empty: the eight by angles
+  std::string sensors;             // file; empty: the eight sensors by angles
   std::vector<double> angles_deg;  // empty: the paper's
 };
 
 void AddHallSensorOptions(CLI::App* command, HallSensorOptions* options);
 
-/// Errors: kInvalid, kUnavailable: of the file; both options given.
+/// The sensors that the options name.
+/// Errors: kInvalid, kUnavailable: of the file; kInvalid: both options are given.
 Result<std::vector<sim::HallSensor>> SensorsOf(const HallSensorOptions& options);
 
+/// The model in the file at `path`.
 /// Errors: as ReadHallModel and ReadTextFile.
 Result<HallModelFile> LoadHallModel(const std::string& path);
 

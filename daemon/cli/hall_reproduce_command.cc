@@ -1,4 +1,5 @@
-// hall reproduce: what the paper behind the Hall sensors claims, and what its simulation says.
+// The command hall reproduce compares the claims of the paper behind the Hall sensors with its
+// simulation.
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-// layout hex: a focal plane out of nothing but a count and a pitch.
+// The command layout hex makes a focal plane from a count and a pitch alone.
 
 #include <fmt/format.h>
 
@@ -14,8 +14,8 @@ namespace {
 
 struct LayoutOptions {
   HexLayoutOptions hex;
-  std::vector<double> arms_mm;  // none, one for both arms, or theta and phi
-  std::vector<double> gears;    // none, one for both axes, or theta and phi
+  std::vector<double> arms_mm;  // empty, one for both arms, or theta and phi
+  std::vector<double> gears;    // empty, one for both axes, or theta and phi
   std::string out;
   std::string fiducials_out;
 };
@@ -34,7 +34,7 @@ ExitCode RunLayoutHex(const Context& context, const LayoutOptions& options) {
       unit.axis[1].gear = options.gears.back();
     }
   }
-  // The same judge as at every later reading: a layout that it would refuse is not written.
+  // The check is the same as at every later reading: a layout that it refuses is not written.
   const auto layout = Layout::Create(units, {});
   if (!layout) return Report(context, layout.error());
   const std::string text = WriteUnits(layout->units());

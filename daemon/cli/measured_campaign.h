@@ -1,5 +1,5 @@
-// What the commands on a measured campaign have in common: its folder, the models that they are
-// given, and the threads that they run on.
+// The commands on a measured campaign share these functions: they read its folder and the given
+// models, and run the work on threads.
 #pragma once
 
 #include <string>
@@ -18,15 +18,16 @@ struct MeasuredCampaign {
   ReportNames names;
 };
 
-/// moves.csv and units.csv of the folder. Tells which columns of them were passed over, and
-/// whether rows had to be sorted. Errors: a
-/// file that cannot be read, or is no such table.
+/// The moves.csv and units.csv of the folder. Reports which columns were ignored, and whether rows
+/// had to be sorted.
+/// Errors: a file that cannot be read, or is no such table.
 Result<MeasuredCampaign> ReadMeasuredCampaign(const Context& context, const std::string& folder);
 
-/// Errors: as above, of a model.toml for the campaign's units.
+/// The model for the campaign's units in a model.toml.
+/// Errors: as those of its file, as above.
 Result<ModelFile> ReadModelFor(const sim::Campaign& campaign, const std::string& file);
 
-/// 0: as many as the machine has.
+/// A loop over `threads` threads; 0: all cores of the machine.
 sim::ParallelFor OnThreads(int threads);
 
 }  // namespace focalfleet::cli

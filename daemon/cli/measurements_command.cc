@@ -1,5 +1,5 @@
-// measurements: what the camera found in one exposure, as a table; as FITS for the spectrograph's
-// pipeline.
+// The command measurements shows what the camera found in one exposure, as a table. The
+// spectrograph's pipeline reads it as FITS.
 
 #include <fmt/format.h>
 
@@ -25,10 +25,11 @@ double NumberOrNan(const Json& row, const char* key) {
   return found != row.end() && found->is_number() ? found->get<double>() : std::nan("");
 }
 
-/// Of a unit that was sent again after the exposure and not seen since: nobody knows its place.
+/// Status of a unit that was moved again after the exposure and not seen since: its position is not
+/// known.
 constexpr const char* kMovedSince = "moved_since";
 
-/// One bit a status, in the order of MeasurementStatus, then kMovedSince; docs/files.md.
+/// A bit for each status, in the order of MeasurementStatus, then kMovedSince; docs/files.md.
 std::int64_t StatusBits(const std::string& status) {
   if (status == kMovedSince) return std::int64_t{1} << kMeasurementStatusCount;
   for (std::size_t bit = 0; bit < kMeasurementStatusCount; ++bit)
@@ -55,8 +56,8 @@ FitsTable TableOf(const Json& answer) {
     beta.push_back(NumberOrNan(orientation, "beta_deg"));
     gamma.push_back(NumberOrNan(orientation, "gamma_deg"));
     bits.push_back(StatusBits(status.back()));
-    // Without a spot there is no place; 0, 0 would look like one. Where it was before it moved on
-    // is not its place either (--json has it).
+    // Without a spot the row has no position; 0, 0 would look like one. The position before a later
+    // move is not valid either (--json has it).
     const bool seen = NumberIn(row, "sigma_um") > 0 && !moved_since;
     x.push_back(seen ? NumberIn(row, "x_mm") : std::nan(""));
     y.push_back(seen ? NumberIn(row, "y_mm") : std::nan(""));

@@ -1,4 +1,5 @@
-// model load, show, unload, rollback: the model of a campaign that blind commands go through.
+// The commands model load, show, unload and rollback manage the model of a campaign through which
+// blind commands go.
 
 #include <fmt/format.h>
 
@@ -50,7 +51,7 @@ std::string ChangeTable(const Json& answer) {
   return AlignColumns(rows) + "\n";
 }
 
-// The model's causes that commands cannot make good for; empty: none.
+// The model's causes that commands cannot compensate; empty: none.
 std::string NotCompensated(const Json& in_force) {
   std::string left_out;
   for (const Json& cause : ListIn(in_force, "left_out"))

@@ -81,7 +81,7 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
     FOCALFLEET_TRY_ASSIGN(const std::string obstacles, ReadTextFile(files.obstacles));
     FOCALFLEET_TRY_ASSIGN(options.obstacles, ReadObstacles(obstacles, files.obstacles));
   }
-  // A misspelt column is one that nobody reads: it must not pass in silence.
+  // Ignored columns are reported: a misspelt column would otherwise be ignored without a message.
   FOCALFLEET_TRY_ASSIGN(const UnitsFile units, ReadUnits(text, files.units));
   ReportPassedOver(context, files.units, units.ignored_columns);
   FOCALFLEET_TRY_ASSIGN(Layout layout, ReadLayout(text, files.units, std::move(options)));
@@ -89,16 +89,17 @@ Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files) 
   return OfflineFleet{std::move(layout), std::move(drives)};
 }
 
-Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet, WhoseState whose) {
+Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
+                             WhoseState required) {
   FOCALFLEET_TRY_ASSIGN(const std::string text, ReadTextFile(path));
   FOCALFLEET_TRY_ASSIGN(StatePoses poses, ReadState(text, path, fleet.layout, fleet.drives));
-  FOCALFLEET_TRY(RequirePoses(path, fleet.layout, poses, whose));
+  FOCALFLEET_TRY(RequirePoses(path, fleet.layout, poses, required));
   return poses;
 }
 
 namespace {
 
-/// What compensating changes of a request.
+/// The changes that compensation makes to a request.
 struct Reported {
   std::vector<Pose> offsets;  // Shape: (n)
   std::size_t compensated = 0;
@@ -109,7 +110,7 @@ bool CanCount(const Unit& unit, const UnitDrive& drive, const Pose& place, const
   return InRange(unit, drive, {place[0] - offset[0], place[1] - offset[1]});
 }
 
-/// From here on `state` and `targets` are places.
+/// Converts `state` and `targets` from counts to positions by the model.
 Reported ReportByModel(const Compensation& compensation, const OfflineFleet& fleet,
                        StatePoses* state, StatePoses* targets) {
   Reported reported{
@@ -148,7 +149,7 @@ Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& flee
   PlanOptions options = files.plan;
   if (files.compensation != nullptr) {
     reported = ReportByModel(*files.compensation, fleet, &places, &poses);
-    // Two that stand clear by their counts may be nearer by the model.
+    // Two units that are clear of each other by their counts may be nearer by the model.
     options.lead_apart = true;
   }
   std::vector<std::uint8_t> frozen(fleet.layout.size());

@@ -1,5 +1,5 @@
-// What the commands that work on files share: the focal plane as units.csv and obstacles.csv give
-// it, with the nominal drive, or with what the daemon's store says that was tuned.
+// OfflineFleet is shared by the commands that work on files: the focal plane as units.csv and
+// obstacles.csv give it. Drives are nominal, or as tuned in the daemon's store.
 #pragma once
 
 #include <array>
@@ -25,19 +25,19 @@ namespace focalfleet::cli {
 struct FleetFiles {
   std::string units;
   std::string obstacles;    // empty: none
-  double clearance_mm = 0;  // 0: by the pitch
+  double clearance_mm = 0;  // 0: derived from the pitch
 };
 
-/// --units, --obstacles, --clearance-mm.
+/// Adds --units, --obstacles, --clearance-mm.
 void AddFleetFiles(CLI::App* command, FleetFiles* files);
 
-/// --store.
+/// Adds --store.
 void AddTunedStore(CLI::App* command, std::string* store);
 
 struct OfflineFleet {
   Layout layout;
   std::vector<UnitDrive> drives;  // Shape: (n)
-  /// What tunings found, by unit and axis. Shape: (n), or empty where no store was read.
+  /// The results of tunings, by unit and axis. Shape: (n), or empty where no store was read.
   std::vector<std::array<std::optional<TuningRow>, kAxisCount>> tunings = {};
 
   [[nodiscard]] std::optional<TuningRow> TuningOf(PositionerIndex i, Axis axis) const {
@@ -45,46 +45,49 @@ struct OfflineFleet {
   }
 };
 
-/// The drives and tunings of units that are bound in the store are those that it has; an empty path
-/// changes nothing. The store is only read: a daemon may have it open. Errors: as StoreReader's.
+/// Takes over the drives and tunings of the units that are bound in the store; an empty path
+/// changes nothing. The store is only read: a daemon may have it open.
+/// Errors: as StoreReader's.
 Status TakeTuned(const std::string& store, OfflineFleet* fleet);
 
-/// Tells on stderr which columns of units.csv were passed over.
+/// The fleet in the files. Reports on stderr which columns of units.csv were ignored.
 /// Errors: kUnavailable, kInvalid with file:line.
 Result<OfflineFleet> LoadFleet(const Context& context, const FleetFiles& files);
 
 using StatePoses = std::vector<std::optional<Pose>>;  // Shape: (n)
 
-/// Where the units of `whose` stand, and others that the file names.
-/// Errors: as LoadFleet, and a unit of these that the file does not name.
-Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet, WhoseState whose);
+/// The poses of the units that `required` selects, and of others that the file names.
+/// Errors: as LoadFleet; also a selected unit that the file does not name.
+Result<StatePoses> LoadState(const std::string& path, const OfflineFleet& fleet,
+                             WhoseState required);
 
 struct PlanFiles {
   std::string targets;
-  std::string from;  // for messages: what `state` was read from
+  std::string from;  // for messages: the source of `state`
   PlanOptions plan = {};
   std::uint32_t sectors = 1;
-  const Compensation* compensation = nullptr;  // none: units are told their targets as they are
+  const Compensation* compensation = nullptr;  // null: units receive their targets unchanged
 };
 struct OfflinePlan {
   Plan plan;
   StatePoses targets;
   std::size_t targeted = 0;
-  std::uint32_t sectors = 1;    // fewer than asked for where some had to become one
-  std::size_t compensated = 0;  // are told what their model has for their target
-  std::vector<PositionerIndex> beyond_range = {};  // could not be told that: they stay
+  std::uint32_t sectors = 1;    // fewer than asked for where some had to be merged
+  std::size_t compensated = 0;  // units whose commands are the model's for their target
+  std::vector<PositionerIndex> beyond_range = {};  // out of their axes' range: they stay
   [[nodiscard]] std::size_t served() const {
     return targeted - plan.unserved.size() - beyond_range.size();
   }
 };
 /// The plan from `state`, by each unit's count, to the targets; disabled units stand. With a
-/// compensation places differ from counts as the daemon has them: by what the model says of each
-/// unit's target. Errors: as LoadFleet, and those of
-/// ResolveTargets and MakePlan.
+/// compensation, positions differ from counts as in the daemon: by the model's correction for each
+/// unit's target.
+/// Errors: as LoadFleet, and those of ResolveTargets and MakePlan.
 Result<OfflinePlan> PlanOffline(const Context& context, const OfflineFleet& fleet,
                                 const StatePoses& state, const PlanFiles& files);
 
-/// `unserved` of the JSON summaries, and the lines for people, each after a line break.
+/// The member `unserved` of the JSON summaries, and the lines for human readers, each after a line
+/// break.
 Json UnservedJson(const Plan& plan, const Layout& layout);
 std::string DescribeUnserved(const Json& unserved);
 

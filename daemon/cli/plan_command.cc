@@ -1,5 +1,5 @@
-// plan: from a state to targets, on paper. Nothing moves; anyone can check the file that it writes,
-// or look at it.
+// The command plan plans from a state to targets, offline. Nothing moves. The file that it writes
+// can be checked by any program, or looked at.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -77,7 +77,7 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   if (!options.plot.empty()) {
     FOCALFLEET_TRY(WriteFileAtomically(options.plot, PageOf(options, fleet, state, planned)));
   }
-  // Last: where it is, all is.
+  // The plan is written last: where it exists, all files exist.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
   PlanEstimate estimate = Estimate(planned.plan, fleet.layout, fleet.drives, motor);
   PowerStatement power = StatePower(planned.plan, fleet.layout, fleet.drives, options.plan);
@@ -90,7 +90,7 @@ Json PairJson(const Layout& layout, PositionerIndex a, PositionerIndex b) {
   return Json::array({layout.unit(a).id.value, layout.unit(b).id.value});
 }
 
-/// What the plan promises besides arriving.
+/// The guarantees of the plan besides arrival.
 Json GuaranteeJson(const Planned& planned, const PlanOptions& options) {
   const Layout& layout = planned.fleet.layout;
   Json tightest = Json::array();
@@ -208,7 +208,7 @@ ExitCode RunPlan(const Context& context, const PlanCommandOptions& options) {
   return planned->plan.unserved.empty() ? ExitCode::kOk : ExitCode::kSomeUnserved;
 }
 
-// stdout has the plan or its summary.
+// Refuses stdout for the page: stdout carries the plan or its summary.
 CLI::Validator NoStdout() {
   return {[](const std::string& path) {
             return path == "-" ? std::string("a page goes into a file") : std::string();

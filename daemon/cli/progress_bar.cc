@@ -45,7 +45,7 @@ void ProgressBar::Show(double fraction, const std::string& stage, const std::str
   if (kind_ == Kind::kNone) return;
   const std::string details = fmt::format("{}  {}", stage, text);
   if (kind_ == Kind::kTerminal) {
-    // One column is left free: a full line makes some terminals wrap.
+    // The last column is left free: a full line makes some terminals wrap.
     RedrawLine(DrawBar(fraction, details, Columns() - 1));
     std::fflush(stderr);
     drawn_ = true;

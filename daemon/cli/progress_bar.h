@@ -1,6 +1,6 @@
-// How far a long command is, on stderr. On a terminal one line that is drawn over; into a file or
-// pipe one plain line when the state changes and at each tenth of the way; with --json or --quiet
-// nothing.
+// ProgressBar shows the progress of a long command on stderr. A terminal gets a line that is
+// redrawn. A file or pipe gets a plain line when the state changes and at each tenth of the way.
+// With --json or --quiet nothing is shown.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace focalfleet::cli {
 
-/// `[######----]  60 %  text`, at most `columns` wide. Fractions outside 0..1 (and NaN) are
-/// clipped.
+/// The text `[######----]  60 %  text`, at most `columns` wide. Fractions outside 0..1 (and NaN)
+/// are clipped.
 std::string DrawBar(double fraction, std::string_view text, std::size_t columns);
 
 class ProgressBar {
@@ -21,7 +21,8 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
   ~ProgressBar();
 
-  /// `stage` is what is being done (its change makes a plain line), `text` the details.
+  /// Shows the progress. `stage` is the current activity (its change makes a plain line), `text`
+  /// the details.
   void Show(double fraction, const std::string& stage, const std::string& text);
 
   /// Leaves the line, so that other text can follow. The destructor does the same.

@@ -1,4 +1,4 @@
-// reproduce: what the paper behind the drive claims, and what its simulation says to each claim.
+// The command reproduce compares each claim of the paper behind the drive with its simulation.
 
 #include <fmt/format.h>
 

@@ -1,4 +1,5 @@
-// retarget UNIT X_MM Y_MM: another target for one unit of the configuration that is under way.
+// The command retarget UNIT X_MM Y_MM gives another target to one unit of the configuration that is
+// under way.
 
 #include <fmt/format.h>
 
@@ -19,7 +20,8 @@ ExitCode RunRetarget(const Context& context, const RetargetOptions& options) {
   const Json args{{"unit_id", options.unit_id},
                   {options.angles ? "theta_deg" : "x_mm", options.first},
                   {options.angles ? "phi_deg" : "y_mm", options.second}};
-  // Answered when the unit starts: it may have to stop first, and waits for others that stop.
+  // The answer comes when the unit starts: it may have to stop first, and waits for other units
+  // that stop.
   const auto answer = Ask(context, {.verb = "retarget", .args = args, .long_lasting = true});
   if (!answer) return Report(context, answer.error());
   const bool goes = answer->value("goes", false);
@@ -29,7 +31,7 @@ ExitCode RunRetarget(const Context& context, const RetargetOptions& options) {
     Say(context, text);
     return ExitCode::kOk;
   }
-  // It was stopped for it, so this is no refusal that changed nothing.
+  // The unit was stopped for the new target, so the failure is no refusal that changed nothing.
   Complain(fmt::format("focalfleet: unit {} does not go: {}\n", options.unit_id, text));
   return ExitCode::kSomeUnserved;
 }

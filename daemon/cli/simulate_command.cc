@@ -1,5 +1,5 @@
-// simulate: what the physics does, without any unit or fleet. drive: one motor on its bridge, at
-// PWM level.
+// The commands simulate run the physics without any unit or fleet. simulate drive runs one motor on
+// its bridge, at PWM level.
 
 #include <fmt/format.h>
 
@@ -19,7 +19,8 @@
 namespace focalfleet::cli {
 namespace {
 
-// wave.csv stays below the size of a file that we would read, a run below some minutes.
+// The limit keeps wave.csv below the size of a file that this program reads, and a run below some
+// minutes.
 constexpr double kSamplesMax = 2e6;
 constexpr double kCarriersMax = 3e7;
 
@@ -63,7 +64,7 @@ Result<sim::RecordingPlan> PlanOf(const SimulateDriveOptions& options, const Dri
   return plan;
 }
 
-// Rounded to what means something, which prints short.
+// The value rounded to its meaningful digits, which prints short.
 double Rounded(double value, double per_unit) { return std::round(value * per_unit) / per_unit; }
 
 std::string WaveText(const sim::Recording& recording) {
@@ -170,7 +171,7 @@ Status WriteAll(const SimulateDriveOptions& options, const Simulated& simulated,
   FOCALFLEET_TRY(WriteFileAtomically(options.out + "/report.html",
                                      DriveReport(simulated.choice, simulated.recording,
                                                  RowsOf(summary), RowsOf(summary["settings"]))));
-  // Last: where it is, all is.
+  // summary.json is written last: where it exists, all files exist.
   return WriteFileAtomically(options.out + "/summary.json",
                              summary.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }

@@ -8,7 +8,8 @@ namespace focalfleet::cli {
 namespace {
 
 constexpr std::size_t kNamedMax = 5;
-// Loads are known to a thousandth; what was tuned without any margin shall not fall below it.
+// Loads are known to a thousandth. A motor that was tuned without any margin must not fail by this
+// rounding.
 constexpr double kLoadRounding = 1e-3;
 
 sim::Drive::Setting SettingOf(const MotorModel& motor, double v_bus_V) {

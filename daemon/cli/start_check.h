@@ -1,7 +1,7 @@
-// Would the motors of a plan start at all? An estimate knows steady rotation only; whether n takes
-// a load along from rest is the drive's question, so here, where both may be seen, it is put to the
-// reduced drive: for the load that a tuning found where the store has one, for the estimate's own
-// otherwise.
+// StartCheck decides whether the motors of a plan start at all. An estimate knows steady rotation
+// only; whether n takes a load along from rest is a question for the drive's model. This layer sees
+// both, so the check asks the reduced drive. The load is the one that a tuning found where the
+// store has one, else the estimate's own.
 #pragma once
 
 #include <map>
@@ -24,19 +24,20 @@ struct BelowCritical {
 };
 
 struct StartVerdict {
-  std::size_t axes = 0;              // that move
+  std::size_t axes = 0;              // axes that move
   std::vector<BelowCritical> below;  // ascending by unit
   [[nodiscard]] bool none_starts() const { return axes > 0 && below.size() == axes; }
 };
 
-/// Cost: some hundredths of a second for each way in which a motor is fed.
+/// Decides for all axes of a plan. Cost: some hundredths of a second for each way in which a motor
+/// is driven.
 class StartCheck {
  public:
   explicit StartCheck(const MotorModel& motor) : motor_(motor) {}
   StartVerdict Of(const Plan& plan, const OfflineFleet& fleet);
 
  private:
-  using Key = std::tuple<std::uint16_t, std::uint16_t, WaveMode, double>;  // but for n
+  using Key = std::tuple<std::uint16_t, std::uint16_t, WaveMode, double>;  // all but n
   int CriticalOf(const Key& feed, double load_Nm);
 
   MotorModel motor_;
@@ -44,8 +45,8 @@ class StartCheck {
   std::map<std::pair<Key, double>, int> known_;
 };
 
-/// `below_critical` of the JSON summaries; and a line for people after a line break, empty where
-/// all start.
+/// The member `below_critical` of the JSON summaries, and a line for human readers after a line
+/// break. The line is empty where all motors start.
 Json BelowCriticalJson(const StartVerdict& verdict);
 std::string DescribeBelowCritical(const StartVerdict& verdict);
 

@@ -1,4 +1,4 @@
-// status, unit, state, history: questions that change nothing.
+// The commands status, unit, state and history are questions that change nothing.
 
 #include <fmt/format.h>
 
@@ -38,7 +38,7 @@ std::string DescribeBus(const Json& bus, bool colour_on) {
       CountIn(bus, "frames_received"), CountIn(bus, "malformed"), CountIn(bus, "retries"));
 }
 
-// Healthy buses are only counted, unless all are wanted.
+// Healthy buses are only counted, unless the caller asks for all.
 std::string DescribeBuses(const Json& buses, double load_max, bool all, bool colour_on) {
   std::size_t up = 0;
   std::string lines;
@@ -128,7 +128,7 @@ bool IsPlaceWitness(const std::string& witness) {
 struct StateFile {
   std::string csv = "unit_id,theta_deg,phi_deg\n";
   std::size_t rows = 0;
-  Json unknown = Json::array();  // of {unit_id, theta, phi}: the witnesses
+  Json unknown = Json::array();  // objects {unit_id, theta, phi} with the witnesses
 };
 
 StateFile MakeStateFile(const Json& rows) {
@@ -142,7 +142,7 @@ StateFile MakeStateFile(const Json& rows) {
       file.csv += fmt::format("{},{},{}\n", id, NumberIn(row, "theta_low_deg"),
                               NumberIn(row, "phi_low_deg"));
     } else {
-      // No row rather than a guess: a reader then knows that the place is not known.
+      // The row is omitted instead of guessed: a reader then sees that the position is not known.
       file.csv += fmt::format("# unit {} left out: theta {}, phi {}\n", id, theta, phi);
       file.unknown.push_back({{"unit_id", id}, {"theta", theta}, {"phi", phi}});
     }
@@ -218,7 +218,7 @@ struct HistoryOptions {
   std::uint32_t limit = 20;
 };
 
-// Which list first, and its columns: who, what, when, how it went, what it took.
+// A list with its columns in order: identity, event, time, result, cost.
 struct HistoryTable {
   const char* name;
   std::vector<std::string> columns;

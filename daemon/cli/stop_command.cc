@@ -1,4 +1,4 @@
-// stop [UNIT]: through the daemon, or with --direct past it.
+// The command stop [UNIT] stops units through the daemon, or with --direct without it.
 
 #include <fmt/format.h>
 
@@ -66,12 +66,14 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
 constexpr std::chrono::milliseconds kLookEvery{50};
 
 struct NotStanding {
-  std::uint64_t moving = 0;     // as far as the daemon knows
+  std::uint64_t moving = 0;     // by the daemon's state
   std::uint64_t not_known = 0;  // they do not answer, or not yet
 };
 
-/// Counts among all units, or looks at the one named. A unit that has never answered counts where
-/// it is named: else a fleet with one broken unit could never be told to stand. Errors: as Ask.
+/// Counts the units that do not stand: among all units, or the named one. A unit that has never
+/// answered counts only where it is named. Otherwise a fleet with one broken unit could never be
+/// reported as standing.
+/// Errors: as Ask.
 tl::expected<NotStanding, Failure> CountNotStanding(const Context& context,
                                                     const std::optional<std::uint32_t>& unit_id) {
   Json phases;
@@ -91,14 +93,15 @@ tl::expected<NotStanding, Failure> CountNotStanding(const Context& context,
   return units;
 }
 
-/// What was asked for is that units stand; "sent" alone is not done.
-ExitCode TellWhetherAllStand(const Context& context, const StopOptions& options) {
+/// Waits until the units stand and reports the result: a stop that was sent is not yet a stop that
+/// was done.
+ExitCode ReportWhetherAllStand(const Context& context, const StopOptions& options) {
   const auto give_up =
       std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
   for (;;) {
     const auto units = CountNotStanding(context, options.unit_id);
     const bool over = std::chrono::steady_clock::now() >= give_up;
-    // A stop is let in where all places are taken, a question is not.
+    // A daemon whose places are all taken accepts a stop, but not a question.
     if (!units && units.error().error.code == ErrorCode::kFull && !over) {
       std::this_thread::sleep_for(kLookEvery);
       continue;
@@ -152,7 +155,7 @@ ExitCode RunStop(const Context& context, const StopOptions& options) {
   }
   Say(context, options.unit_id ? fmt::format("unit {}: stop sent", *options.unit_id)
                                : "stop sent to all units");
-  return TellWhetherAllStand(context, options);
+  return ReportWhetherAllStand(context, options);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// targets: a random configuration in which everything is clear, for load tests and for a first
-// state.
+// The command targets makes a random configuration without collisions, for load tests and for a
+// first state.
 
 #include <fmt/format.h>
 
@@ -25,14 +25,14 @@ struct TargetsOptions {
 
 using Poses = std::vector<std::optional<Pose>>;
 
-// Disabled units stand where the state says; without it they are drawn, too.
-Result<Poses> Standing(const TargetsOptions& options, const OfflineFleet& fleet) {
-  Poses standing(fleet.layout.size());
-  if (options.from.empty()) return standing;
+// Disabled units stand at their poses of the state; without a state they are drawn, too.
+Result<Poses> FixedPoses(const TargetsOptions& options, const OfflineFleet& fleet) {
+  Poses fixed(fleet.layout.size());
+  if (options.from.empty()) return fixed;
   FOCALFLEET_TRY_ASSIGN(const Poses state, LoadState(options.from, fleet, WhoseState::kDisabled));
-  for (std::uint32_t i = 0; i < standing.size(); ++i)
-    if (!fleet.layout.unit({i}).enabled) standing[i] = state[i];
-  return standing;
+  for (std::uint32_t i = 0; i < fixed.size(); ++i)
+    if (!fleet.layout.unit({i}).enabled) fixed[i] = state[i];
+  return fixed;
 }
 
 std::string TargetsText(const OfflineFleet& fleet, const Poses& enabled, bool angles) {
@@ -48,9 +48,9 @@ std::string TargetsText(const OfflineFleet& fleet, const Poses& enabled, bool an
 ExitCode RunTargets(const Context& context, const TargetsOptions& options) {
   const auto fleet = LoadFleet(context, options.files);
   if (!fleet) return Report(context, fleet.error());
-  const auto standing = Standing(options, *fleet);
-  if (!standing) return Report(context, standing.error());
-  const auto drawn = DrawConfiguration(fleet->layout, fleet->drives, *standing, Rng(options.seed));
+  const auto fixed = FixedPoses(options, *fleet);
+  if (!fixed) return Report(context, fixed.error());
+  const auto drawn = DrawConfiguration(fleet->layout, fleet->drives, *fixed, Rng(options.seed));
   if (!drawn) return Report(context, drawn.error());
 
   const bool whole = options.as == "state";

@@ -1,4 +1,4 @@
-// home, disable, enable, adopt, params: what an operator does to single units.
+// The commands home, measure, disable, enable, adopt and params act on single units.
 
 #include <fmt/format.h>
 
@@ -23,9 +23,9 @@ ExitCode ReportConfiguration(const Context& context, const Json& configuration) 
   return exit;
 }
 
-// The answer as it is, or `done` for people.
-ExitCode Tell(const Context& context, const tl::expected<Json, Failure>& answer,
-              const std::string& done) {
+// Prints the answer with --json, else `done`.
+ExitCode PrintAnswer(const Context& context, const tl::expected<Json, Failure>& answer,
+                     const std::string& done) {
   if (!answer) return Report(context, answer.error());
   if (context.json) PrintJson(*answer);
   Say(context, done);
@@ -133,15 +133,17 @@ struct EnableOptions {
 };
 
 ExitCode RunDisable(const Context& context, const EnableOptions& options) {
-  return Tell(context,
-              Ask(context, {.verb = "disable",
-                            .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
-              fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
+  return PrintAnswer(
+      context,
+      Ask(context,
+          {.verb = "disable", .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
+      fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
 }
 
 constexpr std::chrono::milliseconds kLookEvery{50};
 
-/// The units that are still in fault when the daemon has had time to clear it. Errors: as Ask.
+/// The units that are still in fault when the daemon has had time to clear it.
+/// Errors: as Ask.
 tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(const Context& context,
                                                                const EnableOptions& options) {
   const auto give_up =
@@ -206,7 +208,7 @@ ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
       fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id);
   if (const std::string text = answer ? TextIn(*answer, "text") : ""; text.starts_with("done"))
     done += text.substr(4);
-  return Tell(context, answer, done);
+  return PrintAnswer(context, answer, done);
 }
 
 void AddAdopt(CommandLine* line) {
@@ -241,12 +243,13 @@ ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
                   {"axis", options.axis},
                   {"parameter", options.name},
                   {"value", *options.value}};
-  // The unit has the last word: it may hold another value than the one asked for.
+  // The unit decides: it may hold another value than the requested one.
   const auto answer = Ask(context, {.verb = "params_set", .args = args});
-  return Tell(context, answer, answer ? TextIn(*answer, "text") : "");
+  return PrintAnswer(context, answer, answer ? TextIn(*answer, "text") : "");
 }
 
-// What was stored or set, then what holds by default, narrowed to one axis and name where given.
+// The rows of stored or set parameters, then those of the defaults, narrowed to one axis and name
+// where given.
 Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   Json rows = Json::array();
   const auto wanted = [&](const std::string& axis, const std::string& name) {
@@ -273,7 +276,7 @@ Json ParameterRows(const Json& answer, const ParamsOptions& options) {
   return rows;
 }
 
-// What the last tuning found, for people; empty where the unit was never tuned.
+// The result of the last tuning, for human readers; empty where the unit was never tuned.
 std::string DescribeTuning(const Json& answer, const ParamsOptions& options) {
   Json rows = Json::array();
   for (Json row : ListIn(answer, "tuning")) {

@@ -1,4 +1,5 @@
-// watch: the fleet as DDS tells it, drawn over and over on a terminal, or one JSON object a change.
+// The command watch shows the fleet as DDS reports it. A terminal gets a picture that is redrawn;
+// with --json each change gives one JSON object.
 
 #include <fmt/format.h>
 
@@ -25,7 +26,7 @@ struct WatchOptions {
   double wait_s = 5;
 };
 
-// All that came so far: DDS tells what changed, a picture needs the whole.
+// Picture holds all values so far: DDS reports changes, but a picture needs the whole.
 struct Picture {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
@@ -36,7 +37,7 @@ struct Picture {
 constexpr std::size_t kAlarmsShown = 8;
 constexpr std::size_t kUnitsShown = 12;
 
-// Texts from DDS may come from any program on the network, so they are made fit for a terminal.
+// Texts from DDS may come from any program on the network, so they are made safe for a terminal.
 void Absorb(const StatusUpdate& update, Picture* picture) {
   if (update.fleet) {
     picture->fleet = update.fleet;
@@ -161,7 +162,7 @@ Json Rows(const Values& values) {
   return rows;
 }
 
-// What came, in one object; members without news are left out.
+// The update as one object; members without news are omitted.
 Json JsonOf(const StatusUpdate& update) {
   Json object = Json::object();
   if (update.fleet) object["fleet"] = Counts(*update.fleet);
@@ -180,7 +181,7 @@ StatusUpdate Whole(const Picture& picture) {
   return whole;
 }
 
-// ---- for people
+// ---- text for human readers
 
 std::string DescribeFleet(const FleetStatusValue& fleet, bool colour_on) {
   std::string phases;
@@ -233,7 +234,7 @@ std::string DescribeBuses(const Picture& picture, bool colour_on) {
                      picture.buses.size(), 100 * load, troubled);
 }
 
-// Only units that want an eye: not at rest in good order, or with a fault.
+// Only units that need attention are listed: not at rest in good order, or with a fault.
 std::string DescribeUnits(const Picture& picture) {
   std::vector<std::vector<std::string>> rows{{"unit", "phase", "fault", "theta", "phi", "outcome"}};
   std::size_t more = 0;
@@ -277,7 +278,7 @@ void Draw(const Context& context, const Picture& picture, bool over) {
 
 // ---- the loop
 
-ExitCode NobodyPublishes(const Context& context, const WatchOptions& options, bool seen) {
+ExitCode ReportNoPublisher(const Context& context, const WatchOptions& options, bool seen) {
   return Report(
       context,
       {ErrorCode::kUnavailable,
@@ -304,10 +305,10 @@ ExitCode Loop(const Context& context, const WatchOptions& options, StatusReader*
     }
     Absorb(update, &picture);
     const bool late = steady_clock::now() - begun > patience;
-    if (late && !picture.fleet) return NobodyPublishes(context, options, reader->writer_seen());
-    if (picture.fleet && !reader->writer_alive()) return NobodyPublishes(context, options, true);
+    if (late && !picture.fleet) return ReportNoPublisher(context, options, reader->writer_seen());
+    if (picture.fleet && !reader->writer_alive()) return ReportNoPublisher(context, options, true);
     if (options.once) {
-      // What is late is left out rather than waited for without end.
+      // Late values are omitted: waiting for them might never end.
       if (!picture.fleet || (!late && !WholeFleetIsThere(picture))) continue;
       if (context.json) {
         PrintJson(JsonOf(Whole(picture)));

@@ -9,9 +9,9 @@
 namespace focalfleet::dds_internal {
 namespace {
 
-// A killed daemon is noticed after this long. 500 ms works on an idle machine; a machine that plans
-// for 5000 units on all its cores may keep Cyclone's lease thread waiting that long, and a living
-// daemon must not look dead.
+// A killed daemon is noticed after this time. 500 ms works on an idle machine. While a machine
+// plans for 5000 units on all its cores, Cyclone's lease thread may wait that long. A living daemon
+// must not look dead.
 constexpr dds_duration_t kLease = DDS_MSECS(2000);
 
 struct Held {
@@ -22,7 +22,7 @@ struct Domains {
   std::mutex mutex;
   std::map<std::uint32_t, Held> held;
 };
-// Mirrors what Cyclone itself keeps once a process.
+// The table mirrors what Cyclone itself keeps once for each process.
 Domains& TheDomains() {
   static Domains domains;
   return domains;
@@ -34,7 +34,7 @@ struct DeleteQos {
 
 std::unique_ptr<dds_qos_t, DeleteQos> SharedQos() {
   std::unique_ptr<dds_qos_t, DeleteQos> qos(dds_create_qos());
-  // No time to block: a writer whose readers lag refuses the sample, and the tick goes on.
+  // The blocking time is 0: a writer whose readers lag refuses the sample, and the tick goes on.
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
   dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);

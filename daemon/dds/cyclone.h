@@ -1,5 +1,5 @@
-// What publisher and reader share of Cyclone DDS: the domain with its configuration, entities that
-// delete themselves, the topics' names and the QoS that both ends ask for.
+// Publisher and reader share these parts of Cyclone DDS: the domain with its configuration,
+// entities that delete themselves, the topics' names, and the QoS of both ends.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ struct dds_topic_descriptor;
 
 namespace focalfleet::dds_internal {
 
-extern const char* const kLoopbackConfig;  // deploy/cyclonedds.xml
+extern const char* const kLoopbackConfig;  // text of deploy/cyclonedds.xml
 
 using Handle = std::int32_t;  // dds_entity_t
 
@@ -25,7 +25,7 @@ inline constexpr const char* kAlarmTopic = "focalfleet/alarm";
 inline constexpr const char* kExposureRequestTopic = "focalfleet/exposure_request";
 inline constexpr const char* kExposureTopic = "focalfleet/exposure";
 
-/// Deletes its entity, and with it all that was made under it.
+/// Owns a DDS entity; its destructor deletes the entity and all that was made under it.
 class Entity {
  public:
   Entity() = default;
@@ -42,8 +42,9 @@ class Entity {
   Handle handle_ = 0;
 };
 
-/// Holds a domain in this process. Cyclone configures a domain once a process, so publisher and
-/// reader of one process share it: the first one's configuration holds until the last is gone.
+/// Holds a domain in this process. Cyclone configures a domain once for each process, so publisher
+/// and reader of one process share it. The first one's configuration holds until the last one is
+/// gone.
 class Domain {
  public:
   static Result<Domain> Acquire(std::uint32_t id, const std::string& config_xml);
@@ -61,7 +62,7 @@ class Domain {
   bool held_ = false;
 };
 
-/// The error of a DDS call that gave `code` < 0.
+/// The error of a DDS call that returned `code` < 0.
 [[nodiscard]] tl::unexpected<Error> DdsFailure(const char* what, std::int32_t code);
 
 Result<Entity> MakeParticipant(std::uint32_t domain);
@@ -69,7 +70,7 @@ Result<Handle> MakeTopic(const Entity& participant, const dds_topic_descriptor& 
                          const char* name);
 Result<Handle> MakeWriter(const Entity& participant, Handle topic);
 Result<Handle> MakeReader(const Entity& participant, Handle topic);
-/// Takes each sample that comes from now on, the last `depth` of them.
+/// A reader that receives each sample from now on, and keeps the last `depth` of them.
 Result<Handle> MakeListener(const Entity& participant, Handle topic, std::int32_t depth);
 
 }  // namespace focalfleet::dds_internal

@@ -1,7 +1,7 @@
-// A reader or writer of DDS whose domain can be joined now or only later. Joining needs two UDP
-// ports of its own among those that are left on this host (docs/adr/0006): where other programs
-// have taken them all, that is no reason not to move a fleet. The first attempt is made at once;
-// after a failure a thread tries again until it succeeds, and ends.
+// LateJoin makes a reader or writer of DDS whose domain can be joined now or only later. Joining
+// needs two UDP ports of its own among those still free on this host (docs/adr/0006). Where other
+// programs have taken them all, the fleet must still be able to move. The first attempt is made at
+// once. After a failure a thread tries again until it succeeds, and ends.
 #pragma once
 
 #include <atomic>
@@ -23,11 +23,11 @@ class LateJoin {
  public:
   struct Options {
     std::function<Result<std::unique_ptr<T>>()> join;
-    /// Told each reason that is a new one, and an empty text when it joins after a failure. On the
-    /// thread that makes the object, or on its own.
+    /// Receives each new reason for a failure, and an empty text when it joins after a failure.
+    /// Runs on the thread that makes the object, or on LateJoin's own.
     std::function<void(const std::string& trouble)> tell = [](const std::string&) {};
     /// An attempt that fails costs some milliseconds of another core. Half of this makes no reader
-    /// wait noticeably less, and doubles what Cyclone says on standard error each time.
+    /// wait noticeably less, and doubles what Cyclone writes to standard error each time.
     std::chrono::milliseconds period{5000};
   };
 
@@ -36,9 +36,9 @@ class LateJoin {
   }
   LateJoin(const LateJoin&) = delete;
   LateJoin& operator=(const LateJoin&) = delete;
-  ~LateJoin() = default;  // the thread ends first, it is the last member
+  ~LateJoin() = default;  // the thread, the last member, ends first
 
-  /// None: not joined yet. What is there once, stays. Any thread may ask.
+  /// The joined object; null: not joined yet. Once there, the object stays. Any thread may ask.
   [[nodiscard]] T* get() const { return joined_.load(std::memory_order_acquire); }
 
  private:
@@ -66,7 +66,7 @@ class LateJoin {
   }
 
   Options options_;
-  std::string trouble_;  // of one thread at a time
+  std::string trouble_;  // used by one thread at a time
   std::unique_ptr<T> held_;
   std::atomic<T*> joined_{nullptr};
   std::jthread thread_;

@@ -7,7 +7,7 @@
 namespace focalfleet::dds_internal {
 namespace {
 
-// The codes that the IDL documents are our enumerators.
+// The codes that the IDL documents are the enumerators of the C++ types.
 static_assert(focalfleet_WITNESS_MEASURED == static_cast<int>(Witness::kMeasured));
 static_assert(focalfleet_SOURCE_SENSORS == static_cast<int>(MeasurementSource::kSensors));
 static_assert(focalfleet_PHASE_SILENT == static_cast<int>(UnitPhase::kSilent));
@@ -49,7 +49,7 @@ void CopyText(std::string_view text, char (&out)[kSize]) {
   std::size_t length = std::min(text.size(), text.find('\0'));
   if (length > kSize - 1) {
     length = kSize - 1;
-    // Not inside a character: its bytes after the first are 10xxxxxx.
+    // The cut must not fall inside a character, whose bytes after the first are 10xxxxxx.
     while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xc0u) == 0x80u) --length;
   }
   std::memcpy(out, text.data(), length);

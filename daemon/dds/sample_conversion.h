@@ -1,6 +1,6 @@
-// Between values of ours and the types that idlc generates: checks every code on both ways,
-// shortens text to its bound without cutting a UTF-8 character, and allocates nothing on the way
-// out.
+// SampleConversion converts between this project's values and the types that idlc generates. Every
+// code is checked in both directions. Text is shortened to its bound without cutting a UTF-8
+// character. The way out allocates nothing.
 #pragma once
 
 #include "daemon/dds/status_values.h"
@@ -8,7 +8,7 @@
 
 namespace focalfleet::dds_internal {
 
-/// Text that says which code does not exist, or nullptr where all do.
+/// Text that names a code that does not exist, or nullptr where all do.
 const char* Flaw(const UnitStatusValue& value);
 const char* Flaw(const UnitOrientationValue& value);
 const char* Flaw(const BusStatusValue& value);
@@ -22,7 +22,7 @@ void ToSample(const FleetStatusValue& value, focalfleet_FleetStatus* sample);
 void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationProgress* sample);
 void ToSample(const AlarmValue& value, focalfleet_Alarm* sample);
 
-/// False: a code that this version does not know.
+/// Fills `value`. False: the sample has a code that this version does not know.
 bool FromSample(const focalfleet_UnitStatus& sample, UnitStatusValue* value);
 bool FromSample(const focalfleet_UnitOrientation& sample, UnitOrientationValue* value);
 bool FromSample(const focalfleet_BusStatus& sample, BusStatusValue* value);

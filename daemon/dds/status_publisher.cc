@@ -15,9 +15,9 @@ using namespace dds_internal;
 
 namespace {
 
-// Serialised size with its 4-byte header (XCDR1). Structs whose members are in order of falling
-// alignment have no holes but the one at their end; a bounded string is sent as length and used
-// bytes.
+// The serialised size, with its 4-byte header (XCDR1). Structs whose members are in order of
+// falling alignment have no holes but the one at their end. A bounded string is sent as length and
+// used bytes.
 std::uint64_t PayloadBytes(const focalfleet_UnitStatus&) {
   return 4 + offsetof(focalfleet_UnitStatus, enabled) + 1;
 }
@@ -53,7 +53,8 @@ class StatusPublisher::Impl {
     auto impl = std::make_unique<Impl>();
     FOCALFLEET_TRY_ASSIGN(impl->domain_, Domain::Acquire(options.domain, options.config_xml));
     FOCALFLEET_TRY_ASSIGN(impl->participant_, MakeParticipant(options.domain));
-    // After the participant and before the writers, or it takes no hold of them.
+    // The switch must come after the participant and before the writers: writers made earlier
+    // ignore it.
     dds_write_set_batch(true);
     const struct {
       Handle Impl::*writer;
@@ -128,7 +129,7 @@ class StatusPublisher::Impl {
   }
 
   void Flush() {
-    // A failure was told by the Publish that met it; what waits is offered again here.
+    // The Publish call that met a failure has reported it; what waits is offered again here.
     const Status waiting = WriteWaiting();
     static_cast<void>(waiting);
     for (const Handle writer : {fleet_writer_, unit_writer_, orientation_writer_, bus_writer_,
@@ -151,7 +152,7 @@ class StatusPublisher::Impl {
   static std::uint64_t IdOf(const UnitOrientationValue& value) { return value.unit.value; }
   static std::uint64_t IdOf(const BusStatusValue& value) { return value.bus.value; }
 
-  // False: the writer has no room now, because a reader lags.
+  // Writes one sample. False: the writer has no room now, because a reader lags.
   template <class Sample>
   Result<bool> Write(Handle writer, const Sample& sample) {
     const dds_return_t code = dds_write(writer, &sample);
@@ -164,7 +165,8 @@ class StatusPublisher::Impl {
     return DdsFailure("write", code);
   }
 
-  // Single values and alarms that no reader may miss: what finds no room waits for the next Flush.
+  // Writes single values and alarms, which no reader may miss. A sample that finds no room waits
+  // for the next Flush.
   Status WriteWaiting() {
     if (fleet_waits_) {
       FOCALFLEET_TRY_ASSIGN(const bool taken, Write(fleet_writer_, fleet_));
@@ -182,7 +184,7 @@ class StatusPublisher::Impl {
     return {};
   }
 
-  // Readers that have it keep it; those who join later do not get it any more.
+  // Readers that have the alarm keep it; readers that join later do not get it any more.
   void DropOldestAlarm() {
     if (alarms_written_ > 0) {
       dds_unregister_instance(alarm_writer_, &alarms_.front());
@@ -205,7 +207,7 @@ class StatusPublisher::Impl {
   bool fleet_waits_ = false;
   bool configuration_waits_ = false;
   std::deque<focalfleet_Alarm> alarms_;  // the newest kAlarmsKept
-  std::size_t alarms_written_ = 0;       // of these, from the front
+  std::size_t alarms_written_ = 0;       // number of these written, from the front
   PublisherCounters counters_;
 };
 

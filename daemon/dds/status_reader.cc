@@ -31,7 +31,7 @@ class StatusReader::Impl {
       FOCALFLEET_TRY_ASSIGN(impl->orientations_,
                             impl->Open(focalfleet_UnitOrientation_desc, kOrientationTopic));
     }
-    // The fleet topic also tells whether somebody is there.
+    // The fleet topic also shows whether a daemon is there.
     const dds_return_t code = dds_set_status_mask(
         impl->fleet_, DDS_LIVELINESS_CHANGED_STATUS | DDS_SUBSCRIPTION_MATCHED_STATUS);
     if (code < 0) return DdsFailure("watch the daemon", code);
@@ -45,7 +45,8 @@ class StatusReader::Impl {
     const dds_return_t count =
         dds_waitset_wait(waitset_, triggered.data(), triggered.size(), DDS_MSECS(timeout.count()));
     if (count < 0) return DdsFailure("wait", count);
-    // To ask resets; otherwise the next wait would come back at once for the same news.
+    // Reading the status resets it; otherwise the next wait would return at once for the same
+    // change.
     dds_liveliness_changed_status_t liveliness{};
     dds_get_liveliness_changed_status(fleet_, &liveliness);
     dds_subscription_matched_status_t matched{};
@@ -107,12 +108,12 @@ class StatusReader::Impl {
     std::array<void*, kBatch> samples;
     std::array<dds_sample_info_t, kBatch> infos;
     for (;;) {
-      samples[0] = nullptr;  // asks for a loan
+      samples[0] = nullptr;  // null asks Cyclone for a loan
       const dds_return_t count = dds_take(reader, samples.data(), infos.data(), kBatch, kBatch);
       if (count < 0) return DdsFailure("take", count);
       if (count == 0) return {};
       for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
-        if (!infos[i].valid_data) continue;  // news of an instance's end, no value
+        if (!infos[i].valid_data) continue;  // notice of an instance's end, without a value
         Value value;
         if (FromSample(*static_cast<const Sample*>(samples[i]), &value)) {
           sink(std::move(value));

@@ -1,6 +1,6 @@
-// The other end, for `focalfleet watch` and tests: takes what came since the last time, in values
-// of our own. A sample with a code outside its enum is counted and dropped, never shown as
-// something else.
+// StatusReader is the receiving end, for `focalfleet watch` and tests. Take returns the samples
+// that arrived since the last call, in this project's own values. A sample with a code outside its
+// enum is counted and dropped, never shown as something else.
 #pragma once
 
 #include <chrono>
@@ -15,8 +15,8 @@
 
 namespace focalfleet {
 
-/// What came. Of a unit, bus, fleet and configuration only the newest value is worth having; alarms
-/// are each their own.
+/// The samples that arrived. For units, buses, fleet and configuration only the newest value is
+/// kept; alarms are kept one by one.
 struct StatusUpdate {
   std::optional<FleetStatusValue> fleet;
   std::optional<ConfigurationProgressValue> configuration;
@@ -36,25 +36,26 @@ class StatusReader {
  public:
   struct Options {
     DdsOptions dds;
-    bool units = true;  // false: leave the 5000 unit samples on the network's other side
+    bool units = true;  // false: the 5000 unit samples are not requested from the network
   };
   static Result<std::unique_ptr<StatusReader>> Create(const Options& options);
   StatusReader(const StatusReader&) = delete;
   StatusReader& operator=(const StatusReader&) = delete;
   ~StatusReader();
 
-  /// True as soon as something came or a writer appeared or died; false when `timeout` passed.
+  /// True as soon as a sample arrived or a writer appeared or died; false when `timeout` passed.
   /// Errors: kUnavailable.
   Result<bool> Wait(std::chrono::milliseconds timeout);
 
-  /// Takes all that is there, without waiting. `out` is cleared first; its capacity is kept.
+  /// Takes all samples that are there, without waiting. `out` is cleared first; its capacity is
+  /// kept.
   /// Errors: kUnavailable.
   Status Take(StatusUpdate* out);
 
-  /// A daemon is there: a live writer of the fleet topic. A killed one is noticed after its lease
-  /// (2 s), a clean end at once.
+  /// True while a daemon is there: a live writer of the fleet topic. A killed daemon is noticed
+  /// after its lease (2 s), a clean end at once.
   [[nodiscard]] bool writer_alive() const;
-  /// A daemon was there at least once; tells "not started" from "gone".
+  /// True if a daemon was there at least once. The flag distinguishes "not started" from "gone".
   [[nodiscard]] bool writer_seen() const;
 
  private:

@@ -1,6 +1,6 @@
-// What goes out on DDS, as values of our own; the types that idlc makes of focalfleet.idl stay
-// inside this room. Numbers that do not exist (the place of a unit that nobody knows, a target that
-// was not given) are NaN.
+// These values are published on DDS, as this project's own types. The types that idlc makes of
+// focalfleet.idl stay inside this folder. Numbers that do not exist are NaN: the place of a unit
+// whose position is not known, or a target that was not given.
 #pragma once
 
 #include <array>
@@ -18,15 +18,15 @@ inline constexpr std::size_t kWitnessCount = 5;
 
 struct UnitStatusValue {
   UnitId unit;
-  SerialNumber serial;        // that answers; 0: none yet
-  SerialNumber bound_serial;  // that belongs here; 0: none yet
+  SerialNumber serial;        // of the unit that answers; 0: none yet
+  SerialNumber bound_serial;  // of the unit that belongs here; 0: none yet
   BusId bus;
   NodeId node;
   WallTime at;
   std::array<Witness, kAxisCount> witness{};
   std::array<double, kAxisCount> low_deg{kNoNumber, kNoNumber};  // the axis' own angle
   std::array<double, kAxisCount> high_deg{kNoNumber, kNoNumber};
-  double x_fp_mm = kNoNumber;  // the fibre, where both axes stand at one place
+  double x_fp_mm = kNoNumber;  // the fibre, where both axes have a single position
   double y_fp_mm = kNoNumber;
   std::array<double, kAxisCount> target_deg{kNoNumber, kNoNumber};
   MoveId move;
@@ -37,7 +37,7 @@ struct UnitStatusValue {
   bool enabled = true;
 };
 
-/// What a unit's own sensors last showed.
+/// The last reading of a unit's own sensors.
 struct UnitOrientationValue {
   UnitId unit;
   WallTime at;
@@ -56,7 +56,7 @@ struct BusStatusValue {
 
 struct FleetStatusValue {
   WallTime at;
-  WallTime started;     // of the daemon
+  WallTime started;     // start of the daemon
   std::string version;  // at most 31 bytes are sent
   std::uint32_t units = 0;
   std::uint32_t enabled = 0;
@@ -71,7 +71,7 @@ struct FleetStatusValue {
 
 struct ConfigurationProgressValue {
   WallTime at;
-  ConfigurationView view;  // its host instants stay at home; source: at most 255 bytes are sent
+  ConfigurationView view;  // its host instants are not sent; source: at most 255 bytes are sent
 };
 
 struct AlarmValue {

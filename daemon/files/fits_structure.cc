@@ -17,13 +17,13 @@ std::string_view TrimmedRight(std::string_view text) {
   return text.substr(0, text.find_last_not_of(' ') + 1);
 }
 
-/// A header of the file and the size of the data that follow it.
+/// A header of the file, with the size of the data that follow it.
 class Unit {
  public:
   /// Pre: `bytes` begins with the header.
   explicit Unit(std::string_view bytes) : bytes_(bytes) {}
 
-  /// Null: it is in order.
+  /// Checks the header. Null: it is in order; else the reason.
   const char* Check() {
     if (!FindEnd()) return "its header does not end";
     const bool primary = Key() == "SIMPLE";
@@ -59,7 +59,7 @@ class Unit {
     return nullptr;
   }
 
-  /// Whole blocks, or up to the end of the file.
+  /// Bytes of the unit in whole blocks, or up to the end of the file.
   [[nodiscard]] std::size_t size() const {
     const std::size_t blocks = (data_bytes_ + kFitsBlockBytes - 1) / kFitsBlockBytes;
     return header_bytes_ + blocks * kFitsBlockBytes;
@@ -95,7 +95,7 @@ class Unit {
     return TrimmedRight(value.substr(begin + 1, value.find('\'', begin + 1) - begin - 1));
   }
 
-  /// The next card is `key`, with a whole number.
+  /// True if the next card is `key` with a whole number, which goes to `value`.
   bool Take(std::string_view key, std::int64_t* value) {
     if (Key() != key || Card().substr(kKeyBytes, 2) != "= ") return false;
     std::string_view text = Card().substr(kValueAt);
@@ -104,7 +104,7 @@ class Unit {
     if (begin == std::string_view::npos) return false;
     text = TrimmedRight(text.substr(begin));
     const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), *value);
-    ++card_;  // END is behind, so there is always one more
+    ++card_;  // END is behind, so another card always follows
     return problem == std::errc() && end == text.data() + text.size();
   }
 

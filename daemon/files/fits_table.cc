@@ -35,7 +35,7 @@ std::string Reason(int status) {
   std::array<char, FLEN_ERRMSG> detail{};
   std::string all = text.data();
   while (fits_read_errmsg(detail.data()) != 0) {
-  }  // the stack of messages is cfitsio's own state: left empty
+  }  // the stack of messages is cfitsio's own state, so it is left empty
   return all;
 }
 
@@ -48,14 +48,14 @@ bool SameName(std::string_view a, std::string_view b) {
 }
 
 struct ColumnForm {
-  std::string where;  // for messages
+  std::string where;  // name that messages show
   int number = 0;
   int type = 0;
   LONGLONG repeat = 0;
   LONGLONG width = 0;
 };
 
-/// Whether a row has a single number, or a text.
+/// True if a row of the column has a single number, or a text.
 bool IsPlain(const ColumnForm& form) {
   constexpr int kNumbers[] = {TBYTE, TSBYTE, TSHORT,    TUSHORT,    TINT,   TUINT,
                               TLONG, TULONG, TLONGLONG, TULONGLONG, TFLOAT, TDOUBLE};
@@ -68,9 +68,10 @@ class TableReader {
  public:
   TableReader(fitsfile* file, const std::string& name) : file_(file), name_(name) {}
 
-  /// The next binary table, from the first on. Errors: kInvalid; false: there is none.
+  /// Moves to the next binary table, beginning with the first. False: there is none.
+  /// Errors: kInvalid.
   Result<bool> Next() {
-    constexpr int kTablesMax = 1000;  // images too; a header is 2880 bytes at least
+    constexpr int kTablesMax = 1000;  // HDUs, images included; a header is 2880 bytes at least
     for (int kind = 0; ++looked_at_ < kTablesMax;) {
       int status = 0;
       fits_movrel_hdu(file_, 1, &kind, &status);
@@ -81,7 +82,7 @@ class TableReader {
     return false;
   }
 
-  /// Those of `columns` that the table lacks.
+  /// The names in `columns` that the table lacks.
   [[nodiscard]] std::vector<std::string> Lacking(const std::vector<std::string>& columns) const {
     std::vector<std::string> lacking;
     for (const std::string& column : columns)
@@ -109,7 +110,8 @@ class TableReader {
       return Fail(ErrorCode::kInvalid, name_ + ": " + std::to_string(rows_) +
                                            " rows are more than " +
                                            std::to_string(wanted.rows_max));
-    // Rows with bytes are all there; rows without could be as many as the header says.
+    // Rows with bytes are all in the file. Rows without bytes could be as many as the header
+    // states, so they are refused.
     if (row_bytes == 0 && rows_ > 0)
       return Fail(ErrorCode::kInvalid, name_ + ": rows without a byte");
     row_bytes_ = row_bytes;
@@ -131,7 +133,7 @@ class TableReader {
   }
 
  private:
-  /// 0: none; -1: more than one.
+  /// The number of the column; 0: none; -1: more than one.
   [[nodiscard]] int NumberOf(const std::string& column) const {
     int status = 0;
     int number = 0;
@@ -170,7 +172,7 @@ class TableReader {
       int none = 0;
       fits_read_col(file_, TSTRING, form.number, row, 1, 1, nullptr, &into, &none, &status);
       std::string text = into;
-      text.erase(text.find_last_not_of(' ') + 1);  // blanks at the end mean nothing in FITS
+      text.erase(text.find_last_not_of(' ') + 1);  // trailing blanks mean nothing in FITS
       texts[static_cast<std::size_t>(row - 1)] = std::move(text);
     }
     if (status != 0) return Broken(form.where, status, ErrorCode::kInvalid);
@@ -208,7 +210,7 @@ class TableReader {
   int looked_at_ = 0;
 };
 
-/// Keys that describe table or image; writing a table makes them anew.
+/// Keys that describe the table or image; writing a table makes them anew.
 bool IsOfTheFormat(std::string_view key) {
   for (const char* stem :
        {"XTENSION", "SIMPLE", "BITPIX", "NAXIS",  "PCOUNT", "GCOUNT",   "EXTEND",
@@ -218,7 +220,7 @@ bool IsOfTheFormat(std::string_view key) {
   return key == "EXTNAME";
 }
 
-/// A number as the header has it. Nothing: a logical value, a complex number, none at all.
+/// A number as the header has it. Empty: a logical value, a complex number, or no value.
 std::optional<FitsKey> NumberKey(const char* name, std::string_view text, const char* comment) {
   if (text.starts_with('+')) text.remove_prefix(1);
   const char* end = text.data() + text.size();
@@ -233,8 +235,8 @@ std::optional<FitsKey> NumberKey(const char* name, std::string_view text, const 
   return std::nullopt;
 }
 
-/// Adds the keys of the header that is being read, but for those that the table has already. A
-/// broken key is passed over: nobody may want it.
+/// Adds the keys of the current header, except those that the table has already. A broken key is
+/// skipped: it may not be needed.
 void AddKeys(fitsfile* file, FitsTable* table) {
   int none = 0;
   int count = 0;
@@ -327,7 +329,7 @@ Result<FitsTable> ParseFitsTable(std::string bytes, const std::string& name,
   bytes.resize((bytes.size() + kFitsBlockBytes - 1) / kFitsBlockBytes * kFitsBlockBytes);
   void* begin = bytes.data();
   std::size_t size = bytes.size();
-  // No name from outside: it would be read as an extended one.
+  // The name is a constant: cfitsio would interpret a name from outside as an extended file name.
   if (fits_open_memfile(&opened, "table.fits", READONLY, &begin, &size, 0, nullptr, &status) != 0)
     return Broken(name, status, ErrorCode::kInvalid);
   const File file(opened);

@@ -23,8 +23,8 @@ namespace {
 
 constexpr std::size_t kNameMax = 255;
 constexpr int kNamesTried = 10;
-// A camera that counts from 1 anew each night has so many files of one name in three years. Looking
-// for a free name costs a microsecond each.
+// A camera that counts from 1 anew each night has this many files of one name in three years.
+// Looking for a free name costs a microsecond for each.
 constexpr int kEqualNames = 1000;
 
 bool IsOneName(const std::string& name) {
@@ -32,7 +32,7 @@ bool IsOneName(const std::string& name) {
          name.find('/') == std::string::npos && name.find('\0') == std::string::npos;
 }
 
-// -1 with errno.
+// Opens `name` in the folder; -1 with errno on failure.
 int OpenAt(int folder, const std::string& name, int flags, mode_t mode = 0) {
   if (!IsOneName(name)) {
     errno = EINVAL;
@@ -44,13 +44,13 @@ int OpenAt(int folder, const std::string& name, int flags, mode_t mode = 0) {
   how.mode = mode;
   how.resolve = RESOLVE_BENEATH | RESOLVE_NO_SYMLINKS;
   const long fd = syscall(SYS_openat2, folder, name.c_str(), &how, sizeof how);
-  // An old kernel has no such call, an old sandbox forbids it. A single name needs no more than
-  // O_NOFOLLOW.
+  // An old kernel has no such call, and an old sandbox forbids it. For a single name O_NOFOLLOW is
+  // enough.
   if (fd >= 0 || (errno != ENOSYS && errno != EPERM)) return static_cast<int>(fd);
   return openat(folder, name.c_str(), flags, mode);
 }
 
-// Null: a regular file.
+// The kind of file as text; null: a regular file.
 const char* OtherKind(mode_t mode) {
   switch (mode & S_IFMT) {
     case S_IFREG:
@@ -76,7 +76,7 @@ bool IsUnchanged(const struct stat& before, const struct stat& after) {
          before.st_mtim.tv_nsec == after.st_mtim.tv_nsec;
 }
 
-/// As `name`, with a number where it is not the first try; shortened where it would be too long.
+/// `name`, with a number where k is not the first try, and shortened where it would be too long.
 std::string Numbered(const std::string& name, int k) {
   const std::string end = k == 0 ? "" : fmt::format(".{}", k);
   return name.substr(0, kNameMax - end.size()) + end;
@@ -110,7 +110,8 @@ Result<GuardedFolder> GuardedFolder::Subfolder(const std::string& name) const {
 }
 
 Result<std::vector<std::string>> GuardedFolder::Names(std::size_t count_max) const {
-  // A descriptor of its own: fdopendir keeps it, and the position is the stream's.
+  // The folder is opened again, since fdopendir keeps the descriptor and the position belongs to
+  // the stream.
   const int fd = openat(fd_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (fd < 0) return FailErrno(path_, "cannot be read", errno);
   const std::unique_ptr<DIR, int (*)(DIR*)> stream(fdopendir(fd), &closedir);
@@ -144,8 +145,8 @@ Result<std::string> GuardedFolder::Read(const std::string& name, std::size_t byt
   const auto refused = [&](const std::string& why) {
     return Fail(ErrorCode::kInvalid, Shown(name) + ": " + why);
   };
-  // Before it is opened, which of a device may do something; and of what was opened, which may be
-  // something else by now.
+  // The kind is checked twice. Opening a device may have an effect, so the name is checked first.
+  // The name may point elsewhere by the time it is opened, so the opened file is checked too.
   struct stat before {};
   if (fstatat(fd_.get(), name.c_str(), &before, AT_SYMLINK_NOFOLLOW) != 0)
     return FailErrno(Shown(name), "cannot be read", errno);
@@ -173,13 +174,13 @@ Status GuardedFolder::Write(const std::string& name, const std::string& text) co
   Descriptor file;
   for (int k = 0; k < kNamesTried && file.get() < 0; ++k) {
     beside = fmt::format(".focalfleet.{}.{}.tmp", getpid(), k);
-    unlinkat(fd_.get(), beside.c_str(), 0);  // left by a process of this number that was killed
+    unlinkat(fd_.get(), beside.c_str(), 0);  // left by a killed process with the same number
     file = Descriptor(OpenAt(fd_.get(), beside, O_WRONLY | O_CREAT | O_EXCL, 0666));
     if (file.get() < 0 && errno != EEXIST) break;
   }
   if (file.get() < 0) return FailErrno(Shown(name), "cannot be written", errno);
   int error = WriteAll(file.get(), text);
-  // A link or pipe of this name is replaced, not followed; a folder is not.
+  // A link or pipe of this name is replaced, not followed; a folder is not replaced.
   if (error == 0 &&
       (!IsOneName(name) || renameat(fd_.get(), beside.c_str(), fd_.get(), name.c_str()) != 0))
     error = IsOneName(name) ? errno : EINVAL;
@@ -192,7 +193,7 @@ Status GuardedFolder::Move(const std::string& name, const GuardedFolder& to) con
   for (int k = 0; k < kEqualNames; ++k) {
     const std::string free = Numbered(name, k);
     int moved = renameat2(fd_.get(), name.c_str(), to.fd_.get(), free.c_str(), RENAME_NOREPLACE);
-    // Not every file system has the flag (NFS): there, look first.
+    // Some file systems lack the flag (NFS): the name is looked up first there.
     if (moved != 0 && errno == EINVAL && !to.IdentityOf(free))
       moved = renameat(fd_.get(), name.c_str(), to.fd_.get(), free.c_str());
     if (moved == 0) return {};

@@ -21,15 +21,15 @@ class Inflater {
     if (ready_) inflateEnd(&stream_);
   }
 
-  /// Takes one member off the front of `bytes` and adds what it holds to `out`. Null: done, else
-  /// what is wrong.
+  /// Takes one member off the front of `bytes` and appends its content to `out`. Null: done, else
+  /// the reason.
   const char* TakeMember(std::string_view* bytes, std::size_t bytes_max, std::string* out) {
     if (!ready_ || inflateReset(&stream_) != Z_OK) return "there is no memory to unpack it";
     for (;;) {
       const auto given =
           static_cast<uInt>(std::min<std::size_t>(bytes->size(), std::numeric_limits<uInt>::max()));
       stream_.next_in = static_cast<Bytef*>(
-          const_cast<void*>(static_cast<const void*>(bytes->data())));  // it is only read
+          const_cast<void*>(static_cast<const void*>(bytes->data())));  // zlib only reads it
       stream_.avail_in = given;
       const std::size_t had = out->size();
       out->resize(had + kChunk);

@@ -1,5 +1,5 @@
-// Bytes that gzip packed, unpacked in memory. A few kilobytes may stand for gigabytes, so the
-// answer is limited, not the file.
+// Gunzip unpacks bytes that gzip packed, in memory. A few kilobytes may expand to gigabytes, so the
+// limit applies to the result, not to the file.
 #pragma once
 
 #include <cstddef>
@@ -12,8 +12,8 @@ namespace focalfleet {
 
 bool IsGzip(std::string_view bytes);
 
-/// All members of the file, one after the other. Errors: kInvalid, names `name`: cut short, wrong
-/// checksum, no gzip, more than `bytes_max`.
+/// The content of all members of the file, one after the other.
+/// Errors: kInvalid, names `name`: cut short, wrong checksum, no gzip, more than `bytes_max`.
 Result<std::string> Gunzip(std::string_view bytes, const std::string& name, std::size_t bytes_max);
 
 }  // namespace focalfleet

@@ -48,8 +48,8 @@ std::optional<std::size_t> FirstNonText(std::string_view text) {
   return std::nullopt;
 }
 
-// A pipe of the shell, <(command), has its writer and is waited for. One with a name in a folder
-// may have none for ever.
+// A pipe of the shell, <(command), has a writer, so the read waits for it. A named pipe in a folder
+// may never have one.
 Status ReadWithWaiting(int fd, const std::string& path) {
   struct stat status {};
   struct statfs system {};
@@ -106,8 +106,8 @@ tl::expected<std::string, int> ReadAll(int fd, std::size_t bytes_max) {
 }
 
 Result<std::string> ReadFile(const std::string& path) {
-  // Without waiting for a writer, who may never come. /dev/stdin is not opened anew: its file may
-  // be half read, or a socket.
+  // The open call does not wait for a writer, which may never come. The file /dev/stdin is not
+  // opened anew: its data may be half read, or a socket.
   const Descriptor file(path == "/dev/stdin"
                             ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
                             : open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
@@ -153,7 +153,7 @@ Status WriteFileAtomically(const std::string& path, const std::string& text) {
   struct stat status {};
   const bool exists = stat(path.c_str(), &status) == 0;
   if (exists && !S_ISREG(status.st_mode)) return WriteDirectly(path, text);
-  // A symbolic link stays one: what it points to is replaced.
+  // A symbolic link is kept: the file that it points to is replaced.
   std::string place = path;
   char resolved[PATH_MAX];
   if (exists && realpath(path.c_str(), resolved) != nullptr) place = resolved;

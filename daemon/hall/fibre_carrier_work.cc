@@ -12,19 +12,22 @@ namespace focalfleet {
 namespace {
 
 constexpr std::size_t kReadingsKept = 12;
-// So many must agree for one of them to be found out: three angles and one number over.
+// Fewest sensors for a position. If one of the five is wrong, the other four still give three
+// angles and one check.
 constexpr int kSensorsMin = 5;
-// chi^2 beyond which a reading contradicts itself: by its mean and so many standard deviations.
+// A reading contradicts itself where its chi^2 exceeds the expected value by this many standard
+// deviations.
 constexpr double kContradictionSigmas = 8;
-constexpr double kAsGood_chi2 = 9;  // another branch
-constexpr double kNearMm = 3;       // of where it is believed: blind errors are tenths
-constexpr double kStillMm = 0.1;    // where it stood before, and it was sent farther than
+constexpr double kAsGood_chi2 = 9;  // excess of chi^2 up to which another branch fits as well
+constexpr double kNearMm = 3;  // from the believed position; open-loop errors are tenths of a mm
+// A unit has not moved if it is this near to its old position though sent farther than kSentMm.
+constexpr double kStillMm = 0.1;
 constexpr double kSentMm = 1;
 constexpr double kDegPerRad = 1 / sim::kRadPerDeg;
 
 double Apart(PointFp a, PointFp b) { return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm); }
 
-// "missing v3 v4; saturated v1", or nothing.
+// Text such as "missing v3 v4; saturated v1"; empty where all sensors were used.
 std::string Unused(const sim::VoltageRow& row, const sim::HallReading& reading) {
   std::string missing, saturated;
   for (std::size_t k = 0; k < row.voltages_V.size(); ++k) {
@@ -40,7 +43,7 @@ std::string Unused(const sim::VoltageRow& row, const sim::HallReading& reading) 
 
 struct FibreCarrierWorker::Looked {
   FibreCarrierReading carrier;
-  sim::TipEstimate tip;  // where fibre carrier.solved
+  sim::TipEstimate tip;  // valid where fibre carrier.solved
 };
 
 Result<std::unique_ptr<FibreCarrierWorker>> FibreCarrierWorker::Create(const Layout& layout,
@@ -72,16 +75,16 @@ FibreCarrierWorker::Looked FibreCarrierWorker::Look(PositionerIndex i, const sim
   FibreCarrierReading& carrier = looked.carrier;
   carrier.used = static_cast<std::uint16_t>(reading.used);
   carrier.verdict = Unused(row, reading);
-  const auto say = [&](const std::string& what) {
+  const auto add_verdict = [&](const std::string& what) {
     carrier.verdict += (carrier.verdict.empty() ? "" : "; ") + what;
   };
   if (std::popcount(reading.used) < kSensorsMin) {
-    say("too few sensors");
+    add_verdict("too few sensors");
     return looked;
   }
   const std::vector<sim::OrientationFit> fits = solver.Solve(reading);
   if (fits.empty()) {
-    say("no orientation found");
+    add_verdict("no orientation found");
     return looked;
   }
   const double noise_T2 = options_.noise_T * options_.noise_T;
@@ -120,14 +123,14 @@ FibreCarrierWorker::Looked FibreCarrierWorker::Look(PositionerIndex i, const sim
       carrier.covariance_deg2[entry++] =
           best->unit_covariance[a][b] * noise_T2 * kDegPerRad * kDegPerRad;
   looked.tip = tip_of(*best);
-  if (good > 1 && near != 1) say("ambiguous");
+  if (good > 1 && near != 1) add_verdict("ambiguous");
   carrier.trusted = !contradicts && (good == 1 || near == 1);
-  if (contradicts) say("cannot tell");  // Examine may know better
+  if (contradicts) add_verdict("cannot tell");  // Examine may find the sensor
   if (carrier.verdict.empty()) carrier.verdict = "ok";
   return looked;
 }
 
-/// Which sensor lies, by all that is kept of the unit.
+/// Finds which sensor is wrong, from all readings that are kept of the unit.
 void FibreCarrierWorker::Examine(PositionerIndex i, FibreCarrierReading* carrier, int* examined) {
   if (++*examined > kDoubtsExamined) return;
   const sim::OrientationSolver& solver = *solvers_.at(layout_.unit(i).sensors);

@@ -1,11 +1,13 @@
-// From the sensor readings of units to where they are: what the measuring thread does for the units
-// that measure themselves. Each reading by itself gives an orientation by least squares; the tip of
-// its fibre carrier is the fibre. Five numbers a reading check each other: where they contradict
-// (chi^2), no place is told, and the unit's last dozen readings are asked which sensor lies
-// (sim/hall/estimate.h).
+// FibreCarrierWorker turns the sensor readings of units into positions. The measuring thread uses
+// it for the units that measure themselves. Each reading by itself gives an orientation by least
+// squares; the tip of the unit's fibre carrier is the fibre.
 //
-// A joint does not know its branch: other orientations may explain a reading as well. The one that
-// is near to where the unit is believed is taken if no other is near, too.
+// The sensors outnumber the three angles (by five in a set of 8), so a reading checks itself. Where
+// its numbers contradict each other (chi^2), no position is given. The worker then tests the unit's
+// last dozen readings for the sensor that is wrong (sim/hall/estimate.h).
+//
+// The branch of a joint is not known from one reading: other orientations may explain it as well.
+// The orientation near the believed position is taken if no other is near, too.
 //
 // Cost: 0.1 ms a unit; 0.5 s for each of up to kDoubtsExamined units that are not believed.
 #pragma once
@@ -26,11 +28,12 @@ namespace focalfleet {
 class FibreCarrierWorker {
  public:
   struct Options {
-    double noise_T = 3e-5;  // of a sensor's reading, with what model and calibration leave
+    double noise_T = 3e-5;  // of a sensor's reading, including what model and calibration leave
     double tilt_max_deg = 45;
   };
-  /// The model serves all units of the layout that have sensors. `layout` outlives the worker.
-  /// Errors: kInvalid: neither 6 nor 8 sensors, or the model knows one that is not there.
+  /// A worker whose model serves all units of the layout that have sensors. `layout` outlives the
+  /// worker.
+  /// Errors: kInvalid: neither 6 nor 8 sensors, or the model has a sensor that the units lack.
   static Result<std::unique_ptr<FibreCarrierWorker>> Create(const Layout& layout,
                                                             const HallModelFile& model,
                                                             const Options& options);
@@ -38,7 +41,7 @@ class FibreCarrierWorker {
   /// A measurement of each unit with a reading, in the order of the layout.
   std::vector<Measurement> Measure(const ExposureJob& job, std::span<const UnitDrive> drives);
 
-  static constexpr int kDoubtsExamined = 20;  // of a job
+  static constexpr int kDoubtsExamined = 20;  // in one job
 
  private:
   FibreCarrierWorker(const Layout& layout, const Options& options)
@@ -52,7 +55,7 @@ class FibreCarrierWorker {
   const Layout& layout_;
   Options options_;
   std::shared_ptr<const sim::FieldModel> field_;
-  std::map<std::size_t, std::unique_ptr<sim::OrientationSolver>> solvers_;  // by sensors
+  std::map<std::size_t, std::unique_ptr<sim::OrientationSolver>> solvers_;  // by number of sensors
   std::map<std::uint32_t, std::deque<sim::VoltageRow>> history_;            // by index of the unit
 };
 

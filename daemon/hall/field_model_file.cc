@@ -18,7 +18,7 @@ using sim::kRadPerDeg;
 
 constexpr std::size_t kTermsMax = 4000;
 
-// A text in TOML's quotes; control characters cannot stand there.
+// A text in TOML's quotes, which cannot hold control characters.
 std::string Quoted(std::string_view text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -117,7 +117,7 @@ class Reader {
     return node->as_array();
   }
 
-  // A key that nobody read is a mistake that would pass in silence.
+  // An unread key is a mistake that would pass without a message, so it is an error.
   void NothingElse(const toml::table& table) {
     for (const auto& [key, node] : table)
       if (read_.find(&node) == read_.end())

@@ -1,6 +1,8 @@
-// model.toml of a Hall rig: the field as fitted, and what is known of the rig around it (gains,
-// offsets, places of sensors, the rotor's centre, temperature), each with its uncertainty where it
-// has one. `hall fit` writes the field, `hall diagnose` both; `hall orient` and `hall diagnose
+// HallModelFile is model.toml of a Hall rig. The file holds the fitted field and what is known of
+// the rig: gains, offsets, sensor positions, the rotor's centre and temperature. Each has its
+// uncertainty where it has one.
+//
+// `hall fit` writes the field, `hall diagnose` writes both. `hall orient` and `hall diagnose
 // --model` read them.
 #pragma once
 
@@ -14,7 +16,7 @@
 
 namespace focalfleet {
 
-/// What a campaign found about one sensor, from what is known of it otherwise.
+/// The deviation of one sensor that a campaign found, relative to what is known of it otherwise.
 struct SensorCalibration {
   std::size_t sensor = 0;  // from 0
   double gain = 1;
@@ -25,7 +27,7 @@ struct SensorCalibration {
 
 struct HallModelFile {
   std::string name;
-  std::string origin;  // the file that it was made from
+  std::string origin;  // name of the file that it was made from
   std::string sha256;
   sim::FieldParameters field;
   double radius_mm = sim::kSensorRadius_mm;
@@ -43,11 +45,13 @@ struct HallModelFile {
 
 std::string WriteHallModel(const HallModelFile& model);
 
+/// The model in `text`.
 /// Errors: kInvalid with file and line: not TOML, a key missing, unknown or out of its range.
 Result<HallModelFile> ReadHallModel(std::string_view text, const std::string& file);
 
-/// The model's calibration upon that of the sensors: gains multiply, offsets and shifts add up.
-/// Errors: kInvalid: the model knows a sensor that is not there.
+/// The sensors with the model's calibration applied to theirs: gains multiply, offsets and shifts
+/// add up.
+/// Errors: kInvalid: the model has a sensor that is not in `sensors`.
 Result<sim::HallRig> RigOf(const HallModelFile& model, std::vector<sim::HallSensor> sensors);
 
 }  // namespace focalfleet

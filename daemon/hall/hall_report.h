@@ -1,9 +1,11 @@
-// What a diagnosis of a Hall rig is handed over as: report.json (docs/hall.md; the fields of every
-// diagnosis), report.html, the extended model, and the poses to make next.
+// HallReport writes the results of a Hall rig's diagnosis: report.json, report.html, the extended
+// model, and the poses to make next. The fields of report.json are those of every diagnosis
+// (docs/hall.md).
 //
-// Sizes at the fibre: a voltage stands for the tilt that changes a sensor's voltage as much (rms
-// over sensors and poses), a tilt for what it moves at the end of an arm. So every um is a
-// voltage times one number, and both are told.
+// Voltages are converted to sizes at the fibre in two steps. A voltage corresponds to the tilt that
+// changes a sensor's voltage as much (rms over sensors and poses). A tilt corresponds to the
+// displacement at the end of an arm. Every value in um is therefore a voltage times one number, and
+// the report gives both.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -15,8 +17,8 @@
 namespace focalfleet {
 
 struct HallReportNames {
-  std::string data;    // file
-  std::string sha256;  // of it
+  std::string data;    // name of the data file
+  std::string sha256;  // of the data file
   std::string model_before;
   std::string model_after;
   double arm_mm = 8;
@@ -31,12 +33,13 @@ std::string HallVerdictSentence(const sim::HallDiagnosis& diagnosis);
 std::string HallReportPage(const sim::HallDiagnosis& diagnosis, const sim::HallCampaign& campaign,
                            const HallReportNames& names);
 
-/// The model with what was found in it; what it cannot hold is a comment at its head.
+/// The model before, with the effects that the diagnosis found. An effect that the file format
+/// cannot hold is a comment at its head.
 HallModelFile ExtendedModel(const HallModelFile& before, const sim::HallDiagnosis& diagnosis,
                             const sim::HallCampaign& campaign, const sim::FieldModel& field,
                             const HallReportNames& names);
 
-/// alpha_deg, beta_deg, gamma_deg.
+/// The poses to make next, as CSV: alpha_deg, beta_deg, gamma_deg.
 std::string WriteNextPoses(const sim::HallDiagnosis& diagnosis);
 
 }  // namespace focalfleet

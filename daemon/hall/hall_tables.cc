@@ -25,7 +25,7 @@ Status RequireVoltages(const CsvTable& table, std::size_t sensors) {
   return {};
 }
 
-// A cell in degrees as radians.
+// A cell in degrees, converted to radians.
 double Angle_rad(CsvRow* row, std::string_view column) {
   const double angle_deg = row->Number(column);
   if (std::abs(angle_deg) > kAngleMax_deg)

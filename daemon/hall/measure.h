@@ -1,6 +1,7 @@
-// One ExposureJob, done by whoever can: units that measure themselves by their own sensors, the
-// rest by the camera. The camera is asked only where a unit that has a target is not found exactly
-// enough by its own sensors; then both see it, and the more exact of two certain places counts.
+// MeasureUnits does one ExposureJob with two instruments: units that can measure themselves use
+// their own sensors, and the camera measures the rest. The camera is asked only where the sensors
+// of a unit with a target do not find it exactly enough. Then both measure the unit, and the more
+// exact of two certain positions counts.
 #pragma once
 
 #include <atomic>
@@ -10,8 +11,9 @@
 
 namespace focalfleet {
 
-/// Either may be null. Errors of the answer: as the camera's, where no unit measured itself;
-/// otherwise its trouble is told in the findings, and takes only the others away.
+/// The measurements of one job. Either instrument may be null.
+/// Errors in the answer: as the camera's, where no unit measured itself. Otherwise the findings
+/// report the camera's trouble, and only the other units lack a measurement.
 ExposureDone MeasureUnits(const CameraWork& work, FibreCarrierWorker* carriers,
                           CameraWorker* camera, const std::atomic<bool>& ending);
 

@@ -1,6 +1,6 @@
-// What a controller's error frames say: in which state it is, and what went wrong on the bus. A
-// SocketCAN error frame is no frame of the bus; its identifier has one bit a class, its bytes the
-// particulars (linux/can/error.h).
+// These functions read a controller's error frames: the controller's state, and the faults on the
+// bus. A SocketCAN error frame is no frame of the bus. Its identifier has one bit for each class of
+// error, and its bytes hold the details (linux/can/error.h).
 #pragma once
 
 #include <linux/can.h>
@@ -14,21 +14,23 @@
 
 namespace focalfleet {
 
-/// What a CAN_RAW socket is to be told of.
+/// The classes of errors that a CAN_RAW socket must deliver.
 can_err_mask_t ErrorsOfInterest();
 
-/// What an error frame says of the controller's state; none where it says nothing of it.
+/// The controller's state by an error frame; empty where the frame does not give one.
 std::optional<LinkState> LinkStateOf(const can_frame& error);
 
-/// The controller counts so many errors that somebody should look, and still works as ever.
+/// True where the controller's error count calls for attention, though the controller still works
+/// normally.
 bool IsWarning(const can_frame& error);
 
-/// Counts what went wrong since the bus was last well, and names it.
+/// Counts and names the errors since the bus last worked well.
 class ErrorTally {
  public:
   void Note(const can_frame& error, std::uint64_t times = 1);
   void Clear() { counts_.fill(0); }
-  /// "no acknowledgement, bit error": the most frequent first, at most three; empty: none was seen.
+  /// Text such as "no acknowledgement, bit error": the most frequent first, at most three. Empty:
+  /// none was seen.
   [[nodiscard]] std::string Causes() const;
 
  private:

@@ -16,8 +16,8 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint32_t kEchoFlag = 1u << 18;  // IFF_ECHO, which net/if.h does not have
-constexpr std::uint16_t kCanHardware = 280;    // ARPHRD_CAN, which net/if_arp.h does not have
+constexpr std::uint32_t kEchoFlag = 1u << 18;  // IFF_ECHO, which net/if.h lacks
+constexpr std::uint16_t kCanHardware = 280;    // ARPHRD_CAN, which net/if_arp.h lacks
 constexpr std::size_t kAnswerMax = 32'768;
 constexpr std::uint16_t kTypeMask = 0x3fff;  // NLA_TYPE_MASK, which is an int
 
@@ -73,7 +73,7 @@ std::optional<T> Value(std::span<const std::byte> bytes) {
   return value;
 }
 
-/// Calls `visit(type, payload)` for each attribute. False: lengths that cannot be.
+/// Calls `visit(type, payload)` for each attribute. False: impossible lengths.
 template <class Visit>
 bool ForEachAttribute(std::span<const std::byte> bytes, const Visit& visit) {
   while (bytes.size() >= sizeof(nlattr)) {
@@ -142,7 +142,7 @@ Result<Head> ReadHead(std::span<const std::byte> answer) {
               answer.subspan(sizeof(nlmsghdr), header->nlmsg_len - sizeof(nlmsghdr))};
 }
 
-// ---- asking
+// ---- Exchange with the kernel
 
 Result<NetlinkMessage> AskKernel(const NetlinkMessage& request) {
   const int fd = ::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE);
@@ -212,7 +212,8 @@ NetlinkMessage OrderToRaise(int index, bool up) {
 Result<int> ReadAcknowledgement(std::span<const std::byte> answer) {
   FOCALFLEET_TRY_ASSIGN(const Head head, ReadHead(answer));
   const auto error = Value<nlmsgerr>(head.body);
-  // Not only because -INT_MIN is none: no errno is beyond what the kernel encodes in a pointer.
+  // The limit also excludes -INT_MIN, which does not exist. The kernel encodes no errno beyond this
+  // in a pointer.
   constexpr int kErrnoMax = 4095;
   if (head.type != NLMSG_ERROR || !error || error->error > 0 || error->error < -kErrnoMax)
     return NoAnswer();
@@ -267,7 +268,7 @@ Status ReviveLink(const std::string& interface, bool* taken_down) {
   FOCALFLEET_TRY_ASSIGN(const int restart, Order(OrderToRestart(link.index)));
   if (restart == 0) return {};
   if (restart != EOPNOTSUPP) return Failure(interface, "restart", restart);
-  // The driver knows no restart: down and up begins anew.
+  // The driver has no restart, so the interface goes down and up again.
   FOCALFLEET_TRY_ASSIGN(const int down, Order(OrderToRaise(link.index, false)));
   if (down != 0) return Failure(interface, "take down", down);
   *taken_down = true;

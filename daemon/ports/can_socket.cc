@@ -16,12 +16,12 @@
 namespace focalfleet {
 namespace {
 
-/// Room for the answers of a whole bus while the daemon is busy elsewhere: the kernel charges 768
+/// Buffer for the answers of a whole bus while the daemon is busy elsewhere: the kernel charges 768
 /// bytes a frame.
 constexpr int kReceiveBufferBytes = 1 << 20;
 
-// protocol/wire/identifier.h: bit 19 says who sends, bits 25..20 are the function. The first
-// sixteen need one filter, those after them one each.
+// Source: protocol/wire/identifier.h. Bit 19 gives the direction; bits 25..20 are the function. The
+// first sixteen functions need one filter; each later one needs a filter of its own.
 constexpr canid_t kFromUnit = 1u << 19;
 constexpr canid_t kFunctionMask = 0x3Fu << 20;
 constexpr canid_t kAboveSixteen = 0x30u << 20;
@@ -32,7 +32,8 @@ bool Set(int fd, int level, int option, const void* value, socklen_t size) {
   return ::setsockopt(fd, level, option, value, size) == 0;
 }
 
-/// A driver that echoes gives our own frames back as confirmations; the filter must let them in.
+/// Sets up the socket. A driver that echoes returns the host's own frames as confirmations, so the
+/// filter must admit them.
 Status Configure(int fd, const Listening& listening, bool confirms) {
   const int on = 1;
   const int own = confirms ? 1 : 0;
@@ -45,7 +46,8 @@ Status Configure(int fd, const Listening& listening, bool confirms) {
       can_filter{theirs, exact | kAboveSixteen},
       can_filter{theirs | kSensors, exact | kFunctionMask},
       can_filter{CAN_EFF_FLAG | kGroupId, CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_EFF_MASK}};
-  // Groups come from hosts: from others for units, as confirmations for the one that sent them.
+  // Hosts send groups. A unit's port receives them from other nodes; the sender's port receives
+  // them as confirmations.
   const bool groups_come = listening.groups && (hears_hosts || confirms);
   const auto filter_bytes = static_cast<socklen_t>(sizeof(can_filter) * (groups_come ? 3 : 2));
   if (!Set(fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &own, sizeof own) ||
@@ -54,7 +56,8 @@ Status Configure(int fd, const Listening& listening, bool confirms) {
       !Set(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters.data(), filter_bytes))
     return Fail(ErrorCode::kUnavailable,
                 std::string("cannot set up CAN_RAW: ") + std::strerror(errno));
-  // All of these are help, not need: refused by a hardened kernel, the port works as well.
+  // These options help but are not needed: where a hardened kernel refuses them, the port still
+  // works.
   if (!Set(fd, SOL_SOCKET, SO_RCVBUFFORCE, &kReceiveBufferBytes, sizeof kReceiveBufferBytes))
     Set(fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBufferBytes, sizeof kReceiveBufferBytes);
   Set(fd, SOL_SOCKET, SO_RXQ_OVFL, &on, sizeof on);

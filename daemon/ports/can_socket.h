@@ -1,6 +1,6 @@
-// A CAN_RAW socket as a port wants it: bound to one interface, never waiting, hearing only what
-// the other side sends, told of the controller's troubles, its frames stamped by the kernel when
-// they came in.
+// OpenInterface opens a CAN_RAW socket for a port. The socket is bound to one interface, never
+// waits and receives only the frames of the other side. The socket reports the controller's errors,
+// and the kernel stamps its frames on arrival.
 #pragma once
 
 #include <cstdint>
@@ -12,33 +12,35 @@
 
 namespace focalfleet {
 
-/// Whose frames a port hears: the coordinator hears units, the simulated units hear hosts. Frames
-/// of the other direction, of 11 bits, or remote, do not even wake it.
+/// The senders that a port receives: the coordinator receives units, the simulated units receive
+/// hosts. Frames of the other direction, frames of 11 bits and remote frames do not even wake the
+/// port.
 enum class Hears : std::uint8_t { kUnits, kHosts };
 
 struct Listening {
   Hears hears = Hears::kUnits;
-  bool groups = false;  // CAN FD frames pass, both ways
+  bool groups = false;  // CAN FD frames pass in both directions
 };
 
 struct OpenedInterface {
-  int socket = -1;  // -1: the interface is there, and down
+  int socket = -1;  // -1: the interface exists, and is down
   CanLink link;
 };
 
+/// The socket of an interface.
 /// Errors: kUnavailable: the kernel has no CAN, or no such interface (named); kInvalid: none can
 /// have this name.
 Result<OpenedInterface> OpenInterface(const std::string& name, const Listening& listening);
-/// As OpenInterface; another one in tests on a kernel without CAN.
+/// A function like OpenInterface. Tests on a kernel without CAN supply another one.
 using InterfaceOpener =
     std::function<Result<OpenedInterface>(const std::string& name, const Listening& listening)>;
 
-/// What the kernel charges to the socket for frames that it holds below. Units: bytes. 0 where it
-/// does not tell.
+/// The bytes that the kernel charges to the socket for frames that it still holds below. Units:
+/// bytes. 0 where the kernel does not report them.
 std::size_t BytesBelow(int socket);
 
-/// Frames sent from now on pass those of others (and our earlier ones) that wait in an interface's
-/// queue with bands; pfifo_fast, the usual one, has them.
+/// Frames sent from now on overtake those of other programs (and earlier ones of this one) that
+/// wait in an interface's queue with bands. The usual queue, pfifo_fast, has bands.
 void SetUrgent(int socket, bool urgent);
 
 }  // namespace focalfleet

@@ -24,7 +24,7 @@ class Kernel : public GpioKernel {
   void Close(int fd) override { ::close(fd); }
 };
 
-/// A descriptor for the length of a scope; -1: none.
+/// Owns the chip's descriptor within a scope; -1: none.
 class OpenChip {
  public:
   OpenChip(GpioKernel& kernel, const std::string& path)
@@ -41,7 +41,7 @@ class OpenChip {
   int fd_;
 };
 
-/// The kernel fills such a field without a promise that it ends.
+/// The text of a field that the kernel fills without a promise to end it by NUL.
 template <std::size_t kSize>
 std::string TextOf(const char (&field)[kSize]) {
   return {field, ::strnlen(field, kSize)};
@@ -88,7 +88,7 @@ Result<std::unique_ptr<SyncLine>> GpioLine::Create(const GpioLineOptions& option
   request.num_lines = 1;
   request.config.flags = GPIO_V2_LINE_FLAG_OUTPUT;
   if (options.active_low) request.config.flags |= GPIO_V2_LINE_FLAG_ACTIVE_LOW;
-  // At rest from the first moment on: units may be armed by an earlier run.
+  // The line is at rest from the first moment on: units may be armed by an earlier run.
   request.config.num_attrs = 1;
   request.config.attrs[0].mask = 1;
   request.config.attrs[0].attr.id = GPIO_V2_LINE_ATTR_ID_OUTPUT_VALUES;

@@ -1,6 +1,6 @@
-// The SYNC line as an output of a GPIO character device, by version 2 of the kernel's interface
-// (linux/gpio.h, since Linux 5.10). The line is taken when it is opened, is at rest from then on,
-// and nobody else can have it until it is given back.
+// GpioLine drives the SYNC line as an output of a GPIO character device, by version 2 of the
+// kernel's interface (linux/gpio.h, since Linux 5.10). Opening reserves the line and sets it to
+// rest. No other program can use the line until it is released.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace focalfleet {
 
-/// The system calls that it needs; a test puts its own chip behind them.
+/// The system calls that the line needs; a test supplies its own chip behind them.
 class GpioKernel {
  public:
   GpioKernel() = default;
@@ -20,7 +20,7 @@ class GpioKernel {
   GpioKernel& operator=(const GpioKernel&) = delete;
   virtual ~GpioKernel() = default;
 
-  /// As open(2), ioctl(2), close(2): -1 and errno where it failed.
+  /// As open(2), ioctl(2), close(2): -1 and errno on failure.
   virtual int Open(const char* path) = 0;
   virtual int Control(int fd, unsigned long request, void* argument) = 0;
   virtual void Close(int fd) = 0;
@@ -35,9 +35,9 @@ struct GpioLineOptions {
 
 class GpioLine : public SyncLine {
  public:
-  /// `kernel` outlives the line.
+  /// Reserves the line, at rest. `kernel` outlives the line.
   /// Errors: kUnavailable: there is no such chip or line, it is no GPIO chip, or the line is in
-  /// use; the text says which.
+  /// use; the text states the reason.
   static Result<std::unique_ptr<SyncLine>> Create(const GpioLineOptions& options,
                                                   GpioKernel& kernel = RealGpioKernel());
   ~GpioLine() override;

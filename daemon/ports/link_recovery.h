@@ -1,7 +1,7 @@
-// Brings a controller back from bus-off. A driver may take a second to restart, so the attempt runs
-// on a thread of its own that lives no longer than it. Attempts come 1, 2, 4 ... 60 s after one
-// another: a bus that throws its controller off again at once must not be flooded by it, and a bus
-// that was short-circuited for a moment shall not wait for a person.
+// LinkRecovery brings a controller back from bus-off. A driver may take a second to restart, so
+// each attempt runs on a thread of its own that ends with it. Attempts are 1, 2, 4 ... 60 s apart.
+// The growing wait protects a bus that throws its controller off again at once. The first short one
+// lets a bus recover from a brief short circuit without an operator.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ class LinkRecovery {
   using Reviver = std::function<Status()>;
   struct Options {
     Reviver revive;
-    DurationNs first_wait = Milliseconds(1000);  // of real time, as all here
+    DurationNs first_wait = Milliseconds(1000);  // of real time, as all durations here
     DurationNs longest_wait = Milliseconds(60'000);
     DurationNs poll_period = Milliseconds(10);  // while an attempt is under way
   };
@@ -30,15 +30,16 @@ class LinkRecovery {
   LinkRecovery& operator=(const LinkRecovery&) = delete;
   ~LinkRecovery();
 
-  /// The controller is off, and nobody else restarts it. Said again, it changes nothing.
+  /// The controller is off, and nothing else restarts it. Repeated calls change nothing.
   void BusOff(HostInstant now);
-  /// It works again. Soon after, the next bus-off waits as long as the next attempt would have.
+  /// The controller works again. A bus-off soon afterwards waits as long as the next attempt would
+  /// have.
   void Well(HostInstant now);
 
-  /// Begins what is due. The outcome of an attempt, once.
+  /// Begins the attempt that is due. Returns the outcome of each attempt, once.
   std::optional<Status> Poll(HostInstant now);
   [[nodiscard]] HostInstant wake_at() const { return wake_at_; }
-  /// An attempt is under way.
+  /// True while an attempt is under way.
   [[nodiscard]] bool trying() const { return attempt_ != nullptr; }
 
  private:

@@ -1,6 +1,7 @@
-// What the event loop needs of a port beyond FramePort: one descriptor to watch for as long as the
-// port lives (whatever it has to close and open behind it), and the instant at which it wants to be
-// called though nothing came (to connect again, or because a simulated bus moves on by itself).
+// PollablePort is what the event loop needs of a port beyond FramePort. Its one descriptor is
+// watched for as long as the port lives, whatever the port closes and opens behind it. The port
+// also gives the instant at which it must be called though nothing arrived: to connect again, or
+// because a simulated bus goes on.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 
 namespace focalfleet {
 
-/// What a port saw that no frame tells. Counted since the start.
+/// Events of a port that no frame reports, counted since the start.
 struct PortCounters {
   std::uint64_t rejected = 0;     // not an extended data frame of 0..8 bytes
   std::uint64_t lost = 0;         // the kernel's receive queue overflowed
@@ -20,16 +21,16 @@ struct PortCounters {
 
 class PollablePort : public FramePort {
  public:
-  /// Readable when Receive or another Send is worth while. -1: this port only goes by wake_at.
+  /// Readable when Receive or another Send can succeed. -1: this port only uses wake_at.
   [[nodiscard]] virtual int fd() const = 0;
   [[nodiscard]] virtual HostInstant wake_at() const = 0;
-  /// How soon another Send is worth while where one was refused and nothing tells of room. In real
-  /// time; as it is, about eight frames at 1 Mbit/s.
+  /// The wait before another Send can succeed, where one was refused and no event reports room.
+  /// Units: real time. The default lasts about eight frames at 1 Mbit/s.
   [[nodiscard]] virtual DurationNs retry_full() const { return Milliseconds(1); }
   [[nodiscard]] virtual const PortCounters& counters() const = 0;
-  /// The interface or path, for people.
+  /// The interface or path, for messages.
   [[nodiscard]] virtual const std::string& name() const = 0;
-  /// Why the link is not up; empty where it is.
+  /// The reason why the link is not up; empty where it is up.
   [[nodiscard]] virtual const std::string& trouble() const = 0;
 };
 

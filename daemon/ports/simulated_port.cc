@@ -10,7 +10,7 @@
 namespace focalfleet {
 namespace {
 
-/// The error frame by which a SocketCAN driver would tell it.
+/// The error frame by which a SocketCAN driver would report it.
 can_frame ErrorFrameOf(sim::FrameError error) {
   can_frame frame{};
   frame.can_id = CAN_ERR_FLAG;
@@ -42,7 +42,8 @@ Result<std::shared_ptr<SimulatedFleet>> SimulatedFleet::Create(sim::WorldConfig 
   return std::shared_ptr<SimulatedFleet>(new SimulatedFleet(std::move(config), clock));
 }
 
-// The world may stand where it last had something to do; a frame is not there before it is sent.
+// The world may still stand at its last event, before the frame is sent, so the clock gives the
+// time.
 bool SimulatedFleet::Inject(BusId bus, const CanFrame& frame) {
   return world_.Inject(bus, frame, clock_ ? clock_->Now() : world_.now());
 }
@@ -120,7 +121,7 @@ bool SimulatedLink::Look(const sim::World& world) {
   } else if (controller.warns) {
     trouble = "the controller warns of errors";
   }
-  // Told once: its causes go on to be counted.
+  // A trouble is reported once; its causes are still counted.
   if (state == state_ && trouble.empty() == trouble_.empty()) return false;
   if (!trouble.empty())
     if (const std::string causes = tally_.Causes(); !causes.empty()) trouble += " (" + causes + ")";

@@ -1,6 +1,7 @@
-// The fleet in the daemon's own process, for a first look and for tests: all buses share one
-// simulated world on the daemon's clock. It forgets where it stood when the daemon ends;
-// focalfleet-sim does not. A port tells how its host controller stands as a SocketCAN port does.
+// SimulatedPort gives access to a fleet in the daemon's own process, for a first look and for
+// tests. All buses share one simulated world on the daemon's clock. The world is lost when the
+// daemon ends; that of focalfleet-sim is not. A port reports the state of its host controller as a
+// SocketCAN port does.
 #pragma once
 
 #include <array>
@@ -21,16 +22,16 @@ namespace focalfleet {
 
 class SimulatedFleet {
  public:
-  /// `clock`: that the world goes by; without it, by what it is told (Take).
+  /// A fleet whose world follows `clock`; without a clock, the instants given to Take.
   /// Errors: kInvalid: the simulation cannot have such units.
   static Result<std::shared_ptr<SimulatedFleet>> Create(sim::WorldConfig config,
                                                         std::optional<HostClock> clock = {});
 
   bool Inject(BusId bus, const CanFrame& frame);
-  /// Lets the whole fleet go on to `now` and gives what this bus heard.
+  /// Advances the whole fleet to `now` and appends the frames that this bus received.
   void Take(BusId bus, HostInstant now, std::vector<ReceivedFrame>* out);
-  /// When this bus next has something to say; at once where it was heard already, asking for
-  /// another.
+  /// The next event of this bus; at once where its frames already wait, delivered while another bus
+  /// was served.
   [[nodiscard]] HostInstant NextEvent(BusId bus) const;
   [[nodiscard]] bool dead(BusId bus) const { return world_.dead(bus); }
   [[nodiscard]] sim::World& world() { return world_; }
@@ -48,17 +49,17 @@ class SimulatedFleet {
 /// The units of a layout as the simulation describes them.
 std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout);
 
-/// The joints of its units, where any has sensors; else none. With a real spread sensors differ
-/// from their calibration by 0.05 % and 0.2 mV.
+/// The joints of the layout's units, if any unit has sensors; else null. With a real spread,
+/// sensors differ from their calibration by 0.05 % and 0.2 mV.
 std::shared_ptr<const sim::JointSensors> MakeJoints(const Layout& layout, std::uint64_t seed,
                                                     sim::Spread spread);
 
-/// What a port tells of the simulated controller behind it: state and trouble, in the words of the
+/// The state and trouble that a port reports of its simulated controller, in the words of the
 /// SocketCAN port.
 class SimulatedLink {
  public:
   explicit SimulatedLink(BusId bus) : bus_(bus) {}
-  /// True: state or trouble differ from what they were.
+  /// True if state or trouble have changed.
   bool Look(const sim::World& world);
   [[nodiscard]] LinkState state() const { return state_; }
   [[nodiscard]] const std::string& trouble() const { return trouble_; }

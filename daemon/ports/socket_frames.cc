@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kBatch = 64;
 
-/// The room that one batch needs, wired up once a call.
+/// The buffers of one batch, linked once a call.
 struct Batch {
   std::array<canfd_frame, kBatch> frames;  // a can_frame is its front
   std::array<iovec, kBatch> vectors;
@@ -28,7 +28,7 @@ struct Batch {
   };
   std::array<Control, kBatch> control;
 
-  // Only as much of it is touched as is needed: most batches are small.
+  // Only the needed part is initialised: most batches are small.
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init)
   Batch(std::size_t count, bool with_control) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -44,11 +44,11 @@ struct Batch {
 };
 
 struct Reported {
-  std::uint32_t dropped = 0;            // frames that found the receive queue full, in all
-  std::optional<std::int64_t> wall_ns;  // when this one was taken in
+  std::uint32_t dropped = 0;            // frames lost at a full receive queue, in total
+  std::optional<std::int64_t> wall_ns;  // the kernel's time of arrival
 };
 
-/// What the kernel tells of a frame, where the socket asks for it.
+/// The kernel's report on a frame, where the socket asks for it.
 Reported ReadControl(msghdr* header) {
   Reported reported;
   for (cmsghdr* item = CMSG_FIRSTHDR(header); item != nullptr; item = CMSG_NXTHDR(header, item)) {
@@ -66,11 +66,11 @@ Reported ReadControl(msghdr* header) {
 
 bool IsFromUnit(const CanFrame& frame) { return (frame.id >> 19 & 1) != 0; }
 
-/// One packet that was read.
+/// A packet that was read.
 struct Packet {
   const canfd_frame* raw = nullptr;
   std::size_t size = 0;  // bytes; 0: more than any frame has
-  bool own = false;      // our own, come back
+  bool own = false;      // the host's own frame, echoed
   Reported reported;
 };
 
@@ -81,7 +81,7 @@ can_frame Classic(const canfd_frame& frame) {
   return classic;
 }
 
-/// All that is said of a batch once it has been read.
+/// The data with which a batch's frames are stamped.
 struct Stamp {
   BusId bus;
   HostInstant at;  // the clock after that
@@ -93,7 +93,7 @@ HostInstant StampOf(const Packet& packet, const Stamp& stamp, const Aside* aside
   return aside->stamps->At(*packet.reported.wall_ns, stamp.clock);
 }
 
-/// Hands on what a group is made of.
+/// Appends the frames of a group.
 void TakeApart(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* out,
                PortCounters* counters, const Aside& aside) {
   const auto group = FromSocketFrame(*packet.raw);
@@ -103,7 +103,7 @@ void TakeApart(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFra
     ++counters->rejected;
     return;
   }
-  if (aside.only_units) return;  // another host's
+  if (aside.only_units) return;  // from another host
   const HostInstant at = StampOf(packet, stamp, &aside);
   for (std::size_t i = 0; i < entries->count; ++i)
     out->push_back({stamp.bus, at, entries->frame[i]});
@@ -127,7 +127,7 @@ void Sort(const Packet& packet, const Stamp& stamp, std::vector<ReceivedFrame>* 
       ++counters->rejected;
     return;
   }
-  if (aside != nullptr && aside->only_units && !IsFromUnit(*frame)) return;  // another host's
+  if (aside != nullptr && aside->only_units && !IsFromUnit(*frame)) return;  // from another host
   out->push_back({stamp.bus, StampOf(packet, stamp, aside), *frame});
 }
 
@@ -148,7 +148,7 @@ std::optional<CanFrame> FromSocketFrame(const can_frame& frame) {
   CanFrame out;
   out.id = frame.can_id & CAN_EFF_MASK;
   out.length = frame.len;
-  // Bytes past the length are nobody's; equal frames shall compare equal.
+  // Bytes past the length are undefined; equal frames must compare equal.
   std::copy_n(frame.data, frame.len, out.data.begin());
   return out;
 }
@@ -217,13 +217,15 @@ void FrameStamps::HaveRead(HostInstant before, HostInstant after, bool empty) {
   around_ = since_empty_.And(ahead);
   since_ = emptied_;
   now_ = after;
-  // What comes next may have come before this reading of the clocks, not before the last one.
+  // The next frames may have arrived before this reading of the clocks, but not before the last
+  // one.
   since_empty_ = empty ? Readings{last_, last_.low_ns}.And(ahead) : around_;
   if (empty) emptied_ = before;
   last_ = ahead;
 }
 
-// By the least: one small step that hides within the readings makes no stamp too early.
+// The lower bound is used: a small clock step that hides within the readings makes no stamp too
+// early.
 HostInstant FrameStamps::At(std::int64_t wall_ns, const HostClock& clock) const {
   const HostInstant at = clock.FromMonotonic(wall_ns - around_.least_ns);
   return around_.alike() && at >= since_ && at <= now_ ? at : now_;

@@ -1,8 +1,8 @@
-// Frames in batches through a socket that carries `struct can_frame`, one a packet: CAN_RAW and
-// SOCK_SEQPACKET look the same here. CAN_RAW may carry groups of staging frames beside them, as
-// `struct canfd_frame`; whoever hears a group gets the frames that it is made of. A batch of 64
-// costs one system call; on a bus at its limit (7.6k frames/s) that is 120 calls a second instead
-// of 7600.
+// These functions move frames in batches through a socket that carries `struct can_frame`, one a
+// packet. CAN_RAW and SOCK_SEQPACKET look the same here. CAN_RAW may also carry groups of staging
+// frames, as `struct canfd_frame`; a receiver of a group gets its single frames. A batch of 64
+// costs one system call. On a bus at its limit (7.6k frames/s) that means 120 calls a second
+// instead of 7600.
 #pragma once
 
 #include <linux/can.h>
@@ -20,7 +20,8 @@ namespace focalfleet {
 
 can_frame ToSocketFrame(const CanFrame& frame);
 
-/// None where it is anything but an extended data frame: remote, error, 11-bit, or a length past 8.
+/// The frame; empty for anything but an extended data frame: remote, error, 11-bit, or a length
+/// past 8.
 std::optional<CanFrame> FromSocketFrame(const can_frame& frame);
 
 struct BatchSent {
@@ -30,42 +31,42 @@ struct BatchSent {
 BatchSent SendFrames(int fd, std::span<const CanFrame> frames);
 
 canfd_frame ToSocketFrame(const FdFrame& frame);
-/// None where it is no extended data frame, or has a length that CAN FD does not have.
+/// The group; empty where it is no extended data frame, or has a length that CAN FD does not have.
 std::optional<FdFrame> FromSocketFrame(const canfd_frame& frame);
-/// 0, or the errno with which it was refused.
+/// Sends a group. 0: sent, else the errno with which it was refused.
 int SendGroup(int fd, const FdFrame& group);
 
 struct BatchReceived {
   bool closed = false;  // the other end is gone (of a connected socket)
-  int error = 0;        // errno that ended it, but EAGAIN
+  int error = 0;        // errno that ended the call, except EAGAIN
 };
 
-/// By how much the wall clock is ahead of CLOCK_MONOTONIC: within these, because a reader may be
-/// held up between reading the one and the other. It changes only where the wall clock steps: what
-/// slews one of them slews both.
+/// The lead of the wall clock over CLOCK_MONOTONIC, as bounds: a reader may be held up between
+/// reading the two clocks. The lead changes only where the wall clock steps, since slewing acts on
+/// both clocks.
 struct WallAhead {
   std::int64_t low_ns = 0;
   std::int64_t high_ns = 0;
 };
 WallAhead ReadWallAhead();
 
-/// When the kernel took frames in, on the host's clock. The kernel stamps with the wall clock,
-/// which may step. So a stamp counts only where it lies between the readings of the socket before
-/// and behind the frame, and where both clocks ran alike from the one to the other. Otherwise the
-/// frame has the time at which it had been read: late, and never too early.
+/// FrameStamps gives the time at which the kernel received a frame, on the host's clock. The kernel
+/// stamps with the wall clock, which may step. A stamp therefore counts only between the readings
+/// of the socket before and after the frame, and only where both clocks ran alike between these.
+/// Otherwise the frame gets the time at which it was read: late, and never too early.
 class FrameStamps {
  public:
-  /// To be made before frames can come.
+  /// Pre: no frame can have arrived yet.
   explicit FrameStamps(WallAhead (*read)() = ReadWallAhead)
       : read_(read), last_(read()), since_empty_{last_, last_.low_ns} {}
 
-  /// Frames have been read. `before`: a time from before that. `empty`: none were left.
+  /// Records that frames have been read. `before`: a time before the read. `empty`: none were left.
   void HaveRead(HostInstant before, HostInstant after, bool empty);
-  /// Pre: HaveRead, since this frame was read.
+  /// The time of a frame. Pre: HaveRead was called since this frame was read.
   [[nodiscard]] HostInstant At(std::int64_t wall_ns, const HostClock& clock) const;
 
  private:
-  /// What several readings of both clocks have in common, and the least of them.
+  /// The range that several readings of both clocks have in common, and their lowest bound.
   struct Readings {
     WallAhead common;
     std::int64_t least_ns = 0;
@@ -75,36 +76,37 @@ class FrameStamps {
 
   WallAhead (*read_)();
   WallAhead last_;
-  Readings since_empty_;            // from one before the socket was found empty on
-  HostInstant emptied_{INT64_MIN};  // whatever is read next came in later
-  // Of the frames read last.
+  Readings since_empty_;            // from one before the socket was found empty
+  HostInstant emptied_{INT64_MIN};  // frames read next arrived after this
+  // Readings around the frames read last.
   Readings around_;
   HostInstant since_{INT64_MIN};
   HostInstant now_;
 };
 
-/// What a CAN_RAW socket tells beside the frames of others.
+/// Aside is what a CAN_RAW socket delivers beside the frames of other nodes.
 struct Aside {
   std::vector<can_frame> errors;
-  std::size_t confirmed = 0;          // our own frames that came back
-  std::optional<FrameStamps> stamps;  // given: frames are stamped by the kernel. To be kept
-  bool only_units = false;            // of others' frames, drop those of hosts
-  bool groups = false;                // CAN FD frames may come
+  std::size_t confirmed = 0;          // own frames that came back
+  std::optional<FrameStamps> stamps;  // set: the kernel stamps frames. To be kept
+  bool only_units = false;            // drop frames of other hosts
+  bool groups = false;                // CAN FD frames may arrive
 };
 
-/// Whose frames are read, and what they are stamped by: the clock is read after a batch has been,
-/// so that a stamp is never before the frame's end, wherever the process is held up.
+/// The source of frames and the clock for their stamps. The clock is read after a batch has been
+/// read, so a stamp is never before the frame's end, wherever the process is held up.
 struct FrameSource {
   BusId bus;
   HostClock clock = HostClock();
 };
 
-/// Reads until nothing is left, at most kFramesPerReceive. What is no data frame is counted as
-/// rejected, but for error frames where `aside` takes them.
+/// Reads until nothing is left, at most kFramesPerReceive. Packets that are no data frames are
+/// counted as rejected, except error frames where `aside` takes them.
 BatchReceived ReceiveFrames(int fd, const FrameSource& source, std::vector<ReceivedFrame>* out,
                             PortCounters* counters, Aside* aside = nullptr);
 
-/// One bus must not keep the others waiting; what is left makes the descriptor readable again.
+/// The limit keeps one bus from making the others wait; remaining frames make the descriptor
+/// readable again.
 inline constexpr std::size_t kFramesPerReceive = 1024;
 
 }  // namespace focalfleet

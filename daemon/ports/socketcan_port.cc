@@ -11,8 +11,8 @@ namespace focalfleet {
 namespace {
 
 constexpr DurationNs kLookPeriod = Milliseconds(1000);  // real time
-/// A confirmation that is not back by then is lost, unless the kernel still holds the frame. On a
-/// bus at its limit that is 6000 frames.
+/// A confirmation that has not come back by then is lost, unless the kernel still holds the frame.
+/// On a bus at its limit this time is 6000 frames.
 constexpr DurationNs kConfirmationLost = Milliseconds(1000);
 constexpr DurationNs kFull = Milliseconds(1);
 
@@ -43,7 +43,8 @@ Status CheckFd(const CanLink& link, const SocketCanPort* port, std::uint32_t wan
                                        std::to_string(wanted_bps));
 }
 
-/// How many of `frames`, from the front, stand before the next group; at most `most`, at least one.
+/// The number of `frames`, from the front, that stand before the next group; at most `most`, at
+/// least one.
 std::size_t BeforeGroup(std::span<const CanFrame> frames, std::size_t most) {
   const auto begins = [frames](std::size_t at) {
     return at + 1 < frames.size() && CanBeGrouped(frames[at]) && CanBeGrouped(frames[at + 1]);
@@ -116,7 +117,7 @@ Status SocketCanPort::Open() {
   waits_since_ = kNever;
   trouble_.clear();
   counters_.reconnects += std::exchange(was_up_, true) ? 1u : 0u;
-  // How it was before is told once it is looked at, at once.
+  // The state found now is reported at the first look, which is due at once.
   state_ = LinkStateOf(link_);
   look_at_ = state_ == LinkState::kUp ? kNever : HostInstant{0};
   return {};
@@ -136,10 +137,12 @@ HostInstant SocketCanPort::wake_at() const {
   return std::min(socket_.open() ? look_at_ : retry_at_, recovery_.wake_at());
 }
 
-// A driver that echoes wakes us when there is room; else the bit clock tells, or nobody.
+// A driver that echoes wakes the port when there is room. Otherwise the bit clock gives the time,
+// or nothing does.
 DurationNs SocketCanPort::retry_full() const {
   if (window_.unconfirmed() > 0) return Milliseconds(20);
-  if (window_.options().confirms) return kFull;  // others fill the queue, and nothing tells
+  if (window_.options().confirms)
+    return kFull;  // no event reports room in a queue shared with others
   const HostInstant room_at = window_.RoomAt();
   if (room_at == kNever) return kFull;
   return std::clamp(room_at - options_.wire_clock(), Microseconds(20), kFull);
@@ -165,16 +168,16 @@ std::size_t SocketCanPort::Send(std::span<const CanFrame> frames) {
     const std::size_t room = Room(urgent, monotonic);
     if (room == 0) return taken;
     if (urgent) SetUrgent(socket_.socket(), true);
-    // The last place is not for those behind a stop.
+    // The last place is not for frames behind a stop.
     const BatchSent sent = HandDown(frames.subspan(taken), urgent ? 1 : room, monotonic);
     if (urgent) SetUrgent(socket_.socket(), false);
     taken += sent.taken;
-    // ENOBUFS: others have filled the interface's queue, which no poll tells.
+    // ENOBUFS: other programs have filled the interface's queue, which no poll reports.
     socket_.WatchSending(sent.error == EAGAIN);
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return taken;
     if (sent.error != 0) {
       Lose(std::string("cannot send: ") + std::strerror(sent.error));
-      lost_untold_ = true;
+      lost_unreported_ = true;
       return taken;
     }
   }
@@ -199,7 +202,7 @@ BatchSent SocketCanPort::HandDown(std::span<const CanFrame> frames, std::size_t 
   }
   if (sent.taken == 0) return sent;
   if (window_.unconfirmed() == 0) waits_since_ = monotonic;
-  // Their bits begin no sooner than now.
+  // The frames' bits begin no sooner than now.
   const HostInstant below = window_.options().bit_rate_bps > 0 ? options_.wire_clock() : monotonic;
   if (together) {
     window_.Sent(group, below);
@@ -212,11 +215,12 @@ BatchSent SocketCanPort::HandDown(std::span<const CanFrame> frames, std::size_t 
 void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
   Recover(now);
   if (!socket_.open()) {
-    // Down is seen as such before it may be up again: what waited for it is not true any more.
-    if (std::exchange(lost_untold_, false))
+    // The loop must see the link as down before it is up again: frames that waited for it are
+    // outdated.
+    if (std::exchange(lost_unreported_, false))
       retry_at_ = now + options_.clock.Real(options_.retry_period);
     if (now < retry_at_) return;
-    static_cast<void>(Open());  // what failed is the trouble
+    static_cast<void>(Open());  // the trouble is what failed
     if (!socket_.open()) {
       retry_at_ = now + options_.clock.Real(options_.retry_period);
       return;
@@ -230,12 +234,12 @@ void SocketCanPort::Receive(HostInstant now, std::vector<ReceivedFrame>* out) {
       ReceiveFrames(socket_.socket(), {options_.bus, options_.clock}, out, &counters_, &aside_);
   window_.Confirmed(aside_.confirmed);
   if (aside_.confirmed > 0) waits_since_ = options_.wire_clock();
-  // Only on a bus in real time does the window go by bits, and there the host's clock is monotonic.
+  // The window goes by bits only on a bus in real time, and there the host's clock is monotonic.
   if (window_.options().bit_rate_bps > 0)
     for (const ReceivedFrame& heard : std::span(*out).subspan(before))
       window_.Heard(heard.frame, heard.at);
   for (const can_frame& error : aside_.errors) NoteError(error, now);
-  // While an attempt is under way the kernel may not answer before it is over.
+  // While an attempt is under way the kernel may not answer before its end.
   if (now >= look_at_ && !recovery_.trying()) LookAgain(now);
   if (received.error == 0) return;
   Lose(std::string("cannot receive: ") + std::strerror(received.error));
@@ -252,7 +256,7 @@ void SocketCanPort::NoteError(const can_frame& error, HostInstant now) {
   errors_.Note(error);
   const auto state = LinkStateOf(error);
   if (state == LinkState::kUp && state_ == LinkState::kUp && !IsWarning(error)) {
-    trouble_.clear();  // it warns no more
+    trouble_.clear();  // no warning any more
     errors_.Clear();
   }
   if (state) SetState(*state, now);
@@ -264,7 +268,7 @@ void SocketCanPort::SetState(LinkState state, HostInstant now) {
     recovery_.Well(now);
     if (state_ == LinkState::kOff) window_.Clear();  // a restart flushes what was below
   } else {
-    // Where the kernel restarts it by itself, two would only get into each other's way.
+    // Where the kernel restarts the controller by itself, a second restart would only interfere.
     if (link_.restart_ms == 0) recovery_.BusOff(now);
     window_.Clear();
   }
@@ -277,15 +281,15 @@ void SocketCanPort::SetState(LinkState state, HostInstant now) {
   if (state == LinkState::kUp) errors_.Clear();
 }
 
-// The controller is not well, or was not when it was opened: an error frame that says that it is
-// again may be lost.
+// Asks for the state of a controller that is not well, or was not when it was opened. The error
+// frame that reports recovery may be lost.
 void SocketCanPort::LookAgain(HostInstant now) {
   look_at_ = now + options_.clock.Real(kLookPeriod);
   const auto link = LookAtLink(options_.interface);
-  if (!link || link->index != link_.index) return;  // gone: the socket will say so
+  if (!link || link->index != link_.index) return;  // gone: the socket reports it
   link_ = *link;
   const LinkState state = LinkStateOf(link_);
-  if (trouble_.empty()) state_ = LinkState::kUp;  // as Open left it, untold
+  if (trouble_.empty()) state_ = LinkState::kUp;  // as Open left it, unreported
   SetState(state, now);
 }
 
@@ -297,7 +301,8 @@ void SocketCanPort::Recover(HostInstant now) {
       trouble_ = WithCauses("the controller is bus-off") + "; " + outcome->error().text;
     return;
   }
-  // A restart says so by an error frame, down and up by an error of the socket: look in any case.
+  // A restart is reported by an error frame, down and up by an error of the socket. A look covers
+  // both cases.
   if (socket_.open()) look_at_ = now;
 }
 

@@ -1,12 +1,13 @@
-// One bus on a SocketCAN interface: can0 of an adapter, or vcan0. A CAN_RAW socket, never waiting,
-// in batches, with at most three of our frames below it (transmit_window.h). Own frames are looped
-// back to other sockets of this host (candump sees them).
+// SocketCanPort is one bus on a SocketCAN interface: can0 of an adapter, or vcan0. The port uses a
+// CAN_RAW socket, never waits and works in batches. At most three of its frames are below the
+// socket (transmit_window.h). Its frames are looped back to other sockets of this host (candump
+// sees them).
 //
-// An interface that is down or not there takes the link down, no more: it is looked for again and
-// opened when it is up, be it the same or another of the same name. One whose bit rate is wrong is
-// not used, nor is one without CAN FD where that is asked for. A controller that goes bus-off is
-// brought back where that is possible (link_recovery.h), otherwise `trouble` says what a person has
-// to do.
+// An interface that is down or missing only takes the link down. The port looks for it again and
+// opens it when it is up, be it the same or another of the same name. An interface with a wrong bit
+// rate is not used, nor is one without CAN FD where the options ask for it. A controller that goes
+// bus-off is brought back where that is possible (link_recovery.h). Otherwise `trouble` states what
+// the operator has to do.
 #pragma once
 
 #include <functional>
@@ -30,20 +31,21 @@ class SocketCanPort : public PollablePort {
     BusId bus;
     std::string interface;
     Hears hears = Hears::kUnits;
-    std::uint32_t bit_rate_bps = 0;  // that the interface must have, if it has any; 0: whatever
-    /// Of a bus with CAN FD, for a host: staging frames that are handed over one behind the other
-    /// go down in groups. 0: every frame goes alone.
+    std::uint32_t bit_rate_bps = 0;  // that the interface must have, if it has any; 0: any
+    /// The data bit rate of a bus with CAN FD, for a host. Staging frames that are given one behind
+    /// the other are sent in groups. 0: every frame is sent alone.
     std::uint32_t data_bit_rate_bps = 0;
     HostClock clock = HostClock();
     DurationNs retry_period = Milliseconds(200);  // real time
-    // What the frames below go by: bits do not hurry when the host's clock does. None: the
+    // The clock of the frames below: bits do not hurry when the host's clock does. Empty: the
     // monotonic clock.
     std::function<HostInstant()> wire_clock = {};
     WallAhead (*wall_ahead)() = ReadWallAhead;
     InterfaceOpener open = OpenInterface;
-    LinkRecovery::Reviver revive = {};  // none: ReviveLink
+    LinkRecovery::Reviver revive = {};  // empty: ReviveLink
   };
-  /// Tries to open it once; an interface that is down or not there is down, no error.
+  /// Tries to open the interface once. An interface that is down or missing is no error: the link
+  /// is down.
   /// Errors: kInvalid: none can have this name; kRefused: it has another bit rate, or no CAN FD;
   /// kUnavailable: no descriptors left.
   static Result<std::unique_ptr<SocketCanPort>> Create(Options options);
@@ -58,9 +60,9 @@ class SocketCanPort : public PollablePort {
   [[nodiscard]] const std::string& name() const override { return options_.interface; }
   [[nodiscard]] const std::string& trouble() const override { return trouble_; }
 
-  /// The interface was there when it was last looked for, be it up or down.
+  /// True if the interface was there at the last look, be it up or down.
   [[nodiscard]] bool found() const { return found_; }
-  /// As it was when it was last looked at.
+  /// The interface as it was at the last look.
   [[nodiscard]] const CanLink& link() const { return link_; }
 
  private:
@@ -71,7 +73,7 @@ class SocketCanPort : public PollablePort {
   void SetState(LinkState state, HostInstant now);
   void LookAgain(HostInstant now);
   void Recover(HostInstant now);
-  /// Hands down what fits into `room` frames, or one group. Pre: room is not 0.
+  /// Passes down the frames that fit into `room` frames, or one group. Pre: room is not 0.
   BatchSent HandDown(std::span<const CanFrame> frames, std::size_t room, HostInstant monotonic);
   [[nodiscard]] std::size_t Room(bool urgent, HostInstant monotonic);
   [[nodiscard]] std::string WithCauses(const std::string& what) const;
@@ -84,14 +86,14 @@ class SocketCanPort : public PollablePort {
   ErrorTally errors_;
   LinkState state_ = LinkState::kDown;
   bool found_ = false;
-  bool was_up_ = false;               // ever
-  bool lost_untold_ = false;          // by Send, and no Receive has been since
+  bool was_up_ = false;               // at any time
+  bool lost_unreported_ = false;      // lost in Send; no Receive has run since
   HostInstant retry_at_{0};           // while there is no socket
-  HostInstant look_at_ = kNever;      // while the controller is not well: its state is asked for
-  HostInstant waits_since_ = kNever;  // monotonic: confirmations are outstanding since
+  HostInstant look_at_ = kNever;      // next look at the state of a controller that is not well
+  HostInstant waits_since_ = kNever;  // monotonic: start of the wait for outstanding confirmations
   PortCounters counters_;
   std::string trouble_;
-  Aside aside_;  // of one Receive, kept for its room and its stamps
+  Aside aside_;  // of one Receive, kept for its buffers and its stamps
 };
 
 }  // namespace focalfleet

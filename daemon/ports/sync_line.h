@@ -1,5 +1,6 @@
-// One output that tells all units of all buses an instant at once: the SYNC line. What it is made
-// of is behind this door: a line of a GPIO chip (gpio_line.h), or what a test records.
+// SyncLine is the SYNC line: one output that marks an instant for all units of all buses at once.
+// The interface hides its realisation: a line of a GPIO chip (gpio_line.h), or a recorder in a
+// test.
 #pragma once
 
 #include <string>
@@ -15,9 +16,9 @@ class SyncLine {
   SyncLine& operator=(const SyncLine&) = delete;
   virtual ~SyncLine() = default;
 
-  /// Active from now on, or at rest. Takes as long as one system call.
+  /// Sets the line active or to rest from now on. Cost: one system call.
   virtual Status Set(bool active) = 0;
-  /// Chip and line, for people.
+  /// Chip and line, for messages.
   [[nodiscard]] virtual const std::string& name() const = 0;
 };
 

@@ -18,8 +18,8 @@ DurationNs TimeOf(const FdFrame& group, const TransmitWindow::Options& options) 
 
 std::size_t TransmitWindow::ByMemory() const {
   if (charged_bytes_ == 0) return 0;
-  // How much one frame is charged is the kernel's affair: until a frame went down alone, anything
-  // charged may be all that went down since nothing was.
+  // The kernel decides how much one frame is charged. Until a frame went down alone, any charge may
+  // stand for all frames sent since the charge was 0.
   if (frame_bytes_ == 0) return std::min(kAll, sent_when_empty_);
   return (charged_bytes_ + frame_bytes_ - 1) / frame_bytes_;
 }
@@ -32,7 +32,7 @@ std::size_t TransmitWindow::ByBitClock(HostInstant now) const {
 std::size_t TransmitWindow::Room(bool urgent, HostInstant now) const {
   if (!held_ && !needs_time()) return at_once_;
   const std::size_t below = std::max({unconfirmed_, ByMemory(), ByBitClock(now)});
-  // One alone shows what a frame is charged. A bit clock tells enough without.
+  // A single frame shows what one is charged. A bit clock suffices without that figure.
   const bool to_learn = held_ && frame_bytes_ == 0 && !urgent && options_.bit_rate_bps == 0;
   const std::size_t allowed = urgent ? kAll : to_learn ? 1 : kOrdinary;
   return allowed > below ? allowed - below : 0;

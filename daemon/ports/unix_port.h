@@ -1,6 +1,6 @@
-// One bus of focalfleet-sim: the client of its SOCK_SEQPACKET socket, one `struct can_frame` a
-// packet. When the simulator dies or is not there yet the link is down, and the port tries again
-// until it is.
+// UnixPort is one bus of focalfleet-sim: the client of its SOCK_SEQPACKET socket, one `struct
+// can_frame` a packet. While the simulator is dead or not there yet, the link is down and the port
+// tries again.
 #pragma once
 
 #include <memory>
@@ -20,7 +20,7 @@ class UnixPort : public PollablePort {
     DurationNs retry_period = Milliseconds(200);
     HostClock clock = HostClock();
   };
-  /// Tries to connect once; a bus that is not there is down, no error.
+  /// Tries to connect once. A bus that is not there is no error: the link is down.
   /// Errors: kInvalid: the path is too long; kUnavailable: no descriptors left.
   static Result<std::unique_ptr<UnixPort>> Create(Options options);
 
@@ -44,7 +44,7 @@ class UnixPort : public PollablePort {
   Options options_;
   WatchedSocket socket_;
   HostInstant wake_at_{0};  // while the link is down: when to try again
-  bool was_up_ = false;     // ever
+  bool was_up_ = false;     // at any time
   PortCounters counters_;
   std::string trouble_;
 };

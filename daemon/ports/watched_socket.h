@@ -1,5 +1,5 @@
-// A socket that comes and goes behind one descriptor that stays: the socket sits alone in an epoll
-// of its own, and the event loop watches that epoll.
+// WatchedSocket is a socket that can be replaced behind one fixed descriptor. The socket sits alone
+// in an epoll of its own, and the event loop watches that epoll.
 #pragma once
 
 #include "protocol/base/result.h"
@@ -8,6 +8,7 @@ namespace focalfleet {
 
 class WatchedSocket {
  public:
+  /// A watched socket without a socket yet.
   /// Errors: kUnavailable: no descriptors left.
   static Result<WatchedSocket> Create();
   WatchedSocket(WatchedSocket&& other) noexcept;
@@ -16,10 +17,10 @@ class WatchedSocket {
   WatchedSocket& operator=(const WatchedSocket&) = delete;
   ~WatchedSocket();
 
-  /// Takes `socket` over, closes the one before.
+  /// Takes ownership of `socket`, and closes the one before.
   void Open(int socket);
   void Close();
-  /// Whether room to send also counts as something to do.
+  /// Sets whether room to send also makes the descriptor readable.
   void WatchSending(bool watch);
 
   [[nodiscard]] int fd() const { return epoll_; }

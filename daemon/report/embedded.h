@@ -1,4 +1,5 @@
-// Files of this folder that pages carry, as CMake has built them in (embedded.cc.in).
+// These constants hold files of this folder that pages contain; CMake builds them in
+// (embedded.cc.in).
 #pragma once
 
 #include <string_view>

@@ -13,13 +13,13 @@ namespace focalfleet::report {
 namespace {
 
 constexpr double kPlotWidthPx = 760;
-constexpr double kRightPx = 28;  // half of the last label stands there
+constexpr double kRightPx = 28;  // room for half of the last label
 constexpr double kCharacterPx = 6.8;
 constexpr double kLinePx = 17;
 constexpr std::size_t kCategoryCharactersMax = 24;
 constexpr std::size_t kColours = 7;
 constexpr std::size_t kDashes = 3;
-constexpr double kSlantSine = 0.574;  // of 35 degrees
+constexpr double kSlantSine = 0.574;  // sine of 35 degrees
 constexpr double kSlantCosine = 0.819;
 
 double WidthOf(const std::string& text) {
@@ -51,8 +51,8 @@ bool Overlap(const Box& a, const Box& b) {
   return a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
 }
 
-// Labels of reference lines inside the area, each beside its line and on no other line or label
-// where there is such a place.
+// Places the labels of reference lines inside the area. Each label stands beside its line, and on
+// no other line or label where such a place exists.
 class ReferenceLabels {
  public:
   explicit ReferenceLabels(const Frame& frame) : frame_(frame) {
@@ -100,7 +100,8 @@ class ReferenceLabels {
     const auto free = std::find_if(places.begin(), places.end(), is_free);
     const Box place = free == places.end() ? places.front() : *free;
     taken_.push_back(place);
-    // To the right of its place, so that a narrower font than estimated still ends at the edge.
+    // The text ends at the right of its place, so it ends at the edge even where the font is
+    // narrower than estimated.
     Write(out, R"(<text class="halo" text-anchor="end" x="{:.2f}" y="{:.2f}">{}</text>)",
           place.right, place.bottom - 4, EscapeMarkup(label));
   }
@@ -209,8 +210,8 @@ Block Legend(const Frame& frame) {
   return block;
 }
 
-// The ends that are not given, `margin` further out, except that data beginning at zero begin
-// there.
+// Moves the ends that are not given `margin` further out. Data that begin at zero keep zero as
+// their end.
 Range Widened(const Axis& axis, Range range, Range data, double margin) {
   const double wider = margin * (range.high - range.low);
   const bool up_from_zero = !axis.log && data.low >= 0 && data.low < wider;
@@ -220,8 +221,8 @@ Range Widened(const Axis& axis, Range range, Range data, double margin) {
   return range;
 }
 
-// For equal values, or an end given on the wrong side of the data: an end that is given alone
-// stays.
+// A range for equal values, or for an end given on the wrong side of the data. An end that is given
+// alone stays.
 Range AroundOneValue(const Axis& axis, Range range, double half) {
   if (axis.min && !axis.max) return {range.low, range.low + 2 * half};
   if (axis.max && !axis.min) return {range.high - 2 * half, range.high};
@@ -248,7 +249,7 @@ void Extent::Add(double value) {
 
 Scale ScaleFor(const Axis& axis, const Extent& extent, double margin) {
   const auto place = [&](double value) { return axis.log ? std::log10(value) : value; };
-  // Without data 0 to 1, or one decade.
+  // Without data the range is 0 to 1, or one decade.
   const Range data{extent.empty ? 0.0 : place(extent.low), extent.empty ? 1.0 : place(extent.high)};
   Range range{axis.min ? place(*axis.min) : data.low, axis.max ? place(*axis.max) : data.high};
   const double size = std::max(std::abs(range.low), std::abs(range.high));
@@ -259,7 +260,7 @@ Scale ScaleFor(const Axis& axis, const Extent& extent, double margin) {
     const double around = size < 1e-290 ? 1.0 : 0.05 * size;
     range = AroundOneValue(axis, range, axis.log ? 0.3 : around);
   }
-  // Powers of ten beyond these are not numbers.
+  // Powers of ten beyond these are no finite doubles.
   if (axis.log) range = {std::max(range.low, -305.0), std::min(range.high, 305.0)};
   return {axis.log, range, 0};
 }
@@ -280,14 +281,14 @@ void PlaceArea(const std::vector<std::string>& categories, Frame* frame) {
 
   frame->x_marks_are_categories = true;
   const double slot = frame->width_px / static_cast<double>(categories.size());
-  // Not more labels than stand beside each other when slanted.
+  // The number of labels is limited to those that fit beside each other when slanted.
   const auto stride = static_cast<std::size_t>(std::max(1.0, std::ceil(kLinePx / slot)));
   for (std::size_t i = 0; i < categories.size(); i += stride) {
     frame->x_marks.push_back(
         {slot * (static_cast<double>(i) + 0.5), Shorten(categories[i], kCategoryCharactersMax)});
   }
   if (!Slanted(*frame)) return;
-  // The first label leans out to the left; the area gives way.
+  // The first label leans out to the left, so the area starts further right.
   const double overhang = kSlantCosine * WidthOf(frame->x_marks[0].label) - slot / 2;
   const double shift = std::max(0.0, overhang - frame->left_px);
   const double shrink = (frame->width_px - shift) / frame->width_px;

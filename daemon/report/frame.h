@@ -1,6 +1,7 @@
-// What surrounds the data of a plot: title, legend, axes with their ticks, reference lines, notes.
-// Everything is placed by an estimate of the width of text, because only the viewer knows its font;
-// the estimate errs on the wide side. Places are in pixels of a drawing that is 760 wide.
+// Frame is what surrounds the data of a plot: title, legend, axes with their ticks, reference
+// lines, notes. Everything is placed by an estimate of the width of text, because only the viewer
+// knows its font. The estimate errs on the wide side. Places are in pixels of a drawing that is 760
+// wide.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +13,13 @@
 
 namespace focalfleet::report {
 
-/// From values to pixels of the drawing area; y grows upwards there.
+/// Scale maps values to pixels of the drawing area; y grows upwards there.
 struct Scale {
   bool log = false;
   Range range;  // of log10(value) where log
   double length_px = 0;
 
-  /// Pre: value is plottable, positive where log.
+  /// The pixel of `value`. Pre: value is plottable, positive where log.
   [[nodiscard]] double At(double value) const;
   [[nodiscard]] Ticks TicksOf(int count_max) const;
 };
@@ -31,8 +32,9 @@ struct Extent {
   bool empty = true;
 };
 
-/// The ends that are given, else those of the data, `margin` times the span wider, but not across
-/// zero; never degenerate, also for no or equal values. `length_px` is still 0.
+/// The scale with the ends that are given. Other ends are those of the data, moved out by `margin`
+/// times the span, but not across zero. The range is never degenerate, also for no or equal values.
+/// `length_px` is still 0.
 Scale ScaleFor(const Axis& axis, const Extent& extent, double margin);
 
 struct Mark {
@@ -44,7 +46,7 @@ enum class Key { kLine, kDot, kBox };
 
 struct LegendEntry {
   std::string name;
-  std::size_t series = 0;  // its colour
+  std::size_t series = 0;  // sets its colour
   Key key = Key::kLine;
 };
 
@@ -69,17 +71,17 @@ struct Frame {
 /// `width_px`.
 void PlaceArea(const std::vector<std::string>& categories, Frame* frame);
 
-/// "label (unit)" with a shared factor before the unit.
+/// The text "label (unit)", with a shared factor before the unit.
 std::string AxisTitle(const Axis& axis, int exponent);
 
-/// Marks along x; fewer where their labels would touch. Sets marks and title.
+/// Sets the marks along x and the title. Fewer marks are set where their labels would touch.
 void MarkX(const Axis& axis, const Scale& scale, Frame* frame);
-/// The same along y. Pre: scale.length_px is the area's height.
+/// Sets the same along y. Pre: scale.length_px is the area's height.
 void MarkY(const Axis& axis, const Scale& scale, Frame* frame);
 
 Svg Assemble(const Frame& frame);
 
-/// CSS classes of a series: colour, and dashes once the colours begin again.
+/// CSS classes of a series: its colour, and dashes once the colours begin again.
 std::string SeriesClass(std::size_t series);
 
 }  // namespace focalfleet::report

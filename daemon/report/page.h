@@ -1,10 +1,10 @@
-// One report as one file of HTML5: text, tables and plots in the order in which they are added. It
-// needs no script, no network and no second file, so it can be mailed, archived and printed; it is
-// light or dark as the reader's system is, and light on paper.
+// Page is one report as one file of HTML5: text, tables and plots in the order in which they are
+// added. The file needs no script, no network and no second file, so it can be mailed, archived and
+// printed. The page is light or dark as the reader's system is, and light on paper.
 //
-// Everything but a plot is text and is escaped: what a file or a unit is called cannot change the
-// page. Elements are closed as in XML, so that a strict parser reads the page too. No time and no
-// name of a machine gets in by itself: the same calls give the same bytes.
+// Everything but a plot is text and is escaped, so the name of a file or unit cannot change the
+// page. Elements are closed as in XML, so a strict parser reads the page too. The page adds no time
+// and no name of a machine by itself: the same calls give the same bytes.
 #pragma once
 
 #include <string>
@@ -19,19 +19,19 @@ enum class Align { kLeft, kRight };
 
 class Page {
  public:
-  /// The title is also the first heading.
+  /// A page whose title is also its first heading.
   explicit Page(std::string_view title);
 
   Page& Heading(std::string_view text);
   Page& Paragraph(std::string_view text);
 
-  /// Columns without an alignment stand left; numbers read best at the right.
+  /// Adds a table. Columns without an alignment are left-aligned; numbers read best right-aligned.
   /// Pre: every row is as long as the header; no more alignments than columns.
   Page& Table(const std::vector<std::string>& header,
               const std::vector<std::vector<std::string>>& rows,
               const std::vector<Align>& alignments = {});
 
-  /// Empty caption: none.
+  /// Adds a plot. Empty caption: none.
   Page& Plot(const Svg& svg, std::string_view caption = "");
 
   /// The whole document so far.

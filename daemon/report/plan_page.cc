@@ -75,7 +75,7 @@ void AddCounts(const UnitPlan* move, Columns* out) {
   }
 }
 
-// `unserved` and `by` count from 1; 0 is served, and nobody.
+// `unserved` and `by` count from 1; 0 means served, and no blocking unit.
 void AddOutcome(const Unserved* unserved, Columns* out) {
   out->Add("unserved", unserved == nullptr ? 0 : 1 + static_cast<int>(unserved->why));
   out->Add("by", unserved == nullptr || !unserved->by ? 0 : 1.0 + unserved->by->value);
@@ -104,7 +104,7 @@ Json UnitsJson(const PlanScene& scene) {
   return columns.Pack();
 }
 
-// Rows of an axis join up, so that where one begins is where the one before ended.
+// The rows of an axis join up: each begins where the previous one ended.
 Json RowsJson(const std::vector<PlanRow>& rows) {
   Columns columns;
   for (const PlanRow& row : rows) {
@@ -171,7 +171,7 @@ std::string PlanPage(const PlanScene& scene) {
   out.append("<title>").append(title).append("</title>\n<style>\n");
   out.append(kPlanPageStyle).append("</style>\n</head>\n<body>\n");
   out.append("<header><h1>").append(title).append("</h1><p id=\"summary\"></p></header>\n");
-  // Numbers and base64 only: nothing in the data can end the element.
+  // The data are numbers and base64 only, so nothing in them can end the element.
   out.append(kPlanPageBody).append(R"(<script type="application/json" id="plan">)");
   out.append(SceneJson(scene).dump()).append("</script>\n<script>\n");
   return out.append(kPlanPageScript).append("</script>\n</body>\n</html>\n");

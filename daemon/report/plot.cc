@@ -27,7 +27,7 @@ Fate FateOf(double value, bool log) {
   return Fate::kShown;
 }
 
-// What is left out, counted for the notes.
+// Counts, for the notes, of points that are left out.
 struct LeftOut {
   std::size_t infinite = 0;
   std::size_t not_positive = 0;
@@ -39,7 +39,7 @@ struct LeftOut {
   }
 };
 
-// The fate of a point is that of its worse coordinate; a gap is meant and needs no note.
+// The fate of a point is that of its worse coordinate. A gap is intended and needs no note.
 Fate FateOf(const LinePlot& plot, const Series& series, std::size_t i) {
   const Fate x = FateOf(series.x[i], plot.x.log);
   const Fate y = FateOf(series.y[i], plot.y.log);
@@ -77,7 +77,7 @@ void AddReferences(const Axis& axis, const std::vector<Reference>& references, E
   }
 }
 
-// Pixels from the left, or from the top for y.
+// The references' marks, in pixels from the left, or from the top for y.
 std::vector<Mark> PlaceReferences(const std::vector<Reference>& references, const Scale& scale,
                                   bool is_y, std::vector<std::string>* notes) {
   std::vector<Mark> marks;
@@ -121,7 +121,7 @@ Extents ExtentsOf(const LinePlot& plot) {
     for (std::size_t i = 0; i < series.x.size(); ++i) {
       if (!extents.left_out.Shows(FateOf(plot, series, i))) continue;
       extents.x.Add(series.x[i]);
-      // What is cut off at the sides does not stretch the height.
+      // Points cut off at the sides do not stretch the height.
       if (Inside(plot.x, series.x[i])) extents.y.Add(series.y[i]);
     }
   }
@@ -149,7 +149,8 @@ std::string PathOf(const LinePlot& plot, const Series& series, const Scales& sca
 
 // ---- bars
 
-// From the zero line to the value, in pixels from the top; a bar that leaves ends just outside.
+// The ends of a bar from the zero line to the value, in pixels from the top. A bar that leaves the
+// area ends just outside.
 struct BarEnds {
   double top, bottom;
 };
@@ -185,7 +186,7 @@ void DrawGroup(const BarPlot& plot, std::size_t index, const Scale& y, Frame* fr
 
 // ---- histogram
 
-// One outline over each run of bins that are shown, closed along the zero line.
+// The outline over each run of bins that are shown, closed along the zero line.
 std::string OutlineOf(const Histogram& plot, const Scale& x, const Scale& y, LeftOut* left_out) {
   std::string path;
   const double zero = EndsOf(y, 0).top;

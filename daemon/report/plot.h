@@ -1,14 +1,14 @@
-// Plots as SVG for a page (page.h): no script, nothing fetched, sharp on paper, colours from the
-// page's style sheet so that they follow light and dark. The colours are Okabe and Ito's, which
-// stay apart for the colour-blind (their blue is lighter on dark); the eighth series begins them
-// again, lines with dashes, and after 21 they repeat.
+// These functions draw plots as SVG for a page (page.h): no script, nothing fetched, sharp on
+// paper. Colours come from the page's style sheet, so they follow light and dark. The colours are
+// Okabe and Ito's, which are distinct for colour-blind readers (their blue is lighter on dark). The
+// eighth series begins them again, lines with dashes, and after 21 they repeat.
 //
-// Data are shown as they are or the plot says what it leaves out. What would mislead silently is
-// named under the plot: values <= 0 on a logarithmic axis, infinite values, reference lines outside
-// the axes. A series without points says so in the legend. Long series are thinned to the extremes
-// of each pixel column (trace.h).
+// Data are shown as they are, or the plot names what it leaves out. Omissions that could mislead
+// are named under the plot: values <= 0 on a logarithmic axis, infinite values, reference lines
+// outside the axes. The legend marks a series without points. Long series are thinned to the
+// extremes of each pixel column (trace.h).
 //
-// The same input gives the same bytes. Text is escaped here; what is too long for its place is
+// The same input gives the same bytes. Text is escaped here; text that is too long for its place is
 // cut with an ellipsis.
 #pragma once
 
@@ -22,13 +22,13 @@
 
 namespace focalfleet::report {
 
-/// Markup that needs no escaping any more; only plots make it.
+/// Markup that needs no further escaping; only plots make it.
 struct Svg {
   std::string text;
 };
 
-/// An end that is not given follows the data. Ticks beyond 1e5 or all below 1e-2 share a power of
-/// ten in the title: "time (10⁻⁶ s)".
+/// Axis describes one axis. An end that is not given follows the data. Ticks beyond 1e5 or all
+/// below 1e-2 share a power of ten in the title: "time (10⁻⁶ s)".
 /// Pre: min < max where both are given; on a logarithmic axis both are > 0.
 struct Axis {
   std::string label;
@@ -38,16 +38,16 @@ struct Axis {
   std::optional<double> max;
 };
 
-/// Across the whole plot at one value, dashed, with its label beside it. It does not widen an axis
-/// whose ends are given.
+/// A dashed line across the whole plot at one value, with its label beside it. The line does not
+/// widen an axis whose ends are given.
 struct Reference {
   double value = 0;
   std::string label;
 };
 
-/// NaN in x or y breaks the line there.
+/// Series is one line. NaN in x or y breaks the line there.
 /// Pre: x and y are equally long.
-/// Lifetime: the numbers are read by DrawLines alone.
+/// Lifetime: DrawLines alone reads the numbers.
 struct Series {
   std::string name;  // empty: not in the legend
   std::span<const double> x;
@@ -65,10 +65,10 @@ struct LinePlot {
   int height_px = 240;                // of the area inside the axes; its width is about 640
 };
 
-/// Cost: O(points); memory for about 4 points a pixel column.
+/// The plot as SVG. Cost: O(points); memory for about 4 points a pixel column.
 Svg DrawLines(const LinePlot& plot);
 
-/// One value a category; NaN: no bar.
+/// BarGroup has one value for each category; NaN: no bar.
 /// Pre: values are as many as the plot's categories.
 struct BarGroup {
   std::string name;  // empty: not in the legend
@@ -88,7 +88,7 @@ struct BarPlot {
 };
 Svg DrawBars(const BarPlot& plot);
 
-/// Counts of given bins: bin i reaches from edges[i] to edges[i + 1]. NaN: no bar.
+/// Histogram shows counts of given bins: bin i reaches from edges[i] to edges[i + 1]. NaN: no bar.
 /// Pre: edges ascend, one more than counts (or both empty); not y.log.
 struct Histogram {
   std::string title;
@@ -101,7 +101,7 @@ struct Histogram {
 };
 Svg DrawHistogram(const Histogram& plot);
 
-/// The style sheet that the plots need; Page carries it.
+/// The style sheet that the plots need; Page contains it.
 std::string_view PlotStyle();
 
 }  // namespace focalfleet::report

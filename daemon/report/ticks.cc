@@ -17,7 +17,7 @@ struct Step {
   int exponent;
 };
 
-// mantissa * 10^exponent, with the one rounding of a division where 10^exponent is not exact.
+// mantissa * 10^exponent, with a single rounding (of a division) where 10^exponent is not exact.
 double Scaled(std::int64_t mantissa, int exponent) {
   const auto number = static_cast<double>(mantissa);
   return exponent < 0 ? number / std::pow(10.0, -exponent) : number * std::pow(10.0, exponent);
@@ -34,7 +34,7 @@ struct Multiples {
   std::int64_t last;
 };
 
-// The multiples of the step inside the range; an end that misses one by rounding still has it.
+// The multiples of the step inside the range, including an end that rounding alone would exclude.
 Multiples Inside(Range range, Step step) {
   const double length = Scaled(step.mantissa, step.exponent);
   const double slack = 1e-9;
@@ -47,7 +47,7 @@ int SharedExponent(double magnitude_max) {
   return 3 * static_cast<int>(std::floor(std::log10(magnitude_max) / 3 + 1e-9));
 }
 
-// One axis is written in one way: without powers of ten where all its numbers are handy.
+// All labels of one axis use one notation: without powers of ten where all its numbers are handy.
 std::string LogLabel(std::int64_t mantissa, int exponent, bool handy) {
   if (handy) return fmt::format("{:.{}f}", Scaled(mantissa, exponent), std::max(0, -exponent));
   const std::string power = PowerOfTen(exponent);
@@ -108,7 +108,7 @@ Ticks LogTicks(Range range, int count_max) {
   };
   const auto limit = static_cast<std::size_t>(count_max);
   if (Ticks fine = marks_of(1, true); fine.marks.size() <= limit) {
-    // Fewer than three would leave a reader without the scale.
+    // Fewer than three marks would leave a reader without the scale.
     return fine.marks.size() < 3 ? LinearTicks(range, count_max) : fine;
   }
   int stride = 1;

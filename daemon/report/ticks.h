@@ -1,7 +1,7 @@
-// Where an axis is marked, and with which digits. On a linear axis the step is 1, 2 or 5 times a
-// power of ten, and a tick is an integer times that power, so that labels carry exactly the digits
-// that tell neighbours apart and no rounding of 0.1 shows. Large or small numbers share a factor
-// 10^(3k), which goes to the axis's title once instead of into every label.
+// These functions choose where an axis is marked, and with which digits. On a linear axis the step
+// is 1, 2 or 5 times a power of ten. A tick is an integer times that power. Labels therefore carry
+// exactly the digits that separate neighbours, and no rounding of 0.1 shows. Large or small numbers
+// share a factor 10^(3k), which stands once in the axis's title instead of in every label.
 #pragma once
 
 #include <string>
@@ -9,8 +9,7 @@
 
 namespace focalfleet::report {
 
-/// Numbers beyond this are as good as infinite to a plot: differences of those below do not
-/// overflow.
+/// Numbers beyond this are treated as infinite: differences of smaller numbers do not overflow.
 inline constexpr double kPlottableMax = 1e300;
 
 struct Range {
@@ -33,12 +32,13 @@ struct Ticks {
 /// count_max > 1.
 Ticks LinearTicks(Range range, int count_max);
 
-/// Decades, or every second, third... of many; 1-2-5 within few; LinearTicks within less than one.
-/// Exponent 0 except within less than one decade.
+/// The ticks of a logarithmic axis. Over many decades they are decades, or every second, third...
+/// one. Over few decades they are 1-2-5; within less than one they are LinearTicks. The exponent is
+/// 0 except within less than one decade.
 /// Pre: as LinearTicks, and low > 0.
 Ticks LogTicks(Range range, int count_max);
 
-/// "10³", "10⁻⁶".
+/// The power as text: "10³", "10⁻⁶".
 std::string PowerOfTen(int exponent);
 
 }  // namespace focalfleet::report

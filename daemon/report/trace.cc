@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::size_t kPointsPerColumn = 4;
 
-// Viewers compute in single precision; what lies outside is only the direction of a line that
-// leaves.
+// Viewers compute in single precision. A point outside only gives the direction of a line that
+// leaves the area.
 constexpr double kPixelMax = 1e5;
 
-// Not "-0.0": the same point has the same bytes.
+// The value is never "-0.0": the same point must have the same bytes.
 double Written(double pixel) {
   const double clamped = std::clamp(pixel, -kPixelMax, kPixelMax);
   return std::abs(clamped) < 0.005 ? 0.0 : clamped;
@@ -48,7 +48,7 @@ void Trace::Add(Pixel pixel) {
     Emit(pixel);
     return;
   }
-  // All that lies outside on one side is one column.
+  // All points outside on one side form one column.
   const double column = std::clamp(std::floor(pixel.x), -1.0, std::ceil(options_.width_px));
   if (run_length_ > 0 && column != run_column_) EmitRun();
   run_column_ = column;

@@ -1,5 +1,6 @@
-// Where the simulated buses meet the processes outside: UNIX sockets or SocketCAN interfaces. Both
-// take frames for the world and carry away what its buses carried; neither ever waits for anybody.
+// BusDoors connects the simulated buses to processes outside: by UNIX sockets or by SocketCAN
+// interfaces. Both pass frames into the world and carry away the frames of its buses. Neither ever
+// waits.
 #pragma once
 
 #include <span>
@@ -20,13 +21,13 @@ class BusDoors {
 
   /// Readable when Exchange has something to do.
   [[nodiscard]] virtual int fd() const = 0;
-  /// When Exchange wants to be called though nothing came.
+  /// The instant at which Exchange must be called though nothing arrived.
   [[nodiscard]] virtual HostInstant wake_at() const = 0;
-  /// Puts what has arrived into the world, and sends what still waits to be sent. What came from
-  /// all doors enters the world at one time, read after it had been taken in: never before its
-  /// sender let it go, and however long that took, all buses later by the same.
+  /// Injects the frames that have arrived into the world, and sends those that still wait. Frames
+  /// from all doors enter the world at one instant, which is read after they were received. No
+  /// frame therefore enters before its sender released it, and a delay shifts all buses alike.
   virtual void Exchange(const HostClock& clock, sim::World* world) = 0;
-  /// Frames that the simulated buses carried, in order.
+  /// Takes frames that the simulated buses carried, in order.
   virtual void Carry(std::span<const sim::WireFrame> frames) = 0;
 };
 

@@ -16,7 +16,7 @@ namespace {
 constexpr DurationNs kLookPeriod = Milliseconds(20);
 constexpr std::int64_t kLateNs = 90'000'000'000;
 
-/// The number of the request, or nothing where there is none that can be read.
+/// The number of the request; empty where no readable request exists.
 std::optional<std::uint64_t> Asked(const std::string& path) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   const auto text = ReadTextFile(path);
@@ -43,7 +43,7 @@ Result<CameraDoor> CameraDoor::Open(const Options& options) {
   if (failed)
     return focalfleet::Fail(ErrorCode::kUnavailable,
                             "camera folder " + options.directory + ": " + failed.message());
-  // What was asked of an earlier simulation is not asked of this one.
+  // A request to an earlier simulation does not apply to this one.
   door.answered_ = Asked(options.directory + "/request.json").value_or(0);
   return door;
 }

@@ -1,6 +1,6 @@
-// The simulated fibre-view camera: it answers in the folder where the daemon asks
-// (daemon/camera/camera_folder.h), with a picture of the world as it is then. It can be told to
-// fail in the ways in which a camera fails.
+// CameraDoor is the simulated fibre-view camera. The camera answers in the folder where the daemon
+// asks (daemon/camera/camera_folder.h), with a picture of the world at that time. Faults can be set
+// in the kinds that a camera has.
 #pragma once
 
 #include <cstdint>
@@ -17,9 +17,9 @@ namespace focalfleet::simulator {
 
 enum class CameraFault : std::uint8_t {
   kNone,
-  kDead,        // nothing comes
-  kLate,        // what comes shows the plate as it was a minute and a half ago
-  kDoubled,     // the exposure before comes once more
+  kDead,        // no exposure arrives
+  kLate,        // the exposure shows the plate as it was a minute and a half ago
+  kDoubled,     // the previous exposure arrives once more
   kTurned,      // the picture is turned by half a turn
   kOtherField,  // the picture is of fibres elsewhere
 };
@@ -34,10 +34,11 @@ class CameraDoor {
     std::uint64_t seed = 1;
     sim::CameraTraits traits;
   };
+  /// The camera on its folder.
   /// Errors: kUnavailable, kInvalid: the folder or the fiducials.
   static Result<CameraDoor> Open(const Options& options);
 
-  /// Looks whether it was asked, and answers. Errors: the answer cannot be written.
+  /// Looks for a request, and answers it. Errors: the answer cannot be written.
   Status Serve(HostInstant now, const sim::World& world);
   [[nodiscard]] HostInstant wake_at() const { return wake_at_; }
   void Fail(CameraFault fault, std::uint32_t exposures);

@@ -11,7 +11,8 @@
 
 namespace focalfleet::simulator {
 namespace {
-/// A queue that is full says so by no event; a bus at its limit carries 8 frames in this time.
+/// No event reports room in a full queue, so it is tried again. A bus at its limit carries 8 frames
+/// in this time.
 constexpr DurationNs kRetry = Milliseconds(1);
 constexpr std::size_t kWaitingMax = 16'384;
 }  // namespace
@@ -82,7 +83,7 @@ void CanDoors::Exchange(const HostClock& clock, sim::World* world) {
 
 void CanDoors::Carry(std::span<const sim::WireFrame> frames) {
   for (const sim::WireFrame& frame : frames) {
-    if (!frame.from_unit) continue;  // it came from the interface
+    if (!frame.from_unit) continue;  // the interface carried it already
     Door& door = doors_[door_of_bus_.at(frame.bus)];
     if (door.waiting.size() < kWaitingMax) {
       door.waiting.push_back(frame.frame);

@@ -1,6 +1,7 @@
-// One SocketCAN interface a bus. The interface arbitrates and takes its own time, so the world
-// passes frames at once; what the interface cannot take now (ENOBUFS) is kept and tried again.
-// A CAN FD group is taken apart at the door: each unit gets its frames as if they had come alone.
+// CanDoors uses one SocketCAN interface a bus. The interface arbitrates and takes its own time, so
+// the world passes frames at once. Frames that the interface cannot take now (ENOBUFS) are kept and
+// tried again. A CAN FD group is taken apart at the door: each unit gets its frames as if they had
+// come alone.
 #pragma once
 
 #include <deque>
@@ -21,6 +22,7 @@ class CanDoors : public BusDoors {
     std::vector<BusId> buses;
     HostClock clock = HostClock();
   };
+  /// The doors on all interfaces.
   /// Errors: kInvalid where the numbers differ; kUnavailable, names the interface.
   static Result<std::unique_ptr<CanDoors>> Create(const Options& options);
   ~CanDoors() override;

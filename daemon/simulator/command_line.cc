@@ -55,7 +55,17 @@ std::vector<std::string> Split(const std::string& text, char separator) {
   return pieces;
 }
 
-/// All that any subcommand takes, as CLI11 fills it in.
+/// The options of `misbehave`: the ways in which units answer wrongly.
+struct Misbehaviour {
+  std::optional<double> late_s;
+  std::optional<std::uint32_t> copies;
+  std::optional<std::uint32_t> foreign_serial;
+  bool deaf = false;
+  bool wrong_digest = false;
+  bool mute_done = false;
+};
+
+/// The options of all subcommands, as CLI11 fills them in.
 struct Given {
   SimulatorOptions run;
   std::string spread = "nominal";
@@ -72,17 +82,12 @@ struct Given {
   std::uint32_t exposures = 1;
   double seconds = -1;
   double after_s = -1;
-  std::optional<double> late_s;
-  std::optional<std::uint32_t> copies;
-  std::optional<std::uint32_t> foreign_serial;
-  bool deaf = false;
-  bool wrong_digest = false;
-  bool mute_done = false;
+  Misbehaviour misbehaviour;
   bool off = false;
   bool json = false;
 };
 
-/// Asks the running simulation; `on_result` says what came of it.
+/// Sends a request to the running simulation; `on_result` reports its result.
 int Ask(const Given& given, const ControlRequest& request,
         const std::function<int(const Json&)>& on_result) {
   auto client = LineClient::Connect(given.control);
@@ -110,12 +115,13 @@ int AskAboutUnits(const Given& given, const char* verb, Json args) {
 int Misbehave(const Given& given) {
   Json args = Json::object();
   if (given.off) args["off"] = true;
-  if (given.late_s) args["late_s"] = *given.late_s;
-  if (given.copies) args["copies"] = *given.copies;
-  if (given.deaf) args["deaf"] = true;
-  if (given.wrong_digest) args["wrong_digest"] = true;
-  if (given.mute_done) args["mute_done"] = true;
-  if (given.foreign_serial) args["foreign_serial"] = *given.foreign_serial;
+  if (given.misbehaviour.late_s) args["late_s"] = *given.misbehaviour.late_s;
+  if (given.misbehaviour.copies) args["copies"] = *given.misbehaviour.copies;
+  if (given.misbehaviour.deaf) args["deaf"] = true;
+  if (given.misbehaviour.wrong_digest) args["wrong_digest"] = true;
+  if (given.misbehaviour.mute_done) args["mute_done"] = true;
+  if (given.misbehaviour.foreign_serial)
+    args["foreign_serial"] = *given.misbehaviour.foreign_serial;
   if (args.empty())
     return Complain({ErrorCode::kInvalid, "misbehave: say how (--help lists the ways)"},
                     ExitCode::kUsage);
@@ -315,16 +321,17 @@ CLI::App* AddMisbehave(CLI::App* app, Given* given) {
   CLI::App* sub = AddUnitsSubcommand(app, given, "misbehave",
                                      "units answer wrongly; their motors obey as ever. Ways add up "
                                      "until --off");
-  sub->add_option("--late", given->late_s, "every answer comes so many seconds later")
+  sub->add_option("--late", given->misbehaviour.late_s, "every answer comes so many seconds later")
       ->check(cli::NumberBetween(0, 86'400));
-  sub->add_option("--copies", given->copies, "every answer is sent so many times")
+  sub->add_option("--copies", given->misbehaviour.copies, "every answer is sent so many times")
       ->check(CLI::Range(1, 100));
-  sub->add_flag("--deaf", given->deaf, "they hear nothing");
-  sub->add_flag("--wrong-digest", given->wrong_digest,
+  sub->add_flag("--deaf", given->misbehaviour.deaf, "they hear nothing");
+  sub->add_flag("--wrong-digest", given->misbehaviour.wrong_digest,
                 "what they say they hold is not what was staged");
-  sub->add_flag("--mute-done", given->mute_done, "they never report the end of a motion unasked");
+  sub->add_flag("--mute-done", given->misbehaviour.mute_done,
+                "they never report the end of a motion unasked");
   sub->add_option(
-      "--foreign", given->foreign_serial,
+      "--foreign", given->misbehaviour.foreign_serial,
       "other hardware, with this serial number, sits at the place of the one unit; 0: its "
       "number is lost");
   sub->add_flag("--off", given->off, "first: they behave again");
@@ -459,7 +466,7 @@ int Main(int argc, char** argv) {
   app.require_subcommand(0, 1);
   AddRunOptions(&app, &given);
   const std::vector<Subcommand> subcommands = AddSubcommands(&app, &given);
-  // The one library here that throws; what it throws ends here.
+  // CLI11 is the only library here that throws; its exceptions end here.
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,5 +1,5 @@
-// The command line of focalfleet-sim: without a subcommand it runs the fleet; the subcommands ask a
-// running one through its control socket.
+// The command line of focalfleet-sim runs the fleet where it has no subcommand. The subcommands
+// send requests to a running simulation through its control socket.
 #pragma once
 
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace focalfleet::simulator {
 
-/// The process' exit code: 0 done, 1 refused or failed (stderr says why), 2 wrong usage, 4 nobody
-/// answers at the control socket.
+/// The process' exit code: 0 done, 1 refused or failed (stderr gives the reason), 2 wrong usage, 4
+/// no answer at the control socket.
 int Main(int argc, char** argv);
 
-/// "vcan0,vcan1" or "vcan0...vcan49": interface names in the order of the buses.
+/// Interface names in the order of the buses, from text such as "vcan0,vcan1" or "vcan0...vcan49".
 /// Errors: kInvalid, names the piece.
 Result<std::vector<std::string>> ParseInterfaces(const std::string& text);
 
-/// "1,2,5-9".
+/// Numbers from text such as "1,2,5-9".
 /// Errors: kInvalid, names the piece.
 Result<std::vector<std::uint32_t>> ParseNumbers(const std::string& text);
 

@@ -1,5 +1,5 @@
-// faults.csv: which bus or unit of the simulated fleet misbehaves how, from when to when, with what
-// chance. docs/files.md describes it; deploy/faults.csv is an example.
+// faults.csv lists the faults of buses and units of the simulated fleet: kind, start, end and
+// probability. docs/files.md describes it; deploy/faults.csv is an example.
 #pragma once
 
 #include <string>
@@ -14,11 +14,12 @@ namespace focalfleet::simulator {
 
 struct FaultsFor {
   const std::vector<sim::UnitDescription>& units;  // that the file may name, and their buses
-  bool bit_clock = true;  // false: real interfaces carry the frames, and have faults of their own
+  bool bit_clock = true;  // false: real interfaces carry the frames, and have their own faults
 };
 
-/// One fault for each bus or unit that a row names, in the order of the file.
-/// Total: any bytes give a plan or an Error. Errors: kInvalid, with file, line, column and reason.
+/// A fault for each bus or unit that a row names, in the order of the file. Total: any bytes give a
+/// plan or an Error.
+/// Errors: kInvalid, with file, line, column and reason.
 Result<std::vector<sim::PlannedFault>> ReadFaults(std::string_view text, std::string file,
                                                   const FaultsFor& fleet);
 

@@ -30,7 +30,7 @@ Json ToJson(const sim::AxisFlash& flash, const sim::AxisMemory& memory) {
           {"moves", memory.moves}};
 }
 
-// Members by name, checked; the first that is wrong is remembered.
+// Reads members by name and checks them; the first wrong one is kept as the error.
 class Members {
  public:
   explicit Members(const Json& object) : object_(object) {}

@@ -1,6 +1,6 @@
-// FLASH and mechanics of all units as JSON, so that they survive a restart of the simulation as
-// real units survive a power cut. The file names the seed and spread it was made with: with others
-// the same units would have other gears and stops.
+// MemoryFile holds FLASH and mechanics of all units as JSON. They survive a restart of the
+// simulation as those of real units survive a power cut. The file gives the seed and spread it was
+// made with: with others the same units would have other gears and stops.
 #pragma once
 
 #include <string>
@@ -20,7 +20,8 @@ struct MemoryFile {
 
 std::string WriteMemory(const MemoryFile& memory);
 
-/// Total: any bytes give a memory or an Error. Errors: kInvalid, names file and what is wrong.
+/// The memory in `text`. Total: any bytes give a memory or an Error.
+/// Errors: kInvalid, names the file and the fault.
 Result<MemoryFile> ReadMemory(std::string_view text, const std::string& file);
 
 }  // namespace focalfleet::simulator

@@ -34,7 +34,7 @@
 namespace focalfleet::simulator {
 namespace {
 
-/// Events closer together than this are taken in one turn: 50 saturated buses end a frame every 3
+/// Events closer together than this are handled in one turn: 50 saturated buses end a frame every 3
 /// us.
 constexpr std::int64_t kGrainNs = 100'000;
 
@@ -165,7 +165,8 @@ class Wakers {
     return ::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) == 0;
   }
 
-  /// Sleeps until something can be read or CLOCK_MONOTONIC shows `at_ns`. True: asked to end.
+  /// Sleeps until a descriptor is readable or CLOCK_MONOTONIC shows `at_ns`. True: the process must
+  /// end.
   [[nodiscard]] bool Sleep(std::int64_t at_ns) const {
     itimerspec when{};
     if (at_ns != INT64_MAX) {
@@ -224,7 +225,7 @@ class Loop {
     Advance(now);
     verbs_.Tick(now);
     parts_.doors->Exchange(*parts_.clock, parts_.world);
-    // What came in may end at once (a real bus has taken its time already).
+    // Received frames may end at once (a real bus has taken its time already).
     Advance(parts_.clock->Now());
     if (parts_.camera != nullptr) LetLook(now);
     if (parts_.control != nullptr) Answer();
@@ -267,7 +268,7 @@ class Loop {
   Verbs verbs_;
   std::vector<ReceivedFrame> delivered_;
   std::vector<sim::WireFrame> carried_;
-  std::vector<IncomingLine> urgent_;  // nothing is
+  std::vector<IncomingLine> urgent_;  // empty: no line is urgent
 };
 
 }  // namespace

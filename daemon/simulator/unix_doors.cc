@@ -18,13 +18,14 @@
 namespace focalfleet::simulator {
 namespace {
 
-/// More frames than this wait on a bus: its clients are not read until half of them are through.
+/// Limit of waiting frames on a bus. Beyond it the clients of the bus are not read until half of
+/// them are through.
 constexpr std::size_t kPauseFrames = 2048;
-/// Some seconds of a saturated bus; who is so far behind does not read at all.
+/// Some seconds of a saturated bus; a client so far behind does not read at all.
 constexpr std::size_t kClientFramesMax = 65'536;
 constexpr std::uint64_t kListenerTag = std::uint64_t{1} << 32;
 
-bool SomebodyAnswers(const UnixAddress& address) {
+bool HasListener(const UnixAddress& address) {
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
   const bool answered = ::connect(fd, address.get(), address.length()) == 0 || errno == EAGAIN;
@@ -64,7 +65,7 @@ UnixDoors::~UnixDoors() {
 
 Status UnixDoors::Listen(const std::string& path, BusId bus) {
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
-  if (SomebodyAnswers(address))
+  if (HasListener(address))
     return Fail(ErrorCode::kRefused, path + " is in use: another simulation answers there");
   ::unlink(path.c_str());
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
@@ -147,7 +148,7 @@ void UnixDoors::Write(Client* client) {
     client->waiting.erase(client->waiting.begin(),
                           client->waiting.begin() + static_cast<std::ptrdiff_t>(sent.taken));
     if (sent.error == EAGAIN || sent.error == ENOBUFS) return;
-    // Gone: that is found, and cleared away, when it is next read.
+    // The client is gone; the next read finds that and clears it away.
     if (sent.error != 0) return client->waiting.clear();
   }
 }

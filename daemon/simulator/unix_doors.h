@@ -1,8 +1,9 @@
-// One SOCK_SEQPACKET socket a bus, <directory>/bus<ID>.sock; a packet is one `struct can_frame`.
-// Any number of clients: a frame of one goes onto the simulated bus, and when it has won
-// arbitration to the units and to all other clients. While a bus has many frames waiting its
-// clients are not read, so that they feel the bus' pace; a client that does not read what it is
-// sent is dropped, which is said on stderr.
+// UnixDoors has one SOCK_SEQPACKET socket a bus, <directory>/bus<ID>.sock; a packet is one `struct
+// can_frame`. Any number of clients may connect. A client's frame goes onto the simulated bus. When
+// it has won arbitration it goes to the units and to all other clients.
+//
+// While a bus has many frames waiting its clients are not read, so they follow the pace of the bus.
+// A client that does not read its frames is dropped, which is reported on stderr.
 #pragma once
 
 #include <deque>
@@ -22,9 +23,9 @@ class UnixDoors : public BusDoors {
     std::string directory;
     std::vector<BusId> buses;
   };
-  /// Listens on every bus. The directory is made where it is missing; a socket file that nobody
-  /// answers on is left from a crash and replaced. Errors: kRefused where somebody answers there;
-  /// kUnavailable; both name the path.
+  /// Listens on every bus. The directory is made where it is missing. A socket file on which no
+  /// process answers is left from a crash and replaced.
+  /// Errors: kRefused where a process answers there; kUnavailable; both name the path.
   static Result<std::unique_ptr<UnixDoors>> Create(const Options& options);
   ~UnixDoors() override;
 
@@ -41,7 +42,7 @@ class UnixDoors : public BusDoors {
   };
   struct Client {
     std::uint32_t id = 0;
-    std::size_t bus = 0;  // in listeners_
+    std::size_t bus = 0;  // index in listeners_
     int fd = -1;
     bool reading = true;
     std::deque<CanFrame> waiting;

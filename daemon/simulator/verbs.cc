@@ -167,7 +167,7 @@ Result<Json> Verbs::Misbehave(const Json& args) {
     if (off) {
       const sim::UnitFaults before = faults;
       faults = {};
-      faults.silent = before.silent;  // other verbs' doing
+      faults.silent = before.silent;  // set by other verbs
       faults.in_motion = before.in_motion;
     }
     if (args.contains("late_s")) faults.late = Seconds(late_s);

@@ -1,11 +1,11 @@
-// What a running simulation does when asked on its control socket: tells the truth, and plants
-// misfortune.
+// Verbs are the requests that a running simulation serves on its control socket: they report the
+// truth and plant faults.
 //   truth {targets_csv?, targets_name?}   status {}   quit {}
 //   power_cut {units, seconds?}   power_on {units}   fault {units, code, axis?, after_s?}
 //   silence {units, off?}   kill_bus {buses}   revive_bus {buses}
-//   camera {fault, exposures?}: how the next exposures go wrong; `none` ends it
+//   camera {fault, exposures?}: the fault of the next exposures; `none` ends it
 //   misbehave {units, off?, late_s?, copies?, deaf?, wrong_digest?, mute_done?, foreign_serial?}:
-//     adds to how the units already misbehave; `off` ends all that this verb began before
+//     adds to the faults that the units already have; `off` ends all that this verb began before
 #pragma once
 
 #include <vector>
@@ -23,9 +23,9 @@ class Verbs {
   explicit Verbs(sim::World* world, CameraDoor* camera = nullptr)
       : world_(world), camera_(camera) {}
 
-  /// Pre: the world has been brought to the present.
+  /// Serves one request. Pre: the world has been advanced to the present.
   Result<Json> Do(const ControlRequest& request);
-  /// Power that comes back by itself.
+  /// Restores power that is due to come back.
   void Tick(HostInstant now);
   [[nodiscard]] HostInstant wake_at() const;
   [[nodiscard]] bool quit() const { return quit_; }
@@ -40,7 +40,8 @@ class Verbs {
   Result<Json> SetBuses(const Json& args, bool alive);
   Result<Json> FailCamera(const Json& args);
   [[nodiscard]] Json StatusOfAll() const;
-  /// All of them exist, or none is touched.
+  /// The units that the request names. If any does not exist, the request is an error and none is
+  /// touched.
   [[nodiscard]] Result<std::vector<UnitId>> Units(const Json& args) const;
 
   struct PowerReturn {

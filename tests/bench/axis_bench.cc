@@ -1,7 +1,7 @@
-// How much life of how many axes fits into a second of CPU time: the fleet's axes (closed form,
-// read at a fixed rate) and, beside them, the reduced drive (stepped) and the drive at PWM level,
-// in one run. Prints simulated seconds a CPU second, bytes an axis, and how both grow with the
-// number.
+// This bench measures how many simulated axis-seconds fit into a second of CPU time. A single run
+// covers the fleet's axes (closed form, read at a fixed rate), the reduced drive (stepped) and the
+// drive at PWM level. The bench prints simulated seconds a CPU second, bytes an axis, and how both
+// grow with the number.
 //   axis_bench [--axes 10000] [--seconds 20] [--hz 20]
 #include <malloc.h>
 
@@ -33,7 +33,7 @@ struct Outcome {
   double bytes_per_axis = 0;
 };
 
-// Back-and-forth moves of three segments, each axis begun at another time, all read at `hz`.
+// Runs back-and-forth moves of three segments, each axis begun at another time, all read at `hz`.
 Outcome RunAxes(const sim::Motor& motor, int count, int seconds, int hz) {
   const std::size_t before = mallinfo2().uordblks;
   std::vector<sim::AxisModel> axes;

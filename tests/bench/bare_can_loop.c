@@ -1,8 +1,8 @@
-// bare_can_loop INTERFACE...: the least that a program can do that hears frames on several CAN
+// bare_can_loop INTERFACE... is the least that a program can do that hears frames on several CAN
 // interfaces and answers each: wait, read one, write one. A second process asks, with 16 questions
-// under way on each interface, so that there is always something to read. Until SIGTERM; then it
-// prints one line of JSON: the frames that passed (both ways) and the CPU time of the answering
-// process alone.
+// under way on each interface, so that there is always something to read. The program runs until
+// SIGTERM. At the end the program prints one line of JSON. The line has the frames that passed
+// (both ways) and the CPU time of the answering process alone.
 #define _GNU_SOURCE
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -45,7 +45,8 @@ static void send_frame(int fd, canid_t id) {
 static volatile sig_atomic_t ended;
 static void end(int signal) { ended = signal; }
 
-// Waits, reads one frame and writes one, on every interface that has one. How many in all.
+// Waits, reads one frame and writes one, on every interface that has one. Returns the number in
+// all.
 static long loop(const int* fds, int count, canid_t id) {
   long frames = 0;
   const int epoll = epoll_create1(0);

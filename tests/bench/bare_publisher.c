@@ -1,9 +1,10 @@
-/* The least that a publisher of unit status can do: plain C, one topic, the shipped type and QoS,
-   packed writes. What StatusPublisher costs more than this is its own.
+/* bare_publisher is the least that a publisher of unit status can do: plain C, one topic, the
+   shipped type and QoS, packed writes. Any higher cost of StatusPublisher is its own.
 
      bare_publisher DOMAIN UNITS CYCLES HZ
 
-   Waits for a reader, publishes all units CYCLES times at HZ, prints: cpu_s samples. */
+   The program waits for a reader, publishes all units CYCLES times at HZ, and prints: cpu_s
+   samples. */
 #include <dds/dds.h>
 #include <dds/ddsc/dds_public_impl.h>
 #include <stdio.h>

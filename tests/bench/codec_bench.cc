@@ -1,7 +1,7 @@
-// Frames through the codec, one core, all kinds of messages in random order and, beside it, the
-// mix of an upload (begin, segments, confirm, arm, and their answers). Prints frames per CPU second
-// each way and the allocations that it made; ends with 1 if there was any, or if a frame did not
-// come back as it went.
+// This bench runs frames through the codec on one core. The first load is all kinds of messages in
+// random order. The second is the mix of an upload (begin, segments, confirm, arm, and their
+// answers). The bench prints frames per CPU second each way and its allocations. The exit code is 1
+// if there was an allocation, or if a frame did not come back unchanged.
 //   codec_bench [--frames 20000000]
 #include <cstdio>
 #include <ctime>
@@ -48,7 +48,7 @@ Load<Message> MakeLoad(Rng rng, Draw draw) {
   return load;
 }
 
-// Alternatives of the variants: an upload of eight segments, and what a unit says to it.
+// Alternatives of the variants: an upload of eight segments, and the unit's answers to it.
 HostMessage OfAnUpload(Rng& rng, std::size_t i) {
   constexpr std::size_t kOrder[] = {6, 7, 7, 7, 7, 7, 7, 7, 7, 5, 4};
   return testing::RandomHost(kOrder[i % std::size(kOrder)], rng);

@@ -1,9 +1,9 @@
-// CPU time of the host's side of one configuration, units and planner not counted: what the
-// coordinator, codec and transmit queues of all buses take from the plan to the last unit's
-// arrival, on virtual time, against the simulated fleet in the same process. The host's calls alone
-// are between the two readings of the thread's clock; what these cost themselves stands in the last
-// column and is in the figures. Beside each size a loop of known work, so that figures of a busy
-// machine can be read.
+// This bench measures the CPU time of the host's side of one configuration, without units and
+// planner. The host's side is the coordinator, codec and transmit queues of all buses, from the
+// plan to the last unit's arrival. All runs on virtual time, against the simulated fleet in the
+// same process. The host's calls alone are between the two readings of the thread's clock. The cost
+// of the readings themselves stands in the last column and is in the figures. Beside each size a
+// loop of known work shows how busy the machine was.
 //   configure_bench [--units 0] [--runs 5] [--per-bus 100]    0: 500, 1000, 2000 and 5000 units
 #include <algorithm>
 #include <cmath>
@@ -46,7 +46,7 @@ double ReadingSeconds() {
   return (CpuSeconds() - begin) / kReadings;
 }
 
-/// 100 million steps of a generator that no compiler shortens.
+/// The time of 100 million steps of a generator that no compiler shortens.
 double KnownWorkSeconds() {
   const double begin = CpuSeconds();
   std::uint64_t state = 1;
@@ -111,7 +111,7 @@ class Run {
   }
 
   Figures Go() {
-    while (now_ < kBegin + Seconds(5)) Turn();  // everybody has been read
+    while (now_ < kBegin + Seconds(5)) Turn();  // all units have been read
     commands_.push_back({1, ApplyCommand{"bench", Draw("targets"), false}});
     do Turn();
     while (coordinator_->configuration().state == ConfigurationState::kPlanning);
@@ -185,7 +185,7 @@ class Run {
   Figures figures_;
 };
 
-/// The median of several runs; false where a unit did not arrive.
+/// Measures the median of several runs; false where a unit did not arrive.
 bool Measure(std::uint32_t count, std::uint32_t per_bus, int runs) {
   std::vector<double> upload;
   std::vector<double> whole;

@@ -1,6 +1,6 @@
-// correct_bench: how far fibres are from their targets when they come blind, and after each
-// correction, in a simulated fleet with the spread of units in service. The first configuration
-// tells where units stand at all (zero angles); the second is what is reported.
+// correct_bench prints how far fibres are from their targets before and after each correction, in a
+// simulated fleet with the spread of units in service. The first configuration finds where units
+// stand at all (zero angles); the second is reported.
 //   correct_bench [--units N] [--seed S] [--noise-um U] [--corrections C] [--tolerance-um T]
 #include <algorithm>
 #include <cmath>
@@ -30,7 +30,8 @@ struct BenchOptions {
   double tolerance_um = 10;
 };
 
-/// Neither dead nor slipping nor off scale, by the traits that the simulation drew.
+/// The units that are neither dead nor slipping nor off scale, by the traits that the simulation
+/// drew.
 std::vector<bool> HealthyUnits(const Layout& layout, std::uint64_t seed) {
   std::vector<bool> healthy;
   const auto described = DescribeUnits(layout);
@@ -77,15 +78,16 @@ void Print(const char* when, std::vector<double> errors_um) {
       100 * within / count, 100 * beyond / count);
 }
 
-// Nobody assigns a fibre to the very rim of what its unit reaches by its description: with the arms
-// of a fleet in service (57 um each) one in two units would not get there.
+// No operator assigns a fibre to the very rim of what its unit reaches by its description. With the
+// arms of a fleet in service (57 um each) one in two units would not get there.
 constexpr double kRimMm = 0.25;
 constexpr double kRangeMarginDeg = 3;  // that the next exposure may take from the range of phi
-constexpr double kGoneMm = 1;  // who is farther off after a correction is taken out of service
+constexpr double kGoneMm = 1;  // a unit farther off after a correction is taken out of service
 
 bool IsGone(const UnitView& view) { return !view.error_um || *view.error_um > 1e3 * kGoneMm; }
 
-/// Whether its own count, which differs from where it stands, allows it; theta has another turn.
+/// True where the unit's own count, which differs from its position, allows the pose; theta has
+/// another turn.
 bool HoldsInRange(const UnitView& view, const Unit& unit, const Pose& pose) {
   const std::int32_t margin = NearestVectors(kRangeMarginDeg, unit.phi(), AxisDrive{});
   const VectorRange range = RangeOf(unit.phi(), AxisDrive{});
@@ -94,7 +96,7 @@ bool HoldsInRange(const UnitView& view, const Unit& unit, const Pose& pose) {
          InRange(unit, UnitDrive{}, {pose[0] - view.offset[0], count});
 }
 
-/// Asks for a plan beforehand: false, nobody is without a way.
+/// Drops targets without a way, by a plan made beforehand. False: every target has a way.
 bool DropThoseWithoutWay(InProcessFleet& fleet, std::vector<std::optional<Pose>>* targets) {
   std::vector<UnitKnowledge> start;
   std::vector<Pose> offsets;
@@ -120,9 +122,9 @@ bool DropThoseWithoutWay(InProcessFleet& fleet, std::vector<std::optional<Pose>>
   return !plan->unserved.empty();
 }
 
-/// Targets as an operator would have them: not at the rim, around units that the configuration
-/// before has shown to be out of order, which are disabled, and none that a plan made beforehand
-/// finds no way to.
+/// Targets as an operator would choose them: not at the rim, and none without a way in a plan made
+/// beforehand. Units that the configuration before has shown to be out of order are disabled, and
+/// the targets keep clear of them.
 std::vector<std::optional<Pose>> OperatorsTargets(InProcessFleet* fleet, std::uint64_t seed) {
   const Layout& layout = fleet->layout();
   const std::vector<UnitDrive> drives(layout.size());
@@ -158,7 +160,7 @@ std::vector<std::optional<Pose>> OperatorsTargets(InProcessFleet* fleet, std::ui
   return targets;
 }
 
-/// Why a unit is not where it should be, without its own numbers.
+/// The reason why a unit is not at its target, without its own numbers.
 std::string ReasonOf(const UnitView& view) {
   const std::size_t colon = view.outcome_reason.find(": ");
   if (view.outcome == TargetOutcome::kArrived) return "arrived, beyond it by the centroid's error";

@@ -1,6 +1,7 @@
-// What does StatusPublisher cost beside a bare publisher in C? Both publish the whole fleet at a
-// fixed rate to one reader process; compared is the CPU time of the publisher's process, in pairs
-// that alternate, so that a machine that is busy with something else is so for both.
+// This bench compares the cost of StatusPublisher with that of a bare publisher in C. Both publish
+// the whole fleet at a fixed rate to one reader process. The figure is the CPU time of the
+// publisher's process, in pairs that alternate. Other load of the machine therefore affects both
+// alike.
 //   dds_status_bench [--units 5000] [--cycles 60] [--hz 10] [--pairs 5]
 #include <cstdio>
 #include <cstdlib>
@@ -57,7 +58,7 @@ int main(int argc, char** argv) {
   std::vector<double> ours;
   std::vector<double> ratios;
   for (int pair = 0; pair < pairs; ++pair) {
-    // Who goes first alternates, too.
+    // The order within a pair alternates, too.
     const Outcome first = Run(pair % 2 == 0 ? BARE_PUBLISHER : FLEET_PUBLISHER, load);
     const Outcome second = Run(pair % 2 == 0 ? FLEET_PUBLISHER : BARE_PUBLISHER, load);
     const Outcome& b = pair % 2 == 0 ? first : second;

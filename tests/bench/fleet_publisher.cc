@@ -1,4 +1,5 @@
-// bare_publisher's task, through StatusPublisher:   fleet_publisher DOMAIN UNITS CYCLES HZ
+// This program does bare_publisher's task through StatusPublisher:   fleet_publisher DOMAIN UNITS
+// CYCLES HZ
 #include <sys/resource.h>
 
 #include <chrono>

@@ -1,5 +1,6 @@
-// Orientations a CPU second, one core: least squares over eight sensors from a start 0.5 deg off
-// (what following a moving joint needs), for each model; and from nothing, over the atlas.
+// This bench measures orientations a CPU second on one core, for each model. The first case is
+// least squares over eight sensors from a start 0.5 deg off, as when following a moving joint. The
+// second has no start and searches the atlas.
 //   hall_bench [--estimates 200000] [--rows 500]
 #include <cstdio>
 #include <ctime>

@@ -1,7 +1,7 @@
-// Spots of whole focal planes to units: random exposures with everything planted that real ones
-// have, judged by the simulator's truth. Prints wrong matches that are not flagged, swaps found,
-// place errors and CPU time; exits with 1 where a match is wrong and not flagged, or a swap that
-// can be seen passed for something else.
+// This bench assigns spots of whole focal planes to units: random exposures with all planted
+// defects that real ones have, judged by the simulator's truth. The bench prints wrong matches that
+// are not flagged, swaps found, position errors and CPU time. The exit code is 1 where a match is
+// wrong and not flagged, or where a visible swap passed for something else.
 //   identify_bench --units 5000 --fiducials 120 --exposures 1000 --seed 1 --swaps 20 --air-um 8
 //                  --length-mm 150 --crowded 0
 // The calibration loop is a million draws of Rng::Normal: CPU times are to be read beside it.

@@ -1,4 +1,5 @@
-// The few options of a bench: --name VALUE, integers but for names of files.
+// These functions read the few options of a bench: --name VALUE, integers except for names of
+// files.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@ inline int Option(int argc, char** argv, const char* name, int otherwise) {
   return otherwise;
 }
 
-/// Empty: not given.
+/// The option's text. Empty: not given.
 inline const char* TextOption(int argc, char** argv, const char* name) {
   for (int i = 1; i + 1 < argc; i += 2) {
     if (std::strcmp(argv[i], name) == 0) return argv[i + 1];

@@ -1,10 +1,10 @@
-// Random configuration to random configuration, one line a configuration: makespan over the lower
-// bound, CPU seconds, who was not served; the independent checker on request. A summary at the end.
+// This bench plans from random configuration to random configuration. Each gives one line: makespan
+// over the lower bound, CPU seconds, and units that were not served. The independent checker runs
+// on request. A summary stands at the end.
 //   plan_bench --layout 0 --units 5000 --configurations 100 --seed 1 --check 1
-// --beside retract: what the way of others would take at least: all fold into their cells, all
-// rotate, all extend, each when the last one has ended, if nobody ever met anybody.
-// --plot FILE: the distribution of both, SVG. --objective 1, 2, 3: least energy, least peak, even
-// power.
+// --beside retract: the least time of the method of other systems: all fold into their cells, all
+// rotate, all extend, each when the last one has ended, if no unit ever met another. --plot FILE:
+// the distribution of both, SVG. --objective 1, 2, 3: least energy, least peak, even power.
 // --layout 0 hexagonal, 1 the plate of the file FOCALFLEET_DESI_UNITS names, 2 SDSS-like.
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ std::vector<Unit> UnitsOf(int layout, std::uint32_t count) {
 
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-/// The slowest unit's shortest move alone. Units: s.
+/// The duration of the slowest unit's shortest move alone. Units: s.
 double BoundOf(const PlanRequest& request) {
   double bound_s = 0;
   for (std::uint32_t i = 0; i < request.layout->size(); ++i) {
@@ -55,7 +55,7 @@ double BoundOf(const PlanRequest& request) {
   return bound_s;
 }
 
-/// Fold, rotate, extend with a barrier after each. Units: s.
+/// The duration of fold, rotate, extend with a barrier after each. Units: s.
 double RetractOf(const PlanRequest& request) {
   const Scene scene(*request.layout, request.drives, request.start);
   std::array<double, 3> stage_s{};
@@ -143,7 +143,7 @@ int Run(int argc, char** argv) {
                                              testing::CheckedObstacles(*layout), check_options);
       verdict = report.ok() ? "clear" : report.Text();
     }
-    // Who has no way at all, proven, is no fault of the plan.
+    // A unit that provably has no way at all is no fault of the plan.
     const auto proven = static_cast<std::size_t>(
         std::count_if(plan->unserved.begin(), plan->unserved.end(),
                       [](const Unserved& unserved) { return unserved.proof.has_value(); }));

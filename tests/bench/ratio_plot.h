@@ -1,5 +1,5 @@
-// How ratios are distributed, as a picture (SVG): for each series the share of configurations that
-// need no more than so many times the bound.
+// PlotRatios draws how ratios are distributed (SVG). For each series it shows the share of
+// configurations whose ratio to the bound is no more than a given value.
 #pragma once
 
 #include <algorithm>
@@ -38,7 +38,7 @@ inline std::string Line(double x0, double y0, double x1, double y1) {
 
 }  // namespace ratio_plot
 
-/// Pre: no series is empty.
+/// The plot as SVG. Pre: no series is empty.
 inline std::string PlotRatios(const std::string& title, std::vector<RatioSeries> all) {
   using namespace ratio_plot;
   double most = 1;

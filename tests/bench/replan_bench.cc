@@ -1,7 +1,9 @@
-// New targets for single units of a running configuration: at random instants of random plans one
-// unit is stopped, with those that follow it, and finds a new way among all others as they go.
+// This bench gives new targets to single units of a running configuration. At random instants of
+// random plans one unit is stopped, with those that follow it, and finds a new way among all others
+// as they go.
 //   replan_bench --units 5000 --plans 2 --replans 100 --seed 1
-// CPU milliseconds of one answer: median, 95 %, worst; and the share that found a way.
+// The output is CPU milliseconds of one answer: median, 95 %, worst; and the share that found a
+// way.
 #include <ctime>
 #include <memory>
 #include <set>
@@ -92,10 +94,10 @@ class Bench {
   int served = 0;
   std::vector<double> ms;
   std::vector<double> refused_ms;
-  std::vector<double> over_s;  // how much later than the others it ends
+  std::vector<double> over_s;  // delay of its end after the last of the others
 
  private:
-  /// The unit, if it moves, and all that follow those that are stopped.
+  /// The unit, if it moves, and all units that follow those that are stopped.
   [[nodiscard]] std::set<std::uint32_t> StoppedWith(std::uint32_t unit, double t_s) const {
     std::set<std::uint32_t> stopped;
     std::vector<std::uint32_t> open{unit};

@@ -1,6 +1,6 @@
-// The same configurations as one plan and by 2, 3, 4 and 7 sectors: makespan and CPU time (of all
-// sectors together) over the one plan's, how often sectors became one; the independent checker on
-// request.
+// This bench plans the same configurations as one plan and by 2, 3, 4 and 7 sectors. The bench
+// prints makespan and CPU time (of all sectors together) over the one plan's, and how often sectors
+// were merged into one. The independent checker runs on request.
 //   sectors_bench --units 5000 --configurations 5 --seed 1 --check 1
 #include <algorithm>
 #include <ctime>

@@ -1,16 +1,16 @@
-// Do the currents of sim/drive agree with ngspice's, and what does a motor-second cost in both?
-// The netlist (spice_netlist.h) takes settings and nothing that sim computed; both start with the
-// same rotor and no current. A sample counts unless it lies within a rise time of the middle of an
-// edge. Skipped (77) where there is no ngspice.
+// This bench compares the currents of sim/drive with ngspice's, and the cost of a motor-second in
+// both. The netlist (spice_netlist.h) takes settings and nothing that sim computed; both start with
+// the same rotor and no current. A sample counts unless it lies within a rise time of the middle of
+// an edge. The bench is skipped (77) where there is no ngspice.
 //   spice_bench [--case -1] [--periods 20] [--vectors 0] [--rise-ns 10] [--sample-ns 100]
 //               [--step-ns 40] [--keep 0] [--check 0] [--ratio-min 50]
 //   --case     0 to 5: asymmetric, five- and seven-segment at 1.8 V, then at 9 V; -1: all
-//   --vectors  so many vectors instead of whole electrical periods
+//   --vectors  this many vectors instead of whole electrical periods
 //   --rise-ns  of a leg, and its fall; the dead time is 50 ns
 //   --step-ns  ngspice's longest step; shorter than a sample's
 //   --keep     1: leaves netlist and output behind
 //   --check    1: exit code 1 if a current is off by over 0.1 % of the peak, or ngspice's CPU time
-//              is less than --ratio-min times ours
+//              is less than --ratio-min times that of sim
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/resource.h>
@@ -45,8 +45,9 @@ using bench::SpiceRow;
 constexpr double kDifferenceMax = 1e-3;  // of the peak
 constexpr int kSkipped = 77;
 
-// The paper's motor without its gears, in step from the start: at 9 V its bench point (set 9), at
-// 1.8 V three times the speed of its critical n, so that 20 turns stay affordable (set C).
+// The paper's motor without its gears, in step from the start. At 9 V the case is its bench point
+// (set 9). At 1.8 V it is three times the speed of its critical n, so that 20 turns stay affordable
+// (set C).
 std::vector<SpiceCase> Cases() {
   const SpiceCase both{.clock_Hz = 144e6,
                        .counter1 = 500,
@@ -78,7 +79,7 @@ double Seconds(const timeval& time) {
   return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
 }
 
-/// CPU time of ngspice on `folder`/motor.cir; below 0: it failed, or -kSkipped: there is none.
+/// CPU time of ngspice on `folder`/motor.cir; below 0: failed, or -kSkipped: there is no ngspice.
 double RunSpice(const std::string& folder) {
   const std::string log = folder + "/motor.log";
   posix_spawn_file_actions_t actions;
@@ -143,7 +144,7 @@ Ours RunOurs(const SpiceCase& s, int vectors) {
   return ours;
 }
 
-// Does a leg begin to change so near that the sample cannot tell?
+// True where a leg begins to change so near the sample that its value is undefined.
 bool NearEdge(const SpiceCase& s, double t_s) {
   const double period_s = s.counter1 / s.clock_Hz;
   const auto carrier = static_cast<long>(t_s / period_s);
@@ -174,7 +175,7 @@ struct Difference {
   std::size_t beside_edges = 0;
 };
 
-// Row k of both is the same instant of the motor's.
+// Row k of both is the same instant of the motor.
 Difference Compare(const SpiceCase& s, const std::vector<DriveSample>& ours,
                    const std::vector<SpiceRow>& theirs) {
   Difference d;
@@ -209,7 +210,7 @@ struct Load {
   int ratio_min = 0;
 };
 
-/// Exit code of the case.
+/// Runs the case and returns its exit code.
 int Run(SpiceCase s, const Load& load, const std::string& folder) {
   const int vectors = load.vectors > 0 ? load.vectors : load.periods * s.subdivision;
   s.duration_s = vectors * s.repeat * s.counter1 / s.clock_Hz;

@@ -12,11 +12,11 @@ namespace focalfleet::bench {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
-// What the comparators' answer takes; the carrier leads by it.
+// Delay of the comparators' answer; the carrier leads by it.
 constexpr double kAnswer_s = 0.5e-9;
-// The sawtooth's fall, just before a period's end.
+// Duration of the sawtooth's fall, just before a period's end.
 constexpr double kFall_s = 0.1e-9;
-// Of a switch's control; it changes in the middle.
+// Ramp of a switch's control, which changes in the middle.
 constexpr double kRamp_s = 0.4e-9;
 // Volts of the sawtooth a count: ngspice's switches find their threshold to 0.05 V.
 constexpr double kVoltsPerCount = 2;
@@ -36,14 +36,14 @@ CompareValues Centred(double width, double period) {
   return {on, on + whole};
 }
 
-// What the comparators see: a compare value of 0 is always passed, one at the top never.
+// The threshold at the comparators: a compare value of 0 is always passed, one at the top never.
 double Threshold_V(const SpiceCase& setting, const CompareValues& values, double counts) {
   if (values.on >= values.off || counts >= setting.counter1) counts = 2 * setting.counter1;
   if (counts <= 0) counts = -setting.counter1;
   return counts * kVoltsPerCount;
 }
 
-// In `pattern` a # stands for the leg's number.
+// Appends `pattern`, in which a # stands for the leg's number.
 void AppendLeg(std::string* text, std::string_view pattern, std::size_t leg) {
   for (const char c : pattern) *text += c == '#' ? static_cast<char>('0' + leg) : c;
 }
@@ -100,7 +100,7 @@ std::string References(const SpiceCase& setting) {
   const double begin_s = setting.sample_s - kAnswer_s;
   std::string text;
   for (int k = 0; k * vector_s < setting.duration_s + vector_s; ++k) {
-    // They change as the sawtooth falls, and not at once: ngspice looks for when they meet.
+    // The values change as the sawtooth falls, and not at once: ngspice searches for the crossing.
     for (const double at_s : {k * vector_s, (k + 1) * vector_s - kFall_s}) {
       Append(&text, "%.15e", at_s == 0 ? 0 : begin_s + at_s);
       for (const CompareValues& leg : CompareValuesOf(setting, k % setting.subdivision))
@@ -120,8 +120,8 @@ std::string Netlist(const SpiceCase& s) {
   Append(&text, "Vbus bus 0 %.15e\nVone one 0 1\n", s.v_bus_V);
   Append(&text, "Vsaw saw 0 PULSE(0 %.15e %.15e %.15e %.15e 1e-15 %.15e)\n",
          volts * (1 - kFall_s / period_s), begin_s, period_s - kFall_s, kFall_s - 1e-15, period_s);
-  // ngspice takes no notice of the corners of a pulse without a top. (A PWL that repeats it walks
-  // through from time 0 whenever it is asked.)
+  // ngspice ignores the corners of a pulse without a top. (A repeated PWL is evaluated from time 0
+  // at every query.)
   Append(&text, "Vclock clock 0 PULSE(0 1 %.15e %g %g %.15e %.15e)\n", begin_s - kFall_s, kFall_s,
          kFall_s, period_s / 2, period_s);
   Append(&text, ".param r=%.15e l=%.15e flux=%.15e begin=%.15e third=%.15e\n", s.resistance_ohm,
@@ -133,7 +133,8 @@ std::string Netlist(const SpiceCase& s) {
       "+ amplscale=[1 1 1 1 1 1] timeoffset=0 timescale=1 timerelative=false amplstep=false)\n";
   Append(&text, ".model comparator sw(vt=0 vh=0 ron=1 roff=1g)\n");
   // On its way down the sawtooth passes between `off` and `on` once more. A gate swallows a pulse
-  // that is shorter than its rise is slower than its fall; the next one makes good for that.
+  // that is shorter than the difference of its slow rise and fast fall. The next gate compensates
+  // for that difference.
   const double gate_s = (s.rise_s - kRamp_s) / 2;
   Append(&text, ".model adc adc_bridge(in_low=0.5 in_high=0.5 rise_delay=%g fall_delay=%g)\n",
          2 * kAnswer_s, kAnswer_s);
@@ -144,7 +145,7 @@ std::string Netlist(const SpiceCase& s) {
   Append(&text, ".model gate dac_bridge(out_low=-0.125 out_high=0.125 t_rise=%g t_fall=%g)\n",
          kRamp_s, kRamp_s);
   Append(&text, ".model power sw(vt=0 vh=0 ron=0.1m roff=10meg)\n");
-  // Steeper, and a step is taken for solved while a diode has yet to change its mind.
+  // With a steeper diode a step counts as solved while a diode has yet to change its state.
   Append(&text, ".model diode d(is=1e-7 n=0.005)\n");
   Append(&text,
          "Bw 0 w i=time>={begin} ? ({flux}*(-i(Vi0)*sin(v(theta))-i(Vi1)*sin(v(theta)-{third})"
@@ -157,8 +158,8 @@ std::string Netlist(const SpiceCase& s) {
   Append(&text, ".save i(Vi0) i(Vi1) i(Vi2) v(theta) v(w)\n");
   Append(&text, ".tran %.15e %.15e 0 %.15e uic\n", s.sample_s, s.duration_s + s.sample_s,
          s.step_max_s);
-  // The tolerance is for the diodes; steps may be longer than it wants them. Not `-r`: with
-  // `interp` it spoils the file.
+  // The tolerance is for the diodes; steps may be longer than it demands. The option `-r` is not
+  // used: with `interp` it spoils the file.
   text +=
       ".control\n"
       "set filetype=binary\n"

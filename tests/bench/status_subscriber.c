@@ -1,5 +1,5 @@
-/* One reader of unit status, for whichever publisher: takes until the writer is gone, prints how
-   many samples came. status_subscriber DOMAIN */
+/* status_subscriber DOMAIN is a reader of unit status for any publisher. The program takes samples
+   until the writer is gone, and prints how many came. */
 #include <dds/dds.h>
 #include <stdio.h>
 #include <stdlib.h>

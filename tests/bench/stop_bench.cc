@@ -1,10 +1,10 @@
-// How long a stop of all takes on buses at their limit: from the command to the end of arbitration
-// of the last bus' stop frame, in frame times of the simulated bit clock. The real coordinator
-// uploads to every unit through the daemon's transmit queues and simulated ports; a second host
-// polls so that no bit is left, and units answer everything several times over. The stop is one
-// broadcast a bus; what comes behind it (loaded units are asked to disarm) ends no motion. Ends
-// with 1 where a stop took more than two frame times, or a bus was not saturated: simulated time,
-// so no matter of the machine.
+// This bench measures a stop of all on buses at their limit. The time runs from the command to the
+// end of arbitration of the last bus' stop frame, in frame times of the simulated bit clock. The
+// real coordinator uploads to every unit through the daemon's transmit queues and simulated ports.
+// A second host polls so that no bit is left, and units answer everything several times over. The
+// stop is one broadcast a bus; later frames (loaded units are asked to disarm) end no motion.
+// The exit code is 1 where a stop took more than two frame times, or a bus was not saturated. Time
+// is simulated, so the result does not depend on the machine.
 //   stop_bench [--buses 50] [--units-per-bus 100] [--stops 200] [--seed 1]
 #include <algorithm>
 #include <cstdio>
@@ -38,7 +38,7 @@ constexpr std::size_t kPollsWaiting = 12;
 struct StopTaken {
   double worst_bits = 0;  // over the buses
   double median_bits = 0;
-  double load_min = 1;  // of the bus that was least busy while the upload went on
+  double load_min = 1;  // of the least busy bus during the upload
 };
 
 class StopBench {
@@ -167,7 +167,7 @@ class StopBench {
       if (saturating_) Poll(line.bus);
     }
   }
-  // All are stopped before they move, so the first plan is everybody's.
+  // All units are stopped before they move, so the first plan serves for all.
   PlanDone PlanOf(const PlanJob& job) {
     if (!plan_) plan_ = RunPlanJob(job, layout_, coordinator_->drives());
     PlanDone done = *plan_;

@@ -1,5 +1,5 @@
-// What does Store::Commit cost beside a bare sqlite3 loop? Both bring both axes of all serials up
-// to date in one durable transaction, on the same disk, taking turns.
+// This bench compares the cost of Store::Commit with that of a bare sqlite3 loop. Both update both
+// axes of all serials in one durable transaction, on the same disk, taking turns.
 //   store_bench [--serials 5000] [--rounds 200]
 #include <sys/resource.h>
 
@@ -42,7 +42,7 @@ struct Times {
   }
 };
 
-// Writing the rows is the core's work and measured by nobody here.
+// The core writes the rows, so this time is not measured here.
 void SetRows(std::int32_t k, std::vector<Row>* rows) {
   for (std::size_t i = 0; i < rows->size(); ++i) {
     (*rows)[i] = VectorRow{.serial = {static_cast<std::uint32_t>(i + 1)},
@@ -60,7 +60,7 @@ int Run(int serials, int rounds, const std::string& folder) {
   std::vector<Row> rows(static_cast<std::size_t>(serials));
   Times ours;
   Times theirs;
-  for (int round = -3; round < rounds; ++round) {  // the first ones warm up
+  for (int round = -3; round < rounds; ++round) {  // the first rounds warm up
     const std::int32_t k = 1000 + round;
     const WallTime now = WallTime::Now();
     SetRows(k, &rows);
@@ -88,7 +88,7 @@ int Run(int serials, int rounds, const std::string& folder) {
 }  // namespace focalfleet
 
 int main(int argc, char** argv) {
-  // On the disk where it is started, not in a /tmp that may be memory.
+  // The folder is on the disk where the bench is started, not in a /tmp that may be memory.
   std::string folder = (std::filesystem::current_path() / "store_bench_XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) return 1;
   const int code = focalfleet::Run(focalfleet::bench::Option(argc, argv, "--serials", 5000),

@@ -1,17 +1,19 @@
-// Uploads of whole buses on the simulated bit clock at 1 Mbit/s: how much longer they take than the
-// frames that arming needs, and how many bits a configured unit costs, beside jaeger's and DESI's.
+// This bench uploads to whole buses on the simulated bit clock at 1 Mbit/s. The bench prints how
+// much longer uploads take than the frames that arming needs, and how many bits a configured unit
+// costs, beside jaeger's and DESI's.
 //   upload_bench --units 100 --configurations 20 --seed 1
-// Counted as needed, once each: stage_begin, stage_segment, confirm, arm and the answers of the
-// latter two. Nothing of it depends on the machine.
+// Needed frames are counted once each: stage_begin, stage_segment, confirm, arm and the answers of
+// the latter two. No figure depends on the machine.
 //
-// jaeger 1.11 (its source; paths of kaiju on its nominal grid, greedy, seed 3): 7548 frames for 500
-// robots, that is one SEND_NEW_TRAJECTORY (two u32), 13.1 points (steps i32, ticks i32; a chunk of
-// them is as many frames) and one TRAJECTORY_DATA_END a robot, each answered by an empty frame.
-// Abort, stop and status of each robot before that are left out. DESI's frames are made by a
-// program that is not public. From what is: rows of a move table, one upload command a row at
-// least, a checksum and an arming command, both answered; a usual move has at least three rows (the
-// move, the jog against backlash, the final creep). Each frame is taken to be as short as such a
-// frame can be.
+// jaeger 1.11 (its source; paths of kaiju on its nominal grid, greedy, seed 3) sends 7548 frames
+// for 500 robots. For each robot these are one SEND_NEW_TRAJECTORY (two u32), 13.1 points (steps
+// i32, ticks i32; a chunk of them is as many frames) and one TRAJECTORY_DATA_END. Each is answered
+// by an empty frame. Abort, stop and status of each robot before that are left out.
+//
+// DESI's frames are made by a program that is not public. The following is public: rows of a move
+// table, one upload command a row at least, a checksum and an arming command, both answered. A
+// usual move has at least three rows (the move, the jog against backlash, the final creep). Each
+// frame is taken to be as short as such a frame can be.
 
 #include <array>
 #include <cinttypes>
@@ -30,10 +32,10 @@ namespace {
 using testing::InProcessFleet;
 using testing::UploadOnWire;
 
-/// Nothing where the units do not come to move.
+/// The upload of each bus; empty where the units do not begin to move.
 std::vector<UploadOnWire> UploadOnce(std::uint32_t units, std::uint64_t seed) {
   InProcessFleet fleet({.count = units, .units_per_bus = units, .seed = seed});
-  fleet.Run(Milliseconds(2500));  // everybody has been read
+  fleet.Run(Milliseconds(2500));  // all units have been read
   std::vector<sim::WireFrame> wire;
   fleet.wire = &wire;
   fleet.ApplyRandom(seed);
@@ -46,7 +48,7 @@ std::vector<UploadOnWire> UploadOnce(std::uint32_t units, std::uint64_t seed) {
   return uploads;
 }
 
-// ---- jaeger's frames, as its source puts them together
+// ---- jaeger's frames, as its source composes them
 
 constexpr double kJaegerPoints = 7548.0 / 500 - 2;
 
@@ -92,7 +94,7 @@ constexpr std::uint32_t kDataRates_bps[] = {2'000'000, 5'000'000};
 
 /// The same uploads with their staging frames in CAN FD groups, as full as can be.
 struct InGroups {
-  std::uint64_t bits = 0;  // of the nominal rate
+  std::uint64_t bits = 0;  // at the nominal rate
   std::uint64_t frames = 0;
   void Add(const UploadOnWire& upload, const BusRates& rates) {
     bits += upload.needed_bits_with(rates);

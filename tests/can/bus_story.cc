@@ -3,7 +3,7 @@
 namespace focalfleet::testing {
 namespace {
 
-// Segments may come twice (a retry); their index says where they belong.
+// A segment may arrive twice (a retry); its index gives its place.
 struct Upload {
   StageBegin begin;
   std::array<std::map<std::uint8_t, Segment>, kAxisCount> segments;
@@ -58,7 +58,7 @@ class Listener {
     for (auto& [where, unit] : story_.units) {
       const auto move = unit.moves.find(m.move.value);
       if (where.first != *interface_ || move == unit.moves.end() || !move->second.armed) continue;
-      if (move->second.done) continue;  // a repeated start; this one is over
+      if (move->second.done) continue;  // a repeated start; this motion is over
       if (move->second.started_us.empty()) unit.began_at[m.move.value] = unit.at;
       move->second.started_us.push_back(at_us_);
     }

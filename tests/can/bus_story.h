@@ -1,6 +1,7 @@
-// What somebody learns who only listens to the buses: which hardware answers where, which move each
-// unit was given, segment by segment, whether it confirmed and armed it, when it was started and
-// where it says it ended. Decoded with protocol/ alone; nothing comes from the coordinator.
+// BusStory is the knowledge of a listener on the buses. The class holds which hardware answers
+// where, and which move each unit was given, segment by segment. A record also holds whether the
+// unit confirmed and armed the move, when it was started and where it reports that it ended. Frames
+// are decoded with protocol/ alone; nothing comes from the coordinator.
 #pragma once
 
 #include <array>
@@ -25,7 +26,7 @@ struct OverheardMove {
   std::vector<std::int64_t> started_us;  // start frames that reached it armed
   std::optional<Done> done;
 
-  /// How far each axis is sent. Units: vectors.
+  /// The length of the move of each axis. Units: vectors.
   [[nodiscard]] std::array<std::int32_t, kAxisCount> Way() const;
 };
 
@@ -41,7 +42,7 @@ using BusNode = std::pair<std::string, std::uint8_t>;  // interface, node
 struct BusStory {
   std::map<BusNode, OverheardUnit> units;
   std::map<std::string, std::uint64_t> frames;  // by interface
-  std::vector<std::string> malformed;  // frames that no decoder takes, with the rule they broke
+  std::vector<std::string> malformed;  // frames that no decoder accepts, with the rule they broke
 };
 
 BusStory Listen(const CandumpLog& log);

@@ -1,6 +1,6 @@
-// What `candump -l` writes, line by line: "(1436509052.249713) vcan0 1ABCDEF0#0011223344". Only
-// 29-bit data frames are focalfleet's; the rest is told apart from lines that are no candump at
-// all.
+// ParseCandump reads the output of `candump -l`, line by line: "(1436509052.249713) vcan0
+// 1ABCDEF0#0011223344". Only 29-bit data frames are focalfleet's. Other frames are counted apart
+// from lines that are no candump at all.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,7 @@ struct CandumpLog {
   int foreign = 0;  // 11-bit, remote and error frames, CAN FD that is no group
 };
 
+/// The frames of a log.
 /// Errors: kInvalid, names the line.
 Result<CandumpLog> ParseCandump(const std::string& text);
 

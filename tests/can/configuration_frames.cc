@@ -28,7 +28,7 @@ bool CarriesConfiguration(Function function) {
 Function FunctionOf(const CanFrame& frame) { return static_cast<Function>(frame.id >> 20 & 63); }
 
 struct MoveOf {
-  std::uint16_t staged;  // of this unit, by the last begin
+  std::uint16_t staged;  // move number of this unit, by its last begin
   std::uint16_t operator()(const StageSegment&) const { return staged; }
   template <class Message>
   std::uint16_t operator()(const Message& message) const {

@@ -1,7 +1,7 @@
-// The frames that carry a configuration, out of a log of all: stage, read-back, arm, start, done.
-// What legitimately differs between two runs of the same configuration is masked: sequence numbers
-// and the time that a start signal still leaves. The same frame of a move again (a repeat) is
-// counted apart, and so is everything else: polls, clock, identification.
+// ConfigurationFrames are the frames of a log that carry a configuration: stage, read-back, arm,
+// start, done. Fields that legitimately differ between two runs of the same configuration are
+// masked. They are sequence numbers and the time that a start signal still leaves. Repeats of a
+// frame of a move are counted apart, and so are all other frames: polls, clock, identification.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ namespace focalfleet::testing {
 struct MaskedFrame {
   std::uint32_t id = 0;
   std::array<std::uint8_t, 8> data{};
-  std::uint16_t move = 0;  // to which it belongs; a segment's is told by the begin before it
+  std::uint16_t move = 0;  // its move; a segment's is that of the begin before it
   auto operator<=>(const MaskedFrame&) const = default;
 };
 
@@ -28,7 +28,8 @@ struct FrameCount {
 };
 
 struct ConfigurationFrames {
-  /// By interface and node, broadcasts under kBroadcastNode: each frame once, as it first came.
+  /// Frames by interface and node, broadcasts under kBroadcastNode: each frame once, as it first
+  /// came.
   std::map<BusNode, std::vector<MaskedFrame>> of_unit;
   std::map<std::string, std::uint64_t> repeats;    // by interface
   std::array<FrameCount, kFunctionCount> count{};  // all frames of the log

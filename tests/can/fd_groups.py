@@ -1,6 +1,6 @@
 #!/usr/bin/python3
-"""fd_groups.py CLASSIC.log FD.log: two logs of candump -l of one configuration, staged in classic frames and in CAN FD groups.
-Reads the groups by docs/protocol.md alone. Each unit must have been told the same, in the same order; counts the frames."""
+"""fd_groups.py CLASSIC.log FD.log: compares two logs of candump -l of one configuration, staged in classic frames and in CAN FD groups.
+The groups are read by docs/protocol.md alone. Each unit must have received the same, in the same order. The frames are counted."""
 
 import re
 import sys
@@ -15,7 +15,7 @@ def fail(text):
 
 
 def entries(data, line):
-    """(node, function, detail, data) of each entry of a group."""
+    """Yields (node, function, detail, data) of each entry of a group."""
     while data and data[0] != 0xFF:
         node, function, detail = data[0], data[2] >> 3, data[2] & 7
         if function not in LENGTHS or len(data) < 3 + LENGTHS[function]:
@@ -27,7 +27,7 @@ def entries(data, line):
 
 
 def read(path):
-    told = {}  # (bus, node): what it was staged, in order, repeats left out
+    received = {}  # (bus, node): staged data, in order, repeats left out
     frames = groups = grouped = 0
     for line in open(path, encoding="ascii"):
         match = re.fullmatch(r"\(.*\) (\S+) ([0-9A-F]{8})#(#[0-9A-F])?([0-9A-F]*)( [RT])?\n", line)
@@ -49,21 +49,21 @@ def read(path):
             staged = [(identifier >> 11 & 255, function, identifier & 7, data)]
         frames += 1
         for node, *what in staged:
-            unit = told.setdefault((bus, node), [])
+            unit = received.setdefault((bus, node), [])
             if what not in unit:
                 unit.append(what)
-    return told, frames, groups, grouped
+    return received, frames, groups, grouped
 
 
 classic, classic_frames, none, _ = read(sys.argv[1])
-groups_told, fd_frames, groups, grouped = read(sys.argv[2])
+groups_received, fd_frames, groups, grouped = read(sys.argv[2])
 if none or not classic:
     fail("the first log is not of classic staging")
-if classic.keys() != groups_told.keys():
-    fail(f"other units: {classic.keys() ^ groups_told.keys()}")
-for unit, told in classic.items():
-    if told != groups_told[unit]:
-        fail(f"unit {unit} was told {groups_told[unit]}, not {told}")
+if classic.keys() != groups_received.keys():
+    fail(f"other units: {classic.keys() ^ groups_received.keys()}")
+for unit, received in classic.items():
+    if received != groups_received[unit]:
+        fail(f"unit {unit} was told {groups_received[unit]}, not {received}")
 if grouped < 2 * groups or fd_frames * 2 > classic_frames:
     fail(f"{fd_frames} frames stage what {classic_frames} did: hardly any are saved")
 print(f"fd_groups: {len(classic)} units were staged the same by {classic_frames} classic frames and by {groups} groups "

@@ -1,11 +1,11 @@
-// Process 1 of a User Mode Linux guest whose root is the host's file system. It makes the guest
-// usable (pseudo file systems, loopback, CAN modules), runs `bash $focalfleet_run/command` with its
-// output on the first console, leaves the exit status in $focalfleet_run/status and powers the
-// guest off.
+// This program is process 1 of a User Mode Linux guest whose root is the host's file system. The
+// program makes the guest usable (pseudo file systems, loopback, CAN modules). Then it runs `bash
+// $focalfleet_run/command` with its output on the first console. At the end it leaves the exit
+// status in $focalfleet_run/status and powers the guest off.
 //
-// The kernel hands unknown words of its command line to process 1 as environment, so
+// The kernel passes unknown words of its command line to process 1 as environment. Therefore
 // focalfleet_run, focalfleet_modules and focalfleet_vcan (parameters of that module) are plain
-// environment variables here. Static, because it runs before anything is set up.
+// environment variables here. The program is static, because it runs before anything is set up.
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -45,7 +45,7 @@ static void mount_pseudo_file_systems(void) {
   if (symlink("/proc/self/fd", "/dev/fd") != 0 && errno != EEXIST) perror("/dev/fd");
 }
 
-// The first console carries the command's output as it is: no line discipline in between.
+// The first console carries the command's output unchanged: no line discipline in between.
 static void take_console(void) {
   const int in = open("/dev/null", O_RDONLY);
   const int out = open("/dev/tty1", O_WRONLY | O_NOCTTY);
@@ -61,7 +61,7 @@ static void take_console(void) {
   }
 }
 
-// A kernel with CAN built in has no such files; that is as good.
+// A kernel with CAN built in has no such files, and needs none.
 static void load_modules(void) {
   static const char* const names[] = {"net/can/can",
                                       "net/can/can-raw",
@@ -95,7 +95,7 @@ static void raise_loopback(void) {
   close(fd);
 }
 
-// Process 1 also buries orphans.
+// Process 1 also reaps orphans.
 static int run_command(const char* script) {
   const pid_t child = fork();
   if (child == 0) {

@@ -1,8 +1,8 @@
-// in_process_log CONFIG STATE_CSV TARGETS_CSV: what candump would have logged, had the buses of one
-// configuration been real. The coordinator, the planner and the simulated world run in this one
-// process on virtual time, with the units, drive and timing of the daemon's CONFIG; no socket, no
-// daemon, no kernel in between. Interfaces are called vcan0, vcan1 ... by ascending bus_id. Ends
-// with 0 where all units arrived.
+// in_process_log CONFIG STATE_CSV TARGETS_CSV prints what candump would have logged, had the buses
+// of one configuration been real. The coordinator, the planner and the simulated world run in this
+// one process on virtual time. Units, drive and timing are those of the daemon's CONFIG. There is
+// no socket, daemon or kernel in between. Interfaces are called vcan0, vcan1 ... by ascending
+// bus_id. The exit code is 0 where all units arrived.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -24,7 +24,7 @@
 namespace focalfleet::testing {
 namespace {
 
-constexpr DurationNs kTurn = Microseconds(200);  // of the loop, as the daemon's takes one
+constexpr DurationNs kTurn = Microseconds(200);  // of the loop, as the daemon's
 constexpr DurationNs kCommit = Milliseconds(5);
 constexpr DurationNs kPlanning = Milliseconds(20);
 
@@ -84,7 +84,7 @@ class Run {
     return std::ranges::any_of(replies_, [](const ReplyEffect& reply) { return reply.last; });
   }
   const Coordinator& coordinator() const { return coordinator_; }
-  /// The farthest that a rotor stands from where its unit believes it to stand. Units: vectors.
+  /// The largest difference between a rotor's true position and its unit's count. Units: vectors.
   double WorstSlip() const {
     double worst = 0;
     for (std::size_t n = 0; n < layout_.size(); ++n) {
@@ -160,7 +160,7 @@ int Main(char** arguments) {
   std::fprintf(stderr,
                "in-process: %u of %u arrived, makespan %.1f s, rotors within %.1f vectors\n",
                end.arrived, end.targeted, end.makespan_s, run.WorstSlip());
-  // A drive too fast for the motor leaves them whole electrical turns behind, of 96 vectors.
+  // A drive too fast for the motor would leave rotors whole electrical turns behind, of 96 vectors.
   return end.arrived == layout.size() && run.WorstSlip() < 48 ? 0 : 1;
 }
 

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
-"""one_unit.py INTERFACE NODE [--lose FUNCTION,...]: one unit on a CAN interface, written from docs/protocol.md
-and nothing else, with python3-can. It answers, moves in real time, and prints a line of JSON for each motion that ended. The
-first answer of each function named by --lose is not sent. Ends with SIGTERM and prints what its FLASH holds."""
+"""one_unit.py INTERFACE NODE [--lose FUNCTION,...]: a unit on a CAN interface, written from docs/protocol.md
+alone, with python3-can. The unit answers, moves in real time, and prints a line of JSON for each motion that ended. The
+first answer of each function named by --lose is not sent. On SIGTERM the program prints the unit's FLASH and ends."""
 
 import argparse
 import json
@@ -13,7 +13,7 @@ import zlib
 
 import can
 
-# Identifier: functions with their priorities.
+# Functions of the identifier, with their priorities.
 STOP, START, DONE, CLOCK, ARM, STAGE_BEGIN, STAGE_SEGMENT, CONFIRM, HOME, PROGRESS, STATUS, VECTOR, FAULT, IDENTIFY, \
     PARAMETER_READ, PARAMETER_WRITE = range(16)
 PRIORITY = [0, 1, 2, 2, 3, 4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6]
@@ -42,8 +42,8 @@ def put24(value):
 class Flash:
     def __init__(self, serial):
         self.serial = serial
-        self.begun = 0  # the move begun last
-        self.count = 0  # how many were
+        self.begun = 0  # number of the last move begun
+        self.count = 0  # number of moves begun
         self.marked = False
         self.host_timeout_ms = 5000
         self.position = [0, 40000]
@@ -53,7 +53,7 @@ class Flash:
 
 
 class Run:
-    """One axis' path, from the instant at which it begins."""
+    """The path of an axis, from the instant at which it begins."""
 
     def __init__(self, start, segments, counter1, begin):
         self.pieces, free = [], begin
@@ -81,14 +81,14 @@ class Unit:
         self.bus, self.node, self.lose = bus, node, lose
         self.flash = Flash(0xC0FFEE)
         self.state, self.host_lost, self.restarted = REST, False, True
-        self.resume = None  # (identifier, what was told)
+        self.resume = None  # (identifier, data received)
         self.drop_staged()
         self.granted_arm = self.granted_home = None
         self.runs = None
         self.powered_at = self.heard_at = time.monotonic()
         self.began_ticks = 0
 
-    # ---- saying
+    # ---- sending
 
     def send(self, function, sequence, data=b"", detail=0):
         if function in self.lose and sequence != 0:
@@ -101,7 +101,7 @@ class Unit:
         theta, phi = self.flash.position
         self.send(DONE, sequence, put24(theta) + put24(phi) + struct.pack("<H", self.flash.begun), outcome)
 
-    # ---- what is staged
+    # ---- staged moves
 
     def drop_staged(self):
         self.begin, self.segments, self.begins_at = None, [{}, {}], None
@@ -172,7 +172,7 @@ class Unit:
                 self.drop_staged()
                 self.state = HOST_LOST
 
-    # ---- hearing
+    # ---- receiving
 
     def on_message(self, message):
         if not message.is_extended_id or message.is_remote_frame or message.is_error_frame or message.is_fd:
@@ -257,7 +257,7 @@ class Unit:
         self.send(CONFIRM, sequence, struct.pack("<HIBB", move, self.held_digest(), received, self.judge(move)))
 
     def on_home(self, sequence, _detail, data, _frame):
-        # It has no stops to drive to: never in a state for it.
+        # The unit has no stops to drive to, so homing is always refused for its state.
         self.send(HOME, sequence, data + bytes([WRONG_STATE]))
 
     def on_progress(self, sequence, _detail, _data, _frame):
@@ -309,7 +309,7 @@ class Unit:
 
     def on_parameter_write(self, sequence, detail, data, _frame):
         parameter, value = struct.unpack("<Bi", data)
-        # Those that a host must set to move it; of the rest it says that it takes no such value.
+        # A host must set these parameters to move the unit; any other parameter is answered by BAD_VALUE.
         ranges = {COUNTER1: (50, 20000), REPEAT: (1, 255), MODE: (0, 2)}
         answer = BAD_VALUE
         if self.state != REST:

@@ -1,7 +1,8 @@
-// same_frames REFERENCE_LOG LOG SPEED: two candump logs of the same configuration, the reference
-// from in_process_log, the other from real interfaces at SPEED times the pace of life. On every bus
-// the same configuration frames, for every unit in the same order; polls, clock and repeats counted
-// apart and bounded. Says how far apart the buses began. Ends with 0 where all that holds.
+// same_frames REFERENCE_LOG LOG SPEED compares two candump logs of the same configuration. The
+// reference is from in_process_log, the other from real interfaces at SPEED times real time. Every
+// bus must carry the same configuration frames, for every unit in the same order. Polls, clock and
+// repeats are counted apart and bounded. The program prints how far apart the buses began. The exit
+// code is 0 where all that holds.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,11 +19,11 @@
 namespace focalfleet::testing {
 namespace {
 
-// The daemon's defaults, in the fleet's time, and what they allow.
+// The daemon's defaults, in the fleet's time, and the bounds that follow from them.
 constexpr double kClockPeriod_s = 0.5;
 constexpr double kPollPeriodMin_s = 1;
-constexpr double kRepeatsMax = 0.02;      // of the configuration's frames
-constexpr double kSkewTolerance_ms = 20;  // that planner and proofs assume
+constexpr double kRepeatsMax = 0.02;      // share of the configuration's frames
+constexpr double kSkewTolerance_ms = 20;  // assumed by planner and proofs
 constexpr double kStartDelayTick_s = 1e-4;
 
 int complaints = 0;
@@ -60,7 +61,8 @@ void CompareUnit(const BusNode& where, const std::vector<MaskedFrame>& reference
            (b == seen.end() ? "nothing" : Text(*b)));
 }
 
-// As a multiset a bus's frames are equal where each unit's are, in order; both ways.
+// A bus's frames are equal as a multiset where each unit's are equal, in order; the test is made
+// both ways.
 std::size_t Compare(const ConfigurationFrames& reference, const ConfigurationFrames& seen) {
   std::size_t frames = 0;
   for (const auto& [where, expected] : reference.of_unit) {
@@ -90,7 +92,7 @@ void BoundTheRest(const ConfigurationFrames& reference, const ConfigurationFrame
   const double units = static_cast<double>(reference.of_unit.size()) - buses;
   const double life_s = seen.seconds * speed;
   const auto of = [&](Function function) { return seen.count[static_cast<std::size_t>(function)]; };
-  // Two starts more a bus are said by design, in both logs.
+  // Two more starts a bus are sent by design, in both logs.
   const double more =
       static_cast<double>(RepeatsOf(seen)) - static_cast<double>(RepeatsOf(reference));
   const auto bound = [](const char* what, double is, double at_most) {
@@ -98,19 +100,19 @@ void BoundTheRest(const ConfigurationFrames& reference, const ConfigurationFrame
     if (is > at_most) Complain(std::string("too many: ") + what);
   };
   bound("configuration frames again", more, kRepeatsMax * static_cast<double>(frames));
-  // Each unit's clock is read while it is read, once in its move, and with polls at rest.
+  // Each unit's clock is read at identification, once in its move, and with polls at rest.
   bound("clock and its readings", static_cast<double>(of(Function::kClock).host),
         buses * (life_s / kClockPeriod_s + 2) + 2 * units +
             static_cast<double>(of(Function::kStatus).host));
   bound("clock answers", static_cast<double>(of(Function::kClock).unit),
         static_cast<double>(of(Function::kClock).host));
-  // Each unit is asked once while it is read, and then at most once a poll period.
+  // Each unit is asked once at identification, and then at most once a poll period.
   bound("status polls", static_cast<double>(of(Function::kStatus).host),
         units * (life_s / kPollPeriodMin_s + 2));
   bound("answers to them", static_cast<double>(of(Function::kStatus).unit),
         static_cast<double>(of(Function::kStatus).host));
-  // Identity, two vectors, two carrier counts; a tenth of them asked again, and writes of what
-  // differs from the configured drive.
+  // Identification reads identity, two vectors and two carrier counts. A tenth of them is asked
+  // again, and values that differ from the configured drive are written.
   double reading = 0;
   for (const Function function : {Function::kIdentify, Function::kVector, Function::kParameterRead,
                                   Function::kParameterWrite})
@@ -128,8 +130,8 @@ struct Spread {
   double width() const { return high - low; }
 };
 
-// When units begin, as the wire tells it: each start frame's end, plus the delay that it names.
-// Units obey the first one that they hear.
+// Start times of the units by the wire: each start frame's end, plus the delay that it names. Units
+// obey the first start frame that they hear.
 void ReportSkew(const CandumpLog& log, double speed) {
   std::map<std::uint16_t, std::set<std::string>> begun;
   std::map<std::uint16_t, Spread> first;

@@ -1,7 +1,7 @@
-// same_moves CANDUMP_LOG DATABASE UNITS_CSV INTERFACE...: what was said on the buses and what the
-// store remembers must be the same moves, for every unit and in both directions. The log is decoded
-// with protocol/ alone, the database read with plain SQL; interfaces stand in ascending order of
-// bus_id. Ends with 0 where they agree.
+// same_moves CANDUMP_LOG DATABASE UNITS_CSV INTERFACE... compares the moves on the buses with those
+// in the store, for every unit and in both directions. The log is decoded with protocol/ alone, the
+// database read with plain SQL. Interfaces stand in ascending order of bus_id. The exit code is 0
+// where they agree.
 #include <sqlite3.h>
 
 #include <algorithm>
@@ -22,14 +22,14 @@ namespace {
 
 using Pair = std::array<std::int64_t, kAxisCount>;
 
-// What the store's tables mean (docs of daemon/store/schema.cc): how an intent ended.
+// Codes of the store's tables (docs of daemon/store/schema.cc): how an intent ended.
 constexpr std::int64_t kEndArrived = 0;
 
 int complaints = 0;
 
-void Complain(const std::string& who, const std::string& what) {
+void Complain(const std::string& subject, const std::string& what) {
   ++complaints;
-  std::printf("%s: %s\n", who.c_str(), what.c_str());
+  std::printf("%s: %s\n", subject.c_str(), what.c_str());
 }
 
 std::string Text(const Pair& pair) {
@@ -50,10 +50,10 @@ struct Moved {
   Pair from{};
   Pair to{};
   std::int64_t end = -1;  // -1: open
-  Pair stood{};           // where it ended
+  Pair stood{};           // position at its end
 };
 
-struct Standing {
+struct StoredPosition {
   std::int64_t low = 0;
   std::int64_t high = 0;
 };
@@ -89,8 +89,9 @@ std::vector<Moved> ReadMoves(const char* path) {
   return moves;
 }
 
-std::map<std::pair<std::int64_t, std::int64_t>, Standing> ReadStandings(const char* path) {
-  std::map<std::pair<std::int64_t, std::int64_t>, Standing> out;
+std::map<std::pair<std::int64_t, std::int64_t>, StoredPosition> ReadStoredPositions(
+    const char* path) {
+  std::map<std::pair<std::int64_t, std::int64_t>, StoredPosition> out;
   for (const auto& r : Query(path, "SELECT serial, axis, low, high FROM axis_state"))
     out[{r[0], r[1]}] = {r[2], r[3]};
   return out;
@@ -150,14 +151,14 @@ std::map<std::int64_t, BusNode> OnInterfaces(const std::map<std::int64_t, Place>
 // ---- the comparison
 
 void CompareMove(const Moved& stored, const OverheardUnit& unit, const OverheardMove& heard) {
-  const std::string who =
+  const std::string subject =
       "unit " + std::to_string(stored.unit_id) + " move " + std::to_string(stored.move);
   const auto began = unit.began_at.find(static_cast<std::uint16_t>(stored.move));
-  if (heard.confirmed != Answer::kOk) Complain(who, "started without a confirmed read-back");
+  if (heard.confirmed != Answer::kOk) Complain(subject, "started without a confirmed read-back");
   if (heard.confirmed_digest != Digest(heard.staged))
-    Complain(who, "confirmed another move than the segments on the bus");
+    Complain(subject, "confirmed another move than the segments on the bus");
   if (heard.started_us.empty() || began == unit.began_at.end())
-    return Complain(who, "is in the store, but no start signal reached it armed");
+    return Complain(subject, "is in the store, but no start signal reached it armed");
   Pair from{};
   Pair to{};
   for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
@@ -165,15 +166,15 @@ void CompareMove(const Moved& stored, const OverheardUnit& unit, const Overheard
     to[axis] = from[axis] + heard.Way()[axis];
   }
   if (from != stored.from)
-    Complain(who, "began at " + Text(from) + ", stored " + Text(stored.from));
-  if (to != stored.to) Complain(who, "was sent to " + Text(to) + ", stored " + Text(stored.to));
-  if (stored.end != kEndArrived) Complain(who, "stored end is " + std::to_string(stored.end));
-  if (!heard.done) return Complain(who, "said no `done`");
+    Complain(subject, "began at " + Text(from) + ", stored " + Text(stored.from));
+  if (to != stored.to) Complain(subject, "was sent to " + Text(to) + ", stored " + Text(stored.to));
+  if (stored.end != kEndArrived) Complain(subject, "stored end is " + std::to_string(stored.end));
+  if (!heard.done) return Complain(subject, "said no `done`");
   const Pair stood{heard.done->position[0], heard.done->position[1]};
-  if (heard.done->outcome != Outcome::kArrived) Complain(who, "`done` says it did not arrive");
-  if (stood != to) Complain(who, "`done` at " + Text(stood) + ", was sent to " + Text(to));
+  if (heard.done->outcome != Outcome::kArrived) Complain(subject, "`done` says it did not arrive");
+  if (stood != to) Complain(subject, "`done` at " + Text(stood) + ", was sent to " + Text(to));
   if (stood != stored.stood)
-    Complain(who, "`done` at " + Text(stood) + ", stored " + Text(stored.stood));
+    Complain(subject, "`done` at " + Text(stood) + ", stored " + Text(stored.stood));
 }
 
 using Reported = std::set<std::pair<BusNode, std::uint16_t>>;  // moves that the store has, too
@@ -182,18 +183,19 @@ Reported CompareStoreWithBus(const std::vector<Moved>& moves, const BusStory& st
                              const std::map<std::int64_t, BusNode>& places) {
   Reported reported;
   for (const Moved& stored : moves) {
-    const std::string who = "unit " + std::to_string(stored.unit_id);
+    const std::string subject = "unit " + std::to_string(stored.unit_id);
     const auto place = places.find(stored.unit_id);
     const auto unit = place == places.end() ? story.units.end() : story.units.find(place->second);
     if (unit == story.units.end()) {
-      Complain(who, "was never heard of on its bus");
+      Complain(subject, "was never heard of on its bus");
       continue;
     }
-    if (unit->second.serial.value != stored.serial) Complain(who, "another serial number answered");
+    if (unit->second.serial.value != stored.serial)
+      Complain(subject, "another serial number answered");
     const auto id = static_cast<std::uint16_t>(stored.move);
     const auto heard = unit->second.moves.find(id);
     if (heard == unit->second.moves.end()) {
-      Complain(who, "move " + std::to_string(stored.move) + " was never staged on the bus");
+      Complain(subject, "move " + std::to_string(stored.move) + " was never staged on the bus");
       continue;
     }
     reported.insert({place->second, id});
@@ -210,16 +212,17 @@ void CompareBusWithStore(const BusStory& story, const Reported& reported) {
                  "move " + std::to_string(id) + " was started, and the store does not know it");
 }
 
-std::size_t CompareStandings(const char* database, const BusStory& story) {
-  const auto standings = ReadStandings(database);
+std::size_t CompareStoredPositions(const char* database, const BusStory& story) {
+  const auto stored_positions = ReadStoredPositions(database);
   std::size_t compared = 0;
   for (const auto& [where, unit] : story.units) {
     for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
-      const auto standing = standings.find({unit.serial.value, static_cast<std::int64_t>(axis)});
+      const auto found =
+          stored_positions.find({unit.serial.value, static_cast<std::int64_t>(axis)});
       if (!unit.at[axis]) continue;
       ++compared;
-      if (standing == standings.end() || standing->second.low != *unit.at[axis] ||
-          standing->second.high != *unit.at[axis])
+      if (found == stored_positions.end() || found->second.low != *unit.at[axis] ||
+          found->second.high != *unit.at[axis])
         Complain(where.first + " node " + std::to_string(where.second),
                  "the store has it elsewhere than it last said on the bus");
     }
@@ -244,10 +247,10 @@ int Run(const std::vector<std::string>& arguments) {
   const auto moves = ReadMoves(database);
   const Reported reported = CompareStoreWithBus(moves, story, places);
   CompareBusWithStore(story, reported);
-  const std::size_t standing = CompareStandings(database, story);
+  const std::size_t units_compared = CompareStoredPositions(database, story);
   if (moves.empty()) Complain("store", "no moves at all");
-  if (standing != places.size())
-    Complain("bus", std::to_string(standing) + " of " + std::to_string(places.size()) +
+  if (units_compared != places.size())
+    Complain("bus", std::to_string(units_compared) + " of " + std::to_string(places.size()) +
                         " units said where they stand");
   for (const auto& [interface, frames] : story.frames)
     std::printf("%s: %llu frames\n", interface.c_str(), static_cast<unsigned long long>(frames));

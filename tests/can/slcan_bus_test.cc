@@ -1,8 +1,8 @@
-// SocketCanPort on a controller that does not give frames back: the kernel's own slcan driver, with
-// this test as the controller at the other end of the serial line. It takes every frame at once and
-// needs the frame's bits for it, one after the other, as a controller with a deep memory does; what
-// it has not finished is below the socket. The clock of the wire is the test's, so that a guest
-// that is late changes nothing.
+// These tests run SocketCanPort on a controller that does not give frames back. The driver is the
+// kernel's own slcan driver, with this test as the controller at the other end of the serial line.
+// The controller takes every frame at once and sends their bits one after the other, as a
+// controller with a deep memory does. Frames that it has not finished are below the socket. The
+// clock of the wire is the test's, so a guest that is late changes nothing.
 #include <gtest/gtest.h>
 #include <net/if.h>
 #include <poll.h>
@@ -52,11 +52,11 @@ class Controller {
     close(master_);
   }
 
-  /// Empty: this kernel has no slcan, or we may not have it.
+  /// The interface. Empty: this kernel has no slcan, or the test lacks the privilege.
   [[nodiscard]] const std::string& name() const { return name_; }
 
-  /// Does `command`, which waits for the driver, which waits for the line to be read. Its exit
-  /// code.
+  /// Runs `command`, which waits for the driver, which waits for the line to be read. Returns its
+  /// exit code.
   int Run(const std::string& command) {
     std::atomic<int> code{-1};
     const std::jthread thread([&] { code = std::system(command.c_str()); });
@@ -64,7 +64,8 @@ class Controller {
     return code;
   }
 
-  /// These were handed down just now. Their bits follow those of the frames before them.
+  /// Records frames that were handed down just now. Their bits follow those of the frames before
+  /// them.
   void Took(std::span<const CanFrame> frames, HostInstant now) {
     for (const CanFrame& frame : frames) {
       const HostInstant idle = ends_.empty() ? now : std::max(now, ends_.back());
@@ -76,7 +77,7 @@ class Controller {
         std::ranges::count_if(ends_, [now](HostInstant end) { return end > now; }));
   }
 
-  /// Identifiers in the order of the serial line, once so many frames have come through it.
+  /// The identifiers in the order of the serial line, once this many frames have come through it.
   const std::vector<std::uint32_t>& Await(std::size_t frames) {
     while (ids_.size() < frames && Read(kPatienceMs)) {
     }
@@ -98,7 +99,8 @@ class Controller {
       line_ += c;
       return;
     }
-    // "Tiiiiiiiild..": an extended frame. All else is about the controller itself.
+    // The text "Tiiiiiiiild.." is an extended frame. All other lines are about the controller
+    // itself.
     if (line_.size() >= 10 && line_[0] == 'T')
       ids_.push_back(static_cast<std::uint32_t>(std::stoul(line_.substr(1, 8), nullptr, 16)));
     line_.clear();
@@ -136,7 +138,7 @@ TEST(SlcanBus, AtMostThreeOfOursAreBelowAndAStopWaitsForTwo) {
   std::size_t below_max = 0;
   std::array<int, 4> stops_by_wait{};
   std::vector<std::size_t> stops;  // places on the wire
-  // How many of ours were ahead, where it was taken.
+  // Returns how many of the host's frames were ahead, where the frame was taken.
   const auto hand_down = [&](std::span<const CanFrame> frames) {
     const std::size_t ahead = controller.Unfinished(now);
     const std::size_t taken = port.Send(frames);
@@ -147,7 +149,7 @@ TEST(SlcanBus, AtMostThreeOfOursAreBelowAndAStopWaitsForTwo) {
     return std::pair(taken, ahead);
   };
   while (sent < kFrames) {
-    // As the daemon does, and sometimes late.
+    // The test repeats as the daemon does, and sometimes late.
     if (hand_down(batch).first == 0) now = now + port.retry_full();
     if (rng.Below(10) > 0) continue;
     now = now + Microseconds(static_cast<std::int64_t>(rng.Below(400)));

@@ -1,14 +1,14 @@
-// slcan_buses COUNT: COUNT emulated CAN controllers behind serial lines (slcan), each on a bus of
-// its own with the units of vcanN. To the kernel a controller is a real one: it has bit timing,
-// states, error counters and a driver, and it can be pulled out of the machine. Prints "ready" and
-// then what the drivers say.
+// slcan_buses COUNT emulates COUNT CAN controllers behind serial lines (slcan), each on a bus of
+// its own with the units of vcanN. To the kernel a controller is a real one. Each has bit timing,
+// states, error counters and a driver, and can be pulled out of the machine. The program prints
+// "ready" and then the messages of the drivers.
 //
 // Commands on stdin, one a line; bus N of 0..COUNT-1:
-//   raw N TEXT    the controller tells its driver TEXT: "e2ab" (errors: no acknowledgement, bit),
+//   raw N TEXT    the controller sends its driver TEXT: "e2ab" (errors: no acknowledgement, bit),
 //                 "sw096000", "sp128000" (warning, passive, with rx and tx counters) ...
 //   busoff N      it goes bus-off: nothing passes until its driver closes and opens it again
 //   unplug N      it leaves the machine; its interface vanishes
-//   plug N        another one takes its place, closed, with the bit rate of nobody
+//   plug N        another one takes its place, closed, without a bit rate
 //   count N       prints how many frames it carried each way
 #define _GNU_SOURCE
 #include <errno.h>
@@ -79,7 +79,7 @@ static void tell(struct bus* bus, const char* text) {
   if (bus->master < 0) return;
   char line[128];
   const int length = snprintf(line, sizeof line, "%s\r", text);
-  // The driver reads at once; a full line is waited for.
+  // The driver reads at once; a full line makes the loop wait.
   for (int done = 0; done < length;) {
     const ssize_t now = write(bus->master, line + done, (size_t)(length - done));
     if (now > 0) done += (int)now;
@@ -87,7 +87,7 @@ static void tell(struct bus* bus, const char* text) {
   }
 }
 
-// "Tiiiiiiiildd.." of the driver: one frame for the bus.
+// The driver's text "Tiiiiiiiildd.." is one frame for the bus.
 static void send_down(struct bus* bus, const char* text) {
   struct can_frame frame;
   memset(&frame, 0, sizeof frame);
@@ -157,7 +157,7 @@ static void obey(char* line, int count) {
   if (strcmp(what, "count") == 0) printf("count %d %lu down %lu up\n", number, bus->down, bus->up);
 }
 
-// False: the end of the commands.
+// Reads a command. False: the end of the commands.
 static int from_stdin(int count) {
   static char text[1024];
   static int length = 0;

@@ -1,7 +1,7 @@
-// SocketCanPort on an interface that takes its time: vcan0 that echoes like a real driver, behind a
-// queue of 1 Mbit/s (tests/can/slow-bus). What is below the socket is counted by a listener of our
-// own; slow-bus also lets the queue hold no more than three frames, so that the kernel itself would
-// count a fourth as dropped.
+// These tests run SocketCanPort on an interface that takes its time: vcan0 that echoes like a real
+// driver, behind a queue of 1 Mbit/s (tests/can/slow-bus). A listener of the test counts the frames
+// below the socket. The script slow-bus also lets the queue hold no more than three frames, so the
+// kernel itself would count a fourth as dropped.
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
@@ -102,8 +102,8 @@ TEST(SlowBus, AtMostThreeOfOursAreBelowAndAStopWaitsForTwo) {
       sent, below_max, stops_by_wait[0], stops_by_wait[1], stops_by_wait[2]);
 }
 
-// A group is one frame below, and one confirmation: were it more, or none, this would come to a
-// halt or drop frames in a queue that holds three.
+// A group is one frame below, and one confirmation. With more or none, the test would halt, or drop
+// frames in a queue that holds three.
 TEST(SlowBus, AtMostTwoGroupsAreBelowAndEachIsConfirmed) {
   auto created =
       SocketCanPort::Create({.bus = {3}, .interface = "vcan0", .data_bit_rate_bps = 2'000'000});
@@ -113,7 +113,7 @@ TEST(SlowBus, AtMostTwoGroupsAreBelowAndEachIsConfirmed) {
   std::vector<CanFrame> frames;
   for (std::uint8_t n = 0; n < 200; ++n)
     frames.push_back(Encode(HostMessage(StageSegment{Axis::kTheta, 1, {5, 6, 7}}), {{n}, 0}));
-  for (std::uint8_t n = 0; n < 100; ++n)  // these go alone
+  for (std::uint8_t n = 0; n < 100; ++n)  // these are sent alone
     frames.push_back(Encode(HostMessage(Arm{MoveId{1}, 7}), {{n}, 1}));
   std::vector<ReceivedFrame> in;
   for (int round = 0; round < 5; ++round) {
@@ -132,7 +132,7 @@ TEST(SlowBus, AtMostTwoGroupsAreBelowAndEachIsConfirmed) {
   EXPECT_EQ(port.counters().link_errors, 0u) << "a confirmation was given up";
 }
 
-// Somebody else on this host floods the interface: ENOBUFS, no loss, no link down.
+// Another program on this host floods the interface: ENOBUFS, no loss, no link down.
 TEST(SlowBus, AQueueThatOthersFillIsWaitedFor) {
   const auto port = OpenPort();
   ASSERT_TRUE(port);

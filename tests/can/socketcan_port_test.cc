@@ -1,5 +1,5 @@
-// SocketCanPort on real interfaces: run by with-can with vcan0 and vcan1 up. Without them there is
-// nothing to test.
+// These tests run SocketCanPort on real interfaces: with-can starts them with vcan0 and vcan1 up.
+// Without these there is nothing to test.
 #include "daemon/ports/socketcan_port.h"
 
 #include <gtest/gtest.h>
@@ -29,7 +29,7 @@ std::unique_ptr<SocketCanPort> Open(const char* interface, Hears hears = Hears::
   return port ? std::move(*port) : nullptr;
 }
 
-// Identifiers of functions that exist; bit 19 says who sends.
+// Identifiers of functions that exist; bit 19 gives the sender's side.
 constexpr std::uint32_t kFromHost = 10u << 20;
 constexpr std::uint32_t kFromUnit = kFromHost | 1u << 19;
 
@@ -39,7 +39,7 @@ std::size_t SendAll(SocketCanPort& port, std::span<const CanFrame> frames) {
   while (sent < frames.size()) {
     sent += port.Send(frames.subspan(sent));
     if (sent == frames.size()) break;
-    // Confirmations make room; where the driver gives none there always is.
+    // Confirmations make room; where the driver gives none there is always room.
     pollfd wait{port.fd(), POLLIN, 0};
     if (poll(&wait, 1, kPatienceMs) <= 0) break;
     port.Receive(HostInstant{1}, &in);
@@ -74,7 +74,7 @@ void RaiseInterface(const char* interface, bool up) {
   close(fd);
 }
 
-// A socket of somebody else on the bus, who may write what we never would.
+// Another program's socket on the bus, which may write frames that this project never would.
 class Stranger {
  public:
   explicit Stranger(const char* interface) : fd_(socket(PF_CAN, SOCK_RAW, CAN_RAW)) {
@@ -146,7 +146,7 @@ TEST(SocketCanPort, FramesAreStampedWhenTheyComeIn) {
   host->Receive(clock.Now(), &in);
   ASSERT_EQ(in.size(), 1u);
   EXPECT_GE(in[0].at, before);
-  // Where the reader of both clocks was held up between them the stamp is later by so much.
+  // Where the reader of both clocks was held up between them, the stamp is later by that delay.
   EXPECT_LE(in[0].at, after + Milliseconds(5));
 }
 
@@ -168,9 +168,9 @@ TEST(SocketCanPort, ForeignFramesNeverReachTheCore) {
   const Stranger stranger("vcan0");
   stranger.Write(0x123, 2);                                    // 11-bit
   stranger.Write(kFromUnit | CAN_EFF_FLAG | CAN_RTR_FLAG, 2);  // remote
-  stranger.Write(kFromHost | CAN_EFF_FLAG, 2);                 // of a host
+  stranger.Write(kFromHost | CAN_EFF_FLAG, 2);                 // from a host
   stranger.Write(kFromUnit | 1u << 25 | CAN_EFF_FLAG, 2);      // no such function
-  stranger.Write(kFromUnit | 7 | CAN_EFF_FLAG, 2);             // ours
+  stranger.Write(kFromUnit | 7 | CAN_EFF_FLAG, 2);             // a frame of this project
   const auto heard = Receive(*port, 1);
   ASSERT_EQ(heard.size(), 1u);
   EXPECT_EQ(heard[0].id, kFromUnit | 7);

@@ -1,7 +1,8 @@
-// LD_PRELOAD for Debian 12's linux.uml. That kernel writes a traced process' extended registers
-// with a buffer of fixed size; on a processor whose XSAVE area is larger (AMX) the host refuses the
-// short write with EFAULT and the guest dies at once. Here the write is completed to the host's
-// size, with every component that lay beyond the caller's buffer marked as in its initial state.
+// This LD_PRELOAD library is for Debian 12's linux.uml. The kernel writes a traced process'
+// extended registers with a buffer of fixed size. On a processor whose XSAVE area is larger (AMX)
+// the host refuses the short write with EFAULT and the guest dies at once. The library completes
+// the write to the host's size. Every component beyond the caller's buffer is marked as in its
+// initial state.
 #define _GNU_SOURCE
 #include <cpuid.h>
 #include <elf.h>

@@ -1,5 +1,6 @@
-// Any bytes as lines of candump: a frame, a foreign one or the reason why not. A frame that is
-// taken stands in bounds, and written as `candump -l` would write it, it is read as the same frame.
+// The input is any bytes as lines of candump. A line must give a frame, a foreign frame or a
+// reason. An accepted frame stands in bounds. Written as `candump -l` would write it, it reads back
+// as the same frame.
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>

@@ -1,5 +1,6 @@
-// Any bytes as a frame: identifier (4, little-endian), length (1), data. What decodes is encoded
-// again and must give the same bits, so no two frames mean the same, and no frame is two messages.
+// The input is any bytes as a frame: identifier (4, little-endian), length (1), data. A decoded
+// frame is encoded again and must give the same bits. No two frames therefore mean the same, and no
+// frame is two messages.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

@@ -1,8 +1,14 @@
-// Any bytes as a line on a control socket, in both directions, which the first byte picks: a
-// message or an error, never more. What was read and is written again reads back the same; a
-// request becomes a command of units that exist, each once, with texts within their bounds, or is
-// refused with words. Or any bytes as a stream of lines, of which some are urgent: none is lost or
-// doubled, and whoever is overtaken says so. Or any bytes as a text for a terminal.
+// The first byte of the input picks one of three uses.
+//
+// Any bytes as a line on a control socket, in both directions, must give a message or an error,
+// never more. A value that was read and is written again reads back the same. A request becomes a
+// command of units that exist, each once, with texts within their bounds, or is refused with a
+// message.
+//
+// Any bytes as a stream of lines, of which some are urgent. None is lost or doubled, and each line
+// that was overtaken is marked so.
+//
+// Any bytes as a text for a terminal.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -44,7 +50,7 @@ void CheckUnits(const Command& command) {
         } else if constexpr (std::is_same_v<What, ApplyCommand>) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
         } else if constexpr (std::is_same_v<What, KeepModelCommand>) {
-          FOCALFLEET_CHECK(false);  // made by the request handler itself
+          FOCALFLEET_CHECK(false);  // the request handler makes it itself
         } else {
           exists(what.unit);
         }
@@ -88,7 +94,8 @@ void TryAnswer(std::string_view line) {
 
 bool IsUrgent(std::string_view line) { return line.starts_with('s'); }
 
-/// Pre: `text` is not empty; its first byte says in which pieces the rest comes.
+/// Pre: `text` is not empty; its first byte gives the sizes of the pieces in which the rest
+/// arrives.
 void TryStream(std::string_view text) {
   const std::size_t piece = 1 + static_cast<unsigned char>(text[0]) % 16;
   text.remove_prefix(1);
@@ -101,7 +108,7 @@ void TryStream(std::string_view text) {
       any_urgent = true;
       taken.push_back(std::move(*line));
     }
-    // Somebody takes a line now and then; by now all that are urgent have been taken.
+    // A line is taken now and then; by now all urgent lines have been taken.
     if (at / piece % 3 != 0) continue;
     if (auto line = buffer.Take()) {
       FOCALFLEET_CHECK(!IsUrgent(line->text) && (any_urgent || !line->overtaken));

@@ -1,5 +1,6 @@
-// Any bytes as one of the project's tables, which the first byte picks: a table or an error, never
-// more. What was read and is written again reads back with as many rows.
+// The input is any bytes as one of the project's tables, which the first byte picks. The result
+// must be a table or an error, never more. A table that was read and is written again reads back
+// with as many rows.
 #include <cstddef>
 #include <cstdint>
 #include <iterator>

@@ -1,7 +1,7 @@
-// A unit under a host that may say anything at any time, and whose power may go. Records of 12
-// bytes: what happens (1), how long after (1), function and address (2), data (8). Whatever comes,
-// the unit answers in well-formed frames of its own node, keeps its FLASH a possible one, and never
-// moves without the mark.
+// The test runs a unit under a host that may send anything at any time, and whose power may go. The
+// input is records of 12 bytes: event (1), delay (1), function and address (2), data (8). For any
+// input the unit answers in well-formed frames of its own node. Its FLASH stays a possible one, and
+// the unit never moves without the mark.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -81,7 +81,7 @@ void Run(const std::uint8_t* data, std::size_t size) {
       default:
         world.Inject({}, FrameOf(data), world.now());
     }
-    // From within one frame's time to beyond the host's time-out.
+    // Delays reach from within one frame's time to beyond the host's time-out.
     heard.clear();
     world.AdvanceTo(world.now() + Microseconds(200) * (std::int64_t{1} << data[1] % 17), &heard);
     CheckWorld(world, heard);

@@ -1,5 +1,6 @@
-// Drives one fuzz target without libFuzzer: first the committed corpus, then inputs of a seed, half
-// of them mutations of the corpus. `<name> CORPUS [RUNS]`; FOCALFLEET_SEED picks another seed.
+// This program drives one fuzz target without libFuzzer. The committed corpus comes first, then
+// inputs of a seed, half of them mutations of the corpus. `<name> CORPUS [RUNS]`; FOCALFLEET_SEED
+// picks another seed.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>

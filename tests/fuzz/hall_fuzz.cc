@@ -1,6 +1,7 @@
-// Any bytes as a file of a Hall rig by the first byte: field map, sensors, voltages, poses, model;
-// or as the counts of a unit's sensors: values that hold to all rules or an error that names the
-// file, never more. A model that was read is usable, and what is written of it is a model again.
+// The input is any bytes as a file of a Hall rig (field map, sensors, voltages, poses, model) or as
+// the counts of a unit's sensors. The first byte picks the kind. They must give values that obey
+// all rules or an error that names the file, never more. A model that was read is usable, and
+// writing it gives a model again.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,11 +1,11 @@
-// The coordinator under units that may say anything at any time, operators who may ask for
-// anything, links that come and go, and kill -9. Records of 12 bytes: what happens (1), to whom
-// (1), how long after (1), a number (1), data (8). Three puppets on two buses answer as units do
-// until they are told otherwise, so that a record may go wrong deep within a configuration.
-// Whatever comes:
+// The test runs the coordinator under units that may answer anything at any time and operators who
+// may ask for anything. Links come and go, and the host may be killed (kill -9). The input is
+// records of 12 bytes: event (1), unit or bus (1), delay (1), a number (1), data (8). Three simple
+// units on two buses answer correctly until a record changes that, so a record may go wrong deep
+// within a configuration. For any input:
 //
-//   every frame that it sends is well formed and for a unit that exists, or for all;
-//   a start is only said when the intent of every puppet that holds its move is durable;
+//   every frame that the coordinator sends is well formed and for a unit that exists, or for all;
+//   a start is only sent when the intent of every unit that holds its move is durable;
 //   it asks to be woken later than now, and never asks for ever in one instant.
 #include <array>
 #include <cstddef>
@@ -30,7 +30,7 @@ constexpr std::size_t kRecord = 12;
 constexpr std::size_t kRecordsMax = 60;
 constexpr std::uint32_t kUnits = 3;
 constexpr int kStepsPerRecord = 400;
-constexpr std::uint64_t kCommitSteps = 5;  // a start that does not wait for its intent is seen
+constexpr std::uint64_t kCommitSteps = 5;  // exposes a start before its durable intent
 
 Layout ThreeInARow() {
   std::vector<Unit> units(kUnits);
@@ -44,8 +44,8 @@ Layout ThreeInARow() {
   return Layout::Create(std::move(units), {}).value();
 }
 
-/// Says what a unit would say, and moves in no time.
-struct Puppet {
+/// Answers as a unit would, and moves in no time.
+struct FakeUnit {
   NodeId node;
   SerialNumber serial;
   Pose position{0, 20'000};
@@ -55,7 +55,7 @@ struct Puppet {
   bool interrupted = false;
   bool restarted = true;
   bool silent = false;
-  bool keeps_done = false;  // says nothing at the end of a motion
+  bool keeps_done = false;  // sends nothing at the end of a motion
   MoveId begun;
   StagedMove staged;
   std::uint8_t asked = 0;  // the last sequence number
@@ -137,55 +137,56 @@ struct Puppet {
   }
 };
 
-class Theatre {
+class Harness {
  public:
-  Theatre() : layout_(ThreeInARow()) {
+  Harness() : layout_(ThreeInARow()) {
     for (std::uint32_t n = 0; n < kUnits; ++n) {
-      puppets_[n].node = layout_.units()[n].node;
-      puppets_[n].serial = {100 + n};
+      fake_units_[n].node = layout_.units()[n].node;
+      fake_units_[n].serial = {100 + n};
     }
     Restart();
     Pass(Milliseconds(200));
   }
 
   void Do(const std::uint8_t* record) {
-    const std::uint32_t who = record[1] % kUnits;
+    const std::uint32_t index = record[1] % kUnits;
     switch (record[0] % 12) {
       case 0:
-        SayAnything(who, record);
+        SayAnything(index, record);
         break;
       case 1:
-        SayAnAnswer(who, record);
+        SayAnAnswer(index, record);
         break;
       case 2:
         Order(ApplyCommand{"fuzz", Targets(record), (record[3] & 1u) != 0});
         break;
       case 3:
-        Order(record[3] % 2 == 0 ? StopCommand{} : StopCommand{PositionerIndex{who}});
+        Order(record[3] % 2 == 0 ? StopCommand{} : StopCommand{PositionerIndex{index}});
         break;
       case 4:
-        Order(HomeCommand{{{who}}, (record[3] & 1u) != 0});
+        Order(HomeCommand{{{index}}, (record[3] & 1u) != 0});
         break;
       case 5:
-        Order(EnableCommand{{{who}}, (record[3] & 1u) != 0, "fuzz"});
+        Order(EnableCommand{{{index}}, (record[3] & 1u) != 0, "fuzz"});
         break;
       case 6:
-        Order(AdoptCommand{{who}});
+        Order(AdoptCommand{{index}});
         break;
       case 7:
-        Order(WriteParameterCommand{{who},
+        Order(WriteParameterCommand{{index},
                                     static_cast<Axis>(record[3] % 2),
                                     static_cast<Parameter>(record[4] % kParameterCount),
                                     record[5] * 64});
         break;
       case 8:
-        Order(RetargetCommand{{who}, *Targets(record)[who]});
+        Order(RetargetCommand{{index}, *Targets(record)[index]});
         break;
       case 9:
-        Misbehave(&puppets_[who], record);
+        Misbehave(&fake_units_[index], record);
         break;
       case 10:
-        links_.push_back({layout_.units()[who].bus, static_cast<LinkState>(record[3] % 4), "fuzz"});
+        links_.push_back(
+            {layout_.units()[index].bus, static_cast<LinkState>(record[3] % 4), "fuzz"});
         break;
       default:
         if (record[3] % 4 == 0)
@@ -221,57 +222,57 @@ class Theatre {
     return targets;
   }
 
-  void Misbehave(Puppet* puppet, const std::uint8_t* record) {
+  void Misbehave(FakeUnit* fake_unit, const std::uint8_t* record) {
     switch (record[3] % 8) {
       case 0:
-        puppet->silent = !puppet->silent;
+        fake_unit->silent = !fake_unit->silent;
         break;
       case 1:
-        puppet->serial = {100u + record[4] % 5};
+        fake_unit->serial = {100u + record[4] % 5};
         break;
       case 2:
-        puppet->interrupted = puppet->restarted = true;
-        puppet->state = UnitState::kRest;
+        fake_unit->interrupted = fake_unit->restarted = true;
+        fake_unit->state = UnitState::kRest;
         break;
       case 3:
-        puppet->position[record[4] % 2] += record[5] - 128;
+        fake_unit->position[record[4] % 2] += record[5] - 128;
         break;
       case 4:
-        puppet->state = static_cast<UnitState>(record[4] % kUnitStateCount);
+        fake_unit->state = static_cast<UnitState>(record[4] % kUnitStateCount);
         break;
       case 5:
-        puppet->keeps_done = !puppet->keeps_done;
+        fake_unit->keeps_done = !fake_unit->keeps_done;
         break;
       case 6:
-        puppet->subdivision = record[4] % 2 == 0 ? 96 : 192;
+        fake_unit->subdivision = record[4] % 2 == 0 ? 96 : 192;
         break;
       default:
-        puppet->counter1 = 400 + record[4];
+        fake_unit->counter1 = 400 + record[4];
     }
   }
 
-  /// Any identifier bits and bytes, on any bus.
-  void SayAnything(std::uint32_t who, const std::uint8_t* record) {
+  /// Sends any identifier bits and bytes, on any bus.
+  void SayAnything(std::uint32_t index, const std::uint8_t* record) {
     CanFrame frame;
     std::memcpy(&frame.id, record + 4, 4);
     frame.id &= kCanIdMax;
     frame.length = record[3] % 9;
     std::memcpy(frame.data.data(), record + 4, 8);
-    heard_.push_back({layout_.units()[who].bus, now_, frame});
+    heard_.push_back({layout_.units()[index].bus, now_, frame});
   }
-  /// A function's own form, with the sequence number that the host waits for, and any bytes.
-  void SayAnAnswer(std::uint32_t who, const std::uint8_t* record) {
+  /// Sends a function's own form, with the sequence number that the host waits for, and any bytes.
+  void SayAnAnswer(std::uint32_t index, const std::uint8_t* record) {
     const auto function = static_cast<Function>(record[3] % kFunctionCount);
-    const std::uint8_t sequence = (record[3] & 0x40u) != 0 ? 0 : puppets_[who].asked;
+    const std::uint8_t sequence = (record[3] & 0x40u) != 0 ? 0 : fake_units_[index].asked;
     constexpr std::uint8_t kLengths[] = {0, 5, 8, 4, 3, 5, 8, 8, 3, 8, 8, 8, 6, 8, 6, 6};
     CanFrame frame{Pack({function,
                          true,
-                         {puppets_[who].node, sequence},
+                         {fake_units_[index].node, sequence},
                          static_cast<std::uint8_t>(record[3] >> 4 & 3u)}),
                    kLengths[static_cast<std::size_t>(function) % std::size(kLengths)],
                    {}};
     std::memcpy(frame.data.data(), record + 4, frame.length);
-    heard_.push_back({layout_.units()[who].bus, now_, frame});
+    heard_.push_back({layout_.units()[index].bus, now_, frame});
   }
 
   void Pass(DurationNs time) {
@@ -327,26 +328,26 @@ class Theatre {
     FOCALFLEET_CHECK(node == kBroadcastNode || layout_.Find(out.bus, node));
     if (const auto* start = std::get_if<Start>(&message->message)) CheckIntents(out.bus, *start);
     for (std::uint32_t n = 0; n < kUnits; ++n) {
-      Puppet& puppet = puppets_[n];
-      if (layout_.units()[n].bus != out.bus || (node != kBroadcastNode && node != puppet.node))
+      FakeUnit& fake_unit = fake_units_[n];
+      if (layout_.units()[n].bus != out.bus || (node != kBroadcastNode && node != fake_unit.node))
         continue;
-      if (node != kBroadcastNode) puppet.asked = message->address.sequence;
-      for (const UnitMessage& answer : puppet.Hear(message->message)) {
+      if (node != kBroadcastNode) fake_unit.asked = message->address.sequence;
+      for (const UnitMessage& answer : fake_unit.Hear(message->message)) {
         const bool unasked = std::holds_alternative<Start>(message->message) ||
                              (std::holds_alternative<Home>(message->message) &&
                               std::holds_alternative<Done>(answer));
         const std::uint8_t sequence = unasked ? std::uint8_t{0} : message->address.sequence;
-        if (!puppet.silent)
-          heard_.push_back({out.bus, now_, Encode(answer, {puppet.node, sequence})});
+        if (!fake_unit.silent)
+          heard_.push_back({out.bus, now_, Encode(answer, {fake_unit.node, sequence})});
       }
     }
   }
 
   void CheckIntents(BusId bus, const Start& start) const {
     for (std::uint32_t n = 0; n < kUnits; ++n) {
-      const Puppet& puppet = puppets_[n];
-      if (layout_.units()[n].bus != bus || puppet.state != UnitState::kArmed ||
-          puppet.staged.move != start.move)
+      const FakeUnit& fake_unit = fake_units_[n];
+      if (layout_.units()[n].bus != bus || fake_unit.state != UnitState::kArmed ||
+          fake_unit.staged.move != start.move)
         continue;
       bool durable = false;
       for (const IntentRow& intent : store_.begun)
@@ -356,7 +357,7 @@ class Theatre {
   }
 
   Layout layout_;
-  std::array<Puppet, kUnits> puppets_;
+  std::array<FakeUnit, kUnits> fake_units_;
   std::unique_ptr<Coordinator> coordinator_;
   testing::MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
@@ -383,9 +384,9 @@ class Theatre {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using focalfleet::kRecord;
-  focalfleet::Theatre theatre;
+  focalfleet::Harness harness;
   for (std::size_t i = 0; i < focalfleet::kRecordsMax && size >= kRecord;
        ++i, data += kRecord, size -= kRecord)
-    theatre.Do(data);
+    harness.Do(data);
   return 0;
 }

@@ -1,6 +1,6 @@
-// Any bytes as the kernel's answer about a CAN interface: a link, an acknowledgement or the reason
-// why not. Whatever is claimed about lengths, nothing is read past the end (the sanitizers see to
-// it), and what is told stands in bounds.
+// The input is any bytes as the kernel's answer about a CAN interface. They must give a link, an
+// acknowledgement or a reason. Whatever lengths the answer claims, nothing is read past the end
+// (the sanitizers check that), and all values stand in bounds.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

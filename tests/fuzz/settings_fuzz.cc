@@ -1,6 +1,6 @@
-// Any bytes as the daemon's configuration or as the memory file of a simulation, which the first
-// byte picks: values or an error that names the file. What is taken and written again reads back
-// the same.
+// The input is any bytes as the daemon's configuration or as the memory file of a simulation, which
+// the first byte picks. They must give values or an error that names the file. Values that are
+// written again read back the same.
 #include <cstddef>
 #include <cstdint>
 #include <string>

@@ -1,7 +1,7 @@
-// Any bytes as what a socket hands over as a frame: taken only where it is a 29-bit data frame,
-// with nothing past its length, and then the same again on its way back. The same bytes as a
-// controller's error frame: a state or none, and causes in words. The first of them as a CAN FD
-// frame.
+// The input is any bytes as a frame from a socket. A frame is accepted only where it is a 29-bit
+// data frame with nothing past its length. On its way back it is the same. The same bytes are also
+// read as a controller's error frame: a state or none, and causes in words. The first bytes are
+// also read as a CAN FD frame.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

@@ -1,6 +1,7 @@
-// Any bytes as one exposure of the camera, as CSV or as whatever lies in the camera's folder by the
-// first byte, or as the fiducials' table: an exposure that holds to all rules or an error that
-// names the file, never more. What was read and is written again reads back the same.
+// The first byte of the input picks the use. Any bytes are read as one exposure of the camera, as
+// CSV or as a file in the camera's folder, or as the fiducials' table. They must give an exposure
+// that obeys all rules or an error that names the file, never more. An exposure that was read and
+// is written again reads back the same.
 #include <unistd.h>
 
 #include <cstddef>
@@ -20,7 +21,7 @@ namespace {
 
 constexpr SensorLimits kSensor{11'000, 11'000};
 
-/// On a file system in memory where there is one; gone when the process ends.
+/// A folder on a file system in memory where there is one; gone when the process ends.
 class Scratch {
  public:
   Scratch() {
@@ -55,7 +56,7 @@ void TryCsv(std::string_view text) {
   ExpectSame(*exposure, ReadSpots(WriteSpots(*exposure), "again.csv", kSensor));
 }
 
-/// FITS, or whatever a camera may hand over, packed by gzip, too.
+/// Tries bytes as FITS, or as any file of a camera, packed by gzip, too.
 void TryBytes(std::string_view bytes) {
   static const Scratch scratch;
   const auto exposure = ParseExposure(std::string(bytes), "in.fits", kSensor);

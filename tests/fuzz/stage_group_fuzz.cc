@@ -1,5 +1,5 @@
-// Any bytes as a CAN FD frame: identifier (4, little-endian), length (1), data. What is a group is
-// put together again from its entries and must give the same bits.
+// The input is any bytes as a CAN FD frame: identifier (4, little-endian), length (1), data. A
+// valid group is put together again from its entries and must give the same bits.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>

@@ -1,12 +1,12 @@
-// The unit's side of the protocol alone, as a board would run it, under a host that may say
-// anything at any time and a power supply that may go at any time. Records of 12 bytes: what
-// happens (1), how long after (1), function and address (1), length and sequence (1), data (8).
-// Staging frames may come in CAN FD groups. Whatever comes:
+// The test runs the unit's side of the protocol alone, as a board would run it. The host may send
+// anything at any time, and the power supply may go at any time. The input is records of 12 bytes:
+// event (1), delay (1), function and address (1), length and sequence (1), data (8). Staging frames
+// may come in CAN FD groups. For any input the unit obeys these rules:
 //
 //   it answers in well-formed frames of its own node, an addressed request at most once, with that
 //   request's sequence number;
 //   it runs a motor only with the mark kept in FLASH, and no move twice in a row;
-//   what it wakes up with after a power cut is a possible FLASH, and a cut in motion is told.
+//   its FLASH after a power cut is a possible one, and a cut in motion is reported.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -63,12 +63,13 @@ class Bench {
     }
     CheckAll();
   }
-  /// Frames for a group; one that no group carries comes alone, as a port would send it.
+  /// Collects frames for a group; a frame that no group carries comes alone, as a port would send
+  /// it.
   void Collect(const CanFrame& frame) {
     if (!CanBeGrouped(frame)) return Give(frame);
     if (collected_.size() < kGroupEntriesMax) collected_.push_back(frame);
   }
-  /// What was collected; any bytes where nothing was.
+  /// Delivers the collected frames as a group; any bytes where there are none.
   void GiveGroup(std::span<const std::uint8_t> bytes) {
     FdFrame group{.id = kGroupId};
     if (collected_.empty()) {
@@ -90,7 +91,7 @@ class Bench {
     }
     CheckAll();
   }
-  /// What an honest host does: reads back, then arms by the digest that it read.
+  /// Acts as an honest host: reads back, then arms by the digest that it read.
   void ArmWhatIsHeld(MoveId move) {
     TransmitQueue out;
     machine_.OnFrame(Encode(HostMessage{Confirm{move}}, {kNode, 3}), now_, &out);
@@ -99,7 +100,7 @@ class Bench {
     const auto& confirm = std::get<ConfirmReply>(reply->message);
     Give(Encode(HostMessage{Arm{move, confirm.digest}}, {kNode, 4}));
   }
-  /// To the deadline where one comes within `pause`.
+  /// Lets time pass by `pause`, or to the deadline where that comes first.
   void Pass(DurationNs pause) {
     const BoardInstant until = now_ + pause;
     for (int i = 0; i < 8 && machine_.deadline() <= until; ++i) {
@@ -125,7 +126,7 @@ class Bench {
     const bool ran = machine_.runs();
     machine_.PowerOff();
     for (Motor& motor : motor_) motor = {.to = motor.At(now_)};
-    flash_ = kept_;  // the RAM is gone
+    flash_ = kept_;  // the RAM is lost
     FOCALFLEET_CHECK(!ran || flash_.moving);
   }
   void PowerOn() {
@@ -259,7 +260,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       default:
         bench.Give(sim::FrameOf(data));
     }
-    // From at once to beyond the host's time-out.
+    // Delays reach from none to beyond the host's time-out.
     if (data[1] % 18 != 0)
       bench.Pass(focalfleet::Microseconds(100) * (std::int64_t{1} << (data[1] % 18)));
   }

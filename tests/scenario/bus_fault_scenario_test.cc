@@ -1,6 +1,6 @@
-// Configurations while a bus is disturbed by the standard's rules: noise, a babbling unit, a wire
-// stuck dominant, the host's controller off. Units end in a truthful state, all others arrive, and
-// when it is over the bus' units are served again.
+// These tests run configurations while a bus is disturbed by the standard's rules: noise, a
+// babbling unit, a wire stuck dominant, the host's controller off. Units end in a truthful state,
+// and all others arrive. When the disturbance is over the bus' units are served again.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ std::uint64_t ErrorFrames(InProcessFleet* fleet) {
   return sum;
 }
 
-// Nothing that is known is wrong, and who is not on `sick` has arrived.
+// Expects that no knowledge is wrong, and that each unit outside `sick` has arrived.
 void ExpectOnlyTheSickBusSuffers(InProcessFleet* fleet, BusId sick) {
   fleet->Run(Milliseconds(100));  // the last batch becomes durable
   fleet->ExpectStoreTellsTheTruth("at the end");
@@ -38,7 +38,7 @@ void ExpectOnlyTheSickBusSuffers(InProcessFleet* fleet, BusId sick) {
       EXPECT_NE(view.outcome, TargetOutcome::kPending) << n;
       continue;
     }
-    // Where one of the sick bus stands in the way, a refusal with its reason is the truth.
+    // Where a unit of the sick bus stands in the way, a refusal with its reason is the truth.
     EXPECT_TRUE(view.outcome == TargetOutcome::kArrived || view.outcome == TargetOutcome::kRefused)
         << n << " " << view.outcome_reason;
   }
@@ -104,12 +104,12 @@ TEST(BusFaults, BusOffInMidMotionIsReportedWithItsCauseAndTheBusComesBack) {
       [&] { return fleet.coordinator().configuration().state == ConfigurationState::kMoving; },
       Seconds(60)));
   fleet.Run(Seconds(1));
-  // A bus on which hardly a frame survives: the counters do the rest.
+  // Hardly a frame survives on this bus; the controllers' error counters do the rest.
   fleet.world().faults(sick)->bit_error_rate = 0.05;
   const auto state = [&] { return fleet.coordinator().bus(sick).link; };
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kPassive; }, Seconds(20)));
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kOff; }, Seconds(20)));
-  fleet.Run(Milliseconds(20));  // it becomes durable
+  fleet.Run(Milliseconds(20));  // the row becomes durable
   const std::string name = "bus " + std::to_string(sick.value);
   for (const std::string& part :
        {name + ": the controller warns of errors (", name + " is passive: the controller is error-",
@@ -142,7 +142,7 @@ TEST(BusFaults, AWireStuckDominantLosesItsUnitsAndNoTruth) {
   }
 }
 
-// The same, by the clock of a plan: two runs of one seed are one run.
+// The same disturbance by the clock of a plan: two runs of one seed are equal.
 TEST(BusFaults, APlanOfFaultsGivesTheSameRunTwice) {
   const auto run = [](std::uint64_t seed) {
     InProcessFleet::Options options{.count = kUnits, .seed = seed};

@@ -1,5 +1,5 @@
-// A host that is held up, now here, now there: what is said of units' clocks and starts beside what
-// is true. A pause makes what is known wider, and never wrong.
+// These tests hold the host up at random instants. They compare what it reports on units' clocks
+// and starts with the truth. A pause makes the known intervals wider, and never wrong.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using ::testing::Not;
 
 const double kClockLimit = PlanOptions{}.clock_error;
 
-/// What an alarm says of clocks or starts.
+/// The alarms on clocks or starts.
 std::vector<std::string> AlarmsOfTime(InProcessFleet& fleet) {
   std::vector<std::string> texts;
   for (const AlarmRow& alarm : fleet.store().alarms)
@@ -39,7 +39,7 @@ void ExpectClocksWithinTheirBounds(InProcessFleet* fleet) {
   }
 }
 
-/// From the first start of this move to the last.
+/// The time from the first start of this move to the last.
 double TrueSkew_s(const InProcessFleet& fleet, MoveId move) {
   HostInstant first = kNever;
   HostInstant last{INT64_MIN};
@@ -80,7 +80,7 @@ TEST(BusyHost, WhatItSaysOfClocksAndStartsIsTrueWhereverItIsHeldUp) {
     go_on([&] { return !fleet.coordinator().busy(); });
     fleet.Run(Seconds(1));
     const StartView& said = fleet.coordinator().configuration().starts;
-    // Of several rounds the widest is told; the last one is at hand.
+    // The host reports the widest of several rounds; the truth at hand is that of the last round.
     if (fleet.coordinator().configuration().round == said.round && said.reported == said.begun) {
       const double true_s = TrueSkew_s(fleet, fleet.world().Truth(0).last_move);
       EXPECT_LE(said.least_s, true_s + 1e-9);
@@ -108,7 +108,7 @@ TEST(BusyHost, APauseBetweenAQuestionAndItsSendingWidensTheReading) {
   EXPECT_THAT(AlarmsOfTime(fleet), ::testing::IsEmpty());
 }
 
-// With others that are as far off as they may be.
+// The other units' clocks are off by as much as the limit allows.
 TEST(BusyHost, ClocksThatAreOffByOnePercentAreNamedAndNoOtherOnes) {
   const std::uint64_t seed = TestSeed(83);
   InProcessFleet fleet({.count = 19,
@@ -170,8 +170,8 @@ TEST(BusyHost, OtherHardwareHasAnotherClock) {
   EXPECT_EQ(fleet.coordinator().unit({2}).clock.readings, 1u);
 }
 
-// What came while the host was held up on its way to the socket did not come within the second that
-// ends before.
+// Frames that arrived while the host was held up before reading the socket do not count for the
+// second that ended before.
 TEST(BusyHost, ABusIsNotBusierThanItCanBe) {
   InProcessFleet fleet({.count = 7, .units_per_bus = 7, .seed = TestSeed(87)});
   fleet.Run(Milliseconds(1500));
@@ -185,7 +185,8 @@ TEST(BusyHost, ABusIsNotBusierThanItCanBe) {
   EXPECT_LE(fleet.coordinator().bus(unit.bus).load_max, 1);
 }
 
-// A bus of 100 units takes some horizons to be asked: the last ones' questions wait for their turn.
+// Asking a bus of 100 units takes several horizons, so the last units' questions wait for their
+// turn.
 TEST(BusyHost, AnAnswerToAQuestionThatHasNotLeftAnswersNone) {
   InProcessFleet fleet({.count = 100, .units_per_bus = 100, .seed = TestSeed(86)});
   const PositionerIndex last{99};

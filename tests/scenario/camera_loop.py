@@ -1,4 +1,4 @@
-"""What camera-loop's files say, held against the store and the truth, by readers that are not ours."""
+"""Compares camera-loop's files with the store and the truth, by readers from outside the project."""
 import csv
 import json
 import math
@@ -21,7 +21,7 @@ def fibres(fits, truth_file, store, summary_file):
         assert row["UNIT_ID"] == unit
         assert row["STATUS_BITS"] == 1 << status, (unit, row["STATUS"], status)
         if row["STATUS"].strip() in ("measured", "did_not_move"):
-            # To the bit: what the store has is what the pipeline gets.
+            # The pipeline must get the store's values to the bit.
             assert (row["X_MM"], row["Y_MM"]) == (x, y), unit
             assert (row["TARGET_X_MM"], row["TARGET_Y_MM"]) == (target_x, target_y), unit
             assert row["ERROR_UM"] == error, unit

@@ -1,4 +1,4 @@
-"""Whether blind moves through a model err as little as its diagnosis said; by a reader that is not ours."""
+"""Tests that blind moves through a model err as little as its diagnosis predicted, by an independent reader."""
 import csv
 import json
 import math
@@ -11,7 +11,7 @@ def rms(values):
 
 
 def blind_errors_um(folder):
-    """How far fibres are from where the described geometry has their commands."""
+    """Distances of the fibres from their commanded positions by the described geometry."""
     with open(f"{folder}/units.csv", newline="") as text:
         units = {int(row["unit_id"]): row for row in csv.DictReader(text)}
     errors = []
@@ -30,7 +30,8 @@ def blind_errors_um(folder):
 
 planted = sys.argv[1]
 before = rms(blind_errors_um("blind"))
-# Of three moves the middle one: where a busy machine lets a unit start late, it is planned anew and may come from its other side.
+# The middle one of three moves counts. On a busy machine a unit may start late; it is planned anew and may come from its other
+# side.
 achieved = statistics.median(json.load(open(f"apply{move}.json"))["measured"][0]["rms_um"] for move in (1, 2, 3))
 with open("report/report.json") as text:
     report = json.load(text)
@@ -52,7 +53,7 @@ with open("one.json") as text:
     one = json.load(text)
 makespan_s, energy_J = told("estimate.json")
 assert makespan_s == one["makespan_predicted_s"], (makespan_s, one)
-assert math.isclose(energy_J, one["energy_J"], rel_tol=1e-6), (energy_J, one)  # summed another way
+assert math.isclose(energy_J, one["energy_J"], rel_tol=1e-6), (energy_J, one)  # summed in another order
 assert told("nominal.json") != told("estimate.json"), told("nominal.json")
 assert achieved < 0.5 * before, (before, achieved)
 assert achieved < 1.3 * predicted + 2, (predicted, achieved)

@@ -1,5 +1,5 @@
-// A configuration from command to rest on the in-process fleet: all well, and one thing wrong at a
-// time.
+// These tests run a configuration from command to rest on the in-process fleet: without a fault,
+// and with one fault at a time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -104,7 +104,7 @@ TEST(Configuration, SilentUnitIsNamedAndTheOthersArrive) {
   EXPECT_EQ(view.phase, UnitPhase::kSilent);
   EXPECT_NE(view.outcome_reason, "");
   EXPECT_TRUE(HasAlarm(fleet, "unit 5 does not answer"));
-  ExpectOthersArrive(&fleet, 4);  // its neighbours' targets may be blocked by where it stands
+  ExpectOthersArrive(&fleet, 4);  // its position may block its neighbours' targets
 }
 
 TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
@@ -114,7 +114,7 @@ TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({0}).outcome, TargetOutcome::kFailed);
   EXPECT_EQ(fleet.coordinator().unit({0}).phase, UnitPhase::kAbsent);
-  // Nobody knows where it stands, so its six neighbours keep out of its whole reach.
+  // Its position is not known, so its six neighbours keep out of its whole reach.
   EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
 }
 
@@ -305,7 +305,8 @@ TEST(Configuration, EveryStepOfALinkIsReportedWithItsCauseAndOnlyOffLosesUnits) 
   ExpectOthersArrive(&fleet, 0);
 }
 
-// Its units hear the host's clock through a passive controller, or they would give the host up.
+// The bus' units hear the host's clock through a passive controller; otherwise they would give the
+// host up.
 TEST(Configuration, UnitsBehindAPassiveControllerKeepTheirHost) {
   InProcessFleet fleet(Small(24));
   fleet.Run(Seconds(2));
@@ -336,7 +337,7 @@ TEST(Configuration, PowerCutInMidMoveLeavesAnIntervalThatHoldsTheTruth) {
   EXPECT_EQ(view.phase, UnitPhase::kReady);
   fleet.ExpectStoreTellsTheTruth("after the power cut");
 
-  // It is refused by name until it is homed, and then it arrives.
+  // The unit is refused by name until it is homed, and then it arrives.
   fleet.ApplyRandom(22);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit(victim).outcome, TargetOutcome::kRefused);
@@ -395,7 +396,8 @@ TEST(Configuration, StopOfOneUnitLetsTheOthersArrive) {
   ExpectOthersArrive(&fleet, 4);
 }
 
-// One unit's homing, cut at `ms` by somebody; a place may only be claimed where it was homed.
+// Cuts the homing of a unit after `ms` by `cut`. A position may only be claimed where the unit was
+// homed.
 void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*)>& cut) {
   const std::string when = std::to_string(ms) + " ms";
   InProcessFleet fleet(Small(40));
@@ -414,7 +416,7 @@ void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*
   EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
   fleet.ExpectStoreTellsTheTruth(when);
-  // It is homed again, and then it is known.
+  // The unit is homed again, and then its position is known.
   fleet.Send({901, EnableCommand{{{4}}}});
   fleet.Run(Seconds(2));
   fleet.Send({902, HomeCommand{{{4}}, true}});
@@ -440,7 +442,7 @@ TEST(Configuration, CutHomingIsNotAPlace) {
   }
 }
 
-// With the coordinator dead the unit's own mark decides what its vectors are worth.
+// With the coordinator dead the unit's own mark decides how far its vectors are trusted.
 TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
   for (const int ms : {100, 1000, 20'000, 45'000}) {
     for (const bool stopped : {false, true}) {
@@ -460,7 +462,8 @@ TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
   }
 }
 
-// It has ended, everybody stands at a known place, and nobody moves before the next apply.
+// Expects that the configuration has ended, that all units stand at known positions, and that none
+// moves before the next apply.
 void ExpectStoppedForGood(InProcessFleet* fleet, const std::string& when) {
   ASSERT_TRUE(fleet->RunUntilIdle(Seconds(20))) << when;
   EXPECT_EQ(fleet->coordinator().configuration().state, ConfigurationState::kStopped) << when;
@@ -508,7 +511,7 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
   }
 }
 
-// Answers that come late or twice, to stops of ours of which there may be several.
+// Late or repeated answers to stops of this host, of which there may be several.
 TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
   for (std::uint64_t seed = testing::TestSeed(60); seed < testing::TestSeed(60) + 30; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
@@ -600,7 +603,7 @@ TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
               std::string::npos);
     EXPECT_EQ(fleet.world().Truth(std::size_t{5}).moves_begun, 0u);
     EXPECT_TRUE(HasAlarm(fleet, "unit 6 answers with serial number 0"));
-    // Programmed again, it is one like the others.
+    // Programmed again, the unit is like the others.
     fleet.world().faults(fleet.id(5))->foreign_serial.reset();
     fleet.Run(Seconds(5));
     EXPECT_EQ(fleet.coordinator().unit({5}).phase, UnitPhase::kReady);
@@ -620,7 +623,7 @@ TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
   EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
   EXPECT_TRUE(HasAlarm(fleet, "the store refuses the intent of serial"));
   ExpectOthersArrive(&fleet, 4);
-  // It stays out until somebody says that it is mended.
+  // The unit stays out until an operator reports that it is repaired.
   fleet.refuse = nullptr;
   fleet.Run(Seconds(30));
   EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
@@ -764,7 +767,7 @@ TEST(Configuration, WritingItsPositionMakesAUnitKnown) {
   fleet.Run(Seconds(15));
   const UnitView& view = fleet.coordinator().unit(one);
   ASSERT_FALSE(IsPlace(view.knowledge));
-  // The unit takes the nearest place that shows its vector, and that is what the store is told.
+  // The unit takes the nearest position that shows its vector, and the store records that position.
   const Pose seen = fleet.TruePoses()[one.value];
   for (const Axis axis : kAxes) {
     const auto reply = Write(&fleet, {one, axis, Parameter::kPosition, seen[Index(axis)] + 7});
@@ -822,8 +825,9 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
     if (!lost.empty()) {
       fleet.Send({903, HomeCommand{lost}});
       ASSERT_TRUE(fleet.RunUntilIdle());
-      // With the coordinator dead nobody was held back for it: a neighbour may stand where it may
-      // stand, and then no way home can be proven. That is said, and left to the operator.
+      // With the coordinator dead no unit was kept away from it: a neighbour may stand inside its
+      // interval. No way home can be proven then. The coordinator reports that and leaves the
+      // decision to the operator.
       if (fleet.CountOutcome(TargetOutcome::kArrived) != lost.size()) {
         ++unproven;
         fleet.Send({904, HomeCommand{lost, true}});

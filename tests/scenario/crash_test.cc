@@ -1,7 +1,8 @@
-// kill -9 of the real daemon at random instants of a configuration, with the simulated fleet living
-// on, and power cuts of units in mid-move. After each restart, when every unit has come to rest:
-// the true shaft angle lies in what SQLite says; only units that lost power are not known; no move
-// began twice; and the configuration can be completed.
+// These tests kill the real daemon (kill -9) at random instants of a configuration while the
+// simulated fleet lives on. They also cut the power of units in mid-move. After each restart every
+// unit comes to rest, and four facts are checked. The true shaft angle lies in what SQLite holds.
+// Only units that lost power are not known. No move began twice. The configuration can be
+// completed.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,7 +36,8 @@ constexpr int kSpeed = 30;
 constexpr double kSpanRealMs = 90'000.0 / kSpeed;
 constexpr int kPatienceMs = 60'000;
 // The rotor rests behind the field by the angle whose sine is load over stall torque: 15 degrees of
-// 360, 4 of 96 vectors. The rest is for rounding; what a cut motion adds is in the interval.
+// 360, 4 of 96 vectors. The remaining 2 are for rounding; the interval contains the effect of a cut
+// motion.
 constexpr double kLagVectorsMax = 6;
 
 struct Truth {
@@ -56,7 +58,8 @@ class Observatory {
     const auto start = DrawConfiguration(layout_, drives_, {}, Rng::Stream(seed, "start"));
     Write("state.csv", WriteState(layout_, drives_,
                                   std::vector<std::optional<Pose>>(start->begin(), start->end())));
-    // Deadlines are of the fleet's time; what real processes need does not shrink with it.
+    // Deadlines are in the fleet's time, but the time that real processes need does not shrink with
+    // it.
     Write("focalfleet.toml",
           "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
           "[control]\nsocket = \"daemon.sock\"\n[dds]\nenabled = false\n"
@@ -141,7 +144,7 @@ class Observatory {
              return entry.second.state == "moving" || entry.second.state == "homing";
            });
   }
-  /// Everybody rests, has been read anew, and the last batch is durable.
+  /// True when all units rest, have been read anew, and the last batch is durable.
   bool Settled() {
     const auto reader = StoreReader::Open(Path("fleet.db"));
     const auto stored = reader ? (*reader)->Load() : tl::unexpected<Error>(reader.error());
@@ -187,7 +190,7 @@ class Observatory {
   std::optional<Process> daemon_;
 };
 
-// What SQLite says of every unit, held against the truth. Returns the units whose place is not
+// Compares SQLite's record of every unit with the truth. Returns the units whose position is not
 // known.
 std::set<std::uint32_t> ExpectStoreTellsTheTruth(Observatory* observatory) {
   std::set<std::uint32_t> not_known;
@@ -265,8 +268,8 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
       static_cast<void>(observatory.Ask("home", {{"not_known", true}, {"wait", true}}));
       ASSERT_TRUE(WaitUntil([&] { return observatory.Settled(); }, kPatienceMs));
       if (!ExpectStoreTellsTheTruth(&observatory).empty()) {
-        // Nobody was held back while the daemon was dead: no way home can be proven; the operator
-        // decides.
+        // No unit was held back while the daemon was dead, so no way home can be proven; the
+        // operator decides.
         ++unproven;
         ASSERT_TRUE(
             observatory.Ask("home", {{"not_known", true}, {"unproven", true}, {"wait", true}}));
@@ -278,8 +281,8 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
     auto completed = observatory.Ask("apply", all);
     ASSERT_TRUE(completed) << completed.error().text;
     if (completed->value("arrived", 0u) != kUnits) {
-      // Arms that got entangled while nobody watched: those that find no way are homed on the
-      // operator's word.
+      // Arms may have got entangled without supervision: units without a way are homed at the
+      // operator's command.
       ++entangled;
       std::vector<std::uint32_t> blocked;
       for (const Json& unit : completed->value("unserved", Json::array()))

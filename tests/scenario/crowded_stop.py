@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""crowded_stop.py BIN [--units N] [--stops K]: how long `stop` takes on the control socket of a daemon that many others ask. A real
-focalfleetd with a simulated fleet in it; the others are a process of their own and ask again as soon as they are answered. Prints
-the times of K stops on a connection of their own beside each crowd. The exit code is 1 where one was not answered."""
+"""crowded_stop.py BIN [--units N] [--stops K]: measures how long `stop` takes on the control socket of a daemon that many clients
+ask. The daemon is a real focalfleetd with a simulated fleet in it. The clients are a process of their own and ask again as soon as they
+are answered. The program prints the times of K stops on a connection of their own beside each crowd of clients. The exit code is 1
+where a stop was not answered."""
 
 import argparse
 import json
@@ -68,7 +69,7 @@ def be_crowd(path, count, verb):
         for number, _ in ready.poll():
             said = ends[number].recv(1 << 20)
             if not said:
-                ready.unregister(number)  # it made room
+                ready.unregister(number)  # the daemon dropped it to make room
             elif verb and said.endswith(b"\n"):
                 send(ends[number], verb)
 

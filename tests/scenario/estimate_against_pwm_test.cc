@@ -1,7 +1,7 @@
-// The coordinator's estimate of a motor's power against the simulation at PWM level: two
-// derivations of one circuit that share no line. 200 random operating points: every one that turns
-// must be within 2 % of mean supply power, and what stalls in one must stall in the other.
-// docs/physics.md has the table of these errors.
+// These tests compare the coordinator's estimate of a motor's power with the simulation at PWM
+// level: two derivations of one circuit that share no line. They use 200 random operating points.
+// Every point that turns must be within 2 % of mean supply power. A point that stalls in one must
+// stall in the other. docs/physics.md has the table of these errors.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -43,7 +43,7 @@ Point Draw(Rng* rng) {
                           .dead_time_s = rng->Uniform(0, 100e-9)};
   const std::uint16_t subdivision = kSubdivisions[rng->Below(kSubdivisions.size())];
   const std::uint16_t counter1 = kCounters[rng->Below(kCounters.size())];
-  // A vector table of this length at 8 to 120 carriers of 500 counts and 96 vectors.
+  // The duration of a vector at 8 to 120 carriers of 500 counts and 96 vectors.
   const double vector_s =
       std::exp(rng->Uniform(std::log(8.0), std::log(120.0))) * 500 / 144e6 * 96 / subdivision;
   const auto repeat =
@@ -87,7 +87,7 @@ TEST(EstimateAgainstPwm, MeanPowerIsWithinTwoPercentAt200RandomPoints) {
     Errors& errors = by_mode[static_cast<std::size_t>(point.feed.mode)];
     if (!state || estimate.stalled) {
       ++errors.stalled;
-      // At the edge of pull-out a hair decides.
+      // At the edge of pull-out the smallest difference decides.
       const double share = sim::PullOutTorque(point.setting, point.modulation) /
                            (point.setting.motor.load_Nm +
                             point.setting.motor.viscous_Nms * SpeedRadPerS(point.feed.drive));
@@ -138,8 +138,8 @@ TEST(EstimateAgainstPwm, TimeOfAMoveIsExactToACarrierPeriod) {
   }
 }
 
-// Plans have segments that wait, that follow one another and that are slower than tuned; the unit's
-// side of the time is the simulation's field path.
+// Plans have segments that wait, that follow one another and that are slower than tuned. The unit's
+// timing is the simulation's field path.
 TEST(EstimateAgainstPwm, MakespanOfAPlanIsThatOfTheUnitsFields) {
   for (std::uint64_t k = 0; k < 5; ++k) {
     const std::uint64_t seed = testing::TestSeed(4200 + k);

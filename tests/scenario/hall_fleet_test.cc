@@ -1,8 +1,8 @@
-// Units that measure themselves, through the real daemon: orientation from sensors' voltages,
-// SQLite, and a reader of the DDS topics. No camera is there. 500 of them on simulated buses; and a
-// few whose sensors lie, in a simulator of its own. Nothing here depends on how fast the machine
-// is: the fleet's clock runs no faster than two busy cores can follow, and every wait ends with
-// what it waits for.
+// These tests run units that measure themselves through the real daemon: orientation from sensors'
+// voltages, SQLite, and a reader of the DDS topics. No camera is there. A fleet of 500 runs on
+// simulated buses; a few units with faulty sensors run in a simulator of their own.
+// No test depends on how fast the machine is. The fleet's clock runs no faster than two busy cores
+// can follow, and every wait ends with the event that it waits for.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -29,9 +29,8 @@ namespace {
 
 constexpr int kPatienceMs = 170'000;
 constexpr const char* kSpeed = "10.0";
-// Of the fleet's time: what a machine with better things to do needs to tell 500 units to start,
-// and to hear that they came, shall be seconds of ours. Units that miss their start are not
-// measured.
+// The limits are in the fleet's time. A busy machine needs seconds of real time to send 500 units
+// their start, and to receive their arrivals. Units that miss their start are not measured.
 constexpr const char* kTiming =
     "[timing]\nstart_delay_ms = 20000\nsettle_margin_ms = 20000\nsilence_limit_ms = 300000\n";
 
@@ -116,8 +115,8 @@ bool Agree(const FibreCarrierReading& reported, const FibreCarrierReading& in_st
                                reported.covariance_deg2 == in_store.covariance_deg2));
 }
 
-// The newest orientation of each unit, once they are what the store has: topics are told when there
-// is time, the last values last.
+// The newest orientation of each unit, once they equal those in the store. Topics are published
+// when there is time, the last values last.
 FibreCarriers ReadOrientations(StatusReader* reader, const FibreCarriers& in_store) {
   FibreCarriers reported;
   const auto agrees = [&](const auto& entry) {
@@ -154,8 +153,7 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
     EXPECT_EQ(round.at("by_sensors"), round.at("measured"));
     std::printf("%s\n", round.dump().c_str());
   }
-  // Every unit that rests is measured; 4 % slip or are dead, 8.5 % are off scale
-  // (sim/world/spread.h).
+  // Every unit at rest is measured; 4 % slip or are dead, 8.5 % are off scale (sim/world/spread.h).
   EXPECT_GE(rounds[2].at("measured").get<std::uint32_t>(), 490u)
       << Ask("status", Json::object()).value_or(Json{}).dump();
   EXPECT_GE(rounds[2].at("within_tolerance").get<std::uint32_t>(), 430u);
@@ -185,7 +183,7 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
   });
   EXPECT_GE(by_sensors, 490);
 
-  // A reader that joins late gets what the store has.
+  // A reader that joins late gets the values of the store.
   StatusReader::Options options;
   options.dds = {OwnDomain(), {}};
   auto joined = StatusReader::Create(options);
@@ -199,13 +197,13 @@ TEST_F(HallFleet, FiveHundredUnitsMeasureThemselves) {
   EXPECT_EQ(daemon_->Wait(), 0);
 }
 
-// Who lies, how (faults.csv), and what is said of it.
+// A unit with a faulty sensor, the fault (faults.csv), and the expected verdict.
 struct Liar {
   std::uint32_t unit;
   const char* fault;
   int sensor;
   const char* named;
-  bool measured;  // nevertheless, by the sensors that are left
+  bool measured;  // the other sensors suffice
 };
 constexpr Liar kLiars[] = {{4, "sensor_stuck", 3, "stuck v3", false},
                            {9, "sensor_swapped", 2, "swapped v2 v3", false},
@@ -257,7 +255,7 @@ TEST_F(HallFleet, WhoseSensorLiesIsNamedInTheStore) {
     ++judged;
     std::printf("unit %u: %s\n", row.unit.value, row.carrier->verdict.c_str());
     EXPECT_EQ(row.status == MeasurementStatus::kMeasured, found->second->measured);
-    // One or two readings tell who, and not always how.
+    // A reading or two identify the sensor, but not always the kind of fault.
     const std::string who = "bad v" + std::to_string(found->second->sensor);
     EXPECT_THAT(row.carrier->verdict, ::testing::AnyOf(found->second->named, who, "cannot tell"));
   }

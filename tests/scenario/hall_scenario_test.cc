@@ -1,6 +1,6 @@
-// Configurations of units that measure themselves by the sensors at their joints, with the truth at
-// hand: what they say is what the coordinator goes by, no exposure is needed, and a sensor that
-// lies moves nobody.
+// These tests run configurations of units that measure themselves by the sensors at their joints,
+// with the truth at hand. The coordinator uses their readings, no exposure is needed, and a faulty
+// sensor moves no unit.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -115,8 +115,8 @@ TEST_F(HallScenario, WhoDoesNotTellItsSensorsIsNotLost) {
   EXPECT_EQ(fleet_->coordinator().configuration().measured.back().measured, 18u);
 }
 
-// A unit that missed its host for a while says so, and is read anew before anything else is asked
-// of it: its sensors, too, as soon as it is known again.
+// A unit that missed its host for a while reports that, and is read anew before any other request.
+// Its sensors are read, too, as soon as the unit is known again.
 TEST_F(HallScenario, WhoIsReadAnewInBetweenIsMeasuredNevertheless) {
   Make({.count = 40, .seed = 8, .config = {.reads_sensors = true}, .sensors = 8});
   fleet_->ApplyRandomMeasured(1, {.corrections = 0, .tolerance_um = 20});

@@ -20,8 +20,9 @@ namespace {
 constexpr DurationNs kTurn = Microseconds(200);
 
 // At rest the rotor lags the field by the angle whose sine is load over stall torque, 15 degrees of
-// 360 at 1.8 V: 4 of 96 vectors; the rest is for rounding and for the motor's own spread. What a
-// cut motion adds is in the interval, not in here. No run of these scenarios exceeds 5.
+// 360 at 1.8 V. The lag is 4 of 96 vectors. The remaining 2 are for rounding and for the motor's
+// own spread. The interval, not this margin, contains the effect of a cut motion. No run of these
+// scenarios exceeds 5.
 constexpr double kLagVectorsMax = 6;
 
 sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDrive& drive) {
@@ -74,7 +75,7 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
 }
 
 void InProcessFleet::Restart() {
-  commits_.clear();  // what was not durable is gone
+  commits_.clear();  // rows that were not durable are lost
   refused_.clear();
   planning_.clear();
   exposing_.clear();
@@ -164,8 +165,8 @@ void InProcessFleet::Perform(const Effects& effects) {
   wake_at_ = effects.wake_at;
 }
 
-// A camera that sees every fibre and knows whose it is: to see and to tell apart is tried
-// elsewhere.
+// A camera that sees every fibre and knows its unit: detection and identification have tests of
+// their own.
 ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
   if (measurer) return measurer(job);
   const std::vector<UnitExpectation> expected = Expect(*layout_, {.now = job.expected,

@@ -1,7 +1,7 @@
-// The whole fleet in one process and on virtual time: the real coordinator, the real planner, the
-// simulated world, and a store in memory that commits after a delay, can fail, and outlives the
-// coordinator. What a scenario test drives. The same options and seed give the same run, bit for
-// bit.
+// InProcessFleet is the whole fleet in one process and on virtual time; scenario tests drive it.
+// The fleet has the real coordinator, the real planner, the simulated world, and a store in memory.
+// The store commits after a delay, can fail, and outlives the coordinator. The same options and
+// seed give the same run, bit for bit.
 #pragma once
 
 #include <cstdint>
@@ -37,57 +37,59 @@ class InProcessFleet {
     double centroid_sigma_um = 2;
     double clock_error_max = sim::WorldConfig{}.clock_error_max;  // of each unit's clock
     std::uint32_t first_id = 1;
-    sim::FactoryDrive factory;  // as the units left it; the coordinator expects the default
+    sim::FactoryDrive factory;  // the units' settings; the coordinator expects the default
     std::vector<sim::PlannedFault> faults = {};
     std::uint8_t sensors = 0;                           // at the joint of each unit
     std::map<std::uint32_t, double> clock_errors = {};  // of single units, by number in the layout
-    /// Frames are stamped when the coordinator hears them, as on a socket without stamps of the
-    /// kernel; else when they end.
+    /// True: frames are stamped when the coordinator hears them, as on a socket without stamps of
+    /// the kernel. False: they are stamped when they end.
     bool stamped_when_heard = false;
   };
 
   explicit InProcessFleet(const Options& options);
 
-  /// Virtual time passes; the coordinator steps whenever it has something to do.
+  /// Lets virtual time pass; the coordinator steps whenever it has something to do.
   void Run(DurationNs duration);
-  /// True as soon as `done` is; false when `limit` has passed.
+  /// Runs until `done` is true, and returns true; false when `limit` has passed.
   bool RunUntil(const std::function<bool()>& done, DurationNs limit);
-  /// Until no configuration is under way. Default limit: no configuration of these sizes takes
+  /// Runs until no configuration is under way. Default limit: no configuration of these sizes takes
   /// longer.
   bool RunUntilIdle(DurationNs limit = Seconds(900));
 
-  /// The coordinator stands still (kill -STOP) while the world goes on. What it would have heard
-  /// waits for it, or was more than the socket holds and is lost.
+  /// Stops the coordinator (kill -STOP) while the world goes on. Frames meanwhile wait for it, or
+  /// exceed the socket's buffer and are lost.
   enum class Heard : std::uint8_t { kWaits, kLost };
   void Freeze(DurationNs duration, Heard heard);
-  /// A stop of all that somebody else puts on every bus, as `stop --direct` does.
+  /// Sends a stop of all on every bus from another program, as `stop --direct` does.
   void StopDirectly();
 
-  /// What the port of a bus tells of its link, beside what it tells of its controller by itself.
-  /// Frames pass all the same: only what the coordinator makes of it is tried; KillBus is the other
-  /// half.
+  /// Reports a state of a bus' link as its port would, in addition to the states of its controller.
+  /// Frames pass all the same: the call tests only the coordinator's reaction. KillBus tests the
+  /// loss of frames.
   void ReportLink(LinkEvent event) { links_.push_back(std::move(event)); }
 
-  /// A frame that no unit sent, heard with the next step.
+  /// Adds a frame that no unit sent; the coordinator hears it with the next step.
   void Hear(const ReceivedFrame& frame) { heard_.push_back(frame); }
 
   void Send(Command command);
-  /// Applies a random configuration that is clear of what stands; returns its request number.
+  /// Applies a random configuration that is clear of all units that stand; returns its request
+  /// number.
   std::uint64_t ApplyRandom(std::uint64_t seed);
   std::uint64_t Apply(std::vector<std::optional<Pose>> targets);
   std::uint64_t ApplyMeasured(std::vector<std::optional<Pose>> targets,
                               const ApplyCommand::Measure& measure);
-  /// The same configuration as ApplyRandom's, measured and corrected.
+  /// Applies the same configuration as ApplyRandom, measured and corrected.
   std::uint64_t ApplyRandomMeasured(std::uint64_t seed, const ApplyCommand::Measure& measure);
 
-  /// kill -9 and a new start: nothing of the coordinator survives but the store; the world goes on.
+  /// Kills the coordinator (kill -9) and starts a new one. Nothing of it survives but the store;
+  /// the world goes on.
   void Restart();
 
-  /// SIGTERM: the coordinator's last rows are written.
+  /// Ends the coordinator (SIGTERM): its last rows are written.
   void End();
 
   [[nodiscard]] std::optional<ReplyEffect> LastReply(std::uint64_t request) const;
-  /// Fails the running test where a unit's true angle is not where the store says it is.
+  /// Fails the running test where a unit's true angle is not within what the store holds.
   void ExpectStoreTellsTheTruth(const std::string& when) const;
   [[nodiscard]] std::uint32_t CountOutcome(TargetOutcome outcome) const;
   [[nodiscard]] std::vector<Pose> TruePoses() const;  // nearest vectors
@@ -99,21 +101,21 @@ class InProcessFleet {
   [[nodiscard]] const Layout& layout() const { return *layout_; }
   [[nodiscard]] MemoryStore& store() { return store_; }
   [[nodiscard]] const MemoryStore& store() const { return store_; }
-  /// That the coordinator was given last.
+  /// The plan that the coordinator was given last.
   [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
   bool store_fails = false;
   /// Rows that the store refuses beside those that it always does.
   std::function<bool(const Row&)> refuse;
-  /// Given: for so long the host is held up between a step and sending what came of it.
+  /// If set, the delay of the host between a step and sending its results.
   std::function<DurationNs()> held_up;
-  /// What the camera makes of an exposure before the coordinator hears of it.
+  /// Changes the camera's findings of an exposure before the coordinator receives them.
   std::function<void(ExposureDone*)> camera_fault;
-  /// Answers exposure jobs in the stead of that camera.
+  /// Answers exposure jobs in place of that camera.
   std::function<ExposureDone(const ExposureJob&)> measurer;
-  std::vector<sim::WireFrame>* wire = nullptr;  // gets every frame of every bus, where it is set
-  std::vector<OutFrame>* sent = nullptr;        // where it is given: all frames of the coordinator
+  std::vector<sim::WireFrame>* wire = nullptr;  // receives every frame of every bus, if set
+  std::vector<OutFrame>* sent = nullptr;        // receives all frames of the coordinator, if set
 
  private:
   void StepOnce();

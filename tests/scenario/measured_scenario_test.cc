@@ -1,4 +1,4 @@
-// Configurations that a camera looks at: what it finds is what the coordinator goes by.
+// These tests run configurations that a camera measures: the coordinator uses its findings.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,8 @@ TEST(Measured, CorrectionsBringUnitsWithRealGearsToTheirTargets) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
   ASSERT_EQ(view.measured.size(), 3u);
-  // Blind, nobody is there; the rest at the end has gears or motors that no correction mends.
+  // Without correction no unit is on target. At the end the rest has gears or motors that no
+  // correction can compensate.
   EXPECT_EQ(view.measured[0].within_tolerance, 0u);
   EXPECT_GE(view.measured[2].within_tolerance, 138u);
   EXPECT_LT(view.measured[2].median_um, 6);
@@ -37,13 +38,13 @@ TEST(Measured, CorrectionsBringUnitsWithRealGearsToTheirTargets) {
   }
 }
 
-// ---- what is not known to be reached is not done
+// ---- a target that is not known to be reached is not done
 
 InProcessFleet::Options WithCamera(std::uint64_t seed) {
   return {.count = 37, .seed = seed, .config = {.has_camera = true}};
 }
 
-/// Every unit that had a target is counted once, and a reason stands where it was not served.
+/// Expects that every unit with a target is counted once, and has a reason where it was not served.
 void ExpectAccounted(InProcessFleet& fleet) {
   fleet.Run(Seconds(1));  // the last rows become durable
   const ConfigurationView& view = fleet.coordinator().configuration();
@@ -95,7 +96,8 @@ TEST(Measured, CorrectionsThatNobodySawAreUnmeasured) {
   fleet.camera_fault = [&](ExposureDone* done) {
     if (++exposures > 1) done->exposure = Fail(ErrorCode::kUnavailable, "the light went off");
   };
-  // So wide that some are within it blind: they were seen there, and stand there still.
+  // The tolerance is so wide that some units are within it before any correction. They were seen
+  // there, and still stand there.
   fleet.ApplyRandomMeasured(2, {.corrections = 2, .tolerance_um = 100});
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
@@ -151,9 +153,9 @@ TEST(Measured, AStopBeforeTheExposureLeavesNobodyArrived) {
   ExpectAccounted(fleet);
 }
 
-// ---- units of unknown place are found
+// ---- units of unknown position are found
 
-/// The store of the day before: units stand elsewhere than it says.
+/// Restores an old store: units stand elsewhere than it says.
 void PutBackAnOldStore(InProcessFleet* fleet) {
   fleet->ApplyRandom(11);
   ASSERT_TRUE(fleet->RunUntilIdle());
@@ -165,11 +167,11 @@ void PutBackAnOldStore(InProcessFleet* fleet) {
   fleet->Run(Seconds(3));
 }
 
-// A fibre seen to 2 um tells phi of a stretched arm to a fifth of a degree only, which another pose
-// then shows at the fibre: 0.2 degrees are 58 um at the rim.
+// A fibre seen to 2 um gives phi of a stretched arm only to a fifth of a degree. Another pose then
+// shows the error at the fibre: 0.2 degrees are 58 um at the rim.
 constexpr double kAfterAMoveUm = 120;
 
-/// Where the coordinator has a place, the fibre is within `um` of it.
+/// Expects that the fibre is within `um` of each position that the coordinator has.
 void ExpectPlacesAreTrue(InProcessFleet& fleet, double um) {
   for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
     const UnitView& unit = fleet.coordinator().unit({n});
@@ -236,7 +238,7 @@ TEST(Measured, UnitsThatLostPowerInMidMoveAreFoundAndMoveAgain) {
   fleet.Run(Seconds(1));
   EXPECT_EQ(CountKnown(fleet), 37u) << Unserved(fleet);
   for (const std::uint32_t n : {3u, 9u, 17u}) {
-    // What is left between count and place is less than a motor turn.
+    // The remaining difference between count and position is less than a motor turn.
     for (const std::int32_t offset : fleet.coordinator().unit({n}).offset)
       EXPECT_LE(std::abs(offset), UnitDrive{}.axis[0].subdivision) << n;
   }

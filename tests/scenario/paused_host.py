@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""paused_host.py BIN SHIM [--seeds N] [--first-seed S] [--jobs J] [--clocks-off]: what the daemon says of units' clocks and starts while
-the host is busy. For each seed real programs on UNIX sockets, 40 units, four times as fast as life: configurations are applied while
-daemon and simulation are stopped and continued (SIGSTOP), singly and both, and held up in mid-turn (SHIM, pauses.c), all at instants and
-for times drawn from the seed. What was said is put beside what was true. With --clocks-off some units' clocks are off by 1 %: all of
-these have to be named, and no other one. The exit code is 1 where something false was said, or something true was not."""
+"""paused_host.py BIN SHIM [--seeds N] [--first-seed S] [--jobs J] [--clocks-off]: tests the daemon's statements on units' clocks and starts
+while the host is busy. Each seed runs real programs on UNIX sockets, with 40 units, four times as fast as life. Configurations are applied
+while daemon and simulation are stopped and continued (SIGSTOP), singly and both, and held up in mid-turn (SHIM, pauses.c). Instants and
+lengths are drawn from the seed. The statements are compared with the truth. With --clocks-off some units' clocks are off by 1 %: all of
+these have to be named, and no other one. The exit code is 1 where a statement was false, or a true one was missing."""
 
 import argparse
 import concurrent.futures
@@ -71,7 +71,7 @@ class Lines:
 
 
 class Watcher:
-    """Does something again and again in a thread of its own, until the night is over."""
+    """Repeats an action in a thread of its own, until the run is over."""
 
     def __init__(self, what, period_s, over):
         self.over = over
@@ -126,7 +126,7 @@ class Eavesdropper:
 
     def __init__(self, places):
         self.places = places  # by socket: units by node
-        self.heard = {}  # by unit: when
+        self.heard = {}  # by unit: time
 
     def __call__(self):
         ready, _, _ = select.select(list(self.places), [], [], 0.2)
@@ -141,21 +141,21 @@ class Eavesdropper:
 
 
 class Night:
-    """One seed: a fleet of its own, in a folder of its own."""
+    """The run of one seed: a fleet of its own, in a folder of its own."""
 
     def __init__(self, options, seed, folder):
         self.options = options
         self.seed = seed
         self.folder = folder
         self.chance = random.Random(f"night {seed}")
-        self.off = {}  # unit: by how much its clock is off
+        self.off = {}  # unit: error of its clock
         if options.clocks_off:
             for unit in self.chance.sample(range(1, UNITS + 1), 4):
                 self.off[unit] = self.chance.choice([-CLOCK_OFF, CLOCK_OFF])
-        self.false = set()  # what was said and is not so
-        self.begun = {}  # (unit, move): when, as seen from time to time
-        self.clocks = 0  # intervals looked at
-        self.errors = {}  # unit: by how much its clock is off, in truth
+        self.false = set()  # statements that were made and are not true
+        self.begun = {}  # (unit, move): start, as seen from time to time
+        self.clocks = 0  # number of intervals checked
+        self.errors = {}  # unit: true error of its clock
         self.wide_s = []
         self.over = threading.Event()
 
@@ -201,7 +201,7 @@ class Night:
                     raise
                 time.sleep(0.05)
 
-    # ---- what is true, and what is said
+    # ---- the truth, and the daemon's statements
 
     def look_at_truth(self):
         for row in csv.DictReader(io.StringIO(self.truth.ask("truth")["csv"])):
@@ -225,7 +225,7 @@ class Night:
             self.starts[starts["id"]] = starts
 
     def judge_starts(self, moves):
-        """Where all units of a round told when they began. Of several rounds it is said of the widest only."""
+        """Checks rounds in which all units reported when they began. The daemon states the widest of several rounds only."""
         for configuration, said in self.starts.items():
             rounds = [units for (of, _), units in moves.items() if of == configuration and len(units) == said["starts"] == said["starts_known"]]
             truths = [max(units.values()) - min(units.values()) for units in rounds if None not in units.values()]
@@ -270,13 +270,13 @@ class Night:
         store.close()
         heard = self.answers.heard
         self.readings = sum(len(times) for times in heard.values())
-        # The answer that named it is one of those heard before; both are told some milliseconds later.
+        # The answer that named the unit is one of those heard before; both are reported some milliseconds later.
         until = {unit: sum(when <= named.get(unit, time.time()) + 0.05 for when in heard.get(unit, [])) for unit in self.off}
         self.until_named = [count for unit, count in until.items() if unit in named]
         self.missed = sorted(set(self.off) - set(named))
         self.named_late = [f"unit {unit} after {count} readings" for unit, count in until.items() if count > NAMED_BY]
 
-    # ---- the night
+    # ---- the run
 
     def eavesdrop(self):
         places = {}
@@ -326,7 +326,7 @@ class Night:
         self.paused_s = self.pauser.total_s + sum(float(total_s) for _, total_s in pauses)
 
     def apply(self, end):
-        """What becomes of it is the coordinator's affair: units that a pause silenced are refused, and it may outlast the night."""
+        """Applies a configuration. Its result is not checked: units that a pause silenced are refused, and it may outlast the run."""
         self.run("focalfleet", "targets", "--units", "units.csv", "--seed", str(1000 * self.seed + self.configurations), "--out",
                  "targets.csv", "--quiet")
         command = [os.path.join(self.options.bin, "focalfleet"), "apply", "targets.csv", "--wait", "--quiet"]

@@ -1,11 +1,12 @@
-// LD_PRELOAD: holds a process' main thread up where it hurts most. A busy host may take the
-// processor away between any two instructions; a signal sent at random rarely meets the few
-// microseconds in which a time has been read and not been used. Here the thread is held up right
-// after it read the monotonic clock, before or after it reads frames, or before it sends some.
+// This LD_PRELOAD library holds a process' main thread up at the most sensitive instants. A busy
+// host may take the processor away between any two instructions. A signal sent at random rarely
+// meets the few microseconds in which a time has been read and not been used. The library holds the
+// thread up right after it read the monotonic clock, before or after it reads frames, or before it
+// sends some.
 //
 // PAUSES=SEED,LEAST_MS,MOST_MS,GAP_MS: lengths of equal share per octave from LEAST_MS to MOST_MS,
-// gaps evenly from 0 to twice GAP_MS, both drawn from SEED. PAUSES_LOG: a file that gets
-// "<pauses> <seconds>" when the process ends.
+// gaps evenly from 0 to twice GAP_MS, both drawn from SEED. PAUSES_LOG: a file that gets "<pauses>
+// <seconds>" when the process ends.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -38,7 +39,7 @@ static int64_t now_ns(void) {
   return (int64_t)now.tv_sec * 1000000000 + now.tv_nsec;
 }
 
-// splitmix64, to 0..1
+// Generator splitmix64, scaled to 0..1.
 static double draw(void) {
   uint64_t z = state.random += 0x9e3779b97f4a7c15u;
   z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;

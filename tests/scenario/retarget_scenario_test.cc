@@ -1,5 +1,5 @@
-// One unit gets another target while the others move, and those that were stopped on their way go
-// on; all of it on the in-process fleet.
+// In these tests one unit gets another target while the others move, and units that were stopped on
+// their way go on. All run on the in-process fleet.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ class Retargeting {
         [&] { return fleet.coordinator().configuration().state == ConfigurationState::kMoving; },
         Seconds(60)));
   }
-  /// A place where it is clear of where the others are going or stand.
+  /// A pose clear of the targets and positions of all other units.
   [[nodiscard]] Pose DrawTarget(PositionerIndex unit, std::uint64_t draw) {
     std::vector<std::optional<Pose>> standing(fleet.layout().size());
     for (std::uint32_t n = 0; n < standing.size(); ++n) {
@@ -46,7 +46,7 @@ class Retargeting {
   void Send(PositionerIndex unit, const Pose& target) {
     fleet.Send({kRequest, RetargetCommand{unit, target}});
   }
-  /// The `which`-th of those that move.
+  /// The `which`-th of the moving units.
   [[nodiscard]] PositionerIndex Moving(std::uint32_t which) {
     std::vector<PositionerIndex> moving;
     for (std::uint32_t n = 0; n < fleet.layout().size(); ++n)
@@ -54,7 +54,8 @@ class Retargeting {
     EXPECT_FALSE(moving.empty());
     return moving.empty() ? PositionerIndex{0} : moving[which % moving.size()];
   }
-  /// Runs until all is over; how near two arms come meanwhile, half-widths taken off. Units: mm.
+  /// Runs until all motion is over. Returns the smallest distance of two arms meanwhile,
+  /// half-widths taken off. Units: mm.
   double RunAndSeeNearest() {
     double nearest_mm = 1e9;
     EXPECT_TRUE(fleet.RunUntil(
@@ -152,7 +153,8 @@ TEST(Retarget, MovingUnitGoesToItsNewTargetAndAllOthersGoOn) {
 }
 
 TEST(Retarget, NobodyElseHearsOfIt) {
-  // The same fleet with and without: who was not stopped arrives at the same instant.
+  // The same fleet runs with and without the retarget: a unit that was not stopped arrives at the
+  // same instant.
   const std::uint64_t seed = TestSeed(530);
   FOCALFLEET_TRACE_SEED(seed);
   std::vector<double> ends[2];
@@ -189,7 +191,7 @@ TEST(Retarget, UnitAtRestGoes) {
     const std::uint64_t seed = TestSeed(540);
     FOCALFLEET_TRACE_SEED(seed);
     Retargeting run(seed);
-    // One of them stands where it is.
+    // One of the units stays at its position.
     std::vector<std::optional<Pose>> standing(37);
     run.fleet.Run(Seconds(3));
     const UnitKnowledge& stands = run.fleet.coordinator().unit({12}).knowledge;
@@ -247,7 +249,7 @@ TEST(Retarget, WhatCannotBeIsRefusedAndNothingHappens) {
       Seconds(60)));
   fleet.Run(Seconds(1));
   expect({4}, {1 << 22, 0}, ErrorCode::kInvalid, "outside its axes' ranges");
-  // Where a neighbour goes.
+  // The target is a neighbour's target.
   const auto& layout = fleet.layout();
   const auto drives = fleet.coordinator().drives();
   bool found = false;
@@ -274,7 +276,7 @@ TEST(Retarget, WhatCannotBeIsRefusedAndNothingHappens) {
   EXPECT_EQ(fleet.world().Truth(std::size_t{4}).moves_begun, 1u);
 }
 
-/// A retarget, and `then` so long after it; whatever happens, all ends well.
+/// Sends a retarget, and `then` after the time `after`; whatever happens, all units end well.
 void Disturb(std::uint64_t seed, DurationNs after,
              const std::function<void(Retargeting*, PositionerIndex)>& then, bool others_arrive) {
   FOCALFLEET_TRACE_SEED(seed);

@@ -1,5 +1,5 @@
-// A unit ends by itself in mid-motion: those that would come where it may stand are stopped within
-// the notice that the plan was made with, and nobody else is.
+// In these tests a unit ends by itself in mid-motion. Units that would come where it may stand are
+// stopped within the notice that the plan was made with, and no other unit is stopped.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace focalfleet::testing {
 namespace {
 
-constexpr double kSlackS = 1.2;  // both still move for so long
+constexpr double kSlackS = 1.2;  // both units still move for this long
 
 struct Led {
   PositionerIndex leader;
@@ -23,7 +23,7 @@ struct Led {
 
 class Noticed : public ::testing::Test {
  protected:
-  /// A configuration that has just started.
+  /// Begins a configuration; it has just started.
   void Begin(std::uint64_t seed) {
     fleet_.emplace(InProcessFleet::Options{.count = 61, .units_per_bus = 20, .seed = seed});
     fleet_->ApplyRandom(seed + 1000);
@@ -41,7 +41,8 @@ class Noticed : public ::testing::Test {
       if (move.unit == i) return focalfleet::EndOf(move, UnitDrive{});
     return 0;
   }
-  /// A pair and a time between `low_s(pair)` and `high_s(pair)` at which both will move for long.
+  /// A pair, and a time between `low_s(pair)` and `high_s(pair)` at which both will still move for
+  /// long.
   template <class Low, class High>
   std::optional<std::pair<Led, double>> Draw(Rng* rng, const Low& low_s, const High& high_s) {
     std::vector<std::pair<Led, double>> found;
@@ -84,7 +85,7 @@ TEST_F(Noticed, ThoseThatFollowAreStoppedInTime) {
     const UnitId leader = fleet_->id(pair.leader.value);
     const HostInstant ended = fleet_->now();
     if (k % 3 == 0) fleet_->world().PowerCut(leader);
-    if (k % 3 == 1) fleet_->world().faults(leader)->silent = true;  // moves on, and nobody knows
+    if (k % 3 == 1) fleet_->world().faults(leader)->silent = true;  // moves on without any report
     if (k % 3 == 2) {
       fleet_->world().PowerCut(leader);
       fleet_->Run(Milliseconds(30));
@@ -115,7 +116,7 @@ TEST_F(Noticed, ThoseThatFollowOneThatNeverBeganAreStoppedInTime) {
     const auto pair = std::find_if(pairs_.begin(), pairs_.end(), stands_in_the_way);
     if (pair == pairs_.end()) continue;
     ++draws;
-    // It is armed, and hears no start.
+    // The unit is armed, and hears no start.
     fleet_->world().faults(fleet_->id(pair->leader.value))->deaf = true;
     RunTo(0.1);
     fleet_->world().faults(fleet_->id(pair->leader.value))->deaf = false;
@@ -157,7 +158,7 @@ TEST_F(Noticed, InTimeAlsoWhereFramesAreLost) {
   EXPECT_GT(draws, 12);
 }
 
-/// Who has passed already, or does not come where the other stands now, goes on.
+/// A unit that has passed already, or does not come where the other stands now, goes on.
 TEST_F(Noticed, OthersGoOn) {
   int left = 0;
   int not_yet = 0;
@@ -167,7 +168,7 @@ TEST_F(Noticed, OthersGoOn) {
     ASSERT_NO_FATAL_FAILURE(Begin(seed));
     Rng rng = Rng::Stream(seed, "noticed");
     const bool late = k % 2 == 0;
-    // A unit that has said that it moves is asked again after a poll period at most.
+    // A unit that has reported that it moves is asked again after a poll period at most.
     const auto drawn = late ? Draw(
                                   &rng, [](const Led& p) { return p.follower.left_s + 1.1; },
                                   [](const Led&) { return 1e9; })
@@ -176,7 +177,7 @@ TEST_F(Noticed, OthersGoOn) {
                                   [](const Led& p) { return p.follower.since_s - 1.2; });
     if (!drawn) continue;
     const auto& [pair, t_s] = *drawn;
-    // Nor through a third one.
+    // The two must not follow each other through a third unit either.
     const auto follows = [&](PositionerIndex a, PositionerIndex b) {
       return std::any_of(pairs_.begin(), pairs_.end(), [&](const Led& other) {
         return other.leader == a && other.follower.unit == b;
@@ -235,7 +236,7 @@ TEST(StallDetection, IsNoLongerThanAskedForUnlessAnswersAreSlow) {
 }
 
 // The host may be held up between the start signal's instant and its frame on the bus. A unit that
-// says meanwhile that it is armed has not failed to begin.
+// reports meanwhile that it is armed has not failed to begin.
 TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
   const std::uint64_t seed = TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);

@@ -1,4 +1,5 @@
-// When units begin, by their own clocks: what the coordinator makes of it, beside what is true.
+// These tests compare the coordinator's knowledge of when units begin, by their own clocks, with
+// the truth.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 
 const double kAllowed_s = 2 * PlanOptions{}.start_skew_s;
-/// How often a state is looked at: a turn of the loop before and after.
+/// Time between two looks at a state: one turn of the loop before, one after.
 constexpr double kLook_s = 0.0004;
 
 struct TrueStarts {
@@ -35,7 +36,7 @@ bool IsAboutToStart(InProcessFleet* fleet, std::uint64_t configuration, Duration
       Seconds(120));
 }
 
-/// Looks at every unit's state from now on: when each began.
+/// Watches every unit's state from now on; returns when each began.
 TrueStarts WatchStarts(InProcessFleet* fleet, DurationNs duration = Milliseconds(300)) {
   TrueStarts starts;
   std::vector<bool> seen(fleet->layout().size());
@@ -88,7 +89,7 @@ TEST(StartSkew, IsMeasuredAsItIs) {
     EXPECT_GE(said.most_s, truth.skew_s() - kLook_s);
     EXPECT_LE(said.most_s, said.allowed_s);
     EXPECT_EQ(said.allowed_s, kAllowed_s);
-    // Clocks count a quarter of a second down, and are off by half a percent at most.
+    // The clocks count a quarter of a second down, and are off by half a percent at most.
     EXPECT_LE(truth.skew_s(), 0.004);
     fleet.Run(Milliseconds(50));  // its last row is written
     EXPECT_EQ(fleet.store().configurations.back().start_skew_s, said.skew_s);
@@ -97,7 +98,7 @@ TEST(StartSkew, IsMeasuredAsItIs) {
   }
 }
 
-// A controller that holds its frames up: all units of one bus begin late.
+// A controller holds its frames up: all units of one bus begin late.
 TEST(StartSkew, BeyondTheToleranceIsReportedAndPlannedWithNextTime) {
   const std::uint64_t seed = TestSeed(31);
   InProcessFleet fleet({.count = 61, .units_per_bus = 20, .seed = seed});
@@ -136,7 +137,8 @@ TEST(StartSkew, BeyondTheToleranceIsReportedAndPlannedWithNextTime) {
   EXPECT_THAT(troubles[0].text, HasSubstr("(bus " + std::to_string(late_bus.value) + ") began "));
   EXPECT_THAT(troubles[0].text, HasSubstr("more than the 40.0 ms that the plan allowed for"));
 
-  // The next one is planned for what was measured, and as long as that holds nobody complains.
+  // The next configuration is planned for the measured skew. As long as that holds no alarm is
+  // raised.
   configuration = NextConfiguration(&fleet);
   fleet.ApplyRandom(seed + 1);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -163,7 +165,7 @@ TEST(StartSkew, AClockThatIsTooFarOffIsReported) {
     ++reported;
   }
   EXPECT_GT(off, 0u);
-  EXPECT_GE(reported, off);  // once each
+  EXPECT_GE(reported, off);  // one each
   EXPECT_LE(reported, 7u);
 }
 

@@ -1,6 +1,7 @@
-// Traps that earlier fleets fell into, beyond wrong answers (wrong_answers_test.cc): dead links,
-// ends and restarts of the host, stops, disabled units, and what is checked before it is sent.
-// docs/peers.md names each trap beside its test.
+// These tests cover known problems of earlier fleets other than wrong answers
+// (wrong_answers_test.cc). They are dead links, ends and restarts of the host, stops, disabled
+// units, and checks before frames are sent. The page docs/peers.md names each problem beside its
+// test.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,7 +30,8 @@ bool RunUntilUploading(InProcessFleet* fleet) {
 
 // ---- links
 
-// Writes to a link fail in the middle of an upload, whether its port says so or not; it comes back.
+// Writes to a link fail in the middle of an upload, whether its port reports that or not. Then the
+// link comes back.
 TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
   for (const bool reported : {false, true}) {
     InProcessFleet fleet({.count = 60, .units_per_bus = 20, .seed = 80});
@@ -68,7 +70,8 @@ TEST(UnitIds, BeyondElevenBitsAreUnitsLikeAllOthers) {
 
 // ---- ends and restarts of the host
 
-// SIGTERM, and then nobody: what moves finishes its proven way, and nothing begins any more.
+// SIGTERM ends the host, and no other follows. Moving units finish their proven ways, and no
+// further motion begins.
 TEST(HostGone, WhatMovesFinishesAndNothingElseBegins) {
   for (const int ms : {50, 100, 150, 200, 250, 300, 350, 400, 450, 600, 3000, 20'000}) {
     const std::string when = std::to_string(ms) + " ms";
@@ -95,7 +98,7 @@ TEST(HostGone, WhatMovesFinishesAndNothingElseBegins) {
   }
 }
 
-// Frames as another host would send them; the unit cannot tell.
+// Sends the frames of another host; the unit cannot distinguish them.
 void MoveByAnotherHost(InProcessFleet* fleet, std::uint32_t row, std::int32_t delta) {
   const Unit& unit = fleet->layout().units()[row];
   StagedMove move{.move = {60'000}, .mode = WaveMode::kAsymmetric, .path = {}};
@@ -111,7 +114,7 @@ void MoveByAnotherHost(InProcessFleet* fleet, std::uint32_t row, std::int32_t de
   send(Start{move.move, 0}, {kBroadcastNode, 0});
 }
 
-/// Away from where its range ends, so that the unit takes it.
+/// A move away from the end of the unit's range, so that the unit accepts it.
 std::int32_t RoomyDelta(InProcessFleet* fleet, std::uint32_t row, std::int32_t size) {
   return fleet->TruePoses()[row][0] > 0 ? -size : size;
 }
@@ -135,7 +138,8 @@ TEST(HostGone, UnitThatWasMovedMeanwhileIsNotBelievedToStandWhereItStood) {
   fleet.ExpectStoreTellsTheTruth("after it was moved by somebody else");
 }
 
-// Armed by a run that is killed, and not heard since: it must not go with somebody else's start.
+// The unit was armed by a run that was killed, and has not been heard since. The unit must not go
+// with another run's start.
 TEST(HostGone, WhatAnEarlierRunArmedNeverStarts) {
   for (const int ms : {100, 110, 120, 130, 140, 150}) {
     InProcessFleet fleet({.count = 37, .seed = 97, .commit_delay = Milliseconds(60)});
@@ -160,7 +164,7 @@ TEST(Rest, UnitThatLosesPowerBetweenConfigurationsIsNoticed) {
   fleet.ApplyRandom(86);
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.world().PowerCut(fleet.id(3));
-  // Asked every 10 s, and given up after five tries.
+  // The unit is asked every 10 s, and given up after five tries.
   fleet.Run(Seconds(12));
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kSilent);
   EXPECT_TRUE(HasAlarm(fleet, "unit 4 does not answer"));
@@ -192,7 +196,7 @@ TEST(Stop, LeavesTheEvidenceOfAFault) {
       EXPECT_EQ(fleet.world().Truth(std::size_t{3}).fault, FaultCode::kOverCurrent) << when;
       EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kFault) << when;
       EXPECT_EQ(fleet.coordinator().unit({3}).fault, FaultCode::kOverCurrent) << when;
-      // By which of the two it is learnt is a matter of arbitration.
+      // Arbitration decides which of the two reports the fault.
       EXPECT_TRUE(HasAlarm(fleet, "unit 4 stopped with a fault") ||
                   HasAlarm(fleet, "unit 4 reports a fault"))
           << when;
@@ -245,7 +249,7 @@ TEST(Disabled, AThousandTimesIsOneEntryAndOutlivesTheHost) {
 
 // ---- commands
 
-// What is refused does nothing at all: not a frame, not a row but the refusal's own.
+// A refused command has no effect at all: no frame, and no row but the refusal's own.
 TEST(Refused, CommandsLeaveAConfigurationAsItIs) {
   std::uint64_t digests[2];
   std::vector<Pose> ends[2];
@@ -302,7 +306,7 @@ TEST(Limits, TargetOutOfAnAxisRangeIsRefusedByName) {
     }
 }
 
-// The unit has limits of its own, in FLASH, and they hold whatever the host believes.
+// The unit has limits of its own, in FLASH. They hold whatever the host believes.
 TEST(Limits, TheUnitsOwnRangeHoldsToo) {
   InProcessFleet fleet({.count = 37, .seed = 92});
   fleet.Run(Seconds(5));
@@ -331,18 +335,19 @@ TEST(NoSleep, FromTheCommandToTheFirstVectorItTakesAnUploadAndTheStartDelay) {
         return false;
       },
       Seconds(60)));
-  // Start delay 250 ms, plan 20 ms, commit 5 ms, about 0.1 s of upload; nothing else.
+  // The time is start delay 250 ms, plan 20 ms, commit 5 ms and about 0.1 s of upload; nothing
+  // else.
   EXPECT_LT((fleet.now() - asked).seconds(), 0.5);
 }
 
-// ---- what is sent is what is checked
+// ---- the frames that are sent are those that were checked
 
-/// What the frames on the wire make the units do, put together from the frames alone.
+/// The units' motions that the frames on the wire cause, derived from the frames alone.
 class SentMoves {
  public:
   explicit SentMoves(InProcessFleet* fleet) : fleet_(*fleet) { fleet->sent = &frames_; }
 
-  /// Takes the new frames; where a start is among them, the motions that it starts are checked.
+  /// Takes the new frames. Where a start is among them, the motions that it starts are checked.
   void Look() {
     for (; next_ < frames_.size(); ++next_) {
       const OutFrame& out = frames_[next_];

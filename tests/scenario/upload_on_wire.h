@@ -1,4 +1,5 @@
-// What an upload took on the simulated bit clock, beside what it needs: a listener on the wire.
+// UploadOnWire is a listener on the wire. The listener measures the duration of an upload on the
+// simulated bit clock, and the bits that the upload needs.
 #pragma once
 
 #include <algorithm>
@@ -14,9 +15,9 @@
 
 namespace focalfleet::testing {
 
-/// Of one bus, all in bits of its own clock. Needed is each frame without which a unit is not
-/// armed, once: stage_begin, stage_segment, confirm and its answer, arm and its answer. Repeats,
-/// clock frames, polls and the time in which nobody sends are not.
+/// The upload of one bus, all in bits of its own clock. The needed frames are those without which a
+/// unit is not armed, counted once. They are stage_begin, stage_segment, confirm and its answer,
+/// arm and its answer. Repeats, clock frames, polls and idle time do not count.
 struct UploadOnWire {
   std::uint64_t needed_bits = 0;
   std::uint64_t other_bits = 0;    // of all other frames between the first and the last needed one
@@ -33,12 +34,13 @@ struct UploadOnWire {
   [[nodiscard]] double bits_per_unit() const {
     return static_cast<double>(needed_bits) / static_cast<double>(units);
   }
-  /// Of the needed ones, were the staging frames in groups, as full as can be.
+  /// The needed bits if the staging frames were in groups, as full as can be.
   [[nodiscard]] std::uint64_t needed_bits_with(const BusRates& rates) const {
     return needed_bits - BitsOnWire(staged, {rates.nominal_bps}) + BitsOnWire(staged, rates);
   }
 };
 
+/// The upload of each bus.
 /// Pre: `wire` holds one upload, as the wire carried it.
 inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFrame> wire,
                                                    std::uint32_t bit_rate_bps = 1'000'000) {
@@ -90,7 +92,8 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
       upload.segment_bits += bits;
     }
   }
-  // The host hands them over so; between the units' mailboxes lower identifiers pass.
+  // The host sends the frames in this order; between the units' mailboxes lower identifiers
+  // overtake.
   for (auto& [bus, upload] : out)
     std::ranges::stable_sort(upload.staged, {},
                              [](const CanFrame& frame) { return frame.id >> 11 & 255; });

@@ -1,5 +1,5 @@
-// The way onto the wire: how long an upload takes on the simulated bit clock, beside the bits that
-// it needs, and what the coordinator says of it before and after.
+// These tests compare an upload's duration on the simulated bit clock with the bits that it needs.
+// They also check the coordinator's figures before and after.
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 namespace focalfleet::testing {
 namespace {
 
-/// Of the first upload of a random configuration: what passed the wire until the units move.
+/// The frames of the first upload of a random configuration, until the units move.
 std::vector<sim::WireFrame> UploadOf(InProcessFleet* fleet, std::uint64_t seed) {
-  fleet->Run(Milliseconds(2500));  // everybody has been read
+  fleet->Run(Milliseconds(2500));  // all units have been read
   std::vector<sim::WireFrame> wire;
   fleet->wire = &wire;
   fleet->ApplyRandom(seed);
@@ -37,11 +37,11 @@ TEST(Upload, TakesHardlyLongerThanItsBits) {
     EXPECT_LE(upload.ratio(), 1.05);
     sum += upload.ratio();
   }
-  // What a guess of the answers' lengths would already cost is 0.018.
+  // A guess of the answers' lengths alone would cost 0.018.
   EXPECT_LE(sum / kRuns, 1.005);
 }
 
-// The simulated bus carries classic frames; what is charged and told is what groups would take.
+// The simulated bus carries classic frames; the charged and reported bits are those of groups.
 TEST(Upload, WithCanFdIsChargedAsGroups) {
   for (const std::uint32_t data_bps : {2'000'000u, 5'000'000u}) {
     const std::uint64_t seed = TestSeed(3);
@@ -57,7 +57,7 @@ TEST(Upload, WithCanFdIsChargedAsGroups) {
     const auto needed = static_cast<double>(upload.needed_bits_with(rates));
     EXPECT_LT(needed, 0.85 * static_cast<double>(upload.needed_bits));
     const UploadView& said = fleet.coordinator().bus(bus).upload;
-    // Which frames share a group depends on the order of the units, which is the plan's.
+    // The order of the units, which is the plan's, decides which frames share a group.
     EXPECT_NEAR(static_cast<double>(said.bits_predicted), needed, 0.01 * needed);
     // Where the queue runs empty a group is not full: 5 % with so few units.
     EXPECT_NEAR(static_cast<double>(said.bits), needed, 0.10 * needed);
@@ -77,8 +77,8 @@ TEST(Upload, IsPredictedToTheBit) {
       const UploadView& of_bus = fleet.coordinator().bus(bus).upload;
       EXPECT_EQ(of_bus.bits_predicted, upload.needed_bits) << "bus " << bus.value;
       EXPECT_EQ(of_bus.bits, upload.needed_bits) << "bus " << bus.value;
-      // The host hears of the last answer a turn of its loop later, and lets the first frame go
-      // when it is decided.
+      // The host hears of the last answer a turn of its loop later, and sends the first frame as
+      // soon as it is decided.
       const double elapsed_s = static_cast<double>(upload.elapsed_bits) * 1e-6;
       EXPECT_GE(of_bus.measured_s, elapsed_s);
       EXPECT_LE(of_bus.measured_s, elapsed_s + 0.001);

@@ -1,6 +1,6 @@
-// Units that refuse, say nothing, answer late, under another number, or lie: never taken for
-// success, never a reason to hold up the others, always named. docs/peers.md says which trap of an
-// earlier system each test stands for.
+// In these tests units refuse, stay silent, answer late or under another number, or give false
+// answers. Such an answer is never taken for success, never holds up the other units, and is always
+// named. The page docs/peers.md gives the fault of an earlier system that each test stands for.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ std::uint32_t Begun(InProcessFleet& fleet) {
   return begun;
 }
 
-/// Nobody moved; each unit is named with a reason that has `part` in it.
+/// Expects that no unit moved, and that each is named with a reason that has `part` in it.
 void ExpectNothingStarted(InProcessFleet& fleet, const std::string& part, const std::string& when) {
   EXPECT_EQ(Begun(fleet), 0u) << when;
   EXPECT_EQ(fleet.coordinator().configuration().arrived, 0u) << when;
@@ -120,7 +120,7 @@ TEST(OneUnit, DiesInTheUploadOfTwoHundredAndHoldsThemUpForAMoment) {
   const HostInstant uploading = fleet.now();
   fleet.world().faults(fleet.id(150))->silent = true;
   ASSERT_TRUE(fleet.RunUntil([&] { return Begun(fleet) != 0; }, Seconds(60)));
-  // Five tries of 50 to 800 ms, then a plan around it and another upload.
+  // The time is five tries of 50 to 800 ms, then a plan around the unit and another upload.
   EXPECT_LT((fleet.now() - uploading).seconds(), 3.0);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({150}).outcome, TargetOutcome::kFailed);
@@ -216,7 +216,7 @@ TEST(LateAnswer, AfterTheLastRepeatIsNoAnswerToTheNextQuestion) {
   }
 }
 
-// The same node number is on every bus: what one says is never put down to another.
+// The same node number is on every bus: an answer on one bus is never assigned to another.
 TEST(WrongAnswer, OfAnotherBusOrOfNobodysNodeConcernsNobody) {
   std::uint64_t digests[2];
   for (const bool disturbed : {false, true}) {
@@ -238,7 +238,7 @@ TEST(WrongAnswer, OfAnotherBusOrOfNobodysNodeConcernsNobody) {
     fleet.ApplyRandom(70);
     for (int k = 0; k < 200; ++k) {
       shout(smaller, 10);
-      shout(larger, 77);  // nobody's
+      shout(larger, 77);  // the number of no unit
       fleet.Run(Milliseconds(10));
     }
     ASSERT_TRUE(fleet.RunUntilIdle());
@@ -250,7 +250,7 @@ TEST(WrongAnswer, OfAnotherBusOrOfNobodysNodeConcernsNobody) {
   EXPECT_EQ(digests[0], digests[1]);
 }
 
-// Another firmware, or a boot loader, in a unit that was known before.
+// A unit that was known before runs another firmware, or a boot loader.
 TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
   InProcessFleet fleet({.count = 37, .seed = 78});
   fleet.ApplyRandom(77);
@@ -293,7 +293,7 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
   ExpectOthersArrive(&fleet, 0);
 }
 
-// ---- liars
+// ---- units with false answers
 
 TEST(Liar, WhoSaysThatItHasArrivedAndNeverStartedIsNotBelieved) {
   InProcessFleet fleet({.count = 37, .seed = 71});
@@ -318,7 +318,7 @@ TEST(Liar, WhoIgnoresEveryStartIsNamedAndItsMoveTakenBack) {
   ExpectOthersArrive(&fleet, 4);
 }
 
-// ---- settings that are not what plans are made with
+// ---- settings that differ from those of the plans
 
 TEST(Settings, AUnitsOwnCarrierIsReplacedBeforeItMoves) {
   InProcessFleet fleet({.count = 7, .seed = 73, .factory = {.counter1 = 400}});
@@ -345,7 +345,7 @@ TEST(Settings, WhoKeepsAnotherCarrierIsNotMoved) {
   const auto alarms = fleet.store().alarms.size();
   fleet.Run(Seconds(60));
   EXPECT_EQ(fleet.store().alarms.size(), alarms) << "said once";
-  // It is looked at again and again, and goes when it takes its setting.
+  // The unit is checked repeatedly, and goes when it accepts its setting.
   fleet.world().faults(fleet.id(5))->refuses.reset();
   fleet.Run(Seconds(15));
   fleet.ApplyRandom(75);
@@ -361,7 +361,7 @@ TEST(Settings, WhoCountsByAnotherSubdivisionIsNotMoved) {
   for (std::uint32_t n = 0; n < 7; ++n)
     EXPECT_EQ(fleet.coordinator().unit({n}).outcome_reason,
               "it is not fit to move: theta subdivision is 192, not 96 as set");
-  // An operator who gives it the other one gets a unit that goes.
+  // After an operator gives the unit the other setting, it goes.
   for (const Axis axis : kAxes) {
     const std::uint64_t request = 900 + Index(axis);
     fleet.Send({request, WriteParameterCommand{{2}, axis, Parameter::kSubdivision, 96}});

@@ -1,9 +1,9 @@
-// What people touch: time, view, unit, pair, rail. The page draws when something has changed and
-// rests otherwise.
+// Controls handles the reader's input: time, view, unit, pair, rail. The page draws when something
+// has changed and rests otherwise.
 
 const kStep_s = 0.1;
 const kLongStep_s = 1;
-const kFrameMax_s = 0.25;  // after a pause of the browser the plan goes on, it does not jump
+const kFrameMax_s = 0.25;  // after a pause of the browser the plan continues without a jump
 const kZoomStep = 1.4;
 const kDrag_px = 4;
 
@@ -145,7 +145,7 @@ class PlanPage {
     this.redraw();
   }
 
-  /** -1: none. */
+  /** Selects a unit by its place in the layout; -1: none. */
   select(u) {
     this.plate.selected = u;
     byId("unit-hint").hidden = u >= 0;
@@ -227,7 +227,7 @@ class PlanPage {
     this.redraw();
   }
 
-  /** plan.html#t=12.5&unit=17: a place and a moment that one can send to somebody. */
+  /** Shows the place and moment of a link: plan.html#t=12.5&unit=17. */
   goWhereTheAddressSays() {
     const wanted = new URLSearchParams(location.hash.slice(1));
     const t_s = Number(wanted.get("t"));
@@ -338,7 +338,7 @@ class PlanPage {
     return button;
   }
 
-  // ---- what is told beside the pictures
+  // ---- texts beside the pictures
 
   tell() {
     const {motion, t_s} = this;

@@ -1,5 +1,5 @@
-// The power curves under the plate: total above, rails below, with the time as a cursor. What does
-// not change with time is drawn once, beside, and copied.
+// Curves draws the power curves under the plate: total above, rails below, with the time as a
+// cursor. The parts that do not change with time are drawn once to a separate canvas, and copied.
 
 const kCurveMargins_px = {left: 52, right: 14, top: 16, bottom: 22, between: 16};
 
@@ -41,7 +41,7 @@ class Curves {
 
   railColour(place) { return this.colours[`s${place % 7}`]; }
 
-  /** What stands above each other: curves with their colours and limits, and the space for them. */
+  /** The panels from top to bottom: curves with their colours and limits, and their space. */
   panels() {
     const {top, bottom, between} = kCurveMargins_px;
     const {total, rails} = this.power;
@@ -120,8 +120,8 @@ class Curves {
     context.globalAlpha = 1;
   }
 
-  // Of all steps within one column of pixels only the lowest, the highest and the last are drawn:
-  // no peak is lost, and the path stays short.
+  // Within one column of pixels only the lowest, the highest and the last step are drawn. No peak
+  // is lost, and the path stays short.
   drawSteps(context, panel, {curve, colour, dashed, faint, strong}) {
     context.beginPath();
     context.moveTo(this.x(0), panel.y(0));

@@ -1,7 +1,7 @@
 "use strict";
 
-// The plan as typed arrays, and where everything is at a time. Axis 2u is theta of the unit in
-// place u of the layout, 2u + 1 its phi. Names carry their units, as in the program.
+// Motion holds the plan as typed arrays, and the position of everything at a time. Axis 2u is theta
+// of the unit in place u of the layout, 2u + 1 its phi. Names carry their units, as in the program.
 
 const kDegree = Math.PI / 180;
 
@@ -26,7 +26,7 @@ function unpackColumns(packed, count) {
   return columns;
 }
 
-/** How many entries of an ascending array are <= x, from `begin` to `end`. */
+/** The number of entries of an ascending array that are <= x, from `begin` to `end`. */
 function upperBound(array, x, begin = 0, end = array.length) {
   let low = begin;
   let high = end;
@@ -38,7 +38,7 @@ function upperBound(array, x, begin = 0, end = array.length) {
   return low;
 }
 
-/** What a unit is doing; the order is that of the legend. */
+/** The states of a unit, in the order of the legend. */
 const State = {
   moving: 0, waiting: 1, arrived: 2, stands: 3, unserved: 4, disabled: 5, unknown: 6,
 };
@@ -52,7 +52,7 @@ const kStates = [
   {name: "unknown", text: "place not known"},
 ];
 
-/** Why a unit is not served, as fleet/plan/plan.h numbers it, from 1. */
+/** The reasons why a unit is not served, as fleet/plan/plan.h numbers them, from 1. */
 const kUnservedWhy = [
   "", "disabled", "its place is not known", "no way that is clear was found",
   "the target collides with what cannot move",
@@ -71,11 +71,11 @@ class Motion {
     this.joinRows(data.rows_count);
     this.findBlockers();
 
-    // At `t_s`, as setTime leaves them.
+    // The state at `t_s`, as setTime leaves it.
     this.t_s = NaN;
     this.theta_deg = new Float64Array(this.count).fill(NaN);
     this.phi_deg = new Float64Array(this.count).fill(NaN);
-    this.elbow_x = new Float64Array(this.count).fill(NaN);  // NaN: nobody knows
+    this.elbow_x = new Float64Array(this.count).fill(NaN);  // NaN: not known
     this.elbow_y = new Float64Array(this.count).fill(NaN);
     this.fibre_x = new Float64Array(this.count).fill(NaN);
     this.fibre_y = new Float64Array(this.count).fill(NaN);
@@ -84,8 +84,8 @@ class Motion {
     this.setTime(0);
   }
 
-  // Which rows are whose; a row begins where the one before it ended, the first where the axis
-  // stood.
+  // Finds the rows of each axis. A row begins where the previous one ended, the first where the
+  // axis stood.
   joinRows(rows_count) {
     const {units, rows} = this;
     rows.from_deg = new Float64Array(rows_count);
@@ -110,7 +110,7 @@ class Motion {
     }
   }
 
-  // Units that are named as being in the way of another.
+  // Finds the units that are named as being in the way of another.
   findBlockers() {
     this.isBlocker = new Uint8Array(this.count);
     for (let u = 0; u < this.count; ++u) {
@@ -132,7 +132,7 @@ class Motion {
     return k >= 0 && t_s < this.rows.t1_s[k] ? k : -1;
   }
 
-  /** Linear within a row; before, between and after its rows an axis stands. */
+  /** The angle is linear within a row; before, between and after its rows an axis stands. */
   angleAt(axis, t_s, k = this.rowBegun(axis, t_s)) {
     const {units, rows} = this;
     if (k < 0) return (axis & 1 ? units.start_phi_deg : units.start_theta_deg)[axis >> 1];
@@ -151,7 +151,7 @@ class Motion {
     return power_W;
   }
 
-  /** Everything at a time. */
+  /** Computes the position of everything at a time. */
   setTime(t_s) {
     if (t_s === this.t_s) return;
     this.t_s = t_s;
@@ -173,7 +173,7 @@ class Motion {
     }
   }
 
-  /** Elbow and fibre by the angles, as docs/files.md has it. */
+  /** Computes elbow and fibre from the angles, as docs/files.md defines them. */
   placeArm(u) {
     const {units} = this;
     const t = this.theta_deg[u] + units.theta_zero_deg[u];
@@ -194,7 +194,7 @@ class Motion {
     return this.t_s >= this.ends_s[u] ? State.arrived : State.waiting;
   }
 
-  /** Where the arms of two units are nearest to each other now: [x, y] of each. */
+  /** The points where the arms of two units are nearest to each other now: [x, y] of each. */
   nearestPoints(a, b) {
     const armOf = (u) => [
       [this.elbow_x[u], this.elbow_y[u]], [this.fibre_x[u], this.fibre_y[u]]];

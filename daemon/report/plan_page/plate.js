@@ -1,11 +1,11 @@
-// The focal plane on a canvas, seen from the sky side: x to the right, y upwards. Only what lies in
-// the view is drawn, and of that only what is large enough to be seen.
+// Plate draws the focal plane on a canvas, seen from the sky side: x to the right, y upwards. Parts
+// outside the view are not drawn, nor those too small to be seen.
 
 const kReachOfClick_px = 14;
 const kFullCircle = 2 * Math.PI;
 const kZoomMax_px_per_mm = 2000;
-// One path of thousands of pieces is slow to paint without a graphics card, and so is one path a
-// piece: of 5000 arms, 35 ms and 42 ms against 15 ms.
+// A path of thousands of pieces is slow to paint without a graphics card, and so is a path for each
+// piece. For 5000 arms these take 35 ms and 42 ms, paths of 64 pieces 15 ms.
 const kPiecesOfPath = 64;
 
 /** Colours by name, from the style sheet: they follow light and dark. */
@@ -39,7 +39,8 @@ class Plate {
     this.selectedPair = null;
     this.visible = new Uint32Array(motion.count);
     this.visibleCount = 0;
-    // To whole um: what differs by rounding alone is drawn at once.
+    // Widths are rounded to whole um, so that widths that differ by rounding alone are drawn
+    // together.
     this.half_width_mm = motion.units.half_width_mm.map((mm) => Math.round(1000 * mm) / 1000);
     this.half_widths_mm = [...new Set(this.half_width_mm)];
     this.reach_mm = 0;
@@ -95,7 +96,7 @@ class Plate {
     this.scaleAll = this.scale;
   }
 
-  /** What lies under (x, y) stays there. Units: px. */
+  /** Zooms; the point under (x, y) stays there. Units: px. */
   zoom(factor, x_px = this.width / 2, y_px = this.height / 2) {
     const x = this.plateX(x_px);
     const y = this.plateY(y_px);
@@ -235,8 +236,8 @@ class Plate {
   }
 
   /**
-   * Paints (stroke or fill) a piece of path for each visible unit for which `add` says that it made
-   * one.
+   * Paints (stroke or fill) a piece of path for each visible unit for which `add` returns that it
+   * made one.
    */
   paintUnits(paint, add) {
     const {context} = this;
@@ -285,7 +286,7 @@ class Plate {
     });
   }
 
-  // One colour after the other; what moves is drawn last, on top. The arms of a layout have few
+  // Arms are drawn colour by colour; moving arms come last, on top. The arms of a layout have few
   // widths.
   drawPhiArms() {
     for (let state = kStates.length - 1; state >= 0; --state) {
@@ -313,8 +314,8 @@ class Plate {
     }
   }
 
-  // The shape says it without colour: a square is disabled, a diamond not served, an empty circle
-  // not known.
+  // The shape shows the state without colour: a square is disabled, a diamond not served, an empty
+  // circle not known.
   drawBases() {
     const {context, motion} = this;
     const special = Math.min(9, Math.max(2.2, 0.07 * this.pitch_px));
@@ -350,7 +351,7 @@ class Plate {
     const {context} = this;
     const {base_x_mm, base_y_mm} = this.motion.units;
     const radius = Math.min(6, 0.035 * this.pitch_px);
-    const isDot = radius < 0.7;  // of a pixel or two: a short line costs a tenth of a circle
+    const isDot = radius < 0.7;  // at a pixel or two a short line costs a tenth of a circle
     context.fillStyle = this.colours.ink;
     context.strokeStyle = this.colours.ink;
     context.lineWidth = 1 / this.ratio;
@@ -402,7 +403,7 @@ class Plate {
     }
   }
 
-  /** Text that is legible on anything. */
+  /** Draws text that is legible on any background. */
   label(text, x_px, y_px, colour = this.colours.ink) {
     const {context} = this;
     context.lineJoin = "round";
@@ -447,8 +448,8 @@ class Plate {
     }
   }
 
-  // Each arm with half of the clearance around it: where the two outlines meet, the pair is just
-  // clear.
+  // Draws each arm with half of the clearance around it. Where the two outlines meet, the pair is
+  // just clear.
   drawKeepOut({a, b}) {
     const {context, motion} = this;
     context.beginPath();
@@ -490,7 +491,7 @@ class Plate {
   }
 }
 
-/** A clearance for people: "+12.3 um", signed, because 0 is just clear. */
+/** A clearance as text: "+12.3 um", signed, because 0 is just clear. */
 function micrometres(mm) {
   const um = 1000 * mm;
   const digits = Math.abs(um) < 100 ? 1 : 0;

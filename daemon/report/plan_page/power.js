@@ -1,5 +1,6 @@
-// What the rails draw, from the rows' powers, as steps: watts[k] holds from time_s[k] on. Summed in
-// whole nanowatts as Estimate does, so that every curve ends at exactly 0.
+// Power computes the power of the rails from the rows' powers, as steps: watts[k] holds from
+// time_s[k] on. Powers are summed in whole nanowatts as Estimate does, so every curve ends at
+// exactly 0.
 
 class StepCurve {
   constructor(events) {
