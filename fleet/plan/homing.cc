@@ -124,7 +124,7 @@ Status WayMaker::Refuse(std::uint32_t unit, const char* why) const {
 
 Status WayMaker::CheckObstacles() const {
   for (const StandingThing& thing : scene_.standing(homing_)) {
-    if (thing.by != kNobody) continue;
+    if (thing.by != kNoUnitIndex) continue;
     for (const PoseBox& swept : swept_)
       if (!SweepClearOf(scene_.arm(homing_), Sweep::Of(swept), thing.capsule, thing.need_mm,
                         kBudget))

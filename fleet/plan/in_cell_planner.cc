@@ -47,7 +47,8 @@ Way InCellPlanner::WayOf(std::uint32_t unit, bool in_cell) {
   const ArmGeometry& arm = scene_->arm(unit);
   PathSearch::Question question;
   question.blockers = surroundings_->Around(
-      unit, lines_, poses_, in_cell ? Surroundings::Who::kOutOfCell : Surroundings::Who::kAll);
+      unit, lines_, poses_,
+      in_cell ? Surroundings::Include::kOutOfCell : Surroundings::Include::kAll);
   if (SweepClear(arm, {from, to}, question.blockers, nullptr)) return {{from}, {to}};
   question.arm = &arm;
   question.drive = &drives_[unit];

@@ -107,7 +107,7 @@ std::optional<NoWay> ProveNoWay(const NoWayQuestion& question) {
     NoWay proof{.grid_deg = grid_deg, .walls = {}, .obstacle = false};
     std::sort(walls.begin(), walls.end());
     for (const std::uint32_t by : walls) {
-      if (by == kNobody)
+      if (by == kNoUnitIndex)
         proof.obstacle = true;
       else
         proof.walls.push_back({by});

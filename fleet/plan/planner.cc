@@ -405,7 +405,7 @@ Result<Plan> Planner::Run() {
   if (!done) {
     order.clear();
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
-      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, kNobody);
+      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, kNoUnitIndex);
   }
   // Stages gain nothing from short legs.
   const std::vector<Piece> pieces = options_.stall_tolerant ? order : CutPieces(order, scene_);

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fleet/knowledge.h"
@@ -92,13 +93,11 @@ class RunningPlan {
     return ends_[unit.value];
   }
 
-  /// One after the other; each sees the late moves of those before it, and where those stand that
-  /// come after it or found no way. Who found none asks again once one of the others has left.
-  [[nodiscard]] std::vector<Result<LateMove>> ReplanAll(
-      std::span<const ReplanQuestion> questions, std::span<const Deviation> deviations) const;
-
  private:
   friend class Replanner;
+  friend class ReplanNeighbourhood;
+
+  [[nodiscard]] std::string NameOf(std::uint32_t unit) const;
 
   const Layout* layout_;
   std::vector<UnitDrive> drives_;

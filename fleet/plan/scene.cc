@@ -157,7 +157,7 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
       const PointFp& c = obstacle.centre_fp;
       if (DistanceMm(arm.base_fp(), c) > reach + need) continue;
       const double least = need - kGuardMm - kClearToleranceMm;
-      standing_.push_back({{{c, c}, 0}, need, least, kNobody, false});
+      standing_.push_back({{{c, c}, 0}, need, least, kNoUnitIndex, false});
     }
     for (const NeighbourNeed& near : neighbours(i)) {
       if (is_place_[near.unit] != 0) continue;
@@ -186,7 +186,7 @@ void Scene::AllowFor(std::span<const Pose> poses) {
     }
     for (std::uint32_t k = standing_begin_[i]; k < standing_begin_[i + 1]; ++k) {
       StandingThing& thing = standing_[k];
-      if (thing.by != kNobody) continue;
+      if (thing.by != kNoUnitIndex) continue;
       const double distance = DistanceMm(line, thing.capsule.line);
       thing.need_mm = std::max(thing.least_mm, std::min(thing.need_mm, distance - kStartSlackMm));
     }

@@ -21,7 +21,7 @@
 
 namespace focalfleet {
 
-inline constexpr std::uint32_t kNobody = 0xffffffffu;
+inline constexpr std::uint32_t kNoUnitIndex = 0xffffffffu;
 /// Two units that are this much nearer than half-widths plus clearance still count as clear.
 inline constexpr double kClearToleranceMm = 2e-3;
 
@@ -36,9 +36,9 @@ struct NeighbourNeed {
 struct StandingThing {
   Capsule capsule;
   double need_mm = 0;
-  double least_mm = 0;         // what the rule asks at the very least
-  std::uint32_t by = kNobody;  // the unit that it stands for; kNobody: a fixed obstacle
-  bool in_cell = false;        // that unit is in its cell wherever it is
+  double least_mm = 0;              // what the rule asks at the very least
+  std::uint32_t by = kNoUnitIndex;  // the unit that it stands for; kNoUnitIndex: a fixed obstacle
+  bool in_cell = false;             // that unit is in its cell wherever it is
 };
 
 /// Whole vectors of phi, both ends included; empty where low > high.

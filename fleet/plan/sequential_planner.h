@@ -17,6 +17,7 @@
 
 #include "fleet/plan/path_search.h"
 #include "fleet/plan/scene.h"
+#include "fleet/plan/surroundings.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
@@ -25,31 +26,6 @@ namespace focalfleet {
 struct Piece {
   std::uint32_t unit = 0;
   Sweep sweep;
-};
-
-/// Scratch that outlives one plan step: what stands around one unit, and the search.
-class Surroundings {
- public:
-  /// `start` outlives this. Shape: (n).
-  Surroundings(const Scene* scene, std::span<const Pose> start, Abandoned abandoned = {})
-      : scene_(scene), start_(start), search_(std::move(abandoned)) {}
-
-  enum class Who : std::uint8_t {
-    kAll,
-    kOutOfCell,  // without units inside their own cells: for ways that never leave the own one
-  };
-  /// Everything near `unit` with the others at `poses`. Lifetime: until the next call.
-  std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                  std::span<const Pose> poses, Who who);
-  /// Only the units in `these`, as they start, and the standing things. Shape: (n).
-  std::span<const Blocker> AroundOf(std::uint32_t unit, std::span<const std::uint8_t> these);
-  PathSearch& search() { return search_; }
-
- private:
-  const Scene* scene_;
-  std::span<const Pose> start_;
-  PathSearch search_;
-  std::vector<Blocker> blockers_;
 };
 
 class SequentialPlanner {
@@ -76,13 +52,13 @@ class SequentialPlanner {
   [[nodiscard]] int ShutIn(std::uint32_t unit) const;
   bool StraightRound();
   bool GoAround(double grid_deg);
-  bool MakeRoom();
-  bool MakeRoomFor(std::uint32_t unit, bool stay_in_cell);
-  bool GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
-               bool stay_in_cell);
-  bool Shake();
-  bool ShakeFree(std::uint32_t unit);
-  bool Wander(std::uint32_t unit, Way* way);
+  bool ClearStraightWays();
+  bool ClearStraightWayOf(std::uint32_t unit, bool stay_in_cell);
+  bool MoveAside(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
+                 bool stay_in_cell);
+  bool Perturb();
+  bool PerturbAround(std::uint32_t unit);
+  bool RandomWay(std::uint32_t unit, Way* way);
   Way WayIntoCell(std::uint32_t unit, double grid_deg);
   void StandAt(std::uint32_t unit, const Pose& pose);
   PathSearch::Question QuestionFor(std::uint32_t unit, double grid_deg);
@@ -102,10 +78,10 @@ class SequentialPlanner {
   std::vector<std::uint32_t> newly_waiting_;
   std::vector<Piece> pieces_;
   enum class Known : std::uint8_t { kNo, kClear, kBlocked };
-  std::vector<Known> straight_;        // as far as nothing near has moved since
-  std::vector<double> searched_deg_;   // finest grid on which a search failed since then; 0: none
-  std::vector<std::uint8_t> favours_;  // turns and yields made for others
-  std::vector<std::uint8_t> shakes_;   // made for this unit
+  std::vector<Known> straight_;       // as far as nothing near has moved since
+  std::vector<double> searched_deg_;  // finest grid on which a search failed since then; 0: none
+  std::vector<std::uint8_t> moves_aside_;    // turns and yields made for others
+  std::vector<std::uint8_t> perturbations_;  // made for this unit
   Rng rng_;
 };
 

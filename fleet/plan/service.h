@@ -42,8 +42,8 @@ class Service {
   [[nodiscard]] const PlanRequest& request() const { return *request_; }
   [[nodiscard]] const Scene& scene() const { return *scene_; }
 
-  /// It stays where it starts, and may still step aside. `by`: kNobody where nobody is to blame;
-  /// `proof`: that it has no way, where there is one.
+  /// It stays where it starts, and may still step aside. `by`: kNoUnitIndex where nobody is to
+  /// blame; `proof`: that it has no way, where there is one.
   void Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by,
                std::optional<NoWay> proof = std::nullopt);
   /// From now on it moves for nobody.
@@ -67,8 +67,6 @@ class Service {
 
  private:
   void TakeGiven(std::uint32_t unit);
-  [[nodiscard]] std::string TooNear(std::span<const Pose> poses,
-                                    std::span<const std::uint8_t> counts, const char* what) const;
   [[nodiscard]] bool Meet(std::uint32_t a, std::uint32_t b) const;
   [[nodiscard]] bool CollidesWith(std::uint32_t unit, std::uint32_t* by) const;
 

@@ -16,7 +16,7 @@ namespace focalfleet {
 bool CanEver(const Service& service, std::uint32_t unit, Surroundings* surroundings,
              std::optional<NoWay>* proof);
 
-/// Who stands in the straight way of a stuck unit; kNobody where that cannot be told or is an
+/// Who stands in the straight way of a stuck unit; kNoUnitIndex where that cannot be told or is an
 /// obstacle.
 std::uint32_t InTheWayOf(const Service& service, std::uint32_t unit);
 

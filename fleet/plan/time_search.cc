@@ -73,10 +73,11 @@ Leg TimeSearch::LegOf(const Pose& from, const Pose& to, std::int32_t step) const
 bool TimeSearch::StepClear(const Leg& leg) const {
   const SegmentFp middle = ArmAt(*q_.arm, leg, (leg.begin_s + leg.end_s) / 2);
   const double travel = leg.speed_mm_per_s * (leg.end_s - leg.begin_s) / 2;
-  for (const Passer& passer : q_.passers) {
-    const double far = passer.need_mm + travel + passer.track->reach_mm();
-    if (SquaredDistance(passer.arm->base_fp(), middle) > far * far) continue;
-    if (!LegPassesClear(*q_.arm, leg, *passer.arm, *passer.track, passer.need_mm, passer.tolerance))
+  for (const MovingNeighbour& neighbour : q_.moving) {
+    const double far = neighbour.need_mm + travel + neighbour.track->reach_mm();
+    if (SquaredDistance(neighbour.arm->base_fp(), middle) > far * far) continue;
+    if (!LegPassesClear(*q_.arm, leg, *neighbour.arm, *neighbour.track, neighbour.need_mm,
+                        neighbour.tolerance))
       return false;
   }
   for (const Blocker& blocker : q_.standing) {
@@ -110,29 +111,29 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
                     std::min(line.a.y_mm, line.b.y_mm), std::max(line.a.y_mm, line.b.y_mm)};
   blocked_.assign(static_cast<std::size_t>(steps_max_) + 1, 0);
   constexpr double h = Track::kSliceS;
-  for (const Passer& passer : q_.passers) {
-    const double far = passer.need_mm + passer.track->reach_mm();
-    if (SquaredDistance(passer.arm->base_fp(), line) > far * far) continue;
-    const int last = passer.track->slice_count();
+  for (const MovingNeighbour& neighbour : q_.moving) {
+    const double far = neighbour.need_mm + neighbour.track->reach_mm();
+    if (SquaredDistance(neighbour.arm->base_fp(), line) > far * far) continue;
+    const int last = neighbour.track->slice_count();
     const int first = std::max(-1, static_cast<int>(q_.begin_s / h) - 4);
     for (int n = first; n <= last; ++n) {
       // Most of the time most arms are elsewhere: all slices of a box at once.
       if (n >= 0 && n % Track::kSlicesPerBounds == 0 && n + Track::kSlicesPerBounds <= last &&
-          Apart(passer.track->bounds(n / Track::kSlicesPerBounds), here, passer.need_mm)) {
+          Apart(neighbour.track->bounds(n / Track::kSlicesPerBounds), here, neighbour.need_mm)) {
         n += Track::kSlicesPerBounds - 1;
         continue;
       }
-      const Slice& slice = passer.track->slice(n);
-      const double enough = passer.need_mm + slice.travel_mm;
+      const Slice& slice = neighbour.track->slice(n);
+      const double enough = neighbour.need_mm + slice.travel_mm;
       const double distance2 = SquaredDistance(line, slice.line);
       if (distance2 > enough * enough) continue;
-      const double slip_s = passer.tolerance.Slip((n + 2) * h);
+      const double slip_s = neighbour.tolerance.Slip((n + 2) * h);
       const double from_s = n < 0 ? -1 : n * h - slip_s - q_.begin_s;
       const double to_s = n == last ? Track::kForever : (n + 1) * h + slip_s - q_.begin_s;
       const auto from = static_cast<std::int32_t>(std::max(0.0, std::floor(from_s / step_s_)));
       const auto to =
           static_cast<std::int32_t>(std::min<double>(steps_max_, std::ceil(to_s / step_s_)));
-      const bool certain = distance2 <= passer.need_mm * passer.need_mm;
+      const bool certain = distance2 <= neighbour.need_mm * neighbour.need_mm;
       for (std::int32_t step = from; step <= to; ++step) {
         std::uint8_t& blocked = blocked_[static_cast<std::size_t>(step)];
         blocked = std::max(blocked, certain ? kBlocked : kPerhaps);

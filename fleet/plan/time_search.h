@@ -17,7 +17,7 @@
 namespace focalfleet {
 
 /// Somebody whose motion is given.
-struct Passer {
+struct MovingNeighbour {
   const ArmGeometry* arm = nullptr;
   const Track* track = nullptr;
   double need_mm = 0;
@@ -29,7 +29,7 @@ class TimeSearch {
   struct Question {
     const ArmGeometry* arm = nullptr;
     const UnitDrive* drive = nullptr;
-    std::span<const Passer> passers;
+    std::span<const MovingNeighbour> moving;
     std::span<const Blocker> standing;
     Pose from{};
     Pose to{};
@@ -40,7 +40,7 @@ class TimeSearch {
     std::uint32_t expansions_max = 20'000;
   };
 
-  /// Empty: none was found. Cost: O(expansions * (passers + standing)).
+  /// Empty: none was found. Cost: O(expansions * (moving + standing)).
   std::optional<AxisPaths> Find(const Question& question);
 
  private:

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <limits>
 #include <new>
 #include <type_traits>
 
@@ -97,6 +98,24 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
 }
 
 }  // namespace
+
+std::uint32_t BeginTicks(const AxisPaths& paths) {
+  std::uint32_t begin = std::numeric_limits<std::uint32_t>::max();
+  for (const AxisPath& axis : paths)
+    if (axis.size() > 0) begin = std::min(begin, axis.segments().front().start_ticks);
+  return begin;
+}
+
+AxisPaths Shifted(const AxisPaths& paths, std::int64_t by_ticks) {
+  AxisPaths shifted;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    for (Segment segment : paths[k].segments()) {
+      segment.start_ticks = static_cast<std::uint32_t>(segment.start_ticks + by_ticks);
+      shifted[k].Append(segment);
+    }
+  }
+  return shifted;
+}
 
 Track::Track(const ArmGeometry& arm, const Pose& stands) {
   Stand(arm, stands);
@@ -226,6 +245,22 @@ Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
 
 namespace {
 
+/// The leg `a` within `span_a` of its own time, and the legs of `b` within `time_b`.
+bool LegClearOfPart(const Mover& a, const Span1& span_a, const ArmGeometry& arm_b, const Track& b,
+                    const Span1& time_b, double slip_s, double need_mm, int* budget) {
+  for (const Leg& leg_b : b.legs()) {
+    const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
+    if (span_b.low > span_b.high) continue;
+    const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
+                       std::min(span_a.high, span_b.high + slip_s)};
+    const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
+                       std::min(span_b.high, span_a.high + slip_s)};
+    if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
+    if (!LegsClear(a, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, budget)) return false;
+  }
+  return true;
+}
+
 /// The legs of both within these own times.
 bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
                 const ArmGeometry& arm_b, const Track& b, const Span1& time_b, double slip_s,
@@ -233,17 +268,8 @@ bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
   for (const Leg& leg_a : a.legs()) {
     const Span1 span_a{std::max(leg_a.begin_s, time_a.low), std::min(leg_a.end_s, time_a.high)};
     if (span_a.low > span_a.high) continue;
-    for (const Leg& leg_b : b.legs()) {
-      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
-      if (span_b.low > span_b.high) continue;
-      const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
-                         std::min(span_a.high, span_b.high + slip_s)};
-      const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
-                         std::min(span_b.high, span_a.high + slip_s)};
-      if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-      if (!LegsClear({&arm_a, &leg_a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, budget))
-        return false;
-    }
+    if (!LegClearOfPart({&arm_a, &leg_a}, span_a, arm_b, b, time_b, slip_s, need_mm, budget))
+      return false;
   }
   return true;
 }
@@ -340,17 +366,8 @@ bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& a
     const int m = near[n];
     const Span1 time_b{m < 0 ? -Track::kForever : m * h,
                        m >= b.slice_count() ? Track::kForever : (m + 1) * h};
-    for (const Leg& leg_b : b.legs()) {
-      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
-      if (span_b.low > span_b.high) continue;
-      const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
-                         std::min(span_a.high, span_b.high + slip_s)};
-      const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
-                         std::min(span_b.high, span_a.high + slip_s)};
-      if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-      if (!LegsClear({&arm_a, &a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, &budget))
-        return false;
-    }
+    if (!LegClearOfPart({&arm_a, &a}, span_a, arm_b, b, time_b, slip_s, need_mm, &budget))
+      return false;
   }
   return true;
 }

@@ -10,6 +10,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -64,6 +66,14 @@ inline bool Apart(const Bounds& a, const Bounds& b, double need_mm) {
 }
 
 using AxisPaths = std::array<AxisPath, kAxisCount>;
+
+/// The unit stands.
+inline bool IsEmpty(const AxisPaths& paths) { return paths[0].size() + paths[1].size() == 0; }
+/// When the first segment begins; the largest number for an empty motion. Units: ticks of 100 us.
+std::uint32_t BeginTicks(const AxisPaths& paths);
+/// The same motion later by so many ticks of 100 us; sooner, where that is negative. Pre: no
+/// segment begins before 0 then.
+AxisPaths Shifted(const AxisPaths& paths, std::int64_t by_ticks);
 
 class Track {
  public:

@@ -25,7 +25,7 @@ class NoWayTest : public ::testing::Test {
   }
   static Blocker Disc(double x_mm, double y_mm, double radius_mm) {
     const PointFp at{x_mm, y_mm};
-    return {{{at, at}, radius_mm}, 2, kNobody};
+    return {{{at, at}, radius_mm}, 2, kNoUnitIndex};
   }
 
   std::vector<Unit> units_ = MakeHexLayout({.count = 1});

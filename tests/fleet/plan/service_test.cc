@@ -56,7 +56,7 @@ TEST_F(ServiceTest, ACopyBringsBackGoalsAndReasons) {
 
 TEST_F(ServiceTest, WhoIsReadmittedGoesAndHasNoReasonLeft) {
   Service service = Made();
-  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(2, UnservedWhy::kBlocked, kNoUnitIndex);
   service.Unserve(0, UnservedWhy::kTargetCollides, 1);
   service.Hold(2);
   service.Readmit(2);
@@ -80,12 +80,12 @@ TEST_F(ServiceTest, NamesTargetsThatMeetAndDropsOneOfThem) {
 TEST_F(ServiceTest, BoundsAreThoseOfTheServed) {
   Service service = Made();
   const double all_s = TimeBoundS(service);
-  service.Unserve(0, UnservedWhy::kBlocked, kNobody);
-  service.Unserve(1, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(0, UnservedWhy::kBlocked, kNoUnitIndex);
+  service.Unserve(1, UnservedWhy::kBlocked, kNoUnitIndex);
   const double far_one_s = TimeBoundS(service);
   EXPECT_GT(all_s, far_one_s);
   EXPECT_GT(far_one_s, 0);
-  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(2, UnservedWhy::kBlocked, kNoUnitIndex);
   EXPECT_EQ(TimeBoundS(service), 0);
 }
 
@@ -102,7 +102,7 @@ TEST_F(ServiceTest, ALimitBelowOneMotorIsRefusedWithTheLeastThatWouldDo) {
   EXPECT_TRUE(CheckPower(service, options));
   // Nobody goes: nothing is drawn.
   for (std::uint32_t unit = 0; unit < 3; ++unit)
-    service.Unserve(unit, UnservedWhy::kBlocked, kNobody);
+    service.Unserve(unit, UnservedWhy::kBlocked, kNoUnitIndex);
   options.power.rail_W = 1e-6;
   EXPECT_TRUE(CheckPower(service, options));
 }
