@@ -21,7 +21,8 @@ InCellPlanner::InCellPlanner(const Scene* scene, std::span<const UnitDrive> driv
 }
 
 void InCellPlanner::Run() {
-  // Who leaves its cell meets the others where they are: first all turn that can do so at home.
+  // A unit that leaves its cell meets the others where they are: the units that can turn inside
+  // their cells go first.
   for (bool moved = true; moved && !pending_.empty();) moved = Pass(true) || Pass(false);
 }
 

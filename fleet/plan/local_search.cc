@@ -19,7 +19,7 @@ constexpr int kAttemptsPerUnit = 16;
 /// The time that a unit may take grows from this attempt on, by so much for each attempt.
 constexpr int kAttemptsInTime = 5;
 constexpr double kExtension = 0.03;
-constexpr double kWithin = 1.005;  // times the time that may be used without being noticed
+constexpr double kWithin = 1.005;  // times the time that may be used at no cost
 /// A unit that ends later than this, times that time, tries again for each of these shares.
 constexpr double kWorthTightening = 1.1;
 constexpr std::array kTightenTo{1.005, 1.03, 1.1};
@@ -60,7 +60,7 @@ class LocalSearch {
 
  private:
   void Begin();
-  bool BeginUnit(std::uint32_t unit, double* spare_s);
+  bool BeginUnit(std::uint32_t unit, double* late_s);
   void BeginWithinLimits(std::uint32_t unit);
   [[nodiscard]] double TimeFor(std::uint32_t unit) const { return TimeAt(attempts_[unit]); }
   [[nodiscard]] double TimeAt(int attempts) const {
@@ -107,8 +107,9 @@ void LocalSearch::PushMet(std::uint32_t unit) {
     if (motions_.Meets(unit, motions_.track(unit), slot)) Push(scene_.neighbours(unit)[slot].unit);
 }
 
-/// True: the unit looks for a way, and its straight one has `spare_s` seconds too many.
-bool LocalSearch::BeginUnit(std::uint32_t unit, double* spare_s) {
+/// True: the unit looks for a way. `late_s` is how much later than `within_s` its straight one
+/// ends.
+bool LocalSearch::BeginUnit(std::uint32_t unit, double* late_s) {
   if (!scene_.is_place(unit)) return false;
   if (motions_.IsGiven(unit)) {
     motions_.Begin(unit, q_.begin_with[unit]);
@@ -117,30 +118,31 @@ bool LocalSearch::BeginUnit(std::uint32_t unit, double* spare_s) {
   const bool steps_aside = !q_.begin_with.empty() && !IsEmpty(q_.begin_with[unit]);
   if (q_.movable[unit] == 0 || (q_.from[unit] == q_.to[unit] && !steps_aside)) {
     motions_.BeginStanding(unit);
-    *spare_s = -q_.within_s;
+    *late_s = -q_.within_s;
     return q_.movable[unit] != 0;
   }
   const Candidate straight = Straight(q_.drives[unit], q_.from[unit], q_.to[unit]);
   const bool begun = !q_.begin_with.empty() && Reaches(q_, unit, q_.begin_with[unit]);
   if (q_.ledger == nullptr) motions_.Begin(unit, begun ? q_.begin_with[unit] : straight.path);
-  *spare_s = straight.end_s - q_.within_s;
+  *late_s = straight.end_s - q_.within_s;
   return true;
 }
 
 void LocalSearch::Begin() {
-  std::vector<std::pair<double, std::uint32_t>> spare;
+  std::vector<std::pair<double, std::uint32_t>> late;
   for (std::uint32_t i = 0; i < scene_.size(); ++i)
-    if (double spare_s = 0; BeginUnit(i, &spare_s)) spare.emplace_back(spare_s, i);
-  // The unit with the most time to spare gives way first.
-  std::sort(spare.begin(), spare.end());
-  for (const auto& [time, i] : spare) Push(i);
+    if (double late_s = 0; BeginUnit(i, &late_s)) late.emplace_back(late_s, i);
+  // The unit with the most time to spare looks first.
+  std::sort(late.begin(), late.end());
+  for (const auto& [time, i] : late) Push(i);
   if (q_.ledger == nullptr) return;
   // The longest first, each as soon as its rail can feed it.
-  for (auto it = spare.rbegin(); it != spare.rend() && !starved_; ++it)
+  for (auto it = late.rbegin(); it != late.rend() && !starved_; ++it)
     if (q_.from[it->second] != q_.to[it->second]) BeginWithinLimits(it->second);
 }
 
-/// Straight, as soon as the limits of power let it: both axes at once, or phi after theta.
+/// The unit goes straight, as soon as the limits of power let it: both axes at once, or phi after
+/// theta.
 void LocalSearch::BeginWithinLimits(std::uint32_t unit) {
   constexpr double kStepS = 0.5;
   const Candidate straight = Straight(q_.drives[unit], q_.from[unit], q_.to[unit]);
@@ -186,8 +188,8 @@ bool LocalSearch::GoAround(std::uint32_t unit, std::uint32_t other) {
   return false;
 }
 
-/// The first trial keeps the unit at its start as long as can be, the second has it gone as soon:
-/// that leaves the most room at the one end or the other. Further trials are random.
+/// The first trial keeps the unit at its start as long as possible, the second has it gone as soon
+/// as possible. Either leaves the most room at one end. Further trials are random.
 void LocalSearch::SortForTrial(int trial, std::vector<Candidate>* ways) {
   if (trial == 0)
     std::stable_sort(ways->begin(), ways->end(), [](const Candidate& x, const Candidate& y) {
@@ -337,7 +339,8 @@ void LocalSearch::Drain(int turns_most) {
   }
 }
 
-/// Straight again and repaired again, in less time. False: that found no end, and all go as before.
+/// Repairs once more from a straight way of this unit, within less time. False: that found no end,
+/// and all move as before.
 bool LocalSearch::Tighten(std::uint32_t unit, double extend) {
   motions_.BeginTrial();
   attempts_most_ = kAttemptsToTighten;
@@ -350,7 +353,7 @@ bool LocalSearch::Tighten(std::uint32_t unit, double extend) {
   return motions_.EndTrial();
 }
 
-/// The last units may have been late by chance of the order.
+/// The units that end last may be late only by chance of the order.
 void LocalSearch::TightenAll() {
   if (q_.ledger != nullptr) return;  // power is what takes the time
   for (std::uint32_t i = 0; i < scene_.size(); ++i) {

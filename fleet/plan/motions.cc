@@ -59,7 +59,7 @@ bool Motions::Meets(std::uint32_t unit, const Track& track, std::uint32_t slot) 
   const Tolerance& tolerance = ToleranceOf(unit, slot);
   const Track& other = tracks_[near.unit];
   if (!track.moves() && !other.moves()) return false;
-  // Near touching the order of the two may matter: it is always the same.
+  // Near touching, the order of the two arguments may matter: it is always the same.
   return unit < near.unit ? !PassesClear(scene_.arm(unit), track, scene_.arm(near.unit), other,
                                          near.need_mm, tolerance)
                           : !PassesClear(scene_.arm(near.unit), other, scene_.arm(unit), track,

@@ -1,8 +1,8 @@
 // The motions that a local search has chosen so far, one a unit, and which of them conflict.
 //
 // Two neighbours are in conflict where their motions are not clear of each other for all clocks and
-// skews (track.h). Each pair has a weight, which grows each time that the pair stays in conflict;
-// the cost of a motion is the sum of the weights of its conflicts.
+// skews (track.h). Each pair has a weight, which grows each time that the pair stays in conflict.
+// The cost of a motion is the sum of the weights of its conflicts.
 #pragma once
 
 #include <cstdint>
@@ -93,7 +93,7 @@ class Motions {
   const Scene& scene_;
   Tolerance without_notice_;
   std::vector<AxisPaths> paths_;                      // by unit
-  std::vector<Track> tracks_;                         // by unit; no legs: not on the plate
+  std::vector<Track> tracks_;                         // by unit; no legs: taken out
   std::vector<std::vector<std::uint8_t>> unnoticed_;  // by unit and slot: the pair has no notice
   std::vector<std::vector<float>> weight_;            // by unit and neighbour's slot
   std::vector<std::vector<std::uint32_t>> order_;     // slots, those that mattered last first

@@ -17,7 +17,7 @@ constexpr double kTickS = 1e-4;
 constexpr int kPassesMax = 12;
 constexpr double kGainMin = 2e-3;  // of the figure; a pass that gains less is the last
 constexpr int kLimitTrials = 8;
-constexpr int kTested = 6;  // of the candidates that are better, how many are asked for their way
+constexpr int kTested = 6;  // so many of the better candidates are tested for a clear way
 constexpr int kShifts = 16;
 constexpr std::array kRounds{CandidateRound{Shape::kStraight, 0, 13},
                              CandidateRound{Shape::kFolding, 0, 4}};
@@ -51,7 +51,7 @@ class Improver {
 
   const PlanRequest& request_;
   const PlanOptions& options_;
-  Objective objective_;  // of the passes now
+  Objective objective_;  // of the present passes
   double within_s_;
   Plan plan_;
   Scene scene_;
@@ -63,7 +63,7 @@ class Improver {
   std::vector<Pose> end_;
   std::vector<AxisPaths> paths_;
   std::vector<std::uint8_t> fixed_;
-  std::vector<std::uint32_t> order_;  // of the units that may change, the most energy first
+  std::vector<std::uint32_t> order_;  // the units that may change, the most energy first
   RailCurves curves_;
   double limit_W_ = 0;  // with kLeastPeak
   std::vector<Candidate> candidates_;
@@ -111,7 +111,8 @@ double Improver::EndOfPaths(std::uint32_t unit, const AxisPaths& path) const {
   return end_s;
 }
 
-/// What the unit adds to the figure if it draws so. Pre: its own draws are not in the curves.
+/// The amount that the unit adds to the figure if it draws so. Pre: its own draws are not in the
+/// curves.
 double Improver::Cost(std::uint32_t unit, const Draws& draws) {
   return objective_ == Objective::kLeastEnergy ? RailCurves::Energy(draws)
                                                : curves_.AddedSquares(unit, draws, free_W());
@@ -245,8 +246,8 @@ void Improver::LowerThePeak() {
   SetPaths(best);
 }
 
-/// Who stands in the way of a shorter way loses nothing by another time, but gains nothing either:
-/// spreading all over the time moves them.
+/// A unit that blocks a shorter way neither loses nor gains by another time. Spreading the power
+/// over all the time moves such units.
 void Improver::SaveEnergy() {
   constexpr int kRoundsMax = 4;
   Passes();

@@ -15,7 +15,7 @@ namespace focalfleet {
 
 class RailCurves {
  public:
-  /// One motor on for some slots.
+  /// A motor that is on for some slots.
   struct Draw {
     std::size_t first = 0;
     std::size_t last = 0;  // included
@@ -33,7 +33,8 @@ class RailCurves {
   /// Units: J.
   [[nodiscard]] static double Energy(const Draws& draws);
 
-  /// What the unit adds to SumOfSquares if it draws so. Pre: its own draws are not in the curves.
+  /// The amount that the unit adds to SumOfSquares if it draws so. Pre: its own draws are not in
+  /// the curves.
   [[nodiscard]] double AddedSquares(std::uint32_t unit, const Draws& draws, double free_W);
   /// Over all rails and slots, of the power that exceeds `free_W`. Units: W^2.
   [[nodiscard]] double SumOfSquares(double free_W) const;

@@ -16,8 +16,8 @@ namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-/// Grids of the searches among the others as they go, and as they stand in the end: as fine as an
-/// answer within some milliseconds allows.
+/// Grids of the searches among the others as they move, and as they stand in the end. They are as
+/// fine as an answer within some milliseconds allows.
 struct Effort {
   double grid_deg;
   std::uint32_t expansions_max;
@@ -36,7 +36,7 @@ Way Reversed(const Way& way) {
 
 }  // namespace
 
-/// One answer: the search for a way of the unit in its neighbourhood.
+/// The search for one answer: the search for a way of the unit in its neighbourhood.
 class Replanner {
  public:
   Replanner(const RunningPlan& running, const ReplanQuestion& question,
@@ -90,7 +90,7 @@ class Replanner {
 Status Replanner::CheckQuestion() const {
   if (q_.unit.value >= scene_.size()) return Fail(ErrorCode::kInvalid, "there is no such unit");
   const std::string name = running_.NameOf(q_.unit.value);
-  // Written so that what is not a number fails.
+  // The condition is written so that a NaN fails.
   if (!(q_.start_s >= 0 && q_.start_s < kOffsetMaxS && q_.now_s <= q_.start_s &&
         q_.start_skew_s >= 0 && q_.start_skew_s < 1))
     return Fail(ErrorCode::kInvalid, name + " cannot start then");
@@ -115,7 +115,7 @@ bool Replanner::Take(const AxisPaths& own, bool with_notice) {
   return true;
 }
 
-/// The candidate that ends soonest of those that are clear.
+/// Takes the candidate that ends soonest of those that are clear.
 bool Replanner::TakeOneOf(bool with_notice) {
   by_end_.resize(candidates_.size());
   std::iota(by_end_.begin(), by_end_.end(), std::size_t{0});
@@ -141,7 +141,7 @@ void Replanner::Candidates(double within_s) {
   }
 }
 
-/// A way among all others as they go.
+/// Takes a way among all others as they move.
 bool Replanner::Search(double end_s, bool with_notice) {
   std::vector<MovingNeighbour> moving;
   for (const Other& other : near_.others())
@@ -166,8 +166,8 @@ bool Replanner::Search(double end_s, bool with_notice) {
   return false;
 }
 
-/// A way among the others as they stand in the end; empty: none on this grid. `reached`: how many
-/// poses were, where there is none.
+/// A way among the others as they stand in the end. Empty: none on this grid; `reached` is then the
+/// number of poses that were reached.
 Way Replanner::WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached) const {
   std::vector<Blocker> blockers(near_.standing().begin(), near_.standing().end());
   for (const Other& other : near_.others())
@@ -186,10 +186,10 @@ Way Replanner::WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached
   return backwards ? Reversed(way) : way;
 }
 
-/// Waits until the others have ended, and goes along a way among them as they stand then.
+/// Takes a way among the others as they stand in the end, begun after they have ended.
 bool Replanner::GoWhenAllStand() {
-  // Where there is no way the start or the target is shut in: the fine search begins at that end,
-  // where it soon knows.
+  // Where no way exists, the start or the target is shut in. The fine search begins at that end,
+  // where it finishes soon.
   std::size_t from_start = 0;
   std::size_t from_end = 0;
   if (TakeAlong(WayInTheEnd(kGridsAtRestDeg[0], false, &from_start))) return true;
@@ -209,13 +209,14 @@ bool Replanner::TakeAlong(const Way& way) {
   return TakeOneOf(true);
 }
 
-/// Within the time that the others take anyhow, then after them, at last without notice.
+/// Looks for a way within the time that the others take anyhow, then after them, at last without
+/// notice.
 bool Replanner::FindWay() {
   const double straight_s = Straight(drive(), q_.from, q_.to).end_s;
   const double within_s = std::max(straight_s, running_.end_s_ - start_s_);
   Candidates(within_s);
   if (TakeOneOf(true) || Search(start_s_ + within_s, true)) return true;
-  // Folded all the way in and out again, once the others stand.
+  // Time to fold all the way in and out again, once the others stand.
   const PoseBox& range = arm().range();
   const double fold_s = (range.high[1] - range.low[1]) * SecondsPerVector(drive().axis[1]);
   Candidates(std::max(0.0, near_.OthersEnd() - start_s_) + straight_s + 2 * fold_s);
@@ -225,7 +226,7 @@ bool Replanner::FindWay() {
   return TakeOneOf(false) || Search(start_s_ + within_s, false);
 }
 
-/// What the others draw; who stands for certain draws nothing.
+/// Enters the power of the others; a unit that stands for certain draws nothing.
 void Replanner::EnterPower() {
   if (!running_.ledger_) return;
   ledger_.emplace(*running_.ledger_);
@@ -281,7 +282,7 @@ void Replanner::FindFollowersAndLeaders(LateMove* late) const {
         late->unnoticed.push_back({q_.unit, j, following->since_s, following->leaves_s});
     }
     std::swap(question.ends, question.comes);
-    // It may have ended a moment ago, and nobody has noticed yet.
+    // The neighbour may have ended a moment ago, unnoticed so far.
     question.from_s -= notice_s + question.proven.Slip(q_.now_s);
     if (const auto following = FindFollowing(question)) {
       late->leaders.push_back({j, following->FollowerOf(q_.unit)});

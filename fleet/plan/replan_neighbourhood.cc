@@ -22,7 +22,6 @@ ReplanNeighbourhood::ReplanNeighbourhood(const RunningPlan& running, const Repla
 
 const ArmGeometry& ReplanNeighbourhood::arm() const { return scene_.arm(q_.unit.value); }
 
-/// Where the others end, or stand, the target has to be clear for good.
 Status ReplanNeighbourhood::CheckTarget() const {
   const SegmentFp line = arm().At(q_.to);
   const std::string target = "the target of " + running_.NameOf(q_.unit.value);
@@ -119,7 +118,7 @@ void ReplanNeighbourhood::LookAround(std::span<const Deviation> deviations) {
       AddCover(near, deviation->stands);
   }
   for (const StandingThing& thing : scene_.standing(q_.unit.value)) {
-    // Of whom it stands for, more may be known by now.
+    // A deviation says more about its unit than the scene does.
     if (std::find(deviating.begin(), deviating.end(), thing.by) != deviating.end()) continue;
     double need_mm = thing.need_mm;
     if (thing.by == kNoUnitIndex)
@@ -153,7 +152,6 @@ bool ReplanNeighbourhood::IsClear(const Track& track, bool with_notice) {
   return true;
 }
 
-/// By then everybody near is where they stay.
 double ReplanNeighbourhood::OthersEnd() const {
   double end_s = 0;
   for (const Other& other : others_)

@@ -1,5 +1,5 @@
-// What is near one unit that is planned again: its neighbours as they move or stand from now on,
-// and whether a motion of the unit is clear of them.
+// The things near one unit that is planned again: its neighbours as they move or stand from now on.
+// A motion of the unit is tested against them here.
 //
 // Times are seconds after the start signal of the configuration, as in replan.h.
 #pragma once
@@ -15,7 +15,7 @@
 
 namespace focalfleet {
 
-/// Units: s to ticks of 100 us.
+/// The tick of 100 us that is nearest to a time. Units: s.
 std::uint32_t TicksOf(double t_s);
 
 class ReplanNeighbourhood {
@@ -42,15 +42,15 @@ class ReplanNeighbourhood {
   /// Things that stand for good: obstacles, and covers of units of uncertain place.
   [[nodiscard]] std::span<const Blocker> standing() const { return standing_; }
   [[nodiscard]] Tolerance ToleranceOf(const Other& other, bool with_notice) const;
-  /// By then each neighbour is where it stays. Units: s.
+  /// The time by which each neighbour is where it stays. Units: s.
   [[nodiscard]] double OthersEnd() const;
 
-  /// The target is clear for good of the places where the others end, or stand.
-  /// Errors: kInvalid, with every one that it is not clear of.
+  /// The target is clear for good of the places where the others end, or stand. Errors: kInvalid,
+  /// with every one that it is not clear of.
   [[nodiscard]] Status CheckTarget() const;
   /// From now on the motion is clear of all others. False: what it meets is counted.
   bool IsClear(const Track& track, bool with_notice);
-  /// How often motions met the things that stand, and the neighbour that they met most.
+  /// How many motions met things that stand, and how many the neighbour that was met most.
   [[nodiscard]] std::uint32_t things_met() const { return things_met_; }
   [[nodiscard]] std::uint32_t most_met() const;
   /// Names what was met most often, as the end of a message. Empty: no motion met anything.

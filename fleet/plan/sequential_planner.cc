@@ -73,8 +73,8 @@ bool SequentialPlanner::StraightClearOf(std::uint32_t unit, const NeighbourNeed&
                       near.need_mm);
 }
 
-/// How many waiting neighbours this unit would block at the end of its straight way, and does not
-/// block now.
+/// The number of waiting neighbours that this unit would block at the end of its straight way, and
+/// does not block now.
 int SequentialPlanner::ShutIn(std::uint32_t unit) const {
   const SegmentFp after = scene_->arm(unit).At(StraightEnd(unit));
   int count = 0;
@@ -126,7 +126,7 @@ bool SequentialPlanner::GoAround(double grid_deg) {
   return moved;
 }
 
-/// Among all others as they stand. Empty: none on this grid.
+/// A way among all others as they stand. Empty: none on this grid.
 Way SequentialPlanner::WayIntoCell(std::uint32_t unit, double grid_deg) {
   PathSearch::Question question = QuestionFor(unit, grid_deg);
   PoseBox goal = question.within;
@@ -136,8 +136,8 @@ Way SequentialPlanner::WayIntoCell(std::uint32_t unit, double grid_deg) {
   return surroundings_->search().Find(question);
 }
 
-/// Some neighbour of a waiting unit goes where it no longer blocks the straight way. Those that are
-/// in their cells first try to stay there.
+/// A neighbour of each waiting unit is moved aside to where it no longer blocks the straight way.
+/// Neighbours that are in their cells first try to stay there.
 bool SequentialPlanner::ClearStraightWays() {
   for (const bool stay_in_cell : {true, false}) {
     bool moved = false;
@@ -189,8 +189,8 @@ bool SequentialPlanner::Perturb() {
   return false;
 }
 
-/// Some of the unit and its neighbours go anywhere, one after the other, and then it into its cell
-/// if there is a way.
+/// Some of the unit and its neighbours go to random places, one after the other. Then the unit goes
+/// into its cell if there is a way.
 bool SequentialPlanner::PerturbAround(std::uint32_t unit) {
   std::vector<std::uint32_t> near;
   for (const NeighbourNeed& n : scene_->neighbours(unit))
@@ -237,7 +237,7 @@ void SequentialPlanner::StandAt(std::uint32_t unit, const Pose& pose) {
   lines_[unit] = scene_->arm(unit).At(pose);
 }
 
-/// All around the unit as it is now; where to is for the caller to say.
+/// The question around the unit as it is now, without a goal.
 PathSearch::Question SequentialPlanner::QuestionFor(std::uint32_t unit, double grid_deg) {
   PathSearch::Question question;
   question.arm = &scene_->arm(unit);
@@ -273,7 +273,7 @@ void SequentialPlanner::Go(std::uint32_t unit, std::span<const Waypoint> way) {
 
 void SequentialPlanner::DropArrived() {
   std::erase_if(waiting_, [this](std::uint32_t i) { return !Waits(i); });
-  // A unit that left its cell again for another's sake.
+  // Units that left their cells again for the sake of others.
   waiting_.insert(waiting_.end(), newly_waiting_.begin(), newly_waiting_.end());
   newly_waiting_.clear();
   std::sort(waiting_.begin(), waiting_.end());

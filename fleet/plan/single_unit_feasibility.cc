@@ -7,8 +7,8 @@
 namespace focalfleet {
 namespace {
 
-// A proof that whatever never moves leaves the unit no way to this pose. Covers of uncertain units
-// are wider than these may be, so next to one there is none.
+// A proof that the things that never move leave the unit no way to its goal. Covers of units of
+// uncertain place are wider than these units may be, so a unit next to one has no such proof.
 std::optional<NoWay> NoWayFor(const Service& service, std::uint32_t unit) {
   const Scene& scene = service.scene();
   std::vector<Blocker> never_move;

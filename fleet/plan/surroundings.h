@@ -1,4 +1,4 @@
-// What stands around one unit, and the search for a way among it: scratch that outlives one plan
+// The things around one unit, and the search for a way among them: scratch that outlives one plan
 // step.
 #pragma once
 
@@ -22,7 +22,7 @@ class Surroundings {
     kAll,
     kOutOfCell,  // no units inside their own cells: for ways that never leave the unit's own cell
   };
-  /// Everything near `unit` with the others at `poses`. Lifetime: until the next call.
+  /// Everything near `unit`, with the others at `poses`. Lifetime: until the next call.
   std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
                                   std::span<const Pose> poses, Include include);
   /// Only the units in `these`, as they start, and the standing things. Shape: (n).

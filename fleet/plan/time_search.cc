@@ -16,13 +16,14 @@ constexpr std::uint8_t kBlocked = 2;
 
 /// False: there is no time, or the target is never safe for good.
 bool TimeSearch::SetUp() {
-  // As long as the slower axis needs for the grid; the quicker one gets farther in it.
+  // A step lasts as long as the slower axis needs for the grid; the quicker axis gets farther in
+  // it.
   double step_s = 0;
   for (const Axis axis : kAxes) {
     const double vectors = q_.grid_deg * std::numbers::pi / 180 / q_.arm->step_rad(axis);
     step_s = std::max(step_s, vectors * SecondsPerVector(q_.drive->axis[Index(axis)]));
   }
-  // Ticks of a round number, so that usual drives turn whole vectors in a step.
+  // A step is a round number of ticks, so that usual drives turn whole vectors in it.
   constexpr std::int64_t kRoundTicks = 60;
   step_ticks_ =
       std::max<std::int64_t>(1, std::llround(step_s / kTickS / kRoundTicks)) * kRoundTicks;
@@ -55,7 +56,7 @@ Pose TimeSearch::PoseOf(std::int32_t pose) const {
           q_.from[1] + (pose % count_[1] + low_[1]) * step_[1]};
 }
 
-/// From one pose to another in one step.
+/// The leg from one pose to another in one step.
 Leg TimeSearch::LegOf(const Pose& from, const Pose& to, std::int32_t step) const {
   Leg leg;
   leg.begin_s = q_.begin_s + step * step_s_;
@@ -95,7 +96,7 @@ std::int32_t TimeSearch::StepsLeft(const Pose& pose) const {
   return left;
 }
 
-/// When the pose may be held. Slices say it for most steps; the rest is tested.
+/// The intervals in which the pose may be held. Slices decide most steps; the rest is tested.
 std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
   std::vector<Interval>& safe = safe_[static_cast<std::size_t>(pose)];
   if (known_[static_cast<std::size_t>(pose)] != 0) return safe;
@@ -117,7 +118,7 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
     const int last = neighbour.track->slice_count();
     const int first = std::max(-1, static_cast<int>(q_.begin_s / h) - 4);
     for (int n = first; n <= last; ++n) {
-      // Most of the time most arms are elsewhere: all slices of a box at once.
+      // Most of the time most arms are elsewhere: one test covers all slices of a box.
       if (n >= 0 && n % Track::kSlicesPerBounds == 0 && n + Track::kSlicesPerBounds <= last &&
           Apart(neighbour.track->bounds(n / Track::kSlicesPerBounds), here, neighbour.need_mm)) {
         n += Track::kSlicesPerBounds - 1;
@@ -151,7 +152,7 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
 
 std::optional<AxisPaths> TimeSearch::LayOut(std::int32_t last, std::int32_t leaves) const {
   struct Turn {
-    std::int32_t step;  // that ends it
+    std::int32_t step;  // the step that ends it
     std::array<std::int8_t, kAxisCount> turned;
   };
   std::vector<Turn> turns;
@@ -194,7 +195,7 @@ std::optional<AxisPaths> TimeSearch::LayOut(std::int32_t last, std::int32_t leav
   return paths;
 }
 
-/// The rest of less than a step is clear, and so is the target ever after.
+/// The unit stays clear for the rest of less than a step, and at the target from then on.
 bool TimeSearch::EndsClear(const Pose& pose, std::int32_t step) const {
   const double begin_s = q_.begin_s + step * step_s_;
   AxisPaths paths;
@@ -214,7 +215,7 @@ std::optional<AxisPaths> TimeSearch::EndFrom(std::int32_t index) const {
   const Pose pose = PoseOf(node.pose);
   const std::int32_t last =
       safe_[static_cast<std::size_t>(node.pose)][static_cast<std::size_t>(node.interval)].last;
-  // As soon as the target is free, or some steps later.
+  // The unit leaves as soon as the target is free, or some steps later.
   constexpr std::int32_t kTries = 3;
   for (std::int32_t k = 0; k < kTries; ++k) {
     const std::int32_t leaves = std::max(node.step, target_safe_ - 1) + 2 * k;
@@ -254,8 +255,8 @@ void TimeSearch::Expand(std::int32_t index) {
       const std::vector<Interval>& intervals = SafeAt(there);
       for (std::size_t n = 0; n < intervals.size(); ++n) {
         const Interval interval = intervals[n];
-        // Leaves as soon as the other pose may be held at the end of the step; where somebody
-        // passes just then, a little later.
+        // The unit leaves as soon as the other pose may be held at the end of the step. Where a
+        // neighbour passes just then it leaves a little later.
         const std::int32_t soonest = std::max(node.step, interval.first - 1);
         const std::int32_t latest = std::min({stays, interval.last - 1, steps_max_ - 1});
         constexpr std::int32_t kTries = 4;

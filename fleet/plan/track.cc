@@ -11,7 +11,8 @@
 namespace focalfleet {
 namespace {
 
-/// Below this two cells count as one pose: closer than this to touching is "not clear".
+/// Two cells count as one pose below this distance, in mm: a pair that is closer than this to
+/// touching is "not clear".
 constexpr double kResolutionMm = 2e-5;
 constexpr std::size_t kStackSize = 128;
 
@@ -22,7 +23,8 @@ struct Span1 {
   [[nodiscard]] double half() const { return (high - low) / 2; }
 };
 
-/// Own times of both, a part of the band |a - b| <= slip, and where the arms are in their middles.
+/// Own times of both units, a part of the band |a - b| <= slip, and where the arms are in the
+/// middle of them.
 struct Cell {
   Span1 a;
   Span1 b;
@@ -30,7 +32,7 @@ struct Cell {
   SegmentFp line_b;
 };
 
-/// Room for cells that nobody clears beforehand: most pairs need one or two of them.
+/// Room for cells that is not cleared beforehand: most pairs need one or two of them.
 template <class T>
 class Stack {
  public:
@@ -70,7 +72,7 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
     const double distance2 = SquaredDistance(whole.line_a, whole.line_b);
     if (distance2 > enough * enough) continue;
     if (distance2 <= need_mm * need_mm) {
-      // One that stands is there whenever the other comes; else the two middles must be able to
+      // A unit that stands is there whenever the other comes; else the two middles must be able to
       // meet.
       double at_a = whole.a.middle();
       double at_b = whole.b.middle();
@@ -122,7 +124,7 @@ Track::Track(const ArmGeometry& arm, const Pose& stands) {
   Cut(arm);
 }
 
-/// One leg that never ends.
+/// The unit stands in one leg that never ends.
 void Track::Stand(const ArmGeometry& arm, const Pose& pose) {
   Leg leg;
   leg.begin_s = -kForever;
@@ -133,7 +135,7 @@ void Track::Stand(const ArmGeometry& arm, const Pose& pose) {
   reach_mm_ = std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(pose[1], pose[1]));
 }
 
-/// Slices and their bounds.
+/// Cuts the legs into slices and finds the bounds of these.
 void Track::Cut(const ArmGeometry& arm) {
   const int count = std::max(0, static_cast<int>(std::ceil(end_s() / kSliceS)));
   slices_.clear();
@@ -245,7 +247,7 @@ Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
 
 namespace {
 
-/// The leg `a` within `span_a` of its own time, and the legs of `b` within `time_b`.
+/// True: the leg `a` within `span_a` of its own time is clear of the legs of `b` within `time_b`.
 bool LegClearOfPart(const Mover& a, const Span1& span_a, const ArmGeometry& arm_b, const Track& b,
                     const Span1& time_b, double slip_s, double need_mm, int* budget) {
   for (const Leg& leg_b : b.legs()) {
@@ -261,7 +263,7 @@ bool LegClearOfPart(const Mover& a, const Span1& span_a, const ArmGeometry& arm_
   return true;
 }
 
-/// The legs of both within these own times.
+/// True: the legs of both within these own times are clear of each other.
 bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
                 const ArmGeometry& arm_b, const Track& b, const Span1& time_b, double slip_s,
                 double need_mm, int* budget) {
@@ -333,7 +335,7 @@ bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& ar
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget) {
   constexpr double h = Track::kSliceS;
-  // A stand may last for ever; when the other stands too, nothing is new.
+  // A stand may last for ever; when the other stands too, nothing new can happen.
   const double last_s = a.stands() ? std::max(a.begin_s, b.end_s()) + h : a.end_s;
   const Span1 span_a{a.begin_s, std::min(a.end_s, last_s)};
   const double slip_s = tolerance.Slip(span_a.high + tolerance.Slip(span_a.high));
@@ -341,12 +343,12 @@ bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& a
   const SegmentFp line = ArmAt(arm_a, a, middle_s);
   const double travel_a = a.speed_mm_per_s * span_a.half();
   const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
-  // Beyond the end it stands: that is the last slice.
+  // Beyond the end the unit stands: that is the last slice.
   const int first =
       std::min(static_cast<int>(std::floor((span_a.low - slip_s) / h)), b.slice_count());
   const int last =
       std::min(static_cast<int>(std::floor((span_a.high + slip_s) / h)), b.slice_count());
-  // What meets for certain is found at once; only then is it worth to look closely at the rest.
+  // A certain meeting is found at once; only then is it worth to look closely at the rest.
   constexpr std::size_t kNearMax = 64;
   std::array<int, kNearMax> near;
   std::size_t near_count = 0;

@@ -1,6 +1,6 @@
-// Other ways for one unit of a local search, and the choice among them: by the fixed list of
-// candidates (candidates.h), by a search in time among the neighbours as they move
-// (time_search.h), and by a search among what stands (path_search.h).
+// Other ways for one unit of a local search, and the choice among them. A way comes from the fixed
+// list of candidates (candidates.h), from a search in time among moving neighbours (time_search.h),
+// or from a search among what stands (path_search.h).
 #pragma once
 
 #include <cstddef>
@@ -25,8 +25,8 @@ class UnitWays {
   [[nodiscard]] CandidateQuestion QuestionFor(std::uint32_t unit, double within_s) const;
   /// All candidates of the unit that end within `within_s`, in every round.
   [[nodiscard]] std::vector<Candidate> All(std::uint32_t unit, double within_s) const;
-  /// Ways of the unit through its cell that stay clear of `other`: on the way in of where `other`
-  /// starts, on the way out of where it ends.
+  /// Ways of the unit through its cell that stay clear of `other`. The way in is clear of where
+  /// `other` starts, the way out of where it ends. kNoUnitIndex: of no unit.
   [[nodiscard]] std::vector<Candidate> ViaCell(std::uint32_t unit, std::uint32_t other,
                                                double within_s);
   /// A way for `unit` among what never moves, and `other` where `poses` has it. Empty: there is
@@ -34,8 +34,8 @@ class UnitWays {
   [[nodiscard]] Way AmongStanding(std::uint32_t unit, const Pose& from, const PoseBox& goal,
                                   std::uint32_t other, std::span<const Pose> poses);
 
-  /// The least cost of the candidates from `first` on that end within `within_s`, and which.
-  /// Equal costs are drawn by lot. Motions::kNever: none is possible.
+  /// The least cost of the candidates from `first` on that end within `within_s`, and which one has
+  /// it. Equal costs are drawn by lot. Motions::kNever: none is possible.
   double Cheapest(std::uint32_t unit, double within_s, std::span<const Candidate> candidates,
                   std::size_t first, std::size_t* chosen);
   /// The unit takes the first of the ways, in this order, that meets no other. `ways` loses those
