@@ -47,7 +47,7 @@ PlanRow ReadRow(CsvRow* row) {
   return r;
 }
 
-// What is wrong with `later` after `before`, two rows of one axis in the order of time.
+// The fault of `later` after `before`, two rows of one axis in the order of time. Empty: none.
 std::string JoinFault(const PlanRow& before, const PlanRow& later) {
   const std::string of = " of line " + std::to_string(before.line);
   if (later.t0_s < before.t1_s - kJoinToleranceS)
