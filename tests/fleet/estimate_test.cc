@@ -158,7 +158,7 @@ TEST(EstimateWithSpread, LimitsHoldEveryMotorWithinTheSpread) {
     EXPECT_TRUE(holds(figures.total.energy_J, estimate.energy_J)) << k;
     EXPECT_TRUE(holds(figures.total.peak_power_W, estimate.peak_power_W)) << k;
   }
-  // The bus gives the voltage: the power goes nearly as 1 / r.
+  // The bus fixes the voltage: the power is nearly proportional to 1 / r.
   EXPECT_NEAR(figures.total.energy_J.low / figures.total.energy_J.nominal, 1 / 1.1, 0.02);
   EXPECT_NEAR(figures.total.energy_J.high / figures.total.energy_J.nominal, 1 / 0.9, 0.02);
 }

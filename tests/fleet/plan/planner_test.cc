@@ -24,8 +24,8 @@ using ::focalfleet::testing::Seed;
 using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
 
-/// Two arms side by side between the bases, each below or above the other so that folding back (phi
-/// grows, the tip turns counter-clockwise) runs into the other one.
+/// Two arms side by side between the bases, each below or above the other. Folding back (phi grows,
+/// the tip turns counter-clockwise) runs into the other arm.
 PlanningFleet YinYang(double left_theta_zero_deg = 0) {
   PlanningFleet fleet = FleetOf({UnitAt(1, 0, left_theta_zero_deg), UnitAt(2, 25.6)});
   fleet.StandAt({PoseDeg(fleet, 0, -20 - left_theta_zero_deg, 20), PoseDeg(fleet, 1, 160, 20)});
@@ -97,7 +97,7 @@ TEST(Planner, FreesTwoArmsThatLockEachOther) {
   ASSERT_TRUE(plan) << plan.error().text;
   EXPECT_TRUE(plan->unserved.empty());
   ExpectSound(fleet, *plan);
-  // And into the lock again.
+  // The way back leads into the lock again.
   PlanningFleet back = fleet;
   back.StandAt({*fleet.targets[0], *fleet.targets[1]});
   back.targets = {PlaceOf(fleet.start[0]), PlaceOf(fleet.start[1])};
@@ -139,7 +139,7 @@ TEST(Planner, UnnamedUnitsOfARandomFleetEndWhereTheyStood) {
   PlanningFleet fleet = HexFleet(61);
   for (std::uint64_t k = 0; k < 12; ++k) {
     FOCALFLEET_TRACE_SEED(Seed(k));
-    // Targets are drawn around those that stay.
+    // Targets are drawn around the units that stay.
     std::vector<std::optional<Pose>> standing(fleet.layout.size());
     const auto start =
         DrawConfiguration(fleet.layout, fleet.drives, standing, Rng::Stream(Seed(k), "start"));
@@ -218,7 +218,7 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
       fleet.start[0][axis] = {Witness::kInterval, low[axis], high[axis]};
     const auto plan = MakePlan(fleet.request(), {});
     if (!plan) {
-      // Nobody but certain places may be called colliding.
+      // Only units with certain places may be named as colliding.
       EXPECT_THAT(plan.error().text, HasSubstr("apart"));
       continue;
     }
@@ -288,7 +288,7 @@ TEST(Planner, KeepsTheMarginsThatItIsAskedFor) {
   check.start_skew_s = wide.start_skew_s;
   check.clock_error = wide.clock_error;
   ExpectSound(fleet, *plan, check);
-  // A plan for perfect clocks does not stand the same test: it is the margins that carry the first.
+  // A plan for perfect clocks fails the same test: the margins carry the first plan.
   const auto tight =
       MakePlan(fleet.request(), {.fixed = false, .start_skew_s = 0, .clock_error = 0});
   ASSERT_TRUE(tight);

@@ -1,4 +1,4 @@
-// What the replanner refuses, and what it names.
+// Refusals of the replanner, and the units that they name.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -31,7 +31,7 @@ class ReplanErrors : public ::testing::Test {
   [[nodiscard]] std::string IdOf(std::uint32_t i) const {
     return std::to_string(fleet_->fleet().layout.unit({i}).id.value);
   }
-  /// The nearest that a neighbour's arm comes to the unit's, over all of the unit's directions.
+  /// The unit's pose that is nearest to a neighbour's arm, over all of the unit's directions.
   Pose PoseAgainst(std::uint32_t j) {
     const ArmGeometry mine(fleet_->fleet().layout.unit({30}), fleet_->fleet().drives[30]);
     const ArmGeometry theirs(fleet_->fleet().layout.unit({j}), fleet_->fleet().drives[j]);
@@ -54,7 +54,7 @@ class ReplanErrors : public ::testing::Test {
   std::vector<Deviation> deviations_;
 };
 
-TEST_F(ReplanErrors, NamesWhomTheTargetTouches) {
+TEST_F(ReplanErrors, NamesTheUnitThatTheTargetTouches) {
   for (const PositionerIndex j : fleet_->fleet().layout.neighbours({30})) {
     question_.to = PoseAgainst(j.value);
     const auto late = fleet_->running().Replan(question_, deviations_);
@@ -87,8 +87,8 @@ TEST_F(ReplanErrors, RefusesWhatMakesNoSense) {
   Expect(ErrorCode::kInvalid, "no such unit");
 }
 
-TEST_F(ReplanErrors, NamesWhoIsInTheWay) {
-  // It stands where a neighbour's arm is: whatever it does, it begins against that one.
+TEST_F(ReplanErrors, NamesTheUnitInTheWay) {
+  // The unit stands where a neighbour's arm is: every way begins against that arm.
   for (const PositionerIndex j : fleet_->fleet().layout.neighbours({30})) {
     question_.from = PoseAgainst(j.value);
     const auto late = fleet_->running().Replan(question_, deviations_);
@@ -101,7 +101,7 @@ TEST_F(ReplanErrors, NamesWhoIsInTheWay) {
 }
 
 TEST_F(ReplanErrors, StaysOutOfWhereAnotherMayBe) {
-  // A neighbour may be anywhere: nothing in its reach can be a target.
+  // A neighbour may be anywhere: no place in its reach can be a target.
   int invalid = 0;
   for (const PositionerIndex j : fleet_->fleet().layout.neighbours({30})) {
     deviations_ = {{j, UnitKnowledge{}, std::nullopt}};

@@ -9,8 +9,8 @@ inline constexpr double kLateSkewS = 0.040;
 inline constexpr std::uint64_t kSeeds = 8;
 inline constexpr int kDraws = 60;
 
-/// One unit, moving or not, is stopped with those that follow it; and perhaps a neighbour has
-/// failed, of which only an interval is known.
+/// A drawn question. A unit, moving or not, is stopped with those that follow it. Perhaps a
+/// neighbour has failed, of which only an interval is known.
 struct Draw {
   std::uint32_t unit = 0;
   std::optional<std::uint32_t> failed;

@@ -1,4 +1,5 @@
-// Late moves and early ends: what remains safe when units are stopped, and how they go on.
+// Late moves and early ends: the pairs that stay clear when units are stopped, and how these units
+// go on.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -10,8 +11,8 @@
 namespace focalfleet::testing {
 namespace {
 
-// Whoever ends early from then on, the late unit or one of its neighbours: with their followers
-// stopped in time all pairs are clear, but those that were named.
+// The late unit or one of its neighbours ends early. With their followers stopped in time all pairs
+// are clear, but those that were named.
 TEST(Replan, KeepsStopSafety) {
   int draws = 0;
   int unnoticed = 0;
@@ -60,8 +61,8 @@ TEST(Replan, KeepsStopSafety) {
   EXPECT_GT(matters, 20) << "the stops made no difference, the test proves nothing";
 }
 
-/// One unit after the other; each sees the late moves of those before it, and where the units stand
-/// that come after it or found no way.
+/// Replans one unit after the other. Each sees the late moves of those before it, and where the
+/// units stand that come after it or found no way.
 std::vector<Result<LateMove>> ReplanOneByOne(const RunningPlan& running,
                                              std::span<const ReplanQuestion> questions,
                                              std::span<const Deviation> deviations) {
@@ -72,7 +73,7 @@ std::vector<Result<LateMove>> ReplanOneByOne(const RunningPlan& running,
   }
   std::vector<Result<LateMove>> answers(questions.size(),
                                         Fail(ErrorCode::kRefused, "was not looked at"));
-  // A unit may end where another still stands: it asks again once one of the others has left.
+  // A unit may end where another still stands: it is planned again once another has left.
   for (bool left = true; left;) {
     left = false;
     for (std::size_t n = 0; n < questions.size(); ++n) {
@@ -89,8 +90,8 @@ std::vector<Result<LateMove>> ReplanOneByOne(const RunningPlan& running,
   return answers;
 }
 
-// A unit and all that were stopped for its sake go on to where they were going, each around those
-// before it.
+// A unit and all that were stopped because of it go on to their targets, each around those before
+// it.
 TEST(Replan, SeveralGoOnOneAfterTheOther) {
   int asked = 0;
   int served = 0;

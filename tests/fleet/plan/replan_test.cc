@@ -1,4 +1,4 @@
-// One unit gets a new way while the others go on, clear of them all and within the limits of power.
+// A unit gets a new way while the others go on, clear of them all and within the limits of power.
 #include "fleet/plan/replan.h"
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ bool GoesStraightAtOnce(const LateMove& late) {
   });
 }
 
-/// Its neighbours go from one random configuration to another; it stands.
+/// The neighbours of the unit go from one random configuration to another; the unit stands.
 std::optional<UnderWay> BegunAround(std::uint32_t unit, std::uint64_t seed) {
   PlanningFleet fleet = HexFleet(7);
   DrawStartAndTargets(&fleet, seed);
@@ -75,8 +75,8 @@ std::optional<UnderWay> BegunAround(std::uint32_t unit, std::uint64_t seed) {
   return std::optional<UnderWay>(std::in_place, std::move(fleet), options, std::move(*plan));
 }
 
-// The straight way opens or closes while somebody passes: at that moment the tolerance of clocks
-// and skews is all that keeps the two apart.
+// The straight way opens or closes while a neighbour passes. At that moment only the tolerance of
+// clocks and skews keeps the two apart.
 TEST(Replan, HoldsWhereTheStraightWayJustOpensOrCloses) {
   constexpr double kStepS = 0.02;
   int turns = 0;
@@ -115,7 +115,7 @@ TEST(Replan, KeepsLimitsOfPower) {
   FOCALFLEET_TRACE_SEED(seed);
   PlanOptions options;
   DrivePowers powers{options.motor};
-  // As much as eight motors of a rail take: waiting is needed.
+  // The power of about eight motors of a rail: waiting is needed.
   const double motor_W = powers.Of({AxisDrive{}, WaveMode::kAsymmetric, 1.8}).total_W();
   options.power.total_W = 30.5 * motor_W;
   auto fleet = Begun(61, seed, options);

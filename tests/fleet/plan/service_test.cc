@@ -54,7 +54,7 @@ TEST_F(ServiceTest, ACopyBringsBackGoalsAndReasons) {
   EXPECT_TRUE(service.NotServed().empty());
 }
 
-TEST_F(ServiceTest, WhoIsReadmittedGoesAndHasNoReasonLeft) {
+TEST_F(ServiceTest, AReadmittedUnitGoesAndHasNoReasonLeft) {
   Service service = Made();
   service.Unserve(2, UnservedWhy::kBlocked, kNoUnitIndex);
   service.Unserve(0, UnservedWhy::kTargetCollides, 1);
@@ -100,7 +100,7 @@ TEST_F(ServiceTest, ALimitBelowOneMotorIsRefusedWithTheLeastThatWouldDo) {
   ASSERT_NE(at, std::string::npos) << text;
   options.power.rail_W = 1.001 * std::stod(text.substr(at + 9)) + 1e-4;
   EXPECT_TRUE(CheckPower(service, options));
-  // Nobody goes: nothing is drawn.
+  // No unit goes: nothing is drawn.
   for (std::uint32_t unit = 0; unit < 3; ++unit)
     service.Unserve(unit, UnservedWhy::kBlocked, kNoUnitIndex);
   options.power.rail_W = 1e-6;

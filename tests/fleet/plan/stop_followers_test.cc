@@ -1,5 +1,5 @@
-// Each follower of each unit is stopped by itself, with the two clocks as far apart as they may be:
-// the time that the plan leaves for the stop is enough.
+// Each follower of each unit is stopped by itself, with the two clocks as far apart as they may be.
+// The time that the plan leaves for the stop is enough.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,8 +32,9 @@ void StopEveryFollower(Stopped* fleet, Rng* rng, int times) {
         fleet->GoOn();
         fleet->SetClock(i, {sign * options.start_skew_s, 1 - sign * options.clock_error});
         fleet->SetClock(j, {-sign * options.start_skew_s, 1 + sign * options.clock_error});
-        // Before since and after left it is nobody's concern: that is to be seen too.
-        // A stop before `begins_s` cannot come too late, so most are tried where it comes later.
+        // Before `since_s` and after `left_s` the end does not concern the follower: that is tested
+        // too. A stop before `begins_s` cannot come too late, so most ends are drawn where it comes
+        // later.
         const bool early = rng->Uniform() < 0.25;
         const double late_s = std::max(follower.since_s, follower.begins_s - options.notice_s);
         const double t_s =
@@ -77,8 +78,8 @@ TEST_P(StopFollowers, EveryFollowerIsStoppedInTime) {
 }
 INSTANTIATE_TEST_SUITE_P(Seeds, StopFollowers, ::testing::Range(1, 4));
 
-// Where units stand so dense that they go in an order, no pair is proven with notice: what the plan
-// says of the time that is left must hold all the same.
+// Where units stand so dense that they go in an order, no pair is proven with notice. The plan's
+// statements of the time that is left must hold all the same.
 class StopFollowersInOrder : public StopSafety {
  protected:
   [[nodiscard]] std::vector<Unit> Plate() const override { return MakeHexLayout(SdssLike(1000)); }

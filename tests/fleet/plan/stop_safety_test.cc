@@ -1,16 +1,16 @@
-// Whole focal planes that are stopped in mid-motion: all at once, one unit, one bus. Judged by the
-// public plan and the independent checker alone.
+// Whole focal planes that are stopped in mid-motion: all at once, one unit, one bus. The public
+// plan and the independent checker alone are the judges.
 //
 // Every unit runs by a clock of its own within the tolerance that the plan allows for, half of them
-// at its corners, and all stops are at true times. A unit that ends by itself at t has its
-// followers stopped no later than t + notice, and theirs in turn, as far as `since_s` and `left_s`
-// say that they are concerned. Then no pair may be unclear at any time, except those that
-// Plan::unnoticed names, and those only as far as it says.
+// at its corners. All stops are at true times. A unit that ends by itself at t has its followers
+// stopped no later than t + notice, and theirs in turn, as far as `since_s` and `left_s` say that
+// they are concerned. Then no pair may be unclear at any time. The exceptions are those that
+// Plan::unnoticed names, and only as far as it says.
 //
-// What happens before the first stop is what the plan checker has seen of the whole plan, so each
-// draw is walked from just before it; and pairs of which neither was stopped are as planned, so
-// only those who were stopped and their neighbours are looked at. One test proves that this finds
-// the same as a look at everybody from the start.
+// The plan checker has tested the whole plan, so each draw is walked from just before the first
+// stop. Pairs of which neither was stopped are as planned, so only stopped units and their
+// neighbours are looked at. A test proves that this finds the same as a look at all units from the
+// start.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -50,16 +50,16 @@ TEST_P(StopSafety, AllStopAtOnce) {
     const double t_s = DrawInstant(&rng);
     fleet_->DrawClocks(&rng);
     for (const bool with_skew : {false, true}) {
-      for (const std::uint32_t i : fleet_->Everybody())
+      for (const std::uint32_t i : fleet_->AllUnits())
         fleet_->StopAt(i, t_s + (with_skew ? rng.Uniform(-kStopSkewS, kStopSkewS) : 0));
       (with_skew ? skewed : at_once).Count(*fleet_, 0, std::max(t_s - kBeforeS, -kBeforeS));
     }
     if (draw % kReplanEvery == 0) ExpectANewPlan(*fleet_, t_s);
-    // Not at once: every other unit goes on for long.
+    // The units do not stop at once: every other unit goes on for long.
     if (draw < 3) {
-      for (const std::uint32_t i : fleet_->Everybody())
+      for (const std::uint32_t i : fleet_->AllUnits())
         if (i % 2 == 0) fleet_->StopAt(i, t_s + 10);
-      late += static_cast<int>(fleet_->Check(fleet_->Everybody(), t_s).pairs.size());
+      late += static_cast<int>(fleet_->Check(fleet_->AllUnits(), t_s).pairs.size());
     }
   }
   at_once.Print("all at once");
@@ -70,8 +70,8 @@ TEST_P(StopSafety, AllStopAtOnce) {
   EXPECT_GT(late, 0) << "no stop matters, the test proves nothing";
 }
 
-/// One way to stop, over and over: with followers stopped as late as is allowed, with followers
-/// stopped some time before, and with nobody stopped.
+/// Repeats one way to stop: with followers stopped as late as is allowed, with followers stopped
+/// some time before, and with no follower stopped.
 template <class First>
 void StopAgainAndAgain(Stopped* fleet, Rng* rng, const First& first) {
   Tally latest;
@@ -117,7 +117,7 @@ TEST_P(StopSafety, OneUnitEndsEarly) {
   Rng rng = Rng::Stream(seed_, "stop one");
   StopAgainAndAgain(&*fleet_, &rng, [&](double t_s) {
     Units moving;
-    for (const std::uint32_t i : fleet_->Everybody())
+    for (const std::uint32_t i : fleet_->AllUnits())
       if (fleet_->Moves(i, t_s)) moving.push_back(i);
     return moving.empty() ? Units{} : Units{moving[rng.Below(moving.size())]};
   });
@@ -130,7 +130,7 @@ TEST_P(StopSafety, ABusEndsEarly) {
     const auto buses = fleet_->fleet().layout.buses();
     const BusId bus = buses[rng.Below(buses.size())];
     Units moving;
-    for (const std::uint32_t i : fleet_->Everybody())
+    for (const std::uint32_t i : fleet_->AllUnits())
       if (fleet_->fleet().layout.unit({i}).bus == bus && fleet_->Moves(i, t_s)) moving.push_back(i);
     return moving;
   });
@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, StopSafety, ::testing::Range(1, 4));
 
 class StopSafetyOnce : public StopSafety {};
 
-// With followers ignored, so that there is something to find.
+// Followers are ignored, so that unclear pairs exist.
 TEST_P(StopSafetyOnce, ALookAtTheNeighboursFindsWhatALookAtAllFinds) {
   FOCALFLEET_TRACE_SEED(seed_);
   Rng rng = Rng::Stream(seed_, "restricted");
@@ -151,10 +151,10 @@ TEST_P(StopSafetyOnce, ALookAtTheNeighboursFindsWhatALookAtAllFinds) {
     fleet_->GoOn();
     const double t_s = rng.Uniform(0.2, 0.8) * fleet_->plan().makespan_s;
     const BusId bus = buses[rng.Below(buses.size())];
-    for (const std::uint32_t i : fleet_->Everybody())
+    for (const std::uint32_t i : fleet_->AllUnits())
       if (fleet_->fleet().layout.unit({i}).bus == bus) fleet_->StopAt(i, t_s);
     const UnclearPairs near = fleet_->Check(fleet_->StoppedAndNeighbours(), t_s - kBeforeS);
-    const UnclearPairs all = fleet_->Check(fleet_->Everybody(), -kBeforeS);
+    const UnclearPairs all = fleet_->Check(fleet_->AllUnits(), -kBeforeS);
     EXPECT_EQ(near.pairs, all.pairs) << near.text << "---\n" << all.text;
     found += all.pairs.size();
   }
@@ -164,12 +164,13 @@ TEST_P(StopSafetyOnce, ALookAtTheNeighboursFindsWhatALookAtAllFinds) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, StopSafetyOnce, ::testing::Values(1));
 
-// In stages a unit may halt unseen, with both axes, and nobody need be stopped before the next one.
+// In stages a unit may halt unseen, with both axes, and no unit need be stopped before the next
+// stage.
 class StopSafetyInStages : public StopSafety {
  protected:
   [[nodiscard]] PlanOptions Options() const override { return {.stall_tolerant = true}; }
-  /// When any unit may begin the stage after the one of `t_s`, whatever its clock; for ever after
-  /// the last. Units: s.
+  /// The time when any unit may begin the stage after the one of `t_s`, whatever its clock; never
+  /// after the last. Units: s.
   [[nodiscard]] double NextStage(double t_s) const {
     const auto& stages = fleet_->plan().stages_s;
     const auto next = std::upper_bound(stages.begin(), stages.end(), t_s);
@@ -178,7 +179,7 @@ class StopSafetyInStages : public StopSafety {
   }
 };
 
-TEST_P(StopSafetyInStages, AHaltThatNobodySeesTouchesNobody) {
+TEST_P(StopSafetyInStages, AnUnseenHaltTouchesNoOtherUnit) {
   FOCALFLEET_TRACE_SEED(seed_);
   Rng rng = Rng::Stream(seed_, "halts");
   const Plan& plan = fleet_->plan();
@@ -190,9 +191,9 @@ TEST_P(StopSafetyInStages, AHaltThatNobodySeesTouchesNobody) {
     for (const bool in_stages : {true, false}) {
       fleet_->GoOn();
       if (in_stages)
-        for (const std::uint32_t i : fleet_->Everybody()) fleet_->StopAt(i, NextStage(t_s));
+        for (const std::uint32_t i : fleet_->AllUnits()) fleet_->StopAt(i, NextStage(t_s));
       int halted = 0;
-      for (const std::uint32_t i : fleet_->Everybody()) {
+      for (const std::uint32_t i : fleet_->AllUnits()) {
         if (i % 40 != static_cast<std::uint32_t>(draw % 40) || !fleet_->Moves(i, t_s)) continue;
         fleet_->StopAt(i, t_s);
         ++halted;

@@ -54,7 +54,7 @@ class Stopped {
     return clocks_[i].True(end_s);
   }
 
-  /// Stops whoever may run into those that are stopped, each at `stop(when the other ended)`.
+  /// Stops each unit that may run into those that are stopped, at `stop(when the other ended)`.
   /// Returns how many.
   template <class StopTime>
   int StopFollowers(const StopTime& stop) {
@@ -83,7 +83,7 @@ class Stopped {
       if (stops_[i] < kNever) stopped.push_back(i);
     return stopped;
   }
-  [[nodiscard]] Units Everybody() const {
+  [[nodiscard]] Units AllUnits() const {
     Units all(stops_.size());
     std::iota(all.begin(), all.end(), 0u);
     return all;
@@ -97,8 +97,8 @@ class Stopped {
     return {concerned.begin(), concerned.end()};
   }
 
-  /// The pairs among `units` that are not clear at some time from `since_s` on. With
-  /// `clearance_mm` other than the layout's: those that come nearer than half-widths and that.
+  /// The pairs among `units` that are not clear at some time from `since_s` on. With a
+  /// `clearance_mm` other than the layout's: the pairs that come nearer than half-widths and that.
   [[nodiscard]] UnclearPairs Check(const Units& units, double since_s, double clearance_mm,
                                    double tolerance_mm) const {
     std::vector<CheckedUnit> checked;
@@ -113,7 +113,7 @@ class Stopped {
   [[nodiscard]] UnclearPairs Check(const Units& units, double since_s) const {
     return Check(units, since_s, fleet_.layout.clearance_mm(), CheckOptions{}.tolerance_mm);
   }
-  /// True where the plan itself says that these stops come too late for this pair.
+  /// True where the plan itself states that these stops come too late for this pair.
   [[nodiscard]] bool IsUnnoticed(const Pair& pair) const {
     return std::any_of(plan_.unnoticed.begin(), plan_.unnoticed.end(), [&](const Unnoticed& u) {
       const std::uint32_t ends = u.ends.value;
@@ -122,14 +122,14 @@ class Stopped {
              stops_[follows] > stops_[ends] + u.leaves_s;
     });
   }
-  /// How long after the one ended at `end_s` the plan allows for the stop of the other.
+  /// The time after the end of one unit at `end_s` that the plan leaves for the stop of the other.
   [[nodiscard]] double LeftS(std::uint32_t ends, std::uint32_t follows, double end_s) const {
     for (const Unnoticed& u : plan_.unnoticed)
       if (u.ends.value == ends && u.follower.value == follows && end_s >= u.at_s)
         return std::min(u.leaves_s, options_.notice_s);
     return options_.notice_s;
   }
-  /// Where everybody stands when all have stopped: whole vectors.
+  /// The poses when all have stopped: whole vectors.
   [[nodiscard]] std::vector<Pose> Poses() const {
     std::vector<Pose> poses;
     for (std::uint32_t i = 0; i < stops_.size(); ++i) {
@@ -206,13 +206,13 @@ inline std::size_t UnnoticedPairs(const Plan& plan) {
   return pairs.size();
 }
 
-/// What came of many stops.
+/// The outcome of many stops.
 struct Tally {
   int draws = 0;
   int stopped = 0;
   int stopped_most = 0;
   int unclear = 0;    // pairs that the plan does not except
-  int touching = 0;   // those among them whose arms meet
+  int touching = 0;   // of these, pairs whose arms meet
   int unnoticed = 0;  // pairs that the plan excepts, and that were not clear
   int unnoticed_touching = 0;
 
@@ -244,7 +244,7 @@ struct Tally {
   }
 };
 
-/// From where all stand now everybody gets to the target that it had.
+/// From where all stand now, every unit gets to the target that it had.
 inline void ExpectANewPlan(const Stopped& fleet, double t_s) {
   PlanningFleet again = fleet.fleet();
   again.StandAt(fleet.Poses());

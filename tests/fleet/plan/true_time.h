@@ -42,9 +42,9 @@ inline Clock DrawClock(Rng* rng, const PlanOptions& options) {
 
 using Pair = std::pair<std::uint32_t, std::uint32_t>;  // indices of units, lower first
 
-/// Appends what is left of the rows of one motion between `since_s` and `stop_s`, in true time
-/// after `since_s`; `unit` stands then where the rows have brought it by `since_s`. The motion
-/// began `offset_s` after the start signal of the configuration.
+/// Appends the rest of the rows of one motion between `since_s` and `stop_s`, in true time after
+/// `since_s`. `unit` then stands where the rows have brought it by `since_s`. The motion began
+/// `offset_s` after the start signal of the configuration.
 inline void LayRows(std::span<const CheckedRow> motion, const Clock& clock, double offset_s,
                     double since_s, double stop_s, CheckedUnit* unit,
                     std::vector<CheckedRow>* rows) {

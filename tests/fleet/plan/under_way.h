@@ -1,6 +1,6 @@
-// A configuration under way, for tests of the replanner. It is judged by the independent checker in
-// true time: every unit runs by a clock of its own within the tolerance, the late one starts by a
-// signal that is early or late, and where each unit stood at what time is what the rows say.
+// A configuration under way, for tests of the replanner. The independent checker judges it in true
+// time. Every unit runs by a clock of its own within the tolerance, and the late one starts by a
+// signal that is early or late. The rows alone give the place of each unit at each time.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -21,7 +21,8 @@
 
 namespace focalfleet::testing {
 
-/// A configuration under way in true time: who was stopped when, who has a late move.
+/// A configuration under way in true time: the units that were stopped and when, and the late
+/// moves.
 class UnderWay {
  public:
   UnderWay(PlanningFleet fleet, const PlanOptions& options, Plan plan)
@@ -48,7 +49,7 @@ class UnderWay {
     late_.clear();
     extra_.clear();
   }
-  /// All within the tolerance, half of them at its corners; or all at one corner.
+  /// Sets all clocks to one corner of the tolerance.
   void SetClocks(int corner) {
     clocks_.assign(size(),
                    {(corner & 1) != 0 ? options_.start_skew_s : -options_.start_skew_s,
@@ -66,8 +67,8 @@ class UnderWay {
   }
   void Stop(std::uint32_t i, double true_s) { stops_[i] = true_s; }
 
-  /// Whoever `first` leads, and theirs, by the plan and by late moves: all stopped as `stop` says
-  /// for when the one before ended.
+  /// Stops each unit that `first` leads, and those that these lead, by the plan and by late moves.
+  /// `stop` gives the time of the stop for the time when the unit before ended.
   template <class StopTime>
   void StopFollowers(std::uint32_t first, const StopTime& stop) {
     std::vector<std::uint32_t> open{first};
@@ -102,7 +103,7 @@ class UnderWay {
     return late != late_.end() ? late->second.stop_s : stops_[i];
   }
 
-  /// Where those stand that were stopped: what a coordinator is told.
+  /// Fixes the places of the stopped units, as a coordinator learns them.
   void Settle() {
     for (std::uint32_t i = 0; i < size(); ++i)
       if (stops_[i] < kNever && late_.count(i) == 0) stands_[i] = PoseAt(i, stops_[i]);
@@ -176,7 +177,7 @@ class UnderWay {
     Clock clock;
     double stop_s = kNever;
   };
-  /// What is left of its rows from `since_s` on, in true time after that.
+  /// The rest of its rows from `since_s` on, in true time after that.
   void Lay(std::uint32_t i, double since_s, CheckedUnit* unit,
            std::vector<CheckedRow>* rows) const {
     const auto lay = [&](const UnitPlan& move, const Clock& clock, double offset_s, double stop_s) {
@@ -191,7 +192,7 @@ class UnderWay {
             DegreesOf(stands->second[k], fleet_->layout.unit({i}), fleet_->drives[i], k);
     } else if (move_of_[i] != nullptr && late_.count(i) == 0) {
       lay(*move_of_[i], clocks_[i], 0, stops_[i]);
-    } else if (move_of_[i] != nullptr) {  // had arrived
+    } else if (move_of_[i] != nullptr) {  // the unit had arrived
       lay(*move_of_[i], clocks_[i], 0, kNever);
     }
     if (const auto late = late_.find(i); late != late_.end())
@@ -211,7 +212,7 @@ class UnderWay {
   std::map<std::uint32_t, std::vector<UnitPlan::Follower>> extra_;
 };
 
-/// Whether the planner knows a way while all others are where they end.
+/// True: the planner finds a way while all others are where they end.
 inline bool HasStaticWay(const UnderWay& fleet, const ReplanQuestion& question) {
   PlanningFleet then = fleet.fleet();
   for (std::uint32_t i = 0; i < fleet.size(); ++i) {
@@ -227,7 +228,7 @@ inline bool HasStaticWay(const UnderWay& fleet, const ReplanQuestion& question) 
   return plan && plan->unserved.empty();
 }
 
-/// A place where `unit` is clear of where everybody else ends.
+/// A place where `unit` is clear of where all others end.
 inline std::optional<Pose> DrawTarget(const UnderWay& fleet, std::uint32_t unit, const Rng& rng) {
   std::vector<std::optional<Pose>> standing(fleet.size());
   for (std::uint32_t i = 0; i < fleet.size(); ++i)
@@ -237,7 +238,7 @@ inline std::optional<Pose> DrawTarget(const UnderWay& fleet, std::uint32_t unit,
   return (*drawn)[unit];
 }
 
-/// At all corners of the late unit's own clock.
+/// The late move is clear at all corners of the late unit's own clock.
 inline void ExpectClear(UnderWay* fleet, const LateMove& late, double since_s) {
   for (const double skew : {-late.start_skew_s, late.start_skew_s}) {
     for (const double rate : {0.995, 1.005}) {
@@ -249,7 +250,7 @@ inline void ExpectClear(UnderWay* fleet, const LateMove& late, double since_s) {
     }
   }
 }
-/// Were its start this much beyond its skew.
+/// True: the late move would meet another if its start were this much beyond its skew.
 inline bool WouldMeet(UnderWay* fleet, const LateMove& late, double since_s, double beyond_s) {
   bool meets = false;
   for (const double skew : {-late.start_skew_s - beyond_s, late.start_skew_s + beyond_s}) {
@@ -263,7 +264,7 @@ inline std::optional<UnderWay> Begun(std::uint32_t count, std::uint64_t seed,
                                      PlanOptions options = {}) {
   PlanningFleet fleet = HexFleet(count);
   DrawStartAndTargets(&fleet, seed);
-  // Some have nothing to do yet: their targets come later.
+  // Some units have nothing to do yet: their targets come later.
   Rng rng = Rng::Stream(seed, "idle");
   std::vector<std::optional<Pose>> standing(count);
   for (std::uint32_t i = 0; i < count; ++i)
