@@ -1,5 +1,5 @@
 // The faults of all rows of a table, so that one message is enough to correct the file. The first
-// limits::kBadRowsTold rows are listed in full, one a line; the others are counted by kind of
+// limits::kBadRowsReported rows are listed in full, one a line; the others are counted by kind of
 // fault:
 //
 //   t.csv:11: unit 10: x_mm 52.3, y_mm 0.1 is 45 mm from its base (out of patrol, ...)

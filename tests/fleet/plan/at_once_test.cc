@@ -179,16 +179,16 @@ TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
   }
   int found = 0;
   for (std::uint32_t i = 0; i < fleet.layout.size(); ++i) {
-    std::vector<Passer> passers;
+    std::vector<MovingNeighbour> moving;
     for (const PositionerIndex j : fleet.layout.neighbours({i})) {
       const double need_mm = fleet.layout.unit({i}).arm_half_width_mm +
                              fleet.layout.unit(j).arm_half_width_mm + fleet.layout.clearance_mm();
-      passers.push_back({&arms[j.value], &tracks[j.value], need_mm, {}});
+      moving.push_back({&arms[j.value], &tracks[j.value], need_mm, {}});
     }
     TimeSearch search;
     const auto paths = search.Find({.arm = &arms[i],
                                     .drive = &fleet.drives[i],
-                                    .passers = passers,
+                                    .moving = moving,
                                     .from = PlaceOf(fleet.start[i]),
                                     .to = *fleet.targets[i],
                                     .within = arms[i].range(),
@@ -201,9 +201,9 @@ TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
       EXPECT_EQ(at, (*fleet.targets[i])[k]);
     }
     const Track track(arms[i], fleet.drives[i], PlaceOf(fleet.start[i]), *paths);
-    for (const Passer& passer : passers)
-      EXPECT_TRUE(PassesClear(arms[i], track, *passer.arm, *passer.track, passer.need_mm - 1e-3,
-                              passer.tolerance));
+    for (const MovingNeighbour& neighbour : moving)
+      EXPECT_TRUE(PassesClear(arms[i], track, *neighbour.arm, *neighbour.track,
+                              neighbour.need_mm - 1e-3, neighbour.tolerance));
   }
   EXPECT_GE(found, 120);
 }

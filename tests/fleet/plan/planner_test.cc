@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "fleet/geometry/clearance.h"
+#include "fleet/plan/scene.h"
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/planning.h"
 
@@ -252,11 +254,10 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
 }
 
 TEST(Planner, ServesPairsThatAreClearByToleranceOnly) {
-  // Two stretched arms tip to tip, 1.5 um nearer than half-widths and clearance: still clear by the
-  // rule.
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 2 * 16.5 + 4.0)});
-  const double need = 2 * 0.08 * 37.0 + 0.012 * 37.0;
-  fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 37.0)});
+  // Two stretched arms tip to tip, up to 2 um nearer than half-widths and clearance: still clear by
+  // the rule.
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 37.0)});
+  const double need = ClearDistanceMm(fleet.layout, PositionerIndex{0}, PositionerIndex{1});
   ASSERT_GT(need, 4.0);
   // Turn the right arm until the gap is just within the tolerance.
   Pose right = PoseDeg(fleet, 1, 180, 0);
@@ -267,7 +268,7 @@ TEST(Planner, ServesPairsThatAreClearByToleranceOnly) {
     const double x = 37.0 + 16.5 * std::cos(theta) - 16.5;
     return std::hypot(x, 16.5 * std::sin(theta));
   };
-  while (gap() < need - 0.002) ++right[0];
+  while (gap() < need - kClearToleranceMm) ++right[0];
   ASSERT_LT(gap(), need);
   fleet.StandAt({left, right});
   fleet.targets = {PoseDeg(fleet, 0, 90, 90), PoseDeg(fleet, 1, 90, 90)};
