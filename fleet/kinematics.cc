@@ -10,7 +10,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 // Rounding of a table's last digit at the end of a range must not cost a solution.
 constexpr double kRangeToleranceDeg = 1e-6;
-constexpr double kVectorToleranceDeg = 1e-9;
+constexpr double kVectorToleranceDeg = 1e-9;  // rounding of a range that ends at a whole vector
 // Near stretched and folded the distance hardly depends on phi. A point within the reach tolerance
 // may then ask for a phi this far outside the range. The phi is clamped and tried against the
 // tolerance itself. Units: degrees.

@@ -22,7 +22,7 @@ constexpr double kCoordinateMaxMm = 1e5;
 /// A joint that tilts 45 degrees takes the tip this share of its arms' length away.
 constexpr double kFibreCarrierOverArms = 1.4143;
 constexpr double kArmMaxMm = 1e4;
-constexpr double kNearestMinMm = 1e-3;
+constexpr double kNearestMinMm = 1e-3;  // two bases nearer than this are one place
 
 std::string Text(double value) {
   char text[32];

@@ -94,7 +94,7 @@ struct Measurement {
   /// Both axes at that place, in whole vectors from each axis' zero, elbow side and turns as
   /// believed.
   std::optional<Pose> place;
-  std::optional<FibreCarrierReading> carrier = {};  // of units with sensors, whoever is the source
+  std::optional<FibreCarrierReading> carrier = {};  // of units with sensors, whatever the source
 };
 
 /// The findings of one exposure: one measurement for each unit that was looked for.

@@ -267,9 +267,10 @@ namespace {
 // Drawn configurations keep this much more than "clear". A planner needs that room for what it
 // bounds or rounds on its way in and out of them. Units: mm.
 constexpr double kDrawGuardMm = 0.02;
-constexpr double kFoldedBendDeg = 120;
-constexpr int kTriesPerPlace = 64;
-constexpr int kTriesAmongFixed = 4096;
+constexpr double kFoldedBendDeg = 120;  // phi + phi_zero of disabled units, at least
+constexpr int kTriesPerPlace = 64;      // random poses of a unit before it takes an occupied place
+constexpr int kTriesAmongFixed = 4096;  // where only units that cannot move are in the way
+/// Units drawn anew, on average, before the draw is given up.
 constexpr std::size_t kEvictionsPerUnit = 50;
 
 // Draws by sequential placing with local repair. A unit that finds no clear place in many tries

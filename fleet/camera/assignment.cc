@@ -7,7 +7,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kAssignmentsMax = 2e4;
+constexpr double kAssignmentsMax = 2e4;  // of one group; a larger group is not counted
 
 // All claims of one unit on one spot.
 struct Option {

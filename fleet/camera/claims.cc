@@ -9,9 +9,9 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kWideShare = 0.05;
-constexpr double kWideVariances = 16;
-constexpr double kFarVariances = 200;
+constexpr double kWideShare = 0.05;    // share of blind errors in the wide part
+constexpr double kWideVariances = 16;  // variance of the wide part, times that of the narrow one
+constexpr double kFarVariances = 200;  // variance of a rare large error, times the expected one
 
 double Density(double squared_sigmas, const CovarianceFp& covariance, double sigma_mm) {
   const double xx = covariance.xx + sigma_mm * sigma_mm;

@@ -11,10 +11,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kSearchFactor = 3;  // beyond the bounds, so that a refusal can give the reason
-constexpr std::size_t kPairsMax = 60;
+constexpr double kSearchFactor = 3;    // beyond the bounds, so that a refusal can give the reason
+constexpr std::size_t kPairsMax = 60;  // of fiducials, tried one after the other
 constexpr std::size_t kCandidatesMax = 64;  // of one fiducial
-constexpr std::size_t kMatchesMin = 3;
+constexpr std::size_t kMatchesMin = 3;      // an alignment with fewer is none
 
 Complex At(PointFp p) { return {p.x_mm, p.y_mm}; }
 PointFp Point(Complex z) { return {z.real(), z.imag()}; }

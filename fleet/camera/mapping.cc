@@ -13,7 +13,9 @@ using Complex = std::complex<double>;
 
 constexpr double kCellMm = 12;
 constexpr std::size_t kLightsMax = 400;  // the map's cost grows with the square
+/// A spot farther away is not the light of a unit that stands still.
 constexpr double kStillSigmas = 6;
+/// Fiducials beyond the terms of the polynomial that show the air by themselves.
 constexpr std::size_t kFreedomMin = 40;
 
 std::vector<PointFp> SeenBy(const CameraModel& camera, std::span<const Spot> spots,
@@ -56,7 +58,7 @@ class Mapping {
     const auto fit = FitPolynomial(lights_, map_options_);
     if (auto refusal = Rough(fit ? &*fit : nullptr))
       return tl::unexpected<Refusal>(std::move(*refusal));
-    Tell(*alignment, *fit);
+    DescribeCamera(*alignment, *fit);
     std::vector<KnownLight> used;
     for (std::size_t k = 0; k < lights_.size(); ++k)
       if (fit->used[k]) used.push_back(lights_[k]);
@@ -99,7 +101,7 @@ class Mapping {
     return Refusal{RefusalReason::kRough, text};
   }
 
-  void Tell(const Alignment& alignment, const PolynomialFit& fit) {
+  void DescribeCamera(const Alignment& alignment, const PolynomialFit& fit) {
     result_.scale_change = std::abs(alignment.gain) - 1;
     result_.rotation_deg = std::arg(alignment.gain) * 180 / std::numbers::pi;
     result_.shift_fp = {alignment.shift.real(), alignment.shift.imag()};
@@ -178,6 +180,7 @@ class Mapping {
     return mapped;
   }
 
+  /// A unit whose place is less well known is no light of known place.
   static constexpr double kWellKnownMm = 0.03;
 
   const IdentificationRequest& request_;

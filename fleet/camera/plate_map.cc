@@ -12,9 +12,9 @@ namespace focalfleet {
 namespace {
 
 constexpr std::size_t kTermsMax = MonomialCount(kDistortionDegreeMax);
-constexpr std::size_t kLightsPerTerm = 3;
-constexpr double kNodesMax = 2500;
-constexpr double kNoiseMinMm = 1e-5;
+constexpr std::size_t kLightsPerTerm = 3;  // the degree falls where there are fewer
+constexpr double kNodesMax = 2500;         // of the grid, about; the step grows beyond
+constexpr double kNoiseMinMm = 1e-5;       // keeps the matrix positive definite
 
 using Terms = std::array<double, kTermsMax>;
 
@@ -302,10 +302,10 @@ class AirSearch {
     return *known_[key];
   }
 
-  static constexpr std::size_t kLightsMax = 150;
+  static constexpr std::size_t kLightsMax = 150;  // of one factorisation
   static constexpr int kStepsMax = 6;
   static constexpr std::size_t kSide = 2 * kStepsMax + 1;
-  static constexpr double kFactor = 1.5;
+  static constexpr double kFactor = 1.5;       // from one law of the lattice to the next
   static constexpr double kLengthPrior = 0.7;  // standard deviations of the logarithms
   static constexpr double kSigmaPrior = 1;
 

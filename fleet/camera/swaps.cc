@@ -11,8 +11,8 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double kRadian = std::numbers::pi / 180;
-constexpr std::size_t kRingMax = 8;
-constexpr double kCommandCellMm = 1;
+constexpr std::size_t kRingMax = 8;   // units of a ring, at most
+constexpr double kCommandCellMm = 1;  // of the grid of commands
 
 // The place of the reference arm with a command, zero angle of phi included.
 PointFp AtReference(const Unit& reference, const AxisAngles& angles) {
@@ -164,7 +164,7 @@ class Finder {
     return std::adjacent_find(spots.begin(), spots.end()) == spots.end();
   }
 
-  static constexpr double kMapSigmaMm = 0.02;
+  static constexpr double kMapSigmaMm = 0.02;  // of the map, added to every gate
 
   const SwapSearch& search_;
   const Layout& layout_;

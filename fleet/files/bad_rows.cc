@@ -8,10 +8,10 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::size_t kTextMax = 400;  // of one row; a file's name and a cell may be long
-constexpr std::size_t kKindMax = 80;
-constexpr std::size_t kKindsCounted = 16;
-constexpr std::size_t kKindsReported = 5;
+constexpr std::size_t kTextMax = 400;      // of one row; a file's name and a cell may be long
+constexpr std::size_t kKindMax = 80;       // bytes of a kind
+constexpr std::size_t kKindsCounted = 16;  // further kinds are counted as one
+constexpr std::size_t kKindsReported = 5;  // the commonest; the rest is counted as one
 constexpr const char* kOther = "other reasons";
 
 // The text as a single line, not cut within a character of UTF-8.

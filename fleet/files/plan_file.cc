@@ -12,8 +12,8 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kJoinToleranceDeg = 1e-6;
-constexpr double kJoinToleranceS = 1e-9;
+constexpr double kJoinToleranceDeg = 1e-6;  // rounding of a writer
+constexpr double kJoinToleranceS = 1e-9;    // rounding of a writer
 
 template <class Word, std::size_t kCount>
 std::optional<Word> WordOf(const std::string& text, const Word (&words)[kCount]) {

@@ -6,7 +6,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kTightToMm = 1e-2;
+constexpr double kTightToMm = 1e-2;  // a reported clearance is at most this much too small
 
 struct Nearest {
   double distance_mm = 0;

@@ -16,6 +16,7 @@ namespace {
 
 /// A stop may yield, and its place is known only as well as the range was measured. Units: degrees.
 constexpr double kBeyondStopDeg = 1;
+/// Distances of one test of two sweeps; beyond it they count as not clear.
 constexpr int kBudget = 40'000;
 
 class WayMaker {

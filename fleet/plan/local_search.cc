@@ -15,7 +15,7 @@ namespace focalfleet {
 namespace {
 
 constexpr double kNever = Motions::kNever;
-constexpr int kAttemptsPerUnit = 16;
+constexpr int kAttemptsPerUnit = 16;  // a unit looks for another way so often, then it stays
 /// The time that a unit may take grows from this attempt on, by so much for each attempt.
 constexpr int kAttemptsInTime = 5;
 constexpr double kExtension = 0.03;

@@ -10,6 +10,7 @@
 namespace focalfleet {
 namespace {
 
+/// Coarse first: fine grids find narrower walls, and take longer.
 constexpr std::array kGridsDeg{4.0, 2.0, 1.0, 0.5, 0.25};
 constexpr std::uint8_t kOpen = 0;
 constexpr std::uint8_t kReached = 1;

@@ -14,11 +14,11 @@ namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-constexpr int kPassesMax = 12;
+constexpr int kPassesMax = 12;     // over all units
 constexpr double kGainMin = 2e-3;  // of the figure; a pass that gains less is the last
-constexpr int kLimitTrials = 8;
-constexpr int kTested = 6;  // so many of the better candidates are tested for a clear way
-constexpr int kShifts = 16;
+constexpr int kLimitTrials = 8;    // steps of the bisection for the least peak
+constexpr int kTested = 6;         // so many of the better candidates are tested for a clear way
+constexpr int kShifts = 16;        // begins over the time to spare at which a present way is tried
 constexpr std::array kRounds{CandidateRound{Shape::kStraight, 0, 13},
                              CandidateRound{Shape::kFolding, 0, 4}};
 

@@ -22,9 +22,11 @@ namespace {
 /// After so many attempts the fleet is planned with what can be served without moving any unit
 /// aside.
 constexpr int kAttemptsMax = 60;
-constexpr std::size_t kTightest = 20;
+constexpr std::size_t kTightest = 20;  // pairs that Plan::tightest lists
+/// Repeats with other random numbers, without limits of power.
 constexpr std::uint64_t kFreshStarts = 3;
-constexpr double kLongGiven = 1.02;
+constexpr double kLongGiven = 1.02;  // times the bound: given motions up to here do not lengthen it
+/// Share of the time beyond which power takes the time, and rails are full.
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
 /// With more neighbours than this on average a unit hardly ever finds all others out of its way: an

@@ -10,8 +10,8 @@ namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-constexpr double kGuardMm = 1.5e-4;  // of a pair that may be as near as the rule allows
-constexpr double kCoverSlackMm = 0.05;
+constexpr double kGuardMm = 1.5e-4;     // of a pair that may be as near as the rule allows
+constexpr double kCoverSlackMm = 0.05;  // capsules of a cover may be this much too wide
 
 }  // namespace
 

@@ -14,7 +14,7 @@ constexpr double kGuardMm = 2e-4;
 /// A pair that starts or ends nearer than planned is planned this much nearer still, so that
 /// leaving is clear.
 constexpr double kStartSlackMm = 1.5e-4;
-constexpr std::size_t kCoverMax = 400;
+constexpr std::size_t kCoverMax = 400;  // capsules of one cover
 
 double BaseDistance(const ArmGeometry& a, const ArmGeometry& b) {
   return std::hypot(a.base_fp().x_mm - b.base_fp().x_mm, a.base_fp().y_mm - b.base_fp().y_mm);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kCountsPerTick = 14'400;
 static_assert(static_cast<double>(kCountsPerTick) == kTimerHz * 100e-6);
-constexpr double kGrainDeg = 15;
+constexpr double kGrainDeg = 15;  // legs of one axis are cut into parts of about this angle
 
 using AxisCounts = std::array<std::uint32_t, kAxisCount>;
 

@@ -14,7 +14,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint32_t kBusesPerSectorMin = 4;
+constexpr std::uint32_t kBusesPerSectorMin = 4;  // with fewer buses a sector, buses may be split
 constexpr std::uint32_t kNoSector = 0xffffffffu;
 
 std::vector<std::uint32_t> SectorOfUnits(std::size_t units, std::span<const Sector> sectors) {

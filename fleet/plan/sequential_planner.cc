@@ -6,10 +6,10 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint8_t kMovesAsideMax = 3;
+constexpr std::uint8_t kMovesAsideMax = 3;     // of one unit, for the sake of others
 constexpr std::uint8_t kPerturbationsMax = 2;  // for one unit
-constexpr int kPerturbationTries = 300;
-constexpr int kPerturbationSteps = 7;
+constexpr int kPerturbationTries = 300;        // of one perturbation
+constexpr int kPerturbationSteps = 7;          // random steps of a try, at most
 
 }  // namespace
 

@@ -92,8 +92,8 @@ class Track {
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
 
   static constexpr double kForever = 1e9;
-  static constexpr double kSliceS = 0.5;
-  static constexpr int kSlicesPerBounds = 8;
+  static constexpr double kSliceS = 0.5;      // of the unit's own time
+  static constexpr int kSlicesPerBounds = 8;  // slices that one rectangle covers
 
   /// The slice from n * kSliceS on; below 0 and beyond the end: where it stands then.
   [[nodiscard]] const Slice& slice(int n) const {

@@ -9,9 +9,9 @@ namespace {
 
 /// The search in time is quick and coarse for so many attempts of a unit, then thorough.
 constexpr int kQuickAttempts = 3;
-constexpr std::uint32_t kQuickExpansions = 500;
+constexpr std::uint32_t kQuickExpansions = 500;  // nodes of a search
 constexpr std::uint32_t kThoroughExpansions = 4000;
-constexpr double kCoarseGridDeg = 6;
+constexpr double kCoarseGridDeg = 6;  // quick attempts use this grid alone
 constexpr double kFineGridDeg = 3;
 
 }  // namespace
