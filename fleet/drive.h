@@ -1,8 +1,8 @@
-// How vectors, angles and time belong together. One vector turns the motor's field by
-// 360/subdivision degrees and lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1,
-// section "Open loop regulating process"): with 500, n = 108, 96 and a gear of 337 * 45/17 a turn
-// of the axis takes 32.11 s and one vector is 4.2 mdeg. Everything that goes on the bus is whole
-// vectors.
+// Vectors, angles and time of an axis. A vector turns the motor's field by 360/subdivision degrees.
+// It lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1, section "Open loop
+// regulating process"). Example: V_counter1 = 500, n = 108, subdivision 96 and a gear of 337 *
+// 45/17. A turn of the axis then takes 32.11 s and one vector is 4.2 mdeg. All motions on the bus
+// are whole vectors.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct UnitDrive {
   double v_bus_V = 1.8;
 };
 
-/// Where both axes stand: whole vectors from each axis' zero.
+/// The place of both axes: whole vectors from each axis' zero.
 using Pose = std::array<std::int32_t, kAxisCount>;
 
 constexpr double DegreesPerVector(const AxisGeometry& axis, const AxisDrive& drive) {

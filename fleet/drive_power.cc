@@ -26,14 +26,14 @@ const std::array<Complex, kLegs>& LegAxes() {
   return kAxes;
 }
 
-// Of a product only this is asked for.
+// The real part of a product is all that is needed.
 double Along(Complex value, Complex axis) {
   return value.real() * axis.real() + value.imag() * axis.imag();
 }
 
-// ---- what the timer commands
+// ---- commands of the timer
 
-// One leg in one carrier: high from the start or not, and from `rise_s` to `fall_s`.
+// A leg in one carrier: high from the start or not, and from `rise_s` to `fall_s`.
 struct LegPulse {
   bool high_at_start = false;
   double rise_s = kNever;
@@ -47,25 +47,26 @@ LegPulse PulseOf(double high_counts, double counter1, WaveMode mode) {
   const bool centred = mode != WaveMode::kAsymmetric;
   const double low_counts = counter1 - high_counts;
   const double rise = centred ? low_counts / 2 : low_counts;
-  // Up to the end of the carrier: the next one begins low.
+  // The pulse lasts up to the end of the carrier: the next one begins low.
   const double fall = centred ? rise + high_counts : kNever;
   return {false, rise / kTimerHz, fall / kTimerHz};
 }
 
 Pulses PulsesOf(std::uint32_t vector, const AxisDrive& drive, WaveMode mode) {
-  // Whole numbers: a vector on the border of a sector must not fall into the one before.
+  // Whole numbers: a vector on the border of a sector must not be counted in the one before.
   const std::uint32_t sixths = 6 * (vector % drive.subdivision);
   const std::uint32_t sector = sixths / drive.subdivision;
   const double a = kPi / 3 * (sixths % drive.subdivision) / drive.subdivision;
   const double counter1 = drive.counter1;
-  // A half goes up: in the middle of a sector, T1 = T2 = counter1 / 2, sin(30 deg) is a hair short.
+  // A half is rounded up: in the middle of a sector, T1 = T2 = counter1 / 2, and sin(30 deg) is
+  // slightly too small.
   const auto counts = [&](double angle) {
     return std::floor(counter1 * std::sin(angle) + 0.5 + 1e-9);
   };
   const double t1 = counts(kPi / 3 - a);
   const double t2 = std::min(counts(a), counter1 - t1);
   // T1 belongs to the vector at the lower angle, which raises one leg in even sectors and two in
-  // odd ones. One leg is in both.
+  // odd ones. A single leg is in both.
   const bool even = sector % 2 == 0;
   const std::size_t both = (even ? sector / 2 : (sector + 1) / 2) % kLegs;
   const std::size_t second = (even ? sector / 2 + 1 : (sector - 1) / 2) % kLegs;
@@ -79,7 +80,7 @@ Pulses PulsesOf(std::uint32_t vector, const AxisDrive& drive, WaveMode mode) {
   return pulses;
 }
 
-// ---- what bridge and winding make of it
+// ---- voltages and currents of bridge and winding
 
 struct Leg {
   double level = 0;  // of the output, in bus voltages
@@ -91,7 +92,7 @@ struct Leg {
   std::size_t next = 0;     // command of this carrier
 };
 
-// Marches through carriers; sums energies with a weight.
+// Runs through carriers and sums energies with a weight.
 class Bridge {
  public:
   Bridge(const MotorModel& motor, const Feed& feed, bool rotor_stands)
@@ -104,7 +105,7 @@ class Bridge {
         own_A_(-emf_V_ / Complex(motor.phase_resistance_ohm, speed_ * motor.phase_inductance_H)),
         cross_(1.0 / Complex(rate_, speed_)) {}
 
-  // `rotor_rad`: where the flux stands at the begin of the carrier.
+  // `rotor_rad`: the angle of the flux at the begin of the carrier.
   void RunCarrier(const Pulses& pulses, double rotor_rad, double weight) {
     rotor_ = std::polar(1.0, rotor_rad);
     weight_ = weight;
@@ -140,7 +141,7 @@ class Bridge {
  private:
   [[nodiscard]] Complex Current() const { return driven_A_ + own_A_ * rotor_; }
 
-  // Everything that happens now; when the next thing will.
+  // Carries out all that is due now. Returns when the next event is due.
   double Due(const Pulses& pulses) {
     double next_s = kNever;
     for (std::size_t k = 0; k < kLegs; ++k) {
@@ -172,7 +173,7 @@ class Bridge {
     if (leg.target == target) return;
     leg.target = target;
     leg.by_diode = true;
-    const bool diode = Along(Current(), LegAxes()[k]) <= 0;  // which one takes the current
+    const bool diode = Along(Current(), LegAxes()[k]) <= 0;  // which diode takes the current
     leg.close_s = now_s_ + motor_.dead_time_s + (diode == target ? 0 : RampOf(target) / 2);
     leg.flip_s = kNever;
     if (leg.floats || diode == (leg.level > 0.5)) return;
@@ -207,7 +208,8 @@ class Bridge {
   }
 
   // The first instant up to `until_s` at which a diode's current comes to zero; its leg floats
-  // then. An interval with open switches is no longer than the dead time, so a straight line does.
+  // then. An interval with open switches is no longer than the dead time, so a straight line is
+  // good enough.
   double FirstZero(double until_s, Complex end_A) {
     double first_s = until_s;
     std::optional<std::size_t> which;
@@ -242,7 +244,7 @@ class Bridge {
     const double left = 1 - gone;
     const Complex turn = std::polar(1.0, speed_ * dt_s);
     const Complex turn_s = TurnIntegral(speed_ * dt_s) * dt_s;
-    // Of i_v exp(-j theta): carries both the torque and the product of i_v with i_e.
+    // The integral of i_v exp(-j theta) gives both the torque and the product of i_v with i_e.
     const Complex mixed_As = std::conj(rotor_) * (final_A * std::conj(turn_s) +
                                                   off_A * (1.0 - left * std::conj(turn)) * cross_);
     const Complex charge_As = final_A * dt_s + off_A * (gone / rate_) + own_A_ * rotor_ * turn_s;
@@ -292,9 +294,9 @@ class Bridge {
   double weighed_s_ = 0;
 };
 
-// The carriers of a vector that are computed, and how many each stands for.
+// A carrier of a vector that is computed, and how many carriers it stands for.
 struct Sample {
-  double carrier = 0;  // where in the vector; a half for one between two
+  double carrier = 0;  // place in the vector; a half for one between two
   double weight = 0;
 };
 
@@ -329,7 +331,7 @@ struct Balance {
   bool stalled = false;
 };
 
-// Torque over lag is nearly amplitude * sin(lag - shift) - drag: each trial refines amplitude and
+// Torque over lag is nearly amplitude * sin(lag - shift) - drag. Each trial refines amplitude and
 // drag, and bisection takes over where that leads out of the bracket.
 class LagSearch {
  public:
@@ -411,7 +413,7 @@ TurnMeans MeansOverTurn(const MotorModel& motor, const Feed& feed, const TurnOpt
   Bridge bridge(motor, feed, options.rotor_stands);
   for (std::int64_t n = -warm_up; n < vectors; ++n) {
     if (n == 0) bridge.Forget();
-    // The mean field of a vector that is held stands where the vector does in the middle of it.
+    // The mean field of a held vector is where the vector is in the middle of the hold.
     const std::int64_t k = options.first_vector + n;
     const std::int64_t wrapped = ((k % drive.subdivision) + drive.subdivision) % drive.subdivision;
     const Pulses pulses = PulsesOf(static_cast<std::uint32_t>(wrapped), drive, feed.mode);

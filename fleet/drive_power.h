@@ -1,40 +1,41 @@
-// What one motor draws while it turns in step with its field, resolved to the switching edges. A
-// carrier period (1.7 to 14 us) is as long as the winding's time constant L/r (2.5 us), so the
-// current rises and falls within every carrier: its ripple heats the winding, and where it passes
-// through zero decides what the dead time does to the voltage. A sinusoid of the mean voltage knows
-// neither: at 1.8 V it is 7 % low with 2000 counts and 11 % high with 250 and seven segments.
+// The power of one motor while it turns in step with its field, resolved to the switching edges. A
+// carrier period (1.7 to 14 us) is as long as the winding's time constant L/r (2.5 us). The current
+// therefore rises and falls within every carrier. Its ripple heats the winding, and the effect of
+// the dead time on the voltage depends on where the current passes through zero. A sinusoid of the
+// mean voltage has neither. At 1.8 V it is 7 % low with 2000 counts, and 11 % high with 250 counts
+// and seven segments.
 //
-// Equations. Phase quantities as one complex number (amplitude invariant), flux psi at the angle
-// theta = w t - lag, w = 2 pi / (subdivision * time of a vector), constant:
+// Equations. Phase quantities are one complex number (amplitude invariant). The flux psi is at the
+// angle theta = w t - lag. The speed w = 2 pi / (subdivision * time of a vector) is constant:
 //
 //   L di/dt = v - r i - e             e = j w psi exp(j theta)
 //   v       = (2/3) v_bus (s_a + s_b exp(j 120 deg) + s_c exp(j 240 deg)),  s = 0 or 1
 //   torque  = 1.5 psi Im(i exp(-j theta)),   winding = 1.5 r |i|^2,   input = 1.5 Re(v conj(i))
 //
-// It is linear, so i = i_v + i_e. i_e = -e / (r + j w L) is what the turning rotor drives by
-// itself, for good; i_v, what the bridge drives, goes to v / r as exp(-t r / L) between two edges.
-// Every integral over an interval is thus closed: no step size.
+// The equation is linear, so i = i_v + i_e. i_e = -e / (r + j w L) is the steady current that the
+// turning rotor drives by itself. i_v, the current that the bridge drives, goes to v / r as exp(-t
+// r / L) between two edges. Every integral over an interval is thus closed: no step size.
 //
-// Edges. Vector k stands at the angle 2 pi k / subdivision, a within its sector of 60 degrees:
-// T1 = counter1 sin(60 deg - a), T2 = counter1 sin(a), in whole counts. Asymmetric: 000 for the
-// rest, then one leg, then two legs, up to the end of the carrier. Five segments: the same legs
-// with their pulses centred. Seven segments: centred, half of the rest as 111 in the middle.
+// Edges. Vector k stands at the angle 2 pi k / subdivision, a within its sector of 60 degrees: T1 =
+// counter1 sin(60 deg - a), T2 = counter1 sin(a), in whole counts. Asymmetric: 000 for the rest,
+// then one leg, then two legs, up to the end of the carrier. Five segments: the same legs with
+// their pulses centred. Seven segments: centred, half of the rest as 111 in the middle.
 //
 // Dead time. On a command the conducting switch opens at once, the other closes after the dead
-// time; between them a diode takes the current: the low one where it flows out of the leg, the high
-// one where it flows in. Where it comes to zero before the switch closes, the leg floats without
-// current. Edges take their rise or fall time, counted as a delay of half of it. Where a switch
-// closes onto the current of the opposite diode (a hard edge), it carries current and voltage
-// together: 0.5 v_bus |i| (rise or fall). Where the current itself has moved the leg (a soft edge),
-// there is no such loss.
+// time. Between them a diode takes the current: the low one where it flows out of the leg, the high
+// one where it flows in. Where the current comes to zero before the switch closes, the leg floats
+// without current. Edges take their rise or fall time, counted as a delay of half of it. A switch
+// may close onto the current of the opposite diode (a hard edge). It then carries current and
+// voltage together: 0.5 v_bus |i| (rise or fall). Where the current itself has moved the leg (a
+// soft edge), there is no such loss.
 //
-// Lag. The rotor's mean torque is load + viscous w at one lag below pull-out; found by iteration,
-// from the circle of the sinusoid. Where no lag can pull the load the motor is stalled: its rotor
-// stands, and the field turns over it.
+// Lag. The rotor's mean torque is load + viscous w at one lag below pull-out. The lag is found by
+// iteration, from the circle of the sinusoid. Where no lag can pull the load the motor is stalled:
+// its rotor stands, and the field turns over it.
 //
-// Cost. A third of an electrical turn repeats by symmetry. Of each vector the first carriers are
-// taken one by one until what the edge shifts left has died out; of the rest, where only e still
-// turns, one stands for each two degrees. About 1 ms for each drive, mode and voltage.
+// Cost. A third of an electrical turn repeats by symmetry. The first carriers of each vector are
+// taken one by one until the transient of the edge shifts has died out. In the rest only e still
+// turns, and one carrier stands for each two degrees. About 1 ms for each drive, mode and voltage.
 // Source: paper 1 eqs. 4 to 7, one pole pair, Ld = Lq = L.
 #pragma once
 
@@ -59,14 +60,14 @@ struct MotorModel {
   double dead_time_s = 50e-9;
 };
 
-/// How a motor is fed.
+/// The feed of a motor.
 struct Feed {
   AxisDrive drive;
   WaveMode mode = WaveMode::kAsymmetric;
   double v_bus_V = 1.8;
 };
 
-/// Electrical speed. One pole pair: the rotor's, too.
+/// Electrical speed. With one pole pair it is the rotor's, too.
 double SpeedRadPerS(const AxisDrive& drive);
 
 /// Electrical power of one motor in steady rotation, by cause. Units: W.
@@ -74,11 +75,12 @@ struct MotorPower {
   double winding_W = 0;
   double mechanical_W = 0;
   double switching_W = 0;
-  bool stalled = false;  // cannot pull its load: stands, mechanical_W is 0
+  bool stalled = false;  // it cannot pull its load: the rotor stands, mechanical_W is 0
   [[nodiscard]] double total_W() const { return winding_W + mechanical_W + switching_W; }
 };
 
-/// Pre: v_bus_V > 0, all counts of the drive > 0. Cost: see above; keep it in a DrivePowers.
+/// The power in steady rotation. Pre: v_bus_V > 0, all counts of the drive > 0. Cost: about 1 ms;
+/// keep the result in a DrivePowers.
 MotorPower SteadyPower(const MotorModel& motor, const Feed& feed);
 
 /// Means over an electrical turn at a given lag of the rotor behind the field.
@@ -91,13 +93,14 @@ struct TurnMeans {
 };
 struct TurnOptions {
   double lag_rad = 0;
-  std::uint32_t first_vector = 0;  // where the turn is cut open; changes nothing but rounding
-  bool every_carrier = false;      // none stands for others: 5 to 10 times the cost
+  std::uint32_t first_vector = 0;  // where the turn is cut open; only rounding depends on it
+  bool every_carrier = false;      // no carrier stands for others: 5 to 10 times the cost
   bool rotor_stands = false;       // no back EMF; the lag then means nothing
 };
 TurnMeans MeansOverTurn(const MotorModel& motor, const Feed& feed, const TurnOptions& options);
 
-/// SteadyPower, each feed computed once: the units of a fleet share a few.
+/// SteadyPower with a memory: each feed is computed once, and the units of a fleet share a few
+/// feeds.
 class DrivePowers {
  public:
   explicit DrivePowers(const MotorModel& motor) : motor_(motor) {}

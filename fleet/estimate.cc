@@ -20,7 +20,7 @@ std::int64_t Nanowatts(double power_W) {
   return static_cast<std::int64_t>(std::llround(power_W * 1e9));
 }
 
-// Steps of the running sum; events ascend in time.
+// The running sum as steps; events ascend in time.
 std::vector<PowerStep> StepsOf(std::span<const PowerEvent> events) {
   std::vector<PowerStep> steps;
   std::int64_t sum_nW = 0;

@@ -1,6 +1,6 @@
-// How long a plan takes and what it draws: the time of a move is its vectors times V_counter2 /
-// f_clk (paper 1), the power of a motor that runs is that of steady rotation (drive_power.h).
-// Summed over the motors that run, per supply rail and in total, it is a curve over the plan.
+// The duration and the power of a plan. The time of a move is its vectors times V_counter2 / f_clk
+// (paper 1). The power of a running motor is that of steady rotation (drive_power.h). Summed over
+// the running motors, per supply rail and in total, it is a curve over the plan.
 #pragma once
 
 #include <cmath>
@@ -16,18 +16,19 @@
 
 namespace focalfleet {
 
-/// A segment's drive: its own repeat, the rest as tuned.
+/// The drive of a segment: its own repeat, the rest as tuned.
 constexpr AxisDrive AsSent(const Segment& segment, const AxisDrive& tuned) {
   return {tuned.counter1, segment.repeat, tuned.subdivision};
 }
 
-/// When a segment runs, by the unit's nominal clock. Units: s after the start signal.
+/// The time of a segment, by the unit's nominal clock. Units: s after the start signal.
 struct SegmentTime {
   double t0_s = 0;
   double t1_s = 0;
 };
 inline SegmentTime TimeOf(const Segment& segment, const AxisDrive& tuned) {
-  // Divided, not multiplied: gives the double nearest to the decimal time, which prints short.
+  // The division gives the double nearest to the decimal time, which prints short; a product would
+  // not.
   const double t0_s = segment.start_ticks / 1e4;
   return {t0_s, t0_s + std::abs(segment.delta) * SecondsPerVector(AsSent(segment, tuned))};
 }
@@ -52,13 +53,13 @@ struct PlanEstimate {
   std::uint32_t stalled_segments = 0;
 };
 
-/// Shape: `drives` (n). Powers are summed as whole nanowatts, so every curve ends at exactly 0 and
-/// does not depend on the order of its moves. Cost: O(s log s) for s segments, and about 1 ms for
-/// each way in which a motor is fed.
+/// Time, power and energy of a plan. Shape: `drives` (n). Powers are summed as whole nanowatts, so
+/// every curve ends at exactly 0 and does not depend on the order of its moves. Cost: O(s log s)
+/// for s segments, and about 1 ms for each way in which a motor is fed.
 PlanEstimate Estimate(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives,
                       const MotorModel& motor);
 
-// ---- how far the figures can be trusted
+// ---- the uncertainty of the figures
 
 /// A value and the limits within which the truth is expected.
 struct Banded {
@@ -77,8 +78,9 @@ struct RailFigures {
   PowerFigures power;
 };
 
-/// What differs between motors, and the model's own error. The four corners of load and resistance
-/// are computed, each for all motors at once (a cold or a worn fleet, not a cancelling mixture).
+/// The spread between motors, and the model's own error. The four corners of load and resistance
+/// are computed, each for all motors at once. A corner stands for a cold or a worn fleet, not for a
+/// mixture in which errors cancel.
 struct EstimateSpread {
   double load = 0.2;            // share of load_torque_Nm, either way
   double resistance = 0.1;      // share; copper makes 10 % in 25 K
@@ -92,7 +94,7 @@ struct EstimateFigures {
   PowerFigures total;
   std::vector<RailFigures> rails;     // ascending by rail
   bool stalls = false;                // the nominal motor cannot pull its load in some segment
-  bool stalls_within_spread = false;  // nor, at least, does a corner's
+  bool stalls_within_spread = false;  // at least one corner cannot
   PlanEstimate nominal;               // with the curves
 };
 EstimateFigures EstimateWithSpread(const Plan& plan, const Layout& layout,

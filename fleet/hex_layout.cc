@@ -13,7 +13,7 @@ constexpr double kGear = 337.0 * 45 / 17;
 constexpr double kArmPerPitch = 16.5 / 2 / 25.6;
 constexpr double kThetaEndDeg = 190;
 constexpr double kPhiMaxDeg = 180;
-constexpr double kHalfWidthShare = 0.08;  // of the pitch: what Layout gives the arms
+constexpr double kHalfWidthShare = 0.08;  // of the pitch: the width that Layout gives the arms
 constexpr double kFiducialRoomMm = 1.5;   // a ferrule of 2 mm and the clearance
 constexpr double kGoldenTurn = 0.38196601125010515;
 
@@ -24,7 +24,7 @@ struct LatticePoint {
 };
 
 std::vector<PointFp> LatticeNearestFirst(std::uint32_t count, double pitch_mm) {
-  // Within the circle that holds `count` points stand only rings up to 1.16 times the hexagon's.
+  // The circle of `count` points contains only rings up to 1.16 times the hexagon's.
   int rings = 1;
   while (3.0 * rings * (rings + 1) + 1 < count) ++rings;
   rings += rings / 4 + 1;
@@ -75,8 +75,8 @@ PointFp Seed(std::uint32_t k, double radius_mm) {
   return {radius_mm * std::cos(turn), radius_mm * std::sin(turn)};
 }
 
-// A sunflower's seeds, each at the nearest place that is left; the places are taken out, the order
-// of the others stays.
+// Takes places in the pattern of a sunflower's seeds, each at the nearest place that is left. The
+// others keep their order.
 std::vector<Fiducial> TakePlaces(std::uint32_t count, std::vector<PointFp>* places) {
   const double rim_mm = std::hypot(places->back().x_mm, places->back().y_mm);
   std::vector<char> taken(places->size(), 0);

@@ -1,7 +1,7 @@
-// A focal plane out of nothing but a count and a pitch: units on a hexagonal lattice, nearest the
-// centre first, with the proportions of LAMOST (the fibre reaches 16.5 mm at 25.6 mm pitch, so that
-// the patrol discs leave no gap) and the gears of paper 1. Supplies and buses are compact regions
-// of the plate, as harnesses are.
+// A focal plane made from a count and a pitch alone: units on a hexagonal lattice, nearest the
+// centre first. The proportions are those of LAMOST: the fibre reaches 16.5 mm at 25.6 mm pitch, so
+// that the patrol discs leave no gap. The gears are those of paper 1. Supplies and buses are
+// compact regions of the plate, as harnesses are.
 #pragma once
 
 #include <cstdint>
@@ -29,8 +29,8 @@ inline HexLayoutOptions SdssLike(std::uint32_t count) {
   return {.count = count, .pitch_mm = 22.4, .theta_arm_mm = 7.4, .phi_arm_mm = 14.3};
 }
 
-/// Exactly `count` units, ids from 1, nearest the centre first; nodes are given on each bus in that
-/// order. Frame: focal plane, the centre unit at 0, 0. Cost: O(n log n).
+/// Exactly `count` units, ids from 1, nearest the centre first; nodes are numbered on each bus in
+/// that order. Frame: focal plane, the centre unit at 0, 0. Cost: O(n log n).
 std::vector<Unit> MakeHexLayout(const HexLayoutOptions& options);
 
 struct HexPlate {
@@ -39,10 +39,11 @@ struct HexPlate {
 };
 
 /// Units and fiducials, ids from 1 each. No arm reaches a fiducial. On the lattice of LAMOST's
-/// proportions every gap is reached, so fiducials take places of the lattice, evenly over the
-/// plate; the units fill the others. Where neighbours' arms reach an empty place, too (as SDSS-V's
-/// do), fiducials stand on a ring outside all patrol areas. Either way they follow the golden angle
-/// (a sunflower's seeds), so that no turn or reflection of the plate brings them onto themselves.
+/// proportions every gap is reached. Fiducials therefore take places of the lattice, evenly over
+/// the plate, and the units fill the others. Where neighbours' arms reach an empty place, too (as
+/// SDSS-V's do), fiducials stand on a ring outside all patrol areas. Either way they follow the
+/// golden angle (a sunflower's seeds), so that no turn or reflection of the plate maps them onto
+/// themselves.
 HexPlate MakeHexPlate(const HexLayoutOptions& options);
 
 }  // namespace focalfleet

@@ -10,15 +10,15 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 // Rounding of a table's last digit at the end of a range must not cost a solution.
 constexpr double kRangeToleranceDeg = 1e-6;
-constexpr double kVectorToleranceDeg = 1e-9;
-// Near stretched and folded the distance hardly depends on phi, so a point within the reach
-// tolerance may ask for a phi this far outside the range; clamped, it is tried against the
-// tolerance itself.
+constexpr double kVectorToleranceDeg = 1e-9;  // rounding of a range that ends at a whole vector
+// Near stretched and folded the distance hardly depends on phi. A point within the reach tolerance
+// may then ask for a phi this far outside the range. The phi is clamped and tried against the
+// tolerance itself. Units: degrees.
 constexpr double kClampTryDeg = 3;
 
 std::vector<double> TurnsWithin(double angle_deg, const AxisGeometry& axis, double tolerance_deg) {
   std::vector<double> turns;
-  // Exact, and near 0 a turn more is another number, whatever the angle was.
+  // The remainder is exact, and near 0 a turn more is another number, whatever the angle was.
   angle_deg = std::remainder(angle_deg, 360);
   const double first = std::ceil((axis.min_deg - tolerance_deg - angle_deg) / 360);
   for (double k = first; angle_deg + 360 * k <= axis.max_deg + tolerance_deg; ++k)
@@ -38,7 +38,7 @@ double DistanceAt(const Unit& unit, double phi_deg) {
   return std::sqrt(std::max(0.0, a * a + b * b + 2 * a * b * c));
 }
 
-// Theta that points the fibre at a direction, for a given phi; without whole turns.
+// The theta that points the fibre at a direction, for a given phi; without whole turns.
 double ThetaFor(const Unit& unit, double direction_deg, double phi_deg) {
   const double p = (phi_deg + unit.phi().zero_deg) * kDegree;
   const double lead = std::atan2(unit.phi().arm_mm * std::sin(p),
@@ -108,8 +108,8 @@ bool InRange(const Unit& unit, const UnitDrive& drive, const Pose& pose) {
 }
 
 PatrolLimits PatrolOf(const Unit& unit) {
-  // The distance falls from stretched to folded and rises again, so its extremes are at the ends of
-  // the range or at the stretched and folded angles inside it.
+  // The distance falls from stretched to folded and rises again. Its extremes are therefore at the
+  // ends of the range, or at the stretched and folded angles inside it.
   const AxisGeometry& phi = unit.phi();
   const double at_min = DistanceAt(unit, phi.min_deg);
   const double at_max = DistanceAt(unit, phi.max_deg);
@@ -170,7 +170,7 @@ AxisAngles AnglesSeen(const Unit& unit, PointFp seen_fp, const AxisAngles& belie
   return {nearest(ThetaFor(unit, direction_deg, phi), believed.theta_deg), phi};
 }
 
-// One Gauss-Newton step of what PlaceSeen minimises. Units: mm and radians inside.
+// A Gauss-Newton step of the minimisation in PlaceSeen. Units: mm and radians inside.
 AxisAngles Improved(const Unit& unit, PointFp seen_fp, const AxisAngles& at,
                     const AxisAngles& believed, const SeenWith& with) {
   const SegmentFp arm = ArmAt(unit, at);
@@ -185,7 +185,7 @@ AxisAngles Improved(const Unit& unit, PointFp seen_fp, const AxisAngles& at,
   const double tp = jt_x * jp_x + jt_y * jp_y;
   const double bt = jt_x * rx + jt_y * ry + weight * (believed.theta_deg - at.theta_deg) * kDegree;
   const double bp = jp_x * rx + jp_y * ry + weight * (believed.phi_deg - at.phi_deg) * kDegree;
-  const double determinant = tt * pp - tp * tp;  // positive: the prior sees to it
+  const double determinant = tt * pp - tp * tp;  // positive because of the prior
   return {at.theta_deg + (pp * bt - tp * bp) / determinant / kDegree,
           at.phi_deg + (tt * bp - tp * bt) / determinant / kDegree};
 }
@@ -202,7 +202,8 @@ std::optional<Pose> PlaceSeen(const Unit& unit, const UnitDrive& drive, PointFp 
     return std::nullopt;
   const AxisAngles prior = AnglesOf(unit, drive, believed);
   AxisAngles angles = AnglesSeen(unit, seen_fp, prior);
-  constexpr int kSteps = 4;  // quadratic from so near; at the ends of the reach the prior is all
+  /// convergence is quadratic so near; at the ends of the reach the prior decides
+  constexpr int kSteps = 4;
   for (int step = 0; step < kSteps; ++step) angles = Improved(unit, seen_fp, angles, prior, with);
   return Pose{NearestVectors(angles.theta_deg, unit.axis[0], drive.axis[0]),
               NearestVectors(angles.phi_deg, unit.axis[1], drive.axis[1])};

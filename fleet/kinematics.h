@@ -1,13 +1,13 @@
-// From two axis angles to where the fibre is, and back. With the zero angles added, a unit is a
-// two-bar arm:
+// Kinematics of a unit: from two axis angles to the place of the fibre, and back. With the zero
+// angles added, a unit is a two-bar arm:
 //
 //   elbow = base  + arm_theta (cos T, sin T)            T = theta + theta_zero
 //   fibre = elbow + arm_phi   (cos (T+P), sin (T+P))    P = phi + phi_zero
 //
-// The distance from base to fibre depends on P alone: r^2 = a^2 + b^2 + 2ab cos P. So a point has
-// at most two values of P in a turn (elbow on either side), each with one direction T, each in
-// whole turns as the ranges allow. Angles grow counter-clockwise seen from the sky side; P = 0
-// stretches the arm, 180 folds it back.
+// The distance from base to fibre depends on P alone: r^2 = a^2 + b^2 + 2ab cos P. A point
+// therefore has at most two values of P in a turn (elbow on either side), each with one direction
+// T, each in whole turns as the ranges allow. Angles grow counter-clockwise seen from the sky side;
+// P = 0 stretches the arm, 180 folds it back.
 #pragma once
 
 #include <optional>
@@ -19,7 +19,7 @@
 
 namespace focalfleet {
 
-/// Angles of both axes as the axes count them, whole turns and all, zero angles not added.
+/// Angles of both axes as the axes count them: whole turns included, zero angles not added.
 struct AxisAngles {
   double theta_deg = 0;
   double phi_deg = 0;
@@ -27,15 +27,14 @@ struct AxisAngles {
 
 /// The phi arm, the part that can touch: `a` is the elbow, `b` the fibre.
 SegmentFp ArmAt(const Unit& unit, const AxisAngles& angles);
-/// Where the fibre is.
+/// The place of the fibre.
 PointFp FibreAt(const Unit& unit, const AxisAngles& angles);
 
 AxisAngles AnglesOf(const Unit& unit, const UnitDrive& drive, const Pose& pose);
 SegmentFp ArmAt(const Unit& unit, const UnitDrive& drive, const Pose& pose);
 PointFp FibreAt(const Unit& unit, const UnitDrive& drive, const Pose& pose);
 
-/// Whole vectors that lie within the axis' range. Empty (low > high) only for a range below one
-/// vector.
+/// The whole vectors within the axis' range. Empty (low > high) only for a range below one vector.
 struct VectorRange {
   std::int32_t low = 0;
   std::int32_t high = 0;
@@ -49,6 +48,7 @@ std::int32_t NearestInRange(double angle_deg, const AxisGeometry& axis, const Ax
 bool InRange(const Unit& unit, const UnitDrive& drive, const Pose& pose);
 
 /// A point this far out of reach is reached, at the border: coordinates in files are rounded.
+/// Units: mm.
 inline constexpr double kReachToleranceMm = 1e-3;
 
 /// Distances from the base that the fibre can have within the range of phi. Units that cannot fold
@@ -59,23 +59,24 @@ struct PatrolLimits {
 };
 PatrolLimits PatrolOf(const Unit& unit);
 
-/// Every pair of angles within the ranges that puts the fibre on the point: both sides of the
-/// elbow, all whole turns; ordered by phi, then theta. Where the fibre stands over the base every
-/// theta serves, and `free_theta_deg`, brought into range, is taken. Empty: out of patrol or out of
-/// range. Errors of the result: at most kReachToleranceMm. Cost: O(solutions).
+/// Every pair of angles within the ranges that puts the fibre on the point, ordered by phi, then
+/// theta. The pairs are of both sides of the elbow and of all whole turns. Where the fibre stands
+/// over the base every theta is possible, and `free_theta_deg`, brought into range, is taken.
+/// Empty: out of patrol or out of range. Accuracy: at most kReachToleranceMm from the point. Cost:
+/// O(solutions).
 std::vector<AxisAngles> AnglesFor(const Unit& unit, PointFp fibre_fp, double free_theta_deg = 0);
 
-/// How well a fibre was seen, and how far from where it was believed it may well be.
+/// The uncertainty of a measured fibre, and that of the believed pose.
 struct SeenWith {
   double sigma_mm = 0.003;  // of one coordinate
-  double believed_deg = 3;  // standard deviation of what was believed of each axis
+  double believed_deg = 3;  // standard deviation of the belief about each axis
   double out_of_reach_mm = 0.25;
 };
 /// The most likely pose, in whole vectors, of a unit whose fibre was seen at a point:
 ///   argmin |FibreAt(q) - seen|^2 / sigma^2 + |q - believed|^2 / believed_deg^2,
-/// elbow side and whole turns as believed. What was believed decides where the point cannot: at the
-/// ends of the reach theta and phi trade against each other. Not held to the ranges, because what
-/// stands there stands there. None: farther out of reach than that.
+/// elbow side and whole turns as believed. The belief decides where the point cannot: at the ends
+/// of the reach an error of theta can hide an error of phi. The pose is not held to the ranges,
+/// because a unit may stand outside of them. Empty: farther out of reach than that.
 std::optional<Pose> PlaceSeen(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                               const Pose& believed, const SeenWith& with = {});
 

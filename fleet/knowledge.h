@@ -1,7 +1,10 @@
-// What the coordinator may claim about where a unit stands. A number alone lies: it must say who
-// saw it. measured (a camera), reported (the unit's own vectors after a clean end), predicted (the
-// plan, while it moves), interval (a move was cut short: somewhere in low..high), unknown (nobody
-// can say).
+// Knowledge of the coordinator about a unit's place. A bare number hides how it is known, so each
+// has its witness.
+// - measured: by a camera.
+// - reported: the unit's own vectors after a clean end.
+// - predicted: by the plan, while the unit moves.
+// - interval: a move was cut short, so the unit is somewhere in low..high.
+// - unknown: no source.
 #pragma once
 
 #include <array>
@@ -17,7 +20,8 @@ constexpr const char* Name(Witness witness) {
   return kNames[static_cast<std::size_t>(witness)];
 }
 
-/// One axis: low == high unless the witness is kInterval; meaningless where it is kUnknown.
+/// Knowledge of one axis: low == high unless the witness is kInterval; meaningless where it is
+/// kUnknown.
 struct AxisKnowledge {
   Witness witness = Witness::kUnknown;
   std::int32_t low = 0;   // vectors

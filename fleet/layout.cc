@@ -22,7 +22,7 @@ constexpr double kCoordinateMaxMm = 1e5;
 /// A joint that tilts 45 degrees takes the tip this share of its arms' length away.
 constexpr double kFibreCarrierOverArms = 1.4143;
 constexpr double kArmMaxMm = 1e4;
-constexpr double kNearestMinMm = 1e-3;
+constexpr double kNearestMinMm = 1e-3;  // two bases nearer than this are one place
 
 std::string Text(double value) {
   char text[32];
@@ -77,8 +77,8 @@ Box BoxOf(const std::vector<Unit>& units) {
   return box;
 }
 
-// About one unit a cell; a plate with one far stray, or all on a line, must not cost cells without
-// end.
+// About one unit a cell. A plate with one far stray, or all on a line, must not cost an unlimited
+// number of cells.
 double CellMm(const Box& box, std::size_t count) {
   const auto units = static_cast<double>(count);
   const double cells_per_side_max = 2 * std::sqrt(units) + 2;
@@ -87,7 +87,7 @@ double CellMm(const Box& box, std::size_t count) {
                    kNearestMinMm});
 }
 
-// Bases sorted into square cells, so that whoever is near is found in a few cells.
+// Bases sorted into square cells, so that the units near a place are found in a few cells.
 class Grid {
  public:
   explicit Grid(const std::vector<Unit>& units)
@@ -128,7 +128,7 @@ class Grid {
           who = j;
         }
       });
-      // Outside the cells looked at, nothing is nearer than the radius.
+      // Outside the tested cells nothing is nearer than the radius.
       if (best2 <= radius * radius || radius > everywhere) return {std::sqrt(best2), who};
     }
   }
@@ -180,7 +180,7 @@ void SpreadOverBuses(std::vector<Unit>* units) {
   }
 }
 
-// Nodes that were given keep their place; the others take the lowest free ones in order.
+// Given nodes keep their place; the others take the lowest free ones in order.
 Status AssignNodes(std::vector<Unit>* units,
                    std::unordered_map<std::uint64_t, PositionerIndex>* by_address) {
   BadRows bad;
@@ -299,7 +299,7 @@ Status Layout::MeasurePitch(double clearance_mm) {
   } else {
     const Grid grid(units_);
     BadRows bad;
-    std::vector<std::uint8_t> named(units_.size());  // in a pair that is told
+    std::vector<std::uint8_t> named(units_.size());  // in a pair that is listed
     for (std::uint32_t i = 0; i < units_.size(); ++i) {
       const auto [distance, who] = grid.Nearest(i);
       nearest_mm_[i] = distance;

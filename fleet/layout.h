@@ -1,7 +1,7 @@
-// The focal plane as it is believed to be: where each unit sits, how long its arms are, which
-// supply and bus feed it. Frames: _fp is the focal plane in mm, seen from the sky side, angles
+// The focal plane by the units file: where each unit sits, how long its arms are, which supply and
+// bus feed it. Frames: _fp is the focal plane in mm, seen from the sky side, angles
 // counter-clockwise. A unit's moving part is its phi arm, the segment from elbow to fibre, with a
-// half-width; two units can only touch when their reaches overlap, so neighbours are found once, in
+// half-width. Two units can only touch when their reaches overlap, so neighbours are found once, in
 // a grid, in O(n).
 #pragma once
 
@@ -31,11 +31,12 @@ struct AxisGeometry {
   double max_deg = 0;
 };
 
-/// No angle of a file, range or target, is beyond: 100 turns.
+/// No angle of a file, range or target is beyond 100 turns. Units: degrees.
 inline constexpr double kAngleMaxDeg = 36'000;
-/// No bus was given: Create finds a place.
+/// The bus is not given: Create finds a place.
 inline constexpr BusId kNoBus{UINT32_MAX};
-/// No node was given: Create takes the lowest that is free on the bus, in the order of the units.
+/// The node is not given: Create takes the lowest that is free on the bus, in the order of the
+/// units.
 inline constexpr NodeId kNoNode{0};
 
 struct Unit {
@@ -46,19 +47,19 @@ struct Unit {
   RailId rail;
   BusId bus = kNoBus;
   NodeId node = kNoNode;
-  /// Hall sensors at the joint of its fibre carrier, and the fibre carrier's length to the fibre;
-  /// 0: none. Its tilt is then measured by itself (docs/hall.md).
+  /// The number of Hall sensors at the joint of its fibre carrier, and the carrier's length to the
+  /// fibre; 0: none. The unit then measures its tilt itself (docs/hall.md).
   std::uint8_t sensors = 0;
   double carrier_mm = 0;
   bool enabled = true;  // false: stands where it is, an obstacle
-  // Places along the harness and grouping: kept for who asks, nothing in here depends on them.
+  // Places along the harness and grouping: kept for the user, nothing in here depends on them.
   std::optional<std::uint32_t> rail_slot;
   std::optional<std::uint32_t> bus_slot;
   std::optional<std::uint32_t> group;
 
   [[nodiscard]] const AxisGeometry& theta() const { return axis[Index(Axis::kTheta)]; }
   [[nodiscard]] const AxisGeometry& phi() const { return axis[Index(Axis::kPhi)]; }
-  /// Farthest that any point of the arm, half-width included, gets from the base.
+  /// The farthest distance of any point of the arm, half-width included, from the base.
   [[nodiscard]] double reach_mm() const {
     return theta().arm_mm + phi().arm_mm + arm_half_width_mm;
   }
@@ -76,8 +77,8 @@ struct Fiducial {
   PointFp at_fp;
 };
 
-/// Why this unit by itself cannot be (a number that is not finite, an arm without length, an empty
-/// range), or an empty text. Bus, node and neighbours are not looked at.
+/// The fault of this unit by itself (a number that is not finite, an arm without length, an empty
+/// range), or an empty text. Bus, node and neighbours are not checked.
 std::string FaultOf(const Unit& unit);
 
 class Layout {
@@ -89,8 +90,8 @@ class Layout {
 
   /// Checks the units (unique ids, finite numbers, positive arms, min < max, unique bus and node,
   /// limits) and finds pitch, half-widths and neighbours. Units without a bus are spread in order,
-  /// 100 a bus, on buses above all that were given (from 0 where none was).
-  /// Errors: kInvalid, names the unit. Cost: O(n) for an even plate.
+  /// 100 a bus, on buses above all that were given (from 0 where none was). Errors: kInvalid, names
+  /// the unit. Cost: O(n) for an even plate.
   static Result<Layout> Create(std::vector<Unit> units, Options options);
 
   [[nodiscard]] std::span<const Unit> units() const { return units_; }
@@ -99,11 +100,11 @@ class Layout {
   [[nodiscard]] std::span<const Obstacle> obstacles() const { return obstacles_; }
   [[nodiscard]] std::optional<PositionerIndex> Find(UnitId id) const;
   [[nodiscard]] std::optional<PositionerIndex> Find(BusId bus, NodeId node) const;
-  /// Sorted; without duplicates.
+  /// All buses, sorted, without duplicates.
   [[nodiscard]] std::span<const BusId> buses() const { return buses_; }
   /// Units whose reach overlaps this one's, clearance included; ascending.
   [[nodiscard]] std::span<const PositionerIndex> neighbours(PositionerIndex i) const;
-  /// Median distance to the nearest neighbour; one unit alone: twice its reach.
+  /// Median distance to the nearest neighbour; of a single unit, twice its reach.
   [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
   [[nodiscard]] double clearance_mm() const { return clearance_mm_; }
   [[nodiscard]] double nearest_mm(PositionerIndex i) const { return nearest_mm_[i.value]; }

@@ -5,7 +5,7 @@
 namespace focalfleet {
 namespace {
 
-// What does not fit was never taken by a unit: the drive stays as it is.
+// A value that does not fit was never taken by a unit: the drive stays as it is.
 template <class Whole>
 void Take(std::int32_t value, Whole* into) {
   if (value >= 1 && value <= std::numeric_limits<Whole>::max()) *into = static_cast<Whole>(value);

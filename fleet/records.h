@@ -1,6 +1,6 @@
-// What must not be lost, as rows: the coordinator hands them out as effects, the store writes them
-// in order in one transaction a batch, and at start hands back what it holds. Vectors and
-// parameters belong to the serial number; the place on the plate (unit) only binds one.
+// The records that must not be lost, as rows. The coordinator hands them out as effects. The store
+// writes them in order in one transaction a batch, and returns its content at the start. Vectors
+// and parameters belong to the serial number; the place on the plate (unit) only binds one.
 #pragma once
 
 #include <cstdint>
@@ -37,21 +37,20 @@ constexpr const char* Name(Origin origin) {
   return kNames[static_cast<std::size_t>(origin)];
 }
 
-/// Where a unit stands now: the mirror of its FLASH and what it is worth. FLASH has the count of
-/// the vectors that were shown; `offset` more than that is the place that the axis truly has, as a
-/// camera last found it. 0: never measured since the count began anew.
+/// The place of a unit now: the mirror of its FLASH and the witness. FLASH has the count of the
+/// vectors that were applied. The true place of the axis is `offset` more than that, as a camera
+/// last found it. 0: never measured since the count began anew.
 struct VectorRow {
   SerialNumber serial;
   UnitKnowledge knowledge;
   Pose offset{};
   std::array<std::uint16_t, kAxisCount> subdivision{};
-  MoveId move;  // the last one begun, as the unit says
+  MoveId move;  // the last one begun, as the unit reports
   Origin origin = Origin::kFactory;
   bool operator==(const VectorRow&) const = default;
 };
 
-/// "This unit is about to move": durable before any start signal; low..high is all that it may
-/// pass.
+/// The intent of a unit's move: durable before any start signal; low..high is all that it may pass.
 struct IntentRow {
   std::uint64_t configuration = 0;
   SerialNumber serial;
@@ -63,7 +62,7 @@ struct IntentRow {
   bool operator==(const IntentRow&) const = default;
 };
 
-/// The intent's end, kept as history.
+/// The end of an intent, kept as history.
 enum class IntentEnd : std::uint8_t {
   kArrived,
   kStopped,
@@ -83,31 +82,32 @@ struct IntentEndRow {
   IntentEnd end = IntentEnd::kArrived;
 };
 
-/// What one exposure found of one unit.
+/// The finding of one exposure for one unit.
 struct MeasurementRow {
   std::uint64_t exposure = 0;
   std::uint64_t configuration = 0;
   SerialNumber serial;
   UnitId unit;
   MeasurementStatus status = MeasurementStatus::kMissing;
-  std::optional<UnitId> other;  // that it is confused with
+  std::optional<UnitId> other;  // the unit that it is confused with
   double x_mm = 0;              // focal-plane frame
   double y_mm = 0;
   CovarianceFp covariance;
-  std::optional<Pose> place;         // vectors; none: it was put nowhere
+  std::optional<Pose> place;         // vectors; empty: it was given no place
   std::optional<PointFp> target_fp;  // where it had one
-  std::optional<double> error_um;    // from there
-  std::string target_id;             // as the configuration named it; empty: it did not
+  std::optional<double> error_um;    // distance from the target
+  std::string target_id;             // as the configuration named it; empty: not named
   std::optional<double> delay_s;     // end of its motion to the exposure; none: not known
   MeasurementSource source = MeasurementSource::kCamera;
   std::optional<FibreCarrierReading> carrier =
-      {};  // what its own sensors say, whoever is the source
+      {};  // reading of its own sensors, whatever the source
 };
 
-struct BindingRow {  // which hardware sits at a place
+struct BindingRow {  // the hardware that sits at a place
   UnitId unit;
   SerialNumber serial;
-  SerialNumber replaced = {};  // that sat there before; 0: none. Not stored: the history tells.
+  /// the serial that sat there before; 0: none. Not stored: the history has it.
+  SerialNumber replaced = {};
 };
 
 struct EnableRow {
@@ -125,18 +125,18 @@ struct ParameterRow {
   bool operator==(const ParameterRow&) const = default;
 };
 
-/// What the row says of its unit's drive, if anything. A unit has one mode; a tuning writes it for
-/// both axes.
+/// Applies what the row changes of its unit's drive, if anything. A unit has one mode; a tuning
+/// writes it for both axes.
 void TakeParameter(const ParameterRow& row, UnitDrive* drive);
 
-/// What a tuning found for an axis: why its parameters are what they are. The parameters themselves
-/// are rows of their own, which others may change later.
+/// The result of a tuning of an axis: the reason why its parameters are what they are. The
+/// parameters themselves are rows of their own, which may be changed later.
 struct TuningRow {
   SerialNumber serial;
   Axis axis = Axis::kTheta;
   std::uint16_t critical = 0;  // least n that starts the load from rest
   std::uint16_t repeat = 0;    // the n that was chosen
-  double margin = 0;           // by which the load may grow until that n is critical, as a share
+  double margin = 0;           // growth of the load until that n is critical, as a share
   double load_uNm = 0;         // mean, at the motor shaft
   double v_bus_V = 0;
   std::uint16_t counter1 = 0;
@@ -173,7 +173,7 @@ struct ConfigurationRow {
   double makespan_s = 0;
   double energy_J = 0;
   double peak_power_W = 0;
-  // Of the starts of its units, where they are known; else not a number.
+  // Skew of the starts of its units, where they are known; otherwise NaN.
   double start_skew_s = std::numeric_limits<double>::quiet_NaN();
   double start_skew_bound_s = std::numeric_limits<double>::quiet_NaN();
   std::uint32_t stopped = 0;
@@ -195,24 +195,24 @@ struct NextMoveRow {
   MoveId next;
 };
 
-/// Which extended model blind commands go through from here on, or that none does.
+/// The extended model that blind commands go through from here on, or none.
 struct ModelRow {
   std::uint64_t entry = 0;     // of this change, ascending
   std::string sha256;          // of the model's text, in hex; empty: none is in force
-  std::uint64_t restores = 0;  // the change that it goes back to; 0: none
+  std::uint64_t restores = 0;  // the change that it restores; 0: none
   std::string name;
-  std::string campaign;  // that it was found in
+  std::string campaign;  // the campaign that it was found in
   std::string campaign_sha256;
-  double rms_before_um = 0;  // on moves that no fit has seen; not a number: not known
+  double rms_before_um = 0;  // on moves that no fit has used; NaN: not known
   double rms_after_um = 0;
-  std::shared_ptr<const std::string> text;  // none: the store has it under its sha256
+  std::shared_ptr<const std::string> text;  // null: the store has it under its sha256
 };
 
 using Row =
     std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
                  ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow, ModelRow>;
 
-/// A row that the store can never keep. It was set aside, and the rest of its batch was kept.
+/// A row that the store can never keep. The row was set aside, and the rest of its batch was kept.
 struct RefusedRow {
   // Batches that the store may have written together with it, both included.
   std::uint64_t first_batch = 0;
@@ -221,7 +221,7 @@ struct RefusedRow {
   std::string why;
 };
 
-/// All that the coordinator needs to go on after a restart.
+/// The state that the coordinator needs to go on after a restart.
 struct StoredFleet {
   struct StoredUnit {
     UnitId unit;
@@ -235,7 +235,7 @@ struct StoredFleet {
   std::vector<IntentRow> open_intents;
   std::vector<ParameterRow> parameters;
   std::vector<TuningRow> tunings;
-  /// By id: those that never ended, and the newest.
+  /// Configurations by id: those that never ended, and the newest.
   std::vector<ConfigurationRow> configurations;
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;

@@ -1,6 +1,6 @@
-// What a row must satisfy to be kept. One rule for all: the store asks before it writes and when it
-// reads back, the thread in front of it sets rows aside by it, and the store of the tests refuses
-// by it. A row that passes can be read back as it was given.
+// The conditions that a row must satisfy to be kept. A single rule serves all. The store checks
+// before it writes and when it reads back. The thread in front of the store sets rows aside by it,
+// and the store of the tests refuses by it. A row that passes can be read back as it was given.
 #pragma once
 
 #include <string>
@@ -17,13 +17,13 @@ inline constexpr ConfigurationState kLastConfigurationState = ConfigurationState
 inline constexpr Severity kLastSeverity = Severity::kError;
 inline constexpr Parameter kLastParameter = static_cast<Parameter>(kParameterCount - 1);
 
-// Each of these: nullptr, or what is wrong, for people.
+// Each overload returns nullptr, or the fault in words for operators.
 const char* Flaw(const AxisKnowledge& knowledge);
 const char* Flaw(const FibreCarrierReading& carrier);
 const char* Flaw(const TuningRow& row);
 const char* Flaw(const Row& row);
 
-/// What the row is about: "vectors of serial 7", "alarm 12".
+/// The subject of the row: "vectors of serial 7", "alarm 12".
 std::string Describe(const Row& row);
 
 }  // namespace focalfleet

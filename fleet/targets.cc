@@ -29,7 +29,7 @@ std::string RangeText(const AxisGeometry& axis) {
   return Number(axis.min_deg) + ".." + Number(axis.max_deg) + " deg";
 }
 
-// Where a unit stands as far as anyone knows; folded where nobody does.
+// The known place of a unit; folded where no place is known.
 AxisAngles StandsAt(const Unit& unit, const UnitDrive& drive, const UnitKnowledge* known) {
   AxisAngles angles{(unit.theta().min_deg + unit.theta().max_deg) / 2, 180 - unit.phi().zero_deg};
   if (known == nullptr) return angles;
@@ -109,7 +109,7 @@ Solutions SolutionsFor(PointFp target, const Unit& unit, double free_theta_deg) 
                               ", phi " + RangeText(unit.phi()) + ")");
 }
 
-// What one target leaves open: poses in the order of preference, nearest first.
+// The poses that one target leaves open, in the order of preference, nearest first.
 using Choice = std::vector<Pose>;
 
 Choice NearestFirst(const Unit& unit, const UnitDrive& drive, const AxisAngles& from,
@@ -127,7 +127,8 @@ Choice NearestFirst(const Unit& unit, const UnitDrive& drive, const AxisAngles& 
   return choice;
 }
 
-// Where the nearest solution touches a neighbour's, another side of the elbow may not.
+// Chooses the sides: where the nearest solution touches a neighbour's, another side of the elbow
+// may not.
 class SideChooser {
  public:
   SideChooser(const Layout& layout, std::span<const UnitDrive> drives,
@@ -181,14 +182,14 @@ class SideChooser {
   std::vector<std::optional<SegmentFp>> arms_;
 };
 
-// A row that is good by itself.
+// A row without a fault of its own.
 struct Resolved {
   PositionerIndex unit;
   const TargetRow* row = nullptr;
 };
 
-// Two fibres wanted where their arms touch is the author's error, so it is told with the author's
-// lines: all such pairs.
+// Two fibres requested where their arms touch are the author's error, so all such pairs are named
+// with the author's lines.
 void FindCollisions(const Targets& targets, std::span<const Resolved> rows, const Layout& layout,
                     std::span<const UnitDrive> drives, std::span<const std::optional<Pose>> poses,
                     BadRows* bad) {
@@ -263,16 +264,17 @@ Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
 
 namespace {
 
-// Drawn configurations keep this much more than "clear", so that what a planner bounds or rounds on
-// its way in and out of them has room.
+// Drawn configurations keep this much more than "clear". A planner needs that room for what it
+// bounds or rounds on its way in and out of them. Units: mm.
 constexpr double kDrawGuardMm = 0.02;
-constexpr double kFoldedBendDeg = 120;
-constexpr int kTriesPerPlace = 64;
-constexpr int kTriesAmongFixed = 4096;
+constexpr double kFoldedBendDeg = 120;  // phi + phi_zero of disabled units, at least
+constexpr int kTriesPerPlace = 64;      // random poses of a unit before it takes an occupied place
+constexpr int kTriesAmongFixed = 4096;  // where only units that cannot move are in the way
+/// Units drawn anew, on average, before the draw is given up.
 constexpr std::size_t kEvictionsPerUnit = 50;
 
-// Sequential placing with local repair: a unit that finds no clear place in many tries takes one
-// that only movable neighbours stand in, and those are drawn anew.
+// Draws by sequential placing with local repair. A unit that finds no clear place in many tries
+// takes one where only movable neighbours stand, and those are drawn anew.
 class ConfigurationDrawer {
  public:
   ConfigurationDrawer(const Layout& layout, std::span<const UnitDrive> drives, Rng rng)
@@ -346,7 +348,7 @@ class ConfigurationDrawer {
     const AxisGeometry& phi = unit.phi();
     double low = std::max(phi.min_deg, kFoldedBendDeg - phi.zero_deg);
     const double high = std::min(phi.max_deg, 360 - kFoldedBendDeg - phi.zero_deg);
-    if (low > high) low = high;  // does not fold that far: as far as it goes
+    if (low > high) low = high;  // phi does not fold that far: as far as it goes
     Rng& rng = streams_[i];
     const double theta_deg = rng.Uniform(unit.theta().min_deg, unit.theta().max_deg);
     return InVectors(i, {theta_deg, rng.Uniform(low, high)});
@@ -375,7 +377,7 @@ class ConfigurationDrawer {
     return contact;
   }
 
-  // Places unit i; who must leave for it.
+  // Places unit i. Returns the units that must leave for it.
   Result<std::vector<std::uint32_t>> FindPlace(std::uint32_t i) {
     const bool enabled = layout_.unit({i}).enabled;
     std::optional<std::pair<Pose, std::vector<std::uint32_t>>> least;
@@ -396,7 +398,7 @@ class ConfigurationDrawer {
   std::span<const UnitDrive> drives_;
   std::vector<Rng> streams_;
   std::vector<Pose> poses_;
-  std::vector<std::optional<SegmentFp>> arms_;  // of units that are placed
+  std::vector<std::optional<SegmentFp>> arms_;  // of placed units; empty: not placed
   std::vector<std::uint8_t> fixed_;
 };
 
@@ -426,7 +428,7 @@ std::vector<Pose> FoldedConfiguration(const Layout& layout, std::span<const Unit
   for (std::uint32_t i = 0; i < layout.size(); ++i)
     if (layout.unit({i}).enabled) standing[i] = FoldedPose(layout.unit({i}), drives[i]);
   if (auto drawn = DrawConfiguration(layout, drives, standing, Rng(0))) return *drawn;
-  // Something disabled has no clear place at all: folded is the least that it can be in the way.
+  // A disabled unit has no clear place at all: folded it is least in the way.
   std::vector<Pose> poses;
   for (std::uint32_t i = 0; i < layout.size(); ++i)
     poses.push_back(FoldedPose(layout.unit({i}), drives[i]));

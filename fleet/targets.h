@@ -1,7 +1,7 @@
-// From what an astronomer asks for to where two axes shall stand. A target is a point of the focal
-// plane or two angles; a point has up to two solutions (elbow left or right) and theta any whole
-// turn in its range: the one nearest to where the unit stands is taken. Also draws random
-// configurations for load tests.
+// From the requests of an astronomer to the poses of two axes. A target is a point of the focal
+// plane or two angles. A point has up to two solutions (elbow left or right), and theta any whole
+// turn in its range. The solution nearest to where the unit stands is taken. Random configurations
+// for load tests are drawn here, too.
 #pragma once
 
 #include <optional>
@@ -33,28 +33,27 @@ struct TargetRow {
 struct Targets {
   std::string source;  // file name for messages
   std::vector<TargetRow> rows;
-  std::vector<std::string> ignored_columns = {};  // not known; a misspelt one would be among them
+  std::vector<std::string> ignored_columns = {};  // unknown; a misspelt one would be among them
 };
 
-/// The pose for each unit, none where no target names it. Shape: (n).
-/// Errors: kInvalid naming file, line and reason: unknown unit, named twice, out of patrol, out of
-/// range, two targets of enabled units that collide.
-/// Disabled units' targets are resolved too; the planner passes them over by name.
+/// The pose for each unit, empty where no target names it. Shape: (n). Disabled units' targets are
+/// resolved too; the planner skips them by name. Errors: kInvalid naming file, line and reason:
+/// unknown unit, named twice, out of patrol, out of range, two targets of enabled units that
+/// collide.
 Result<std::vector<std::optional<Pose>>> ResolveTargets(const Targets& targets,
                                                         const Layout& layout,
                                                         std::span<const UnitDrive> drives,
                                                         std::span<const UnitKnowledge> now);
 
-/// A random configuration in which all pairs (and obstacles) are clear: enabled units uniform over
-/// their patrol area; disabled units random with the arm folded back to phi + phi_zero >= 120
-/// degrees. Where `standing` is given, units that it fixes keep that pose and the others are drawn
-/// around them.
-/// Errors: kRefused where some unit finds no clear place.
+/// A random configuration in which all pairs (and obstacles) are clear. Enabled units are uniform
+/// over their patrol area; disabled units are random with the arm folded back to phi + phi_zero >=
+/// 120 degrees. Where `standing` is given, units that it fixes keep that pose and the others are
+/// drawn around them. Errors: kRefused where some unit finds no clear place.
 Result<std::vector<Pose>> DrawConfiguration(const Layout& layout, std::span<const UnitDrive> drives,
                                             std::span<const std::optional<Pose>> standing, Rng rng);
 
-/// Every unit folded back: theta in the middle of its range, phi as near to 180 degrees as it gets;
-/// disabled units as DrawConfiguration draws them.
+/// The configuration with every unit folded back: theta in the middle of its range, phi as near to
+/// 180 degrees as it gets. Disabled units are as DrawConfiguration draws them.
 std::vector<Pose> FoldedConfiguration(const Layout& layout, std::span<const UnitDrive> drives);
 
 }  // namespace focalfleet

@@ -7,7 +7,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kAssignmentsMax = 2e4;
+constexpr double kAssignmentsMax = 2e4;  // of one group; a larger group is not counted
 
 // All claims of one unit on one spot.
 struct Option {
@@ -63,7 +63,7 @@ Claimant ClaimantOf(std::span<const Claim> claims) {
   return claimant;
 }
 
-// Visits every assignment of a group; adds its weight to each answer that it holds.
+// Visits every assignment of a group and adds its weight to each answer that it includes.
 class Enumeration {
  public:
   explicit Enumeration(std::span<Claimant> group) : group_(group), choice_(group.size()) {}

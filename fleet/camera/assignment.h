@@ -1,8 +1,8 @@
-// Who has which spot, where more than one answer is possible. A claim says how likely a spot is a
-// unit's against the plainest story: the unit is dark and the spot is dust. Claims that share a
-// unit or a spot hang together; what hangs together is small (a unit, a spot; rarely three or
-// four), so every assignment of it is counted with its weight and the sums are the exact
-// probabilities of each answer. What is not nearly certain is left undecided.
+// The assignment of spots to units where more than one answer is possible. The claim of a unit on a
+// spot has odds against the plainest explanation: the unit is dark and the spot is dust. Claims
+// that share a unit or a spot form a group. Groups are small (a unit, a spot; rarely three or
+// four). Every assignment of a group is therefore counted with its weight, and the sums are the
+// exact probabilities of each answer. An answer that is not nearly certain is left undecided.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace focalfleet {
 
 inline constexpr std::uint32_t kNoSpot = UINT32_MAX;
 
-/// Why a unit would be there.
+/// The reason why a unit would be at a place.
 enum class PlaceKind : std::uint8_t {
   kExpected,     // where its move ends
   kBefore,       // where it was: neither axis moved
@@ -33,15 +33,14 @@ struct Decision {
   std::uint32_t unit = 0;
   std::uint32_t spot = kNoSpot;  // the likeliest answer; kNoSpot: none of them
   PlaceKind kind = PlaceKind::kExpected;
-  double doubt = 0;        // probability that the spot is another (or none)
-  double kind_doubt = 0;   // given the spot, that the reason is another
-  bool too_large = false;  // too many answers to be counted; spot and doubt mean nothing
+  double doubt = 0;        // probability that the right answer is another spot (or none)
+  double kind_doubt = 0;   // given the spot, probability that the reason is another
+  bool too_large = false;  // too many answers to count; spot and doubts mean nothing
 };
 
-/// One decision for each unit that claims, ascending by unit. No spot is given twice, unless one of
-/// the two answers has a doubt of at least a half.
-/// Cost: O(claims log claims) for pairs; at most 2e4 assignments are counted for what hangs
-/// together.
+/// The decisions, one for each unit that has a claim, ascending by unit. No spot is assigned twice,
+/// unless one of the two answers has a doubt of at least a half. Cost: O(claims log claims) for
+/// pairs; at most 2e4 assignments are counted for one group.
 std::vector<Decision> Assign(std::vector<Claim> claims);
 
 }  // namespace focalfleet

@@ -1,5 +1,5 @@
-// The one piece of linear algebra that a fit of a few hundred points asks for: A = L L^T of a
-// symmetric positive definite matrix. Cost: n^3 / 6 multiplications, 1 ms at n = 200.
+// The factor L of a symmetric positive definite matrix, A = L L^T. A fit of a few hundred points
+// needs no other linear algebra. Cost: n^3 / 6 multiplications, 1 ms at n = 200.
 #pragma once
 
 #include <cstddef>
@@ -11,15 +11,15 @@ namespace focalfleet {
 
 class Cholesky {
  public:
-  /// `matrix`: row-major, (n, n); only its lower half is read. Nothing where it is not positive
-  /// definite within rounding.
+  /// `matrix`: row-major, (n, n); only its lower half is read. Empty: it is not positive definite
+  /// within rounding.
   static std::optional<Cholesky> Of(std::vector<double> matrix, std::size_t n);
 
-  /// b becomes L^-1 b.
+  /// Replaces b by L^-1 b.
   void SolveLower(std::span<double> b) const;
-  /// b becomes L^-T b.
+  /// Replaces b by L^-T b.
   void SolveUpper(std::span<double> b) const;
-  /// b becomes A^-1 b.
+  /// Replaces b by A^-1 b.
   void Solve(std::span<double> b) const;
   /// Natural logarithm of det A.
   [[nodiscard]] double LogDeterminant() const;

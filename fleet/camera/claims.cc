@@ -9,9 +9,9 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kWideShare = 0.05;
-constexpr double kWideVariances = 16;
-constexpr double kFarVariances = 200;
+constexpr double kWideShare = 0.05;    // share of blind errors in the wide part
+constexpr double kWideVariances = 16;  // variance of the wide part, times that of the narrow one
+constexpr double kFarVariances = 200;  // variance of a rare large error, times the expected one
 
 double Density(double squared_sigmas, const CovarianceFp& covariance, double sigma_mm) {
   const double xx = covariance.xx + sigma_mm * sigma_mm;
@@ -32,10 +32,10 @@ CovarianceFp Round(double sigma_mm) { return {sigma_mm * sigma_mm, 0, sigma_mm *
 }  // namespace
 
 Odds Odds::Of(const Layout& layout, const IdentifyOptions& options) {
-  // A unit's share of the plate on a hexagonal lattice; within a factor for any other.
+  // The area of one unit on a hexagonal lattice; for other plates it is right within a factor.
   const double cell_mm2 = layout.pitch_mm() * layout.pitch_mm() * std::numbers::sqrt3 / 2;
-  const double dust = options.dust_share / cell_mm2;
-  return {dust, options.missing_share * dust};
+  const double dust = options.shares.dust / cell_mm2;
+  return {dust, options.shares.missing * dust};
 }
 
 void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const IdentifyOptions& options,
@@ -44,12 +44,12 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   const CovarianceFp as_before =
       Round(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
   const double as_reported =
-      1 - options.did_not_move_share - options.strayed_share - options.missing_share;
+      1 - options.shares.did_not_move - options.shares.strayed - options.shares.missing;
   if (expectation.lost) {
     if (expectation.expected_fp)
       places->push_back({PlaceKind::kExpected, *expectation.expected_fp,
                          CovarianceAt(unit, *expectation.commanded, expectation.blind),
-                         options.lost_says_right_share});
+                         options.shares.lost_report_right});
     return;
   }
   if (!expectation.moved) {
@@ -59,7 +59,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   }
   if (expectation.before_fp)
     places->push_back(
-        {PlaceKind::kBefore, *expectation.before_fp, as_before, options.did_not_move_share});
+        {PlaceKind::kBefore, *expectation.before_fp, as_before, options.shares.did_not_move});
   if (!expectation.expected_fp) return;
   const auto at = [&](const AxisAngles& angles) {
     return CovarianceAt(unit, angles, expectation.blind);
@@ -71,15 +71,16 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   if (!commanded || !expectation.before) return;
   const AxisAngles only_phi{expectation.before->theta_deg, commanded->phi_deg};
   const AxisAngles only_theta{commanded->theta_deg, expectation.before->phi_deg};
-  const double share = options.one_axis_stayed_share / 2;
+  const double share = options.shares.one_axis_stayed / 2;
   places->push_back({PlaceKind::kThetaStayed, FibreAt(unit, only_phi), at(only_phi), share});
   places->push_back({PlaceKind::kPhiStayed, FibreAt(unit, only_theta), at(only_theta), share});
 }
 
 namespace {
 
-// A spot where one axis or both may have stayed may also be where the unit strayed to, or a move
-// that ended far from its end by a rare large error: what a stay has to be likelier than.
+// Adds other explanations of a spot where one axis or both may have stayed. The unit may have
+// strayed there, or its move ended far from its end by a rare large error. A stay has to be
+// likelier than these.
 void AddOtherReasons(const ClaimSearch& search, std::uint32_t unit, std::size_t begin,
                      const std::vector<ExpectedPlace>& places, double dark_and_dust,
                      std::vector<Claim>* all) {
@@ -88,14 +89,14 @@ void AddOtherReasons(const ClaimSearch& search, std::uint32_t unit, std::size_t 
   for (std::size_t k = begin; k < end; ++k) {
     const std::uint32_t spot = (*all)[k].spot;
     if ((*all)[k].kind == PlaceKind::kExpected) continue;
-    double density = options.strayed_share / PatrolAreaMm2(search.request->layout->unit({unit}));
+    double density = options.shares.strayed / PatrolAreaMm2(search.request->layout->unit({unit}));
     for (const ExpectedPlace& place : places) {
       if (place.kind != PlaceKind::kExpected) continue;
       const CovarianceFp far{place.covariance.xx * kFarVariances,
                              place.covariance.xy * kFarVariances,
                              place.covariance.yy * kFarVariances};
       const double squared = SquaredSigmas(place.at_fp, search.spots->at_fp[spot], far, 0);
-      density += options.strayed_share * Density(squared, far, 0);
+      density += options.shares.strayed * Density(squared, far, 0);
     }
     all->push_back({unit, spot, PlaceKind::kAnywhere, std::log(density / dark_and_dust)});
   }
@@ -133,7 +134,7 @@ Claims FindClaims(const ClaimSearch& search) {
         claimed[spot] = 1;
       });
     }
-    // A lost unit says nothing of whether this is the field that was expected.
+    // A lost unit is no evidence for or against the expected field.
     if (places.empty() || search.request->expectations[i].lost) continue;
     AddOtherReasons(search, i, before, places, odds.dark_and_dust, &claims.all);
     ++claims.units;
@@ -146,7 +147,7 @@ Claims FindClaims(const ClaimSearch& search) {
 
 namespace {
 
-/// Some pose of the unit within its box puts the fibre there.
+/// True: some pose of the unit within its box puts the fibre there.
 bool IsWithin(const Unit& unit, PointFp at_fp, const UnitExpectation& expectation) {
   if (!expectation.within) return true;
   const auto inside = InReach(unit, at_fp, kStraySlackMm);
@@ -166,10 +167,10 @@ std::vector<Claim> FindStrays(const ClaimSearch& search, std::span<const std::ui
   for (const std::uint32_t i : units) {
     const Unit& unit = layout.unit({i});
     const UnitExpectation& expectation = search.request->expectations[i];
-    // A unit without a place is somewhere: where it says, or anywhere.
-    const double share = !expectation.lost          ? search.options->strayed_share
+    // A unit without a place is somewhere: where it reports, or anywhere.
+    const double share = !expectation.lost          ? search.options->shares.strayed
                          : !expectation.expected_fp ? 1
-                                                    : 1 - search.options->lost_says_right_share;
+                                                    : 1 - search.options->shares.lost_report_right;
     const double log_odds = std::log(share / PatrolAreaMm2(unit) / odds.dark_and_dust);
     const double reach_mm = PatrolOf(unit).max_mm + kStraySlackMm;
     search.grid->ForNear(unit.base_fp, reach_mm, [&](std::uint32_t spot, double) {
@@ -196,7 +197,7 @@ std::optional<PointFp> InReach(const Unit& unit, PointFp at_fp, double slack_mm)
 bool InPatrol(const Unit& unit, PointFp at_fp, double slack_mm) {
   const auto inside = InReach(unit, at_fp, slack_mm);
   if (!inside) return false;
-  // A theta that goes all round leaves no direction out.
+  // A theta that goes all round excludes no direction.
   if (unit.theta().max_deg - unit.theta().min_deg >= 360) return true;
   if (DistanceMm(unit.base_fp, at_fp) <= slack_mm) return true;
   return !AnglesFor(unit, *inside).empty();

@@ -8,7 +8,7 @@ namespace focalfleet {
 namespace {
 
 constexpr double kRadian = std::numbers::pi / 180;
-// Sides of the elbow nearer than this are one: the arm is stretched or folded.
+// Sides of the elbow nearer than this count as one: the arm is stretched or folded. Units: degrees.
 constexpr double kSameElbowDeg = 1;
 
 double Farther(const AxisAngles& a, const AxisAngles& b) {
@@ -95,7 +95,7 @@ PoseReading ReadPose(const Unit& unit, PointFp seen_fp, const AxisAngles& believ
     if (!same_elbow) reading.elbow_is_known = false;
     if (same_elbow && turned > 180) reading.turn_is_known = false;
   }
-  // Believed so badly that even the nearest may be another one.
+  // The belief is so poor that even the nearest pose may be the wrong one.
   if (Farther(*reading.nearest, believed) > travel_max_deg) {
     reading.elbow_is_known = all.size() == 1;
     reading.turn_is_known = all.size() == 1;

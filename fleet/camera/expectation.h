@@ -1,5 +1,6 @@
-// Where a unit's fibre is expected, and how well: what the identification of spots starts from. The
-// blind error of a move is an error of the two angles, so at the fibre it is an ellipse:
+// The place where a unit's fibre is expected, and how well it is known: the identification of spots
+// starts from it. The blind error of a move is an error of the two angles, so at the fibre it is an
+// ellipse:
 //
 //   S = st^2 jt jt' + sp^2 jp jp' + s0^2 1     jt, jp: fibre per radian of theta and phi,
 //                                              perpendicular to base-fibre and elbow-fibre
@@ -14,7 +15,7 @@
 
 namespace focalfleet {
 
-/// Standard deviations after a move that nobody has measured yet.
+/// Standard deviations after a move that no camera has measured yet.
 struct BlindError {
   double theta_sigma_deg = 0.22;  // with 8.25 mm arms: 54 um rms over the patrol area
   double phi_sigma_deg = 0.22;
@@ -35,31 +36,33 @@ struct AngleBox {
 };
 
 struct UnitExpectation {
-  /// By the current model, after the move. None: nobody can say (unknown, an interval).
+  /// The place after the move by the current model. Empty: not known (the knowledge is unknown or
+  /// an interval).
   std::optional<PointFp> expected_fp;
-  std::optional<AxisAngles> commanded;  // what it was told; swaps are found by it
+  std::optional<AxisAngles> commanded;  // the command that was sent; swaps are found by it
   std::optional<AxisAngles> before;     // where its axes were believed before
   std::optional<PointFp> before_fp;     // where it was seen before, or believed
   double before_sigma_mm = 0.02;        // of one coordinate of before_fp
-  /// Told to go elsewhere since before_fp. False: disabled, or without a target: it only shines.
+  /// The unit was commanded elsewhere since before_fp. False: disabled, or without a target; its
+  /// light is then a light of known place.
   bool moved = true;
   BlindError blind;
   double flux = 0;  // of its spot, as usual; 0: not known
-  /// Its place is not known. expected_fp is then what the unit says itself, against the store: a
-  /// hypothesis; none: it says nothing, or its word cannot be right.
+  /// The place of the unit is not known. expected_fp is then what the unit reports, against the
+  /// store: a hypothesis. Empty: it reports nothing, or its report cannot be right.
   bool lost = false;
-  /// Of a lost unit: its axes stand within these angles; none: anywhere in their ranges.
+  /// Angles of a lost unit: its axes stand within these. Empty: anywhere in their ranges.
   std::optional<AngleBox> within;
 };
 
-/// S at these angles.
+/// The covariance S at these angles.
 CovarianceFp CovarianceAt(const Unit& unit, const AxisAngles& angles, const BlindError& blind);
 
 /// Squared distance in units of the covariance with `sigma_mm` added to each coordinate.
 double SquaredSigmas(PointFp from, PointFp to, const CovarianceFp& covariance, double sigma_mm);
 double LargestVariance(const CovarianceFp& covariance);
 
-/// A move between two pairs of angles, seen or believed at `before_fp`.
+/// A unit that moves between two pairs of angles and was seen or believed at `before_fp`.
 UnitExpectation ExpectMove(const Unit& unit, const AxisAngles& before, const AxisAngles& commanded,
                            const BlindError& blind);
 /// A unit that stays where it is: disabled, or without a target.
@@ -69,15 +72,15 @@ UnitExpectation ExpectStill(PointFp seen_fp, double sigma_mm);
 UnitExpectation ExpectLost(const Unit& unit, const std::optional<AxisAngles>& says,
                            const std::optional<AngleBox>& within, const BlindError& blind);
 
-/// What x and y leave open. Theta's whole turn and the side of the elbow cannot be seen; they are
-/// taken from where the axes are believed, where that decides.
+/// The pose that x and y show, and what they leave open. Theta's whole turn and the side of the
+/// elbow cannot be seen. They are taken from where the axes are believed, where that decides.
 struct PoseReading {
-  std::optional<AxisAngles> nearest;  // to the believed angles; none: no angles reach the place
+  std::optional<AxisAngles> nearest;  // to the believed angles; empty: no angles reach the place
   bool elbow_is_known = false;        // the other side is farther than `travel_max_deg` away
-  bool turn_is_known = false;         // so is every other whole turn
+  bool turn_is_known = false;         // every other whole turn is that far away
 };
-/// `travel_max_deg`: how far an axis may be from where it is believed, of either axis. Swapped and
-/// strayed units have no believed angles: give 360 or more, and nothing is known.
+/// `travel_max_deg`: how far either axis may be from where it is believed. Swapped and strayed
+/// units have no believed angles: with 360 or more nothing counts as known.
 PoseReading ReadPose(const Unit& unit, PointFp seen_fp, const AxisAngles& believed,
                      double travel_max_deg);
 

@@ -11,10 +11,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kSearchFactor = 3;  // beyond the bounds, so that what is out of bounds has a name
-constexpr std::size_t kPairsMax = 60;
+constexpr double kSearchFactor = 3;    // beyond the bounds, so that a refusal can give the reason
+constexpr std::size_t kPairsMax = 60;  // of fiducials, tried one after the other
 constexpr std::size_t kCandidatesMax = 64;  // of one fiducial
-constexpr std::size_t kMatchesMin = 3;
+constexpr std::size_t kMatchesMin = 3;      // an alignment with fewer is none
 
 Complex At(PointFp p) { return {p.x_mm, p.y_mm}; }
 PointFp Point(Complex z) { return {z.real(), z.imag()}; }
@@ -25,14 +25,15 @@ struct Pair {
   double distance2 = 0;
 };
 
-// Wide pairs, each fiducial in few of them, so that one false light does not spoil all.
+// Wide pairs with each fiducial in few of them, so that one false light does not spoil all.
 std::vector<Pair> WidePairs(std::span<const Fiducial> fiducials) {
   std::vector<Pair> pairs;
   for (std::uint32_t a = 0; a < fiducials.size(); ++a) {
     Pair widest{a, a, -1};
     for (std::uint32_t b = 0; b < fiducials.size(); ++b) {
       const double d2 = std::norm(At(fiducials[a].at_fp) - At(fiducials[b].at_fp));
-      // Equal up to rounding on symmetric plates: the later one, so that partners differ.
+      // Distances may be equal up to rounding on symmetric plates: the later one is taken, so that
+      // partners differ.
       if (b != a && d2 >= widest.distance2) widest = {a, b, d2};
     }
     if (widest.distance2 > 0) pairs.push_back(widest);
@@ -99,7 +100,7 @@ class Search {
     }
   }
 
-  // What the distortion at the two ends may add to scale and rotation.
+  // The part of scale and rotation that the distortion at the two ends may add.
   [[nodiscard]] double Slack(const Pair& pair) const {
     return 2 * bounds_.distortion_mm_max / std::sqrt(pair.distance2);
   }
@@ -107,7 +108,8 @@ class Search {
   void Count(Complex gain, Complex shift) {
     Alignment trial{gain, shift, {}};
     for (std::uint32_t f = 0; f < fiducials_.size(); ++f) {
-      // Back to where the model would see it: the grid is there.
+      // The inverse leads back to where the model would see the fiducial: the grid is in that
+      // frame.
       const PointFp seen = Point((At(fiducials_[f].at_fp) - shift) / gain);
       double nearest2 = std::numeric_limits<double>::infinity();
       std::uint32_t spot = 0;

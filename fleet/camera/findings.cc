@@ -11,9 +11,9 @@
 namespace focalfleet {
 namespace {
 
-// Of units in service (sim/world/spread.h): the zero angles are off by 0.5 degrees, arms by 57 um;
-// once a camera has put a unit, what is left is scale (0.3 % of a move), periodic error and the
-// arms.
+// Errors of units in service (sim/world/spread.h): the zero angles are off by 0.5 degrees, arms by
+// 57 um. Once a camera has measured a unit, scale (0.3 % of a move), periodic error and the arms
+// remain.
 constexpr BlindError kNeverSeen{
     .theta_sigma_deg = 0.7, .phi_sigma_deg = 0.7, .place_sigma_mm = 0.06};
 constexpr BlindError kSeen{.theta_sigma_deg = 0.35, .phi_sigma_deg = 0.35, .place_sigma_mm = 0.04};
@@ -23,10 +23,10 @@ bool IsMeasured(const UnitKnowledge& knowledge) {
   return knowledge[0].witness == Witness::kMeasured && knowledge[1].witness == Witness::kMeasured;
 }
 
-/// By how much zero angles and arms may put a unit of unknown place outside of its interval.
+/// The angle by which zero angles and arms may put a unit of unknown place outside of its interval.
 constexpr double kBoxSlackDeg = 3;
 
-/// Where an interval of vectors is known, its angles; none: one axis at least is unknown.
+/// The angles of an interval of vectors. Empty: one axis at least is unknown.
 std::optional<AngleBox> BoxOf(const Unit& unit, const UnitDrive& drive,
                               const UnitKnowledge& knowledge) {
   AngleBox box;
@@ -39,7 +39,7 @@ std::optional<AngleBox> BoxOf(const Unit& unit, const UnitDrive& drive,
   return box;
 }
 
-/// An axis that stayed is believed where it was.
+/// The pose after the exposure: an axis that stayed is believed where it was.
 Pose BelievedPose(const UnitMeasurement& seen, const Pose& now, const std::optional<Pose>& before) {
   Pose pose = now;
   if (seen.status == MeasurementStatus::kDidNotMove && before)
@@ -74,7 +74,7 @@ std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believ
         unit,
         believed.before[n] ? AnglesOf(unit, believed.drives[n], *believed.before[n]) : commanded,
         commanded, believed.seen[n] != 0 ? kSeen : kNeverSeen);
-    // Its place is only what it reports: it does not tell the camera anything.
+    // The place of this unit is only reported: it is no light of known place for the camera.
     all[n].moved = true;
   }
   return all;

@@ -1,5 +1,5 @@
-// One exposure from spots to findings: where each unit of the fleet was expected, who is who
-// (identify.h), and at which vectors its axes stand by that.
+// The way of an exposure from spots to findings. First each unit of the fleet is expected
+// somewhere, then spots are assigned (identify.h), then its axes stand at certain vectors by that.
 #pragma once
 
 #include <optional>
@@ -12,7 +12,7 @@
 
 namespace focalfleet {
 
-/// What the camera looks at, and with which camera.
+/// The plate and its camera.
 struct CameraSite {
   CameraModel model;
   SensorLimits sensor;
@@ -20,29 +20,29 @@ struct CameraSite {
   IdentifyOptions options;
 };
 
-/// What was believed when the exposure was asked for. Shapes: (n), as the layout.
+/// The beliefs at the time when the exposure was requested. Shapes: (n), as the layout.
 struct Believed {
   std::span<const UnitKnowledge> now;
-  std::span<const std::optional<Pose>> before;    // before its last move; none: not known
-  std::span<const std::uint8_t> seen;             // non-zero: a camera has put it somewhere before
-  std::span<const std::optional<Pose>> reported;  // what units of unknown place say; or empty
+  std::span<const std::optional<Pose>> before;  // before its last move; empty: not known
+  std::span<const std::uint8_t> seen;           // non-zero: a camera has measured its place before
+  std::span<const std::optional<Pose>> reported;  // reports of units of unknown place; or empty
   std::span<const UnitDrive> drives;
 };
 
-/// Where each unit is looked for. A unit of unknown place is looked for where it says, and anywhere
-/// in its interval or, without one, in its patrol area.
+/// The place where each unit is looked for. A unit of unknown place is looked for where it reports,
+/// and anywhere in its interval or, without one, in its patrol area.
 std::vector<UnitExpectation> Expect(const Layout& layout, const Believed& believed);
 
-/// Where a unit of unknown place that is seen at `seen_fp` stands, in vectors. None: more than one
-/// whole turn or elbow side is possible, neither its interval nor its own word decides, or its arms
-/// do not reach there.
+/// The pose, in vectors, of a unit of unknown place that is seen at `seen_fp`. Empty: its arms do
+/// not reach there, or more than one whole turn or elbow side is possible and neither its interval
+/// nor its own report decides.
 std::optional<Pose> PoseOfLost(const Unit& unit, const UnitDrive& drive, PointFp seen_fp,
                                const UnitExpectation& expectation, double sigma_mm);
 
-/// One measurement a unit of the layout. A place is given where the status is certain and the arms
-/// reach it; of a unit of unknown place, where one pose alone is possible there (PoseOfLost). Cost:
-/// as Identify. Errors: kRefused: the exposure as a whole is not believed; the reason's name and
-/// its numbers.
+/// The measurements, one for each unit of the layout. A place is given where the status is certain
+/// and the arms reach it. A unit of unknown place gets one where a single pose is possible there
+/// (PoseOfLost). Cost: as Identify. Errors: kRefused: the exposure as a whole is not used; the
+/// reason's name and its numbers.
 Result<ExposureFindings> FindUnits(std::uint64_t id, const Layout& layout, const Believed& believed,
                                    const CameraSite& site, const Exposure& exposure);
 

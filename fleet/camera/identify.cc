@@ -13,9 +13,9 @@ namespace focalfleet {
 namespace {
 
 constexpr double kCellMm = 8;
-constexpr std::uint32_t kStrayFibresMin = 9;  // fewer say nothing about a whole field
+constexpr std::uint32_t kStrayFibresMin = 9;  // fewer are no evidence about a whole field
 
-// Who has which spot, in the order in which certainty falls.
+// Assigns spots in steps of falling certainty.
 class Matching {
  public:
   Matching(const IdentificationRequest& request, const IdentifyOptions& options,
@@ -65,8 +65,8 @@ class Matching {
     settled_[unit] = 1;
   }
 
-  // Candidates: told to move, and no spot near where the move ends. Their spots: all but those that
-  // are one unit's only one at the end of its move.
+  // Candidates are units that were commanded to move and have no spot near the end of the move.
+  // Their spots are all but those that are the only one at the end of a unit's move.
   void TakeSwaps() {
     std::vector<std::uint32_t> ends(settled_.size(), 0);
     for (const Claim& claim : claims_.all)
@@ -103,7 +103,7 @@ class Matching {
     for (const Decision& decision : decisions) {
       if (decision.spot != kNoSpot && decision.doubt <= options_.doubt_max) GiveExpected(decision);
     }
-    // What an undecided unit could have is nobody's else, either.
+    // A spot that an undecided unit could have is not assigned to another either.
     for (const Decision& decision : decisions)
       if (decision.doubt > options_.doubt_max) LeaveAmbiguous(decision.unit, decision.doubt);
     for (const Claim& claim : open) {
@@ -144,7 +144,7 @@ class Matching {
     std::vector<char> is_held(is_free_.size(), 0);
     for (const std::uint32_t spot : held_) is_held[spot] = 1;
     std::vector<Claim> strays = FindStrays(search_, open, is_candidate);
-    // A unit that could have a spot over which others are undecided is undecided, too.
+    // A unit is undecided if it could have a spot over which others are undecided.
     for (const Claim& claim : strays)
       if (is_held[claim.spot] != 0 && settled_[claim.unit] == 0) LeaveAmbiguous(claim.unit, 0.5);
     std::vector<Claim> left;
@@ -158,7 +158,7 @@ class Matching {
         continue;
       } else if (request_.expectations[decision.unit].lost &&
                  decision.doubt <= options_.doubt_max) {
-        // Nobody knew where it was, so it did not stray: it is found.
+        // The place of this unit was not known, so it did not stray: it is found.
         Give(decision.unit, decision.spot, MeasurementStatus::kMeasured, decision.doubt);
         measurements_[decision.unit].motion_is_known = false;
       } else {
@@ -174,7 +174,7 @@ class Matching {
       }
   }
 
-  // One other unit, not seen where it should be, was told to go where this one is.
+  // A single other unit, not seen where it should be, was commanded to where this one is.
   void Suspect(std::uint32_t unit, std::uint32_t spot) {
     int found = 0;
     for (const SwapTrace& trace : traces_) {
@@ -202,7 +202,7 @@ class Matching {
     }
   }
 
-  // For whoever looks into an ambiguity: one other unit near it that is undecided as well.
+  // Names a rival of an ambiguous unit: the single other unit near it that is undecided as well.
   void NameRivals() {
     for (std::uint32_t i = 0; i < measurements_.size(); ++i) {
       UnitMeasurement& measurement = measurements_[i];
@@ -228,7 +228,8 @@ class Matching {
       const bool wide = width_px > 0 && spot.fwhm_px > options_.blend_width_ratio * width_px;
       if (wide || (flux > 0 && spot.flux > options_.blend_flux_ratio * flux)) Blend(i);
     }
-    // A unit that is not seen, expected where another's spot is: that spot may be both.
+    // A unit is not seen and is expected where another's spot is: that spot may be the light of
+    // both.
     for (std::uint32_t i = 0; i < measurements_.size(); ++i) {
       if (measurements_[i].status != MeasurementStatus::kMissing ||
           !request_.expectations[i].expected_fp)
@@ -325,12 +326,12 @@ std::string Said(Orientation orientation, bool model_is_mirrored) {
   if (orientation.mirrored)
     return std::string("the picture is mirrored") +
            (orientation.quarters == 0 ? "" : " and turned");
-  // Undone on the plate; on a mirrored sensor the sense is the other.
+  // The turn is undone on the plate; on a mirrored sensor the sense is the other.
   const int quarters = model_is_mirrored ? orientation.quarters : 4 - orientation.quarters;
   return "the picture is turned by " + std::to_string(90 * quarters) + " degrees";
 }
 
-// The field that was expected, seen the wrong way round: fiducials and fibres fit when it is
+// Tests for the expected field seen the wrong way round: fiducials and fibres fit when it is
 // turned.
 std::optional<Refusal> Turned(const IdentificationRequest& request,
                               const IdentifyOptions& options) {

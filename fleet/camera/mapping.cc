@@ -13,7 +13,9 @@ using Complex = std::complex<double>;
 
 constexpr double kCellMm = 12;
 constexpr std::size_t kLightsMax = 400;  // the map's cost grows with the square
+/// A spot farther away is not the light of a unit that stands still.
 constexpr double kStillSigmas = 6;
+/// Fiducials beyond the terms of the polynomial that show the air by themselves.
 constexpr std::size_t kFreedomMin = 40;
 
 std::vector<PointFp> SeenBy(const CameraModel& camera, std::span<const Spot> spots,
@@ -56,14 +58,14 @@ class Mapping {
     const auto fit = FitPolynomial(lights_, map_options_);
     if (auto refusal = Rough(fit ? &*fit : nullptr))
       return tl::unexpected<Refusal>(std::move(*refusal));
-    Tell(*alignment, *fit);
+    DescribeCamera(*alignment, *fit);
     std::vector<KnownLight> used;
     for (std::size_t k = 0; k < lights_.size(); ++k)
       if (fit->used[k]) used.push_back(lights_[k]);
     const std::size_t fiducials = used.size();
     if (options_.use_still_units) AddStillUnits(*fit, &used);
-    // How exactly units stand still is known less well than the fiducials: these say how the air
-    // is, where they are enough.
+    // The places of units that stand still are known less well than those of fiducials. The
+    // fiducials alone show the air, where they are enough.
     const bool enough = fiducials >= MonomialCount(fit->degree) + kFreedomMin;
     result_.air =
         AirOf(std::span(used).first(enough ? fiducials : used.size()), fit->degree, map_options_);
@@ -99,7 +101,7 @@ class Mapping {
     return Refusal{RefusalReason::kRough, text};
   }
 
-  void Tell(const Alignment& alignment, const PolynomialFit& fit) {
+  void DescribeCamera(const Alignment& alignment, const PolynomialFit& fit) {
     result_.scale_change = std::abs(alignment.gain) - 1;
     result_.rotation_deg = std::arg(alignment.gain) * 180 / std::numbers::pi;
     result_.shift_fp = {alignment.shift.real(), alignment.shift.imag()};
@@ -111,9 +113,9 @@ class Mapping {
     result_.residual_mm = fit.residual_mm;
   }
 
-  // Units that were not told to move and were measured before are lights of known place, too, where
-  // exactly one spot is near. Fiducials stay whatever the units say; units that do not fit go.
-  // The degree stays: the process follows what is left of the distortion, too.
+  // Adds units that were not commanded to move and were measured before, where exactly one spot is
+  // near: they are lights of known place, too. Fiducials stay whatever the units show; units that
+  // do not fit are left out. The degree stays: the process follows the rest of the distortion, too.
   void AddStillUnits(const PolynomialFit& fit, std::vector<KnownLight>* used) {
     std::vector<std::uint32_t> still;
     for (std::uint32_t i = 0; i < request_.expectations.size(); ++i) {
@@ -121,12 +123,12 @@ class Mapping {
       if (!e.moved && e.before_fp && e.before_sigma_mm <= kWellKnownMm) still.push_back(i);
     }
     if (still.empty() || used->size() >= kLightsMax) return;
-    // By the fit without the air; its error is the residual.
+    // Places by the fit without the air; its error is the residual.
     std::vector<PointFp> at;
     at.reserve(seen_.size());
     for (const PointFp& p : seen_) at.push_back(PlateBy(fit, map_options_, p));
     const SpotGrid grid(at, kCellMm);
-    // Every k-th, so that they stand all over the plate.
+    // Every k-th unit is taken, so that they stand all over the plate.
     const std::size_t room = kLightsMax - used->size();
     const std::size_t stride = (still.size() + room - 1) / room;
     const std::size_t fiducials = used->size();
@@ -146,7 +148,7 @@ class Mapping {
     const double gate_mm = kStillSigmas * std::hypot(residual_mm, noise);
     int near = 0;
     std::uint32_t spot = 0;
-    // Twice the gate: a second spot so near could have pulled the first.
+    // Twice the gate: a second spot within that distance could have pulled the first.
     grid.ForNear(*unit.before_fp, 2 * gate_mm, [&](std::uint32_t s, double d2) {
       ++near;
       spot = d2 <= gate_mm * gate_mm ? s : kNoSpot;
@@ -178,6 +180,7 @@ class Mapping {
     return mapped;
   }
 
+  /// A unit whose place is less well known is no light of known place.
   static constexpr double kWellKnownMm = 0.03;
 
   const IdentificationRequest& request_;

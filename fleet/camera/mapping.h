@@ -1,5 +1,5 @@
-// First half of Identify: from pixels to the plate, or a refusal. Knows fiducials and units that
-// stand still, not yet who is who.
+// First half of Identify: from pixels to the plate, or a refusal. The map uses fiducials and units
+// that stand still, before any spot is assigned.
 #pragma once
 
 #include "fleet/camera/identify.h"
@@ -12,13 +12,13 @@ struct MappedSpots {
   std::vector<bool> is_fiducial;
 };
 
-/// Quarters of a turn, then mirrored or not: how the picture is turned before the model is applied.
+/// The turn of the picture before the model is applied: quarters of a turn, then mirrored or not.
 struct Orientation {
   int quarters = 0;
   bool mirrored = false;
 };
 
-/// Fills the fields of `result` that tell about the camera.
+/// Maps every spot and fills the fields of `result` that describe the camera.
 tl::expected<MappedSpots, Refusal> MapSpots(const IdentificationRequest& request,
                                             const IdentifyOptions& options, Orientation orientation,
                                             Identification* result);

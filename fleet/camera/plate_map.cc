@@ -12,9 +12,9 @@ namespace focalfleet {
 namespace {
 
 constexpr std::size_t kTermsMax = MonomialCount(kDistortionDegreeMax);
-constexpr std::size_t kLightsPerTerm = 3;
-constexpr double kNodesMax = 2500;
-constexpr double kNoiseMinMm = 1e-5;
+constexpr std::size_t kLightsPerTerm = 3;  // the degree falls where there are fewer
+constexpr double kNodesMax = 2500;         // of the grid, about; the step grows beyond
+constexpr double kNoiseMinMm = 1e-5;       // keeps the matrix positive definite
 
 using Terms = std::array<double, kTermsMax>;
 
@@ -62,7 +62,7 @@ bool SolveOnce(std::span<const KnownLight> lights, double radius_mm, PolynomialF
   return true;
 }
 
-// Median distance over those used: one wild light does not move it.
+// A sigma from the median distance of the lights in use: one wild light does not change it.
 double RobustSigma(std::vector<double> distances) {
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
@@ -75,7 +75,8 @@ int DegreeFor(std::size_t lights, int degree_max) {
   return degree;
 }
 
-// One pass: puts aside what is beyond the gate, takes back what is not. True: nothing changed.
+// Makes one pass: puts aside lights beyond the gate and takes back those within. True: nothing
+// changed.
 bool Sort(std::span<const KnownLight> lights, const PlateMapOptions& options, PolynomialFit* fit) {
   std::vector<double> distance(lights.size());
   std::vector<double> of_used;
@@ -111,7 +112,7 @@ std::optional<PolynomialFit> FitPolynomial(std::span<const KnownLight> lights,
   fit.used.assign(lights.size(), true);
   fit.used_count = lights.size();
   const int top = DegreeFor(lights.size(), std::min(options.degree, kDistortionDegreeMax));
-  // Low degrees first: what is far off goes before it can bend a high one.
+  // Low degrees come first: a light that is far off is put aside before it can bend a high degree.
   for (fit.degree = 1; fit.degree <= top; ++fit.degree) {
     for (int pass = 0; pass < 6; ++pass) {
       if (fit.used_count < 3 || fit.used_count < MonomialCount(fit.degree)) return std::nullopt;
@@ -129,7 +130,7 @@ PointFp PlateBy(const PolynomialFit& fit, const PlateMapOptions& options, PointF
   return {seen_fp.x_mm + p.x_mm, seen_fp.y_mm + p.y_mm};
 }
 
-// C and F'C^-1F factored, and what is needed at each place.
+// The factored matrices C and F'C^-1F, and what is needed at each place.
 class PlateSolution {
  public:
   PlateSolution(std::span<const KnownLight> lights, int degree, const AirLaw& air,
@@ -189,7 +190,7 @@ class PlateSolution {
             Dot(scratch_.data(), y_.weights.data(), n_)};
   }
 
-  /// Of the air's part and the polynomial together. Units: mm^2, of one coordinate.
+  /// Variance of the air's part and the polynomial together. Units: mm^2, of one coordinate.
   [[nodiscard]] double VarianceAt(PointFp p) {
     SetCovariances(p);
     of_lights_->SolveLower(scratch_);
@@ -301,10 +302,10 @@ class AirSearch {
     return *known_[key];
   }
 
-  static constexpr std::size_t kLightsMax = 150;
+  static constexpr std::size_t kLightsMax = 150;  // of one factorisation
   static constexpr int kStepsMax = 6;
   static constexpr std::size_t kSide = 2 * kStepsMax + 1;
-  static constexpr double kFactor = 1.5;
+  static constexpr double kFactor = 1.5;       // from one law of the lattice to the next
   static constexpr double kLengthPrior = 0.7;  // standard deviations of the logarithms
   static constexpr double kSigmaPrior = 1;
 
@@ -342,7 +343,7 @@ std::optional<PlateMap> PlateMap::Solve(std::span<const KnownLight> lights, int 
   const double width = high.x_mm + margin - map.low_.x_mm;
   const double height = high.y_mm + margin - map.low_.y_mm;
   map.step_mm_ = std::max(air.length_mm / 3, std::sqrt(width * height / kNodesMax));
-  // Odd counts: every node without a variance of its own lies between two that have one.
+  // The counts are odd: every node without a variance of its own lies between two that have one.
   map.columns_ = static_cast<std::size_t>(width / map.step_mm_ / 2) * 2 + 3;
   map.rows_ = static_cast<std::size_t>(height / map.step_mm_ / 2) * 2 + 3;
   map.nodes_.resize(map.columns_ * map.rows_);

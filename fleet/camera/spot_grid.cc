@@ -13,7 +13,7 @@ SpotGrid::SpotGrid(std::span<const PointFp> points, double cell_mm) : cell_mm_(c
     low_ = {std::min(low_.x_mm, p.x_mm), std::min(low_.y_mm, p.y_mm)};
     high = {std::max(high.x_mm, p.x_mm), std::max(high.y_mm, p.y_mm)};
   }
-  // One far point must not cost cells without end.
+  // A single far point must not cost an unlimited number of cells.
   const double side_max = 2 * std::sqrt(static_cast<double>(points.size())) + 2;
   cell_mm_ =
       std::max({cell_mm_, (high.x_mm - low_.x_mm) / side_max, (high.y_mm - low_.y_mm) / side_max});
@@ -38,7 +38,7 @@ SpotGrid::SpotGrid(std::span<const PointFp> points, double cell_mm) : cell_mm_(c
 }
 
 std::size_t SpotGrid::Cell(double offset_mm, std::size_t count) const {
-  // Compared before the cast: a place far off the plate fits no integer.
+  // The comparison comes before the cast: a place far off the plate fits no integer.
   const double cells = offset_mm / cell_mm_;
   if (!(cells > 0)) return 0;
   if (cells >= static_cast<double>(count)) return count - 1;

@@ -1,4 +1,4 @@
-// Points of the plate sorted into square cells: whoever is near a place is found in a few cells.
+// Points of the plate sorted into square cells: the points near a place are found in a few cells.
 #pragma once
 
 #include <cstddef>
@@ -12,7 +12,7 @@ namespace focalfleet {
 
 class SpotGrid {
  public:
-  /// Points that are not finite must not be there. Cost: O(n); cells are bounded by the count.
+  /// Pre: all points are finite. Cost: O(n); the number of cells is bounded by the count.
   SpotGrid(std::span<const PointFp> points, double cell_mm);
 
   /// Calls `visit(index, squared distance)` for every point within the radius.
@@ -40,9 +40,9 @@ class SpotGrid {
   double cell_mm_ = 1;
   std::size_t columns_ = 1;
   std::size_t rows_ = 1;
-  std::vector<std::uint32_t> begin_;   // of each cell in member_, and the end
+  std::vector<std::uint32_t> begin_;   // first entry of each cell in member_, and the end
   std::vector<std::uint32_t> member_;  // indices of points, cell by cell
-  std::vector<PointFp> sorted_;        // the points in that order
+  std::vector<PointFp> sorted_;        // the points in the order of member_
 };
 
 }  // namespace focalfleet

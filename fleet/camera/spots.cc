@@ -13,7 +13,7 @@ namespace {
 
 std::string FaultOf(const Spot& spot, const SensorLimits& sensor) {
   if (!std::isfinite(spot.x_px) || !std::isfinite(spot.y_px)) return "its place is not finite";
-  // Half a pixel around the first and the last centre is still the sensor.
+  // The sensor extends half a pixel beyond the first and the last centre.
   if (spot.x_px < -0.5 || spot.y_px < -0.5 || spot.x_px > sensor.columns_px - 0.5 ||
       spot.y_px > sensor.rows_px - 0.5)
     return "it is off the sensor";
@@ -79,8 +79,8 @@ const char* Name(RefusalReason reason) {
 }
 
 std::uint64_t ContentOf(const Exposure& exposure) {
-  // A sum forgets the order; each term is mixed, so that coordinates of two spots cannot change
-  // places unseen.
+  // A sum does not depend on the order. Each term is mixed, so that coordinates of two spots cannot
+  // be exchanged without a change of the sum.
   std::uint64_t sum = exposure.spots.size();
   for (const Spot& spot : exposure.spots) {
     const std::uint64_t x = Mixed(std::bit_cast<std::uint64_t>(spot.x_px) + 0x9e3779b97f4a7c15u);

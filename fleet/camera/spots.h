@@ -1,8 +1,9 @@
-// What a fibre-view camera delivers: spots of light, nameless, with the exposure they belong to.
-// It comes from outside (a file, a topic, a simulation) and is never trusted: first it is checked
-// as a list of numbers (CheckSpots), then as an exposure that may speak about the present state of
-// the fleet (Admit), then its fiducials and fibres have to be where they can be (identify.h). Each
-// of these refuses the exposure as a whole, with the reason; nothing of it is used then.
+// The delivery of a fibre-view camera: spots of light, unidentified, with the exposure that they
+// belong to. An exposure comes from outside (a file, a topic, a simulation) and is never trusted.
+// First it is checked as a list of numbers (CheckSpots). Then it is checked as an exposure that may
+// describe the present state of the fleet (Admit). Then its fiducials and fibres have to be where
+// they can be (identify.h). Each check refuses the exposure as a whole, with the reason; nothing of
+// it is used then.
 //
 // Frames: pixels of the sensor, the first pixel's centre at 0, 0.
 #pragma once
@@ -26,7 +27,7 @@ struct Spot {
 };
 
 struct Exposure {
-  std::string id;                  // the camera's name for it; never used twice
+  std::string id;                  // the camera's name for it; used once only
   std::int64_t taken_unix_ns = 0;  // the shutter opens; nanoseconds since 1970 UTC
   std::vector<Spot> spots;
 };
@@ -36,13 +37,13 @@ struct SensorLimits {
   double rows_px = 0;
 };
 
-/// Errors: kInvalid with the spot's id: a number that is not finite, a place off the sensor, flux
-/// not above 0, a negative width, two spots with one id or at one place, too many. Cost: O(n log
-/// n).
+/// All spots are possible ones. Errors: kInvalid with the spot's id: a number that is not finite, a
+/// place off the sensor, flux not above 0, a negative width, two spots with one id or at one place,
+/// too many. Cost: O(n log n).
 Status CheckSpots(const Exposure& exposure, const SensorLimits& sensor);
 
 enum class RefusalReason : std::uint8_t {
-  kDoubled,       // it was there before, by its id or by its content
+  kDoubled,       // the exposure was there before, by its id or by its content
   kEarly,         // taken before the motion had ended
   kLate,          // too old
   kFuture,        // from a clock that is ahead
@@ -58,13 +59,13 @@ enum class RefusalReason : std::uint8_t {
 };
 const char* Name(RefusalReason reason);
 
-/// Why an exposure as a whole is not used.
+/// The reason why an exposure as a whole is not used.
 struct Refusal {
   RefusalReason reason = RefusalReason::kCount;
-  std::string text;  // one line for people, with the numbers
+  std::string text;  // one line for operators, with the numbers
 };
 
-/// The same for any order of the spots; ids of spots and the exposure's name do not count.
+/// A digest of the spots, equal for any order; ids of spots and the exposure's name do not count.
 std::uint64_t ContentOf(const Exposure& exposure);
 
 struct SeenExposure {
@@ -79,8 +80,8 @@ struct AdmissionRules {
   std::int64_t clock_slack_ns = 50'000'000;  // how far camera and host may differ
 };
 
-/// Nothing: the exposure may speak about the state after the motion. `seen`: earlier exposures,
-/// those that were refused too. Cost: O(n + seen).
+/// Empty: the exposure may describe the state after the motion. `seen`: earlier exposures, refused
+/// ones included. Cost: O(n + seen).
 std::optional<Refusal> Admit(const Exposure& exposure, const AdmissionRules& rules,
                              std::span<const SeenExposure> seen);
 

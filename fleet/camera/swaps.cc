@@ -11,10 +11,10 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double kRadian = std::numbers::pi / 180;
-constexpr std::size_t kRingMax = 8;
-constexpr double kCommandCellMm = 1;
+constexpr std::size_t kRingMax = 8;   // units of a ring, at most
+constexpr double kCommandCellMm = 1;  // of the grid of commands
 
-// Where the reference arm would be with a command, zero angle of phi included.
+// The place of the reference arm with a command, zero angle of phi included.
 PointFp AtReference(const Unit& reference, const AxisAngles& angles) {
   const double t = angles.theta_deg * kRadian;
   const double p = t + (angles.phi_deg + reference.phi().zero_deg) * kRadian;
@@ -75,7 +75,7 @@ class Finder {
     for (std::size_t k = 1; k < begin_.size(); ++k) begin_[k] += begin_[k - 1];
   }
 
-  // No place of this unit has a wider gate.
+  // The widest gate of any place of this unit.
   [[nodiscard]] double GateMm(std::uint32_t unit) const {
     const Unit& arms = layout_.unit({unit});
     const double reach_mm = arms.theta().arm_mm + arms.phi().arm_mm;
@@ -135,7 +135,8 @@ class Finder {
     }
   }
 
-  // Three units and more, where each has one other that it can have followed.
+  // Finds rings of three units and more, where each has one other whose command it can have carried
+  // out.
   void FindRings() {
     std::vector<char> done(layout_.size(), 0);
     for (const SwapRing& ring : findings_.rings)
@@ -163,13 +164,13 @@ class Finder {
     return std::adjacent_find(spots.begin(), spots.end()) == spots.end();
   }
 
-  static constexpr double kMapSigmaMm = 0.02;
+  static constexpr double kMapSigmaMm = 0.02;  // of the map, added to every gate
 
   const SwapSearch& search_;
   const Layout& layout_;
   const Unit& reference_;
   SwapFindings findings_;
-  std::vector<std::size_t> begin_;  // of each unit's traces
+  std::vector<std::size_t> begin_;  // first of each unit's traces
 };
 
 }  // namespace

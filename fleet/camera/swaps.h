@@ -1,8 +1,8 @@
 // Units that carried out each other's commands: node or identity exchanged in a table, plugs
 // exchanged on the plate. The fibre over A's base is then where A's own arms lead with the angles
-// commanded to B. One such coincidence is worth little (a spot anywhere in a patrol area of 850
-// mm^2 meets a gate of 0.1 mm^2 of one of a hundred other commands once in a hundred times); two
-// that close a ring, A as B and B as A, are worth its square.
+// commanded to B. A single such coincidence is weak evidence. A hundred other commands have gates
+// of 0.1 mm^2 in a patrol area of 850 mm^2, so a spot anywhere meets one of them once in a hundred
+// times. Two that close a ring, A as B and B as A, are evidence of its square.
 //
 // Angles are absolute, so an exchange that stands since earlier moves is found in each of them. Two
 // units commanded to the same angles are where they should be, exchanged or not: that cannot be
@@ -26,8 +26,8 @@ struct SwapTrace {
 
 struct SwapRing {
   std::vector<SwapTrace> members;  // two or more; each carried out the next one's command
-  /// More than one ring fits, or each member's spot is also where it would be for a reason of its
-  /// own: then nothing is decided.
+  /// More than one ring fits, or each member's spot also has an explanation of its own: nothing is
+  /// decided then.
   bool ambiguous = false;
 };
 
@@ -40,14 +40,15 @@ struct SwapSearch {
   const IdentificationRequest* request = nullptr;
   const IdentifyOptions* options = nullptr;
   const MappedSpots* spots = nullptr;
-  const SpotGrid* grid = nullptr;        // over spots->at_fp
-  std::span<const std::uint32_t> units;  // not seen where they should be, with a command
-  std::span<const char> is_free;         // Shape: as the spots
-  std::span<const Claim> claims;         // sorted by unit: reasons of its own
+  const SpotGrid* grid = nullptr;  // over spots->at_fp
+  /// units with a command that are not seen where they should be
+  std::span<const std::uint32_t> units;
+  std::span<const char> is_free;  // Shape: as the spots
+  std::span<const Claim> claims;  // sorted by unit: the units' other explanations
 };
 
-/// Cost: O(units * spots in reach); commands are looked up in a grid of places at one reference
-/// arm, widened by what arms and zero angles differ.
+/// All rings of exchanged commands. Cost: O(units * spots in reach). Commands are looked up in a
+/// grid of places at one reference arm, widened by what arms and zero angles differ.
 SwapFindings FindSwaps(const SwapSearch& search);
 
 }  // namespace focalfleet

@@ -8,10 +8,10 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::size_t kTextMax = 400;  // of one row; a file's name and a cell may be long
-constexpr std::size_t kKindMax = 80;
-constexpr std::size_t kKindsCounted = 16;
-constexpr std::size_t kKindsReported = 5;
+constexpr std::size_t kTextMax = 400;      // of one row; a file's name and a cell may be long
+constexpr std::size_t kKindMax = 80;       // bytes of a kind
+constexpr std::size_t kKindsCounted = 16;  // further kinds are counted as one
+constexpr std::size_t kKindsReported = 5;  // the commonest; the rest is counted as one
 constexpr const char* kOther = "other reasons";
 
 // The text as a single line, not cut within a character of UTF-8.
@@ -47,13 +47,13 @@ Status BadRows::Check() const {
   return Fail(ErrorCode::kInvalid, std::move(text));
 }
 
-// The commonest first.
+// The kinds of fault with their counts, the commonest first.
 std::string BadRows::Totals() const {
   std::vector<std::pair<std::string, std::size_t>> kinds(of_kind_.begin(), of_kind_.end());
   std::stable_sort(kinds.begin(), kinds.end(),
                    [](const auto& a, const auto& b) { return a.second > b.second; });
   std::string totals;
-  std::size_t others = 0;  // some kinds, or what had no room among them
+  std::size_t others = 0;  // some kinds, or faults beyond the list of kinds
   for (std::size_t k = 0; k < kinds.size(); ++k) {
     if (k >= kKindsReported || kinds[k].first == kOther) {
       others += kinds[k].second;

@@ -1,13 +1,12 @@
-// Everything that is wrong with the rows of a table, so that one message mends the file. The first
-// limits::kBadRowsTold rows are told in full, one a line; the others are counted by what is wrong
-// with them:
+// The faults of all rows of a table, so that one message is enough to correct the file. The first
+// limits::kBadRowsReported rows are listed in full, one a line; the others are counted by kind of
+// fault:
 //
 //   t.csv:11: unit 10: x_mm 52.3, y_mm 0.1 is 45 mm from its base (out of patrol, ...)
 //     t.csv:21: unit 20: unknown unit, the layout has none such
 //     and 3387 more rows; all 3389: out of patrol (3377), unknown unit (12)
 //
-// The text stays below some 10 kB whatever is in the file, and no cell puts a line of its own into
-// it.
+// The text stays below some 10 kB whatever is in the file, and no cell adds a line of its own.
 #pragma once
 
 #include <cstddef>
@@ -22,7 +21,7 @@ namespace focalfleet {
 
 class BadRows {
  public:
-  /// `text` says where and why; rows with the same `kind` are counted together.
+  /// Adds a row. `text` is the place and the fault; rows with the same `kind` are counted together.
   void Add(std::string_view text, std::string_view kind);
   [[nodiscard]] bool empty() const { return count_ == 0; }
   /// Errors: kInvalid where a row was added.
@@ -36,7 +35,7 @@ class BadRows {
   std::map<std::string, std::size_t> of_kind_;
 };
 
-/// A message with several lines as a log tells it: the first, and how many follow.
+/// The first line of a message for a log, and how many lines follow.
 std::string FirstRow(std::string_view text);
 
 }  // namespace focalfleet

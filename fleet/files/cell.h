@@ -1,4 +1,4 @@
-// A cell of a table: what its text means, and how it is shown to people.
+// A cell of a table: the meaning of its text, and its form in messages.
 #pragma once
 
 #include <cstdint>
@@ -8,10 +8,10 @@
 
 namespace focalfleet {
 
-/// Without blanks and tabs around it.
+/// The text without blanks and tabs around it.
 std::string_view Trimmed(std::string_view text);
 
-/// A cell that may hold anything, as a person can read it: quoted, its first 40 bytes.
+/// The first 40 bytes of a cell with any content, quoted, in readable form.
 std::string Quoted(std::string_view cell);
 
 // Pre: the cell is Trimmed.
@@ -20,7 +20,7 @@ std::optional<double> ParseNumber(std::string_view cell);  // may be infinite
 std::optional<bool> ParseFlagWord(std::string_view cell);  // true, false, T, F; any capitals
 
 enum class CellKind : std::uint8_t { kMissing, kNumber, kFlag, kWord };
-/// The kind of a cell in a column that nobody knows; `inf` is no number here.
+/// The kind of a cell in an unknown column; `inf` is no number here.
 CellKind KindOf(std::string_view cell);
 
 }  // namespace focalfleet

@@ -26,7 +26,7 @@ bool IsUnnamed(std::string_view name) {
 
 }  // namespace
 
-// One pass over the text, one character at a time; the state is the cell being read.
+// Parses the text in one pass, one character at a time; the state is the cell being read.
 class CsvParser {
  public:
   CsvParser(std::string_view text, std::string file) : text_(text) {
@@ -66,7 +66,7 @@ class CsvParser {
     return {};
   }
 
-  // Up to and including one newline outside quotes. The text is known to end in one.
+  // Parses up to and including one newline outside quotes. The text is known to end in one.
   Status ParseLine() {
     const int line = line_;
     const std::string_view rest = RestOfLine();
@@ -117,7 +117,7 @@ class CsvParser {
     return by_blanks_ ? text_[at_] == ' ' || text_[at_] == '\t' : text_[at_] == ',';
   }
 
-  // Steps over what separates cells; false at the end of the line, which it steps over too.
+  // Steps over what separates cells. False: the end of the line, which it steps over too.
   bool NextCellInLine() {
     if (by_blanks_) SkipBlanks();
     if (AtLineEnd()) {

@@ -1,15 +1,15 @@
 // A CSV table as the project's files use it: one header line, then one row a line. Lines that start
-// with `#` are comments, lines of nothing but commas and blanks are passed over; a cell may be
-// quoted ("" is a quote within); lines may end in CRLF; an empty cell or `nan` is a missing value.
-// ECSV of astropy reads too, also with its usual blanks instead of commas.
+// with `#` are comments. Lines of nothing but commas and blanks are skipped. A cell may be quoted
+// ("" is a quote within); lines may end in CRLF; an empty cell or `nan` is a missing value. ECSV of
+// astropy reads too, also with its usual blanks instead of commas.
 //
-// Columns without a name (the index of pandas, the last commas of spreadsheets) are passed over, as
-// are columns that a reader does not know.
+// Columns without a name (the index of pandas, the last commas of spreadsheets) are skipped, as are
+// columns that a reader does not know.
 //
 // Parsing is total: any bytes give a table or an Error that names file, line, column and reason. A
-// file that was cut short is refused where that shows: a row with too few cells, an open quote, a
-// last line without its newline. (A file cut exactly between two lines cannot be told from a whole
-// one.)
+// file that was cut short is refused where that shows. The signs are a row with too few cells, an
+// open quote, and a last line without its newline. (A file cut exactly between two lines cannot be
+// distinguished from a whole one.)
 //
 // Cost: linear in the text; a cell by its column's name O(1).
 #pragma once
@@ -33,16 +33,16 @@ namespace focalfleet {
 
 class CsvTable {
  public:
-  /// Errors: kInvalid: empty, not text, no header, a column twice, more columns or a longer row
-  /// than limits.h has, rows of another width, cut short.
+  /// The table of the text. Errors: kInvalid: empty, not text, no header, a column twice, more
+  /// columns or a longer row than limits.h has, rows of another width, cut short.
   static Result<CsvTable> Parse(std::string_view text, std::string file);
 
   [[nodiscard]] const std::string& file() const { return file_; }
-  /// As they stand in the header.
+  /// The names as they stand in the header.
   [[nodiscard]] const std::vector<std::string>& columns() const { return columns_; }
   /// A column as messages call it; "column 1 (no name)" where it has none.
   [[nodiscard]] std::string Shown(std::size_t column) const;
-  /// Not where it has none, or the one that pandas gives to a column without (`Unnamed: 0`).
+  /// False where it has no name, or the one that pandas gives to a column without (`Unnamed: 0`).
   [[nodiscard]] bool HasName(std::size_t column) const;
   [[nodiscard]] std::optional<std::size_t> Find(std::string_view column) const;
   [[nodiscard]] std::size_t size() const { return lines_.size(); }  // rows
@@ -52,15 +52,16 @@ class CsvTable {
     return cells_[row * columns_.size() + column];
   }
 
-  /// Errors: kInvalid, names the columns that are missing and those that are there.
+  /// All columns are there. Errors: kInvalid, names the columns that are missing and those that are
+  /// there.
   [[nodiscard]] Status Require(std::initializer_list<std::string_view> columns) const;
-  /// Columns that are not among `known`, for telling that they were passed over.
+  /// Columns that are not among `known`, for a message that they were skipped.
   [[nodiscard]] std::vector<std::string> Others(
       std::initializer_list<std::string_view> known) const;
   [[nodiscard]] Error ErrorAt(std::size_t row, std::string_view reason) const;
 
   /// Calls `read(CsvRow&)` for every row, in their order; a reader rejects what it does not take
-  /// and keeps nothing of it. Errors: kInvalid tells all rows that were rejected.
+  /// and keeps nothing of it. Errors: kInvalid, lists all rows that were rejected.
   template <class Read>
   [[nodiscard]] Status ReadRows(Read read) const;
 
@@ -86,8 +87,8 @@ struct IntegerBounds {
   std::int64_t high = 0;
 };
 
-/// One row's cells as values. The first cell that is wrong is remembered and the values read after
-/// it mean nothing, so a reader takes all that it needs and looks once whether there is an error().
+/// The cells of one row as values. The first wrong cell is remembered, and the values read after it
+/// mean nothing. A reader therefore takes all that it needs and checks error() once.
 class CsvRow {
  public:
   CsvRow(const CsvTable& table, std::size_t row) : table_(table), row_(row) {}
@@ -100,7 +101,7 @@ class CsvRow {
   /// A cell of a 0/1 column: 1 and 0, or as other writers have them: true and false, T and F, in
   /// capitals or not.
   std::optional<bool> FlagIfAny(std::string_view column);
-  /// A cell of a column that nobody knows: numbers, and flags as 1 and 0.
+  /// A cell of an unknown column: numbers, and flags as 1 and 0.
   std::optional<double> NumberOrFlagIfAny(std::string_view column);
   /// The cell as it stands, without the blanks around it; empty where there is none.
   [[nodiscard]] std::string Text(std::string_view column) const;
@@ -114,7 +115,7 @@ class CsvRow {
   [[nodiscard]] const std::string& kind() const { return kind_; }  // of the error
 
  private:
-  // Without the blanks around it; empty where the column is not there.
+  // The cell without the blanks around it; empty where the column is not there.
   [[nodiscard]] std::string_view Cell(std::string_view column) const;
 
   const CsvTable& table_;

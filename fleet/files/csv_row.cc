@@ -11,7 +11,7 @@ namespace {
 
 constexpr const char* kMissing = "the value is missing (empty or nan)";
 
-/// A reason without the cell that it begins with: what rows with other values share.
+/// A reason without the cell that it begins with: the part that rows with other values share.
 std::string_view WithoutCell(std::string_view reason, std::string_view cell) {
   for (const std::string& shown : {Quoted(cell), std::string(cell)})
     if (!shown.empty() && reason.starts_with(shown + " ")) return reason.substr(shown.size() + 1);
@@ -62,7 +62,7 @@ double CsvRow::Number(std::string_view column) {
 }
 
 std::optional<std::int64_t> CsvRow::IntegerIfAny(std::string_view column, IntegerBounds bounds) {
-  constexpr std::int64_t kExactMax = std::int64_t{1} << 53;  // beyond it numbers are not told apart
+  constexpr std::int64_t kExactMax = std::int64_t{1} << 53;  // beyond it numbers are not distinct
   bounds = {std::max(bounds.low, -kExactMax), std::min(bounds.high, kExactMax)};
   const std::optional<double> value = NumberIfAny(column);
   if (!value) return std::nullopt;

@@ -11,8 +11,9 @@
 
 namespace focalfleet {
 
-/// Errors: kInvalid with file:line: a column or value missing, a fiducial twice, two at one place,
-/// more than limits::kFiducials, fewer than three: a camera cannot be solved from them.
+/// At least three fiducials: fewer do not solve a camera. Errors: kInvalid with file:line: a column
+/// or value missing, a fiducial twice, two at one place, more than limits::kFiducials, fewer than
+/// three.
 Result<std::vector<Fiducial>> ReadFiducials(std::string_view text, std::string file);
 
 std::string WriteFiducials(std::span<const Fiducial> fiducials);

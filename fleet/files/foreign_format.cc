@@ -50,7 +50,7 @@ bool Stands(std::string_view magic, std::string_view bytes, std::size_t at) {
   return bytes.size() >= at + magic.size() && bytes.substr(at, magic.size()) == magic;
 }
 
-/// Archives of one kind, told apart by what they hold.
+/// The message for a ZIP archive, by its content.
 std::string ZipText(std::string_view head) {
   const auto holds = [&](std::string_view name) {
     return head.find(name) != std::string_view::npos;

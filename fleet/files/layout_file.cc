@@ -70,7 +70,7 @@ std::string LinePrefix(const UnitsFile& file, std::string_view text) {
   return file.source + ": ";
 }
 
-// Each line of a message by itself.
+// Adds the line of the file to each line of a message.
 std::string WithLines(const UnitsFile& file, std::string_view text) {
   std::string reported;
   while (!text.empty()) {

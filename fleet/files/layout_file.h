@@ -1,7 +1,7 @@
 // units.csv: where each unit sits, how long its arms are, which supply and bus feed it.
-// docs/files.md has the columns. Reading checks each row by itself and names its line; what
-// concerns several units (two at one address, one place twice) is Layout::Create's, and ReadLayout
-// adds the line to that too.
+// docs/files.md has the columns. Reading checks each row by itself and names its line. Faults of
+// several units (two at one address, one place twice) are found by Layout::Create, and ReadLayout
+// adds the line to those, too.
 #pragma once
 
 #include <span>
@@ -19,17 +19,17 @@ struct UnitsFile {
   std::vector<Unit> units;
   std::vector<int> lines;                    // Shape: (n), of each unit's row
   std::vector<std::string> columns;          // of the header: the others have their defaults
-  std::vector<std::string> ignored_columns;  // not known; a misspelt `enabled` would be among them
+  std::vector<std::string> ignored_columns;  // unknown; a misspelt `enabled` would be among them
 };
 
-/// Errors: kInvalid with file:line: a column missing; of all rows a value missing or out of its
-/// bounds, a unit twice.
+/// Every row checked by itself. Errors: kInvalid with file:line: a column missing; of all rows a
+/// value missing or out of its bounds, a unit twice.
 Result<UnitsFile> ReadUnits(std::string_view text, std::string file);
 
 /// ReadUnits and Layout::Create in one, errors of both with file:line.
 Result<Layout> ReadLayout(std::string_view text, std::string file, Layout::Options options);
 
-/// All columns; optional ones that no unit has are left out. Reads back equal.
+/// A table with all columns but optional ones that no unit has. The text reads back equal.
 std::string WriteUnits(std::span<const Unit> units);
 
 }  // namespace focalfleet

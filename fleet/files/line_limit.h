@@ -1,5 +1,5 @@
-// A limit of the lines of a table, to be asked before it is read: every cell takes some hundred
-// bytes of memory, so a small file of very many lines takes gigabytes.
+// A limit on the lines of a table, checked before it is read. Every cell takes some hundred bytes
+// of memory, so a small file of very many lines takes gigabytes.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// obstacles.csv: what stands still on the plate (fiducials, guide cameras, the plate's edge), as
+// obstacles.csv: the fixed things on the plate (fiducials, guide cameras, the plate's edge), as
 // circles.
 #pragma once
 
@@ -12,9 +12,8 @@
 
 namespace focalfleet {
 
-/// A header without rows is a plate without obstacles.
-/// Errors: kInvalid with file:line: a column or value missing, a negative radius, an obstacle
-/// twice.
+/// The obstacles; a header without rows is a plate without any. Errors: kInvalid with file:line: a
+/// column or value missing, a negative radius, an obstacle twice.
 Result<std::vector<Obstacle>> ReadObstacles(std::string_view text, std::string file);
 
 std::string WriteObstacles(std::span<const Obstacle> obstacles);

@@ -12,8 +12,8 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kJoinToleranceDeg = 1e-6;
-constexpr double kJoinToleranceS = 1e-9;
+constexpr double kJoinToleranceDeg = 1e-6;  // rounding of a writer
+constexpr double kJoinToleranceS = 1e-9;    // rounding of a writer
 
 template <class Word, std::size_t kCount>
 std::optional<Word> WordOf(const std::string& text, const Word (&words)[kCount]) {
@@ -47,7 +47,7 @@ PlanRow ReadRow(CsvRow* row) {
   return r;
 }
 
-// What is wrong with `later` after `before`, two rows of one axis in the order of time.
+// The fault of `later` after `before`, two rows of one axis in the order of time. Empty: none.
 std::string JoinFault(const PlanRow& before, const PlanRow& later) {
   const std::string of = " of line " + std::to_string(before.line);
   if (later.t0_s < before.t1_s - kJoinToleranceS)

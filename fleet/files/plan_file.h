@@ -1,7 +1,8 @@
-// plan.csv: what will move when, so that anyone can check it without us. One row is one segment as
-// it goes on the bus: within it the angle is linear in time, t = 0 is the start signal; before,
-// between and after its rows an axis stands with its motor off. Angles are whole vectors and times
-// whole ticks and timer counts, written with as many digits as give back the same number.
+// plan.csv: the motions of a plan, so that anyone can check it with programs of their own. A row is
+// one segment as it goes on the bus. Within it the angle is linear in time, and t = 0 is the start
+// signal. Before, between and after its rows an axis stands with its motor off. Angles are whole
+// vectors and times whole ticks and timer counts, written with as many digits as give back the same
+// number.
 #pragma once
 
 #include <span>
@@ -25,7 +26,7 @@ struct PlanRow {
   double to_deg = 0;
   WaveMode mode = WaveMode::kAsymmetric;
   double power_W = 0;  // electrical, of this motor during the row
-  int line = 0;        // in the file it came from
+  int line = 0;        // in the file that it came from
 };
 
 /// The rows of a plan, ascending by unit's place in the layout, axis and time.
@@ -34,7 +35,7 @@ std::vector<PlanRow> RowsOf(const Plan& plan, const Layout& layout,
 
 std::string WritePlan(std::span<const PlanRow> rows);
 
-/// Rows in the order of the file. Errors: kInvalid with file:line: a column or value missing, a
+/// The rows in the order of the file. Errors: kInvalid with file:line: a column or value missing, a
 /// word that is no axis or mode, a row that ends before it begins, negative power, rows of one axis
 /// that overlap or do not join up.
 Result<std::vector<PlanRow>> ReadPlan(std::string_view text, std::string file);

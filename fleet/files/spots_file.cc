@@ -26,14 +26,14 @@ std::string_view Trimmed(std::string_view text) {
 
 struct Keyed {
   std::string_view value;
-  int line = 0;  // 0: not there
+  int line = 0;  // 0: the key is not there
 };
 
 std::string Where(const std::string& file, int line) {
   return file + ":" + std::to_string(line) + ": ";
 }
 
-// `# key: value` among the comment lines before the table.
+// Finds `# key: value` among the comment lines before the table.
 Result<Keyed> FindKey(std::string_view text, const std::string& file, std::string_view key) {
   Keyed found;
   int line = 0;
@@ -203,7 +203,8 @@ std::string UtcOf(std::int64_t unix_ns) {
   const std::int64_t seconds = unix_ns / kNsPerSecond;
   const std::int64_t days = seconds / kSecondsPerDay;
   const auto of_day = static_cast<int>(seconds % kSecondsPerDay);
-  // The year, month and day by search: days per year are known only by counting leaps.
+  // The year, month and day are found by search: days per year are known only by counting leap
+  // days.
   int year = 1970 + static_cast<int>(days / 366);
   while (DaysOf(year + 1, 1, 1) <= days) ++year;
   int month = 1;

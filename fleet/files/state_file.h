@@ -1,4 +1,4 @@
-// state.csv: where every axis stands, whole turns included; the poses of disabled units stand here
+// state.csv: the place of every axis, whole turns included; the poses of disabled units are here
 // too.
 #pragma once
 
@@ -22,12 +22,13 @@ Result<std::vector<std::optional<Pose>>> ReadState(std::string_view text, std::s
                                                    std::span<const UnitDrive> drives);
 
 enum class WhoseState : std::uint8_t { kAll, kDisabled };
-/// A plan needs to know where each unit stands, a draw of targets where the disabled ones do.
-/// Errors: kInvalid names the file and the units without a pose.
+/// Every unit that `whose` asks for has a pose. A plan needs the places of all units, a draw of
+/// targets those of the disabled ones. Errors: kInvalid names the file and the units without a
+/// pose.
 Status RequirePoses(const std::string& file, const Layout& layout,
                     std::span<const std::optional<Pose>> poses, WhoseState whose);
 
-/// A row for each unit that has a pose. Reads back equal.
+/// A row for each unit that has a pose. The text reads back equal.
 std::string WriteState(const Layout& layout, std::span<const UnitDrive> drives,
                        std::span<const std::optional<Pose>> poses);
 

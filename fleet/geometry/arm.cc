@@ -13,7 +13,7 @@ namespace {
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 /// A part of a sweep: middle and half-widths in radians. While `half_along` is not 0 it is the part
-/// of a band around the fraction `along` and is halved there; once that is shorter than the band is
+/// of a band around the fraction `along` and is halved there. Once that is shorter than the band is
 /// wide it is a box, and its wider side is halved.
 struct Cell {
   double theta = 0;
@@ -32,7 +32,7 @@ struct CellPlace {
   [[nodiscard]] double largest_mm() const { return std::max(by_theta_mm, by_phi_mm); }
 };
 
-/// Below this the boxes count as one pose: closer than this to touching is "not clear".
+/// Boxes below this size count as one pose: closer than this to touching is "not clear".
 constexpr double kResolutionMm = 2e-5;
 constexpr std::size_t kStackSize = 160;  // four halvings of 40 bits each are more than int32 has
 
@@ -98,7 +98,7 @@ class SweepTest {
   int budget_;
 };
 
-/// One arm and its sweep, cut into cells on demand.
+/// An arm and its sweep, cut into cells on demand.
 class SweepTest::Mover {
  public:
   Mover(const ArmGeometry& arm, const Sweep& sweep)
@@ -172,7 +172,7 @@ bool SweepTest::BothClear(const Mover& a, const Mover& b) {
   const Cell whole_a = a.Whole();
   const Cell whole_b = b.Whole();
   const Pair whole{whole_a, whole_b, a.Place(whole_a), b.Place(whole_b)};
-  // Most pairs are far apart: they shall not pay for the stack.
+  // Most pairs are far apart: they do not pay for the stack.
   if (Judge(whole) == Verdict::kClear) return true;
   std::array<Pair, kStackSize> stack;
   std::size_t size = 0;

@@ -1,12 +1,12 @@
-// The part of a unit that can touch others, and when two of them are clear for good.
-// The arm is the segment from elbow to fibre. Where both angles of a unit vary within a box
-// [theta] x [phi], no point of the arm is farther from where it is in the box's middle than
+// The part of a unit that can touch others, and the test whether two of them are clear for good.
+// The arm is the segment from elbow to fibre. Let both angles of a unit vary within a box [theta] x
+// [phi]. Then no point of the arm is farther from where it is in the box's middle than
 //     R * d_theta + L2 * d_phi
-// (half-widths of the box in radians, R the farthest point of the arm from the base, L2 the phi
-// arm): turning by an angle moves a point by at most its radius times the angle. So one distance of
-// two segments decides about two whole boxes of poses, or the boxes are halved and asked again.
-// Nothing is sampled: "clear" holds for every pose in the boxes; "not clear" may be said of boxes
-// that are clear by less than a few micrometres.
+// The half-widths of the box are in radians, R is the farthest point of the arm from the base, and
+// L2 is the phi arm. Turning by an angle moves a point by at most its radius times the angle. A
+// single distance of two segments thus decides about two whole boxes of poses, or the boxes are
+// halved and tested again. Nothing is sampled: "clear" holds for every pose in the boxes. "Not
+// clear" may be returned for boxes that are clear by less than a few micrometres.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ struct PoseBox {
   constexpr bool operator==(const PoseBox&) const = default;
 };
 
-/// One unit's kinematics with everything that does not change computed once.
+/// Kinematics of one unit, with everything that does not change computed once.
 class ArmGeometry {
  public:
   ArmGeometry() = default;
@@ -75,7 +75,7 @@ class ArmGeometry {
   [[nodiscard]] double step_rad(Axis axis) const {
     return axis == Axis::kTheta ? theta_step_rad_ : phi_step_rad_;
   }
-  /// From now on its range lies so much further on.
+  /// The range lies so much further on from now on. Units: vectors.
   void ShiftRange(const Pose& offset) {
     for (std::size_t k = 0; k < kAxisCount; ++k) {
       range_.low[k] += offset[k];
@@ -104,16 +104,16 @@ class ArmGeometry {
   PoseBox range_;
 };
 
-/// A segment with a radius of its own beyond the half-widths: a standing arm (0), a disc (both ends
-/// equal), or one piece of the cover of all poses that a unit may have.
+/// A segment with a radius of its own beyond the half-widths. Examples are a standing arm (radius
+/// 0), a disc (both ends equal), and one piece of the cover of all possible poses of a unit.
 struct Capsule {
   SegmentFp line;
   double radius_mm = 0;
 };
 
-/// A set of poses that one leg of a way may pass. The axes go from one pose to the other, theta has
-/// covered a fraction f of its way and phi a fraction g of its own, with |f - g| <= `out_of_step`:
-/// 1 is the whole box between the poses, less is a band around its diagonal.
+/// A set of poses that one leg of a way may pass. The axes go from one pose to the other. Theta has
+/// covered a fraction f of its way and phi a fraction g of its own, with |f - g| <= `out_of_step`.
+/// The value 1 is the whole box between the poses, less is a band around its diagonal.
 struct Sweep {
   Pose from{};
   Pose to{};
@@ -124,8 +124,8 @@ struct Sweep {
 };
 
 /// True: every pose of `a` in `sweep_a` stays farther than `need_mm` from every pose of `b` in
-/// `sweep_b`.
-/// Cost: at most `budget` distances; more would be needed only where the two nearly touch: false.
+/// `sweep_b`. Cost: at most `budget` distances. More would be needed only where the two nearly
+/// touch; the answer is then false.
 bool SweepsClear(const ArmGeometry& a, const Sweep& sweep_a, const ArmGeometry& b,
                  const Sweep& sweep_b, double need_mm, int budget = 3000);
 

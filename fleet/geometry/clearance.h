@@ -1,6 +1,6 @@
-// When two things on the plate are clear of each other: their cores are farther apart than the sum
-// of their half-widths (or radius) and the configured clearance. `extra_mm` asks for more than
-// that, to leave room for what a caller rounds or bounds.
+// Two things on the plate are clear of each other when the distance of their cores is large enough.
+// The limit is the sum of their half-widths (or radius) and the configured clearance. `extra_mm`
+// asks for more than that, to leave room for what a caller rounds or bounds.
 #pragma once
 
 #include "fleet/geometry/segment.h"

@@ -1,7 +1,7 @@
-// Distances in the plane. What can touch on the plate is a stadium: a segment (the arm from elbow
-// to fibre) and a half-width around it; an obstacle is a point with a radius. Two of them are clear
-// of each other when the distance of their cores exceeds the sum of the widths, so all that is
-// asked here is core to core.
+// Distances in the plane. A unit's touchable part is a stadium: a segment (the arm from elbow to
+// fibre) and a half-width around it. An obstacle is a point with a radius. Two of them are clear of
+// each other when the distance of their cores exceeds the sum of the widths. The functions here
+// therefore measure from core to core.
 #pragma once
 
 #include <algorithm>
@@ -35,10 +35,10 @@ constexpr double SquaredDistance(PointFp p, const SegmentFp& s) {
 }
 inline double DistanceMm(PointFp p, const SegmentFp& s) { return std::sqrt(SquaredDistance(p, s)); }
 
-/// Squared distance of two segments, 0 within rounding where they cross: the nearest points of the
-/// two lines, moved to the ends where they lie beyond (Ericson, Real-Time Collision Detection,
-/// 5.1.9). Where the two are almost parallel the nearest points are ill-conditioned, their distance
-/// is not: it stays within 1e-6 mm. Units: mm^2.
+/// Squared distance of two segments, 0 within rounding where they cross. The nearest points of the
+/// two lines are moved to the ends where they lie beyond (Ericson, Real-Time Collision Detection,
+/// 5.1.9). Where the two are almost parallel the nearest points are ill-conditioned, but their
+/// distance is not: it stays within 1e-6 mm. Units: mm^2.
 constexpr double SquaredDistance(const SegmentFp& s, const SegmentFp& t) {
   const double ux = s.b.x_mm - s.a.x_mm;
   const double uy = s.b.y_mm - s.a.y_mm;

@@ -1,8 +1,8 @@
-// Sine and cosine of one angle, for the innermost loops of the planner: a fraction of libm's cost,
-// and the same bits on every machine (libm picks its own variant by the processor).
-// The angle less whole turns is cut into four, which Taylor's polynomials to x^15 and x^16 give
-// within rounding; doubling the angle twice is cheaper than a branch that nobody can predict. The
-// error stays below 1e-14 within +-100 rad.
+// Sine and cosine of one angle, for the innermost loops of the planner. They take a fraction of
+// libm's cost and give the same bits on every machine (libm picks its own variant by the
+// processor). The angle less whole turns is divided by four; Taylor's polynomials to x^15 and x^16
+// give sine and cosine of that within rounding. Doubling the angle twice is cheaper than a branch
+// that cannot be predicted. The error stays below 1e-14 within +-100 rad.
 #pragma once
 
 #include <cmath>

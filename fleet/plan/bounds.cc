@@ -43,7 +43,7 @@ Status CheckPower(const Service& service, const PlanOptions& options) {
   const PlanRequest& request = service.request();
   const Scene& scene = service.scene();
   PowerLedger ledger(scene.layout(), request.drives, options.motor, options.power, {});
-  double least_W = 0;  // of those that go somewhere
+  double least_W = 0;  // of the units that move
   for (std::uint32_t i = 0; i < scene.size(); ++i)
     for (std::size_t k = 0; k < kAxisCount; ++k)
       if (service.is_served(i) && service.goal(i)[k] != service.start(i)[k])

@@ -1,5 +1,5 @@
-// What no plan can be better than: the time of the slowest straight way, and the energy of all
-// straight ways over the limits of power.
+// Lower bounds of every plan: the time of the slowest straight way, and the energy of all straight
+// ways over the limits of power.
 #pragma once
 
 #include "fleet/plan/power_ledger.h"
@@ -7,14 +7,14 @@
 
 namespace focalfleet {
 
-/// Of those that are served, each alone and straight. Units: s.
+/// The longest time of a served unit that moves alone and straight. Units: s.
 double TimeBoundS(const Service& service);
 
 /// No plan within the limits is shorter than the energy of straight moves over the limit. Units: s.
 double PowerBoundS(const Service& service, const PowerLimits& limits, PowerLedger* ledger);
 
-/// A limit below what one motor draws lets nobody move; one that takes longer than offsets can say
-/// leaves some no time. Errors: kRefused, with the least limit that would do.
+/// A limit below what one motor draws lets no unit move. A limit whose plan takes longer than
+/// offsets can say leaves some units no time. Errors: kRefused, with the least limit that would do.
 Status CheckPower(const Service& service, const PlanOptions& options);
 
 }  // namespace focalfleet

@@ -11,8 +11,8 @@ namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-/// Delays as shares of the time to spare, far from each other first: where one meets somebody, one
-/// a little later does so, too.
+/// Delays as shares of the time to spare, far from each other first: where one delay meets a
+/// neighbour, a slightly longer one does, too.
 constexpr std::array kDelays{0.0,   1.0,   0.5,    0.25,   0.75,   0.125, 0.375,
                              0.625, 0.875, 0.0625, 0.3125, 0.5625, 0.8125};
 
@@ -59,7 +59,8 @@ class Builder {
     Add(1, phi_s, q_.to[1] - q_.from[1], &made);
     return made;
   }
-  /// Folds to `fold` from `begin_s` on, opens again to end at `open_by_s` or as soon as it can.
+  /// The arm folds to `fold` from `begin_s` on, and opens again to end at `open_by_s` or as soon as
+  /// it can.
   [[nodiscard]] Candidate FoldingAt(std::int32_t fold, double begin_s, double theta_s,
                                     double open_by_s) const {
     Candidate made;
@@ -70,8 +71,9 @@ class Builder {
     return made;
   }
 
-  /// Leg after leg; before the leg to way[n] it waits for waits_s[n] (absent: not at all). Ends
-  /// never where that takes more segments than a move holds. Pre: at least two corners.
+  /// Leg after leg; before the leg to way[n] the unit waits for waits_s[n] (absent: not at all).
+  /// The way never ends where that takes more segments than a move holds. Pre: at least two
+  /// corners.
   [[nodiscard]] Candidate Along(const Way& way, std::span<const double> waits_s) const;
 
   const CandidateQuestion& q_;
@@ -83,7 +85,7 @@ class Builder {
 void Builder::AppendStraight(std::vector<Candidate>* out) const {
   const double theta = lasts_s_[0];
   const double phi = lasts_s_[1];
-  // Begin of theta and phi within the shape.
+  // Begins of theta and phi within the shape.
   std::array<std::array<double, 2>, 5> shapes{};
   std::size_t count = 0;
   shapes[count++] = {0, 0};
@@ -149,7 +151,7 @@ void Builder::AppendFolding(std::vector<Candidate>* out) const {
   }
 }
 
-/// Out of the start, over to the target and in, where out and in may slide.
+/// Slides out of the start, goes over to the target and slides in; either slide may be absent.
 void Builder::AppendSliding(std::vector<Candidate>* out) const {
   const ArmGeometry& arm = q_.scene->arm(q_.unit);
   const double per_phi = arm.step_rad(Axis::kPhi) / arm.step_rad(Axis::kTheta);
@@ -174,7 +176,8 @@ void Builder::AppendSliding(std::vector<Candidate>* out) const {
               std::max(Seconds(1, fold - q_.to[1]), Seconds(0, std::abs(in_theta - q_.to[0])));
           const double lasts = out_s + over_s + in_s + 3 * kTickS;
           const double spare = std::max(0.0, q_.within_s - lasts);
-          // The time to spare is spent before, folded before or after going over, or at the end.
+          // The time to spare is spent at the start, folded before or after crossing, or at the
+          // end.
           constexpr std::array<std::array<double, 3>, 4> kWaits{
               {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}, {0, 0.5, 0.5}}};
           for (const auto& waits : kWaits) {

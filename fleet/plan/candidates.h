@@ -1,5 +1,5 @@
-// The ways in which one unit may go from its start to its target: both axes at once or one after
-// the other, sooner or later, with the arm folded back on the way as far as it helps.
+// The ways in which one unit may go from its start to its target. Both axes move at once or one
+// after the other, sooner or later. The arm is folded back on the way as far as that helps.
 #pragma once
 
 #include <array>
@@ -33,7 +33,8 @@ struct CandidateRound {
   std::size_t first = 0;
   std::size_t last = 0;
 };
-/// Going straight comes first, folding back helps most often, waiting sometimes.
+/// The order of trial: going straight comes first, folding back helps most often, waiting
+/// sometimes.
 inline constexpr std::array kCandidateRounds{
     CandidateRound{Shape::kStraight, 0, 2}, CandidateRound{Shape::kFolding, 0, 2},
     CandidateRound{Shape::kSliding, 0, 1},  CandidateRound{Shape::kStraight, 2, 13},
@@ -45,25 +46,26 @@ struct CandidateQuestion {
   std::uint32_t unit = 0;
   Pose from{};
   Pose to{};
-  double within_s = 0;  // ends by then where it can
+  double within_s = 0;  // the way ends by then where it can
   CandidateRound round;
 };
 
-/// Straight ones first, sooner before later.
+/// Appends the candidates of the question's round: straight ones first, sooner before later.
 void AppendCandidates(const CandidateQuestion& question, std::vector<Candidate>* candidates);
 
-/// Leg after leg along a way that was found elsewhere, sooner or later.
+/// Appends candidates leg after leg along a way that was found elsewhere, sooner or later.
 void AppendAlong(const CandidateQuestion& question, const Way& way,
                  std::vector<Candidate>* candidates);
 
-/// Along `in` into the own cell, there over to the end of `out`, and along that backwards to the
-/// target; folded before or after going over for as long as there is time to spare.
+/// Appends candidates along `in` into the unit's own cell, across the cell to the end of `out`, and
+/// along `out` backwards to the target. The arm folds before or after it crosses the cell, for as
+/// long as there is time to spare.
 void AppendVia(const CandidateQuestion& question, const Way& in, const Way& out,
                std::vector<Candidate>* candidates);
 
 /// Both axes at once, without delay.
 Candidate Straight(const UnitDrive& drive, const Pose& from, const Pose& to);
-/// A straight one whose axes begin later. Units: s. Shape: (axes).
+/// A straight candidate whose axes begin later. Units: s. Shape: (axes).
 Candidate Delayed(const UnitDrive& drive, const Candidate& straight,
                   const std::array<double, kAxisCount>& begin_s);
 

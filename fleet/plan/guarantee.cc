@@ -6,14 +6,14 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kTightToMm = 1e-2;
+constexpr double kTightToMm = 1e-2;  // a reported clearance is at most this much too small
 
 struct Nearest {
   double distance_mm = 0;
   double t_s = 0;
 };
 
-/// The least distance of two motions, where it is below `below_mm`; else something above.
+/// The least distance of two motions, where it is below `below_mm`; else a larger number.
 class Search {
  public:
   Search(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
@@ -129,7 +129,7 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
     return x.seen_mm != y.seen_mm ? x.seen_mm < y.seen_mm
                                   : std::pair(x.i, x.j) < std::pair(y.i, y.j);
   });
-  // Those that were seen near come first, so that most of the others need no more than one test.
+  // Pairs that were seen near come first, so that most of the others need no more than one test.
   std::vector<TightPair> tightest;
   const auto nearer = [](const TightPair& x, const TightPair& y) {
     if (x.clearance_mm != y.clearance_mm) return x.clearance_mm < y.clearance_mm;
@@ -144,8 +144,8 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
       continue;
     const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
                                 .Run(seen_mm + need_mm + kTightToMm);
-    // Clear by the planned need it is proven to be; the search stops short of the very least.
-    // A pair that is led apart is not: it may start nearer.
+    // The pair is proven clear by the planned need; the search stops short of the very least. A
+    // pair that is led apart is not proven: it may start nearer.
     const bool proven = nearest.distance_mm >= NeedOf(scene, i, j) - kTightToMm;
     const double proven_mm = proven ? NeedOf(scene, i, j) - need_mm : -1e9;
     const double clearance_mm = std::max(proven_mm, nearest.distance_mm - kTightToMm - need_mm);
@@ -169,7 +169,7 @@ std::optional<Following> FindFollowing(const FollowingQuestion& q) {
   std::optional<Following> found;
   for (int n = std::max(0, static_cast<int>(q.from_s / h)); n < mine.slice_count(); ++n) {
     if (n % kGroup == 0) {
-      // Nothing in this group of slices is met later: on to the next.
+      // Nothing in this group of slices is met later: on to the next group.
       bool apart = true;
       for (int g = n / kGroup; g * kGroup <= other.slice_count() && apart; ++g)
         apart = Apart(mine.bounds(n / kGroup), other.bounds(g), q.need_mm);
@@ -193,8 +193,8 @@ std::optional<Following> FindFollowing(const FollowingQuestion& q) {
                           .leaves_s = q.notice_s};
       found->begins_s = std::min(found->begins_s, begins_s);
       found->left_s = (n + 1) * h / (1 - error) + q.skew_s;
-      // What is proven holds for each instant of the slice, what is seen only for all of it;
-      // and the other may be ahead by its clock when this one ends.
+      // The proof holds for each instant of the slice, the distance of slices only for all of it.
+      // The other unit may also be ahead by its clock when this one ends.
       const double ends_s = (n + 1) * h;
       const double seen_s = (m * h - ends_s - plain.Slip(ends_s)) / (1 + error);
       found->leaves_s = std::min(found->leaves_s, std::max(seen_s, q.proven.notice_s));

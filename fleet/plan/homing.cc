@@ -1,6 +1,6 @@
-// Who has to leave before a unit of uncertain place may look for its stops, and to where.
-// Neighbours go into their own cells and turn there until they are clear of everything that the
-// homing arm may sweep; the nearest such place is taken.
+// The units that have to leave before a unit of uncertain place may look for its stops, and where
+// they go. Neighbours go into their own cells and turn there until they are clear of everything
+// that the homing arm may sweep. The nearest such place is taken.
 
 #include <algorithm>
 #include <array>
@@ -14,8 +14,9 @@
 namespace focalfleet {
 namespace {
 
-/// A stop may give way, and stands where the range says only as well as it was measured.
+/// A stop may yield, and its place is known only as well as the range was measured. Units: degrees.
 constexpr double kBeyondStopDeg = 1;
+/// Distances of one test of two sweeps; beyond it they count as not clear.
 constexpr int kBudget = 40'000;
 
 class WayMaker {
@@ -65,8 +66,8 @@ bool WayMaker::ClearOfSwept(std::uint32_t unit, const PoseBox& box, double need_
   });
 }
 
-/// Others stand where they are or go into their cells: a place in the own cell is clear of the
-/// latter.
+/// Others stand where they are or go into their cells; a place in the unit's own cell is clear of
+/// the latter.
 bool WayMaker::ClearOfOthers(std::uint32_t unit, const Pose& pose) const {
   const SegmentFp line = scene_.arm(unit).At(pose);
   for (const NeighbourNeed& near : scene_.neighbours(unit)) {
@@ -124,7 +125,7 @@ Status WayMaker::Refuse(std::uint32_t unit, const char* why) const {
 
 Status WayMaker::CheckObstacles() const {
   for (const StandingThing& thing : scene_.standing(homing_)) {
-    if (thing.by != kNobody) continue;
+    if (thing.by != kNoUnitIndex) continue;
     for (const PoseBox& swept : swept_)
       if (!SweepClearOf(scene_.arm(homing_), Sweep::Of(swept), thing.capsule, thing.need_mm,
                         kBudget))

@@ -21,7 +21,8 @@ InCellPlanner::InCellPlanner(const Scene* scene, std::span<const UnitDrive> driv
 }
 
 void InCellPlanner::Run() {
-  // Who leaves its cell meets the others where they are: first all turn that can do so at home.
+  // A unit that leaves its cell meets the others where they are: the units that can turn inside
+  // their cells go first.
   for (bool moved = true; moved && !pending_.empty();) moved = Pass(true) || Pass(false);
 }
 
@@ -47,7 +48,8 @@ Way InCellPlanner::WayOf(std::uint32_t unit, bool in_cell) {
   const ArmGeometry& arm = scene_->arm(unit);
   PathSearch::Question question;
   question.blockers = surroundings_->Around(
-      unit, lines_, poses_, in_cell ? Surroundings::Who::kOutOfCell : Surroundings::Who::kAll);
+      unit, lines_, poses_,
+      in_cell ? Surroundings::Include::kOutOfCell : Surroundings::Include::kAll);
   if (SweepClear(arm, {from, to}, question.blockers, nullptr)) return {{from}, {to}};
   question.arm = &arm;
   question.drive = &drives_[unit];

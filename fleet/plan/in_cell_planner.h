@@ -1,8 +1,10 @@
-// Between the ways in and out: every mover turns inside its cell from where it came in to where it
+// Between the ways in and out every mover turns inside its cell, from where it came in to where it
 // will go out from. Cells are clear of each other, so all this concerns only what stands across a
-// cell: obstacles, and units that do not move. Movers "by themselves" have no way through their
-// cells; they stand at their starts while the others come in, go to their targets in one way here,
-// while all others are in their cells, and stand there while the others go out.
+// cell: obstacles, and units that do not move.
+//
+// Movers "by themselves" have no way through their cells. They stand at their starts while the
+// others come in. They go to their targets in one way here, while all others are in their cells,
+// and stand there while the others go out.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +18,13 @@ namespace focalfleet {
 
 class InCellPlanner {
  public:
-  /// `from` is where everybody stands after the way in, `to` before the way out. Shape: (n).
+  /// `from` is where each unit stands after the way in, `to` before the way out. Shape: (n).
   InCellPlanner(const Scene* scene, std::span<const UnitDrive> drives, Surroundings* surroundings,
                 std::span<const Pose> from, std::span<const Pose> to);
   void Run();
 
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
-  /// Who found no way; ascending.
+  /// Units that found no way; ascending.
   [[nodiscard]] const std::vector<std::uint32_t>& stuck() const { return pending_; }
 
  private:

@@ -21,7 +21,7 @@ bool NeighbourOfAny(const Layout& layout, PositionerIndex unit,
   });
 }
 
-// The moves that let one unit home, or why there are none.
+// The moves that let one unit home, or the reason why there are none.
 Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Pose>>& way,
                         PlanRequest request, const PlanOptions& options) {
   request.targets = way;
@@ -82,7 +82,7 @@ PlanDone PlanOf(const PlanJob& job, const PlanRequest& request, const Abandoned&
   options.abandoned = abandoned;
   if (!job.to_home.empty()) return PlanHomingWave(job, request, options);
   PlanDone done{.job = job.job, .plan = MakePlan(request, options)};
-  // The running plan is kept with options that nobody can abandon: it outlives the asker.
+  // The running plan is kept with options that cannot be abandoned: it outlives the caller.
   if (done.plan)
     done.running = std::make_shared<const RunningPlan>(request, done.plan->moves, job.options);
   return done;

@@ -1,4 +1,5 @@
-// What the planner's thread does for the coordinator: one job in, one answer out, no state between.
+// The work of the planner's thread for the coordinator: one job in, one answer out, no state
+// between.
 #pragma once
 
 #include <span>
@@ -7,11 +8,14 @@
 
 namespace focalfleet {
 
-/// Plans a configuration, or the next wave of homing: as many of `job.to_home` as can home at once
-/// with nobody stepping aside (no two of them neighbours), else one of them with the moves that
-/// make way for it. Or a late move in one that is under way; its predicted makespan is its end,
-/// counted from the configuration's start signal.
-/// Abandoned, it ends soon, with kUnavailable for a plan.
+/// Plans one job, which is one of three kinds.
+/// - A configuration.
+/// - The next wave of homing. As many units of `job.to_home` home together as can do so with no
+/// unit moved aside, no two of them neighbours. Else one of them homes, with the moves that make
+/// way for it.
+/// - A late move in a configuration that is under way. Its predicted makespan is its end, counted
+/// from the configuration's start signal.
+/// An abandoned job ends soon, with kUnavailable for a plan.
 PlanDone RunPlanJob(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives,
                     const Abandoned& abandoned = {});
 

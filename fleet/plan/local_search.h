@@ -1,12 +1,12 @@
-// All at once: every unit goes straight to its target, and where two would meet, one of them goes
-// later or another way round, within the time that the slowest unit needs anyhow.
+// The local search plans all units at once: every unit goes straight to its target. Where two would
+// meet, one of them goes later or another way, within the time that the slowest unit needs anyhow.
 //
 // Most units need far less time than the slowest one, so there is room to wait in. The repair is
-// local and greedy: a unit in conflict looks through its candidates (candidates.h) for the one that
-// meets the fewest others as these go now; whom it still meets must look next. A pair that keeps
-// meeting weighs more each time, which drives the search out of dead ends (breakout local search,
-// Morris 1993; repair instead of construction as in MAPF-LNS2, Li et al. 2022). Every choice is
-// tested as a motion in time (track.h), so nothing has to be proven afterwards.
+// local and greedy. A unit in conflict looks through its candidates (candidates.h) for the one that
+// meets the fewest others as these move now. Each unit that it still meets looks next. A pair that
+// keeps meeting weighs more each time. These weights drive the search out of dead ends (breakout
+// local search, Morris 1993; repair instead of construction as in MAPF-LNS2, Li et al. 2022). Every
+// choice is tested as a motion in time (track.h), so nothing has to be proven afterwards.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,9 @@ struct LocalSearchResult {
   /// Shape: (n). Empty paths: the unit stands.
   std::vector<AxisPaths> paths;
   std::vector<Track> tracks;
-  std::vector<std::uint32_t> in_conflict;  // ascending; empty: clear of each other at all times
-  bool starved = false;  // the limits of power leave somebody no time at all: nothing was tried
+  /// ascending; empty: all are clear of each other at all times
+  std::vector<std::uint32_t> in_conflict;
+  bool starved = false;  // the limits of power leave a unit no time at all: nothing was tried
   /// Pairs that are clear, but not with notice. Lower index first, sorted.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> without_notice;
 };
@@ -39,17 +40,19 @@ struct LocalSearchRequest {
   std::span<const Pose> to;               // Shape: (n)
   std::span<const std::uint8_t> movable;  // Shape: (n); others stand
   std::span<const AxisPaths> begin_with;  // Shape: (n), or empty: straight ways
-  /// Shape: (n), or empty: nobody. Non-zero: goes as `begin_with` says, whatever the others do; its
-  /// power is somebody else's to count. Two such units are not tested against each other.
+  /// Non-zero: the unit moves as `begin_with` says, whatever the others do, and its power is
+  /// counted by the caller. Two such units are not tested against each other. Shape: (n), or empty:
+  /// no unit is given.
   std::span<const std::uint8_t> given = {};
   PowerLedger* ledger = nullptr;  // empty at first; null: power has no limit
   Tolerance tolerance;
-  double within_s = 0;  // the time that may be used without being noticed
+  double within_s = 0;  // the time that may be used at no cost
   std::uint64_t seed = 1;
-  Abandoned abandoned = {};  // nobody looks for another way any more
+  Abandoned abandoned = {};  // once true, no unit looks for another way
 };
 
-/// Cost: O(n) for bounded neighbourhoods; a unit without conflicts costs one test a neighbour.
+/// A motion for every unit of the request, straight wherever that is clear. Cost: O(n) for bounded
+/// neighbourhoods; a unit without conflicts costs one test for each neighbour.
 LocalSearchResult SearchLocally(const LocalSearchRequest& request);
 
 }  // namespace focalfleet

@@ -10,12 +10,13 @@
 namespace focalfleet {
 namespace {
 
+/// Coarse first: fine grids find narrower walls, and take longer.
 constexpr std::array kGridsDeg{4.0, 2.0, 1.0, 0.5, 0.25};
 constexpr std::uint8_t kOpen = 0;
 constexpr std::uint8_t kReached = 1;
 
-/// Boxes of one size over all that the axes' ranges allow. Whole vectors lie in boxes that share
-/// their borders, so a way cannot slip between two.
+/// Boxes of one size over all that the axes' ranges allow. Neighbouring boxes share the whole
+/// vectors at their borders, so a way cannot slip between two.
 class Boxes {
  public:
   Boxes(const NoWayQuestion& question, double grid_deg) : q_(question), range_(Range()) {
@@ -28,8 +29,8 @@ class Boxes {
     state_.assign(static_cast<std::size_t>(count_[0]) * static_cast<std::size_t>(count_[1]), kOpen);
   }
 
-  /// Everything that may be reached from the start. False: the target is not among it, and `walls`
-  /// are who closes it off.
+  /// True: the target may be reached from the start. False: it cannot, and `walls` are the units
+  /// and obstacles that close it off.
   bool Reaches(std::vector<std::uint32_t>* walls);
 
  private:
@@ -48,7 +49,7 @@ class Boxes {
     return state_[static_cast<std::size_t>(a) * static_cast<std::size_t>(count_[1]) +
                   static_cast<std::size_t>(b)];
   }
-  /// Whose surroundings hold the whole box; null: nobody's.
+  /// The blocker that every pose of the box is too near to. Null: there is none.
   [[nodiscard]] const Blocker* Closes(std::int32_t a, std::int32_t b) const;
 
   const NoWayQuestion& q_;
@@ -81,7 +82,7 @@ bool Boxes::Reaches(std::vector<std::uint32_t>* walls) {
     const auto [a, b] = open.back();
     open.pop_back();
     if (a == target[0] && b == target[1]) return true;
-    // Closed boxes hold their corners, so nothing passes between two that meet in one.
+    // Closed boxes include their corners, so nothing passes between two that meet in one.
     for (const auto& [da, db] : {std::array{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       const std::int32_t c = a + da;
       const std::int32_t d = b + db;
@@ -107,7 +108,7 @@ std::optional<NoWay> ProveNoWay(const NoWayQuestion& question) {
     NoWay proof{.grid_deg = grid_deg, .walls = {}, .obstacle = false};
     std::sort(walls.begin(), walls.end());
     for (const std::uint32_t by : walls) {
-      if (by == kNobody)
+      if (by == kNoUnitIndex)
         proof.obstacle = true;
       else
         proof.walls.push_back({by});

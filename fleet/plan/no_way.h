@@ -1,8 +1,9 @@
-// Why a unit cannot be served, as a proof and not as a search that gave up: its square of angles is
-// cut into boxes, and a box counts as closed only where every pose in it is too near to one thing
-// that never moves. What can be reached through the boxes that are not closed is more than what
-// can be reached; where even that does not contain the target, no way exists, however all others
-// move. A proof on a coarse grid is as good as one on a fine grid; fine grids find narrower walls.
+// The reason why a unit cannot be served, as a proof and not as a search that gave up. The unit's
+// square of angles is cut into boxes. A box counts as closed only where every pose in it is too
+// near to one thing that never moves. The poses that can be reached through boxes that are not
+// closed include all poses that can be reached. Where even those do not include the target, no way
+// exists, however all others move. A proof on a coarse grid is as good as one on a fine grid; fine
+// grids find narrower walls.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +23,8 @@ struct NoWayQuestion {
   Pose to{};
 };
 
-/// The proof, or nothing where the boxes are not enough for one. Cost: O(boxes * blockers), a tenth
-/// of a second at the finest.
+/// The proof. Empty: the boxes are not enough for one. Cost: O(boxes * blockers), a tenth of a
+/// second at the finest.
 std::optional<NoWay> ProveNoWay(const NoWayQuestion& question);
 
 }  // namespace focalfleet

@@ -33,7 +33,8 @@ std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDri
   if (repeat > std::numeric_limits<std::uint8_t>::max()) return std::nullopt;
   step.repeat[quick] = static_cast<std::uint8_t>(repeat);
   const double together = repeat / drive.axis[quick].repeat / stretch;
-  // One vector of either axis besides: within it nobody says how the angle grows.
+  // The last two terms are one vector of either axis: within a vector the growth of the angle is
+  // not known.
   step.out_of_step = std::abs(1 - together) + 1 / vectors[0] + 1 / vectors[1];
   return step;
 }
@@ -80,7 +81,7 @@ double PathSearch::ExactClearance(std::int32_t index) {
   if (last_touched_ < q_.blockers.size()) least = clearance(q_.blockers[last_touched_]);
   for (std::size_t k = 0; k < q_.blockers.size() && least > 0; ++k) {
     const double here = clearance(q_.blockers[k]);
-    if (here <= 0) last_touched_ = k;  // not clear is all that matters then
+    if (here <= 0) last_touched_ = k;  // only "not clear" matters then
     least = std::min(least, here);
   }
   // Rounded down: a clearance must never be overstated.
@@ -89,9 +90,9 @@ double PathSearch::ExactClearance(std::int32_t index) {
   return static_cast<double>(node.clearance);
 }
 
-/// Every pose of the edge is within its travel of both ends, counted from the one and the other; so
-/// it is clear where the clearances of the ends sum up to more. What an end has, the other has less
-/// the travel.
+/// Every pose of the edge is within its travel of both ends. The edge is therefore clear where the
+/// clearances of its ends sum up to more than the travel. An end's clearance is at least that of
+/// the other less the travel.
 bool PathSearch::EdgeClear(std::int32_t a, std::int32_t b) {
   const Pose pa = PoseOf(a);
   const Pose pb = PoseOf(b);
@@ -199,7 +200,7 @@ std::vector<Pose> PathSearch::Trace(std::int32_t node) const {
   return way;
 }
 
-/// The leg from one corner to another, in whatever manner is clear. None: neither is.
+/// The leg from one corner to another, in the manner that is clear. Empty: neither manner is.
 std::optional<Waypoint> PathSearch::Leg(const Pose& from, const Pose& to) const {
   constexpr int kBudget = 400;
   if (SweepClear(*q_.arm, {from, to}, q_.blockers, nullptr, kBudget)) return Waypoint{to};
@@ -210,8 +211,8 @@ std::optional<Waypoint> PathSearch::Leg(const Pose& from, const Pose& to) const 
   return Waypoint{to, step->out_of_step};
 }
 
-/// Each leg as far along the way as it can go; where that leaves many corners, the fewest that
-/// there can be with corners on the way.
+/// Each leg goes as far along the way as it can. Where that leaves many corners, the result is the
+/// least number of legs with corners on the way.
 Way PathSearch::Shorten(const std::vector<Pose>& way) const {
   constexpr std::size_t kManyCorners = 6;
   Way corners{{way.front()}};

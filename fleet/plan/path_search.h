@@ -1,7 +1,7 @@
-// A way for one unit among things that stand still: the search runs over a grid in the unit's own
+// A way for one unit among things that stand still. The search runs over a grid in the unit's own
 // square of angles (theta, phi). Every edge is a box of poses, and a box is taken only where all of
-// it is clear, so the way found is as sound as a straight one. Most edges cost nothing: a pose
-// whose clearance exceeds what the arm can travel along the edge proves the whole edge.
+// it is clear. The way found is therefore as sound as a straight one. Most edges cost nothing: a
+// pose whose clearance exceeds what the arm can travel along the edge proves the whole edge.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@
 
 namespace focalfleet {
 
-/// What one unit must stay clear of during one search.
+/// One thing that a unit must stay clear of during one search.
 struct Blocker {
   Capsule capsule;
   double need_mm = 0;
@@ -30,15 +30,15 @@ struct Waypoint {
 };
 using Way = std::vector<Waypoint>;
 
-/// How both axes of a unit can begin and end a leg together: the one with less to do takes more
-/// carrier periods a vector. None where that is beyond what a vector may take.
+/// A pace for which both axes of a unit begin and end a leg together. The axis with less to do
+/// takes more carrier periods a vector. Empty: that is beyond what a vector may take.
 struct InStep {
   std::array<std::uint8_t, kAxisCount> repeat{};
   double out_of_step = 1;
 };
 std::optional<InStep> KeepInStep(const Pose& from, const Pose& to, const UnitDrive& drive);
 
-/// Everything that the axes' ranges allow, and where the unit stands should that be outside.
+/// All poses that the axes' ranges allow, and where the unit stands should that be outside.
 PoseBox RangeAround(const ArmGeometry& arm, const Pose& pose);
 
 /// Coarse first: most ways are wide.
@@ -48,8 +48,8 @@ class PathSearch {
  public:
   explicit PathSearch(Abandoned abandoned = {}) : abandoned_(std::move(abandoned)) {}
 
-  /// Where the way may go and where it shall end: any pose in `goal`; none: explore all that can be
-  /// reached.
+  /// Where the way may go and where it shall end: any pose in `goal`. Empty goal: explore all that
+  /// can be reached.
   struct Question {
     const ArmGeometry* arm = nullptr;
     const UnitDrive* drive = nullptr;
@@ -60,13 +60,13 @@ class PathSearch {
     double grid_deg = 3;
   };
 
-  /// Corners of the way, `from` first; the legs between them are clear of all blockers. Empty: none
-  /// on this grid, or abandoned. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180 /
+  /// The corners of the way, `from` first; the legs between them are clear of all blockers. Empty:
+  /// none on this grid, or abandoned. Cost: O(nodes log nodes), nodes = (360 / grid_deg) * (180 /
   /// grid_deg).
   Way Find(const Question& question);
   [[nodiscard]] bool abandoned() const { return IsAbandoned(abandoned_); }
 
-  /// All poses that the last Find reached, if it found no way; nearest first. Lifetime: until the
+  /// The poses that the last Find reached, if it found no way; nearest first. Lifetime: until the
   /// next Find.
   [[nodiscard]] const std::vector<Pose>& reached() const { return reached_; }
   /// The way to one of them. Empty: not reached.
@@ -74,7 +74,7 @@ class PathSearch {
 
  private:
   struct Node {
-    std::int32_t cost = -1;  // vectors of the slower axis, summed; -1: not seen
+    std::int32_t cost = -1;  // vectors of the slower axis, summed; -1: not reached
     std::int32_t came_from = -1;
     float clearance = -1;  // at least this much, exactly this much where `exact`
     bool exact = false;
@@ -104,14 +104,15 @@ class PathSearch {
   std::int32_t low_[kAxisCount]{};  // grid index of the lowest pose within
   std::int32_t count_[kAxisCount]{};
   std::vector<Node> nodes_;
-  std::size_t last_touched_ = 0;  // blocker; the next node is likely to touch the same one
+  /// the blocker that was touched last; the next node is likely to touch the same one
+  std::size_t last_touched_ = 0;
   std::vector<Open> open_;
   std::vector<Pose> reached_;
   std::vector<std::int32_t> reached_nodes_;
 };
 
-/// Every pose of the sweep is clear of all blockers. `by` (may be null) receives the first that it
-/// is not clear of.
+/// True: every pose of the sweep is clear of all blockers. `by` (may be null) receives the first
+/// that it is not clear of.
 bool SweepClear(const ArmGeometry& arm, const Sweep& sweep, std::span<const Blocker> blockers,
                 std::uint32_t* by, int budget = 3000);
 

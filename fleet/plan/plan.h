@@ -1,4 +1,4 @@
-// A plan: for every unit that moves, exactly the segments that go on the bus. What is proven is
+// A plan: for every unit that moves, exactly the segments that go on the bus. The proof holds for
 // what is sent: times are whole 100 us ticks after the start signal, ways are whole vectors.
 #pragma once
 
@@ -19,14 +19,14 @@ struct UnitPlan {
   Pose to{};
   WaveMode mode = WaveMode::kAsymmetric;
   std::array<AxisPath, kAxisCount> path;
-  /// Units whose later motion enters space that this one must first have left: if this one ends
-  /// early, they must be stopped before `begins_s` (their own first such motion), or they may touch
-  /// it.
+  /// A unit whose later motion enters space that this unit must first have left. If this unit ends
+  /// early, the follower must be stopped before `begins_s` (its own first such motion), or they may
+  /// touch.
   struct Follower {
     PositionerIndex unit;
     double begins_s = 0;  // seconds after the start signal
-    /// This one has left all of it by then: if it ends later, the other may go on. Nor does it
-    /// concern the other if it ends before `since_s`.
+    /// This unit has left all of that space by then: if it ends later, the follower may go on. An
+    /// end before `since_s` does not concern the follower either.
     double left_s = 0;
     double since_s = 0;
   };
@@ -41,19 +41,18 @@ enum class UnservedWhy : std::uint8_t {
 };
 const char* Name(UnservedWhy why);
 
-/// A proof that no way leads to a pose, however all that can move gets out of the way
-/// (no_way.h).
+/// A proof that no way leads to a pose, wherever all movable units stand (no_way.h).
 struct NoWay {
-  double grid_deg = 0;                 // of the boxes that were enough for it
+  double grid_deg = 0;                 // grid of the boxes that were enough for it
   std::vector<PositionerIndex> walls;  // units that never move and close the way; ascending
-  bool obstacle = false;               // fixed obstacles do, too
+  bool obstacle = false;               // fixed obstacles close it, too
 };
 
 struct Unserved {
   PositionerIndex unit;
   UnservedWhy why = UnservedWhy::kBlocked;
   std::optional<PositionerIndex> by;
-  std::optional<NoWay> proof;  // of kBlocked; none: a way may exist and was not found
+  std::optional<NoWay> proof;  // of kBlocked; empty: a way may exist and was not found
 };
 
 /// Two units where they come nearest to each other.
@@ -64,30 +63,32 @@ struct TightPair {
   double t_s = 0;           // after the start signal
 };
 
-/// A pair for which a stop of the one may be noticed too late to stop the other.
+/// A pair for which the early end of one unit may be noticed too late to stop the other.
 struct Unnoticed {
   PositionerIndex ends;
   PositionerIndex follower;
-  double at_s = 0;      // it may be too late from here on, seconds after the start signal
+  double at_s = 0;      // from here on it may be too late, in seconds after the start signal
   double leaves_s = 0;  // time that is left between the end of the one and the stop of the other
 };
 
 struct Plan {
   std::vector<UnitPlan> moves;     // ascending by unit; only units that move
   std::vector<Unserved> unserved;  // ascending by unit
-  std::string too_near;   // with PlanOptions::lead_apart: the pairs that are led apart, for people
+  /// with PlanOptions::lead_apart: the pairs that are led apart, as text for operators
+  std::string too_near;
   double makespan_s = 0;  // start signal to the last vector, by nominal clocks
   double bound_s = 0;     // no plan can be shorter: the slowest unit's shortest move alone
-  /// With PlanOptions::stall_tolerant: when each stage begins; where everybody is must be measured
-  /// before. Seconds after the start signal.
+  /// With PlanOptions::stall_tolerant: when each stage begins; the places of all units must be
+  /// measured before. Seconds after the start signal.
   std::vector<double> stages_s;
   std::uint32_t crossings = 0;       // pairs of which one comes where the other was before
   std::vector<Unnoticed> unnoticed;  // those among them that the notice does not cover
-  std::vector<TightPair> tightest;   // those with the least clearance; empty: nobody looked
+  /// the pairs with the least clearance; empty: they were not looked for
+  std::vector<TightPair> tightest;
 };
 
-/// Where an axis is `t_s` after the start signal by the unit's own clock: whole vectors applied so
-/// far. Cost: O(segments).
+/// The place of an axis `t_s` after the start signal by the unit's own clock: whole vectors applied
+/// so far. Cost: O(segments).
 std::int32_t PositionAt(std::int32_t from, const AxisPath& path, const AxisDrive& drive,
                         double t_s);
 

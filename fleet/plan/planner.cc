@@ -18,17 +18,19 @@
 namespace focalfleet {
 namespace {
 
-/// Each attempt takes at least one unit out of the served ones or lets at least one step aside; a
-/// fleet in which more goes wrong than this is planned with what can be served without any stepping
+/// Each attempt takes at least one unit out of the served ones or lets at least one be moved aside.
+/// After so many attempts the fleet is planned with what can be served without moving any unit
 /// aside.
 constexpr int kAttemptsMax = 60;
-constexpr std::size_t kTightest = 20;
+constexpr std::size_t kTightest = 20;  // pairs that Plan::tightest lists
+/// Repeats with other random numbers, without limits of power.
 constexpr std::uint64_t kFreshStarts = 3;
-constexpr double kLongGiven = 1.02;
+constexpr double kLongGiven = 1.02;  // times the bound: given motions up to here do not lengthen it
+/// Share of the time beyond which power takes the time, and rails are full.
 constexpr double kFullShare = 0.75;
 constexpr double kSlackMost = 2;  // times the bound that limits of power may take
-/// With more neighbours than this a unit hardly ever finds everybody else out of its way: an order
-/// is found sooner.
+/// With more neighbours than this on average a unit hardly ever finds all others out of its way: an
+/// order is found sooner.
 constexpr double kDenseNeighbours = 10;
 
 std::vector<Pose> StartsOf(const PlanRequest& request) {
@@ -81,7 +83,7 @@ class Planner {
   std::string too_near_;  // pairs that start so, by name
   std::vector<std::uint8_t> aside_;
   std::vector<std::uint8_t> by_itself_;  // goes from start to target in one way, not by its cell
-  std::vector<std::uint8_t> hopeful_;    // CanEver was asked and said yes
+  std::vector<std::uint8_t> hopeful_;    // CanEver has returned true for it
   std::vector<std::uint8_t> movers_;
   std::vector<std::uint32_t> stuck_;
   std::vector<std::uint32_t> stuck_for_order_;  // given up though a way exists
@@ -108,7 +110,7 @@ Piece BackOf(const Piece& piece) {
   return {piece.unit, {piece.sweep.to, piece.sweep.from, piece.sweep.out_of_step}};
 }
 
-/// That every target is in reach, and nobody starts or ends nearer to another than allowed.
+/// Every target is in reach, and no unit starts or ends nearer to another than allowed.
 Status Planner::Check() const {
   std::string text = service_.TargetsOutOfRange();
   const auto add = [&text](const std::string& more) {
@@ -119,7 +121,7 @@ Status Planner::Check() const {
   return text.empty() ? Status{} : Fail(ErrorCode::kInvalid, text);
 }
 
-/// One whole try: in, turn, out. False: stuck_ says who could not.
+/// Makes one whole attempt: in, turn, out. False: stuck_ has the units that found no way.
 bool Planner::Attempt(std::vector<Piece>* order) {
   order->clear();
   stuck_.clear();
@@ -175,7 +177,7 @@ void Planner::Abandon(std::uint32_t unit, std::optional<NoWay> proof) {
   by_itself_[unit] = 0;
 }
 
-/// Gives up on stuck units that no order of moves can help. True: there was one.
+/// Gives up stuck units that no order of moves can help. True: there was one.
 bool Planner::AbandonHopeless() {
   bool any = false;
   for (const std::uint32_t i : stuck_) {
@@ -192,15 +194,15 @@ bool Planner::AbandonHopeless() {
   return any;
 }
 
-/// After a failed attempt. What is hopeless is given up at once. Those that stand may step aside;
-/// where nobody is left to ask, the stuck unit tries it by itself; where that has been tried, near
-/// it or by itself, that unit is given up and stays.
+/// Changes the request after a failed attempt. Units with no way at all are given up at once.
+/// Standing units may then be moved aside. Where none is left, the stuck unit goes in one way by
+/// itself. Where that has failed too, a unit near it, or the stuck unit, is given up and stays.
 void Planner::GiveWay() {
   if (AbandonHopeless()) return;
   bool added = false;
   for (const std::uint32_t i : stuck_) added = LetStepAside(i) || added;
   if (added) return;
-  // One of each cluster at a time: with it changed the others may find a way.
+  // Only one unit of each cluster changes at a time: after its change the others may find a way.
   std::vector<std::uint8_t> changed(scene_.size(), 0);
   for (const std::uint32_t i : stuck_) {
     const auto near = scene_.neighbours(i);
@@ -228,7 +230,7 @@ double Planner::MeanNeighbours() const {
   return scene_.size() == 0 ? 0 : static_cast<double>(sum) / static_cast<double>(scene_.size());
 }
 
-/// Everybody at once. False: somebody is left who meets others; nothing is planned then.
+/// Plans all units at once. False: some units still meet others, and nothing is planned.
 bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   std::vector<std::uint8_t> may_move(service_.movable().begin(), service_.movable().end());
   if (options_.fixed)
@@ -245,11 +247,11 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
     const Tolerance tolerance{options_.start_skew_s, options_.clock_error, options_.notice_s};
     std::optional<PowerLedger> ledger;
     double within_s = std::max({TimeBoundS(service_), plan_.makespan_s, options_.within_s});
-    // Each turn of sectors may take a little longer than its bound: that must not add up.
+    // Each turn of sectors may take a little longer than its bound: the excess must not add up.
     if (service_.given_end_s() > kLongGiven * within_s) within_s = service_.given_end_s();
     if (options_.power.any()) {
       ledger.emplace(layout_, request_.drives, options_.motor, options_.power, tolerance);
-      // Where power is what takes the time, rails that are full leave no room to give way.
+      // Where power takes the time, full rails leave no room to give way.
       const double power_s = PowerBoundS(service_, options_.power, &*ledger);
       if (slack == 0) slack = power_s > kFullShare * within_s ? 1.3 : 1.02;
       within_s = std::min(std::max(within_s, power_s) * slack, kOffsetMaxS);
@@ -271,11 +273,11 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
       PlanOfLocalSearch();
       return true;
     }
-    // Some may have no way at all: they stay, and the others are asked again.
+    // Some units may have no way at all: they stay, and the others are planned again.
     stuck_ = local_search_.in_conflict;
     std::erase_if(stuck_, [&](std::uint32_t i) { return !service_.is_movable(i); });
     if (AbandonHopeless()) continue;
-    // The others may need more time within limits of power, or other luck.
+    // The others may need more time within limits of power, or other random numbers.
     if (ledger) slack *= 1.1;
     if (ledger ? slack > kSlackMost : ++fresh_starts > kFreshStarts) break;
     if (!options_.power.any()) paths = local_search_.paths;
@@ -284,13 +286,13 @@ bool Planner::AllAtOnce(std::span<const AxisPaths> begin_with) {
   return false;
 }
 
-/// After all at once has failed: once more, without those that it failed for. False: they are too
-/// many, or do not move; nothing has changed then.
+/// Plans all units at once again, without those that made it fail. False: they are too many, or do
+/// not move; nothing has changed then.
 bool Planner::LeaveStuck() {
   constexpr int kTimes = 8;
   const Service before = service_;
   for (int time = 0; time < kTimes && !stuck_.empty(); ++time) {
-    // One of each cluster at a time: with it at rest the others may find a way.
+    // Only one unit of each cluster rests at a time: with it at rest the others may find a way.
     std::vector<std::uint8_t> stays(scene_.size(), 0);
     for (const std::uint32_t i : stuck_) {
       const auto near = scene_.neighbours(i);
@@ -336,7 +338,7 @@ void Planner::TracksOfPlan() {
       if (i < near.unit) local_search_.without_notice.emplace_back(i, near.unit);
 }
 
-/// Those that found no turn in the order go among the others as these are planned.
+/// Plans units that found no turn in the order among the others as these are planned.
 void Planner::ServeTheRest() {
   const Service before = service_;
   const Plan ordered = plan_;
@@ -365,7 +367,7 @@ Plan Planner::Finish() {
   return std::move(plan_);
 }
 
-/// An order would not know what is given.
+/// An order could not take account of given motions.
 Result<Plan> Planner::AmongGiven() {
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
   if (too_near_.empty() && AllAtOnce(request_.motions)) return Finish();
@@ -383,8 +385,8 @@ Result<Plan> Planner::Run() {
   if (options_.power.any()) FOCALFLEET_TRY(CheckPower(service_, options_));
   const bool dense = MeanNeighbours() > kDenseNeighbours;
   const bool at_once = !dense && !options_.stall_tolerant;
-  // An order sends everybody through its cell, which costs a fleet that a camera corrects most of
-  // its accuracy: that a few stand too near must not lead to it.
+  // An order sends every unit through its cell, which costs a fleet that a camera corrects most of
+  // its accuracy. A few units that stand too near must not lead to it.
   const Scene as_ruled = scene_;
   if (at_once && AllAtOnce(request_.motions)) return Finish();
   FOCALFLEET_TRY(CheckWanted());
@@ -405,7 +407,7 @@ Result<Plan> Planner::Run() {
   if (!done) {
     order.clear();
     for (std::uint32_t i = 0; i < scene_.size(); ++i)
-      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, kNobody);
+      if (service_.goes(i)) service_.Unserve(i, UnservedWhy::kBlocked, kNoUnitIndex);
   }
   // Stages gain nothing from short legs.
   const std::vector<Piece> pieces = options_.stall_tolerant ? order : CutPieces(order, scene_);
@@ -433,7 +435,7 @@ Status CheckPlanRequest(const PlanRequest& request, const PlanOptions& options) 
 
 Result<Plan> MakePlan(const PlanRequest& request, const PlanOptions& options) {
   FOCALFLEET_TRY(CheckShapes(request));
-  // Stages are an order in time: whoever goes at another time would leave them.
+  // Stages are an order in time: a unit that moves at another time would leave them.
   if (options.stall_tolerant &&
       (options.objective != Objective::kSoonest || !request.given.empty()))
     return Fail(ErrorCode::kInvalid,

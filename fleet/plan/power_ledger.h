@@ -1,7 +1,7 @@
-// What each supply rail gives at every moment of a plan in the making, against what it may give.
-// Time is cut into slots, and a motor that may run at any moment of a slot, for any start skew and
-// clock, is counted for all of it: what fits here holds at every instant of the nominal rows and of
-// all rows that the tolerance allows.
+// The power that each supply rail gives at every moment of a plan in the making, against what it
+// may give. Time is cut into slots. A motor that may run at any moment of a slot, for any start
+// skew and clock, is counted for all of it. A motion that fits here keeps the limits at every
+// instant of the nominal rows and of all rows that the tolerance allows.
 #pragma once
 
 #include <cmath>
@@ -26,22 +26,23 @@ class PowerLedger {
   PowerLedger(const Layout& layout, std::span<const UnitDrive> drives, const MotorModel& motor,
               const PowerLimits& limits, const Tolerance& tolerance);
 
-  /// Enters the motion of a unit where it keeps the limits. False: it does not, nothing changes.
+  /// Enters the motion of a unit where it keeps the limits. False: it does not, and nothing
+  /// changes.
   bool Enter(std::uint32_t unit, const AxisPaths& path);
-  /// Enters what moves already, whatever the limits say of it.
+  /// Enters a motion that is under way already, whatever the limits say.
   void EnterAnyway(std::uint32_t unit, const AxisPaths& path) { Add(unit, path, 1); }
   void Remove(std::uint32_t unit, const AxisPaths& path);
   /// Units that are entered from now on may start this early or late.
   void WidenSkew(double start_skew_s) { tolerance_.start_skew_s = start_skew_s; }
-  /// Whether `path` would keep the limits if the unit left `instead_of`, which is entered.
+  /// True: `path` would keep the limits if the unit left `instead_of`, which is entered.
   bool Fits(std::uint32_t unit, const AxisPaths& path, const AxisPaths& instead_of);
 
-  /// The soonest begin of a segment that is in no slot with one that ends at `end_s`. Units: s.
+  /// The soonest begin of a segment that shares no slot with one that ends at `end_s`. Units: s.
   [[nodiscard]] double BeginAfter(double end_s) const;
 
-  /// Energy that the motion takes by nominal clocks. Units: J.
+  /// Energy of the motion by nominal clocks. Units: J.
   double Energy(std::uint32_t unit, const AxisPaths& path);
-  /// What one motor draws as it is driven: no limit below it lets it turn. Units: W.
+  /// The power of one motor as it is driven: no limit below it lets it turn. Units: W.
   [[nodiscard]] double Motor_W(std::uint32_t unit, std::size_t axis) {
     const UnitDrive& drive = drives_[unit];
     return powers_.Of({drive.axis[axis], drive.mode, drive.v_bus_V}).total_W();

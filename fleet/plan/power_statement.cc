@@ -43,7 +43,7 @@ double Flatness(const Curve& curve, double makespan_s) {
   return curve.energy_J * curve.energy_J / (makespan_s * curve.square_W2s);
 }
 
-/// By rail and, last, of all together.
+/// The curves of each rail and, last, of all rails together.
 std::vector<std::pair<RailId, Curve>> CurvesOf(std::vector<Change> changes) {
   std::vector<std::pair<RailId, Curve>> curves;
   std::sort(changes.begin(), changes.end(), [](const Change& a, const Change& b) {

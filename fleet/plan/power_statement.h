@@ -1,4 +1,5 @@
-// What a plan draws, in the few figures that tell whether a supply, a sky and a bill can stand it.
+// The power that a plan drawsin a few figures: is the supply strong enough, how even is the load,
+// what does it cost.
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,7 @@ struct RailStatement {
   RailId rail;
   double energy_J = 0;
   double peak_W = 0;       // by nominal clocks
-  double peak_most_W = 0;  // whatever skew and clocks do
+  double peak_most_W = 0;  // for all skews and clocks
   double flatness = 0;     // mean squared over mean square until the plan's end: 1 is even
 };
 struct PowerStatement {
@@ -30,7 +31,7 @@ struct PowerStatement {
     return most_W;
   }
 };
-/// Exact, from the segments. Cost: O(s log s) for s segments.
+/// The statement is exact, from the segments. Cost: O(s log s) for s segments.
 PowerStatement StatePower(const Plan& plan, const Layout& layout, std::span<const UnitDrive> drives,
                           const PlanOptions& options);
 

@@ -3,45 +3,27 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <utility>
 
 #include "fleet/plan/candidates.h"
 #include "fleet/plan/guarantee.h"
+#include "fleet/plan/replan_neighbourhood.h"
+#include "fleet/plan/service.h"
 #include "fleet/plan/time_search.h"
 
 namespace focalfleet {
 namespace {
 
 constexpr double kTickS = 1e-4;
-constexpr double kGuardMm = 1.5e-4;  // of a pair that may be as near as the rule allows
-constexpr double kCoverSlackMm = 0.05;
-/// Grids of the searches among the others as they go, and as they stand in the end: as fine as an
-/// answer within some milliseconds allows.
+/// Grids of the searches among the others as they move, and as they stand in the end. They are as
+/// fine as an answer within some milliseconds allows.
 struct Effort {
   double grid_deg;
   std::uint32_t expansions_max;
 };
 constexpr std::array kGridsAtRestDeg{3.0, 1.5};
 constexpr std::array kEfforts{Effort{6, 300}, Effort{3, 600}};
-
-AxisPaths Later(const AxisPaths& paths, std::uint32_t by_ticks) {
-  AxisPaths later;
-  for (std::size_t k = 0; k < kAxisCount; ++k) {
-    for (Segment segment : paths[k].segments()) {
-      segment.start_ticks += by_ticks;
-      later[k].Append(segment);
-    }
-  }
-  return later;
-}
-
-AxisPaths Sooner(const AxisPaths& paths, std::uint32_t by_ticks) {
-  return Later(paths, 0u - by_ticks);  // modulo 2^32, and none begins before
-}
-
-std::uint32_t TicksOf(double t_s) { return static_cast<std::uint32_t>(std::llround(t_s / kTickS)); }
 
 Way Reversed(const Way& way) {
   Way reversed(way.size());
@@ -52,44 +34,29 @@ Way Reversed(const Way& way) {
   return reversed;
 }
 
-bool IsEmpty(const AxisPaths& paths) { return paths[0].size() + paths[1].size() == 0; }
-
 }  // namespace
 
-/// One answer: what is near the unit, and the search among it.
+/// The search for one answer: the search for a way of the unit in its neighbourhood.
 class Replanner {
  public:
   Replanner(const RunningPlan& running, const ReplanQuestion& question,
             std::span<const Deviation> deviations)
-      : running_(running), scene_(running.scene_), q_(question), deviations_(deviations) {}
+      : running_(running),
+        scene_(running.scene_),
+        q_(question),
+        deviations_(deviations),
+        near_(running, question) {}
 
   Result<LateMove> Run();
   Status Check();
 
  private:
-  /// A neighbour with a place, in the configuration's time.
-  struct Other {
-    std::uint32_t unit = 0;
-    Track track;
-    Pose ends{};
-    double skew_s = 0;
-    double need_mm = 0;
-    Tolerance tolerance;  // of the pair, with notice
-    std::uint32_t met = 0;
-  };
-  static constexpr std::size_t kThing = SIZE_MAX;  // not one of the others
+  using Other = ReplanNeighbourhood::Other;
 
   [[nodiscard]] Status CheckQuestion() const;
-  [[nodiscard]] Status CheckTarget() const;
-  void LookAround();
-  void AddOther(const NeighbourNeed& near, const Deviation* deviation);
-  void AddCover(const NeighbourNeed& near, const UnitKnowledge& knowledge);
-  void AllowFor(Other* other, const Pose& starts) const;
-  [[nodiscard]] Tolerance ToleranceOf(const Other& other, bool with_notice) const;
   [[nodiscard]] Track TrackOf(const AxisPaths& own) const {
-    return {arm(), drive(), q_.from, Later(own, start_ticks_)};
+    return {arm(), drive(), q_.from, Shifted(own, start_ticks_)};
   }
-  bool IsClear(const Track& track, bool with_notice);
   bool Take(const AxisPaths& own, bool with_notice);
   bool TakeOneOf(bool with_notice);
   void Candidates(double within_s);
@@ -98,13 +65,10 @@ class Replanner {
   bool TakeAlong(const Way& way);
   bool GoWhenAllStand();
   bool FindWay();
-  [[nodiscard]] double OthersEnd() const;
   void EnterPower();
   LateMove Finish();
+  void FindFollowersAndLeaders(LateMove* late) const;
   [[nodiscard]] Error NoWay() const;
-  [[nodiscard]] std::string NameOf(std::uint32_t unit) const {
-    return "unit " + std::to_string(running_.layout_->unit({unit}).id.value);
-  }
   [[nodiscard]] const ArmGeometry& arm() const { return scene_.arm(q_.unit.value); }
   [[nodiscard]] const UnitDrive& drive() const { return running_.drives_[q_.unit.value]; }
 
@@ -112,13 +76,9 @@ class Replanner {
   const Scene& scene_;
   const ReplanQuestion& q_;
   std::span<const Deviation> deviations_;
+  ReplanNeighbourhood near_;
   std::uint32_t start_ticks_ = 0;
   double start_s_ = 0;
-  std::vector<Other> others_;
-  std::vector<std::size_t> order_;  // of others_, those that were met last first
-  std::vector<Blocker> standing_;
-  std::uint32_t things_met_ = 0;
-  std::uint32_t thing_ = kNobody;  // met last, of those that stand for good
   std::optional<PowerLedger> ledger_;
   std::uint32_t short_of_power_ = 0;
   std::vector<Candidate> candidates_;
@@ -129,8 +89,8 @@ class Replanner {
 
 Status Replanner::CheckQuestion() const {
   if (q_.unit.value >= scene_.size()) return Fail(ErrorCode::kInvalid, "there is no such unit");
-  const std::string name = NameOf(q_.unit.value);
-  // Written so that what is not a number fails.
+  const std::string name = running_.NameOf(q_.unit.value);
+  // The condition is written so that a NaN fails.
   if (!(q_.start_s >= 0 && q_.start_s < kOffsetMaxS && q_.now_s <= q_.start_s &&
         q_.start_skew_s >= 0 && q_.start_skew_s < 1))
     return Fail(ErrorCode::kInvalid, name + " cannot start then");
@@ -143,140 +103,10 @@ Status Replanner::CheckQuestion() const {
   return {};
 }
 
-/// Where the others end, or stand, the target has to be clear for good.
-Status Replanner::CheckTarget() const {
-  const SegmentFp line = arm().At(q_.to);
-  const std::string target = "the target of " + NameOf(q_.unit.value);
-  std::string text;
-  for (const Other& other : others_) {
-    const double distance = DistanceMm(line, scene_.arm(other.unit).At(other.ends));
-    const double need = scene_.FullNeed(q_.unit.value, other.unit);
-    if (distance >= need - kClearToleranceMm) continue;
-    std::array<char, 200> words{};
-    std::snprintf(words.data(), words.size(),
-                  "%s%s and the place where %s ends are %.4f mm apart, %.4f mm needed",
-                  text.empty() ? "" : "; ", target.c_str(), NameOf(other.unit).c_str(), distance,
-                  need);
-    text += words.data();
-  }
-  std::uint32_t named = q_.unit.value;
-  for (const Blocker& thing : standing_) {
-    if (thing.by == named) continue;
-    if (DistanceMm(line, thing.capsule.line) > thing.capsule.radius_mm + thing.need_mm) continue;
-    named = thing.by;
-    text += (text.empty() ? "" : "; ") + target + " is not clear of " +
-            (named == kNobody ? "a fixed obstacle" : "where " + NameOf(named) + " may stand");
-  }
-  if (!text.empty()) return Fail(ErrorCode::kInvalid, text);
-  return {};
-}
-
-Tolerance Replanner::ToleranceOf(const Other& other, bool with_notice) const {
-  Tolerance tolerance = other.tolerance;
-  if (!with_notice) tolerance.notice_s = 0;
-  return tolerance;
-}
-
-/// A pair may stand as near as the rule allows where it starts or ends, as in Scene::AllowFor.
-void Replanner::AllowFor(Other* other, const Pose& starts) const {
-  const double least = scene_.FullNeed(q_.unit.value, other->unit) - kClearToleranceMm;
-  for (const Pose& mine : {q_.from, q_.to}) {
-    for (const Pose& theirs : {starts, other->ends}) {
-      const double distance = DistanceMm(arm().At(mine), scene_.arm(other->unit).At(theirs));
-      other->need_mm = std::max(least, std::min(other->need_mm, distance - kGuardMm));
-    }
-  }
-}
-
-void Replanner::AddCover(const NeighbourNeed& near, const UnitKnowledge& knowledge) {
-  const ArmGeometry& other = scene_.arm(near.unit);
-  for (const Capsule& capsule : CoverOf(other, BoxOf(other, knowledge), kCoverSlackMm))
-    standing_.push_back({capsule, near.need_mm, near.unit});
-}
-
-void Replanner::AddOther(const NeighbourNeed& near, const Deviation* deviation) {
-  const std::uint32_t j = near.unit;
-  const ArmGeometry& other_arm = scene_.arm(j);
-  Other other;
-  other.unit = j;
-  other.need_mm = near.need_mm;
-  other.skew_s = running_.options_.start_skew_s;
-  Pose starts = running_.from_[j];
-  if (deviation == nullptr) {
-    other.ends = running_.to_[j];
-    other.track = Track(other_arm, running_.drives_[j], starts, running_.paths_[j]);
-  } else if (deviation->goes) {
-    const LateMove& late = *deviation->goes;
-    starts = late.move.from;
-    other.ends = late.move.to;
-    other.skew_s = late.start_skew_s;
-    other.track =
-        Track(other_arm, running_.drives_[j], starts, Later(late.move.path, TicksOf(late.start_s)));
-  } else {
-    starts = other.ends = PlaceOf(deviation->stands);
-    other.track = Track(other_arm, starts);
-  }
-  other.tolerance = {(other.skew_s + q_.start_skew_s) / 2, running_.options_.clock_error,
-                     running_.options_.notice_s};
-  AllowFor(&other, starts);
-  others_.push_back(std::move(other));
-}
-
-void Replanner::LookAround() {
-  std::vector<std::uint32_t> deviating;
-  for (const NeighbourNeed& near : scene_.neighbours(q_.unit.value)) {
-    const auto it =
-        std::find_if(deviations_.begin(), deviations_.end(),
-                     [&](const Deviation& deviation) { return deviation.unit.value == near.unit; });
-    const Deviation* deviation = it == deviations_.end() ? nullptr : &*it;
-    if (deviation != nullptr) deviating.push_back(near.unit);
-    const bool is_place = deviation == nullptr
-                              ? scene_.is_place(near.unit)
-                              : deviation->goes.has_value() || IsPlace(deviation->stands);
-    if (is_place)
-      AddOther(near, deviation);
-    else if (deviation != nullptr)
-      AddCover(near, deviation->stands);
-  }
-  for (const StandingThing& thing : scene_.standing(q_.unit.value)) {
-    // Of whom it stands for, more may be known by now.
-    if (std::find(deviating.begin(), deviating.end(), thing.by) != deviating.end()) continue;
-    double need_mm = thing.need_mm;
-    if (thing.by == kNobody)
-      for (const Pose& pose : {q_.from, q_.to})
-        need_mm =
-            std::max(thing.least_mm,
-                     std::min(need_mm, DistanceMm(arm().At(pose), thing.capsule.line) - kGuardMm));
-    standing_.push_back({thing.capsule, need_mm, thing.by});
-  }
-  order_.resize(others_.size());
-  std::iota(order_.begin(), order_.end(), std::size_t{0});
-}
-
-bool Replanner::IsClear(const Track& track, bool with_notice) {
-  for (const Blocker& thing : standing_) {
-    if (PassesClearOf(arm(), track, thing.capsule, thing.need_mm)) continue;
-    ++things_met_;
-    thing_ = thing.by;
-    return false;
-  }
-  for (std::size_t k = 0; k < order_.size(); ++k) {
-    Other& other = others_[order_[k]];
-    if (PassesClearSince(q_.now_s, arm(), track, scene_.arm(other.unit), other.track, other.need_mm,
-                         ToleranceOf(other, with_notice)))
-      continue;
-    ++other.met;
-    std::rotate(order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(k),
-                order_.begin() + static_cast<std::ptrdiff_t>(k) + 1);
-    return false;
-  }
-  return true;
-}
-
 bool Replanner::Take(const AxisPaths& own, bool with_notice) {
   Track track = TrackOf(own);
-  if (!IsClear(track, with_notice)) return false;
-  if (ledger_ && !ledger_->Enter(q_.unit.value, Later(own, start_ticks_))) {
+  if (!near_.IsClear(track, with_notice)) return false;
+  if (ledger_ && !ledger_->Enter(q_.unit.value, Shifted(own, start_ticks_))) {
     ++short_of_power_;
     return false;
   }
@@ -285,7 +115,7 @@ bool Replanner::Take(const AxisPaths& own, bool with_notice) {
   return true;
 }
 
-/// The candidate that ends soonest of those that are clear.
+/// Takes the candidate that ends soonest of those that are clear.
 bool Replanner::TakeOneOf(bool with_notice) {
   by_end_.resize(candidates_.size());
   std::iota(by_end_.begin(), by_end_.end(), std::size_t{0});
@@ -311,17 +141,17 @@ void Replanner::Candidates(double within_s) {
   }
 }
 
-/// A way among all others as they go.
+/// Takes a way among all others as they move.
 bool Replanner::Search(double end_s, bool with_notice) {
-  std::vector<Passer> passers;
-  for (const Other& other : others_)
-    passers.push_back(
-        {&scene_.arm(other.unit), &other.track, other.need_mm, ToleranceOf(other, with_notice)});
+  std::vector<MovingNeighbour> moving;
+  for (const Other& other : near_.others())
+    moving.push_back({&scene_.arm(other.unit), &other.track, other.need_mm,
+                      near_.ToleranceOf(other, with_notice)});
   TimeSearch search;
   TimeSearch::Question question{.arm = &arm(),
                                 .drive = &drive(),
-                                .passers = passers,
-                                .standing = standing_,
+                                .moving = moving,
+                                .standing = near_.standing(),
                                 .from = q_.from,
                                 .to = q_.to,
                                 .within = RangeAround(arm(), q_.from),
@@ -331,25 +161,16 @@ bool Replanner::Search(double end_s, bool with_notice) {
     question.grid_deg = effort.grid_deg;
     question.expansions_max = effort.expansions_max;
     const std::optional<AxisPaths> paths = search.Find(question);
-    if (paths && Take(Sooner(*paths, start_ticks_), with_notice)) return true;
+    if (paths && Take(Shifted(*paths, -std::int64_t{start_ticks_}), with_notice)) return true;
   }
   return false;
 }
 
-/// By then everybody near is where they stay.
-double Replanner::OthersEnd() const {
-  double end_s = 0;
-  for (const Other& other : others_)
-    end_s = std::max(
-        end_s, other.track.end_s() + other.tolerance.Slip(other.track.end_s() + Track::kSliceS));
-  return end_s;
-}
-
-/// A way among the others as they stand in the end; empty: none on this grid. `reached`: how many
-/// poses were, where there is none.
+/// A way among the others as they stand in the end. Empty: none on this grid; `reached` is then the
+/// number of poses that were reached.
 Way Replanner::WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached) const {
-  std::vector<Blocker> blockers = standing_;
-  for (const Other& other : others_)
+  std::vector<Blocker> blockers(near_.standing().begin(), near_.standing().end());
+  for (const Other& other : near_.others())
     blockers.push_back({{scene_.arm(other.unit).At(other.ends), 0}, other.need_mm, other.unit});
   PathSearch::Question question;
   question.arm = &arm();
@@ -365,10 +186,10 @@ Way Replanner::WayInTheEnd(double grid_deg, bool backwards, std::size_t* reached
   return backwards ? Reversed(way) : way;
 }
 
-/// Waits until the others have ended, and goes along a way among them as they stand then.
+/// Takes a way among the others as they stand in the end, begun after they have ended.
 bool Replanner::GoWhenAllStand() {
-  // Where there is no way the start or the target is shut in: the fine search begins at that end,
-  // where it soon knows.
+  // Where no way exists, the start or the target is shut in. The fine search begins at that end,
+  // where it finishes soon.
   std::size_t from_start = 0;
   std::size_t from_end = 0;
   if (TakeAlong(WayInTheEnd(kGridsAtRestDeg[0], false, &from_start))) return true;
@@ -383,28 +204,29 @@ bool Replanner::TakeAlong(const Way& way) {
   candidates_.clear();
   AppendAlong(along, way, &candidates_);
   if (candidates_.empty()) return false;
-  along.within_s = std::max(0.0, OthersEnd() - start_s_) + candidates_.front().end_s;
+  along.within_s = std::max(0.0, near_.OthersEnd() - start_s_) + candidates_.front().end_s;
   AppendAlong(along, way, &candidates_);
   return TakeOneOf(true);
 }
 
-/// Within the time that the others take anyhow, then after them, at last without notice.
+/// Looks for a way within the time that the others take anyhow, then after them, at last without
+/// notice.
 bool Replanner::FindWay() {
   const double straight_s = Straight(drive(), q_.from, q_.to).end_s;
   const double within_s = std::max(straight_s, running_.end_s_ - start_s_);
   Candidates(within_s);
   if (TakeOneOf(true) || Search(start_s_ + within_s, true)) return true;
-  // Folded all the way in and out again, once the others stand.
+  // Time to fold all the way in and out again, once the others stand.
   const PoseBox& range = arm().range();
   const double fold_s = (range.high[1] - range.low[1]) * SecondsPerVector(drive().axis[1]);
-  Candidates(std::max(0.0, OthersEnd() - start_s_) + straight_s + 2 * fold_s);
+  Candidates(std::max(0.0, near_.OthersEnd() - start_s_) + straight_s + 2 * fold_s);
   if (TakeOneOf(true) || GoWhenAllStand()) return true;
   if (running_.options_.notice_s <= 0) return false;
   Candidates(within_s);
   return TakeOneOf(false) || Search(start_s_ + within_s, false);
 }
 
-/// What the others draw; who stands for certain draws nothing.
+/// Enters the power of the others; a unit that stands for certain draws nothing.
 void Replanner::EnterPower() {
   if (!running_.ledger_) return;
   ledger_.emplace(*running_.ledger_);
@@ -416,7 +238,7 @@ void Replanner::EnterPower() {
     if (deviation.unit == q_.unit || !deviation.goes) continue;
     ledger_->WidenSkew(deviation.goes->start_skew_s);
     ledger_->EnterAnyway(deviation.unit.value,
-                         Later(deviation.goes->move.path, TicksOf(deviation.goes->start_s)));
+                         Shifted(deviation.goes->move.path, TicksOf(deviation.goes->start_s)));
   }
   ledger_->WidenSkew(q_.start_skew_s);
 }
@@ -434,57 +256,56 @@ LateMove Replanner::Finish() {
                 .leaders = {},
                 .unnoticed = {}};
   late.end_s += EndOf(late.move, drive());
-  if (IsEmpty(own_)) return late;
+  if (!IsEmpty(own_)) FindFollowersAndLeaders(&late);
+  return late;
+}
+
+/// The neighbours to stop where this unit ends early, and those whose early end stops this unit.
+void Replanner::FindFollowersAndLeaders(LateMove* late) const {
   const double notice_s = running_.options_.notice_s;
-  for (const Other& other : others_) {
+  for (const Other& other : near_.others()) {
     if (other.track.legs().size() < 2) continue;
-    const bool noticed = PassesClearSince(q_.now_s, arm(), track_, scene_.arm(other.unit),
-                                          other.track, other.need_mm, ToleranceOf(other, true));
+    const bool noticed =
+        PassesClearSince(q_.now_s, arm(), track_, scene_.arm(other.unit), other.track,
+                         other.need_mm, near_.ToleranceOf(other, true));
     FollowingQuestion question{.ends = &track_,
                                .comes = &other.track,
                                .need_mm = other.need_mm,
-                               .proven = ToleranceOf(other, noticed),
+                               .proven = near_.ToleranceOf(other, noticed),
                                .skew_s = std::max(q_.start_skew_s, other.skew_s),
                                .from_s = q_.now_s,
                                .notice_s = notice_s};
     const PositionerIndex j{other.unit};
     if (const auto following = FindFollowing(question)) {
-      late.move.followers.push_back(following->FollowerOf(j));
+      late->move.followers.push_back(following->FollowerOf(j));
       if (following->leaves_s < notice_s)
-        late.unnoticed.push_back({q_.unit, j, following->since_s, following->leaves_s});
+        late->unnoticed.push_back({q_.unit, j, following->since_s, following->leaves_s});
     }
     std::swap(question.ends, question.comes);
-    // It may have ended a moment ago, and nobody has noticed yet.
+    // The neighbour may have ended a moment ago, unnoticed so far.
     question.from_s -= notice_s + question.proven.Slip(q_.now_s);
     if (const auto following = FindFollowing(question)) {
-      late.leaders.push_back({j, following->FollowerOf(q_.unit)});
+      late->leaders.push_back({j, following->FollowerOf(q_.unit)});
       if (following->leaves_s < notice_s)
-        late.unnoticed.push_back({j, q_.unit, following->since_s, following->leaves_s});
+        late->unnoticed.push_back({j, q_.unit, following->since_s, following->leaves_s});
     }
   }
-  return late;
 }
 
 Error Replanner::NoWay() const {
-  std::string text = "no way to the target of " + NameOf(q_.unit.value) + " was found";
-  const auto most = std::max_element(others_.begin(), others_.end(),
-                                     [](const Other& a, const Other& b) { return a.met < b.met; });
-  const std::uint32_t met = most == others_.end() ? 0 : most->met;
-  if (short_of_power_ > std::max(met, things_met_))
+  std::string text = "no way to the target of " + running_.NameOf(q_.unit.value) + " was found";
+  const std::string in_the_way = near_.InTheWay();
+  if (short_of_power_ > std::max(near_.most_met(), near_.things_met()))
     text += " within the limits of power";
-  else if (things_met_ > met)
-    text += ": " +
-            (thing_ == kNobody ? "a fixed obstacle" : "where " + NameOf(thing_) + " may stand") +
-            " is in the way";
-  else if (met > 0)
-    text += ": " + NameOf(most->unit) + " is in the way";
+  else if (!in_the_way.empty())
+    text += ": " + in_the_way;
   return {ErrorCode::kRefused, text};
 }
 
 Status Replanner::Check() {
   FOCALFLEET_TRY(CheckQuestion());
-  LookAround();
-  return CheckTarget();
+  near_.LookAround(deviations_);
+  return near_.CheckTarget();
 }
 
 Result<LateMove> Replanner::Run() {
@@ -521,6 +342,10 @@ RunningPlan::RunningPlan(const PlanRequest& request, std::span<const UnitPlan> m
   scene_.AllowFor(to_);
 }
 
+std::string RunningPlan::NameOf(std::uint32_t unit) const {
+  return "unit " + UnitName(*layout_, unit);
+}
+
 Result<LateMove> RunningPlan::Replan(const ReplanQuestion& question,
                                      std::span<const Deviation> deviations) const {
   return Replanner(*this, question, deviations).Run();
@@ -529,32 +354,6 @@ Result<LateMove> RunningPlan::Replan(const ReplanQuestion& question,
 Status RunningPlan::CheckTarget(const ReplanQuestion& question,
                                 std::span<const Deviation> deviations) const {
   return Replanner(*this, question, deviations).Check();
-}
-
-std::vector<Result<LateMove>> RunningPlan::ReplanAll(std::span<const ReplanQuestion> questions,
-                                                     std::span<const Deviation> deviations) const {
-  std::vector<Deviation> all(deviations.begin(), deviations.end());
-  for (const ReplanQuestion& question : questions) {
-    std::erase_if(all, [&](const Deviation& d) { return d.unit == question.unit; });
-    all.push_back({question.unit, Exactly(Witness::kReported, question.from), std::nullopt});
-  }
-  std::vector<Result<LateMove>> answers(questions.size(),
-                                        Fail(ErrorCode::kRefused, "was not looked at"));
-  // One may end where another still stands: who found no way asks again once somebody has left.
-  for (bool left = true; left;) {
-    left = false;
-    for (std::size_t n = 0; n < questions.size(); ++n) {
-      if (answers[n]) continue;
-      answers[n] = Replan(questions[n], all);
-      if (!answers[n]) continue;
-      left = true;
-      const auto mine = std::find_if(all.begin(), all.end(), [&](const Deviation& deviation) {
-        return deviation.unit == questions[n].unit;
-      });
-      mine->goes = *answers[n];
-    }
-  }
-  return answers;
 }
 
 }  // namespace focalfleet

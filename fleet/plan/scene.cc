@@ -8,18 +8,19 @@
 namespace focalfleet {
 namespace {
 
-/// Beyond what the rule asks: covers the rounding of the sums that decide, thousands of times over.
+/// The guard covers the rounding of the sums that decide, thousands of times over. The guard is
+/// added to what the rule asks.
 constexpr double kGuardMm = 2e-4;
 /// A pair that starts or ends nearer than planned is planned this much nearer still, so that
 /// leaving is clear.
 constexpr double kStartSlackMm = 1.5e-4;
-constexpr std::size_t kCoverMax = 400;
+constexpr std::size_t kCoverMax = 400;  // capsules of one cover
 
 double BaseDistance(const ArmGeometry& a, const ArmGeometry& b) {
   return std::hypot(a.base_fp().x_mm - b.base_fp().x_mm, a.base_fp().y_mm - b.base_fp().y_mm);
 }
 
-/// The least disc around the base that the arm fits in, folded back as far as it goes.
+/// The least disc around the base that holds the arm, folded back as far as it goes.
 double FoldedRadius(const ArmGeometry& arm) {
   const double low = arm.Fold(arm.range().low[1]);
   const double high = arm.Fold(arm.range().high[1]);
@@ -45,7 +46,7 @@ PhiSpan PhiWithin(const ArmGeometry& arm, double radius_mm) {
   const double high = std::floor((2 * std::numbers::pi - opening - arm.phi_zero_rad()) / step);
   span.low = std::max(span.low, static_cast<std::int32_t>(low));
   span.high = std::min(span.high, static_cast<std::int32_t>(high));
-  // The arc cosine rounds: what counts is the radius.
+  // The arc cosine rounds, so the radius decides.
   while (span.low <= span.high && arm.FibreRadiusMax(span.low, span.low) > radius_mm) ++span.low;
   while (span.low <= span.high && arm.FibreRadiusMax(span.high, span.high) > radius_mm) --span.high;
   return span;
@@ -78,7 +79,8 @@ std::vector<Capsule> CoverOf(const ArmGeometry& arm, const PoseBox& box, double 
   cover.reserve(static_cast<std::size_t>(parts[0]) * static_cast<std::size_t>(parts[1]));
   for (std::int32_t a = 0; a < parts[0]; ++a) {
     for (std::int32_t b = 0; b < parts[1]; ++b) {
-      // The middle of a part need not be whole vectors: the nearest whole pose and one vector more.
+      // The middle of a part need not be whole vectors: the cover takes the nearest whole pose and
+      // one vector more.
       const Pose middle{
           static_cast<std::int32_t>(std::lround(box.low[0] + theta_half * (2 * a + 1) / parts[0])),
           static_cast<std::int32_t>(std::lround(box.low[1] + phi_half * (2 * b + 1) / parts[1]))};
@@ -157,7 +159,7 @@ void Scene::FindStanding(std::span<const UnitKnowledge> start) {
       const PointFp& c = obstacle.centre_fp;
       if (DistanceMm(arm.base_fp(), c) > reach + need) continue;
       const double least = need - kGuardMm - kClearToleranceMm;
-      standing_.push_back({{{c, c}, 0}, need, least, kNobody, false});
+      standing_.push_back({{{c, c}, 0}, need, least, kNoUnitIndex, false});
     }
     for (const NeighbourNeed& near : neighbours(i)) {
       if (is_place_[near.unit] != 0) continue;
@@ -186,7 +188,7 @@ void Scene::AllowFor(std::span<const Pose> poses) {
     }
     for (std::uint32_t k = standing_begin_[i]; k < standing_begin_[i + 1]; ++k) {
       StandingThing& thing = standing_[k];
-      if (thing.by != kNobody) continue;
+      if (thing.by != kNoUnitIndex) continue;
       const double distance = DistanceMm(line, thing.capsule.line);
       thing.need_mm = std::max(thing.least_mm, std::min(thing.need_mm, distance - kStartSlackMm));
     }
@@ -194,7 +196,7 @@ void Scene::AllowFor(std::span<const Pose> poses) {
 }
 
 void Scene::LeadApart(std::span<const Pose> poses) {
-  // Arms nearer than this may have crossed: which way is apart is then anybody's guess.
+  // Arms nearer than this may have crossed: the direction apart is then not known.
   constexpr double kCrossedMm = 0.2;
   for (std::uint32_t i = 0; i < size(); ++i) {
     if (is_place_[i] == 0) continue;

@@ -1,14 +1,15 @@
-// What a plan is made in: every unit's arm, how far each pair of neighbours must stay apart, the
-// cell of each unit, and what stands still whatever happens.
+// The setting of a plan: every unit's arm and cell, the distance that each pair of neighbours must
+// keep, and the things that never move.
 //
-// Cells. Discs around the bases, so small that an arm inside its own cell is clear of every arm
-// inside another: half-width and clearance are taken off the distance of two bases and the rest is
-// shared. A unit whose elbow needs more than its half gets more, as long as its neighbours can
-// spare it. Where that fails the unit has no cell (radius 0) and cannot be moved by cells.
+// Cells. A cell is a disc around the base, so small that an arm inside its own cell is clear of
+// every arm inside another. Half-width and clearance are taken off the distance of two bases, and
+// the rest is shared. A unit whose elbow needs more than its half gets more, as long as its
+// neighbours can spare it. Where that fails the unit has no cell (radius 0) and cannot be moved by
+// cells.
 //
-// Needs. A pair is planned with the full distance and a guard against rounding; where the two start
-// or end nearer than that (the rule allows 2 um less) the pair's need is lowered to just below what
-// it has.
+// Needs. A pair is planned with the full distance and a guard against rounding. Where the two start
+// or end nearer than that (the rule allows 2 um less), the pair's need is lowered to just below
+// that distance.
 #pragma once
 
 #include <cstdint>
@@ -21,14 +22,14 @@
 
 namespace focalfleet {
 
-inline constexpr std::uint32_t kNobody = 0xffffffffu;
-/// Two units that are this much nearer than half-widths plus clearance still count as clear.
+inline constexpr std::uint32_t kNoUnitIndex = 0xffffffffu;
+/// Two units count as clear that are up to this much nearer than half-widths plus clearance.
 inline constexpr double kClearToleranceMm = 2e-3;
 
 struct NeighbourNeed {
   std::uint32_t unit = 0;
   double need_mm = 0;  // segments of the two must be farther apart than this
-  /// And while both still are where they start; less only where they are to be led apart.
+  /// The need while both still are where they start; smaller only where they are to be led apart.
   double at_start_mm = 0;
 };
 
@@ -36,9 +37,9 @@ struct NeighbourNeed {
 struct StandingThing {
   Capsule capsule;
   double need_mm = 0;
-  double least_mm = 0;         // what the rule asks at the very least
-  std::uint32_t by = kNobody;  // the unit that it stands for; kNobody: a fixed obstacle
-  bool in_cell = false;        // that unit is in its cell wherever it is
+  double least_mm = 0;              // the least that the rule asks
+  std::uint32_t by = kNoUnitIndex;  // the unit that it stands for; kNoUnitIndex: a fixed obstacle
+  bool in_cell = false;             // that unit is in its cell at any of its possible places
 };
 
 /// Whole vectors of phi, both ends included; empty where low > high.
@@ -83,11 +84,11 @@ class Scene {
   /// Lowers the needs of pairs that stand nearer than planned needs in this configuration, by no
   /// more than the rule's tolerance.
   void AllowFor(std::span<const Pose> poses);
-  /// From now on pairs that start nearer than the rule allows may leave each other: on the first
+  /// From now on pairs that start nearer than the rule allows may leave each other. On the first
   /// way of either they are never brought nearer. Pairs that cross are not helped. Shape: (n), the
   /// starts.
   void LeadApart(std::span<const Pose> poses);
-  /// The same for plans that know no first way: such pairs are never nearer than they start.
+  /// The same for plans without a first way: such pairs are never nearer than they start.
   void LeadApartThroughout(std::span<const Pose> poses);
 
  private:

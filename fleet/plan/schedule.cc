@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kCountsPerTick = 14'400;
 static_assert(static_cast<double>(kCountsPerTick) == kTimerHz * 100e-6);
-constexpr double kGrainDeg = 15;
+constexpr double kGrainDeg = 15;  // legs of one axis are cut into parts of about this angle
 
 using AxisCounts = std::array<std::uint32_t, kAxisCount>;
 
@@ -57,7 +57,7 @@ class Scheduler {
     std::int64_t begins = 0;
   };
 
-  /// First count at which a piece may begin that must not meet one that ends at `end`.
+  /// The first count at which a piece may begin that must not meet one that ends at `end`.
   [[nodiscard]] std::int64_t After(std::int64_t end) const {
     const double error = options_.clock_error;
     const double skew = options_.start_skew_s * kTimerHz;
@@ -88,8 +88,8 @@ class Scheduler {
   std::vector<Wait> waits_;
 };
 
-/// What a piece sends where it begins at `earliest`; `phi` as well, or later if it need not keep in
-/// step with theta.
+/// The segments of a piece that begins at `earliest`. `phi` begins then as well, or later if it
+/// need not keep in step with theta.
 AxisPaths Scheduler::SegmentsOf(const Piece& piece, std::int64_t earliest, std::int64_t phi) const {
   const Sweep& sweep = piece.sweep;
   const UnitDrive& drive = drives_[piece.unit];
@@ -105,7 +105,7 @@ AxisPaths Scheduler::SegmentsOf(const Piece& piece, std::int64_t earliest, std::
   return paths;
 }
 
-/// Enters the piece where its rail can feed it, as soon as that is. Empty: never.
+/// Enters the piece as soon as its rail can feed it. Empty: never.
 std::optional<AxisPaths> Scheduler::FindPower(const Piece& piece, std::int64_t earliest) {
   constexpr std::int64_t kStepCounts = 500 * kCountsPerTick;
   constexpr std::int64_t kLast = std::int64_t{limits::kOffsetTicksMax} * kCountsPerTick;
@@ -139,7 +139,7 @@ Scheduler::Timed Scheduler::Lay(std::uint32_t index, std::int64_t earliest,
                                drives_[piece.unit].axis[k].counter1;
     std::int64_t& end = axis_end_[piece.unit][k];
     const std::span<const Segment> before = plan.path[k].segments();
-    // What is entered in the ledger stays as it was entered.
+    // An entry in the ledger stays as it was entered.
     const bool goes_on = ledger_ == nullptr && piece.sweep.out_of_step >= 1 && end == earliest &&
                          !before.empty() && before.back().repeat == segment.repeat &&
                          (before.back().delta > 0) == (segment.delta > 0);
@@ -196,8 +196,9 @@ Status Scheduler::Place(std::uint32_t index, std::int64_t earliest) {
   return {};
 }
 
-/// The stage of every piece: behind all that come before it in the order and that it would meet,
-/// so pieces of one stage meet nobody's, wherever their units may halt. Shape: as the order.
+/// The stage of every piece: behind all pieces that come before it in the order and that it would
+/// meet. Pieces of one stage therefore meet no other, wherever their units may halt. Shape: as the
+/// order.
 std::vector<std::uint32_t> Scheduler::FindStages() const {
   std::vector<std::uint32_t> stages(order_.size(), 0);
   std::vector<std::vector<std::uint32_t>> earlier(scene_.size());
@@ -214,7 +215,7 @@ std::vector<std::uint32_t> Scheduler::FindStages() const {
   return stages;
 }
 
-/// Each stage begins when all of the one before it have ended, and there is time to look.
+/// Each stage begins when all pieces of the one before it have ended, and there was time to look.
 Status Scheduler::RunInStages(Plan* plan) {
   const std::vector<std::uint32_t> stages = FindStages();
   std::vector<std::uint32_t> sorted(order_.size());
@@ -260,8 +261,8 @@ void Scheduler::Collect(Plan* plan) {
   }
 }
 
-/// Into how many parts a leg is cut; only legs of one axis are. The unit's counts grow by what it
-/// takes.
+/// The number of parts that a leg is cut into; only legs of one axis are cut. The unit's counts
+/// grow by it.
 std::int32_t PartsOf(const Piece& piece, const Scene& scene, AxisCounts* counts) {
   const Sweep& sweep = piece.sweep;
   const bool theta = sweep.from[0] != sweep.to[0];
@@ -273,7 +274,7 @@ std::int32_t PartsOf(const Piece& piece, const Scene& scene, AxisCounts* counts)
   const auto wanted = static_cast<std::int32_t>(std::ceil(length_deg / kGrainDeg));
   const auto spare =
       static_cast<std::int32_t>(limits::kSegmentsPerAxis) - static_cast<std::int32_t>((*counts)[k]);
-  // Half of what is spare: the way out must find some too.
+  // Half of the spare segments: the way out needs some, too.
   const std::int32_t parts = std::clamp(wanted, 1, 1 + std::max(0, (spare + 1) / 2));
   (*counts)[k] += static_cast<std::uint32_t>(parts - 1);
   return parts;

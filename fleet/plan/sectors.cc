@@ -14,7 +14,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint32_t kBusesPerSectorMin = 4;
+constexpr std::uint32_t kBusesPerSectorMin = 4;  // with fewer buses a sector, buses may be split
 constexpr std::uint32_t kNoSector = 0xffffffffu;
 
 std::vector<std::uint32_t> SectorOfUnits(std::size_t units, std::span<const Sector> sectors) {
@@ -24,7 +24,7 @@ std::vector<std::uint32_t> SectorOfUnits(std::size_t units, std::span<const Sect
   return sector_of;
 }
 
-/// Units within so many hops of `own`, without it.
+/// Units within so many hops of `own`, without `own`.
 std::vector<PositionerIndex> HaloOf(const Layout& layout, std::span<const PositionerIndex> own,
                                     std::uint32_t hops) {
   std::vector<std::uint8_t> seen(layout.size(), 0);
@@ -46,7 +46,7 @@ std::vector<PositionerIndex> HaloOf(const Layout& layout, std::span<const Positi
   return halo;
 }
 
-/// Halos, turns and who comes after whom, of sectors that know their own units only.
+/// Fills in halos, turns and predecessors of sectors that have only their own units.
 void Arrange(const Layout& layout, std::uint32_t hops, std::vector<Sector>* sectors) {
   const auto sector_of = SectorOfUnits(layout.size(), *sectors);
   for (std::uint32_t s = 0; s < sectors->size(); ++s) {
@@ -67,7 +67,7 @@ void Arrange(const Layout& layout, std::uint32_t hops, std::vector<Sector>* sect
   }
 }
 
-/// Units that must stay together: of a bus or a rail, or one alone.
+/// Units that must stay together: of a bus or a rail, or a single unit.
 struct Group {
   double x_mm = 0;  // mean of its bases
   std::vector<PositionerIndex> units;
@@ -142,14 +142,14 @@ Result<LocalRequest> LocalOf(const PlanRequest& request, const Sector& sector) {
   return local;
 }
 
-/// Motions of earlier turns, and what these propose.
+/// Takes the motions of earlier turns and their proposals.
 void TakeEarlier(const PlanRequest& request, std::span<const Sector> sectors,
                  std::span<const std::optional<SectorPlan>> plans, std::uint32_t which,
                  LocalRequest* local) {
   const auto sector_of = SectorOfUnits(request.layout->size(), sectors);
   const Sector& sector = sectors[which];
   std::vector<std::uint32_t> after = sector.after;
-  // The latest turn knows most: its proposals replace earlier ones.
+  // The latest turn has the most information: its proposals replace earlier ones.
   std::stable_sort(after.begin(), after.end(), [&](std::uint32_t a, std::uint32_t b) {
     return sectors[a].turn < sectors[b].turn;
   });
@@ -179,7 +179,7 @@ double BoundOf(const PlanRequest& request) {
   return bound_s;
 }
 
-/// Of the energy of all straight ways, the part of these units.
+/// The part of these units in the energy of all straight ways.
 double EnergyShare(const PlanRequest& request, const PlanOptions& options,
                    std::span<const PositionerIndex> own) {
   PowerLedger ledger(*request.layout, request.drives, options.motor, {}, {});
@@ -210,8 +210,8 @@ Result<std::vector<Sector>> SplitIntoSectors(const Layout& layout, const SectorO
   std::size_t s = 0;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const std::size_t size = groups[g].units.size();
-    // On to the next one where the middle of the group is beyond this one's even share, or where
-    // only one group is left for each of those that follow.
+    // The next sector begins where the middle of the group is beyond this sector's even share. The
+    // same holds where only one group is left for each of the sectors that follow.
     const bool full = !sectors[s].own.empty() &&
                       (2 * before + size) * options.count > 2 * (s + 1) * layout.size();
     const bool needed = !sectors[s].own.empty() && groups.size() - g == options.count - s - 1;
@@ -252,7 +252,7 @@ Result<SectorPlan> PlanSector(const PlanRequest& request, const PlanOptions& opt
   FOCALFLEET_TRY_ASSIGN(LocalRequest local, LocalOf(request, sector));
   TakeEarlier(request, sectors, plans, which, &local);
   PlanOptions own_options = options;
-  own_options.objective = Objective::kSoonest;  // another one is for the whole
+  own_options.objective = Objective::kSoonest;  // another objective is for the whole plan
   own_options.within_s = std::max(options.within_s, BoundOf(request));
   if (options.power.total_W > 0)
     own_options.power.total_W *= EnergyShare(request, options, sector.own);

@@ -6,43 +6,12 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint8_t kFavoursMax = 3;
-constexpr std::uint8_t kShakesMax = 2;  // for one unit
-constexpr int kShakeTries = 300;
-constexpr int kShakeSteps = 7;
+constexpr std::uint8_t kMovesAsideMax = 3;     // of one unit, for the sake of others
+constexpr std::uint8_t kPerturbationsMax = 2;  // for one unit
+constexpr int kPerturbationTries = 300;        // of one perturbation
+constexpr int kPerturbationSteps = 7;          // random steps of a try, at most
 
 }  // namespace
-
-std::span<const Blocker> Surroundings::Around(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                              std::span<const Pose> poses, Who who) {
-  blockers_.clear();
-  const bool at_start = poses[unit] == start_[unit];
-  for (const NeighbourNeed& near : scene_->neighbours(unit)) {
-    const std::uint32_t j = near.unit;
-    if (!scene_->is_place(j)) continue;
-    if (who == Who::kOutOfCell && scene_->InCell(j, poses[j])) continue;
-    const bool both_at_start = at_start && poses[j] == start_[j];
-    blockers_.push_back({{lines[j], 0}, both_at_start ? near.at_start_mm : near.need_mm, j});
-  }
-  for (const StandingThing& thing : scene_->standing(unit)) {
-    if (who == Who::kOutOfCell && thing.in_cell) continue;
-    blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
-  }
-  return blockers_;
-}
-
-std::span<const Blocker> Surroundings::AroundOf(std::uint32_t unit,
-                                                std::span<const std::uint8_t> these) {
-  blockers_.clear();
-  for (const NeighbourNeed& near : scene_->neighbours(unit)) {
-    if (!scene_->is_place(near.unit) || these[near.unit] == 0) continue;
-    const SegmentFp line = scene_->arm(near.unit).At(start_[near.unit]);
-    blockers_.push_back({{line, 0}, near.at_start_mm, near.unit});
-  }
-  for (const StandingThing& thing : scene_->standing(unit))
-    blockers_.push_back({thing.capsule, thing.need_mm, thing.by});
-  return blockers_;
-}
 
 SequentialPlanner::SequentialPlanner(const Scene* scene, std::span<const UnitDrive> drives,
                                      Surroundings* surroundings, std::span<const Pose> poses,
@@ -56,8 +25,8 @@ SequentialPlanner::SequentialPlanner(const Scene* scene, std::span<const UnitDri
       waits_(poses.size(), 0),
       straight_(poses.size(), Known::kNo),
       searched_deg_(poses.size(), 0),
-      favours_(poses.size(), 0),
-      shakes_(poses.size(), 0),
+      moves_aside_(poses.size(), 0),
+      perturbations_(poses.size(), 0),
       rng_(Rng::Stream(1, "retreat")) {
   for (std::uint32_t i = 0; i < poses_.size(); ++i) {
     lines_[i] = scene_->arm(i).At(poses_[i]);
@@ -73,7 +42,7 @@ void SequentialPlanner::Run() {
     if (waiting_.empty()) return;
     bool moved = false;
     for (const double grid_deg : kSearchGridsDeg) moved = moved || GoAround(grid_deg);
-    moved = moved || MakeRoom() || Shake();
+    moved = moved || ClearStraightWays() || Perturb();
     DropArrived();
     if (!moved) return;
   }
@@ -91,7 +60,8 @@ bool SequentialPlanner::StraightClear(std::uint32_t unit) {
     const bool clear =
         scene_->HasCell(unit) &&
         SweepClear(scene_->arm(unit), sweep,
-                   surroundings_->Around(unit, lines_, poses_, Surroundings::Who::kAll), nullptr);
+                   surroundings_->Around(unit, lines_, poses_, Surroundings::Include::kAll),
+                   nullptr);
     straight_[unit] = clear ? Known::kClear : Known::kBlocked;
   }
   return straight_[unit] == Known::kClear;
@@ -103,8 +73,8 @@ bool SequentialPlanner::StraightClearOf(std::uint32_t unit, const NeighbourNeed&
                       near.need_mm);
 }
 
-/// How many waiting neighbours this unit would block at the end of its straight way, and does not
-/// block now.
+/// The number of waiting neighbours that this unit would block at the end of its straight way, and
+/// does not block now.
 int SequentialPlanner::ShutIn(std::uint32_t unit) const {
   const SegmentFp after = scene_->arm(unit).At(StraightEnd(unit));
   int count = 0;
@@ -119,13 +89,13 @@ int SequentialPlanner::ShutIn(std::uint32_t unit) const {
 
 bool SequentialPlanner::StraightRound() {
   bool moved = false;
-  std::uint32_t least_harmful = kNobody;
+  std::uint32_t least_harmful = kNoUnitIndex;
   int least_harm = 0;
   for (const std::uint32_t i : waiting_) {
     if (!StraightClear(i)) continue;
     const int harm = ShutIn(i);
     if (harm > 0) {
-      if (least_harmful == kNobody || harm < least_harm) {
+      if (least_harmful == kNoUnitIndex || harm < least_harm) {
         least_harmful = i;
         least_harm = harm;
       }
@@ -134,7 +104,7 @@ bool SequentialPlanner::StraightRound() {
     GoStraight(i);
     moved = true;
   }
-  if (!moved && least_harmful != kNobody) {
+  if (!moved && least_harmful != kNoUnitIndex) {
     GoStraight(least_harmful);
     moved = true;
   }
@@ -156,7 +126,7 @@ bool SequentialPlanner::GoAround(double grid_deg) {
   return moved;
 }
 
-/// Among all others as they stand. Empty: none on this grid.
+/// A way among all others as they stand. Empty: none on this grid.
 Way SequentialPlanner::WayIntoCell(std::uint32_t unit, double grid_deg) {
   PathSearch::Question question = QuestionFor(unit, grid_deg);
   PoseBox goal = question.within;
@@ -166,34 +136,34 @@ Way SequentialPlanner::WayIntoCell(std::uint32_t unit, double grid_deg) {
   return surroundings_->search().Find(question);
 }
 
-/// Some neighbour of a waiting unit goes where it no longer blocks the straight way. Those that are
-/// in their cells first try to stay there.
-bool SequentialPlanner::MakeRoom() {
+/// A neighbour of each waiting unit is moved aside to where it no longer blocks the straight way.
+/// Neighbours that are in their cells first try to stay there.
+bool SequentialPlanner::ClearStraightWays() {
   for (const bool stay_in_cell : {true, false}) {
     bool moved = false;
-    for (const std::uint32_t i : waiting_) moved = MakeRoomFor(i, stay_in_cell) || moved;
+    for (const std::uint32_t i : waiting_) moved = ClearStraightWayOf(i, stay_in_cell) || moved;
     if (moved) return true;
   }
   return false;
 }
 
-bool SequentialPlanner::MakeRoomFor(std::uint32_t unit, bool stay_in_cell) {
+bool SequentialPlanner::ClearStraightWayOf(std::uint32_t unit, bool stay_in_cell) {
   if (!scene_->HasCell(unit) || surroundings_->search().abandoned()) return false;
   bool moved = false;
   for (const NeighbourNeed& near : scene_->neighbours(unit)) {
-    if (movers_[near.unit] == 0 || favours_[near.unit] >= kFavoursMax) continue;
+    if (movers_[near.unit] == 0 || moves_aside_[near.unit] >= kMovesAsideMax) continue;
     if (StraightClearOf(unit, near, lines_[near.unit])) continue;
-    moved =
-        std::any_of(kSearchGridsDeg.begin(), kSearchGridsDeg.end(),
-                    [&](double grid_deg) { return GiveWay(near, unit, grid_deg, stay_in_cell); }) ||
-        moved;
+    moved = std::any_of(
+                kSearchGridsDeg.begin(), kSearchGridsDeg.end(),
+                [&](double grid_deg) { return MoveAside(near, unit, grid_deg, stay_in_cell); }) ||
+            moved;
   }
   return moved;
 }
 
 /// `near` goes to the nearest place where it no longer blocks the straight way of `waiting`.
-bool SequentialPlanner::GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
-                                bool stay_in_cell) {
+bool SequentialPlanner::MoveAside(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
+                                  bool stay_in_cell) {
   const std::uint32_t unit = near.unit;
   const bool in_cell = stay_in_cell && scene_->InCell(unit, poses_[unit]);
   PathSearch::Question question = QuestionFor(unit, grid_deg);
@@ -206,38 +176,39 @@ bool SequentialPlanner::GiveWay(const NeighbourNeed& near, std::uint32_t waiting
   for (std::size_t k = 0; k < reached.size(); ++k) {
     if (!StraightClearOf(waiting, near, question.arm->At(reached[k]))) continue;
     const Way way = surroundings_->search().WayTo(k);
-    ++favours_[unit];
+    ++moves_aside_[unit];
     Go(unit, way);
     return true;
   }
   return false;
 }
 
-bool SequentialPlanner::Shake() {
+bool SequentialPlanner::Perturb() {
   for (const std::uint32_t i : waiting_)
-    if (scene_->HasCell(i) && ShakeFree(i)) return true;
+    if (scene_->HasCell(i) && PerturbAround(i)) return true;
   return false;
 }
 
-/// Some of the unit and its neighbours go anywhere, one after the other, and then it into its cell
-/// if there is a way.
-bool SequentialPlanner::ShakeFree(std::uint32_t unit) {
+/// Some of the unit and its neighbours go to random places, one after the other. Then the unit goes
+/// into its cell if there is a way.
+bool SequentialPlanner::PerturbAround(std::uint32_t unit) {
   std::vector<std::uint32_t> near;
   for (const NeighbourNeed& n : scene_->neighbours(unit))
     if (movers_[n.unit] != 0) near.push_back(n.unit);
-  if (near.empty() || shakes_[unit] >= kShakesMax) return false;
-  ++shakes_[unit];
+  if (near.empty() || perturbations_[unit] >= kPerturbationsMax) return false;
+  ++perturbations_[unit];
   std::vector<std::pair<std::uint32_t, Way>> made;
-  for (int attempt = 0; attempt < kShakeTries && !surroundings_->search().abandoned(); ++attempt) {
+  for (int attempt = 0; attempt < kPerturbationTries && !surroundings_->search().abandoned();
+       ++attempt) {
     made.clear();
-    const int steps = 1 + attempt * kShakeSteps / kShakeTries;
+    const int steps = 1 + attempt * kPerturbationSteps / kPerturbationTries;
     for (int step = 0; step < steps; ++step) {
       const std::uint64_t pick = rng_.Below(near.size() + (steps > 1 ? 1 : 0));
-      const std::uint32_t who = pick < near.size() ? near[pick] : unit;
+      const std::uint32_t mover = pick < near.size() ? near[pick] : unit;
       Way way;
-      if (!Wander(who, &way)) continue;
-      StandAt(who, way.back().pose);
-      made.emplace_back(who, std::move(way));
+      if (!RandomWay(mover, &way)) continue;
+      StandAt(mover, way.back().pose);
+      made.emplace_back(mover, std::move(way));
     }
     Way in;
     for (const double grid_deg : kSearchGridsDeg)
@@ -245,7 +216,7 @@ bool SequentialPlanner::ShakeFree(std::uint32_t unit) {
     for (auto it = made.rbegin(); it != made.rend(); ++it)
       StandAt(it->first, it->second.front().pose);
     if (in.empty()) continue;
-    for (const auto& [who, way] : made) Go(who, way);
+    for (const auto& [mover, way] : made) Go(mover, way);
     Go(unit, in);
     return true;
   }
@@ -253,7 +224,7 @@ bool SequentialPlanner::ShakeFree(std::uint32_t unit) {
 }
 
 /// A way to any place that the unit can reach among all others as they stand.
-bool SequentialPlanner::Wander(std::uint32_t unit, Way* way) {
+bool SequentialPlanner::RandomWay(std::uint32_t unit, Way* way) {
   surroundings_->search().Find(QuestionFor(unit, kSearchGridsDeg.front()));
   const std::vector<Pose>& reached = surroundings_->search().reached();
   if (reached.empty()) return false;
@@ -266,12 +237,12 @@ void SequentialPlanner::StandAt(std::uint32_t unit, const Pose& pose) {
   lines_[unit] = scene_->arm(unit).At(pose);
 }
 
-/// All around the unit as it is now; where to is for the caller to say.
+/// The question around the unit as it is now, without a goal.
 PathSearch::Question SequentialPlanner::QuestionFor(std::uint32_t unit, double grid_deg) {
   PathSearch::Question question;
   question.arm = &scene_->arm(unit);
   question.drive = &drives_[unit];
-  question.blockers = surroundings_->Around(unit, lines_, poses_, Surroundings::Who::kAll);
+  question.blockers = surroundings_->Around(unit, lines_, poses_, Surroundings::Include::kAll);
   question.from = poses_[unit];
   question.within = RangeAround(*question.arm, poses_[unit]);
   question.grid_deg = grid_deg;
@@ -302,7 +273,7 @@ void SequentialPlanner::Go(std::uint32_t unit, std::span<const Waypoint> way) {
 
 void SequentialPlanner::DropArrived() {
   std::erase_if(waiting_, [this](std::uint32_t i) { return !Waits(i); });
-  // A unit that left its cell again for another's sake.
+  // Units that left their cells again for the sake of others.
   waiting_.insert(waiting_.end(), newly_waiting_.begin(), newly_waiting_.end());
   newly_waiting_.clear();
   std::sort(waiting_.begin(), waiting_.end());

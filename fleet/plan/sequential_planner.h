@@ -1,14 +1,17 @@
-// One at a time: an order in which all movers of a configuration can go into their cells, each
-// along a way that is clear of all others as they stand at that moment. Run from the starts it is
-// the way in; run from the targets and read backwards it is the way out again.
+// The sequential planner finds an order in which all movers of a configuration can go into their
+// cells, one at a time. Each goes along a way that is clear of all others as they stand at that
+// moment. Run from the starts it gives the way in; run from the targets and read backwards it gives
+// the way out again.
 //
 // The usual way is straight: phi folds back just as far as the cell needs, theta stands. Rounds
 // take all units that are free now, so that chains of waiting stay short. A unit whose end would
-// shut in a neighbour that is free waits for it. Where a round finds nobody free it tries a way
-// around (path search); where there is none, a neighbour goes where it no longer blocks a straight
-// way, inside its cell if it is there already and finds room, otherwise anywhere. At last it and
-// its neighbours go anywhere at all, a few steps, until that happens to let it in. How often one
-// does that for others is bounded.
+// shut in a free neighbour waits for that neighbour.
+//
+// Where a round finds no free unit, three means follow in this order. A unit goes around by a path
+// search. A neighbour is moved aside to where it no longer blocks a straight way. The place is
+// inside its cell if it is there already and finds room, otherwise anywhere. At last the unit and
+// its neighbours take a few random steps, until a way into its cell opens. The number of times that
+// a unit does that for others is bounded.
 #pragma once
 
 #include <cstdint>
@@ -17,39 +20,15 @@
 
 #include "fleet/plan/path_search.h"
 #include "fleet/plan/scene.h"
+#include "fleet/plan/surroundings.h"
 #include "protocol/base/rng.h"
 
 namespace focalfleet {
 
-/// One leg of one unit.
+/// A leg of one unit.
 struct Piece {
   std::uint32_t unit = 0;
   Sweep sweep;
-};
-
-/// Scratch that outlives one plan step: what stands around one unit, and the search.
-class Surroundings {
- public:
-  /// `start` outlives this. Shape: (n).
-  Surroundings(const Scene* scene, std::span<const Pose> start, Abandoned abandoned = {})
-      : scene_(scene), start_(start), search_(std::move(abandoned)) {}
-
-  enum class Who : std::uint8_t {
-    kAll,
-    kOutOfCell,  // without units inside their own cells: for ways that never leave the own one
-  };
-  /// Everything near `unit` with the others at `poses`. Lifetime: until the next call.
-  std::span<const Blocker> Around(std::uint32_t unit, std::span<const SegmentFp> lines,
-                                  std::span<const Pose> poses, Who who);
-  /// Only the units in `these`, as they start, and the standing things. Shape: (n).
-  std::span<const Blocker> AroundOf(std::uint32_t unit, std::span<const std::uint8_t> these);
-  PathSearch& search() { return search_; }
-
- private:
-  const Scene* scene_;
-  std::span<const Pose> start_;
-  PathSearch search_;
-  std::vector<Blocker> blockers_;
 };
 
 class SequentialPlanner {
@@ -58,11 +37,11 @@ class SequentialPlanner {
                     Surroundings* surroundings, std::span<const Pose> poses,
                     std::span<const std::uint8_t> movers);
 
-  /// Takes as many movers as it can into their cells.
+  /// Takes as many movers as possible into their cells.
   void Run();
 
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
-  /// Where everybody stands in the end. Shape: (n).
+  /// Where each unit stands in the end. Shape: (n).
   [[nodiscard]] const std::vector<Pose>& poses() const { return poses_; }
   [[nodiscard]] const std::vector<SegmentFp>& lines() const { return lines_; }
   /// Movers that did not get into their cells; ascending.
@@ -76,13 +55,13 @@ class SequentialPlanner {
   [[nodiscard]] int ShutIn(std::uint32_t unit) const;
   bool StraightRound();
   bool GoAround(double grid_deg);
-  bool MakeRoom();
-  bool MakeRoomFor(std::uint32_t unit, bool stay_in_cell);
-  bool GiveWay(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
-               bool stay_in_cell);
-  bool Shake();
-  bool ShakeFree(std::uint32_t unit);
-  bool Wander(std::uint32_t unit, Way* way);
+  bool ClearStraightWays();
+  bool ClearStraightWayOf(std::uint32_t unit, bool stay_in_cell);
+  bool MoveAside(const NeighbourNeed& near, std::uint32_t waiting, double grid_deg,
+                 bool stay_in_cell);
+  bool Perturb();
+  bool PerturbAround(std::uint32_t unit);
+  bool RandomWay(std::uint32_t unit, Way* way);
   Way WayIntoCell(std::uint32_t unit, double grid_deg);
   void StandAt(std::uint32_t unit, const Pose& pose);
   PathSearch::Question QuestionFor(std::uint32_t unit, double grid_deg);
@@ -102,10 +81,10 @@ class SequentialPlanner {
   std::vector<std::uint32_t> newly_waiting_;
   std::vector<Piece> pieces_;
   enum class Known : std::uint8_t { kNo, kClear, kBlocked };
-  std::vector<Known> straight_;        // as far as nothing near has moved since
-  std::vector<double> searched_deg_;   // finest grid on which a search failed since then; 0: none
-  std::vector<std::uint8_t> favours_;  // turns and yields made for others
-  std::vector<std::uint8_t> shakes_;   // made for this unit
+  std::vector<Known> straight_;       // as far as nothing near has moved since
+  std::vector<double> searched_deg_;  // finest grid on which a search failed since then; 0: none
+  std::vector<std::uint8_t> moves_aside_;    // by unit, for the sake of others
+  std::vector<std::uint8_t> perturbations_;  // by unit, for its own sake
   Rng rng_;
 };
 

@@ -7,6 +7,33 @@
 #include "fleet/estimate.h"
 
 namespace focalfleet {
+namespace {
+
+/// The pairs of `poses` that are nearer than the rule allows, by name, where both units count.
+/// Shape: both (n).
+std::string TooNear(const Scene& scene, std::span<const Pose> poses,
+                    std::span<const std::uint8_t> counts, const char* what) {
+  std::string text;
+  for (std::uint32_t i = 0; i < scene.size(); ++i) {
+    if (counts[i] == 0) continue;
+    for (const NeighbourNeed& near : scene.neighbours(i)) {
+      if (near.unit < i || counts[near.unit] == 0) continue;
+      const double distance =
+          DistanceMm(scene.arm(i).At(poses[i]), scene.arm(near.unit).At(poses[near.unit]));
+      const double need = scene.FullNeed(i, near.unit);
+      if (distance >= need - kClearToleranceMm) continue;
+      std::array<char, 160> line{};
+      std::snprintf(line.data(), line.size(),
+                    "%s%s of units %s and %s are %.4f mm apart, %.4f mm needed",
+                    text.empty() ? "" : "; ", what, UnitName(scene.layout(), i).c_str(),
+                    UnitName(scene.layout(), near.unit).c_str(), distance, need);
+      text += line.data();
+    }
+  }
+  return text;
+}
+
+}  // namespace
 
 std::string UnitName(const Layout& layout, std::uint32_t unit) {
   return std::to_string(layout.unit({unit}).id.value);
@@ -31,9 +58,9 @@ Service::Service(const PlanRequest& request, const Scene& scene, std::span<const
     if (movable_[i] != 0) {
       Readmit(i);
     } else if (!enabled) {
-      Unserve(i, UnservedWhy::kDisabled, kNobody);
+      Unserve(i, UnservedWhy::kDisabled, kNoUnitIndex);
     } else if (!place) {
-      Unserve(i, UnservedWhy::kUnknownPlace, kNobody);
+      Unserve(i, UnservedWhy::kUnknownPlace, kNoUnitIndex);
     } else if (*request.targets[i] != start[i]) {
       Unserve(i, UnservedWhy::kBlocked, i);
     }
@@ -54,7 +81,7 @@ void Service::Unserve(std::uint32_t unit, UnservedWhy why, std::uint32_t by,
   served_[unit] = 0;
   goal_[unit] = start_[unit];
   Unserved unserved{{unit}, why, std::nullopt, std::move(proof)};
-  if (by != kNobody) unserved.by = PositionerIndex{by};
+  if (by != kNoUnitIndex) unserved.by = PositionerIndex{by};
   unserved_.push_back(std::move(unserved));
 }
 
@@ -81,30 +108,13 @@ std::string Service::TargetsOutOfRange() const {
   return text;
 }
 
-std::string Service::TooNear(std::span<const Pose> poses, std::span<const std::uint8_t> counts,
-                             const char* what) const {
-  std::string text;
-  for (std::uint32_t i = 0; i < scene_->size(); ++i) {
-    if (counts[i] == 0) continue;
-    for (const NeighbourNeed& near : scene_->neighbours(i)) {
-      if (near.unit < i || counts[near.unit] == 0) continue;
-      const double distance =
-          DistanceMm(scene_->arm(i).At(poses[i]), scene_->arm(near.unit).At(poses[near.unit]));
-      const double need = scene_->FullNeed(i, near.unit);
-      if (distance >= need - kClearToleranceMm) continue;
-      std::array<char, 160> line{};
-      std::snprintf(line.data(), line.size(),
-                    "%s%s of units %s and %s are %.4f mm apart, %.4f mm needed",
-                    text.empty() ? "" : "; ", what, UnitName(scene_->layout(), i).c_str(),
-                    UnitName(scene_->layout(), near.unit).c_str(), distance, need);
-      text += line.data();
-    }
-  }
-  return text;
+std::string Service::StartsTooNear() const {
+  return TooNear(*scene_, start_, movable_, "the starts");
 }
 
-std::string Service::StartsTooNear() const { return TooNear(start_, movable_, "the starts"); }
-std::string Service::TargetsTooNear() const { return TooNear(goal_, served_, "the targets"); }
+std::string Service::TargetsTooNear() const {
+  return TooNear(*scene_, goal_, served_, "the targets");
+}
 
 bool Service::Meet(std::uint32_t a, std::uint32_t b) const {
   return DistanceMm(scene_->arm(a).At(goal_[a]), scene_->arm(b).At(goal_[b])) <
@@ -142,7 +152,7 @@ void Service::DropCollidingTargets() {
   for (bool changed = true; changed;) {
     changed = false;
     for (std::uint32_t i = 0; i < scene_->size(); ++i) {
-      std::uint32_t by = kNobody;
+      std::uint32_t by = kNoUnitIndex;
       if (!goes(i) || !CollidesWith(i, &by)) continue;
       Unserve(i, UnservedWhy::kTargetCollides, by);
       changed = true;

@@ -7,8 +7,8 @@
 namespace focalfleet {
 namespace {
 
-// A proof that whatever never moves leaves the unit no way to this pose. Covers of uncertain units
-// are wider than these may be, so next to one there is none.
+// A proof that the things that never move leave the unit no way to its goal. Covers of units of
+// uncertain place are wider than these units may be, so a unit next to one has no such proof.
 std::optional<NoWay> NoWayFor(const Service& service, std::uint32_t unit) {
   const Scene& scene = service.scene();
   std::vector<Blocker> never_move;
@@ -20,7 +20,7 @@ std::optional<NoWay> NoWayFor(const Service& service, std::uint32_t unit) {
     never_move.push_back({{scene.arm(j).At(service.start(j)), 0}, least_mm, j});
   }
   for (const StandingThing& thing : scene.standing(unit)) {
-    if (thing.by != kNobody) continue;
+    if (thing.by != kNoUnitIndex) continue;
     never_move.push_back({thing.capsule, thing.least_mm, thing.by});
   }
   return ProveNoWay({.arm = &scene.arm(unit),
@@ -58,7 +58,7 @@ std::uint32_t InTheWayOf(const Service& service, std::uint32_t unit) {
   const Scene& scene = service.scene();
   const ArmGeometry& arm = scene.arm(unit);
   const PhiSpan& cell = scene.cell(unit);
-  if (!scene.HasCell(unit)) return kNobody;
+  if (!scene.HasCell(unit)) return kNoUnitIndex;
   for (const std::span<const Pose> poses : {service.starts(), service.goals()}) {
     Pose end = poses[unit];
     end[1] = std::clamp(end[1], cell.low, cell.high);
@@ -71,7 +71,7 @@ std::uint32_t InTheWayOf(const Service& service, std::uint32_t unit) {
     for (const StandingThing& thing : scene.standing(unit))
       if (!SweepClearOf(arm, sweep, thing.capsule, thing.need_mm)) return thing.by;
   }
-  return kNobody;
+  return kNoUnitIndex;
 }
 
 }  // namespace focalfleet

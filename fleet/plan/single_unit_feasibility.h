@@ -1,5 +1,5 @@
-// One unit as if all that can move were out of its way: whether it can come to its target at all,
-// and who stands in its straight way.
+// Feasibility of one unit as if all movable units were out of its way: whether it can come to its
+// target at all, and what stands in its straight way.
 #pragma once
 
 #include <cstdint>
@@ -10,13 +10,12 @@
 
 namespace focalfleet {
 
-/// Whether a way may lead from the start to the target. Pre: `surroundings` is of the same scene
-/// and starts. False: there is none that a search finds; `proof` (where that is possible): there is
-/// none at all.
+/// True: a way may lead from the start to the target. False: no search finds one; `proof`, where it
+/// is possible, says that none exists. Pre: `surroundings` is of the same scene and starts.
 bool CanEver(const Service& service, std::uint32_t unit, Surroundings* surroundings,
              std::optional<NoWay>* proof);
 
-/// Who stands in the straight way of a stuck unit; kNobody where that cannot be told or is an
+/// The unit that stands in the straight way of a stuck unit. kNoUnitIndex: not known, or an
 /// obstacle.
 std::uint32_t InTheWayOf(const Service& service, std::uint32_t unit);
 

@@ -16,13 +16,14 @@ constexpr std::uint8_t kBlocked = 2;
 
 /// False: there is no time, or the target is never safe for good.
 bool TimeSearch::SetUp() {
-  // As long as the slower axis needs for the grid; the quicker one gets farther in it.
+  // A step lasts as long as the slower axis needs for the grid; the quicker axis gets farther in
+  // it.
   double step_s = 0;
   for (const Axis axis : kAxes) {
     const double vectors = q_.grid_deg * std::numbers::pi / 180 / q_.arm->step_rad(axis);
     step_s = std::max(step_s, vectors * SecondsPerVector(q_.drive->axis[Index(axis)]));
   }
-  // Ticks of a round number, so that usual drives turn whole vectors in a step.
+  // A step is a round number of ticks, so that usual drives turn whole vectors in it.
   constexpr std::int64_t kRoundTicks = 60;
   step_ticks_ =
       std::max<std::int64_t>(1, std::llround(step_s / kTickS / kRoundTicks)) * kRoundTicks;
@@ -55,7 +56,7 @@ Pose TimeSearch::PoseOf(std::int32_t pose) const {
           q_.from[1] + (pose % count_[1] + low_[1]) * step_[1]};
 }
 
-/// From one pose to another in one step.
+/// The leg from one pose to another in one step.
 Leg TimeSearch::LegOf(const Pose& from, const Pose& to, std::int32_t step) const {
   Leg leg;
   leg.begin_s = q_.begin_s + step * step_s_;
@@ -73,10 +74,11 @@ Leg TimeSearch::LegOf(const Pose& from, const Pose& to, std::int32_t step) const
 bool TimeSearch::StepClear(const Leg& leg) const {
   const SegmentFp middle = ArmAt(*q_.arm, leg, (leg.begin_s + leg.end_s) / 2);
   const double travel = leg.speed_mm_per_s * (leg.end_s - leg.begin_s) / 2;
-  for (const Passer& passer : q_.passers) {
-    const double far = passer.need_mm + travel + passer.track->reach_mm();
-    if (SquaredDistance(passer.arm->base_fp(), middle) > far * far) continue;
-    if (!LegPassesClear(*q_.arm, leg, *passer.arm, *passer.track, passer.need_mm, passer.tolerance))
+  for (const MovingNeighbour& neighbour : q_.moving) {
+    const double far = neighbour.need_mm + travel + neighbour.track->reach_mm();
+    if (SquaredDistance(neighbour.arm->base_fp(), middle) > far * far) continue;
+    if (!LegPassesClear(*q_.arm, leg, *neighbour.arm, *neighbour.track, neighbour.need_mm,
+                        neighbour.tolerance))
       return false;
   }
   for (const Blocker& blocker : q_.standing) {
@@ -94,7 +96,7 @@ std::int32_t TimeSearch::StepsLeft(const Pose& pose) const {
   return left;
 }
 
-/// When the pose may be held. Slices say it for most steps; the rest is tested.
+/// The intervals in which the pose may be held. Slices decide most steps; the rest is tested.
 std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
   std::vector<Interval>& safe = safe_[static_cast<std::size_t>(pose)];
   if (known_[static_cast<std::size_t>(pose)] != 0) return safe;
@@ -110,29 +112,29 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
                     std::min(line.a.y_mm, line.b.y_mm), std::max(line.a.y_mm, line.b.y_mm)};
   blocked_.assign(static_cast<std::size_t>(steps_max_) + 1, 0);
   constexpr double h = Track::kSliceS;
-  for (const Passer& passer : q_.passers) {
-    const double far = passer.need_mm + passer.track->reach_mm();
-    if (SquaredDistance(passer.arm->base_fp(), line) > far * far) continue;
-    const int last = passer.track->slice_count();
+  for (const MovingNeighbour& neighbour : q_.moving) {
+    const double far = neighbour.need_mm + neighbour.track->reach_mm();
+    if (SquaredDistance(neighbour.arm->base_fp(), line) > far * far) continue;
+    const int last = neighbour.track->slice_count();
     const int first = std::max(-1, static_cast<int>(q_.begin_s / h) - 4);
     for (int n = first; n <= last; ++n) {
-      // Most of the time most arms are elsewhere: all slices of a box at once.
+      // Most of the time most arms are elsewhere: one test covers all slices of a box.
       if (n >= 0 && n % Track::kSlicesPerBounds == 0 && n + Track::kSlicesPerBounds <= last &&
-          Apart(passer.track->bounds(n / Track::kSlicesPerBounds), here, passer.need_mm)) {
+          Apart(neighbour.track->bounds(n / Track::kSlicesPerBounds), here, neighbour.need_mm)) {
         n += Track::kSlicesPerBounds - 1;
         continue;
       }
-      const Slice& slice = passer.track->slice(n);
-      const double enough = passer.need_mm + slice.travel_mm;
+      const Slice& slice = neighbour.track->slice(n);
+      const double enough = neighbour.need_mm + slice.travel_mm;
       const double distance2 = SquaredDistance(line, slice.line);
       if (distance2 > enough * enough) continue;
-      const double slip_s = passer.tolerance.Slip((n + 2) * h);
+      const double slip_s = neighbour.tolerance.Slip((n + 2) * h);
       const double from_s = n < 0 ? -1 : n * h - slip_s - q_.begin_s;
       const double to_s = n == last ? Track::kForever : (n + 1) * h + slip_s - q_.begin_s;
       const auto from = static_cast<std::int32_t>(std::max(0.0, std::floor(from_s / step_s_)));
       const auto to =
           static_cast<std::int32_t>(std::min<double>(steps_max_, std::ceil(to_s / step_s_)));
-      const bool certain = distance2 <= passer.need_mm * passer.need_mm;
+      const bool certain = distance2 <= neighbour.need_mm * neighbour.need_mm;
       for (std::int32_t step = from; step <= to; ++step) {
         std::uint8_t& blocked = blocked_[static_cast<std::size_t>(step)];
         blocked = std::max(blocked, certain ? kBlocked : kPerhaps);
@@ -150,7 +152,7 @@ std::vector<TimeSearch::Interval>& TimeSearch::SafeAt(std::int32_t pose) {
 
 std::optional<AxisPaths> TimeSearch::LayOut(std::int32_t last, std::int32_t leaves) const {
   struct Turn {
-    std::int32_t step;  // that ends it
+    std::int32_t step;  // the step that ends it
     std::array<std::int8_t, kAxisCount> turned;
   };
   std::vector<Turn> turns;
@@ -193,7 +195,7 @@ std::optional<AxisPaths> TimeSearch::LayOut(std::int32_t last, std::int32_t leav
   return paths;
 }
 
-/// The rest of less than a step is clear, and so is the target ever after.
+/// The unit stays clear for the rest of less than a step, and at the target from then on.
 bool TimeSearch::EndsClear(const Pose& pose, std::int32_t step) const {
   const double begin_s = q_.begin_s + step * step_s_;
   AxisPaths paths;
@@ -213,7 +215,7 @@ std::optional<AxisPaths> TimeSearch::EndFrom(std::int32_t index) const {
   const Pose pose = PoseOf(node.pose);
   const std::int32_t last =
       safe_[static_cast<std::size_t>(node.pose)][static_cast<std::size_t>(node.interval)].last;
-  // As soon as the target is free, or some steps later.
+  // The unit leaves as soon as the target is free, or some steps later.
   constexpr std::int32_t kTries = 3;
   for (std::int32_t k = 0; k < kTries; ++k) {
     const std::int32_t leaves = std::max(node.step, target_safe_ - 1) + 2 * k;
@@ -253,8 +255,8 @@ void TimeSearch::Expand(std::int32_t index) {
       const std::vector<Interval>& intervals = SafeAt(there);
       for (std::size_t n = 0; n < intervals.size(); ++n) {
         const Interval interval = intervals[n];
-        // Leaves as soon as the other pose may be held at the end of the step; where somebody
-        // passes just then, a little later.
+        // The unit leaves as soon as the other pose may be held at the end of the step. Where a
+        // neighbour passes just then it leaves a little later.
         const std::int32_t soonest = std::max(node.step, interval.first - 1);
         const std::int32_t latest = std::min({stays, interval.last - 1, steps_max_ - 1});
         constexpr std::int32_t kTries = 4;

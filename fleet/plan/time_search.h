@@ -1,9 +1,9 @@
-// A way for one unit among others that move: A* over its own square of angles and the times at
-// which each pose is safe (safe interval path planning, Phillips and Likhachev 2011): waiting in a
-// safe pose costs no search, so a pose is looked at once for each of its safe intervals. Every step
-// takes the same time; in it each axis turns one way, the other way, or not. A step is tested
-// against the motions of the others as they are (track.h), so what is found holds in time; it is
-// laid out as segments and may be tested whole once more.
+// A way for one unit among others that move. The search is A* over the unit's own square of angles
+// and the times at which each pose is safe (safe interval path planning, Phillips and Likhachev
+// 2011). Waiting in a safe pose costs no search, so a pose is looked at once for each of its safe
+// intervals. Every step takes the same time; in it each axis turns one way, the other way, or not.
+// A step is tested against the motions of the others as they are (track.h), so the way found holds
+// in time. The way is laid out as segments and may be tested whole once more.
 #pragma once
 
 #include <cstdint>
@@ -16,8 +16,8 @@
 
 namespace focalfleet {
 
-/// Somebody whose motion is given.
-struct Passer {
+/// A neighbour whose motion is given.
+struct MovingNeighbour {
   const ArmGeometry* arm = nullptr;
   const Track* track = nullptr;
   double need_mm = 0;
@@ -29,18 +29,18 @@ class TimeSearch {
   struct Question {
     const ArmGeometry* arm = nullptr;
     const UnitDrive* drive = nullptr;
-    std::span<const Passer> passers;
+    std::span<const MovingNeighbour> moving;
     std::span<const Blocker> standing;
     Pose from{};
     Pose to{};
     PoseBox within;
-    double begin_s = 0;  // stands until then
-    double end_s = 0;    // is at the target by then
+    double begin_s = 0;  // the unit stands until then
+    double end_s = 0;    // the unit is at the target by then
     double grid_deg = 4;
     std::uint32_t expansions_max = 20'000;
   };
 
-  /// Empty: none was found. Cost: O(expansions * (passers + standing)).
+  /// The segments of a way. Empty: none was found. Cost: O(expansions * (moving + standing)).
   std::optional<AxisPaths> Find(const Question& question);
 
  private:
@@ -48,13 +48,13 @@ class TimeSearch {
   struct Interval {
     std::int32_t first = 0;
     std::int32_t last = 0;
-    std::int32_t node = -1;  // that reached it first; the earliest is the best
+    std::int32_t node = -1;  // the node that reached it first; the earliest is the best
   };
   struct Node {
     std::int32_t came_from = -1;
     std::int32_t pose = 0;  // index into the grid
     std::int32_t interval = 0;
-    std::int32_t step = 0;  // arrives
+    std::int32_t step = 0;  // on which the node is reached
     std::int8_t turned[2] = {0, 0};
     bool done = false;
   };
@@ -84,7 +84,7 @@ class TimeSearch {
   std::int64_t step_ticks_ = 0;
   double step_s_ = 0;
   std::int32_t steps_max_ = 0;
-  std::int32_t target_safe_ = 0;  // from this step on
+  std::int32_t target_safe_ = 0;  // the target may be held from this step on
   std::array<std::int32_t, kAxisCount> step_{};
   std::array<std::int32_t, kAxisCount> low_{};
   std::array<std::int32_t, kAxisCount> count_{};

@@ -4,13 +4,15 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <limits>
 #include <new>
 #include <type_traits>
 
 namespace focalfleet {
 namespace {
 
-/// Below this two cells count as one pose: closer than this to touching is "not clear".
+/// Two cells count as one pose below this distance, in mm: a pair that is closer than this to
+/// touching is "not clear".
 constexpr double kResolutionMm = 2e-5;
 constexpr std::size_t kStackSize = 128;
 
@@ -21,7 +23,8 @@ struct Span1 {
   [[nodiscard]] double half() const { return (high - low) / 2; }
 };
 
-/// Own times of both, a part of the band |a - b| <= slip, and where the arms are in their middles.
+/// Own times of both units, a part of the band |a - b| <= slip, and where the arms are in the
+/// middle of them.
 struct Cell {
   Span1 a;
   Span1 b;
@@ -29,7 +32,7 @@ struct Cell {
   SegmentFp line_b;
 };
 
-/// Room for cells that nobody clears beforehand: most pairs need one or two of them.
+/// Room for cells that is not cleared beforehand: most pairs need one or two of them.
 template <class T>
 class Stack {
  public:
@@ -69,7 +72,7 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
     const double distance2 = SquaredDistance(whole.line_a, whole.line_b);
     if (distance2 > enough * enough) continue;
     if (distance2 <= need_mm * need_mm) {
-      // One that stands is there whenever the other comes; else the two middles must be able to
+      // A unit that stands is there whenever the other comes; else the two middles must be able to
       // meet.
       double at_a = whole.a.middle();
       double at_b = whole.b.middle();
@@ -98,12 +101,30 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
 
 }  // namespace
 
+std::uint32_t BeginTicks(const AxisPaths& paths) {
+  std::uint32_t begin = std::numeric_limits<std::uint32_t>::max();
+  for (const AxisPath& axis : paths)
+    if (axis.size() > 0) begin = std::min(begin, axis.segments().front().start_ticks);
+  return begin;
+}
+
+AxisPaths Shifted(const AxisPaths& paths, std::int64_t by_ticks) {
+  AxisPaths shifted;
+  for (std::size_t k = 0; k < kAxisCount; ++k) {
+    for (Segment segment : paths[k].segments()) {
+      segment.start_ticks = static_cast<std::uint32_t>(segment.start_ticks + by_ticks);
+      shifted[k].Append(segment);
+    }
+  }
+  return shifted;
+}
+
 Track::Track(const ArmGeometry& arm, const Pose& stands) {
   Stand(arm, stands);
   Cut(arm);
 }
 
-/// One leg that never ends.
+/// The unit stands in one leg that never ends.
 void Track::Stand(const ArmGeometry& arm, const Pose& pose) {
   Leg leg;
   leg.begin_s = -kForever;
@@ -114,7 +135,7 @@ void Track::Stand(const ArmGeometry& arm, const Pose& pose) {
   reach_mm_ = std::max(arm.theta_arm_mm(), arm.FibreRadiusMax(pose[1], pose[1]));
 }
 
-/// Slices and their bounds.
+/// Cuts the legs into slices and finds the bounds of these.
 void Track::Cut(const ArmGeometry& arm) {
   const int count = std::max(0, static_cast<int>(std::ceil(end_s() / kSliceS)));
   slices_.clear();
@@ -226,24 +247,31 @@ Track::Track(const ArmGeometry& arm, const UnitDrive& drive, const Pose& from,
 
 namespace {
 
-/// The legs of both within these own times.
+/// True: the leg `a` within `span_a` of its own time is clear of the legs of `b` within `time_b`.
+bool LegClearOfPart(const Mover& a, const Span1& span_a, const ArmGeometry& arm_b, const Track& b,
+                    const Span1& time_b, double slip_s, double need_mm, int* budget) {
+  for (const Leg& leg_b : b.legs()) {
+    const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
+    if (span_b.low > span_b.high) continue;
+    const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
+                       std::min(span_a.high, span_b.high + slip_s)};
+    const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
+                       std::min(span_b.high, span_a.high + slip_s)};
+    if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
+    if (!LegsClear(a, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, budget)) return false;
+  }
+  return true;
+}
+
+/// True: the legs of both within these own times are clear of each other.
 bool PartsClear(const ArmGeometry& arm_a, const Track& a, const Span1& time_a,
                 const ArmGeometry& arm_b, const Track& b, const Span1& time_b, double slip_s,
                 double need_mm, int* budget) {
   for (const Leg& leg_a : a.legs()) {
     const Span1 span_a{std::max(leg_a.begin_s, time_a.low), std::min(leg_a.end_s, time_a.high)};
     if (span_a.low > span_a.high) continue;
-    for (const Leg& leg_b : b.legs()) {
-      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
-      if (span_b.low > span_b.high) continue;
-      const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
-                         std::min(span_a.high, span_b.high + slip_s)};
-      const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
-                         std::min(span_b.high, span_a.high + slip_s)};
-      if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-      if (!LegsClear({&arm_a, &leg_a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, budget))
-        return false;
-    }
+    if (!LegClearOfPart({&arm_a, &leg_a}, span_a, arm_b, b, time_b, slip_s, need_mm, budget))
+      return false;
   }
   return true;
 }
@@ -307,7 +335,7 @@ bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& ar
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget) {
   constexpr double h = Track::kSliceS;
-  // A stand may last for ever; when the other stands too, nothing is new.
+  // A stand may last for ever; when the other stands too, nothing new can happen.
   const double last_s = a.stands() ? std::max(a.begin_s, b.end_s()) + h : a.end_s;
   const Span1 span_a{a.begin_s, std::min(a.end_s, last_s)};
   const double slip_s = tolerance.Slip(span_a.high + tolerance.Slip(span_a.high));
@@ -315,12 +343,12 @@ bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& a
   const SegmentFp line = ArmAt(arm_a, a, middle_s);
   const double travel_a = a.speed_mm_per_s * span_a.half();
   const double halves = (arm_a.phi_arm_mm() + arm_b.phi_arm_mm()) / 2;
-  // Beyond the end it stands: that is the last slice.
+  // Beyond the end the unit stands: that is the last slice.
   const int first =
       std::min(static_cast<int>(std::floor((span_a.low - slip_s) / h)), b.slice_count());
   const int last =
       std::min(static_cast<int>(std::floor((span_a.high + slip_s) / h)), b.slice_count());
-  // What meets for certain is found at once; only then is it worth to look closely at the rest.
+  // A certain meeting is found at once; only then is it worth to look closely at the rest.
   constexpr std::size_t kNearMax = 64;
   std::array<int, kNearMax> near;
   std::size_t near_count = 0;
@@ -340,17 +368,8 @@ bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& a
     const int m = near[n];
     const Span1 time_b{m < 0 ? -Track::kForever : m * h,
                        m >= b.slice_count() ? Track::kForever : (m + 1) * h};
-    for (const Leg& leg_b : b.legs()) {
-      const Span1 span_b{std::max(leg_b.begin_s, time_b.low), std::min(leg_b.end_s, time_b.high)};
-      if (span_b.low > span_b.high) continue;
-      const Span1 meet_a{std::max(span_a.low, span_b.low - slip_s),
-                         std::min(span_a.high, span_b.high + slip_s)};
-      const Span1 meet_b{std::max(span_b.low, span_a.low - slip_s),
-                         std::min(span_b.high, span_a.high + slip_s)};
-      if (meet_a.low > meet_a.high || meet_b.low > meet_b.high) continue;
-      if (!LegsClear({&arm_a, &a}, {&arm_b, &leg_b}, meet_a, meet_b, slip_s, need_mm, &budget))
-        return false;
-    }
+    if (!LegClearOfPart({&arm_a, &a}, span_a, arm_b, b, time_b, slip_s, need_mm, &budget))
+      return false;
   }
   return true;
 }

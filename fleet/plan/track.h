@@ -1,15 +1,19 @@
-// Where a unit's arm is over its own time: legs, linear in both angles, with a stand before the
+// The place of a unit's arm over its own time: legs, linear in both angles, with a stand before the
 // first and after the last. Times are seconds after the start signal by the unit's own clock, made
 // from the very segments that go on the bus.
 //
 // Two clocks never agree: a unit starts up to `start_skew_s` early or late and its clock runs up to
-// `clock_error` fast or slow. So of two units own times a and b can belong to one true instant
-// exactly if |a - b| <= Slip(max(a, b)), and a test of all such (a, b) holds for every skew and
-// clock. Asking for `notice_s` more keeps each clear of where the other was that long before: a
-// unit that halts by itself can then be waited for by stopping the other that much later.
+// `clock_error` fast or slow. Own times a and b of two units can therefore belong to one true
+// instant exactly if |a - b| <= Slip(max(a, b)). A test of all such (a, b) holds for every skew and
+// clock.
+//
+// `notice_s` keeps each unit clear of where the other was up to that long before as well. A unit
+// that halts by itself is then no danger if the other is stopped that much later.
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -24,16 +28,16 @@ struct Tolerance {
   double clock_error = 0.005;
   double notice_s = 0;
 
-  /// How far apart the own times of two units may be at one instant, by `t_s`. Units: s.
+  /// The most that the own times of two units may differ at one instant, by `t_s`. Units: s.
   [[nodiscard]] double Slip(double t_s) const {
     // (1 + e) / (1 - e) - 1 is below 2 e / (1 - e).
     return ((2 * start_skew_s + notice_s) * (1 + clock_error) + kVectorS) +
            2 * clock_error / (1 - clock_error) * std::max(t_s, 0.0);
   }
-  static constexpr double kVectorS = 1e-3;  // within a vector nobody says where the rotor is
+  static constexpr double kVectorS = 1e-3;  // within a vector the place of the rotor is not known
 };
 
-/// One leg: angles at `begin_s` and their rates.
+/// Leg of a motion: angles at `begin_s` and their rates.
 struct Leg {
   double begin_s = 0;
   double end_s = 0;
@@ -45,12 +49,12 @@ struct Leg {
   [[nodiscard]] bool stands() const { return speed_mm_per_s == 0; }
 };
 
-/// Where an arm is during one slice of its own time: nowhere farther than `travel_mm` from `line`.
+/// Where an arm is during one slice of its own time: no farther than `travel_mm` from `line`.
 struct Slice {
   SegmentFp line;
   double travel_mm = 0;
 };
-/// All that the arm covers during some slices, without its half-width.
+/// The rectangle that the arm covers during some slices, without its half-width.
 struct Bounds {
   double x_low = 0;
   double x_high = 0;
@@ -64,6 +68,14 @@ inline bool Apart(const Bounds& a, const Bounds& b, double need_mm) {
 }
 
 using AxisPaths = std::array<AxisPath, kAxisCount>;
+
+/// The unit stands.
+inline bool IsEmpty(const AxisPaths& paths) { return paths[0].size() + paths[1].size() == 0; }
+/// When the first segment begins; the largest number for an empty motion. Units: ticks of 100 us.
+std::uint32_t BeginTicks(const AxisPaths& paths);
+/// The same motion later by so many ticks of 100 us; sooner, where that is negative. Pre: no
+/// segment begins before 0 then.
+AxisPaths Shifted(const AxisPaths& paths, std::int64_t by_ticks);
 
 class Track {
  public:
@@ -80,15 +92,16 @@ class Track {
   [[nodiscard]] double reach_mm() const { return reach_mm_; }
 
   static constexpr double kForever = 1e9;
-  static constexpr double kSliceS = 0.5;
-  static constexpr int kSlicesPerBounds = 8;
+  static constexpr double kSliceS = 0.5;      // of the unit's own time
+  static constexpr int kSlicesPerBounds = 8;  // slices that one rectangle covers
 
   /// The slice from n * kSliceS on; below 0 and beyond the end: where it stands then.
   [[nodiscard]] const Slice& slice(int n) const {
     return slices_[static_cast<std::size_t>(std::clamp(n + 1, 0, slice_count() + 1))];
   }
   [[nodiscard]] int slice_count() const { return static_cast<int>(slices_.size()) - 2; }
-  /// Of slices n * kSlicesPerBounds and those that follow; of the stands beyond either end.
+  /// The bounds of slices n * kSlicesPerBounds and those that follow; beyond either end, of the
+  /// stand there.
   [[nodiscard]] const Bounds& bounds(int n) const {
     return bounds_[static_cast<std::size_t>(
         std::clamp(n + 1, 0, static_cast<int>(bounds_.size()) - 1))];
@@ -104,7 +117,7 @@ class Track {
   double reach_mm_ = 0;
 };
 
-/// A leg of one arm, where it is at a time.
+/// Where one arm is at a time of a leg.
 inline SegmentFp ArmAt(const ArmGeometry& arm, const Leg& leg, double own_s) {
   const double dt_s = leg.stands() ? 0 : own_s - leg.begin_s;
   return arm.AtAngles(leg.theta_rad + leg.theta_rad_per_s * dt_s,
@@ -112,17 +125,17 @@ inline SegmentFp ArmAt(const ArmGeometry& arm, const Leg& leg, double own_s) {
 }
 
 /// True: the two are farther apart than `need_mm` at all own times that the tolerance lets meet.
-/// Nothing is sampled. Cost: at most `budget` distances; more would be needed only where they
-/// nearly touch: false.
+/// Nothing is sampled. Cost: at most `budget` distances. More would be needed only where they
+/// nearly touch; the answer is then false.
 bool PassesClear(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
                  double need_mm, const Tolerance& tolerance, int budget = 2000);
 
-/// The same, asked of `a` from `since_s` of its own time on only: where it was before is no matter.
+/// The same for `a` from `since_s` of its own time on: where it was before does not count.
 bool PassesClearSince(double since_s, const ArmGeometry& arm_a, const Track& a,
                       const ArmGeometry& arm_b, const Track& b, double need_mm,
                       const Tolerance& tolerance, int budget = 2000);
 
-/// The same for one leg of `a`; before and after it nothing is asked.
+/// The same for one leg of `a`; times before and after it do not count.
 bool LegPassesClear(const ArmGeometry& arm_a, const Leg& a, const ArmGeometry& arm_b,
                     const Track& b, double need_mm, const Tolerance& tolerance, int budget = 500);
 

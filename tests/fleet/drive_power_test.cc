@@ -1,5 +1,6 @@
-// Against what is known in closed form: with a winding so slow that its current has no ripple, the
-// circle of the sinusoid; with one so fast that it has no memory, the duty; a pulse between them.
+// The power of a motor against closed forms. A winding so slow that its current has no ripple is
+// compared with the circle of the sinusoid. A winding so fast that it has no memory is compared
+// with the duty. A pulse between the two is compared with its exponentials.
 #include "fleet/drive_power.h"
 
 #include <gtest/gtest.h>
@@ -96,11 +97,11 @@ TEST(MeansOverTurn, AWindingWithoutMemoryDrawsTheDutyOfTheBus) {
   motor.phase_inductance_H = 37e-9;
   constexpr double kVolt = 1.8;
   double duty = 0;
-  for (int k = 0; k < 16; ++k) {  // 96 vectors, a sector of them
+  for (int k = 0; k < 16; ++k) {  // 96 vectors, 16 of them a sector
     const double a = kPi / 3 * k / 16;
     duty += (std::sin(kPi / 3 - a) + std::sin(a)) / 16;
   }
-  // One leg against two in parallel, or two against one.
+  // A single leg against two in parallel, or two against one.
   const double power_W = kVolt * kVolt * 2 / 3 / 14.85 * duty;
   for (const WaveMode mode : kModes) {
     const auto means =
@@ -127,7 +128,8 @@ TEST(MeansOverTurn, RippleHeatsAsThePeriodicPulseDoes) {
     const double falling = peak * peak * tau / 2 * (1 - std::exp(-2 * (period - on) / tau));
     const Feed feed{{static_cast<std::uint16_t>(counter1), 255, 6}, WaveMode::kAsymmetric, 1.8};
     const auto means = MeansOverTurn(motor, feed, {.rotor_stands = true});
-    // What is left: between two vectors the current turns by 60 degrees, once in 255 carriers.
+    // The remaining difference: between two vectors the current turns by 60 degrees, once in 255
+    // carriers.
     EXPECT_NEAR(means.winding_W / (1.5 * r * (rising + falling) / period), 1, 4e-3) << counter1;
   }
 }
@@ -161,9 +163,9 @@ TEST(MeansOverTurn, DeadTimeTakesItsShareOfTheFundamental) {
 }
 
 TEST(MeansOverTurn, SwitchingIsOneHardEdgeForEachLegThatSwitches) {
-  // As above. Each leg's current has one sign over a carrier, so of its two edges one is hard. The
-  // mean of |cos| is 2/pi; the leg that never rises (not with seven segments) is the one whose
-  // current is most negative, 0.827 on average. 90 vectors: none with a leg that stays high; at the
+  // As above, each leg's current has one sign over a carrier, so of its two edges one is hard. The
+  // mean of |cos| is 2/pi. The leg that never rises (not with seven segments) is the one whose
+  // current is most negative, 0.827 on average. 90 vectors: none with a leg that stays high. At the
   // border of two sectors one more leg, with half the current, does not rise.
   MotorModel motor;
   motor.phase_inductance_H *= 100;
@@ -179,7 +181,7 @@ TEST(MeansOverTurn, SwitchingIsOneHardEdgeForEachLegThatSwitches) {
   EXPECT_NEAR(switching(WaveMode::kFiveSegment) / ((6 / kPi - resting) * a_leg_W), 1, 0.02);
 }
 
-// An independent way to the same current: a phasor, the load angle found by bisection.
+// A phasor gives the same current in an independent way, the load angle found by bisection.
 TEST(SteadyPower, OfASlowWindingIsThatOfThePhasorOfTheLoadAngle) {
   const std::uint64_t seed = testing::TestSeed(7);
   FOCALFLEET_TRACE_SEED(seed);
@@ -289,7 +291,7 @@ TEST(SteadyPower, TheTunedMotorDrawsAboutATenthOfAWatt) {
   EXPECT_LT(power.switching_W, 0.03 * power.winding_W);
 }
 
-TEST(SteadyPower, IsTotalOverSettingsThatNobodyWouldUse) {
+TEST(SteadyPower, IsTotalOverUnreasonableSettings) {
   for (const AxisDrive& drive :
        {AxisDrive{1, 1, 6}, AxisDrive{7, 3, 1}, AxisDrive{10, 255, 7}, AxisDrive{65'535, 255, 96},
         AxisDrive{12, 4, 3000}, AxisDrive{500, 1, 5000}}) {

@@ -144,21 +144,21 @@ TEST(EstimateWithSpread, LimitsHoldEveryMotorWithinTheSpread) {
   const std::uint64_t seed = testing::TestSeed(9);
   FOCALFLEET_TRACE_SEED(seed);
   const Case c = RandomCase(seed);
-  const EstimateFigures figures =
-      EstimateWithSpread(c.plan, c.layout, c.drives, {}, {.model_error = 0});
+  const EstimateSpread spread{.load = 0.2, .resistance = 0.1, .model_error = 0};
+  const EstimateFigures figures = EstimateWithSpread(c.plan, c.layout, c.drives, {}, spread);
   const auto holds = [](const Banded& band, double value) {
     return band.low <= value * (1 + 1e-4) && value <= band.high * (1 + 1e-4);
   };
   Rng rng(seed);
   for (int k = 0; k < 5; ++k) {
     MotorModel motor;
-    motor.load_torque_Nm *= rng.Uniform(0.8, 1.2);
-    motor.phase_resistance_ohm *= rng.Uniform(0.9, 1.1);
+    motor.load_torque_Nm *= rng.Uniform(1 - spread.load, 1 + spread.load);
+    motor.phase_resistance_ohm *= rng.Uniform(1 - spread.resistance, 1 + spread.resistance);
     const PlanEstimate estimate = Estimate(c.plan, c.layout, c.drives, motor);
     EXPECT_TRUE(holds(figures.total.energy_J, estimate.energy_J)) << k;
     EXPECT_TRUE(holds(figures.total.peak_power_W, estimate.peak_power_W)) << k;
   }
-  // The bus gives the voltage: the power goes nearly as 1 / r.
+  // The bus fixes the voltage: the power is nearly proportional to 1 / r.
   EXPECT_NEAR(figures.total.energy_J.low / figures.total.energy_J.nominal, 1 / 1.1, 0.02);
   EXPECT_NEAR(figures.total.energy_J.high / figures.total.energy_J.nominal, 1 / 0.9, 0.02);
 }

@@ -81,7 +81,7 @@ TEST(Kinematics, EverySolutionOfAReachablePointIsFoundAndReachesIt) {
       EXPECT_LE(s.theta_deg, unit.theta().max_deg);
       EXPECT_GE(s.phi_deg, unit.phi().min_deg);
       EXPECT_LE(s.phi_deg, unit.phi().max_deg);
-      // Near stretched and folded the point hardly tells phi, hence the distance of the elbows.
+      // Near stretched and folded the point hardly fixes phi, hence the distance of the elbows.
       found |= DistanceMm(ArmAt(unit, s).a, ArmAt(unit, angles).a) < 1e-3 &&
                std::abs(s.theta_deg - angles.theta_deg) < 90;
     }

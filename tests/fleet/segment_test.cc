@@ -19,7 +19,8 @@ TEST(Segment, DistancesOfPlainCases) {
   EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{0, 3}, {4, 3}}), 3);
   EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{2, -1}, {2, 1}}), 0);
   EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{7, 4}, {7, 9}}), 5);
-  EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{4, 0}, {9, 9}}), 0);  // touch at ends
+  /// touching at ends
+  EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{4, 0}, {9, 9}}), 0);
   EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{6, 0}, {9, 0}}), 2);  // one line
   EXPECT_EQ(DistanceMm(SegmentFp{{0, 0}, {4, 0}}, SegmentFp{{2, 0}, {9, 0}}), 0);  // overlap
   EXPECT_EQ(DistanceMm(SegmentFp{{1, 1}, {1, 1}}, SegmentFp{{4, 5}, {4, 5}}), 5);  // two points
@@ -48,7 +49,7 @@ double DoubleArea(PointFp a, PointFp b, PointFp c) {
   return (b.x_mm - a.x_mm) * (c.y_mm - a.y_mm) - (b.y_mm - a.y_mm) * (c.x_mm - a.x_mm);
 }
 
-/// 0 where they cross, else from one of the ends.
+/// The distance: 0 where they cross, otherwise from one of the ends.
 double ByCrossingAndEnds(const SegmentFp& s, const SegmentFp& t) {
   const bool s_parts = DoubleArea(s.a, s.b, t.a) * DoubleArea(s.a, s.b, t.b) < 0;
   const bool t_parts = DoubleArea(t.a, t.b, s.a) * DoubleArea(t.a, t.b, s.b) < 0;

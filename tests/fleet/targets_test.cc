@@ -42,7 +42,7 @@ TargetRow Row(std::uint32_t unit, std::variant<PointFp, TargetAngles> place, int
   return row;
 }
 
-// Own geometry: no shared code with what is tested, dense along both arms.
+// A distance of its own, without shared code: dense samples along both arms.
 double SampledDistance(const SegmentFp& s, const SegmentFp& t) {
   constexpr int kSteps = 60;
   const auto along = [](const SegmentFp& g, int k) {
@@ -254,7 +254,7 @@ TEST(DrawConfiguration, FiveThousandUnitsFindTheirPlaces) {
 }
 
 TEST(DrawConfiguration, CoversThePatrolAreaEvenly) {
-  // Units too far apart to touch: within each ring of equal area falls the same share of fibres.
+  // Units too far apart to touch: the same share of fibres falls within each ring of equal area.
   constexpr int kUnits = 3000;
   constexpr int kRings = 10;
   auto units = MakeHexLayout({.count = kUnits, .pitch_mm = 100, .theta_arm_mm = 8.25});
@@ -297,7 +297,7 @@ TEST(DrawConfiguration, KeepsStandingUnitsFoldsDisabledOnesAndAvoidsObstacles) {
     }
 }
 
-TEST(DrawConfiguration, SaysWhoFindsNoPlace) {
+TEST(DrawConfiguration, NamesTheUnitWithoutAPlace) {
   const auto units = MakeHexLayout({.count = 1});
   const Fleet fleet = FleetOf(units, {{1, {0, 0}, 30}});
   const auto poses = DrawConfiguration(fleet.layout, fleet.drives, {}, Rng(1));

@@ -11,8 +11,8 @@
 namespace focalfleet {
 namespace {
 
-// Counts in a way of its own: every word of (units) letters over (spots + none), those thrown out
-// that give a spot twice. Odds of several reasons for one spot add up.
+// An independent count: every word of (units) letters over (spots + none), without those that give
+// a spot twice. Odds of several reasons for one spot add up.
 struct Exact {
   int units = 0;
   int spots = 0;

@@ -47,18 +47,21 @@ TEST(CovarianceAt, IsThatOfTheSimulatorsMechanism) {
   EXPECT_NEAR(sum.yy, claimed.yy, 0.03 * scale);
 }
 
-TEST(CovarianceAt, BlindErrorOfTheDefaultsIsFiftyFourMicrometresOverThePatrolArea) {
+TEST(CovarianceAt, OfEqualAnglesIsRootThreeArmsTimesTheAngleOverThePatrolArea) {
   Rng rng(1);
   const Unit unit = MakeHexLayout({.count = 1})[0];
+  const double sigma_deg = 0.22;
   double sum = 0;
   const int draws = 20000;
   for (int k = 0; k < draws; ++k) {
     // Evenly over the disc: r^2 = 2 a^2 (1 + cos phi).
     const double phi = std::acos(2 * rng.Uniform() - 1) * 180 / std::acos(-1.0);
-    const CovarianceFp c = CovarianceAt(unit, {0, phi}, {0.22, 0.22, 0});
+    const CovarianceFp c = CovarianceAt(unit, {0, phi}, {sigma_deg, sigma_deg, 0});
     sum += (c.xx + c.yy) / draws;
   }
-  EXPECT_NEAR(std::sqrt(sum) * 1e3, 54, 2);
+  // The mean of r^2 is 2 a^2, phi turns the fibre at the radius a.
+  const double expected_mm = std::sqrt(3) * unit.theta().arm_mm * sigma_deg * std::acos(-1.0) / 180;
+  EXPECT_NEAR(std::sqrt(sum) / expected_mm, 1, 0.01);
 }
 
 TEST(SquaredSigmas, CountsAlongTheEllipse) {

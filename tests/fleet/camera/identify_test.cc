@@ -1,5 +1,5 @@
-// Identification of a simulated plate with one trouble at a time, and with all at once. What is
-// wrong is planted in the truth; the judge knows whose light is in which spot.
+// Identification of a simulated plate with one trouble at a time, and with all at once. Troubles
+// are planted in the truth, and the judge knows whose light is in which spot.
 #include "fleet/camera/identify.h"
 
 #include <gtest/gtest.h>
@@ -66,7 +66,7 @@ class Identify : public ::testing::Test {
     return seen.count[static_cast<std::size_t>(status)];
   }
 
-  /// A healthy unit whose fibre moved far, the k-th of them.
+  /// The k-th of the healthy units whose fibre moved far.
   std::uint32_t FarMover(int k) {
     for (std::uint32_t i = 0; i < field_.units().size(); ++i) {
       const auto& unit = field_.units()[i];
@@ -112,7 +112,7 @@ TEST_F(Identify, TheOrderOfTheSpotsDoesNotMatter) {
   }
 }
 
-TEST_F(Identify, DarkFibresAreMissingAndDustIsNobodys) {
+TEST_F(Identify, DarkFibresAreMissingAndDustIsNotAssigned) {
   field_.Move(kNoTroubles);
   auto sources = field_.Sources();
   const Complex dust = sources[40].place_mm;
@@ -132,7 +132,7 @@ TEST_F(Identify, DarkFibresAreMissingAndDustIsNobodys) {
             1);
 }
 
-TEST_F(Identify, WhoDidNotMoveIsNamedWithItsAxes) {
+TEST_F(Identify, AUnitThatDidNotMoveIsNamedWithItsAxes) {
   field_.Move(kNoTroubles);
   const std::uint32_t both = FarMover(0);
   const std::uint32_t theta = FarMover(1);
@@ -157,7 +157,8 @@ TEST_F(Identify, AStayThatALargeErrorExplainsAsWellIsNotClaimed) {
   const std::uint32_t i = FarMover(0);
   auto& unit = field_.units()[i];
   unit.commanded.phi_deg = unit.before.phi_deg + (unit.before.phi_deg < 90 ? 3 : -3);
-  // Near where phi's stay would have left it, and not far from where the move ends.
+  // The place is near where a stay of phi would have left the fibre, and not far from the end of
+  // the move.
   unit.place_mm = field_.PlaceOf(i, {unit.commanded.theta_deg - 0.6,
                                      unit.before.phi_deg * 0.9 + unit.commanded.phi_deg * 0.1});
   const Identification seen = See();
@@ -210,7 +211,7 @@ TEST_F(Identify, TwoThatStrayedIntoACommonAreaAreAmbiguous) {
   const Complex pa(layout.unit({a}).base_fp.x_mm, layout.unit({a}).base_fp.y_mm);
   const Complex pb(layout.unit({b}).base_fp.x_mm, layout.unit({b}).base_fp.y_mm);
   const Complex across = (pb - pa) / std::abs(pb - pa);
-  // In both patrol areas, off the line between the bases.
+  // The place is in both patrol areas, off the line between the bases.
   field_.units()[a].place_mm = (pa + pb) / 2.0 + across * Complex(1.5, 3);
   field_.units()[b].place_mm = (pa + pb) / 2.0 + across * Complex(-1.5, -3);
   const Identification seen = See();
@@ -446,7 +447,7 @@ TEST_F(Identify, FarTooFewOrManySpotsAreRefused) {
   EXPECT_EQ(RefusedAs(), "count");
 }
 
-TEST_F(Identify, AFleetOfWhichNobodyMovedIsNotAnotherField) {
+TEST_F(Identify, AFleetInWhichNoUnitMovedIsNotAnotherField) {
   field_.Move(kNoTroubles);
   for (std::uint32_t i = 0; i < field_.units().size(); ++i)
     field_.units()[i].place_mm = field_.PlaceOf(i, field_.units()[i].before);

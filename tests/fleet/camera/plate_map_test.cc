@@ -90,7 +90,8 @@ TEST(FitPolynomial, LightsOnALineDetermineNothing) {
   EXPECT_FALSE(FitPolynomial(lights, {}));
 }
 
-// Lights displaced by the simulator's air, and where the map puts others that it displaced as well.
+// Lights displaced by the simulator's air, and the map's places of others that it displaced as
+// well.
 struct Windy {
   std::vector<KnownLight> lights;
   std::vector<KnownLight> others;
@@ -123,8 +124,8 @@ TEST(AirOf, FindsTheAirsStrengthOverExposures) {
       ASSERT_TRUE(fit);
       sum2 += std::pow(AirOf(windy.lights, fit->degree, {}).sigma_mm, 2) / 40;
     }
-    // The simulator's air has another shape of covariance, hence the width; and what is usual
-    // weighs where there is none.
+    // The simulator's air has another shape of covariance, hence the width. The usual law weighs
+    // where there is no air.
     EXPECT_NEAR(std::sqrt(sum2), sigma_mm, 0.0025);
   }
 }
@@ -168,7 +169,7 @@ TEST(PlateMap, WithoutNoiseASmoothFieldIsFollowedEverywhere) {
   for (const PointFp& p : Disc(150, 1000)) lights.push_back(light(p));
   const auto map = PlateMap::Solve(lights, 1, {0.02, 300}, {});
   ASSERT_TRUE(map);
-  // Between the lights, within the interpolation of the grid: 1.5 % of the air's 28 um and waves
+  // Between the lights, within the interpolation of the grid: 1.5 % of the air's 28 um, and waves
   // that are shorter than l.
   for (const PointFp& p : Disc(77, 800))
     EXPECT_LT(Apart(map->At(light(p).seen_fp).at_fp, p), 0.001);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <string>
 
+#include "protocol/base/limits.h"
+
 namespace focalfleet {
 namespace {
 
@@ -29,21 +31,23 @@ TEST(BadRows, OneIsOneLine) {
   EXPECT_EQ(bad.Check().error().code, ErrorCode::kInvalid);
 }
 
-TEST(BadRows, TwentyAreReportedAndTheOthersCountedByTheirKind) {
+TEST(BadRows, TheFirstAreReportedAndTheOthersCountedByTheirKind) {
   BadRows bad;
-  for (int k = 1; k <= 20; ++k) bad.Add(Row(k), "out of patrol");
+  constexpr int kFirst = limits::kBadRowsReported;
+  const std::string first = std::to_string(kFirst);
+  for (int k = 1; k <= kFirst; ++k) bad.Add(Row(k), "out of patrol");
   std::string text = Reported(bad);
   EXPECT_THAT(text, StartsWith("t.csv:1: wrong\n  t.csv:2: wrong\n"));
-  EXPECT_THAT(text, HasSubstr("\n  t.csv:20: wrong"));
+  EXPECT_THAT(text, HasSubstr("\n  t.csv:" + first + ": wrong"));
   EXPECT_THAT(text, Not(HasSubstr("more")));
-  bad.Add(Row(21), "unknown unit");
-  EXPECT_THAT(Reported(bad),
-              HasSubstr("\n  and 1 more row; all 21: out of patrol (20), unknown unit (1)"));
-  for (int k = 22; k <= 3407; ++k) bad.Add(Row(k), "unknown unit");
+  bad.Add(Row(kFirst + 1), "unknown unit");
+  EXPECT_THAT(Reported(bad), HasSubstr("\n  and 1 more row; all " + std::to_string(kFirst + 1) +
+                                       ": out of patrol (" + first + "), unknown unit (1)"));
+  for (int k = 2; k <= 3387; ++k) bad.Add(Row(kFirst + k), "unknown unit");
   text = Reported(bad);
-  EXPECT_THAT(text, HasSubstr("\n  and 3387 more rows; all 3407: unknown unit (3387), out of "
-                              "patrol (20)"));
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 20);
+  EXPECT_THAT(text, HasSubstr("\n  and 3387 more rows; all " + std::to_string(kFirst + 3387) +
+                              ": unknown unit (3387), out of patrol (" + first + ")"));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), kFirst);
 }
 
 TEST(BadRows, CellsNeitherMakeLinesNorFillTheText) {

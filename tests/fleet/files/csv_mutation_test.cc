@@ -1,6 +1,6 @@
-// Every reader is total: good files with bytes changed, cut, doubled and swapped, and plain noise,
-// give a value or an Error that names the file. What a reader accepts, its writer writes and the
-// reader reads again.
+// Every reader is total. Good files with bytes changed, cut, doubled and swapped, and plain noise,
+// give a value or an Error that names the file. A value that a reader accepts is written by its
+// writer and read again.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -55,7 +55,7 @@ std::string Noise(Rng& rng) {
   return text;
 }
 
-// Reads; the error's text, empty where there was none.
+// Reads a text. Returns the error's text, empty where there was none.
 using Reader = std::function<std::string(const std::string&)>;
 
 template <class T>

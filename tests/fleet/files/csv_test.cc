@@ -93,7 +93,7 @@ TEST(Csv, TellsAllRowsOfAnotherWidth) {
 }
 
 TEST(Csv, ColumnsWithoutANameArePassedOver) {
-  // The index that pandas writes, and what a spreadsheet adds behind the last column.
+  // The index that pandas writes, and the columns that a spreadsheet adds behind the last one.
   const CsvTable table = Parsed(",unit_id,Unnamed: 0,x_mm,Unnamed: 0.1,,\n0,7,0,2.5,0,,\n");
   ASSERT_EQ(table.size(), 1u);
   CsvRow row(table, 0);

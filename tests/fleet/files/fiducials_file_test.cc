@@ -34,7 +34,7 @@ TEST(FiducialsFile, SaysWhereAndWhy) {
   EXPECT_EQ(ErrorOf("3,1e6,0\n"), "f.csv:4: column x_mm: 1e6 is not on any plate");
 }
 
-// ---- where they come from
+// ---- made fiducials
 
 TEST(HexPlate, WithoutFiducialsIsTheHexLayout) {
   const auto plate = MakeHexPlate({.count = 300});

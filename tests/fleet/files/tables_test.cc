@@ -45,7 +45,7 @@ TEST(TargetsFile, ReadsPlacesAnglesAndWhatIsCarriedAlong) {
   EXPECT_EQ(targets->source, "night.csv");
 }
 
-TEST(TargetsFile, KeepsTheNamesOfColumnsThatNobodyReads) {
+TEST(TargetsFile, KeepsTheNamesOfUnreadColumns) {
   const auto targets =
       ReadTargets("unit_id,x_mm,y_mm,prioritty,target_id\n3,1.5,-2,7,NGC 224\n", "night.csv");
   ASSERT_TRUE(targets) << targets.error().text;

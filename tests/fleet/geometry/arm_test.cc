@@ -96,7 +96,7 @@ TEST(ArmGeometry, FibreRadiusBoundsTheWholeRange) {
   }
 }
 
-/// The one property that everything rests on: "clear" is never said of sweeps that touch.
+/// The property that everything rests on: "clear" is never returned for sweeps that touch.
 TEST(SweepsClear, NeverOverlooksAContact) {
   const std::uint64_t seed = TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
@@ -117,7 +117,7 @@ TEST(SweepsClear, NeverOverlooksAContact) {
       EXPECT_GT(least, need);
     }
     ++(said_clear ? clear : touching);
-    // Well clear of each other must be seen as such, otherwise nothing could ever move.
+    // Sweeps well clear of each other must be recognised, otherwise nothing could ever move.
     if (least > need + 3) {
       EXPECT_TRUE(said_clear) << "draw " << draw << ", sampled least distance " << least;
     }

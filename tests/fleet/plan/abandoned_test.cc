@@ -1,4 +1,4 @@
-// A plan that nobody wants any more, given up after any number of questions.
+// A plan that is abandoned after any number of questions.
 #include "fleet/plan/abandoned.h"
 
 #include <gmock/gmock.h>
@@ -21,10 +21,10 @@ using ::focalfleet::testing::PlanningFleet;
 using ::focalfleet::testing::Seed;
 using ::testing::HasSubstr;
 
-/// An answer to the planner's question: false for so many times.
+/// The answer to the planner's question: false for so many times.
 struct Asked {
   std::size_t times = 0;
-  std::optional<std::size_t> wanted_for;  // none: for ever
+  std::optional<std::size_t> wanted_for;  // empty: for ever
 
   [[nodiscard]] Abandoned question() {
     return [this] {
@@ -43,7 +43,7 @@ void ExpectSamePlan(const Plan& a, const Plan& b) {
       EXPECT_TRUE(std::ranges::equal(a.moves[m].path[k].segments(), b.moves[m].path[k].segments()));
 }
 
-// All at once, by an order, and so crowded that hardly anybody is served.
+// Fleets that are planned all at once, by an order, and so crowded that hardly any unit is served.
 std::vector<PlanningFleet> Fleets() {
   std::vector<PlanningFleet> fleets;
   fleets.push_back(HexFleet(127));
@@ -83,7 +83,7 @@ TEST(Abandoned, APlanEndsSoonWheneverItIsGivenUp) {
   }
 }
 
-TEST(Abandoned, AJobSaysSoAndWhatItKeepsAsksNobody) {
+TEST(Abandoned, AJobReportsItAndItsRunningPlanIsKeptWithoutTheQuestion) {
   PlanningFleet fleet = HexFleet(19);
   DrawStartAndTargets(&fleet, Seed(1));
   PlanJob job{.job = 7,

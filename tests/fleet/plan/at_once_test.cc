@@ -1,5 +1,5 @@
-// Plans in which all go at once: close to the bound, within limits of power at every instant, with
-// notice; and a search in time that finds what waiting and folding do not.
+// Plans in which all units go at once: close to the bound, within limits of power at every instant,
+// with notice. A search in time finds ways that waiting and folding do not find.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -44,7 +44,7 @@ TEST(PlanAtOnce, TakesHardlyLongerThanTheSlowestUnitAlone) {
   EXPECT_LE(ratios.back(), 1.25);
 }
 
-/// Power of each rail at the worst of all skews and clocks, summed from the rows: a row may run at
+/// Power of each rail for the worst of all skews and clocks, summed from the rows. A row may run at
 /// any instant between its earliest begin and its latest end.
 double WorstRailPower(const PlanningFleet& fleet, const Plan& plan) {
   DrivePowers powers{MotorModel{}};
@@ -127,11 +127,11 @@ TEST(PlanAtOnce, TightestPairsAreAsNearAsTheCheckerSeesThem) {
   for (std::size_t k = 1; k < plan->tightest.size(); ++k)
     EXPECT_LE(plan->tightest[k - 1].clearance_mm, plan->tightest[k].clearance_mm);
   const CheckReport report = Witnessed(fleet, *plan);
-  // The checker looks at the corners of skew and clocks only, the promise holds for all of them.
+  // The checker tests only the corners of skew and clocks, the promise holds for all of them.
   EXPECT_GE(report.worst_margin_mm, plan->tightest.front().clearance_mm - 1e-4);
 }
 
-TEST(PlanAtOnce, NobodyGoesThroughWhatLeavesNoWay) {
+TEST(PlanAtOnce, NoUnitGoesWhereNoWayExists) {
   // The elbow itself cannot pass these two, on either side of the unit.
   std::vector<Unit> units = MakeHexLayout({.count = 1});
   PlanningFleet fleet =
@@ -153,7 +153,7 @@ TEST(PlanAtOnce, NobodyGoesThroughWhatLeavesNoWay) {
 }
 
 TEST(PlanAtOnce, RefusesALimitThatWouldTakeLongerThanAnOffsetCanSay) {
-  // One motor at a time: 200 units take some 3000 s.
+  // A single motor at a time: 200 units take some 3000 s.
   const PlanningFleet fleet = Drawn(200, TestSeed(331));
   PlanOptions options;
   options.power.rail_W = 1.01 * SteadyPower({}, {}).total_W();
@@ -179,16 +179,16 @@ TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
   }
   int found = 0;
   for (std::uint32_t i = 0; i < fleet.layout.size(); ++i) {
-    std::vector<Passer> passers;
+    std::vector<MovingNeighbour> moving;
     for (const PositionerIndex j : fleet.layout.neighbours({i})) {
       const double need_mm = fleet.layout.unit({i}).arm_half_width_mm +
                              fleet.layout.unit(j).arm_half_width_mm + fleet.layout.clearance_mm();
-      passers.push_back({&arms[j.value], &tracks[j.value], need_mm, {}});
+      moving.push_back({&arms[j.value], &tracks[j.value], need_mm, {}});
     }
     TimeSearch search;
     const auto paths = search.Find({.arm = &arms[i],
                                     .drive = &fleet.drives[i],
-                                    .passers = passers,
+                                    .moving = moving,
                                     .from = PlaceOf(fleet.start[i]),
                                     .to = *fleet.targets[i],
                                     .within = arms[i].range(),
@@ -201,9 +201,9 @@ TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
       EXPECT_EQ(at, (*fleet.targets[i])[k]);
     }
     const Track track(arms[i], fleet.drives[i], PlaceOf(fleet.start[i]), *paths);
-    for (const Passer& passer : passers)
-      EXPECT_TRUE(PassesClear(arms[i], track, *passer.arm, *passer.track, passer.need_mm - 1e-3,
-                              passer.tolerance));
+    for (const MovingNeighbour& neighbour : moving)
+      EXPECT_TRUE(PassesClear(arms[i], track, *neighbour.arm, *neighbour.track,
+                              neighbour.need_mm - 1e-3, neighbour.tolerance));
   }
   EXPECT_GE(found, 120);
 }

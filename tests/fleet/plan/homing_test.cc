@@ -34,7 +34,8 @@ TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {
     ASSERT_TRUE(targets) << targets.error().text;
     ASSERT_EQ(targets->size(), fleet.layout.size());
     EXPECT_FALSE((*targets)[0]);
-    // From anywhere in the interval: phi to the upper stop, then theta to the lower one.
+    // The homing arm starts anywhere in the interval: phi goes to the upper stop, then theta to the
+    // lower one.
     std::vector<CheckedRow> rows;
     PlanningFleet then = fleet;
     for (std::uint32_t i = 1; i < fleet.layout.size(); ++i) {

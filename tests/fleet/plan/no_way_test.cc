@@ -1,5 +1,5 @@
-// A proof that no way exists is never given where a search finds one, and is given where a wall of
-// known thickness stands between start and target.
+// A proof that no way exists is never given where a search finds a way. The proof is given where a
+// wall of known thickness stands between start and target.
 #include "fleet/plan/no_way.h"
 
 #include <gtest/gtest.h>
@@ -25,7 +25,7 @@ class NoWayTest : public ::testing::Test {
   }
   static Blocker Disc(double x_mm, double y_mm, double radius_mm) {
     const PointFp at{x_mm, y_mm};
-    return {{{at, at}, radius_mm}, 2, kNobody};
+    return {{{at, at}, radius_mm}, 2, kNoUnitIndex};
   }
 
   std::vector<Unit> units_ = MakeHexLayout({.count = 1});
@@ -40,7 +40,7 @@ TEST_F(NoWayTest, IsProvenWhereTheElbowCannotPass) {
       ProveNoWay({.arm = &arm_, .never_move = both, .from = At(0, 90), .to = At(179, 90)});
   ASSERT_TRUE(proof);
   EXPECT_TRUE(proof->obstacle);
-  // One of them is not on the way between these two.
+  // A single one of them is not on the way between these two.
   const std::vector<Blocker> one{both[1]};
   EXPECT_FALSE(ProveNoWay({.arm = &arm_, .never_move = one, .from = At(0, 90), .to = At(179, 90)}));
 }

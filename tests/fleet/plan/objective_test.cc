@@ -1,4 +1,4 @@
-// Plans for other things than an early end: never worse in what they are for, never later, as
+// Plans for other objectives than an early end: never worse by their objective, never later, as
 // clear.
 #include "fleet/plan/objective.h"
 
@@ -30,7 +30,7 @@ Made Make(const PlanningFleet& fleet, const PlanOptions& options) {
   return {std::move(*plan), std::move(power)};
 }
 
-/// Of rails, each counted by what it draws.
+/// The flatness of rails, each weighted by its power.
 double RailFlatness(const PowerStatement& power) {
   double sum = 0;
   for (const RailStatement& rail : power.rails)
@@ -40,7 +40,7 @@ double RailFlatness(const PowerStatement& power) {
   return even / sum;
 }
 
-/// Never below by more than rounding.
+/// The new plan is never worse by more than rounding.
 void ExpectNotWorse(Objective objective, const Made& now, const Made& before, double slot_share) {
   switch (objective) {
     case Objective::kSoonest:

@@ -1,5 +1,5 @@
-// Who checks the checker: plans that are wrong in known ways must be caught, and distances must be
-// what a slow and simple computation says.
+// The checker itself is checked. Plans that are wrong in known ways must be caught. Distances must
+// equal those of a slow and simple computation.
 #include "tests/support/plan_checker.h"
 
 #include <gtest/gtest.h>
@@ -47,7 +47,8 @@ TEST(PlanChecker, MeasuresStandingArmsExactly) {
 }
 
 TEST(PlanChecker, FindsAContactOfAnInstant) {
-  // The one arm sweeps past the tip of the other within a long motion: near for milliseconds only.
+  // The first arm sweeps past the tip of the other within a long motion: near for milliseconds
+  // only.
   const std::vector<CheckedRow> rows{{1, 0, 0, 16, -90, 90}};
   const auto passing = [&](double tip_mm) {
     return CheckPlan({Stretched(1, {0, 0}, -90), Stretched(2, {tip_mm, -16.5}, 90)}, rows, {},
@@ -60,7 +61,7 @@ TEST(PlanChecker, FindsAContactOfAnInstant) {
 }
 
 TEST(PlanChecker, FindsContactsThatOnlySkewOrClocksMake) {
-  // The one sweeps through the middle, the other comes down into the same place afterwards.
+  // The first arm sweeps through the middle, the other comes down into the same place afterwards.
   const std::vector<CheckedUnit> units{Stretched(1, {0, 0}, -90), Stretched(2, {30, 0}, 90)};
   std::vector<CheckedRow> rows{{1, 0, 0, 16, -90, 90}, {2, 0, 0, 0, 90, 180}};
   CheckOptions exact = NoClearance();

@@ -1,4 +1,4 @@
-// From the planner's types to the checker's: whole vectors become degrees and ticks become seconds
+// The planner's types become the checker's: whole vectors become degrees and ticks become seconds
 // here, by the definitions of files.md and not by the planner's own helpers.
 #pragma once
 

@@ -1,6 +1,6 @@
 // Whole focal planes: 5000 units of a hexagonal fleet and the measured plate of DESI, random
 // configuration to random configuration. Every unit must be served, and the independent checker
-// must find no pair that is not clear. One test a seed or a few, so that ctest spreads them;
+// must find no pair that is not clear. Each test has a seed or a few, so that ctest spreads them;
 // FOCALFLEET_SEED picks one.
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@
 namespace focalfleet::testing {
 namespace {
 
-/// Makespan over the slowest unit's time alone.
+/// Returns the makespan over the time of the slowest unit alone.
 double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
   FOCALFLEET_TRACE_SEED(seed);
   DrawStartAndTargets(fleet, seed);
@@ -27,11 +27,12 @@ double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
     ADD_FAILURE() << plan.error().text;
     return 1e9;
   }
-  // Who is not served has no way at all: next to disabled units that happens.
+  // A unit that is not served has no way at all: next to disabled units that happens.
   for (const Unserved& unserved : plan->unserved)
     EXPECT_TRUE(unserved.proof) << "unit index " << unserved.unit.value;
   const double ratio = plan->makespan_s / plan->bound_s;
-  // All at once hardly any of the pairs that cross may be noticed too late; an order has no notice.
+  // In a plan all at once hardly any of the pairs that cross may be noticed too late; an order has
+  // no notice.
   if (ratio < 1.25) {
     EXPECT_LE(static_cast<double>(plan->unnoticed.size()), 0.02 * plan->crossings);
   }

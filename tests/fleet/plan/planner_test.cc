@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "fleet/geometry/clearance.h"
+#include "fleet/plan/scene.h"
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/planning.h"
 
@@ -24,8 +26,8 @@ using ::focalfleet::testing::Seed;
 using ::focalfleet::testing::UnitAt;
 using ::testing::HasSubstr;
 
-/// Two arms side by side between the bases, each below or above the other so that folding back (phi
-/// grows, the tip turns counter-clockwise) runs into the other one.
+/// Two arms side by side between the bases, each below or above the other. Folding back (phi grows,
+/// the tip turns counter-clockwise) runs into the other arm.
 PlanningFleet YinYang(double left_theta_zero_deg = 0) {
   PlanningFleet fleet = FleetOf({UnitAt(1, 0, left_theta_zero_deg), UnitAt(2, 25.6)});
   fleet.StandAt({PoseDeg(fleet, 0, -20 - left_theta_zero_deg, 20), PoseDeg(fleet, 1, 160, 20)});
@@ -97,7 +99,7 @@ TEST(Planner, FreesTwoArmsThatLockEachOther) {
   ASSERT_TRUE(plan) << plan.error().text;
   EXPECT_TRUE(plan->unserved.empty());
   ExpectSound(fleet, *plan);
-  // And into the lock again.
+  // The way back leads into the lock again.
   PlanningFleet back = fleet;
   back.StandAt({*fleet.targets[0], *fleet.targets[1]});
   back.targets = {PlaceOf(fleet.start[0]), PlaceOf(fleet.start[1])};
@@ -139,7 +141,7 @@ TEST(Planner, UnnamedUnitsOfARandomFleetEndWhereTheyStood) {
   PlanningFleet fleet = HexFleet(61);
   for (std::uint64_t k = 0; k < 12; ++k) {
     FOCALFLEET_TRACE_SEED(Seed(k));
-    // Targets are drawn around those that stay.
+    // Targets are drawn around the units that stay.
     std::vector<std::optional<Pose>> standing(fleet.layout.size());
     const auto start =
         DrawConfiguration(fleet.layout, fleet.drives, standing, Rng::Stream(Seed(k), "start"));
@@ -218,7 +220,7 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
       fleet.start[0][axis] = {Witness::kInterval, low[axis], high[axis]};
     const auto plan = MakePlan(fleet.request(), {});
     if (!plan) {
-      // Nobody but certain places may be called colliding.
+      // Only units with certain places may be named as colliding.
       EXPECT_THAT(plan.error().text, HasSubstr("apart"));
       continue;
     }
@@ -252,11 +254,10 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
 }
 
 TEST(Planner, ServesPairsThatAreClearByToleranceOnly) {
-  // Two stretched arms tip to tip, 1.5 um nearer than half-widths and clearance: still clear by the
-  // rule.
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 2 * 16.5 + 4.0)});
-  const double need = 2 * 0.08 * 37.0 + 0.012 * 37.0;
-  fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 37.0)});
+  // Two stretched arms tip to tip, up to 2 um nearer than half-widths and clearance: still clear by
+  // the rule.
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 37.0)});
+  const double need = ClearDistanceMm(fleet.layout, PositionerIndex{0}, PositionerIndex{1});
   ASSERT_GT(need, 4.0);
   // Turn the right arm until the gap is just within the tolerance.
   Pose right = PoseDeg(fleet, 1, 180, 0);
@@ -267,7 +268,7 @@ TEST(Planner, ServesPairsThatAreClearByToleranceOnly) {
     const double x = 37.0 + 16.5 * std::cos(theta) - 16.5;
     return std::hypot(x, 16.5 * std::sin(theta));
   };
-  while (gap() < need - 0.002) ++right[0];
+  while (gap() < need - kClearToleranceMm) ++right[0];
   ASSERT_LT(gap(), need);
   fleet.StandAt({left, right});
   fleet.targets = {PoseDeg(fleet, 0, 90, 90), PoseDeg(fleet, 1, 90, 90)};
@@ -288,7 +289,7 @@ TEST(Planner, KeepsTheMarginsThatItIsAskedFor) {
   check.start_skew_s = wide.start_skew_s;
   check.clock_error = wide.clock_error;
   ExpectSound(fleet, *plan, check);
-  // A plan for perfect clocks does not stand the same test: it is the margins that carry the first.
+  // A plan for perfect clocks fails the same test: the margins carry the first plan.
   const auto tight =
       MakePlan(fleet.request(), {.fixed = false, .start_skew_s = 0, .clock_error = 0});
   ASSERT_TRUE(tight);

@@ -1,5 +1,5 @@
-// A fleet to plan for in tests: layout, where everybody stands and shall go; and what every plan
-// must keep.
+// A fleet to plan for in tests: the layout, the starts and the targets; and the properties that
+// every plan must have.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ struct PlanningFleet {
   }
 };
 
-/// Of the k-th draw of a test.
+/// The seed of the k-th draw of a test.
 inline std::uint64_t Seed(std::uint64_t k) { return TestSeed(1000 + k); }
 
 inline PlanningFleet FleetOf(std::vector<Unit> units, Layout::Options options = {}) {
@@ -46,7 +46,7 @@ inline PlanningFleet FleetOf(std::vector<Unit> units, Layout::Options options = 
   return fleet;
 }
 
-/// On the x axis; angles count from where the arm is stretched along it.
+/// A unit on the x axis; angles count from where the arm is stretched along it.
 inline Unit UnitAt(std::uint32_t id, double x_mm, double theta_zero_deg = 0) {
   Unit unit;
   unit.id = UnitId{id};
@@ -68,7 +68,7 @@ inline PlanningFleet HexFleet(std::uint32_t count, Layout::Options options = {})
   return FleetOf(MakeHexLayout({.count = count}), std::move(options));
 }
 
-/// Random start and, for every unit that may move, a random target; both clear.
+/// Draws a random start and, for every unit that may move, a random target; both are clear.
 inline void DrawStartAndTargets(PlanningFleet* fleet, std::uint64_t seed) {
   const std::size_t n = fleet->layout.size();
   std::vector<std::optional<Pose>> standing(n);
@@ -111,7 +111,7 @@ inline CheckReport Witnessed(const PlanningFleet& fleet, const Plan& plan,
                    options);
 }
 
-/// What holds of every plan: clear at all times, and everybody ends at the target or where it
+/// The properties of every plan: clear at all times, and each unit ends at the target or where it
 /// stood.
 inline void ExpectSound(const PlanningFleet& fleet, const Plan& plan,
                         const CheckOptions& options = {}) {

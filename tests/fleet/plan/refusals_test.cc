@@ -84,7 +84,7 @@ TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
   ASSERT_TRUE(plan) << plan.error().text;
   EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
   EXPECT_TRUE(plan->unserved.empty());
-  // Never nearer than they start, by the checker's own distance.
+  // The two are never nearer than they start, by the checker's own distance.
   const auto before = focalfleet::testing::Witnessed(fleet, {});
   ASSERT_LT(before.worst_margin_mm, -0.1);
   CheckOptions options;
@@ -92,8 +92,8 @@ TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
   ExpectSound(fleet, *plan, options);
 }
 
-TEST(Planner, SendsNobodyElseThroughItsCellBecauseTwoStartTooNear) {
-  // The two of the test above, and one far away that has a degree to go.
+TEST(Planner, SendsNoOtherUnitThroughItsCellBecauseTwoStartTooNear) {
+  // The two units of the test above, and one far away that has a degree to go.
   PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
   fleet.StandAt(
       {PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5), PoseDeg(fleet, 2, 10, 30)});
@@ -106,8 +106,8 @@ TEST(Planner, SendsNobodyElseThroughItsCellBecauseTwoStartTooNear) {
   for (const Axis axis : kAxes) EXPECT_EQ(plan->moves[2].path[Index(axis)].size(), 1u);
 }
 
-TEST(Planner, LeavesNobodyWhoMerelyStartsTooNear) {
-  // The two of the tests above; whether both go, or the other stands and may not move.
+TEST(Planner, ServesUnitsThatMerelyStartTooNear) {
+  // The two units of the tests above; either both go, or the other stands and may not move.
   for (const bool frozen : {false, true}) {
     PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
     fleet.StandAt({PoseDeg(fleet, 0, -12.5, 12.5), PoseDeg(fleet, 1, 167.5, 12.5),
@@ -149,7 +149,7 @@ TEST(Planner, TwoThatStandTooNearAndShallStayAreNoError) {
   EXPECT_EQ(plan->moves.size(), 1u);
 }
 
-TEST(Planner, LeavesWhoIsStuckWhenAskedToAndTheOthersGoStraight) {
+TEST(Planner, LeavesStuckUnitsWhenAskedToAndTheOthersGoStraight) {
   // Two arms across each other, and one far away that has a degree to go.
   PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 80)});
   fleet.StandAt({PoseDeg(fleet, 0, 0, 0), PoseDeg(fleet, 1, 180, 0), PoseDeg(fleet, 2, 10, 30)});
@@ -169,7 +169,7 @@ TEST(Planner, KeepsToTheRangeOfAUnitsOwnCount) {
   fleet.StandAt({PoseDeg(fleet, 0, 90, 100)});
   fleet.targets = {PoseDeg(fleet, 0, 90, 178)};
   PlanRequest request = fleet.request();
-  // It stands 3 degrees of phi less than it counts: 178 degrees would be 181 to it.
+  // The unit stands 3 degrees of phi less than it counts: 178 degrees would be 181 by its count.
   const std::vector<Pose> less{PoseDeg(fleet, 0, 0, -3)};
   request.offsets = less;
   EXPECT_FALSE(MakePlan(request, {}));

@@ -1,4 +1,5 @@
-// A plate planned by sectors: the whole is as clear as one plan, whoever computes when.
+// A plate planned by sectors: the whole is as clear as one plan, wherever and whenever each sector
+// is planned.
 #include "fleet/plan/sectors.h"
 
 #include <gtest/gtest.h>
@@ -115,7 +116,7 @@ TEST(Sectors, TogetherServeAndClearAllAsOnePlanDoes) {
   }
 }
 
-TEST(Sectors, AreTheSameWhoeverComputesWhen) {
+TEST(Sectors, AreTheSameForAnyOrderOfComputing) {
   const std::uint64_t seed = TestSeed(720);
   FOCALFLEET_TRACE_SEED(seed);
   const PlanningFleet fleet = Drawn(271, seed);
@@ -135,7 +136,7 @@ TEST(Sectors, AreTheSameWhoeverComputesWhen) {
           ready.push_back(s);
       ASSERT_FALSE(ready.empty());
       const std::uint32_t which = ready[rng.Below(ready.size())];
-      // It must not look at more than it comes after.
+      // The sector must not look at more than the plans that it comes after.
       std::vector<std::optional<SectorPlan>> seen(sectors.size());
       for (const std::uint32_t before : sectors[which].after) seen[before] = plans[before];
       auto plan = PlanSector(request, {}, sectors, seen, which);
@@ -162,7 +163,7 @@ TEST(Sectors, TwoThreadsMakeTheSamePlanAsOne) {
   const std::vector<Sector>& sectors = made->sectors;
   std::vector<std::optional<SectorPlan>> plans(sectors.size());
   for (std::uint32_t turn = 0; turn < 2; ++turn) {
-    // What a turn writes is looked at in the next one only.
+    // The results of a turn are looked at in the next turn only.
     const std::vector<std::optional<SectorPlan>> before = plans;
     const auto every_other = [&](std::uint32_t first) {
       for (std::uint32_t s = 0, n = 0; s < sectors.size(); ++s) {
@@ -232,7 +233,7 @@ TEST(Planner, LeavesGivenMotionsAsTheyAre) {
     std::vector<AxisPaths> motions(127);
     std::vector<std::uint8_t> given(127, 0);
     Plan late = *before;
-    if (k % 2 == 1) Delay(&late, 100'000);  // and end when nobody else needs to move
+    if (k % 2 == 1) Delay(&late, 100'000);  // these end when no other unit needs to move
     for (const UnitPlan& move : late.moves) {
       if (move.unit.value % 3 != 0) continue;
       motions[move.unit.value] = move.path;
@@ -255,7 +256,7 @@ TEST(Planner, LeavesGivenMotionsAsTheyAre) {
   }
 }
 
-TEST(Planner, RefusesGivenMotionsThatEndOnSomebody) {
+TEST(Planner, RefusesGivenMotionsThatEndOnAnotherUnit) {
   PlanningFleet fleet = HexFleet(7);
   const Unit& middle = fleet.layout.unit({0});
   const Unit& other = fleet.layout.unit({1});
@@ -268,7 +269,8 @@ TEST(Planner, RefusesGivenMotionsThatEndOnSomebody) {
   const double to_middle_deg = to_other_deg > 0 ? to_other_deg - 180 : to_other_deg + 180;
   std::vector<Pose> start;
   for (std::uint32_t i = 0; i < 7; ++i) start.push_back(pose(fleet.layout.unit({i}), 0, 175));
-  // One stands with its arm towards the other, which shall turn around and unfold over it.
+  // The first unit stands with its arm towards the other, which shall turn around and unfold over
+  // it.
   start[0] = pose(middle, to_other_deg, 0);
   start[1] = pose(other, to_other_deg, 175);
   fleet.StandAt(start);
@@ -299,7 +301,8 @@ TEST(Sectors, ThatDoNotFitAreRefusedByName) {
   const PlanRequest request = fleet.request();
   auto sectors = SplitIntoSectors(fleet.layout, {.count = 2});
   ASSERT_TRUE(sectors);
-  // Each as if it were alone: the other side's motions are only its own proposals.
+  // Each sector is planned as if it were alone: the other side's motions are only its own
+  // proposals.
   for (Sector& sector : *sectors) sector.after.clear();
   std::vector<std::optional<SectorPlan>> plans(2);
   for (std::uint32_t s = 0; s < 2; ++s) {
@@ -309,7 +312,7 @@ TEST(Sectors, ThatDoNotFitAreRefusedByName) {
     ASSERT_TRUE(plan);
     plans[s] = std::move(*plan);
   }
-  // One of them late as a whole: what crosses the border no longer fits.
+  // A sector is late as a whole: the motions across the border no longer fit.
   Delay(&plans[1]->plan, 150'000);
   const auto joined = JoinSectors(request, {}, *sectors, plans);
   ASSERT_FALSE(joined);

@@ -54,9 +54,9 @@ TEST_F(ServiceTest, ACopyBringsBackGoalsAndReasons) {
   EXPECT_TRUE(service.NotServed().empty());
 }
 
-TEST_F(ServiceTest, WhoIsReadmittedGoesAndHasNoReasonLeft) {
+TEST_F(ServiceTest, AReadmittedUnitGoesAndHasNoReasonLeft) {
   Service service = Made();
-  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(2, UnservedWhy::kBlocked, kNoUnitIndex);
   service.Unserve(0, UnservedWhy::kTargetCollides, 1);
   service.Hold(2);
   service.Readmit(2);
@@ -80,12 +80,12 @@ TEST_F(ServiceTest, NamesTargetsThatMeetAndDropsOneOfThem) {
 TEST_F(ServiceTest, BoundsAreThoseOfTheServed) {
   Service service = Made();
   const double all_s = TimeBoundS(service);
-  service.Unserve(0, UnservedWhy::kBlocked, kNobody);
-  service.Unserve(1, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(0, UnservedWhy::kBlocked, kNoUnitIndex);
+  service.Unserve(1, UnservedWhy::kBlocked, kNoUnitIndex);
   const double far_one_s = TimeBoundS(service);
   EXPECT_GT(all_s, far_one_s);
   EXPECT_GT(far_one_s, 0);
-  service.Unserve(2, UnservedWhy::kBlocked, kNobody);
+  service.Unserve(2, UnservedWhy::kBlocked, kNoUnitIndex);
   EXPECT_EQ(TimeBoundS(service), 0);
 }
 
@@ -100,9 +100,9 @@ TEST_F(ServiceTest, ALimitBelowOneMotorIsRefusedWithTheLeastThatWouldDo) {
   ASSERT_NE(at, std::string::npos) << text;
   options.power.rail_W = 1.001 * std::stod(text.substr(at + 9)) + 1e-4;
   EXPECT_TRUE(CheckPower(service, options));
-  // Nobody goes: nothing is drawn.
+  // No unit goes: nothing is drawn.
   for (std::uint32_t unit = 0; unit < 3; ++unit)
-    service.Unserve(unit, UnservedWhy::kBlocked, kNobody);
+    service.Unserve(unit, UnservedWhy::kBlocked, kNoUnitIndex);
   options.power.rail_W = 1e-6;
   EXPECT_TRUE(CheckPower(service, options));
 }

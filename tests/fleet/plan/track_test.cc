@@ -1,6 +1,6 @@
-// Motions in time: a track is where its segments put the arm, and "passes clear" holds for all
-// pairs of own times that skew, clocks and notice let meet. The oracle samples densely and knows
-// nothing of legs, slices or bounds.
+// Motions in time. A track is where its segments put the arm. "Passes clear" holds for all pairs of
+// own times that skew, clocks and notice let meet. The oracle samples densely and uses no legs,
+// slices or bounds.
 #include "fleet/plan/track.h"
 
 #include <gtest/gtest.h>
@@ -33,7 +33,7 @@ struct Motion {
   AxisPaths paths;
 };
 
-/// Up to three segments an axis, anywhere in range, with waits between them.
+/// A motion of up to three segments an axis, anywhere in range, with waits between them.
 Motion DrawMotion(const ArmGeometry& arm, Rng* rng) {
   Motion motion;
   const auto draw = [&](std::size_t k) {
@@ -92,7 +92,7 @@ TEST(Track, IsWhereItsSegmentsPutIt) {
       const SegmentFp line = ArmAt(arm, *leg, t_s);
       ASSERT_NEAR(line.b.x_mm, expected.b.x_mm, 1e-6);
       ASSERT_NEAR(line.b.y_mm, expected.b.y_mm, 1e-6);
-      // And within what its slice covers.
+      // The arm is within the bounds of its slice, too.
       const Slice& slice = track.slice(static_cast<int>(std::floor(t_s / Track::kSliceS)));
       ASSERT_LE(DistanceMm(line.b, slice.line.b), slice.travel_mm + 1e-9);
       ASSERT_LE(DistanceMm(line.a, slice.line.a), slice.travel_mm + 1e-9);
@@ -117,7 +117,7 @@ TEST(PassesClear, HoldsForAllTimesThatCanMeetAndNotForMuchMore) {
     double least_mm = 1e9;
     for (double t = -1; t < std::max(a.end_s(), b.end_s()) + 2; t += 0.04) {
       const SegmentFp line = LineAt(fleet.layout.unit({0}), motions[0], t);
-      // Written out again: starts, clocks of both, and the notice.
+      // The tolerance written out again: starts, clocks of both, and the notice.
       const double slip_s = 0.04 + 0.5 + 0.01 * std::max(t, 0.0);
       for (double d = -slip_s; d <= slip_s; d += slip_s / 12)
         least_mm =
