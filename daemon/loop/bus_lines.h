@@ -9,7 +9,7 @@
 #include "daemon/clock/clock.h"
 #include "daemon/loop/transmit_queue.h"
 #include "daemon/ports/pollable_port.h"
-#include "daemon/status/status_json.h"
+#include "daemon/status/shell_facts.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {

@@ -16,6 +16,8 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/verbs/model_upkeep.h"
+
 namespace focalfleet {
 namespace {
 
@@ -123,7 +125,7 @@ void EventLoop::Run() {
       Perform();
     }
     parts_.lines->Flush(parts_.clock);
-    Tell();
+    PublishStatus();
   }
   effects_.Clear();
   parts_.coordinator->End(now_, &effects_);
@@ -237,7 +239,7 @@ void EventLoop::Step() {
 
 void EventLoop::Perform() {
   LogChanges();
-  ReportModel();
+  NoteEffects(View(), effects_, parts_.models->compensation());
   if (!effects_.rows.empty()) {
     last_batch_ = effects_.batch;
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
@@ -258,29 +260,7 @@ void EventLoop::Perform() {
   if (parts_.scheduler != nullptr) parts_.scheduler->Changed(effects_.changed);
 }
 
-// A model predicts from how a unit came to where it rests. A count that began anew, or other
-// hardware, is not what it was measured on.
-void EventLoop::ReportModel() {
-  Compensation* compensation = parts_.handler->models().compensation();
-  if (compensation == nullptr) return;
-  const auto forget = [&](SerialNumber serial) {
-    for (const PositionerIndex i : effects_.changed)
-      if (parts_.coordinator->unit(i).serial == serial) compensation->Forget(i);
-  };
-  for (const Row& row : effects_.rows) {
-    if (const auto* end = std::get_if<IntentEndRow>(&row); end && end->end == IntentEnd::kHomed)
-      forget(end->serial);
-    if (const auto* vector = std::get_if<VectorRow>(&row);
-        vector && (vector->origin == Origin::kOperator || vector->origin == Origin::kFound))
-      forget(vector->serial);
-    if (const auto* binding = std::get_if<BindingRow>(&row);
-        binding && binding->replaced.value != 0)
-      if (const auto i = parts_.layout->Find(binding->unit)) compensation->Forget(*i);
-  }
-  for (const PositionerIndex i : effects_.changed) NoteRest(View(), i, compensation);
-}
-
-void EventLoop::Tell() {
+void EventLoop::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
@@ -303,7 +283,7 @@ FleetView EventLoop::View() const {
           .coordinator = parts_.coordinator,
           .now = now_,
           .at = WallTime::Now(),
-          .compensation = std::as_const(*parts_.handler).models().compensation()};
+          .compensation = std::as_const(*parts_.models).compensation()};
 }
 
 }  // namespace focalfleet

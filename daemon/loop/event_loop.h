@@ -18,6 +18,7 @@
 #include "daemon/loop/sync_pulse.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
+#include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/request_handler.h"
 #include "fleet/coordinator.h"
 
@@ -38,6 +39,7 @@ class EventLoop {
     Coordinator* coordinator = nullptr;
     BusLines* lines = nullptr;
     RequestHandler* handler = nullptr;
+    ModelRegistry* models = nullptr;
     PlannerThread* planner = nullptr;
     CameraThread* camera = nullptr;  // measures; none: neither camera nor sensors
     StoreThread* store = nullptr;
@@ -76,8 +78,7 @@ class EventLoop {
   void Step();
   void ServeSync();
   void Perform();
-  void Tell();
-  void ReportModel();
+  void PublishStatus();
   void LogChanges();
   [[nodiscard]] FleetView View() const;
 

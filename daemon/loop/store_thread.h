@@ -23,22 +23,12 @@
 #include <vector>
 
 #include "daemon/clock/wall_time.h"
-#include "daemon/dds/status_values.h"
 #include "daemon/loop/event_signal.h"
 #include "daemon/loop/spsc_queue.h"
+#include "daemon/status/status_batch.h"
 #include "fleet/records.h"
 
 namespace focalfleet {
-
-/// What is to be shown, as values. Of each unit, bus and so on the last value wins.
-struct StatusBatch {
-  std::uint64_t after_batch = 0;  // not to be told before this batch is durable
-  std::vector<UnitStatusValue> units;
-  std::vector<UnitOrientationValue> orientations;  // of some of these units
-  std::vector<BusStatusValue> buses;
-  std::optional<FleetStatusValue> fleet;
-  std::optional<ConfigurationProgressValue> configuration;
-};
 
 class StoreThread {
  public:

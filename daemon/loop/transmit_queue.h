@@ -12,17 +12,12 @@
 #include <deque>
 #include <vector>
 
+#include "daemon/status/transmit_queue_counters.h"
 #include "protocol/base/instants.h"
 #include "protocol/base/limits.h"
 #include "protocol/link/frame_port.h"
 
 namespace focalfleet {
-
-struct TransmitQueueCounters {
-  std::uint64_t refused = 0;      // no room
-  std::uint64_t stale = 0;        // thrown away because the link went down
-  std::uint64_t late_starts = 0;  // start signals that missed their instant
-};
 
 class TransmitQueue {
  public:

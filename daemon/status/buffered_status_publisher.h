@@ -14,7 +14,7 @@
 
 #include "daemon/dds/late_join.h"
 #include "daemon/dds/status_publisher.h"
-#include "daemon/loop/store_thread.h"
+#include "daemon/status/status_batch.h"
 
 namespace focalfleet {
 

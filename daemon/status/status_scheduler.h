@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/clock/clock.h"
-#include "daemon/loop/store_thread.h"
+#include "daemon/status/status_batch.h"
 #include "daemon/status/status_snapshot.h"
 
 namespace focalfleet {

@@ -12,15 +12,13 @@
 // tables.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/store/store_options.h"
 #include "fleet/records.h"
 #include "protocol/base/result.h"
 
@@ -29,13 +27,8 @@ namespace focalfleet {
 namespace store_internal {
 class Connection;
 class LockFile;
-struct Statements;
+class Statements;
 }  // namespace store_internal
-
-struct StoreOptions {
-  std::chrono::milliseconds busy_wait{2000};  // for a reader that holds the file for a moment
-  const char* vfs = nullptr;                  // SQLite's file layer; tests put a failing one in
-};
 
 struct StoreCounters {
   std::uint64_t transactions = 0;
@@ -86,101 +79,6 @@ class Store {
   std::unique_ptr<store_internal::Connection> connection_;
   std::unique_ptr<store_internal::Statements> statements_;
   StoreCounters counters_;
-};
-
-/// One motion of one unit, from the intent to its end. Units: vectors.
-struct MoveHistory {
-  std::uint64_t configuration = 0;
-  UnitId unit;
-  SerialNumber serial;
-  MoveId move;
-  Pose from{};
-  Pose to{};
-  UnitKnowledge hull;
-  WallTime began;
-  std::optional<WallTime> ended;          // none: the intent is open
-  std::optional<IntentEnd> end;           // present with `ended`
-  std::optional<UnitKnowledge> ended_at;  // what was known of the unit then
-};
-
-struct ConfigurationHistory {
-  ConfigurationRow row;
-  WallTime began;
-  WallTime changed;  // last written: the end, where the state is done, stopped or failed
-};
-
-struct ParameterHistory {
-  ParameterRow row;
-  WallTime at;
-};
-
-struct TuningHistory {
-  TuningRow row;
-  WallTime at;
-};
-
-struct AlarmHistory {
-  AlarmRow row;
-  WallTime at;
-};
-
-/// What happened to a place: bound to a serial number, disabled, enabled.
-struct UnitHistory {
-  UnitId unit;
-  SerialNumber serial;
-  bool enabled = true;
-  std::string reason;
-  WallTime at;
-};
-
-struct MeasurementHistory {
-  MeasurementRow row;
-  WallTime at;  // stored
-  /// The unit was sent again after this exposure, in the same configuration: it is elsewhere now.
-  bool moved_since = false;
-};
-
-struct ModelHistory {
-  ModelRow row;  // without its text
-  WallTime at;
-};
-
-/// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
-/// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
-/// read.
-class StoreReader {
- public:
-  /// Errors: kUnavailable: no such file, or not readable; kNewer; kInvalid: not a store.
-  static Result<std::unique_ptr<StoreReader>> Open(const std::string& path,
-                                                   const StoreOptions& options = {});
-  StoreReader(const StoreReader&) = delete;
-  StoreReader& operator=(const StoreReader&) = delete;
-  ~StoreReader();
-
-  Result<StoredFleet> Load();
-  Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit);
-  Result<std::vector<ConfigurationHistory>> Configurations(std::uint32_t limit);
-  Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
-  Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
-  Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
-  /// Of one exposure, by unit id.
-  Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
-  /// The newest exposure of a configuration; none: it was never measured.
-  Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
-  Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
-  /// Units whose count began anew later than that: homed, set by hand, found by the camera, or
-  /// other hardware was adopted there.
-  Result<std::vector<UnitId>> CountedAnewSince(WallTime since);
-  /// Which hardware is bound to which place.
-  Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
-  /// Errors: kRefused: there is none of that sha256.
-  Result<std::string> ModelText(const std::string& sha256);
-  Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
-
- private:
-  StoreReader();
-
-  std::unique_ptr<store_internal::Connection> connection_;
 };
 
 }  // namespace focalfleet

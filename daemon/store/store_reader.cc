@@ -1,3 +1,5 @@
+#include "daemon/store/store_reader.h"
+
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -7,7 +9,6 @@
 #include "daemon/store/cells.h"
 #include "daemon/store/schema.h"
 #include "daemon/store/sqlite.h"
-#include "daemon/store/store.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {

@@ -12,13 +12,17 @@
 
 #include "daemon/campaign/compensation.h"
 #include "daemon/control/messages.h"
-#include "daemon/store/store.h"
-#include "fleet/coordinator.h"
+#include "daemon/store/history.h"
+#include "fleet/layout.h"
+#include "fleet/records.h"
 
 namespace focalfleet {
 
 class ModelRegistry {
  public:
+  /// Limit of the changes that are taken from the store and shown.
+  static constexpr std::uint32_t kChangesMax = 1000;
+
   /// `layout` outlives the registry.
   explicit ModelRegistry(const Layout* layout) : layout_(layout) {}
 
@@ -46,6 +50,7 @@ class ModelRegistry {
   /// Errors: kRefused: there is nothing before; those of `text_of`.
   Result<ModelRow> Rollback(const std::function<Result<std::string>(const std::string&)>& text_of);
 
+  [[nodiscard]] const Layout& layout() const { return *layout_; }
   /// When the model in force was first put in force; units homed later are none of its own. Pre:
   /// there is one.
   [[nodiscard]] WallTime since() const;

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/status/history_json.h"
+#include "daemon/status/status_json.h"
+#include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/requested_command.h"
 #include "fleet/files/bad_rows.h"
 #include "protocol/base/limits.h"
@@ -11,12 +14,6 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint64_t kHistoryRowsMax = 1000;
-
-AxisAngles CountOf(const FleetView& view, PositionerIndex i, const Pose& place) {
-  const Pose& offset = view.coordinator->unit(i).offset;
-  return AnglesOf(view.layout->unit(i), view.coordinator->drives()[i.value],
-                  {place[0] - offset[0], place[1] - offset[1]});
-}
 
 /// The newest value of each axis and parameter; `history` is newest first.
 Json NewestOf(const std::vector<ParameterHistory>& history) {
@@ -44,19 +41,7 @@ bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
 
-/// What all units count that rest.
-void NoteRests(const FleetView& view, Compensation* compensation) {
-  if (compensation == nullptr) return;
-  for (std::uint32_t n = 0; n < view.layout->size(); ++n) NoteRest(view, {n}, compensation);
-}
-
 }  // namespace
-
-void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation) {
-  const UnitView& unit = view.coordinator->unit(i);
-  if (unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) return;
-  compensation->Rests(i, CountOf(view, i, PlaceOf(unit.knowledge)));
-}
 
 void RequestHandler::Service(const FleetView& view, std::vector<Command>* commands) {
   stops_.clear();
@@ -99,17 +84,17 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
-  pending.pursues =
+  pending.is_configuration =
       request->verb == "apply" || request->verb == "home" || request->verb == "measure";
-  pending.retargets = request->verb == "retarget";
-  if (line.overtaken && (pending.pursues || pending.retargets))
+  pending.is_retarget = request->verb == "retarget";
+  if (line.overtaken && (pending.is_configuration || pending.is_retarget))
     return Answer(pending, Fail(ErrorCode::kRefused,
                                 "a stop that came before " + request->verb +
                                     " was begun went ahead of it; command it again if it is still "
                                     "wanted"));
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
-  pending.wait = *wait && pending.pursues;
+  pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
@@ -131,7 +116,8 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
   if (request.verb == "params") return AskParameters(view, request);
   if (request.verb == "history") return AskHistory(view, request);
   if (request.verb == "measurements") return AskMeasurements(view, request);
-  if (request.verb == "model") return Result<Json>(models_.Show(kHistoryRowsMax));
+  if (request.verb == "model")
+    return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
   return std::nullopt;
 }
 
@@ -195,10 +181,11 @@ Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const Contro
 
 std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view,
                                                            const ControlRequest& request) {
+  ModelRegistry& models = *options_.models;
   const auto change = [&]() -> Result<ModelRow> {
-    if (request.verb == "model_unload") return models_.Unload();
+    if (request.verb == "model_unload") return models.Unload();
     if (request.verb == "model_rollback")
-      return models_.Rollback([this](const std::string& sha256) -> Result<std::string> {
+      return models.Rollback([this](const std::string& sha256) -> Result<std::string> {
         FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
         return reader->ModelText(sha256);
       });
@@ -206,52 +193,31 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
                           TextArgument(request.args, "model_toml", kControlLineBytesMax));
     FOCALFLEET_TRY_ASSIGN(const std::string source,
                           TextArgumentOr(request.args, "source", "model.toml"));
-    return models_.Load(text, source);
+    return models.Load(text, source);
   };
   if (request.verb != "model_load" && request.verb != "model_unload" &&
       request.verb != "model_rollback")
     return std::nullopt;
   // A change is numbered after those that the store has.
-  const Status known = models_.changes_known() ? Status() : TakeModelChanges();
+  const auto know_changes = [&]() -> Status {
+    if (models.changes_known()) return {};
+    FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+    return TakeModelChanges(reader, &models);
+  };
+  const auto forget_strangers = [&]() -> Status {
+    if (models.compensation() == nullptr) return {};
+    FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+    return ForgetStrangers(reader, &models);
+  };
+  const Status known = know_changes();
   auto row = known ? change() : Result<ModelRow>(tl::unexpected<Error>(known.error()));
   if (!row) return Result<Command>(tl::unexpected<Error>(std::move(row).error()));
-  if (const Status forgot = ForgetStrangers(); !forgot)
+  if (const Status forgot = forget_strangers(); !forgot)
     options_.log("model: " + forgot.error().text);
-  NoteRests(view, models_.compensation());
+  NoteRests(view, models.compensation());
   Command command;
   command.what = KeepModelCommand{std::move(*row)};
   return command;
-}
-
-Status RequestHandler::TakeModelChanges() {
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(auto changes, reader->Models(kHistoryRowsMax));
-  models_.TakeChanges(std::move(changes));
-  return {};
-}
-
-Status RequestHandler::RestoreModel() {
-  FOCALFLEET_TRY(TakeModelChanges());
-  if (models_.newest_sha256().empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const std::string text, reader->ModelText(models_.newest_sha256()));
-  FOCALFLEET_TRY(models_.Restore(text));
-  return ForgetStrangers();
-}
-
-Status RequestHandler::ForgetStrangers() {
-  Compensation* const model = models_.compensation();
-  if (model == nullptr) return {};
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto counted_anew, reader->CountedAnewSince(models_.since()));
-  for (const UnitId id : counted_anew)
-    if (const auto i = options_.layout->Find(id)) model->Forget(*i);
-  FOCALFLEET_TRY_ASSIGN(const auto bindings, reader->Bindings());
-  for (const auto& [id, serial] : bindings) {
-    const auto i = options_.layout->Find(id);
-    if (i && model->serial(*i).value != 0 && model->serial(*i) != serial) model->Forget(*i);
-  }
-  return {};
 }
 
 /// Adopted hardware is not driven by the model of what sat there before, and the operator is told.
@@ -259,7 +225,7 @@ std::string RequestHandler::NoteOn(const FleetView& view, const Command& command
   const auto* adopt = std::get_if<AdoptCommand>(&command.what);
   if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
     return "";
-  return "; the model in force (" + models_.name() +
+  return "; the model in force (" + options_.models->name() +
          ") was measured on the robot before it, so its commands go without one";
 }
 
@@ -286,12 +252,12 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   const Pending pending = it->second;
   // The first word on a configuration is that it began; who waits wants the last.
   it->second.began = true;
-  if (!reply.last && (pending.wait || pending.retargets)) return;
+  if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
   waiting_ -= pending.wait ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
-    if (pending.retargets && pending.began)
+    if (pending.is_retarget && pending.began)
       return Answer(pending, Json{{"goes", false}, {"text", reply.error->text}});
     // An error means that nothing happened. What failed on the way is a summary with a reason.
     if (!pending.began || !HasMoved(view.coordinator->configuration()))
@@ -300,8 +266,8 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
     summary["error"] = reply.error->text;
     return Answer(pending, summary);
   }
-  if (pending.retargets) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
-  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text + pending.note}});
+  if (pending.is_retarget) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
+  if (!pending.is_configuration) return Answer(pending, Json{{"text", reply.text + pending.note}});
   if (!pending.wait)
     return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});
   Answer(pending, ConfigurationJson(view));

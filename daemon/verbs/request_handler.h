@@ -19,15 +19,13 @@
 #include <vector>
 
 #include "daemon/control/line_server.h"
-#include "daemon/status/status_json.h"
-#include "daemon/store/store.h"
+#include "daemon/status/shell_facts.h"
+#include "daemon/status/status_snapshot.h"
+#include "daemon/store/store_reader.h"
 #include "daemon/verbs/model_registry.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
-
-/// Tells the model what the unit counts, if it rests.
-void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation);
 
 class RequestHandler {
  public:
@@ -36,10 +34,10 @@ class RequestHandler {
     std::function<ShellFacts()> facts;
     std::function<void(const std::string&)> log;  // one sentence for each command
     std::string store_path;
-    const Layout* layout = nullptr;
+    ModelRegistry* models = nullptr;  // outlives the handler
   };
   RequestHandler(LineServer server, Options options)
-      : server_(std::move(server)), options_(std::move(options)), models_(options_.layout) {}
+      : server_(std::move(server)), options_(std::move(options)) {}
 
   /// Bytes of lines and answers of one turn, after which no further line is taken: a turn ends with
   /// the line that exceeds them. The cost goes by the bytes, 10 to 30 ns each: so much is a
@@ -63,12 +61,6 @@ class RequestHandler {
   void ShowProgress(const FleetView& view);
   /// When ShowProgress wants to be called; kNever while nobody waits.
   [[nodiscard]] HostInstant wake_at() const { return waiting_ > 0 ? progress_at_ : kNever; }
-  /// The model that was in force when the last daemon ended. Errors: those of the store; kInvalid:
-  /// it is none of this fleet any more. Then none is in force.
-  Status RestoreModel();
-  [[nodiscard]] ModelRegistry& models() { return models_; }
-  [[nodiscard]] const ModelRegistry& models() const { return models_; }
-
   /// Tells all who wait that the daemon ends, and leaves the store: whoever closes it last makes
   /// one file of it.
   void Close();
@@ -78,8 +70,8 @@ class RequestHandler {
     ClientId client = 0;
     std::uint64_t id = 0;  // of the client's request
     bool wait = false;
-    bool pursues = false;  // apply or home: its summary is the configuration
-    bool retargets = false;
+    bool is_configuration = false;  // apply, home or measure: its summary is the configuration
+    bool is_retarget = false;
     bool began = false;  // and the coordinator took it up
     std::string note;    // to go after the answer's text
   };
@@ -93,10 +85,6 @@ class RequestHandler {
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   /// None: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
-  Status TakeModelChanges();
-  /// Units that are not any more what the model in force was measured on go without it: their count
-  /// began anew, or other hardware sits there.
-  Status ForgetStrangers();
   [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
@@ -104,7 +92,6 @@ class RequestHandler {
 
   LineServer server_;
   Options options_;
-  ModelRegistry models_;
   std::unique_ptr<StoreReader> reader_;                 // opened with the first question for it
   std::unordered_map<std::uint64_t, Pending> pending_;  // by the coordinator's request number
   std::uint64_t next_request_ = 1;

@@ -12,7 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/clock/wall_time.h"
 #include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "tests/support/temporary_folder.h"
 
 namespace focalfleet::testing {
@@ -44,6 +46,16 @@ class StoreTest : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+inline constexpr WallTime kEight{1'700'000'000'000'000'000};
+inline constexpr WallTime kNine{1'700'003'600'000'000'000};
+
+/// The error of an operation that should have failed. A success reads as an error that no test
+/// expects.
+template <class T>
+Error ErrorOf(const Result<T>& result) {
+  return result ? Error{static_cast<ErrorCode>(99), "success"} : result.error();
+}
+
 inline void ExpectDone(const Status& status) { EXPECT_TRUE(status) << status.error().text; }
 
 inline VectorRow Vector(std::uint32_t serial, Witness witness, std::int32_t theta, std::int32_t phi,
@@ -65,6 +77,20 @@ inline IntentRow Intent(std::uint32_t unit, std::uint32_t serial, std::uint16_t 
                       std::max(from[axis], to[axis])};
   }
   return row;
+}
+
+/// The tuning of the phi axis of serial number 7.
+inline TuningRow Tuned(std::uint16_t critical, double margin) {
+  return {.serial = {7},
+          .axis = Axis::kPhi,
+          .critical = critical,
+          .repeat = 54,
+          .margin = margin,
+          .load_uNm = 4.07,
+          .v_bus_V = 1.8,
+          .counter1 = 500,
+          .subdivision = 96,
+          .mode = WaveMode::kSevenSegment};
 }
 
 /// Batch k says k everywhere: in the vectors of all serials, in a parameter, in the next move and

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/control/line_client.h"
+#include "daemon/status/status_json.h"
 #include "protocol/base/limits.h"
 #include "tests/daemon/control/raw_client.h"
 #include "tests/daemon/control/scratch.h"
@@ -33,7 +34,7 @@ class RequestHandlerTest : public ::testing::Test {
                  {.facts = [] { return ShellFacts{}; },
                   .log = [this](const std::string& text) { log_ += text + "\n"; },
                   .store_path = scratch_ / "none.db",
-                  .layout = &fleet_.layout()}) {}
+                  .models = &models_}) {}
 
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
@@ -61,6 +62,7 @@ class RequestHandlerTest : public ::testing::Test {
   const Scratch scratch_;
   SmallFleet fleet_;
   std::string log_;
+  ModelRegistry models_{&fleet_.layout()};
   RequestHandler handler_;
   std::vector<std::unique_ptr<RawClient>> clients_;
   std::vector<Command> commands_;
