@@ -12,7 +12,7 @@
 
 namespace focalfleet {
 
-/// What one axis needs for its move at one candidate.
+/// The cost of an axis' move at one candidate.
 struct AxisCost {
   bool tuned = false;  // false: the axis is refused there, and the rest says nothing
   double move_s = 0;

@@ -13,7 +13,7 @@ constexpr double kStepMaxDeg = 10;  // of one iteration
 constexpr double kAwayMaxDeg = 30;  // from the guess: beyond, it is another way, not a correction
 constexpr int kIterations = 12;
 
-/// One damped step of Newton's method, in degrees: each joint turns all that lies beyond it.
+/// A damped step of Newton's method, in degrees: each joint turns all that lies beyond it.
 std::array<double, kAxisCount> StepTowards(const WantedPlace& wanted, const SegmentFp& arm) {
   const PointFp &elbow = arm.a, &fibre = arm.b;
   const double theta_x = -(fibre.y_mm - wanted.base_fp.y_mm),

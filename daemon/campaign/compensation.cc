@@ -17,7 +17,7 @@ using sim::kTheta;
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSameDeg = 1e-6;
 constexpr std::size_t kRestsMax = 32;
-constexpr std::size_t kRestsKept = 8;  // whatever forgets itself has done so by then
+constexpr std::size_t kRestsKept = 8;  // effects that fade have faded by then
 
 bool IsCompensated(const sim::Template& form) {
   return form.axis != sim::EffectAxis::kNone && sim::IsOfPosesAlone(*form.effect);
@@ -53,7 +53,7 @@ sim::PoseTrack Compensation::WayOf(const KnownUnit& unit) {
   return way;
 }
 
-/// Where the fibre is after the last move of the way.
+/// The place of the fibre after the last move of the way.
 PointFp Compensation::PlaceAfter(const KnownUnit& unit, sim::PoseTrack* way,
                                  sim::PoseErrors* errors) {
   const sim::UnitTrack& track = way->track();
@@ -140,7 +140,7 @@ void Compensation::Rests(PositionerIndex i, const AxisAngles& count) {
   if (unit.rests_deg.size() > kRestsMax) Shorten(&unit);
 }
 
-/// The older rests become what they added up to.
+/// Replaces the older rests by the sum of their effects.
 void Compensation::Shorten(KnownUnit* unit) {
   const std::size_t gone = unit->rests_deg.size() - kRestsKept;
   sim::PoseTrack way = WayOf(*unit);

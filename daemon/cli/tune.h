@@ -1,5 +1,5 @@
-// tune: its options, and its two ways. One motor is tuned for the terminal, or both axes of every
-// unit of a fleet for a table and the store.
+// Options and the two ways of the command tune: a single motor for the terminal, or both axes of
+// every unit of a fleet for a table and the store.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// tune: the n that each motor needs, by its own load and always from rest; for one motor, or for a
-// fleet into the store.
+// The command tune finds the repeat n that a motor needs, by its own load and always from rest. It
+// tunes one motor, or a fleet into the store.
 
 #include <fmt/format.h>
 

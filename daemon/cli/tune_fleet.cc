@@ -19,7 +19,7 @@
 namespace focalfleet::cli {
 namespace {
 
-// A load is drawn within this many sigmas, and never below a twentieth of the mean.
+// Limits of a drawn load: this many sigmas, and a twentieth of the mean.
 constexpr double kSigmasMax = 4;
 constexpr double kLoadShareMin = 0.05;
 
@@ -66,13 +66,13 @@ Result<std::vector<AxisLoad>> LoadsOf(const TuneOptions& options, const DriveCho
   return loads;
 }
 
-// What all loads need with one voltage and mode.
+/// The tunings of all loads with one voltage and mode.
 struct FleetChoice {
   DriveChoice choice;
   std::vector<sim::LoadTuning> tunings;  // Shape: as the loads
 };
 
-// Which of the choices an axis gets, and what it needs there.
+/// The choice of an axis, and its tuning there.
 struct AxisTuning {
   const DriveChoice* choice;
   sim::LoadTuning tuning;
@@ -135,7 +135,8 @@ struct Refused {
   std::string why;
 };
 
-// What the store takes, as rows of one transaction; who is not bound there has no parameters.
+/// Writes the tunings into the store, in one transaction. Units without a serial number there are
+/// refused.
 Status WriteStore(const TuneOptions& options, const std::vector<AxisLoad>& loads,
                   const std::vector<AxisTuning>& chosen, std::vector<Refused>* refused) {
   if (!std::filesystem::exists(options.store)) {
@@ -176,7 +177,7 @@ Status WriteStore(const TuneOptions& options, const std::vector<AxisLoad>& loads
   return store->Commit(rows, WallTime::Now());
 }
 
-// How many axes of a rail got which voltage and mode, and what their moves take.
+/// Axes of each rail by voltage and mode, with time and energy of their moves.
 Json ChoicesJson(const std::vector<AxisLoad>& loads, const std::vector<AxisTuning>& chosen) {
   struct Group {
     int axes = 0;

@@ -16,7 +16,7 @@ struct Candidate {
   sim::Tuning tuning;
 };
 
-// Without a ramp, and with the one that is given.
+/// No ramp, and the given one.
 std::vector<sim::Ramp> RampsOf(const TuneOptions& options) {
   std::vector<sim::Ramp> ramps = {options.rule.ramp};
   if (!options.minimise.empty() && options.rule.ramp.stages > 0) ramps.insert(ramps.begin(), {{}});
@@ -43,7 +43,7 @@ std::vector<Candidate> TryAll(const Context& context, const TuneOptions& options
   return candidates;
 }
 
-// The first of the best; none: all are refused.
+/// The first of the best candidates; none: all are refused.
 const Candidate* Best(const std::vector<Candidate>& candidates, const std::string& minimise) {
   const Candidate* best = nullptr;
   const auto cost = [&](const Candidate& candidate) {

@@ -25,7 +25,8 @@ constexpr std::uint64_t kListener = 0;
 constexpr std::uint64_t kAgain = ~std::uint64_t{0};
 constexpr std::uint64_t kResume = kAgain - 1;
 
-/// A flood of connections is taken in pieces, so that those who are in are read in between.
+/// Limit of the connections accepted in a turn: in a flood of them, present clients are read in
+/// between.
 constexpr int kAcceptsPerTurn = 16;
 
 bool NoDescriptor(int error) { return error == EMFILE || error == ENFILE; }
@@ -77,13 +78,13 @@ class LineServer::Impl {
   ListeningSocket listener_;
   Options options_;
   int epoll_ = -1;
-  int again_ = -1;   // readable while some client has a complete line that was not handed out yet
-  int resume_ = -1;  // a timer: accept again
+  int again_ = -1;         // readable while a complete line of some client waits
+  int resume_ = -1;        // a timer: the end of a pause in accepting
   bool reminded_ = false;  // again_ is readable
   ClientId next_ = 1;
-  ClientId turn_ = 0;  // whose line was handed out last
+  ClientId turn_ = 0;  // client whose line was handed out last
   std::uint64_t active_ = 0;
-  std::size_t reserved_ = 0;  // of clients_
+  std::size_t reserved_ = 0;  // clients in reserved places
   std::map<ClientId, Client> clients_;
   SpareDescriptors spares_;  // for reserved places that no client has
 };
@@ -114,7 +115,7 @@ void LineServer::Impl::Accept() {
     if (!AcceptOne()) return;
 }
 
-/// False: nobody waits, or nobody can be taken now.
+/// False: no connection waits, or none can be accepted now.
 bool LineServer::Impl::AcceptOne() {
   bool spared = false;
   int fd = listener_.Accept();
@@ -150,7 +151,7 @@ void LineServer::Impl::Admit(int fd, bool reserved) {
   if (::epoll_ctl(epoll_, EPOLL_CTL_ADD, fd, &event) != 0) Drop(id);
 }
 
-/// Makes room. False: nobody is idle.
+/// Makes room for a client. False: no client is idle.
 bool LineServer::Impl::DropIdlest(bool reserved) {
   auto idlest = clients_.end();
   for (auto it = clients_.begin(); it != clients_.end(); ++it)
@@ -159,7 +160,7 @@ bool LineServer::Impl::DropIdlest(bool reserved) {
         it->second.Idle(options_.output_bytes_pause))
       idlest = it;
   if (idlest == clients_.end()) return false;
-  // In the middle of an answer it is told nothing: that would be part of the answer.
+  // In the middle of an answer the reason is not sent: it would be part of the answer.
   if (idlest->second.waiting() == 0)
     ReportAndClose(std::exchange(idlest->second.fd, -1),
                    "too many clients at " + path() + ": this one was idle longest");
@@ -184,7 +185,7 @@ void LineServer::Impl::ResumeAccepting() {
   ::epoll_ctl(epoll_, EPOLL_CTL_MOD, listener_.fd(), &listen);
 }
 
-/// Clients in reserved places get one of the others as soon as there is one.
+/// Clients in reserved places get other places as soon as there are any.
 void LineServer::Impl::PromoteReserved() {
   for (auto& [id, client] : clients_) {
     if (reserved_ == 0 || Taken(false) >= options_.clients_max) return;
@@ -200,7 +201,7 @@ void LineServer::Impl::Drop(ClientId id) {
   clients_.erase(it);
 }
 
-/// Writes, and watches for what matters next. False: nothing matters any more, drop it.
+/// Writes, and watches for the next events. False: the client has ended, drop it.
 bool LineServer::Impl::Settle(ClientId id, Client* client) {
   if (!client->Write()) return false;
   if (client->waiting() > options_.output_bytes_max) return false;
@@ -224,8 +225,8 @@ void LineServer::Impl::Watch(ClientId id, Client* client) {
   ::epoll_ctl(epoll_, EPOLL_CTL_MOD, client->fd, &event);
 }
 
-/// Takes an urgent line of each client. Lines that other clients have sent by then count as earlier
-/// than it: the order of two sockets in one turn is not known.
+/// Takes an urgent line of each client. Lines that other clients have sent by then count as
+/// earlier: the order of two sockets within a turn is unknown.
 void LineServer::Impl::TakeUrgent(std::vector<IncomingLine>* urgent) {
   const std::size_t before = urgent->size();
   for (auto& [id, client] : clients_) {
@@ -252,7 +253,7 @@ void LineServer::Impl::Service(std::vector<IncomingLine>* urgent) {
     if (event.data.u64 == kResume) ResumeAccepting();
     const auto it = clients_.find(event.data.u64);
     if (it == clients_.end()) continue;
-    // A peer that asked and closed at once ("stop", and away) is still heard.
+    // A peer that sent a request and closed at once is still heard.
     it->second.deaf = it->second.deaf || (event.events & (EPOLLHUP | EPOLLERR)) != 0;
     const bool readable = it->second.deaf || (event.events & EPOLLIN) != 0;
     if (readable && !it->second.Read()) Drop(it->first);
@@ -265,7 +266,7 @@ void LineServer::Impl::Service(std::vector<IncomingLine>* urgent) {
     client.CheckLength(options_.line_bytes_max);
     if (!Settle(id, &client)) Drop(id);
   }
-  // After the others were read: who has just spoken is not idle.
+  // Accept comes after the clients were read: a client that has just sent a line is not idle.
   if (accept) Accept();
   PromoteReserved();
   KeepSpares();
@@ -294,7 +295,7 @@ std::optional<IncomingLine> LineServer::Impl::Next() {
   return next;
 }
 
-/// Sees to it that the next call comes at once where there is something left to hand out.
+/// fd() is readable exactly while lines are left to hand out.
 void LineServer::Impl::Remind() {
   const bool more = std::ranges::any_of(clients_, [this](const auto& entry) {
     const Client& client = entry.second;

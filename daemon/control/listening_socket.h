@@ -1,7 +1,7 @@
 // A UNIX stream socket that listens at a path.
 //
 // Owner and group may connect (mode 0660). A socket file that a live server answers on is refused
-// as in use; a file that no process answers on was left by a crash and is replaced. The new socket
+// as in use. A file that no process answers on was left by a crash and is replaced. The new socket
 // listens under a temporary name and is renamed into place, so no client ever finds a socket file
 // that does not answer.
 #pragma once

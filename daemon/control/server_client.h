@@ -1,5 +1,5 @@
-// One client of the control socket as the server sees it: its lines that wait, its answers that it
-// has not read yet, and in which of its two halves it has ended.
+// A client of the control socket as the server sees it: its waiting lines, the answers that it has
+// not read yet, and whether it still sends and reads.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,12 @@ struct ServerClient {
   std::uint64_t active = 0;  // the server's count when it was last accepted, heard or answered
   LineBuffer input;
   std::string output;
-  std::size_t written = 0;    // of output
+  std::size_t written = 0;    // bytes of output
   std::uint32_t open = 0;     // lines handed out and not yet answered
   std::uint32_t watched = 0;  // epoll events
   bool input_ended = false;   // it will ask nothing more
   bool closing = false;       // only its output is still of interest
-  bool deaf = false;          // it closed: what it asked still counts, answers do not
+  bool deaf = false;          // it closed: its requests still count, answers do not
 
   /// Units: bytes of output that the client has not read yet.
   [[nodiscard]] std::size_t waiting() const { return output.size() - written; }
@@ -36,17 +36,18 @@ struct ServerClient {
   /// waits, unless it does not read its answers.
   [[nodiscard]] bool Idle(std::size_t bytes_pause) const;
 
-  /// Reads one chunk, so that one busy client does not keep the others waiting. False: the client
-  /// is gone.
+  /// A chunk is read, no more, so that one busy client does not keep the others waiting. False: the
+  /// client is gone.
   bool Read();
-  /// Writes as much as goes without waiting. False: the client is gone.
+  /// Output is written, as much as goes without waiting. False: the client is gone.
   bool Write();
   /// False: the next line is longer than `bytes_max`. The client receives an error, and nothing
   /// more of its input is taken.
   bool CheckLength(std::size_t bytes_max);
 };
 
-/// Reports in one line why the server closes this connection, if that goes without waiting.
+/// The connection is closed; before, its client receives `why` in one line, if that goes without
+/// waiting.
 void ReportAndClose(int fd, const std::string& why);
 
 }  // namespace focalfleet

@@ -28,7 +28,7 @@ class SpareDescriptors {
       held_.push_back(fd);
     }
   }
-  /// One descriptor is free for other use. False: none was held.
+  /// A held descriptor is free for other use. False: none was held.
   bool Release() {
     if (held_.empty()) return false;
     ::close(held_.back());

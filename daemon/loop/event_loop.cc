@@ -21,7 +21,7 @@
 namespace focalfleet {
 namespace {
 
-// What an epoll event is about: the number of a bus line, or one of these.
+// The data of an epoll event is the number of a bus line, or one of these constants.
 constexpr std::uint64_t kRequests = std::uint64_t{1} << 32;
 constexpr std::uint64_t kThreads = kRequests + 1;
 constexpr std::uint64_t kTimer = kRequests + 2;
@@ -46,7 +46,7 @@ spdlog::level::level_enum LevelOf(Severity severity) {
   return spdlog::level::err;
 }
 
-/// Most alarms name their unit or bus themselves.
+/// The text of an alarm with its unit or bus; most alarms name it themselves.
 std::string TextOf(const AlarmRow& alarm) {
   std::string where;
   if (alarm.bus) where = "bus " + std::to_string(alarm.bus->value);
@@ -151,7 +151,7 @@ void EventLoop::DispatchReady(int timeout_ms) {
   for (int i = 0; i < count; ++i) Dispatch(events[static_cast<std::size_t>(i)].data.u64);
 }
 
-// Before anything else is done: the edge is what an instant is told by.
+// The pulse comes before everything else of a turn, because units take the instant from its edge.
 void EventLoop::ServeSync() {
   if (parts_.sync == nullptr) return;
   const std::string trouble = parts_.sync->Serve(parts_.clock.Now());
@@ -193,8 +193,8 @@ void EventLoop::ReadSignals() {
 }
 
 void EventLoop::Gather() {
-  // Whatever is there at `now_` is heard in this turn. Else units would pass for silent whose
-  // answers wait, where the host was held up on its way here.
+  // All that is there at `now_` is read in this turn. Otherwise units would count as silent while
+  // their answers wait, where the host was held up on its way here.
   now_ = parts_.clock.Now();
   DispatchReady(0);
   frames_.clear();
@@ -218,7 +218,7 @@ bool EventLoop::StepIsDue() const {
 }
 
 void EventLoop::Step() {
-  // In this order: a batch that comes through in between is then only told a step later.
+  // This order matters: a batch that is committed in between is reported one step later.
   store_failing_ = parts_.store->failing();
   committed_through_ = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();

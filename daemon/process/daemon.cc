@@ -37,14 +37,14 @@ double ProcessCpuSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// From the last turn of the loop until planner, camera and buses have ended; then the process goes
-/// without them. A planner looks at least every 0.1 s whether it is wanted, a camera every 20 ms; a
-/// driver that restarts a controller takes up to a second. Half of it leaves such a driver behind
-/// for nothing; twice as much makes the end of a daemon with a dead camera take longer than the
-/// 2 s that docs/cli.md promises.
+/// Limit of the time from the last turn of the loop until planner, camera and buses have ended.
+/// Parts that take longer are left behind. A planner checks every 0.1 s or more often whether it is
+/// wanted, a camera every 20 ms. A driver that restarts a controller takes up to a second. Half of
+/// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
+/// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
 
-/// What the store's thread counts, for the core thread to show.
+/// Counters of the store that its thread writes and the core thread reads.
 struct SharedCounters {
   std::atomic<std::uint64_t> transactions{0};
   std::atomic<std::uint64_t> rows{0};
@@ -73,9 +73,10 @@ class Daemon {
   explicit Daemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
 
   Status Start();
-  /// Until SIGTERM or SIGINT. Errors: rows could not be stored.
+  /// The loop ran until SIGTERM or SIGINT, and all parts have ended or are left behind. Errors:
+  /// rows could not be stored.
   Status Run();
-  /// Something hangs and still uses this, which must not be taken down then.
+  /// A part hangs and still uses this object, which must not be destroyed then.
   [[nodiscard]] bool left() const { return left_; }
 
  private:
@@ -261,9 +262,9 @@ Status Daemon::Run() {
   return End();
 }
 
-/// In this order: nothing more goes to the buses, the last rows are stored, clients and readers are
-/// told, the store is whole by itself and free for the next daemon, the socket is gone. What may
-/// hang ends meanwhile, or is left.
+/// The order of the end: nothing more goes to the buses, then the last rows are stored, then
+/// clients and readers learn of the end. At last the store is one file and free for the next
+/// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
@@ -318,7 +319,7 @@ DaemonEnd RunDaemon(const DaemonConfig& config) {
   Status ended = daemon->Start();
   if (ended) ended = daemon->Run();
   const bool left = daemon->left();
-  if (left) static_cast<void>(daemon.release());  // what hangs still uses it
+  if (left) static_cast<void>(daemon.release());  // a part that hangs still uses it
   return {std::move(ended), left};
 }
 

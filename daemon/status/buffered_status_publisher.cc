@@ -42,7 +42,7 @@ void BufferedStatusPublisher::Tell(Newest<Value>* kept) {
   if (kept->values().empty()) return;
   const auto taken = joined_.get()->Publish(std::span<const Value>(kept->values()));
   if (!taken) Note(tl::unexpected<Error>(taken.error()));
-  // A value that DDS calls wrong would be wrong the next time, too.
+  // A value that DDS calls invalid would be invalid the next time, too.
   kept->DropFirst(taken ? *taken : kept->values().size());
 }
 

@@ -1,5 +1,5 @@
-// Why DDS is not there, for everybody who should know: `status` asks, the event loop takes what is
-// new to make alarms of it. Any thread may tell.
+// The troubles of DDS, for the answer to `status` and for alarms: the event loop takes new reports
+// and makes alarms of them. Any thread may report.
 #pragma once
 
 #include <functional>
@@ -18,18 +18,18 @@ class DdsTroubles {
   /// `wake` is called after each report, on the thread that reports.
   explicit DdsTroubles(std::function<void()> wake) : wake_(std::move(wake)) {}
 
-  /// Reports that `what` does not work, and why; an empty text: it works again.
+  /// `what` does not work because of `trouble`; an empty text: it works again.
   void Report(const std::string& what, const std::string& trouble);
 
-  /// Takes the reports since the last call.
+  /// The reports since the last call.
   std::vector<ShellNote> TakeNotes();
-  /// All that lasts; empty: nothing.
+  /// All lasting troubles in one text; empty: none.
   [[nodiscard]] std::string Summary() const;
 
  private:
   std::function<void()> wake_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::string> lasting_;  // by what
+  std::map<std::string, std::string> lasting_;  // by `what`
   std::vector<ShellNote> notes_;
 };
 

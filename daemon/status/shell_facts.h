@@ -28,12 +28,12 @@ struct ShellFacts {
   std::size_t batches_waiting = 0;
   StoreCounters store;
   bool dds_enabled = false;
-  std::string dds_trouble;  // why it is not there (it is tried again); empty: it is, or is off
+  std::string dds_trouble;  // why DDS is absent (it is tried again); empty: present, or off
   std::uint64_t dds_samples = 0;
   std::uint64_t dds_bytes = 0;
   std::uint64_t steps = 0;
   double cpu_s = 0;        // user and system, of the whole process
-  std::vector<Bus> buses;  // in the order of the layout's
+  std::vector<Bus> buses;  // in the order of the layout's buses
 };
 
 }  // namespace focalfleet

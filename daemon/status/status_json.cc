@@ -51,7 +51,7 @@ Json ClockJson(const ClockView& clock) {
           {"bound_s", known ? Json(clock.bound_s) : Json(nullptr)}};
 }
 
-/// Of the units of a bus: the widest bound and the rate that is off most.
+/// The widest bound of a bus' units, and the rate that deviates most.
 struct BusClocks {
   std::uint32_t known = 0;
   double bound_s = 0;
@@ -136,14 +136,14 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"subdivision", drive.subdivision}};
 }
 
-/// The rounds that ended, and so much of the one under way.
+/// The makespan of the rounds that ended, and the time of the present one so far.
 double MakespanSoFar(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
   return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
 }
 
-/// How far along, 0..1: by time while it moves, by arrivals in the end.
+/// The progress of the configuration, 0..1: by time while units move, by arrivals in the end.
 double FractionOf(const FleetView& fleet) {
   const ConfigurationView& view = fleet.coordinator->configuration();
   if (view.state == ConfigurationState::kDone) return 1;

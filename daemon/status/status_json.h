@@ -1,4 +1,4 @@
-// The fleet as the control socket tells it. docs/cli.md has the members.
+// The state of the fleet as the control socket reports it. docs/cli.md has the members.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@ namespace focalfleet {
 
 /// The current or last configuration, with every unit that was not served.
 Json ConfigurationJson(const FleetView& view);
-/// What a waiting client is shown on the way. Cost: constant.
+/// The progress that a waiting client receives. Cost: constant.
 Json ProgressJson(const FleetView& view);
 Json StatusJson(const FleetView& view, const ShellFacts& facts);
 /// The angles of a ball-jointed fibre carrier as its sensors report them.
 Json FibreCarrierJson(const FibreCarrierReading& carrier);
 Json UnitJson(const FleetView& view, PositionerIndex i);
-/// {"rows":[...]} of all units as text: as Json values it would take ten times as long.
+/// {"rows":[...]} of all units, as text: Json values would take ten times as long.
 std::string StateText(const FleetView& view);
 
 }  // namespace focalfleet

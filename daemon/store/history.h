@@ -1,4 +1,4 @@
-// What the store keeps of the past, as entries of the lists that StoreReader gives.
+// Entries of the history that the store keeps, as StoreReader lists them.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace focalfleet {
 
-/// One motion of one unit, from the intent to its end. Units: vectors.
+/// A motion of a unit, from the intent to its end. Units: vectors.
 struct MoveHistory {
   std::uint64_t configuration = 0;
   UnitId unit;
@@ -22,13 +22,13 @@ struct MoveHistory {
   WallTime began;
   std::optional<WallTime> ended;          // none: the intent is open
   std::optional<IntentEnd> end;           // present with `ended`
-  std::optional<UnitKnowledge> ended_at;  // what was known of the unit then
+  std::optional<UnitKnowledge> ended_at;  // knowledge of the unit at the end
 };
 
 struct ConfigurationHistory {
   ConfigurationRow row;
   WallTime began;
-  WallTime changed;  // last written: the end, where the state is done, stopped or failed
+  WallTime changed;  // time of the last write; where done, stopped or failed: the end
 };
 
 struct ParameterHistory {
@@ -46,7 +46,7 @@ struct AlarmHistory {
   WallTime at;
 };
 
-/// What happened to a place: bound to a serial number, disabled, enabled.
+/// A change of a place: bound to a serial number, disabled, enabled.
 struct UnitHistory {
   UnitId unit;
   SerialNumber serial;
@@ -57,8 +57,8 @@ struct UnitHistory {
 
 struct MeasurementHistory {
   MeasurementRow row;
-  WallTime at;  // stored
-  /// The unit was sent again after this exposure, in the same configuration: it is elsewhere now.
+  WallTime at;  // when it was stored
+  /// The unit was moved again after this exposure, in the same configuration: it is elsewhere now.
   bool moved_since = false;
 };
 

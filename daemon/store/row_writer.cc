@@ -20,8 +20,8 @@ Status RowWriter::Write(const Row& row) {
 
 Status RowWriter::Put(const VectorRow& row) {
   for (const Axis axis : kAxes) {
-    // Motions are kept in intent, exposures in measurement; what sets a vector otherwise would
-    // leave no trace.
+    // Motions are kept in intent, exposures in measurement. Vectors set in any other way would
+    // leave no trace, so they go to the axis' history.
     if (row.origin != Origin::kMove && row.origin != Origin::kHoming &&
         row.origin != Origin::kCamera && row.origin != Origin::kSensors) {
       FOCALFLEET_TRY(KeepVector(row, axis));
@@ -88,7 +88,7 @@ Status RowWriter::Put(const IntentEndRow& row) {
 }
 
 Status RowWriter::Put(const BindingRow& row) {
-  // A serial number sits at one place: where it was before, nothing is bound any more.
+  // A serial number belongs to one place; the place that had it before is unbound.
   for (Statement* s : {&statements_[Sql::kUnboundElsewhere], &statements_[Sql::kUnbindElsewhere],
                        &statements_[Sql::kBind]}) {
     s->Bind(1, row.unit.value);
@@ -183,7 +183,7 @@ Status RowWriter::Put(const AlarmRow& row) {
   return SetMeta(statements_[Sql::kRaiseMeta], "next_alarm", row.id + 1);
 }
 
-// Not raised but set: move ids are 16 bits and begin again.
+// The number is set, not raised: move ids have 16 bits and begin again.
 Status RowWriter::Put(const NextMoveRow& row) {
   return SetMeta(statements_[Sql::kSetMeta], "next_move", row.next.value);
 }

@@ -1,5 +1,4 @@
-// The rows of one batch, written into the open transaction one after the other. Each row runs one
-// prepared statement or a few.
+// The writer of rows into the open transaction. A row runs one prepared statement or a few.
 #pragma once
 
 #include <cstdint>

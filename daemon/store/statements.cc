@@ -5,7 +5,7 @@
 namespace focalfleet::store_internal {
 namespace {
 
-// Replaces the row as a whole: ON CONFLICT DO UPDATE reads it first, and costs a fifth more.
+// The row is replaced as a whole: ON CONFLICT DO UPDATE reads it first, and costs a fifth more.
 constexpr const char* kAxis =
     "INSERT OR REPLACE INTO axis_state(serial, axis, witness, low, high, vector, turns, "
     "subdivision, move, origin, at_ns, offset) VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, "
@@ -45,7 +45,8 @@ constexpr const char* kEnable =
     "INSERT INTO unit(unit_id, serial, enabled, reason, at_ns) VALUES(?1, 0, ?2, ?3, ?4) "
     "ON CONFLICT(unit_id) DO UPDATE SET enabled = ?2, reason = ?3, at_ns = ?4 "
     "WHERE enabled <> ?2 OR reason <> ?3";
-// Runs straight after kBind or kEnable: what they left alone has an older or equal entry already.
+// This statement runs straight after kBind or kEnable, and adds an entry only where they changed a
+// row.
 constexpr const char* kUnitChanged =
     "INSERT INTO unit_history(unit_id, serial, enabled, reason, at_ns) "
     "SELECT unit_id, serial, enabled, reason, at_ns FROM unit WHERE unit_id = ?1 AND changes() > 0";

@@ -16,7 +16,7 @@ using namespace store_internal;
 
 namespace {
 
-// The name under which every path to this file locks the same lock.
+/// The path by which all names of this file lock the same lock.
 std::string Canonical(const std::string& path) {
   const std::unique_ptr<char, void (*)(void*)> file(realpath(path.c_str(), nullptr), std::free);
   if (file != nullptr) return file.get();
@@ -29,7 +29,7 @@ std::string Canonical(const std::string& path) {
 
 Status SetUp(Connection& connection) {
   const auto version_max = static_cast<std::int32_t>(Migrations().size());
-  // Until it is known to be ours, closing it must not tidy its WAL away.
+  // Until the file is known to be a store, closing it must not remove its WAL.
   sqlite3_db_config(connection.db(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   FOCALFLEET_TRY_ASSIGN(const std::int32_t version, InspectSchema(connection, version_max));
   sqlite3_db_config(connection.db(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
@@ -48,8 +48,8 @@ Store::~Store() = default;
 Result<std::unique_ptr<Store>> Store::Open(const std::string& path, const StoreOptions& options) {
   auto store = std::unique_ptr<Store>(new Store);
   store->path_ = Canonical(path);
-  // The lock comes first: to open and close the file would drop this process's own locks on it, if
-  // it had any.
+  // The lock comes first, because opening and closing the file would drop locks that this process
+  // may have on it.
   FOCALFLEET_TRY_ASSIGN(store->lock_, LockFile::Acquire(store->path_ + ".lock"));
   FOCALFLEET_TRY(InspectHeader(store->path_, static_cast<std::int32_t>(Migrations().size())));
   FOCALFLEET_TRY_ASSIGN(store->connection_,

@@ -1,5 +1,5 @@
-// The history of the fleet, and all that the coordinator needs to go on, read beside the writer. A
-// reader has a connection of its own; any number may read, in any process.
+// Readers of the store beside its writer: the history of the fleet, and all that the coordinator
+// needs to go on. A reader has a connection of its own; any number may read, in any process.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,8 @@ class Connection;
 /// read.
 class StoreReader {
  public:
-  /// Errors: kUnavailable: no such file, or not readable; kNewer; kInvalid: not a store.
+  /// The store is open for reading. Errors: kUnavailable: no such file, or not readable; kNewer:
+  /// written by a later version; kInvalid: not a store.
   static Result<std::unique_ptr<StoreReader>> Open(const std::string& path,
                                                    const StoreOptions& options = {});
   StoreReader(const StoreReader&) = delete;
@@ -39,17 +40,17 @@ class StoreReader {
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
-  /// Of one exposure, by unit id.
+  /// The measurements of one exposure, by unit id.
   Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
   /// The newest exposure of a configuration; none: it was never measured.
   Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
   Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
-  /// Units whose count began anew later than that: homed, set by hand, found by the camera, or
+  /// The units whose count began anew after `since`: homed, set by hand, found by the camera, or
   /// other hardware was adopted there.
   Result<std::vector<UnitId>> CountedAnewSince(WallTime since);
-  /// Which hardware is bound to which place.
+  /// The places and the hardware that is bound to each.
   Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
-  /// Errors: kRefused: there is none of that sha256.
+  /// The text of a model. Errors: kRefused: the store has none of that sha256.
   Result<std::string> ModelText(const std::string& sha256);
   Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
 

@@ -1,5 +1,5 @@
-// Keeps the model in force true to the fleet: it is restored at the start, learns where each unit
-// rests, and loses each unit that is no longer what the model was measured on.
+// Upkeep of the model in force. The model is restored at the start and learns where each unit
+// rests. It loses each unit that is no longer what the model was measured on.
 #pragma once
 
 #include "daemon/status/status_snapshot.h"
@@ -24,9 +24,9 @@ Status ForgetStrangers(StoreReader* reader, ModelRegistry* models);
 void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation);
 /// The same for all units. Nothing happens where no model is in force.
 void NoteRests(const FleetView& view, Compensation* compensation);
-/// After a step of the coordinator: the model loses units whose count began anew or whose hardware
-/// was replaced, and learns the rests of units that changed. Nothing happens where no model is in
-/// force.
+/// The model has lost units whose count began anew or whose hardware was replaced, and has learnt
+/// the rests of units that changed, by the effects of one step. Nothing happens where no model is
+/// in force.
 void NoteEffects(const FleetView& view, const Effects& effects, Compensation* compensation);
 
 }  // namespace focalfleet

@@ -47,7 +47,7 @@ void RequestHandler::Service(const FleetView& view, std::vector<Command>* comman
   stops_.clear();
   server_.Service(&stops_);
   for (const IncomingLine& line : stops_) Handle(view, line, commands);
-  // A flood of stops must not keep everybody else out, so every second turn is for all.
+  // A flood of stops must not keep other clients out, so every second turn is for all.
   stopped_ = !stops_.empty() && !stopped_;
   if (stopped_) return;
   spent_bytes_ = 0;
@@ -77,7 +77,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
                                              std::to_string(limits::kControlClients) +
                                              " places have requests open, try again later"));
   if (request->verb == "state") {
-    // Spliced in as text; the frame around it is the one that EncodeResult makes.
+    // The answer is spliced in as text, into the frame that EncodeResult makes.
     std::string answer = EncodeResult(request->id, nullptr);
     const std::size_t place = answer.find("null");
     answer.replace(place, 4, StateText(view));
@@ -140,7 +140,7 @@ Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlR
       drive[std::string(axis) + "_" + name] = known[axis][name];
   return Json{{"unit_id", view.layout->unit(i).id.value},
               {"serial", serial.value},
-              {"drive", std::move(drive)},  // what holds now, whether stored or by default
+              {"drive", std::move(drive)},  // effective values, stored or by default
               {"parameters", NewestOf(history)},
               {"tuning", NewestOf(tunings)},
               {"tuning_history", HistoryJson(tunings)},
@@ -163,7 +163,7 @@ Result<Json> RequestHandler::AskHistory(const FleetView& view, const ControlRequ
   return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
 }
 
-/// {exposure?}: the newest of the last configuration without it.
+/// {exposure?}: without it, the newest exposure of the last configuration.
 Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const ControlRequest& request) {
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
   FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
@@ -198,7 +198,7 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
   if (request.verb != "model_load" && request.verb != "model_unload" &&
       request.verb != "model_rollback")
     return std::nullopt;
-  // A change is numbered after those that the store has.
+  // A change gets the number after those that the store has.
   const auto know_changes = [&]() -> Status {
     if (models.changes_known()) return {};
     FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
@@ -220,7 +220,7 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
   return command;
 }
 
-/// Adopted hardware is not driven by the model of what sat there before, and the operator is told.
+/// Adopted hardware is not driven by the model of the hardware before it, and the answer says so.
 std::string RequestHandler::NoteOn(const FleetView& view, const Command& command) const {
   const auto* adopt = std::get_if<AdoptCommand>(&command.what);
   if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
@@ -250,7 +250,7 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   const auto it = pending_.find(reply.request);
   if (it == pending_.end()) return;
   const Pending pending = it->second;
-  // The first word on a configuration is that it began; who waits wants the last.
+  // The first reply on a configuration says that it began; clients that wait need the last one.
   it->second.began = true;
   if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
@@ -259,7 +259,7 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
     options_.log("refused or failed: " + reply.error->text);
     if (pending.is_retarget && pending.began)
       return Answer(pending, Json{{"goes", false}, {"text", reply.error->text}});
-    // An error means that nothing happened. What failed on the way is a summary with a reason.
+    // An error means that nothing happened. A failure after motion is a summary with a reason.
     if (!pending.began || !HasMoved(view.coordinator->configuration()))
       return Answer(pending, tl::unexpected<Error>(*reply.error));
     Json summary = ConfigurationJson(view);
