@@ -1,6 +1,6 @@
-// The inverse of a model of where a fibre goes: the count of both axes from which the fibre comes
-// to a wanted point. The model is a function that is given; the inverse knows the unit's base and
-// arms only, and finds the count by Newton's method with bounded steps.
+// The inverse of a model of where a fibre goes: the count of both axes at which the fibre is at a
+// wanted point. The caller gives the model as a function. The inverse uses the unit's base and arms
+// only, and finds the count by Newton's method with bounded steps.
 #pragma once
 
 #include <array>

@@ -73,9 +73,9 @@ class BufferedStatusPublisher {
 
   void Keep(const StatusBatch& status);
   template <class Value>
-  void Tell(Newest<Value>* kept);
+  void Offer(Newest<Value>* kept);
   template <class Value>
-  void Tell(std::optional<Value>* kept);
+  void Offer(std::optional<Value>* kept);
   void ReportAlarms();
   void Note(const Status& status);
   void Count();

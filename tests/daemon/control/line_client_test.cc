@@ -36,7 +36,7 @@ class EchoServer {
     while (!end_) {
       pollfd poller{server_.fd(), POLLIN, 0};
       ::poll(&poller, 1, 10);
-      std::vector<IncomingLine> urgent;  // nothing is
+      std::vector<IncomingLine> urgent;  // stays empty
       server_.Service(&urgent);
       while (const auto line = server_.Next()) Answer(*line);
     }
@@ -132,7 +132,7 @@ TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
   EXPECT_FALSE(client.connected());
 }
 
-// As a daemon that is stopped: it listens, and takes nobody.
+// The server stands for a stopped daemon: it listens, and accepts no connection.
 TEST(LineClient, GivesUpOnAServerThatTakesNoConnection) {
   const Scratch scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();

@@ -22,7 +22,7 @@ using ::testing::HasSubstr;
 class Crowd {
  public:
   Crowd(const std::string& path, LineServer* server) : path_(path), server_(server) {}
-  /// A client; what it says is read, and not handed out.
+  /// A client whose line is read, and not handed out.
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(path_));
     OnlyUrgent(server_);
@@ -128,7 +128,7 @@ TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
   Crowd crowd(scratch / "s", &server);
   crowd.Add();
   const RawClient newcomer(scratch / "s");
-  crowd[0].Send("status\n");  // both before the server's next turn
+  crowd[0].Send("status\n");  // both come before the server's next turn
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].text, "status");
@@ -202,7 +202,7 @@ class NoDescriptors {
  public:
   NoDescriptors() {
     ::getrlimit(RLIMIT_NOFILE, &before_);
-    const int next = ::dup(STDERR_FILENO);  // the lowest that is free
+    const int next = ::dup(STDERR_FILENO);  // the lowest free one
     ::close(next);
     rlimit none = before_;
     none.rlim_cur = static_cast<rlim_t>(next);

@@ -23,7 +23,7 @@ inline void Turn(LineServer* server, std::vector<IncomingLine>* lines) {
     if (auto line = server->Next()) lines->push_back(std::move(*line));
 }
 
-/// Everything that the server hands out until it has nothing more to do.
+/// All lines that the server hands out until it has nothing more to do.
 inline std::vector<IncomingLine> Drain(LineServer* server) {
   std::vector<IncomingLine> lines;
   for (int i = 0; i < 100'000 && Readable(server->fd()); ++i) Turn(server, &lines);

@@ -9,7 +9,7 @@
 namespace focalfleet {
 namespace {
 
-/// Takes so many frames, and no more until it is given room again.
+/// A port that takes a number of frames, and no more until it gets room again.
 class NarrowPort : public FramePort {
  public:
   explicit NarrowPort(std::size_t room) : room_(room) {}

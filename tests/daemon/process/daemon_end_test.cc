@@ -1,4 +1,4 @@
-// The end of the real focalfleetd, whatever it was doing.
+// The end of the real focalfleetd, in every state of its work.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -36,7 +36,7 @@ TEST_F(FocalfleetdTest, EndsCleanlyOnSigterm) {
   EXPECT_THAT(Log(), HasSubstr("all is stored"));
 }
 
-/// Checks all that has to be true when a daemon has ended well, whatever it was doing.
+/// Checks all that has to be true after a good end of the daemon.
 class FocalfleetdEndTest : public FocalfleetdTest {
  protected:
   void ExpectEndOn(int signal, Process* daemon) const {
@@ -50,7 +50,7 @@ class FocalfleetdEndTest : public FocalfleetdTest {
         << "the store is one file";
     ExpectWholeStore();
   }
-  /// The next daemon reads it, and finds the configuration ended.
+  /// The next daemon reads the store, and finds the configuration ended.
   void ExpectWholeStore() const {
     auto next = Start("next");
     ASSERT_TRUE(Answers()) << Log("next");
@@ -80,8 +80,8 @@ class FocalfleetdEndTest : public FocalfleetdTest {
   }
 };
 
-/// A fleet whose arms reach far into their neighbours', from one random configuration to another:
-/// the planner gives up its units by ones and twos, for a minute.
+/// A fleet whose arms reach far into their neighbours' cells, from one random configuration to
+/// another. The planner needs a minute, because it abandons units by ones and twos.
 class CrowdedFocalfleetdTest : public FocalfleetdEndTest {
  protected:
   static constexpr std::uint32_t kUnits = 300;
@@ -110,7 +110,7 @@ class CrowdedFocalfleetdTest : public FocalfleetdEndTest {
     }
     return targets;
   }
-  /// Tells each unit that it stands there.
+  /// Sets the position of each unit to this pose.
   void StandAt(const std::vector<Pose>& poses) const {
     auto client = LineClient::Connect(scratch_ / "control.sock");
     ASSERT_TRUE(client);
@@ -156,7 +156,7 @@ TEST_F(FocalfleetdEndTest, DoesNotWaitForACamera) {
   EXPECT_THAT(Log(), Not(HasSubstr("left behind")));
 }
 
-// As on a file system that is gone: whoever opens this FIFO waits for ever.
+// The FIFO stands for a file system that is gone: opening it waits for ever.
 TEST_F(FocalfleetdEndTest, DoesNotWaitForACameraFolderThatHangs) {
   UseCamera();
   auto daemon = Start();
@@ -191,7 +191,7 @@ TEST_F(FocalfleetdEndTest, TellsThoseWhoWaitAndGivesTheBusesBack) {
   ExpectWholeStore();
 }
 
-// The camera may be another user: what it puts into its folder is neither followed nor waited for.
+// The camera may be another user: links in its folder are not followed, pipes are not waited for.
 TEST_F(FocalfleetdTest, EndsWhateverLiesInTheCamerasFolder) {
   std::ofstream(scratch_ / "fiducials.csv") << "fiducial_id,x_mm,y_mm\n1,-40,0\n2,40,9\n3,0,40\n";
   Configure(
@@ -215,7 +215,7 @@ TEST_F(FocalfleetdTest, EndsWhateverLiesInTheCamerasFolder) {
       kPatienceMs))
       << Log();
   EXPECT_EQ(::access((scratch_ / "camera/refused/new.fits.reason").c_str(), F_OK), 0);
-  // A request into a link would be written now, and the thread would wait for this pipe.
+  // A daemon that follows links would have written its request by now, or would wait for a pipe.
   daemon.Signal(SIGTERM);
   EXPECT_EQ(daemon.Wait(), 0) << Log();
   std::ifstream secret(scratch_ / "secret");

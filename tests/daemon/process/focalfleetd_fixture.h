@@ -14,7 +14,7 @@
 
 namespace focalfleet {
 
-inline constexpr int kPatienceMs = 30'000;  // a hang ends here; nothing is timed
+inline constexpr int kPatienceMs = 30'000;  // limit for a hang; nothing is timed
 
 class FocalfleetdTest : public ::testing::Test {
  protected:

@@ -28,7 +28,7 @@ TEST_F(StoreTest, ASecondWriterIsRefusedAndTheFirstNamed) {
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kRefused);
   EXPECT_THAT(second.error().text, HasSubstr("process " + std::to_string(getpid())));
-  // By another name of the same file, too.
+  // The same holds by another name of the file.
   std::filesystem::create_symlink(Path(), folder_.File("link.db"));
   EXPECT_EQ(ErrorOf(Store::Open(folder_.File("link.db"))).code, ErrorCode::kRefused);
   testing::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
@@ -47,7 +47,7 @@ TEST_F(StoreTest, TheLockEndsWithItsProcess) {
     auto store = Store::Open(Path());
     const char word = store ? 'y' : 'n';
     close(hold[1]);
-    // Ends with its parent at the latest.
+    // The child ends with its parent at the latest.
     _exit(write(ready[1], &word, 1) == 1 && read(hold[0], &end, 1) == 0 ? 0 : 1);
   }
   char word = 0;

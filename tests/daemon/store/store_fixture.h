@@ -1,5 +1,4 @@
-// A folder for one test's store, and batches whose content tells by which of them the store was
-// written.
+// A folder for a test's store, and batches whose content shows which of them the store holds.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -33,7 +32,7 @@ class StoreTest : public ::testing::Test {
     EXPECT_TRUE(reader) << (reader ? "" : reader.error().text);
     return reader ? std::move(*reader) : nullptr;
   }
-  /// Behind the store's back, as an operator with the sqlite3 shell.
+  /// SQL past the store, as an operator with the sqlite3 shell would run it.
   void Sql(const std::string& sql) {
     sqlite3* db = nullptr;
     ASSERT_EQ(sqlite3_open(Path().c_str(), &db), SQLITE_OK);
@@ -93,8 +92,8 @@ inline TuningRow Tuned(std::uint16_t critical, double margin) {
           .mode = WaveMode::kSevenSegment};
 }
 
-/// Batch k says k everywhere: in the vectors of all serials, in a parameter, in the next move and
-/// in an alarm.
+/// Batch k holds k everywhere: in the vectors of all serials, in a parameter, in a tuning, in the
+/// next move and in an alarm.
 inline std::vector<Row> Batch(std::uint32_t k, std::uint32_t serials) {
   std::vector<Row> rows;
   for (std::uint32_t serial = 1; serial <= serials; ++serial) {
@@ -117,7 +116,7 @@ inline std::vector<Row> Batch(std::uint32_t k, std::uint32_t serials) {
   return rows;
 }
 
-/// Which batch a store holds; fails where it holds parts of two.
+/// The batch that a store holds; fails where it holds parts of two.
 inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   if (fleet.vectors.empty()) {
     EXPECT_EQ(fleet.next_alarm, 1u);

@@ -1,4 +1,4 @@
-// The past that the store keeps, read back beside the writer.
+// The history that the store keeps, read back beside the writer.
 #include "daemon/store/store_reader.h"
 
 #include <gmock/gmock.h>
@@ -58,7 +58,7 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   const auto none = reader->ModelText("bb");
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::kRefused);
-  // What could not be read back is not written.
+  // A row that could not be read back is not written.
   EXPECT_FALSE(store->Commit(std::vector<Row>{ModelRow{.entry = 0}}, kNine));
   ModelRow later = back;
   later.entry = 4;
@@ -131,7 +131,7 @@ TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
 TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
   auto store = OpenStore();
   testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
-  // The end stands before the vectors in the batch, and still tells where they are.
+  // The end stands before the vectors in the batch, and still has their place.
   testing::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
                                                      Vector(40, Witness::kReported, 10, 20)},
                                     kNine));

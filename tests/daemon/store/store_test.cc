@@ -120,7 +120,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
       IntentEndRow{{1}, {1}, static_cast<IntentEnd>(6)},
       ParameterRow{{1}, Axis::kTheta, static_cast<Parameter>(kParameterCount), 1, Origin::kTuning},
       Tuned(0, 0.5),   // no n at all
-      Tuned(55, 0.5),  // chosen below what starts the load
+      Tuned(55, 0.5),  // chosen n below the critical one
       Tuned(37, std::nan("")),
       ConfigurationRow{.id = 1, .source = "", .state = static_cast<ConfigurationState>(6)},
       AlarmRow{1, static_cast<Severity>(3), {}, {}, ""},
@@ -158,7 +158,7 @@ TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
   ASSERT_FALSE(fleet);
   EXPECT_EQ(fleet.error().code, ErrorCode::kInvalid);
   EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().reported));
-  // The store is not stuck in the read.
+  // The store can still write after the failed read.
   testing::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
 }
 

@@ -25,7 +25,7 @@ std::string Line(std::uint64_t id, const std::string& verb, const Json& args = J
   return EncodeRequest({id, verb, args}) + "\n";
 }
 
-/// A request handler, and the clients before it; its turns are taken one by one.
+/// A request handler and its clients; its turns are taken one by one.
 class RequestHandlerTest : public ::testing::Test {
  protected:
   explicit RequestHandlerTest(std::uint32_t units = 3)
@@ -70,7 +70,7 @@ class RequestHandlerTest : public ::testing::Test {
 
 TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
   for (int i = 0; i < 10; ++i) Add(Line(1, "status"));
-  Turn();  // takes them in, in turns of its own size
+  Turn();  // accepts the clients, some in each turn
   TurnUntilQuiet();
   for (auto& client : clients_) {
     static_cast<void>(client->Receive());
@@ -163,7 +163,7 @@ TEST_F(RequestHandlerTest, AMotionThatAStopOvertookIsRefused) {
 
 TEST_F(RequestHandlerTest, WhereAllPlacesAreBusyOnlyStopIsTaken) {
   for (std::uint32_t i = 0; i < limits::kControlClients; ++i) {
-    Add(Line(1, "adopt", {{"unit_id", 1}}));  // stays open: nobody steps the coordinator
+    Add(Line(1, "adopt", {{"unit_id", 1}}));  // stays open: the coordinator is not stepped
     TurnUntilQuiet();
   }
   Add(Line(7, "status"));
