@@ -109,7 +109,7 @@ TEST(LineClient, GivesUpASilentServer) {
   EXPECT_FALSE(client.connected());
 }
 
-TEST(LineClient, NamesASocketThatNobodyAnswers) {
+TEST(LineClient, NamesASocketThatNoServerAnswers) {
   const Scratch scratch;
   const auto client = LineClient::Connect(scratch / "s");
   ASSERT_FALSE(client);
@@ -117,7 +117,7 @@ TEST(LineClient, NamesASocketThatNobodyAnswers) {
   EXPECT_THAT(client.error().text, HasSubstr(scratch / "s"));
 }
 
-TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
+TEST(LineClient, ReportsAServerThatDiesOrSendsGarbage) {
   const Scratch scratch;
   auto server = std::make_unique<EchoServer>(scratch / "s");
   auto mumbled = LineClient::Connect(scratch / "s").value();

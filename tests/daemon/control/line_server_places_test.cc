@@ -155,9 +155,9 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
   ASSERT_EQ(lines.size(), 2u);
   EXPECT_EQ(lines[0].text, "stop") << "the urgent one first";
   EXPECT_TRUE(lines[0].reserved);
-  EXPECT_TRUE(lines[1].reserved) << "whoever answers can say that only stop is taken";
+  EXPECT_TRUE(lines[1].reserved) << "the answer can say that only stop is taken";
   std::string said;
-  EXPECT_FALSE(Ended(crowd[0], &said)) << "who has something open keeps its place";
+  EXPECT_FALSE(Ended(crowd[0], &said)) << "a client with an open request keeps its place";
 }
 
 TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) {
@@ -171,7 +171,7 @@ TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) 
   EXPECT_EQ(server.clients(), 20u);
 }
 
-TEST(LineServer, WhoHasAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
+TEST(LineServer, AClientInAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1, .urgent = IsStop}).value();
   Crowd crowd(scratch / "s", &server);
@@ -185,7 +185,7 @@ TEST(LineServer, WhoHasAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
   EXPECT_FALSE(lines[0].reserved);
 }
 
-TEST(LineServer, AFloodOfConnectionsDoesNotKeepOutWhoIsThere) {
+TEST(LineServer, AFloodOfConnectionsDoesNotKeepOutPresentClients) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 64, .urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> flood;
@@ -245,7 +245,7 @@ TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
   int turns = 0;
   for (; turns < 1000 && Readable(server.fd()); ++turns) Turn(&server, &lines);
   ASSERT_EQ(lines.size(), 1u) << "one place is reserved, and its descriptor with it";
-  EXPECT_LT(turns, 20) << "who cannot be taken waits, and the listener is left alone";
+  EXPECT_LT(turns, 20) << "a connection without a place waits, and the listener rests";
 }
 
 TEST(LineServer, AcceptsAgainAfterAPauseWhenDescriptorsAreThere) {

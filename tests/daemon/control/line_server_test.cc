@@ -62,7 +62,7 @@ TEST(LineServer, IsReadableAsLongAsALineIsLeft) {
   EXPECT_FALSE(Readable(server.fd()));
 }
 
-TEST(LineServer, WhatIsUrgentGoesBeforeEverythingElseThatWasRead) {
+TEST(LineServer, AnUrgentLineGoesBeforeAllOtherLines) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> askers;
@@ -78,7 +78,7 @@ TEST(LineServer, WhatIsUrgentGoesBeforeEverythingElseThatWasRead) {
   EXPECT_EQ(Drain(&server).size(), 80u);
 }
 
-TEST(LineServer, WhatIsUrgentComesFromBehindOtherLinesOfItsClientWhichSaySo) {
+TEST(LineServer, AnUrgentLineOvertakesLinesOfItsClientWhichAreMarked) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   const RawClient client(scratch / "s");
@@ -95,11 +95,11 @@ TEST(LineServer, WhatIsUrgentComesFromBehindOtherLinesOfItsClientWhichSaySo) {
   EXPECT_EQ(overtaken.size(), 1003u);
   EXPECT_TRUE(overtaken["apply x"]);
   EXPECT_TRUE(overtaken["state 999"]);
-  EXPECT_TRUE(overtaken["apply y"]) << "who sent the stop knew nothing of it";
+  EXPECT_TRUE(overtaken["apply y"]) << "the stop counts for lines of other clients, too";
   EXPECT_FALSE(overtaken["apply z"]) << "it came after the stop";
 }
 
-TEST(LineServer, HearsAStopOfAClientThatReadsNoAnswers) {
+TEST(LineServer, TakesAStopOfAClientThatReadsNoAnswers) {
   const Scratch scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .urgent = IsStop}).value();
@@ -143,7 +143,7 @@ TEST(LineServer, ReadsNoFurtherAheadThanItsBound) {
   EXPECT_EQ(OnlyUrgent(&server).size(), 1u);
 }
 
-TEST(LineServer, RefusesALineThatIsTooLongAndHangsUp) {
+TEST(LineServer, RefusesALineThatIsTooLongAndCloses) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.line_bytes_max = 1000}).value();
   const RawClient client(scratch / "s");
@@ -207,7 +207,7 @@ TEST(LineServer, TakesNoMoreLinesOfAClientThatDoesNotRead) {
   EXPECT_GT(received, 0u);
 }
 
-TEST(LineServer, DropsAClientForWhomTooMuchWaits) {
+TEST(LineServer, DropsAClientThatLeavesTooMuchUnread) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s", {.output_bytes_max = 1'000'000}).value();
   const RawClient client(scratch / "s");
@@ -237,7 +237,7 @@ TEST(LineServer, SkipsProgressForAClientThatDoesNotRead) {
   EXPECT_LT(all.size(), 2'000'000u);
 }
 
-TEST(LineServer, HearsTheLastWordsOfAClientThatHangsUp) {
+TEST(LineServer, TakesTheLastLinesOfAClientThatCloses) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s").value();
   RawClient client(scratch / "s");
@@ -250,7 +250,7 @@ TEST(LineServer, HearsTheLastWordsOfAClientThatHangsUp) {
   EXPECT_FALSE(server.Answer(lines[0].client, "too late"));
 }
 
-TEST(LineServer, AnswersAClientThatEndedItsInputAndThenHangsUp) {
+TEST(LineServer, AnswersAClientThatEndedItsInputAndThenCloses) {
   const Scratch scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");

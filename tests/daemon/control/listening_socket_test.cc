@@ -28,7 +28,7 @@ TEST(LineServer, OnlyOwnerAndGroupMayConnect) {
   EXPECT_EQ(info.st_mode & 0777u, 0660u);
 }
 
-TEST(LineServer, ReplacesASocketFileThatNobodyAnswers) {
+TEST(LineServer, ReplacesASocketFileThatNoServerAnswers) {
   const Scratch scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();
   const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);

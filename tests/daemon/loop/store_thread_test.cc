@@ -93,7 +93,7 @@ bool Await(const EventSignal& progressed, const Predicate& done) {
   return done();
 }
 
-TEST(StoreThread, CommitsInOrderAndSaysHowFar) {
+TEST(StoreThread, CommitsInOrderAndReportsTheLastBatch) {
   Disk disk;
   const auto progressed = EventSignal::Create().value();
   const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
@@ -172,7 +172,7 @@ TEST(StoreThread, ABatchOfRefusedRowsAloneIsOverToo) {
   EXPECT_TRUE(thread->Finish());
 }
 
-TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {
+TEST(StoreThread, PublishesStatusOnlyAfterTheCommitOfItsRows) {
   Disk disk;
   disk.Break(true);
   const auto progressed = EventSignal::Create().value();
@@ -186,7 +186,7 @@ TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {
   ASSERT_TRUE(thread->Finish());
   const auto log = disk.log();
   ASSERT_EQ(log.size(), 4u);
-  EXPECT_EQ(log[1], "publish 0 failing") << "that the store fails is told at once";
+  EXPECT_EQ(log[1], "publish 0 failing") << "the failure of the store is published at once";
   EXPECT_EQ(log[2], "commit one");
   EXPECT_EQ(log[3], "publish 3");
 }

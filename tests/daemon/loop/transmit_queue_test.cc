@@ -44,7 +44,7 @@ std::uint32_t DelayOf(const CanFrame& frame) {
   return start == nullptr ? 0 : start->delay_ticks;
 }
 
-TEST(TransmitQueue, SendsInOrderAndKeepsWhatThePortRefuses) {
+TEST(TransmitQueue, SendsInOrderAndKeepsFramesThatThePortRefuses) {
   TransmitQueue transmit_queue;
   NarrowPort port(70);
   for (std::uint8_t n = 0; n < 100; ++n) EXPECT_TRUE(transmit_queue.Put(Identify(n), kNow));

@@ -23,7 +23,7 @@ TEST(BoundedEnd, WaitsForAllThatEnd) {
   EXPECT_THAT(BoundedEnd({}).Wait(kPatience), IsEmpty());
 }
 
-TEST(BoundedEnd, NamesWhatHangsAndGoesOn) {
+TEST(BoundedEnd, NamesPartsThatHangAndGoesOn) {
   std::latch go(1);
   std::latch other_ended(1);
   BoundedEnd all({{"the camera", [&go] { go.wait(); }},

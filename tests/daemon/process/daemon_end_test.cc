@@ -142,7 +142,8 @@ TEST_F(CrowdedFocalfleetdTest, DoesNotWaitForAPlanThatTakesAMinute) {
   ASSERT_TRUE(taken) << taken.error().text;
   ASSERT_TRUE(Reaches("planning")) << Log();
   ExpectEndOn(SIGTERM, &daemon);
-  EXPECT_THAT(Log(), Not(HasSubstr("left behind"))) << "the planner heard that nobody waits";
+  EXPECT_THAT(Log(), Not(HasSubstr("left behind")))
+      << "the planner stopped because its plan was not wanted";
 }
 
 TEST_F(FocalfleetdEndTest, DoesNotWaitForACamera) {
@@ -174,7 +175,7 @@ TEST_F(FocalfleetdEndTest, DoesNotWaitForACameraFolderThatHangs) {
   ExpectEndOn(SIGTERM, &daemon);
 }
 
-TEST_F(FocalfleetdEndTest, TellsThoseWhoWaitAndGivesTheBusesBack) {
+TEST_F(FocalfleetdEndTest, WaitingClientsReceiveTheEndAndTheBusesAreFree) {
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   auto client = LineClient::Connect(scratch_ / "control.sock");
@@ -192,7 +193,7 @@ TEST_F(FocalfleetdEndTest, TellsThoseWhoWaitAndGivesTheBusesBack) {
 }
 
 // The camera may be another user: links in its folder are not followed, pipes are not waited for.
-TEST_F(FocalfleetdTest, EndsWhateverLiesInTheCamerasFolder) {
+TEST_F(FocalfleetdTest, EndsWithAnyFileInTheCamerasFolder) {
   std::ofstream(scratch_ / "fiducials.csv") << "fiducial_id,x_mm,y_mm\n1,-40,0\n2,40,9\n3,0,40\n";
   Configure(
       "[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n[camera]\ndirectory = \"camera\"\n"

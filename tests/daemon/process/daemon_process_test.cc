@@ -35,7 +35,7 @@ TEST_F(FocalfleetdTest, GoesOnAfterSighup) {
   EXPECT_TRUE(daemon.running());
 }
 
-TEST_F(FocalfleetdTest, MovesAUnitAndSaysSo) {
+TEST_F(FocalfleetdTest, MovesAUnitAndReportsIt) {
   Configure("[bus]\nport = \"simulated\"\n[clock]\nspeed = 20\n");
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
@@ -64,7 +64,7 @@ TEST_F(FocalfleetdTest, MovesAUnitAndSaysSo) {
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalid);
 }
 
-TEST_F(FocalfleetdTest, TellsTheTimeSoFarWhileAConfigurationMoves) {
+TEST_F(FocalfleetdTest, ReportsTheTimeSoFarWhileAConfigurationMoves) {
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   ASSERT_TRUE(Ask("apply", {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,180,90\n"}}));
@@ -77,7 +77,7 @@ TEST_F(FocalfleetdTest, TellsTheTimeSoFarWhileAConfigurationMoves) {
       kPatienceMs));
 }
 
-TEST_F(FocalfleetdTest, TellsTheClientAllBadRowsAndItsLogTheFirst) {
+TEST_F(FocalfleetdTest, ReportsAllBadRowsToTheClientAndTheFirstToItsLog) {
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   const auto refused =
@@ -156,7 +156,7 @@ TEST_F(FocalfleetdTest, WaitsForBusesThatAreNotThereYet) {
   EXPECT_EQ(daemon.Wait(), 0) << Log();
 }
 
-TEST_F(FocalfleetdTest, SaysWhatIsWrongWithItsFilesAndTouchesNothing) {
+TEST_F(FocalfleetdTest, ReportsFaultsOfItsFilesAndTouchesNothing) {
   Configure("[bus]\nport = \"simulated\"\n[fleet]\nunits = \"none.csv\"\n");
   EXPECT_EQ(Start("a").Wait(), 1);
   EXPECT_THAT(Log("a"), HasSubstr("none.csv"));
@@ -189,7 +189,7 @@ TEST_F(FocalfleetdTest, WrongUsageIsTwoAndHelpIsZero) {
   EXPECT_THAT(Log(), HasSubstr("Exit codes"));
 }
 
-TEST_F(FocalfleetdTest, IdleConnectionsKeepNobodyOut) {
+TEST_F(FocalfleetdTest, IdleConnectionsKeepNoClientOut) {
   auto daemon = Start();
   ASSERT_TRUE(Answers()) << Log();
   std::vector<LineClient> idle;
@@ -257,7 +257,7 @@ TEST_F(FocalfleetdTest, EndsWhileItStillTriesToJoinDds) {
   EXPECT_EQ(daemon.WaitFor(kPatienceMs), 0) << Log();
 }
 
-TEST_F(FocalfleetdTest, SaysThatTheEnvironmentDoesNotDecideWhereStatusGoes) {
+TEST_F(FocalfleetdTest, WarnsThatTheEnvironmentDoesNotDecideWhereStatusGoes) {
   std::ofstream(scratch_ / "f.toml")
       << "[dds]\ndomain = " << testing::OwnDomain() << "\n[bus]\nport = \"simulated\"\n";
   ::setenv("CYCLONEDDS_URI", "<Nonsense/>", 1);

@@ -58,7 +58,7 @@ TEST_F(OpenPortsTest, OnlyVirtualInterfacesMayRunInAnotherTime) {
             "motors do not hurry");
   kind = "vcan";
   EXPECT_TRUE(Open(all));
-  EXPECT_FALSE(Open({"can0", "can2"})) << "nobody knows what can1 will be";
+  EXPECT_FALSE(Open({"can0", "can2"})) << "it is unknown what can1 will be";
 }
 
 TEST_F(OpenPortsTest, AnInterfaceThatIsMissingIsABusThatIsDown) {

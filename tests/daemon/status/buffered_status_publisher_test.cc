@@ -42,7 +42,7 @@ AlarmValue Alarm(std::uint64_t id) {
   return alarm;
 }
 
-TEST(BufferedStatusPublisher, TellsTheWholeStateOnceItCanJoin) {
+TEST(BufferedStatusPublisher, PublishesTheWholeStateOnceItCanJoin) {
   std::counting_semaphore<> may_join(0);
   std::vector<std::string> reported;
   BufferedStatusPublisher publisher(

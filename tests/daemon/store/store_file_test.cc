@@ -93,7 +93,7 @@ TEST_F(StoreTest, ANewerStoreIsSeenInItsWalToo) {
   EXPECT_EQ(Bytes(Path() + "-wal"), wal);
 }
 
-TEST_F(StoreTest, WhatIsNoStoreIsRefusedAndLeftAlone) {
+TEST_F(StoreTest, AFileThatIsNoStoreIsRefusedAndLeftAlone) {
   for (const std::string& content : {std::string("unit_id,x_mm\n1,2\n"),
                                      std::string("SQLite format 3"), std::string(5000, '\xff')}) {
     std::ofstream(Path(), std::ios::binary) << content;

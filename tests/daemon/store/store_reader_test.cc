@@ -67,7 +67,7 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   EXPECT_EQ(OpenReader()->Models(10)->size(), 3u);
 }
 
-TEST_F(StoreTest, TellsWhoseCountBeganAnewSince) {
+TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSince) {
   auto store = OpenStore();
   const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
     testing::ExpectDone(store->Commit(
@@ -284,7 +284,7 @@ TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
   EXPECT_FALSE(OpenStore()->Commit(std::vector<Row>{row}, {6}));
 }
 
-TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithWhoeverMeasured) {
+TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithItsSource) {
   MeasurementRow row{.exposure = 8,
                      .serial = {7001},
                      .unit = {12},

@@ -36,7 +36,7 @@ class ModelRegistryTest : public ::testing::Test {
   std::map<std::string, std::string> stored_;
 };
 
-TEST_F(ModelRegistryTest, WhatIsLoadedHoldsAndSaysWhereItIsFrom) {
+TEST_F(ModelRegistryTest, ALoadedModelIsInForceAndNamesItsOrigin) {
   ModelRegistry registry(&layout_);
   EXPECT_EQ(registry.compensation(), nullptr);
   const ModelRow row = Load(&registry, "one");
@@ -97,7 +97,7 @@ TEST_F(ModelRegistryTest, GoesBackStepByStepAndForwardAgainByLoading) {
   EXPECT_EQ(registry.compensation(), nullptr);
 }
 
-TEST_F(ModelRegistryTest, ARestartFindsWhatHeld) {
+TEST_F(ModelRegistryTest, ARestartRestoresTheModelInForce) {
   ModelRegistry registry(&layout_);
   std::vector<ModelHistory> newest_first;
   for (const char* name : {"one", "two"})

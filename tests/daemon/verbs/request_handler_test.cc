@@ -68,7 +68,7 @@ class RequestHandlerTest : public ::testing::Test {
   std::vector<Command> commands_;
 };
 
-TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
+TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeAllOtherLines) {
   for (int i = 0; i < 10; ++i) Add(Line(1, "status"));
   Turn();  // accepts the clients, some in each turn
   TurnUntilQuiet();
@@ -89,7 +89,7 @@ TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
   for (std::size_t i = 0; i < 10; ++i) EXPECT_THAT(clients_[i]->Receive(), HasSubstr(R"("id":3)"));
 }
 
-TEST_F(RequestHandlerTest, AFloodOfStopsKeepsNobodyOut) {
+TEST_F(RequestHandlerTest, AFloodOfStopsKeepsNoClientOut) {
   std::string flood;
   for (std::uint64_t id = 1; id <= 200; ++id) flood += Line(id, "stop");
   Add();

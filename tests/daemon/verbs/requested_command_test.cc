@@ -112,7 +112,7 @@ TEST(RequestedCommand, RetargetTakesAPlaceOrTwoAngles) {
   EXPECT_THAT(far, HasSubstr("out of patrol"));
 }
 
-TEST(RequestedCommand, NamesWhatIsWrong) {
+TEST(RequestedCommand, NamesTheFault) {
   const SmallFleet fleet;
   EXPECT_THAT(ErrorOf(fleet, "dance", Json::object()), HasSubstr("no verb 'dance'"));
   EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", 99}}), HasSubstr("no unit 99"));
