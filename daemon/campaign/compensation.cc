@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "daemon/campaign/campaign_log.h"
+#include "fleet/place_inverse.h"
 
 namespace focalfleet {
 namespace {
@@ -15,35 +16,11 @@ using sim::kTheta;
 
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSameDeg = 1e-6;
-constexpr double kEnoughMm = 2e-4;
-constexpr double kStepMaxDeg = 10;  // of one iteration
-constexpr double kAwayMaxDeg = 30;  // from the guess: then it is another way, not a correction
-constexpr int kIterations = 12;
 constexpr std::size_t kRestsMax = 32;
-constexpr std::size_t kRestsKept = 8;  // whatever forgets itself has done so by then
+constexpr std::size_t kRestsKept = 8;  // effects that fade have faded by then
 
 bool IsCompensated(const sim::Template& form) {
   return form.axis != sim::EffectAxis::kNone && sim::IsOfPosesAlone(*form.effect);
-}
-
-/// One damped step of Newton's method, in degrees: both joints turn what lies beyond them.
-std::array<double, 2> StepTowards(const sim::CampaignUnit& unit, const PointFp& place,
-                                  const PointFp& elbow, const PointFp& wanted) {
-  const double theta_x = -(place.y_mm - unit.base_y_mm), theta_y = place.x_mm - unit.base_x_mm;
-  const double phi_x = -(place.y_mm - elbow.y_mm), phi_y = place.x_mm - elbow.x_mm;
-  const double x = wanted.x_mm - place.x_mm, y = wanted.y_mm - place.y_mm;
-  // Stretched or folded, both turn the fibre the same way: damping shares the step among them.
-  const double damping =
-      1e-6 * (unit.arm_mm[kTheta] * unit.arm_mm[kTheta] + unit.arm_mm[kPhi] * unit.arm_mm[kPhi]);
-  const double a = theta_x * theta_x + theta_y * theta_y + damping;
-  const double b = theta_x * phi_x + theta_y * phi_y;
-  const double d = phi_x * phi_x + phi_y * phi_y + damping;
-  const double u = theta_x * x + theta_y * y, v = phi_x * x + phi_y * y;
-  const double determinant = a * d - b * b;
-  const auto bounded = [](double radians) {
-    return std::clamp(radians / kRadians, -kStepMaxDeg, kStepMaxDeg);
-  };
-  return {bounded((d * u - b * v) / determinant), bounded((a * v - b * u) / determinant)};
 }
 
 }  // namespace
@@ -76,7 +53,7 @@ sim::PoseTrack Compensation::WayOf(const KnownUnit& unit) {
   return way;
 }
 
-/// Where the fibre is after the last move of the way.
+/// The place of the fibre after the last move of the way.
 PointFp Compensation::PlaceAfter(const KnownUnit& unit, sim::PoseTrack* way,
                                  sim::PoseErrors* errors) {
   const sim::UnitTrack& track = way->track();
@@ -105,34 +82,24 @@ std::optional<AxisAngles> Compensation::CountFor(PositionerIndex i, const Wish& 
   const std::size_t before = way.moves();
   const bool runs_up = wish.last_deg[0] != 0 || wish.last_deg[1] != 0;
   sim::PoseErrors errors;
-  AxisPair count{wish.guess.theta_deg, wish.guess.phi_deg};
-  AxisPair best = count;
-  double best_mm = INFINITY;
-  for (int k = 0; k < kIterations; ++k) {
+  const sim::CampaignUnit& arms = unit.geometry;
+  const PlaceModel model = [&](const AxisAngles& count) {
     way.Cut(before);
-    if (runs_up) way.Go({count[0] - wish.last_deg[0], count[1] - wish.last_deg[1]});
-    way.Go(count);
-    const PointFp place = PlaceAfter(unit, &way, &errors);
-    const double off_mm =
-        std::hypot(place.x_mm - wish.fibre_fp.x_mm, place.y_mm - wish.fibre_fp.y_mm);
-    if (!std::isfinite(off_mm)) return std::nullopt;
-    if (off_mm < best_mm) {
-      best_mm = off_mm;
-      best = count;
-    }
-    if (off_mm < kEnoughMm) break;
-    const double theta = (count[0] + errors.angle_deg[kTheta].back() + unit.added_deg[kTheta] +
-                          unit.geometry.zero_deg[kTheta]) *
+    if (runs_up) way.Go({count.theta_deg - wish.last_deg[0], count.phi_deg - wish.last_deg[1]});
+    way.Go({count.theta_deg, count.phi_deg});
+    const PointFp fibre = PlaceAfter(unit, &way, &errors);
+    const double theta = (count.theta_deg + errors.angle_deg[kTheta].back() +
+                          unit.added_deg[kTheta] + arms.zero_deg[kTheta]) *
                          kRadians;
-    const PointFp elbow{unit.geometry.base_x_mm + unit.geometry.arm_mm[kTheta] * std::cos(theta),
-                        unit.geometry.base_y_mm + unit.geometry.arm_mm[kTheta] * std::sin(theta)};
-    const auto step = StepTowards(unit.geometry, place, elbow, wish.fibre_fp);
-    count = {count[0] + step[0], count[1] + step[1]};
-  }
-  if (std::abs(best[0] - wish.guess.theta_deg) > kAwayMaxDeg ||
-      std::abs(best[1] - wish.guess.phi_deg) > kAwayMaxDeg)
-    return std::nullopt;
-  return AxisAngles{best[0], best[1]};
+    return SegmentFp{{arms.base_x_mm + arms.arm_mm[kTheta] * std::cos(theta),
+                      arms.base_y_mm + arms.arm_mm[kTheta] * std::sin(theta)},
+                     fibre};
+  };
+  return CountAt({.fibre_fp = wish.fibre_fp,
+                  .guess = wish.guess,
+                  .base_fp = {arms.base_x_mm, arms.base_y_mm},
+                  .arm_mm = {arms.arm_mm[kTheta], arms.arm_mm[kPhi]}},
+                 model);
 }
 
 std::optional<Pose> Compensation::OffsetFor(PositionerIndex i, const Stand& stand,
@@ -173,7 +140,7 @@ void Compensation::Rests(PositionerIndex i, const AxisAngles& count) {
   if (unit.rests_deg.size() > kRestsMax) Shorten(&unit);
 }
 
-/// The older rests become what they added up to.
+/// Replaces the older rests by the sum of their effects.
 void Compensation::Shorten(KnownUnit* unit) {
   const std::size_t gone = unit->rests_deg.size() - kRestsKept;
   sim::PoseTrack way = WayOf(*unit);

@@ -1,14 +1,14 @@
-// Commands go through the model of a campaign: what a unit has to be told, in angles of its own
-// count, so that its fibre comes to its target. The model predicts the place after a move from the
-// count's end, the direction that it comes from, and what has added up since the campaign; the
-// command is its inverse, by Newton's method on the model's own arms.
+// The compensation sends commands through the model of a campaign. A command is given in angles of
+// the unit's own count, chosen so that its fibre comes to its target. The model predicts the place
+// after a move from the count at its end, the direction that it comes from, and the effects added
+// up since the campaign. The command is the inverse of the model (fleet/place_inverse.h).
 //
-// A unit's way since the campaign is kept here: from where the campaign left it, each place at
-// which it came to rest. What happened while nobody looked (another daemon, a restart) counts as
-// one straight move. A unit that was homed counts anew, and the model's zeros are no longer its
-// own: it goes uncompensated until there is another model. So do units that the campaign did not
-// measure. Effects that need conditions which the daemon is not told of (temperature, supply,
-// elevation), and those of camera, rails and plate, are left out, by name.
+// A unit's way since the campaign is kept here: where the campaign left it, and each place at which
+// it came to rest. Motion during the daemon's absence (another daemon, a restart) counts as one
+// straight move. A unit that was homed counts anew, and the model's zeros are no longer its own: it
+// goes uncompensated until there is another model. Units that the campaign did not measure go uncompensated, too.
+// Effects that need conditions unknown to the daemon (temperature, supply, elevation), and those of
+// camera, rails and plate, are left out, by name.
 #pragma once
 
 #include <array>
@@ -33,14 +33,14 @@ class Compensation {
 
   struct Wish {
     PointFp fibre_fp;                           // where the fibre is to end
-    AxisAngles now;                             // what it counts before the move
-    AxisAngles guess;                           // the count that leads there but for the model
-    std::array<double, kAxisCount> last_deg{};  // its last piece, where it runs up; 0: straight
+    AxisAngles now;                             // count before the move
+    AxisAngles guess;                           // count that leads there without the model
+    std::array<double, kAxisCount> last_deg{};  // last piece of a unidirectional approach; 0: none
   };
-  /// What it is to count at the end. None: the model does not know the unit, or does not lead there
-  /// (farther than 30 degrees from the guess). Not held to the axes' ranges. Error: below 0.5 um by
-  /// the model where the fibre can get there, else near the nearest.
-  /// Cost: some microseconds for each effect and iteration; at most 12 iterations.
+  /// The count at the end of the move. None: the unit is not in the model, or the model does not
+  /// lead there (farther than 30 degrees from the guess). Not held to the axes' ranges. Error:
+  /// below 0.5 um by the model where the fibre can get there, else near the nearest point. Cost:
+  /// some microseconds for each effect and iteration; at most 12 iterations.
   [[nodiscard]] std::optional<AxisAngles> CountFor(PositionerIndex i, const Wish& wish) const;
 
   /// A unit as the planner has it, in whole vectors.
@@ -48,18 +48,18 @@ class Compensation {
     const Unit* unit = nullptr;
     const UnitDrive* drive = nullptr;
     Pose place{};
-    Pose offset{};                              // its place less its own count
+    Pose offset{};                              // place less count
     std::array<double, kAxisCount> last_deg{};  // as in a wish
   };
-  /// How much more than its count its place is to be from here on, so that the way from one place
-  /// to the target is the way of its count. None: as CountFor.
+  /// The offset of place from count from now on, so that the way from the present place to the
+  /// target is the way of the count. None: as CountFor.
   [[nodiscard]] std::optional<Pose> OffsetFor(PositionerIndex i, const Stand& stand,
                                               const Pose& target) const;
 
-  /// Where the model has the fibre when the unit comes from its last rest to `count`.
+  /// Where the model has the fibre after a move from the unit's last rest to `count`.
   [[nodiscard]] std::optional<PointFp> FibreAfter(PositionerIndex i, const AxisAngles& count) const;
 
-  /// The unit rests, and counts that.
+  /// The unit rests at this count.
   void Rests(PositionerIndex i, const AxisAngles& count);
   /// The serial number of the hardware that the campaign measured there; 0: the model does not say.
   [[nodiscard]] SerialNumber serial(PositionerIndex i) const {
@@ -67,11 +67,11 @@ class Compensation {
   }
   /// Commands to this unit go through the model.
   [[nodiscard]] bool Knows(PositionerIndex i) const { return units_[i.value].has_value(); }
-  /// Its count began anew (homed, set by hand, found by the camera), or other hardware stands in
-  /// its place.
+  /// The unit goes without the model: its count began anew (homed, set by hand, found by the
+  /// camera), or other hardware stands in its place.
   void Forget(PositionerIndex i) { units_[i.value].reset(); }
 
-  /// Units that it has a say on.
+  /// Number of units whose commands go through the model.
   [[nodiscard]] std::size_t units() const;
   /// Causes in the model that are not compensated, once each.
   [[nodiscard]] const std::vector<std::string>& left_out() const { return left_out_; }
@@ -94,17 +94,17 @@ class Compensation {
   static PointFp PlaceAfter(const KnownUnit& unit, sim::PoseTrack* way, sim::PoseErrors* errors);
   static void Shorten(KnownUnit* unit);
 
-  std::vector<std::optional<KnownUnit>> units_;  // by position
+  std::vector<std::optional<KnownUnit>> units_;  // by PositionerIndex
   std::vector<std::string> left_out_;
 };
 
-/// A model.toml whose commands a fleet may take.
+/// A model.toml that may be in force for a fleet.
 struct ModelInForce {
   ModelFile file;
   Compensation compensation;
 };
-/// Errors: as ReadModelFile; kInvalid: its campaign was insufficient, or it says of no unit of the
-/// layout where its campaign left it.
+/// The model of a text. Errors: as ReadModelFile; kInvalid: its campaign was insufficient, or it
+/// names for no unit of the layout where the campaign left it.
 Result<ModelInForce> ReadModelInForce(std::string_view text, const std::string& file,
                                       const Layout& layout);
 

@@ -6,7 +6,7 @@
 
 #include "daemon/cli/command_line.h"
 #include "daemon/files/text_file.h"
-#include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/obstacles_file.h"
 #include "fleet/files/state_file.h"

@@ -1,5 +1,5 @@
-// Host time as the daemon tells it: the monotonic clock, times `speed` where a simulated fleet runs
-// faster than life. Daemon and focalfleet-sim agree on it without a word, because both scale the
+// Host time of the daemon: the monotonic clock, times `speed` where a simulated fleet runs faster
+// than real time. Daemon and focalfleet-sim agree on it without an exchange, because both scale the
 // same clock of one machine.
 #pragma once
 
@@ -20,7 +20,7 @@ inline std::int64_t ReadMonotonicNs() { return ReadClockNs(CLOCK_MONOTONIC); }
 
 class HostClock {
  public:
-  /// `read`: CLOCK_MONOTONIC in ns; a test has one of its own.
+  /// `read` gives CLOCK_MONOTONIC in ns; a test passes a clock of its own.
   explicit HostClock(double speed = 1, std::int64_t (*read)() = ReadMonotonicNs)
       : speed_(speed), read_(read) {}
 
@@ -34,7 +34,7 @@ class HostClock {
     if (speed_ == 1) return {ns};
     return {static_cast<std::int64_t>(static_cast<double>(ns) * speed_)};
   }
-  /// What so much real time is in host time.
+  /// The host time that passes in this real time.
   [[nodiscard]] DurationNs Real(DurationNs duration) const {
     return {static_cast<std::int64_t>(static_cast<double>(duration.ns) * speed_)};
   }

@@ -1,5 +1,5 @@
-// The time of day, for people and for the store. It may step (NTP, an operator) and must never time
-// a motion: that is HostInstant's work. Only daemon/ may know it.
+// The time of day, for people and for the store. Wall time may step (NTP, an operator), so it never
+// times a motion: HostInstant does. Only daemon/ uses wall time.
 #pragma once
 
 #include <chrono>

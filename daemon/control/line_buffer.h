@@ -1,5 +1,5 @@
-// The lines that one client has sent and nobody has taken yet. A line that is urgent may be taken
-// from behind others; the lines that it overtook say so when their turn comes.
+// The lines that one client has sent and the server has not handed out yet. An urgent line may be
+// taken from behind others; the lines that it overtook bear a mark when their turn comes.
 #pragma once
 
 #include <cstddef>
@@ -18,19 +18,19 @@ class LineBuffer {
     bool overtaken = false;  // an urgent line that came later was taken before it
   };
 
-  /// Limit of the bytes of lines that one call of TakeUrgent looks at. A line that only looks
-  /// urgent costs some microseconds to tell: 4 KiB are a hundred of them, a fifth of a millisecond
-  /// a client. Twice as much doubles what a hostile client costs a turn; half as much takes two
-  /// turns for a stop that stands behind a full buffer of short lines.
+  /// Limit of the bytes of lines that one call of TakeUrgent looks at. Each line that only looks
+  /// urgent costs some microseconds; 4 KiB hold a hundred of them, a fifth of a millisecond a
+  /// client. Twice the limit doubles what a hostile client costs a turn. With half of it, a stop
+  /// behind a full buffer of short lines takes two turns.
   static constexpr std::size_t kLookBytes = 4096;
 
   void Append(std::string_view bytes);
   /// The first line, if it is complete.
   std::optional<Line> Take();
-  /// The first complete line that `urgent` says yes to, wherever it stands. What stands before it
-  /// is overtaken.
+  /// The first complete line for which `urgent` is true, wherever it stands. The lines before it
+  /// are overtaken.
   std::optional<std::string> TakeUrgent(const Urgent& urgent);
-  /// All complete lines are: an urgent line of somebody else went ahead of them.
+  /// All complete lines are overtaken: an urgent line of another client went ahead of them.
   void Overtake();
   void Clear() { *this = {}; }
 
@@ -38,17 +38,17 @@ class LineBuffer {
   /// Length of the first line, complete or not, without its newline.
   [[nodiscard]] std::size_t first_bytes() const { return has_line() ? line_end_ : bytes_.size(); }
   [[nodiscard]] std::size_t size() const { return bytes_.size(); }
-  /// TakeUrgent has not looked at all complete lines yet.
+  /// Whether TakeUrgent has not looked at all complete lines yet.
   [[nodiscard]] bool unseen() const { return unseen_; }
 
  private:
   void Erase(std::size_t from, std::size_t count);
 
   std::string bytes_;
-  std::size_t line_end_ = std::string::npos;  // of the first complete line
-  std::size_t looked_ = 0;                    // where the first line begins that is unseen
-  std::size_t searched_ = 0;                  // no newline from looked_ to here
-  std::size_t overtaken_ = 0;                 // lines that begin before this are
+  std::size_t line_end_ = std::string::npos;  // place of the first newline
+  std::size_t looked_ = 0;                    // begin of the first unseen line
+  std::size_t searched_ = 0;                  // there is no newline from looked_ to here
+  std::size_t overtaken_ = 0;                 // lines that begin before this are overtaken
   bool unseen_ = false;
 };
 

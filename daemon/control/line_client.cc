@@ -17,7 +17,7 @@
 namespace focalfleet {
 namespace {
 
-/// Waits for `events`. False: nothing came for `silence_max`.
+/// Waits for `events`. False: none came for `silence_max`.
 Result<bool> WaitFor(int fd, short events, std::optional<DurationNs> silence_max) {
   using Clock = std::chrono::steady_clock;
   const auto end = Clock::now() + std::chrono::nanoseconds(silence_max ? silence_max->ns : 0);
@@ -40,8 +40,8 @@ Result<bool> WaitFor(int fd, short events, std::optional<DurationNs> silence_max
 Result<LineClient> LineClient::Connect(const std::string& path, DurationNs patience) {
   using Clock = std::chrono::steady_clock;
   FOCALFLEET_TRY_ASSIGN(const UnixAddress address, UnixAddress::Of(path));
-  // Waiting is done where it can end: a connect that blocks waits without limit for a server whose
-  // backlog is full, and there is nothing to poll for.
+  // The socket does not block: a blocking connect would wait without limit for a server whose
+  // backlog is full, and there is no event to poll for.
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd < 0)
     return Fail(ErrorCode::kUnavailable, std::string("no socket: ") + std::strerror(errno));
@@ -93,7 +93,7 @@ Status LineClient::SendAll(std::string_view bytes, const CallOptions& options) {
       if (!ready) return Broken(ready.error().text);
       if (!*ready) return Broken("the request was not taken in time");
     } else if (errno == EPIPE || errno == ECONNRESET) {
-      return {};  // the server hung up, and may have said why
+      return {};  // the server closed, and may have sent the reason
     } else if (errno != EINTR) {
       return Broken(std::string("the connection broke: ") + std::strerror(errno));
     }
@@ -119,7 +119,7 @@ Result<std::string> LineClient::NextLine(const CallOptions& options) {
     if (got > 0) {
       received_.append(chunk.data(), static_cast<std::size_t>(got));
     } else if (errno != EAGAIN && errno != EINTR && errno != ECONNRESET) {
-      // A reset is told once, before what was sent ahead of it.
+      // The kernel reports a reset once, before the bytes that were sent ahead of it.
       return Broken(std::string("the connection broke: ") + std::strerror(errno));
     }
   }
@@ -134,7 +134,7 @@ Result<Json> LineClient::Call(const std::string& verb, const Json& args,
     FOCALFLEET_TRY_ASSIGN(const std::string line, NextLine(options));
     auto answer = DecodeAnswer(line);
     if (!answer) return Broken(answer.error().text);
-    // Id 0: the server could not even read whose request it was; there is only this one.
+    // Id 0: the server could not read the id of the request; only this one is open.
     if (answer->id != id && answer->id != 0) continue;
     switch (answer->kind) {
       case ControlAnswer::Kind::kProgress:

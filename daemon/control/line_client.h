@@ -1,4 +1,4 @@
-// The asking end of a control socket, for programs that may wait: one request at a time, with a
+// The client's end of a control socket, for programs that may wait: one request at a time, with a
 // limit on silence.
 #pragma once
 
@@ -20,8 +20,9 @@ class LineClient {
     std::function<void(const Json&)> on_progress;         // may be empty
   };
 
-  /// Errors: kUnavailable, names the path: nobody listens there, it may not be opened, or whoever
-  /// listens has not taken a connection for `patience` (it hangs, or is stopped).
+  /// The client is connected. Errors: kUnavailable, names the path: no server listens there, the
+  /// socket may not be opened, or the server has not taken a connection for `patience` (it hangs,
+  /// or is stopped).
   static Result<LineClient> Connect(const std::string& path, DurationNs patience = Seconds(10));
 
   LineClient(LineClient&& other) noexcept;
@@ -31,8 +32,8 @@ class LineClient {
   ~LineClient();
 
   /// Sends one request and waits for its last answer: the result object.
-  /// Errors: what the server answered; or kUnavailable where the connection broke or stayed silent,
-  /// and then connected() is false: whether the request took effect is not known.
+  /// Errors: that of the server's answer; kUnavailable where the connection broke or stayed silent.
+  /// In the latter case connected() is false, and it is unknown whether the request took effect.
   Result<Json> Call(const std::string& verb, const Json& args, const CallOptions& options);
   Result<Json> Call(const std::string& verb, const Json& args) {
     return Call(verb, args, CallOptions{});

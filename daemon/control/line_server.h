@@ -1,20 +1,16 @@
-// The listening end of a control socket: lines in, lines out, never waiting for anybody.
+// The server's end of a control socket: lines come in, lines go out, and the server never waits for
+// a client. control/listening_socket.h makes the socket file.
 //
-// Owner and group may connect (mode 0660). A socket file that a live server answers on is refused
-// as in use; one that nobody answers on is left from a crash and replaced. The new socket listens
-// under a temporary name and is renamed into place, so that nobody ever finds a file that does not
-// answer.
+// The length of a line, the number of clients and the unread output of a client are bounded.
+// Clients take turns. No line of a client is taken while much of its earlier answers is unread, so
+// a client that asks without reading stops itself. All descriptors are in one inner epoll, so that
+// an event loop watches a single one.
 //
-// Bounds: a line, the number of clients, and what may wait to be read by a client. Clients take
-// turns, and none of their lines is taken while much of the earlier answers waits: a client that
-// asks without reading stops itself. All descriptors sit in one inner epoll, so that an event loop
-// watches a single one.
-//
-// A line may be urgent (`Options::urgent`). Then it is handed out before all others, from behind
-// other lines of its own client, too: up to ahead_bytes are read of what nobody has taken yet.
-// Nobody can keep such a line out:
+// A line may be urgent (`Options::urgent`). Such a line is handed out before all others, even from
+// behind other lines of its own client: up to ahead_bytes are read of lines that wait. No other
+// client can keep an urgent line out:
 //   - Where all places are taken, a newcomer gets the place of the client that was idle longest.
-//   - Where none is idle, it gets one of the reserved places, and says what is urgent, or waits.
+//   - Where none is idle, a newcomer gets a reserved place, where only urgent lines are handled.
 //   - Each reserved place keeps a descriptor of its own, for when the process has none left.
 #pragma once
 
@@ -33,7 +29,7 @@
 
 namespace focalfleet {
 
-/// Never given twice by one server, so an answer cannot reach another client than the one that
+/// A server never gives an id twice, so an answer cannot reach another client than the one that
 /// asked.
 using ClientId = std::uint64_t;
 
@@ -41,7 +37,7 @@ struct IncomingLine {
   ClientId client = 0;
   std::string text;        // without its newline
   bool overtaken = false;  // an urgent line that came later was handed out before it
-  bool reserved = false;  // of a client in a reserved place, where only urgent lines are to be done
+  bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
 };
 
 class LineServer {
@@ -55,40 +51,41 @@ class LineServer {
     std::size_t progress_bytes_max = std::size_t{64}
                                      << 10;  // more than this waits: progress is skipped
     std::size_t clients_max = limits::kControlClients;
-    /// Which lines go before all others; asked about each complete line, so it must be quick. None:
-    /// nothing is urgent, and no place is reserved.
+    /// Whether a line goes before all others. The function sees each complete line, so it must be
+    /// quick. Without it nothing is urgent, and no place is reserved.
     std::function<bool(std::string_view)> urgent = {};
     std::size_t reserved_max = limits::kControlClientsReserved;
-    /// Read of each client beyond the line that is next, to find what is urgent: 1600 short
-    /// requests. With half of it a stop behind 800 of them waits for some answers; twice as much
-    /// costs twice the memory, 4 MiB for all clients.
+    /// Bytes that are read of each client beyond its next line, to find urgent lines; they hold
+    /// 1600 short requests. With half of it, a stop behind more than 800 requests waits for some
+    /// answers. Twice as much costs twice the memory, 4 MiB for all clients.
     std::size_t ahead_bytes = std::size_t{64} << 10;
-    /// After an accept that found no descriptor at all, nobody is accepted for so long.
+    /// The pause in accepting after an accept that found no descriptor at all.
     std::chrono::milliseconds accept_pause{1000};
   };
 
-  /// Errors: kRefused where a live server answers at `path`; kUnavailable where the path is no
-  /// socket, too long or not writable; both name it.
+  /// The server listens at `path`. Errors: kRefused where a live server answers there; kUnavailable
+  /// where the path is no socket, too long or not writable; both name it.
   static Result<LineServer> Create(const std::string& path, const Options& options);
   static Result<LineServer> Create(const std::string& path) { return Create(path, Options{}); }
 
   LineServer(LineServer&&) noexcept;
   LineServer& operator=(LineServer&&) noexcept;
-  /// Removes the socket file, if it still is ours.
+  /// Removes the socket file, if it still is the one of this server.
   ~LineServer();
 
   /// Readable whenever Service has something to do.
   [[nodiscard]] int fd() const;
 
-  /// Accepts, reads, writes what goes without waiting, and appends what is urgent: at most one line
-  /// of each client.
+  /// Accepts, reads and writes as much as goes without waiting. Urgent lines are appended, at most
+  /// one of each client.
   void Service(std::vector<IncomingLine>* urgent);
-  /// Another line; clients take turns. None: nothing is there, or nobody reads his answers.
+  /// The next line; clients take turns. None: no line waits, or its client does not read answers.
   std::optional<IncomingLine> Next();
 
   /// Queues the last answer to a line of this client. False: the client is gone (that is no fault).
   bool Answer(ClientId client, std::string_view line);
-  /// Queues something before the last answer; skipped where the client does not read. False: gone.
+  /// Queues a line before the last answer; skipped where the client does not read. False: the
+  /// client is gone.
   bool Progress(ClientId client, std::string_view line);
 
   [[nodiscard]] bool connected(ClientId client) const;

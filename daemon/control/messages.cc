@@ -35,14 +35,14 @@ tl::unexpected<Error> BadArgument(const char* name, const char* expected) {
   return Fail(ErrorCode::kInvalid, std::string("argument '") + name + "' must be " + expected);
 }
 
-/// A number that this program made may be a signed one with an unsigned value.
+/// An unsigned number; one that this program made may be of a signed type.
 std::optional<std::uint64_t> UnsignedOf(const Json& value) {
   if (!value.is_number_integer()) return std::nullopt;
   if (!value.is_number_unsigned() && value.get<std::int64_t>() < 0) return std::nullopt;
   return value.get<std::uint64_t>();
 }
 
-/// Depth and number of values, told before any is made: a parser takes 60 bytes for a bracket.
+/// Checks depth and number of values before any is made: a parser takes 60 bytes for a bracket.
 Status CheckShape(std::string_view line, std::size_t values_max) {
   std::size_t depth = 0;
   std::size_t values = 0;
@@ -50,7 +50,7 @@ Status CheckShape(std::string_view line, std::size_t values_max) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const char c = line[i];
     if (in_text) {
-      i += c == '\\' ? 1u : 0u;  // what follows ends no text
+      i += c == '\\' ? 1u : 0u;  // the next character does not end the text
       in_text = c != '"';
       continue;
     }

@@ -1,13 +1,13 @@
-// What travels on a control socket: one JSON object a line.
+// The messages of a control socket: one JSON object a line.
 //
 //   request   {"id":1,"verb":"apply","args":{...}}
 //   answers   {"id":1,"progress":{...}}                                  any number, may be lost
 //             {"id":1,"ok":true,"result":{...}}                          the last one, or
 //             {"id":1,"ok":false,"error":{"code":"refused","text":"..."}}
 //
-// Everything here is total: any bytes give a request or an Error, and nothing throws. What a line
-// may hold is bounded before it is parsed (limits::kControlDepth, kControlValues): on the core
-// thread a line must not cost more than its length is worth.
+// All functions are total: any bytes give a request or an Error, and nothing throws. Depth and
+// number of a line's values are bounded before it is parsed (limits::kControlDepth,
+// kControlValues), because on the core thread a short line must not cost much.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,8 @@ namespace focalfleet {
 
 using Json = nlohmann::json;
 
-/// Limit of a request line; a targets file of 32,768 units is about 1 MiB, a model of as many is
-/// several.
+/// Limit of a request line. A targets file of 32,768 units is about 1 MiB, a model of as many units
+/// is several MiB.
 inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;
 
 struct ControlRequest {
@@ -38,16 +38,16 @@ struct ControlAnswer {
   std::uint64_t id = 0;
   Kind kind = Kind::kResult;
   Json body;    // progress or result
-  Error error;  // of kError
+  Error error;  // where kError
 };
 
 const char* CodeName(ErrorCode code);
-/// A name that no code has is kUnavailable: the peer failed in a way that we do not know.
+/// The code of a name. An unknown name is kUnavailable: the peer failed in an unknown way.
 ErrorCode CodeOf(std::string_view name);
 
-/// Errors: kInvalid. `id` is then 0: the answer cannot be matched and goes out with id 0.
+/// The request of a line. Errors: kInvalid; the answer then goes out with id 0, as no id is known.
 Result<ControlRequest> DecodeRequest(std::string_view line);
-/// Errors: kInvalid.
+/// The answer of a line. Errors: kInvalid.
 Result<ControlAnswer> DecodeAnswer(std::string_view line);
 
 /// Encoders give the line without its newline. Text that is not UTF-8 is repaired, NaN becomes
@@ -57,14 +57,14 @@ std::string EncodeProgress(std::uint64_t id, const Json& progress);
 std::string EncodeResult(std::uint64_t id, const Json& result);
 std::string EncodeError(std::uint64_t id, const Error& error);
 
-// Arguments by name, checked. Errors of all: kInvalid, names the argument.
+// Arguments by name, checked. Errors of all these functions: kInvalid, names the argument.
 Result<std::uint64_t> UnsignedArgument(const Json& args, const char* name);
 Result<std::int64_t> IntegerArgument(const Json& args, const char* name);
 Result<double> NumberArgument(const Json& args, const char* name);
-/// A name, a reason. Errors: also where it is longer than `bytes_max`.
+/// A short text, as a name or a reason. Errors: also where it is longer than `bytes_max`.
 Result<std::string> TextArgument(const Json& args, const char* name,
                                  std::size_t bytes_max = limits::kTextBytes);
-/// Absent: `otherwise`.
+/// The same, or `otherwise` where the argument is absent.
 Result<std::string> TextArgumentOr(const Json& args, const char* name, std::string otherwise,
                                    std::size_t bytes_max = limits::kTextBytes);
 Result<bool> FlagArgumentOr(const Json& args, const char* name, bool otherwise);

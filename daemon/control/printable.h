@@ -1,5 +1,5 @@
-// Texts of others before they reach a log or a terminal. A newline would forge a line, an escape
-// sequence would move the cursor, hide or rename what stands elsewhere on the screen.
+// Texts from outside are cleaned here before they reach a log or a terminal. A newline would forge
+// a line. An escape sequence would move the cursor, or hide or change other text on the screen.
 #pragma once
 
 #include <string>
@@ -7,15 +7,14 @@
 
 namespace focalfleet {
 
-/// As one line that is nothing but text: control characters, bytes that are not UTF-8 and marks
+/// The text as one line without control. Control characters, bytes that are not UTF-8 and marks
 /// that turn the direction of writing become `\n`, `\x1b`, `\u202e`. All else stays.
 std::string Printable(std::string_view text);
 
-/// As Printable, but newlines stay: for texts that have several lines of their own.
+/// The same, but newlines stay: for texts of several lines.
 std::string PrintableLines(std::string_view text);
 
-/// JSON as it is written out, with the same value: what it holds of such characters is escaped.
-/// Pre: valid UTF-8.
+/// JSON text of the same value, with such characters escaped. Pre: valid UTF-8.
 std::string PrintableJson(std::string_view json);
 
 }  // namespace focalfleet

@@ -14,7 +14,7 @@ namespace focalfleet {
 
 class UnixAddress {
  public:
-  /// Errors: kInvalid where the path is empty or too long.
+  /// The address of a path. Errors: kInvalid where the path is empty or too long.
   static Result<UnixAddress> Of(const std::string& path) {
     UnixAddress address;
     if (path.empty() || path.size() >= sizeof address.raw_.sun_path)

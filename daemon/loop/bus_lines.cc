@@ -7,7 +7,7 @@
 namespace focalfleet {
 namespace {
 
-/// Nothing gets through, and what waits would be stale when the link lives again.
+/// No frame gets through, and waiting frames would be stale when the link lives again.
 bool Dead(LinkState state) { return state == LinkState::kDown || state == LinkState::kOff; }
 
 }  // namespace
@@ -32,7 +32,7 @@ void BusLines::Receive(HostInstant now, std::vector<ReceivedFrame>* frames,
     if (line.ready || line.port->wake_at() <= now) line.port->Receive(now, frames);
     line.ready = false;
     const LinkState state = line.port->state();
-    // A link that is looked for in vain has one trouble after another; it is down all the same.
+    // A link that is down may have one trouble after another; only the first one is reported.
     const std::string& trouble = line.port->trouble();
     const bool more = state != LinkState::kDown && !trouble.empty() && trouble != line.trouble;
     if (line.reported && state == line.last && !more) continue;

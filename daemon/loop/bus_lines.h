@@ -1,5 +1,5 @@
-// All buses as the event loop sees them: what came in, what changed, what has to go out. One line
-// is a port with its transmit queue; only lines with something to do are touched.
+// All buses as the event loop sees them: frames that came in, links that changed, frames that have
+// to go out. A line is a port with its transmit queue; only lines with something to do are touched.
 #pragma once
 
 #include <memory>
@@ -9,7 +9,7 @@
 #include "daemon/clock/clock.h"
 #include "daemon/loop/transmit_queue.h"
 #include "daemon/ports/pollable_port.h"
-#include "daemon/status/status_json.h"
+#include "daemon/status/shell_facts.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
@@ -23,16 +23,17 @@ class BusLines {
   [[nodiscard]] int fd(std::size_t line) const { return lines_[line].port->fd(); }
   void MarkReady(std::size_t line) { lines_[line].ready = true; }
 
-  /// Receives on every line that is ready or due, and notes links that changed, or
-  /// have something else the matter. The first call notes all links.
+  /// Appends the frames of every line that is ready or due, and the links that changed or have
+  /// another trouble. The first call appends all links.
   void Receive(HostInstant now, std::vector<ReceivedFrame>* frames, std::vector<LinkEvent>* links);
 
+  /// The frame waits for its port; a frame for a dead link is discarded.
   void Put(const OutFrame& frame, HostInstant decided_at);
-  /// Offers what waits to the ports. Each line gets its own reading of the clock, for its start
+  /// Offers waiting frames to the ports. Each line gets its own reading of the clock, for its start
   /// signals.
   void Flush(const HostClock& clock);
 
-  /// When some line wants Receive or Flush though nothing happens.
+  /// The instant at which some line needs Receive or Flush though nothing happens.
   [[nodiscard]] HostInstant wake_at(HostInstant now, const HostClock& clock) const;
   [[nodiscard]] std::vector<ShellFacts::Bus> Facts() const;
   [[nodiscard]] const std::string& trouble(BusId bus) const;
@@ -44,9 +45,9 @@ class BusLines {
     std::unique_ptr<PollablePort> port;
     TransmitQueue transmit_queue;
     bool ready = true;
-    bool reported = false;  // the coordinator knows of the link at all
+    bool reported = false;  // the coordinator has received a state of the link
     LinkState last = LinkState::kUp;
-    std::string trouble;  // as last told
+    std::string trouble;  // as last reported
   };
   [[nodiscard]] std::size_t IndexOf(BusId bus) const;
 

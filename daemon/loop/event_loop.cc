@@ -16,10 +16,12 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/verbs/model_upkeep.h"
+
 namespace focalfleet {
 namespace {
 
-// What an epoll event is about: the number of a bus line, or one of these.
+// The data of an epoll event is the number of a bus line, or one of these constants.
 constexpr std::uint64_t kRequests = std::uint64_t{1} << 32;
 constexpr std::uint64_t kThreads = kRequests + 1;
 constexpr std::uint64_t kTimer = kRequests + 2;
@@ -44,7 +46,7 @@ spdlog::level::level_enum LevelOf(Severity severity) {
   return spdlog::level::err;
 }
 
-/// Most alarms name their unit or bus themselves.
+/// The text of an alarm with its unit or bus; most alarms name it themselves.
 std::string TextOf(const AlarmRow& alarm) {
   std::string where;
   if (alarm.bus) where = "bus " + std::to_string(alarm.bus->value);
@@ -123,7 +125,7 @@ void EventLoop::Run() {
       Perform();
     }
     parts_.lines->Flush(parts_.clock);
-    Tell();
+    PublishStatus();
   }
   effects_.Clear();
   parts_.coordinator->End(now_, &effects_);
@@ -149,7 +151,7 @@ void EventLoop::DispatchReady(int timeout_ms) {
   for (int i = 0; i < count; ++i) Dispatch(events[static_cast<std::size_t>(i)].data.u64);
 }
 
-// Before anything else is done: the edge is what an instant is told by.
+// The pulse comes before everything else of a turn, because units take the instant from its edge.
 void EventLoop::ServeSync() {
   if (parts_.sync == nullptr) return;
   const std::string trouble = parts_.sync->Serve(parts_.clock.Now());
@@ -191,8 +193,8 @@ void EventLoop::ReadSignals() {
 }
 
 void EventLoop::Gather() {
-  // Whatever is there at `now_` is heard in this turn. Else units would pass for silent whose
-  // answers wait, where the host was held up on its way here.
+  // All that is there at `now_` is read in this turn. Otherwise units would count as silent while
+  // their answers wait, where the host was held up on its way here.
   now_ = parts_.clock.Now();
   DispatchReady(0);
   frames_.clear();
@@ -216,7 +218,7 @@ bool EventLoop::StepIsDue() const {
 }
 
 void EventLoop::Step() {
-  // In this order: a batch that comes through in between is then only told a step later.
+  // This order matters: a batch that is committed in between is reported one step later.
   store_failing_ = parts_.store->failing();
   committed_through_ = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
@@ -237,7 +239,7 @@ void EventLoop::Step() {
 
 void EventLoop::Perform() {
   LogChanges();
-  ReportModel();
+  NoteEffects(View(), effects_, parts_.models->compensation());
   if (!effects_.rows.empty()) {
     last_batch_ = effects_.batch;
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
@@ -258,29 +260,7 @@ void EventLoop::Perform() {
   if (parts_.scheduler != nullptr) parts_.scheduler->Changed(effects_.changed);
 }
 
-// A model predicts from how a unit came to where it rests. A count that began anew, or other
-// hardware, is not what it was measured on.
-void EventLoop::ReportModel() {
-  Compensation* compensation = parts_.handler->models().compensation();
-  if (compensation == nullptr) return;
-  const auto forget = [&](SerialNumber serial) {
-    for (const PositionerIndex i : effects_.changed)
-      if (parts_.coordinator->unit(i).serial == serial) compensation->Forget(i);
-  };
-  for (const Row& row : effects_.rows) {
-    if (const auto* end = std::get_if<IntentEndRow>(&row); end && end->end == IntentEnd::kHomed)
-      forget(end->serial);
-    if (const auto* vector = std::get_if<VectorRow>(&row);
-        vector && (vector->origin == Origin::kOperator || vector->origin == Origin::kFound))
-      forget(vector->serial);
-    if (const auto* binding = std::get_if<BindingRow>(&row);
-        binding && binding->replaced.value != 0)
-      if (const auto i = parts_.layout->Find(binding->unit)) compensation->Forget(*i);
-  }
-  for (const PositionerIndex i : effects_.changed) NoteRest(View(), i, compensation);
-}
-
-void EventLoop::Tell() {
+void EventLoop::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
@@ -303,7 +283,7 @@ FleetView EventLoop::View() const {
           .coordinator = parts_.coordinator,
           .now = now_,
           .at = WallTime::Now(),
-          .compensation = std::as_const(*parts_.handler).models().compensation()};
+          .compensation = std::as_const(*parts_.models).compensation()};
 }
 
 }  // namespace focalfleet

@@ -1,8 +1,8 @@
-// The core thread. It waits until something is there (frames, requests, a plan, a commit, a signal)
-// or due, gives it all to the coordinator in one Step, and performs what comes back: rows to the
-// store's thread, frames to the buses, a plan job to the planner's thread, an exposure to the
-// camera's, replies to the request handler, status to the scheduler. It never waits for any of
-// them.
+// The core thread. Each turn of its loop waits until an input is there (frames, requests, a plan, a
+// commit, a signal) or a time is due. All inputs go to the coordinator in one Step. Then the loop
+// performs the effects. Rows go to the store's thread, frames to the buses, a plan job to the
+// planner's thread, an exposure to the camera's thread, replies to the request handler, status to
+// the scheduler. The loop never waits for any of these.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,7 @@
 #include "daemon/loop/sync_pulse.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
+#include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/request_handler.h"
 #include "fleet/coordinator.h"
 
@@ -32,23 +33,24 @@ using CameraThread = JobThread<CameraWork, ExposureDone>;
 
 class EventLoop {
  public:
-  /// All outlive the loop.
+  /// All parts outlive the loop.
   struct Parts {
     const Layout* layout = nullptr;
     Coordinator* coordinator = nullptr;
     BusLines* lines = nullptr;
     RequestHandler* handler = nullptr;
+    ModelRegistry* models = nullptr;  // the model in force
     PlannerThread* planner = nullptr;
-    CameraThread* camera = nullptr;  // measures; none: neither camera nor sensors
+    CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
     SyncPulse* sync = nullptr;             // none: no SYNC line
-    DdsTroubles* troubles = nullptr;       // none: nobody speaks DDS
+    DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
     const EventSignal* threads = nullptr;  // raised by planner, camera, store
     HostClock clock;
   };
 
-  /// From now on SIGTERM, SIGINT and SIGHUP come as data. Call before the first thread starts.
+  /// SIGTERM, SIGINT and SIGHUP come as data from now on. Pre: no other thread runs yet.
   static void BlockSignals();
 
   /// Errors: kUnavailable: no descriptors left.
@@ -57,7 +59,7 @@ class EventLoop {
   EventLoop& operator=(const EventLoop&) = delete;
   ~EventLoop();
 
-  /// Returns when SIGTERM or SIGINT came.
+  /// The loop ran until SIGTERM or SIGINT came; the last rows are with the store's thread.
   void Run();
 
   [[nodiscard]] std::uint64_t steps() const { return steps_; }
@@ -76,8 +78,7 @@ class EventLoop {
   void Step();
   void ServeSync();
   void Perform();
-  void Tell();
-  void ReportModel();
+  void PublishStatus();
   void LogChanges();
   [[nodiscard]] FleetView View() const;
 
@@ -96,7 +97,7 @@ class EventLoop {
   std::vector<PlanDone> plans_;
   std::vector<ExposureDone> exposures_;
   std::vector<ShellNote> notes_;
-  std::uint64_t committed_through_ = 0;  // as the coordinator knows it
+  std::uint64_t committed_through_ = 0;  // as the coordinator last received it
   bool store_failing_ = false;
   Effects effects_;
   std::uint64_t last_batch_ = 0;

@@ -1,5 +1,5 @@
-// How one thread wakes another that sleeps in epoll or poll: an eventfd. Raising it twice is
-// raising it once.
+// The signal by which one thread wakes another that sleeps in epoll or poll: an eventfd. A second
+// Raise before the Clear changes nothing.
 #pragma once
 
 #include <chrono>
@@ -21,7 +21,7 @@ class EventSignal {
 
   void Raise() const;  // any thread
   void Clear() const;
-  /// Returns when it is raised (and clears it), or after `timeout`.
+  /// Returns when the signal is raised, or after `timeout`. The signal is clear then.
   void Wait(std::optional<std::chrono::milliseconds> timeout) const;
 
   [[nodiscard]] int fd() const { return fd_; }

@@ -1,6 +1,5 @@
-// What takes longer than a bus may wait (a plan, an exposure) is done on a thread of its own, one
-// job after the other. A job carries all that it needs as values; the answer comes back through a
-// queue.
+// A thread for jobs that take longer than a bus may wait (a plan, an exposure), done one after the
+// other. A job carries all that it needs as values; the answer comes back through a queue.
 #pragma once
 
 #include <atomic>
@@ -19,25 +18,26 @@ namespace focalfleet {
 template <class Job, class Answer>
 class JobThread {
  public:
-  /// `ending` turns true while a job is done that nobody waits for any more.
+  /// `ending` turns true when the answer of the running job is no longer wanted.
   using Work = std::function<Answer(const Job&, const std::atomic<bool>& ending)>;
 
-  /// `done` is raised when an answer is there; it outlives the thread. Errors: kUnavailable: no
-  /// descriptors left.
+  /// The thread runs. `done` is raised with each answer; it outlives the thread.
+  /// Errors: kUnavailable: no descriptors left.
   static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done) {
     FOCALFLEET_TRY_ASSIGN(EventSignal wake, EventSignal::Create());
     return std::unique_ptr<JobThread>(new JobThread(std::move(work), done, std::move(wake)));
   }
   JobThread(const JobThread&) = delete;
   JobThread& operator=(const JobThread&) = delete;
-  /// Waits for the job that is being done.
+  /// Waits for the running job.
   ~JobThread() {
     ending_ = true;
     wake_.Raise();
     thread_.join();
   }
 
-  /// False: too many jobs wait (the coordinator has one at a time); `job` is untouched.
+  /// The job is taken over. False: too many jobs wait (the coordinator has one at a time), and
+  /// `job` is untouched.
   [[nodiscard]] bool Submit(Job* job) {
     if (answers_.size() + jobs_.size() >= kJobs || !jobs_.Push(job)) return false;
     wake_.Raise();
@@ -53,7 +53,7 @@ class JobThread {
         done_(done),
         wake_(std::move(wake)),
         jobs_(kJobs),
-        // A job is only taken while its answer has room, so an answer always has.
+        // A job is accepted only where its answer has room, so Push below never fails.
         answers_(2 * kJobs),
         thread_([this] { Run(); }) {}
 

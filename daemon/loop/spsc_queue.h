@@ -1,5 +1,6 @@
-// One thread puts, one takes, none waits: a ring of fixed size with two counters. A full ring
-// refuses and gives the item back, so the putting side decides what happens then.
+// A queue between two threads: one puts, one takes, none waits. The queue is a ring of fixed size
+// with two counters. A full ring refuses the item and leaves it with the caller, which decides what
+// to do.
 #pragma once
 
 #include <atomic>
@@ -15,7 +16,7 @@ class SpscQueue {
  public:
   explicit SpscQueue(std::size_t capacity) : slots_(capacity) {}
 
-  /// Takes `*item` over. False: full, and `*item` is untouched.
+  /// `*item` is in the queue. False: the queue is full, and `*item` is untouched.
   [[nodiscard]] bool Push(T* item) {
     const std::size_t put = put_.load(std::memory_order_relaxed);
     if (put - taken_.load(std::memory_order_acquire) == slots_.size()) return false;
@@ -33,7 +34,7 @@ class SpscQueue {
     return item;
   }
 
-  /// Exact on either side's own thread while the other is at rest; else a moment old.
+  /// The size is exact on either thread while the other is at rest; else it may be outdated.
   [[nodiscard]] std::size_t size() const {
     return put_.load(std::memory_order_acquire) - taken_.load(std::memory_order_acquire);
   }
@@ -41,7 +42,8 @@ class SpscQueue {
 
  private:
   std::vector<T> slots_;
-  // A cache line each, or the two threads keep taking it from each other.
+  // Each counter has its own cache line. On one line, each write would evict it from the other
+  // core.
   alignas(64) std::atomic<std::size_t> put_{0};
   alignas(64) std::atomic<std::size_t> taken_{0};
 };

@@ -13,8 +13,8 @@ constexpr std::size_t kBatches = 1024;
 constexpr std::size_t kStatuses = 4;
 constexpr std::size_t kRowsPerTransaction = 65'536;
 constexpr std::chrono::milliseconds kPublishAgain{50};
-/// Alarms of the thread itself (the store fails, so they are not stored) are numbered apart from
-/// the stored ones.
+/// Alarms of the thread itself are numbered apart from the stored ones: the store fails, so these
+/// alarms are not stored.
 constexpr std::uint64_t kOwnAlarms = std::uint64_t{1} << 63;
 
 }  // namespace
@@ -38,7 +38,7 @@ StoreThread::~StoreThread() {
   if (thread_.joinable()) static_cast<void>(Finish());
 }
 
-// ---- the giving thread
+// ---- called by the core thread
 
 void StoreThread::Commit(std::uint64_t batch, std::vector<Row> rows) {
   held_.push_back({batch, batch, std::move(rows), WallTime::Now()});
@@ -77,16 +77,16 @@ Status StoreThread::Finish() {
   return tl::unexpected<Error>(last_error_);
 }
 
-// ---- the thread
+// ---- called on the store's thread
 
 void StoreThread::Run() {
   for (;;) {
-    const bool ending = ending_;  // read before the queues: what was given before it is seen below
+    const bool ending = ending_;  // read before the queues: earlier batches are seen below
     Gather();
     const bool committed = TryCommit();
     PublishReady();
     if (committed && batches_.size() > 0) continue;
-    // At the end one more attempt is all that a broken disk gets.
+    // At the end a broken disk gets one more attempt only.
     if (ending && (Idle() || failing_)) return;
     if (attempted_)
       wake_.Wait(std::clamp(std::chrono::ceil<std::chrono::milliseconds>(
@@ -101,8 +101,8 @@ bool StoreThread::Idle() const {
   return open_.rows.empty() && batches_.size() == 0 && statuses_.size() == 0 && !status_;
 }
 
-/// Adds what waits to the open batch, unless that has failed already: then it must stay what it
-/// was.
+/// Adds waiting batches to the open one, unless that has failed already: then it must stay the
+/// same.
 void StoreThread::Gather() {
   while (!attempted_ && open_.rows.size() < kRowsPerTransaction) {
     auto next = batches_.Pop();
@@ -144,7 +144,8 @@ bool StoreThread::TryCommit() {
   return true;
 }
 
-/// The rest of its batch goes on without the row; whoever reads committed_through() finds it told.
+/// The rest of the batch goes on without the row, which is in refused_ before committed_through_
+/// reaches its batch.
 void StoreThread::SetAside(std::size_t row, const std::string& why) {
   const auto at = open_.rows.begin() + static_cast<std::ptrdiff_t>(row);
   sinks_.log_error("the store refuses the " + Describe(*at) + ": " + why + "; it is set aside");
@@ -162,7 +163,7 @@ void StoreThread::NoteFailure(const Error& error) {
   if (failing_.exchange(true)) return;
   const std::string text = "the store cannot be written, nothing new is started: " + error.text;
   sinks_.log_error(text);
-  // Numbered by the time, so that a restarted daemon does not reuse a number.
+  // The number contains the time, so that a restarted daemon does not reuse it.
   const WallTime now = WallTime::Now();
   const std::uint64_t id = kOwnAlarms + static_cast<std::uint64_t>(now.ns) / 1000 + own_alarms_++;
   sinks_.alarm(
@@ -176,7 +177,7 @@ void StoreThread::PublishReady() {
     if (!status_) status_ = statuses_.Pop();
     if (!status_) return;
     if (committed_through_ < status_->after_batch) {
-      // The fleet's own line says that the store fails; it alone may go ahead.
+      // The fleet's own status says that the store fails; it alone may go ahead of the commit.
       if (failing_ && status_->fleet) {
         StatusBatch ahead;
         ahead.fleet = std::move(status_->fleet);

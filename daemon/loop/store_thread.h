@@ -1,13 +1,13 @@
-// The thread that may wait for a disk, so that no other has to. It commits batches of rows in order
-// and never drops one: what cannot be written now is tried again each second, and everything behind
-// it waits. A row that can never be written (fleet/row_check.h, or a contradiction to what is
-// stored) would hold up all others for ever: it alone is set aside, and told. Status goes out after
-// the commit of all that it tells of, never before. The thread hands back three facts: through
-// which batch all is durable, which rows up to there were set aside, and whether the last attempt
-// failed.
+// The thread that may wait for a disk, so that no other has to. Batches of rows are committed in
+// order, and none is dropped. A batch that cannot be written now is tried again each second, and
+// all later ones wait. A row that can never be written (fleet/row_check.h, or a contradiction to
+// what is stored) would hold up all others for ever. This row alone is set aside and reported.
+// Status is published after the commit of the rows that it reflects, never before. The thread
+// returns three facts: the batch through which all is durable, the rows up to there that were set
+// aside, and whether the last attempt failed.
 //
-// A slow disk makes the batches that wait one transaction, in order, so that it never falls behind
-// by more than one flush.
+// Waiting batches become one transaction, in order. Thereby the thread falls behind a slow disk by
+// no more than one flush.
 #pragma once
 
 #include <atomic>
@@ -23,31 +23,21 @@
 #include <vector>
 
 #include "daemon/clock/wall_time.h"
-#include "daemon/dds/status_values.h"
 #include "daemon/loop/event_signal.h"
 #include "daemon/loop/spsc_queue.h"
+#include "daemon/status/status_batch.h"
 #include "fleet/records.h"
 
 namespace focalfleet {
 
-/// What is to be shown, as values. Of each unit, bus and so on the last value wins.
-struct StatusBatch {
-  std::uint64_t after_batch = 0;  // not to be told before this batch is durable
-  std::vector<UnitStatusValue> units;
-  std::vector<UnitOrientationValue> orientations;  // of some of these units
-  std::vector<BusStatusValue> buses;
-  std::optional<FleetStatusValue> fleet;
-  std::optional<ConfigurationProgressValue> configuration;
-};
-
 class StoreThread {
  public:
-  /// What the thread does with what it is given; called on the thread.
+  /// Functions that the thread calls, on itself.
   struct Sinks {
-    /// As Store::Commit: where the error is kInvalid, `refused` is the index of the row that it is
-    /// about, if it is about one, else the number of rows.
+    /// As Store::Commit. Where the error is kInvalid and concerns one row, `refused` is the index
+    /// of this row; else it is the number of rows.
     std::function<Status(std::span<const Row>, WallTime, std::size_t* refused)> commit;
-    /// True: something still waits to go out, call again soon (with nothing new).
+    /// True: some status still waits to go out; the thread calls again soon, with nothing new.
     std::function<bool(const StatusBatch&)> publish;
     std::function<void(const AlarmValue&)> alarm;
     std::function<void(const std::string&)> log_error;
@@ -55,35 +45,37 @@ class StoreThread {
     std::chrono::milliseconds retry_period{1000};
   };
 
-  /// `progressed` is raised when what it hands back changed; it outlives the thread.
-  /// Errors: kUnavailable: no descriptors left.
+  /// The thread runs. `progressed` is raised when one of the three facts changed; it outlives the
+  /// thread. Errors: kUnavailable: no descriptors left.
   static Result<std::unique_ptr<StoreThread>> Create(Sinks sinks, const EventSignal* progressed);
   StoreThread(const StoreThread&) = delete;
   StoreThread& operator=(const StoreThread&) = delete;
   ~StoreThread();
 
-  // ---- the giving thread
+  // ---- called by the core thread
 
+  /// The batch will be committed after all earlier ones.
   void Commit(std::uint64_t batch, std::vector<Row> rows);
-  /// False: the thread is behind; offer newer values later. `status` is untouched.
+  /// `status` is taken over. False: the thread is behind, and `status` is untouched; offer newer
+  /// values later.
   [[nodiscard]] bool Publish(StatusBatch* status);
-  /// Batches that found the queue full, handed over as room comes. Call now and then.
+  /// Hands over batches that found the queue full, as far as there is room. Call once a turn.
   void HandOver();
-  /// All is durable and told, the thread has ended. Errors: what the last attempt to commit failed
-  /// with; then rows are lost.
+  /// All is durable and published, and the thread has ended. Errors: that of the last attempt to
+  /// commit; then rows are lost.
   Status Finish();
 
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
   [[nodiscard]] bool failing() const { return failing_; }
-  /// Rows that were set aside since the last call. All of the batches through a committed_through()
-  /// that was read before are among these or were handed over earlier.
+  /// Rows that were set aside since the last call. Read committed_through() first: all rows set
+  /// aside up to that batch are then in this result or in an earlier one.
   std::vector<RefusedRow> TakeRefused();
   [[nodiscard]] std::size_t waiting() const { return batches_.size() + held_.size(); }
 
  private:
   struct Batch {
-    std::uint64_t first = 0;   // of the batches that became this one transaction
-    std::uint64_t number = 0;  // the last of them
+    std::uint64_t first = 0;   // first of the batches that became this transaction
+    std::uint64_t number = 0;  // last of them
     std::vector<Row> rows;
     WallTime at;
   };
@@ -102,7 +94,7 @@ class StoreThread {
   EventSignal wake_;
   SpscQueue<Batch> batches_;
   SpscQueue<StatusBatch> statuses_;
-  std::deque<Batch> held_;  // of the giving thread
+  std::deque<Batch> held_;  // used by the core thread alone
   std::atomic<std::uint64_t> committed_through_{0};
   std::atomic<bool> failing_{false};
   std::atomic<bool> ending_{false};
@@ -110,9 +102,9 @@ class StoreThread {
   std::mutex refused_lock_;
   std::vector<RefusedRow> refused_;  // under the lock
 
-  // Of the thread alone.
-  Batch open_;  // being committed; empty rows: none
-  std::optional<StatusBatch> status_;
+  // Members that the store's thread alone uses.
+  Batch open_;                         // being committed; empty rows: none
+  std::optional<StatusBatch> status_;  // waits for its rows
   bool publish_again_ = false;
   bool attempted_ = false;  // the open batch has failed
   std::chrono::steady_clock::time_point retry_at_;

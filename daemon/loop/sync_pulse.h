@@ -1,6 +1,6 @@
-// The pulse on the SYNC line at the common start: active at the planned instant, at rest again a
-// little later. Units take the edge only within a window before their own start (docs/protocol.md),
-// so a pulse that would come later than they begin by themselves is left out.
+// The pulse on the SYNC line at the common start: the line is active at the planned instant and at
+// rest again a little later. Units take the edge only within a window before their own start
+// (docs/protocol.md). A pulse that would come after that start is left out.
 #pragma once
 
 #include <algorithm>
@@ -17,16 +17,16 @@ namespace focalfleet {
 class SyncPulse {
  public:
   struct Options {
-    DurationNs late_most = Milliseconds(5);  // later it is left out
+    DurationNs late_most = Milliseconds(5);  // a later pulse is left out
     DurationNs width = Milliseconds(10);
   };
   SyncPulse(std::unique_ptr<SyncLine> line, const Options& options)
       : line_(std::move(line)), options_(options) {}
 
-  /// Takes the place of a pulse that has not come yet.
+  /// A pulse is planned; a planned one that has not come yet is replaced.
   void Plan(HostInstant at) { at_ = at; }
 
-  /// Does what is due. What went wrong, for the log; empty where nothing did.
+  /// The line is as planned for `now`. The result is the trouble, for the log; empty: none.
   std::string Serve(HostInstant now);
 
   [[nodiscard]] HostInstant wake_at() const { return std::min(at_, down_at_); }

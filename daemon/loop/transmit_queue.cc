@@ -22,7 +22,7 @@ bool ShiftStart(CanFrame* frame, DurationNs waited) {
   if (!decoded) return true;
   auto* start = std::get_if<Start>(&decoded->message);
   if (start == nullptr) return true;
-  // Half a tick up or down: the rest of the way to the wire costs more.
+  // Rounding costs up to half a tick, which is less than the rest of the way to the wire.
   const auto ticks = (waited.ns + kTick.ns / 2) / kTick.ns;
   if (ticks <= 0) return true;
   if (ticks >= std::int64_t{start->delay_ticks}) return false;
@@ -51,14 +51,14 @@ void TransmitQueue::Flush(FramePort* port, HostInstant now) {
     if (!FlushOne(&others_, port, now)) return;
 }
 
-/// One batch. False: the port is full.
+/// Offers a batch of the queue. False: the port is full.
 bool TransmitQueue::FlushOne(std::deque<Waiting>* queue, FramePort* port, HostInstant now) {
   batch_.clear();
   const std::size_t count = std::min(kBatch, queue->size());
   for (std::size_t i = 0; i < count; ++i) {
     CanFrame frame = (*queue)[i].frame;
     if (IsStart(frame) && !ShiftStart(&frame, now - (*queue)[i].decided_at)) {
-      // Alone at the front it is thrown away; else what stands before it goes first.
+      // A late start at the front is discarded; else the frames before it go first.
       if (i > 0) break;
       ++counters_.late_starts;
       --starts_;

@@ -1,46 +1,41 @@
-// Frames of one bus that the coordinator has let go and the port has not taken yet. Usually empty:
-// the coordinator follows the bit clock. It fills when an interface's queue is full or a peer does
-// not read.
+// Frames of one bus that the coordinator has released and the port has not taken yet. The queue is
+// usually empty, because the coordinator follows the bit clock. Frames wait when an interface's
+// queue is full or a peer does not read.
 //
-// Stop frames (priority 0) pass everything. A start signal says "begin so long after this frame",
-// so the time that it waited here is taken off its delay; one that waited past its instant is
-// thrown away, because late would be worse than never: the unit's neighbours rely on the common
-// instant.
+// Stop frames (priority 0) overtake all others. A start signal says "begin so long after this
+// frame", so the time that it waited here is taken off its delay. A start signal that waited past
+// its instant is discarded. A late start would be worse than none, because the neighbours of the
+// unit rely on the common instant.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <vector>
 
+#include "daemon/status/transmit_queue_counters.h"
 #include "protocol/base/instants.h"
 #include "protocol/base/limits.h"
 #include "protocol/link/frame_port.h"
 
 namespace focalfleet {
 
-struct TransmitQueueCounters {
-  std::uint64_t refused = 0;      // no room
-  std::uint64_t stale = 0;        // thrown away because the link went down
-  std::uint64_t late_starts = 0;  // start signals that missed their instant
-};
-
 class TransmitQueue {
  public:
   explicit TransmitQueue(std::size_t capacity = limits::kFramesPerBusQueued)
       : capacity_(capacity) {}
 
-  /// False: no room, and the frame is gone; whoever asked the unit asks again. There is always room
-  /// for as many stop frames again.
+  /// The frame waits. False: there is no room, and the frame is discarded; the coordinator asks the
+  /// unit again. Stop frames have as much room of their own.
   bool Put(const CanFrame& frame, HostInstant decided_at);
 
-  /// Offers the port what waits, until it takes no more. `now`: read just before where
-  /// holds_start(), it shifts start signals.
+  /// Offers waiting frames to the port, until it takes no more. `now` shifts start signals. Pre:
+  /// where holds_start(), `now` was read just before.
   void Flush(FramePort* port, HostInstant now);
 
-  /// Throws away what waits: after a link was down nothing of it is true any more.
+  /// Waiting frames are discarded: after a link was down, none of them is valid any more.
   void Clear();
 
-  /// Some of what waits has to be shifted: only then does Flush look at the time.
+  /// Whether a waiting frame has to be shifted: only then does Flush use the time.
   [[nodiscard]] bool holds_start() const { return starts_ > 0; }
   [[nodiscard]] std::size_t size() const { return stops_.size() + others_.size(); }
   [[nodiscard]] const TransmitQueueCounters& counters() const { return counters_; }

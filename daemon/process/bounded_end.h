@@ -1,7 +1,7 @@
-// Ends what may hang (a planner in a long search, a camera's folder on a dead file system, a driver
-// that restarts) at the same time, and waits no longer than it is told to. What has not ended by
-// then still uses what it was given, so the process has to go without taking anything down:
-// by _exit.
+// Parts of the daemon that may hang end at the same time, within a limit. Such parts are a planner
+// in a long search, a camera's folder on a dead file system, a driver that restarts. A part that
+// has not ended by then still uses what it was given. The process then has to end by _exit, without
+// destructors.
 #pragma once
 
 #include <chrono>
@@ -19,17 +19,17 @@ class BoundedEnd {
  public:
   struct Part {
     std::string name;           // for people; no two alike
-    std::function<void()> end;  // on a thread of its own; returns when it has ended
+    std::function<void()> end;  // runs on a thread of its own; returns when the part has ended
   };
 
-  /// Begins to end all of them.
+  /// All parts have begun to end.
   explicit BoundedEnd(std::vector<Part> parts);
   BoundedEnd(const BoundedEnd&) = delete;
   BoundedEnd& operator=(const BoundedEnd&) = delete;
-  /// Waits for all of them, however long that takes.
+  /// Waits for all parts, however long that takes.
   ~BoundedEnd() = default;
 
-  /// The names of those that have not ended `limit` after they were begun.
+  /// The names of the parts that have not ended `limit` after the constructor.
   std::vector<std::string> Wait(std::chrono::milliseconds limit);
 
  private:
@@ -37,7 +37,7 @@ class BoundedEnd {
   std::mutex mutex_;
   std::condition_variable ended_;
   std::set<std::string> left_;
-  std::vector<std::jthread> threads_;  // last: they use all of the above
+  std::vector<std::jthread> threads_;  // last: the threads use all members above
 };
 
 }  // namespace focalfleet

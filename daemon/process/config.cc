@@ -28,8 +28,8 @@ struct Range {
 };
 constexpr Range<std::int64_t> kMillisecondRange{1, 3'600'000};
 
-/// The one list of keys, in two parts. `visit` is a reader or a writer; both see every key once, in
-/// the order of the file.
+/// The one list of keys stands here and in VisitTimingKeys. `visit` is a reader or a writer; both
+/// visit every key once, in the order of the file.
 template <class Config, class Visitor>
 void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("fleet");
@@ -104,8 +104,8 @@ void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Choice("spread", &c->simulated.spread, kSpreads);
 }
 
-/// A simulated fleet that runs faster than life does not make our own processes faster: waits that
-/// have to cover them stay what they are in real time.
+/// Waits that have to cover the host's own processes stay what they are in real time: a simulated
+/// fleet that runs faster than real time does not make the host faster.
 void ScaleDefaults(double speed, CoordinatorConfig* timing) {
   for (DurationNs* wait :
        {&timing->reply_wait, &timing->start_delay, &timing->settle_margin, &timing->silence_limit})
@@ -202,7 +202,7 @@ class Reader {
     }
   }
 
-  /// After all keys were read: what is in the file and was not asked for is wrong too.
+  /// Each key of the file that was not read is a problem. Pre: all keys were read.
   void CheckUnknown() {
     for (const auto& [name, node] : root_) {
       if (!known_.contains(std::string(name.str())))
@@ -216,12 +216,13 @@ class Reader {
       }
     }
   }
-  /// What only the keys together tell; stands at the line of `section.key`, or of the section where
-  /// it has none.
+  /// A condition on several keys. The problem stands at the line of `section.key`, or of the
+  /// section where the key is absent.
   void Require(bool condition, const char* section, const char* key, const std::string& text) {
     if (!condition) problems_.emplace(LineOf(section, key), text);
   }
-  /// file:line of a key, for what only shows when it is used; as Require where it is not there.
+  /// file:line of a key, for faults that show only when its value is used. The line is that of
+  /// Require.
   [[nodiscard]] std::string At(const char* section, const char* key) const {
     return file_ + ":" + std::to_string(LineOf(section, key));
   }
@@ -323,7 +324,7 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
                   "bus.unix_directory must say where bus<ID>.sock are for bus.port = \"unix\"");
   reader->Require(config.sync.chip.empty() || config.clock.speed == 1, "sync", "chip",
                   "sync.chip asks for clock.speed = 1: a pulse is one of real time");
-  // The unit's window for the edge, docs/protocol.md.
+  // Source of the 20 ms: the window in which a unit takes an edge, docs/protocol.md.
   reader->Require(config.timing.sync_lead < Milliseconds(20), "timing", "sync_lead_ms",
                   "timing.sync_lead_ms must be below 20: units take an edge only so short before "
                   "their start");
@@ -352,7 +353,7 @@ Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path)
   ScaleDefaults(config.clock.speed, &config.timing);
   VisitTimingKeys(&config, &reader);
   reader.CheckUnknown();
-  FOCALFLEET_TRY(reader.Verdict());  // a misspelt key is the likely reason of what is missing below
+  FOCALFLEET_TRY(reader.Verdict());  // a misspelt key is the likely reason of a missing one
   CheckTogether(config, &reader);
   FOCALFLEET_TRY(reader.Verdict());
   config.drive.axis[1] = config.drive.axis[0];

@@ -1,6 +1,6 @@
-// The daemon's configuration: one TOML file, every key with a default, a type and a range. A key
-// that nobody reads is an error, because a misspelt limit is a limit that is not there. Relative
-// paths are relative to the file. deploy/focalfleet.toml shows every key with its default.
+// The daemon's configuration: one TOML file, every key with a default, a type and a range. An
+// unknown key is an error, because a misspelt limit would be no limit. Relative paths are relative
+// to the file. deploy/focalfleet.toml shows every key with its default.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ struct DaemonConfig {
   struct Dds {
     bool enabled = true;
     std::uint32_t domain = 0;
-    double rate_hz = 10;  // at most so often is the status of changed units published
+    double rate_hz = 10;  // limit of how often the status of changed units is published
     std::string config;   // Cyclone's XML file; empty: loopback only
   } dds;
   struct Log {
@@ -46,20 +46,20 @@ struct DaemonConfig {
     PortKind port = PortKind::kUnix;
     std::uint32_t bit_rate_bps = 1'000'000;
     bool can_fd = false;                          // staging frames go in groups (docs/adr/0008)
-    std::uint32_t data_bit_rate_bps = 2'000'000;  // of these; only where can_fd
+    std::uint32_t data_bit_rate_bps = 2'000'000;  // of staging frames; only where can_fd
     std::string unix_directory;                   // where bus<ID>.sock are
     std::vector<std::string> interfaces;          // by ascending bus id
     std::string interfaces_at;                    // file:line, for messages
   } bus;
   struct Sync {
-    std::string chip;  // of the GPIO that pulses at the common start; empty: there is no such line
+    std::string chip;  // GPIO chip that pulses at the common start; empty: no SYNC line
     std::uint32_t line = 0;
     bool active_low = false;
     std::string chip_at;  // file:line, for messages
   } sync;
   struct Camera {
-    // Where it is asked and answers: a folder (camera/camera_folder.h), or topics of [dds]
-    // (camera/camera_dds.h). Neither: there is no camera.
+    // Requests and answers go through a folder (camera/camera_folder.h), or through topics of
+    // [dds] (camera/camera_dds.h). With neither of them there is no camera.
     std::string directory;
     bool dds = false;
     [[nodiscard]] bool present() const { return dds || !directory.empty(); }
@@ -67,17 +67,17 @@ struct DaemonConfig {
     SensorLimits sensor{11'000, 11'000};
     CameraModel model{.pixels_per_mm = 5, .centre_x_px = 5500, .centre_y_px = 5500};
     double centroid_sigma_um = 2;
-    DurationNs patience = Milliseconds(30'000);  // real time; until an exposure has to be there
+    DurationNs patience = Milliseconds(30'000);  // real time within which an exposure must come
   } camera;
   struct Hall {
-    std::string model;  // of the joints' field, as `focalfleet hall fit` writes it; empty: not used
-    double noise_mT = 0.03;  // of a sensor's reading, with what model and calibration leave
+    std::string model;  // field of the joints, from `focalfleet hall fit`; empty: sensors unused
+    double noise_mT = 0.03;  // of a reading, including the residual of model and calibration
     double tilt_max_deg = 45;
   } hall;
   struct Clock {
-    double speed = 1;  // host time runs so many times faster than real time; simulated fleets only
+    double speed = 1;  // host time by real time; other than 1 for simulated fleets only
   } clock;
-  UnitDrive drive;           // of units whose own parameters are not known
+  UnitDrive drive;           // for units whose own parameters are not known
   CoordinatorConfig timing;  // its bit rates are those of bus
   struct Simulated {
     std::uint64_t seed = 1;
@@ -85,13 +85,12 @@ struct DaemonConfig {
   } simulated;
 };
 
-/// Errors: kUnavailable: the file cannot be read; kInvalid: the first thing wrong, as file:line:
-/// reason.
+/// Errors: kUnavailable: the file cannot be read; kInvalid: the first fault, as file:line: reason.
 Result<DaemonConfig> LoadConfig(const std::string& path);
-/// As LoadConfig, of a text that came from `path`.
+/// The same for a text that came from `path`.
 Result<DaemonConfig> ParseConfig(std::string_view text, const std::string& path);
 
-/// Every key with the value that holds, as TOML that reads back the same.
+/// Every key with its effective value, as TOML that reads back the same.
 std::string EffectiveConfig(const DaemonConfig& config);
 
 }  // namespace focalfleet

@@ -19,6 +19,10 @@
 #include "daemon/status/buffered_status_publisher.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
+#include "daemon/verbs/model_registry.h"
+#include "daemon/verbs/model_upkeep.h"
+#include "daemon/verbs/request_handler.h"
 #include "fleet/plan/job.h"
 
 namespace focalfleet {
@@ -33,17 +37,31 @@ double ProcessCpuSeconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// From the last turn of the loop until planner, camera and buses have ended; then the process goes
-/// without them. A planner looks at least every 0.1 s whether it is wanted, a camera every 20 ms; a
-/// driver that restarts a controller takes up to a second. Half of it leaves such a driver behind
-/// for nothing; twice as much makes the end of a daemon with a dead camera take longer than the
-/// 2 s that docs/cli.md promises.
+/// Limit of the time from the last turn of the loop until planner, camera and buses have ended.
+/// Parts that take longer are left behind. A planner checks every 0.1 s or more often whether it is
+/// wanted, a camera every 20 ms. A driver that restarts a controller takes up to a second. Half of
+/// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
+/// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
 
-/// What the store's thread counts, for the core thread to show.
+/// Counters of the store that its thread writes and the core thread reads.
 struct SharedCounters {
   std::atomic<std::uint64_t> transactions{0};
   std::atomic<std::uint64_t> rows{0};
+};
+
+/// The fleet's status on its way to DDS.
+struct StatusOutput {
+  std::unique_ptr<DdsTroubles> troubles;
+  std::unique_ptr<BufferedStatusPublisher> publisher;  // none: DDS is off
+  std::unique_ptr<StatusScheduler> scheduler;          // none: DDS is off
+};
+
+/// Where places of units come from. The thread ends before the workers that it uses.
+struct Measuring {
+  std::unique_ptr<CameraWorker> camera;          // none: there is no camera
+  std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
+  std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
 };
 
 DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
@@ -55,9 +73,10 @@ class Daemon {
   explicit Daemon(const DaemonConfig& config) : config_(config), clock_(config.clock.speed) {}
 
   Status Start();
-  /// Until SIGTERM or SIGINT. Errors: rows could not be stored.
+  /// The loop ran until SIGTERM or SIGINT, and all parts have ended or are left behind. Errors:
+  /// rows could not be stored.
   Status Run();
-  /// Something hangs and still uses this, which must not be taken down then.
+  /// A part hangs and still uses this object, which must not be destroyed then.
   [[nodiscard]] bool left() const { return left_; }
 
  private:
@@ -65,6 +84,7 @@ class Daemon {
   Status StartThreads();
   StoreThread::Sinks StoreSinks();
   Status OpenRequestHandler();
+  Status RestoreLastModel();
   void OpenStatus();
   Status OpenCamera();
   ShellFacts Facts() const;
@@ -76,16 +96,13 @@ class Daemon {
   std::unique_ptr<Layout> layout_;
   std::unique_ptr<Store> store_;
   std::unique_ptr<EventSignal> signal_;
-  std::unique_ptr<DdsTroubles> dds_troubles_;
-  std::unique_ptr<BufferedStatusPublisher> publisher_;  // none: DDS is off
-  std::unique_ptr<StatusScheduler> scheduler_;
-  std::unique_ptr<CameraWorker> camera_worker_;         // none: there is no camera
-  std::unique_ptr<FibreCarrierWorker> carrier_worker_;  // none: no unit measures itself
+  StatusOutput status_;
+  Measuring measuring_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<StoreThread> store_thread_;
   std::unique_ptr<PlannerThread> planner_;
-  std::unique_ptr<CameraThread> camera_;  // none: nobody can measure
+  std::unique_ptr<ModelRegistry> models_;
   std::unique_ptr<RequestHandler> handler_;
   std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
@@ -96,7 +113,7 @@ class Daemon {
 Status Daemon::Start() {
   FOCALFLEET_TRY_ASSIGN(EventSignal signal, EventSignal::Create());
   signal_ = std::make_unique<EventSignal>(std::move(signal));
-  dds_troubles_ = std::make_unique<DdsTroubles>(signal_.get());
+  status_.troubles = std::make_unique<DdsTroubles>([this] { signal_->Raise(); });
   FOCALFLEET_TRY_ASSIGN(Layout layout, LoadLayout(config_.fleet));
   layout_ = std::make_unique<Layout>(std::move(layout));
   FOCALFLEET_TRY_ASSIGN(store_, Store::Open(config_.store.path));
@@ -111,7 +128,7 @@ Status Daemon::Start() {
   lines_ =
       std::make_unique<BusLines>(std::vector<BusId>(buses.begin(), buses.end()), std::move(ports));
   FOCALFLEET_TRY(OpenCamera());
-  FOCALFLEET_TRY_ASSIGN(carrier_worker_, OpenFibreCarriers(config_.hall, *layout_));
+  FOCALFLEET_TRY_ASSIGN(measuring_.carriers, OpenFibreCarriers(config_.hall, *layout_));
   OpenStatus();
   coordinator_ = std::make_unique<Coordinator>(
       layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
@@ -122,16 +139,22 @@ Status Daemon::Start() {
 Status Daemon::OpenRequestHandler() {
   FOCALFLEET_TRY_ASSIGN(LineServer server, LineServer::Create(config_.control.socket,
                                                               {.urgent = &RequestHandler::IsStop}));
+  models_ = std::make_unique<ModelRegistry>(layout_.get());
   handler_ = std::make_unique<RequestHandler>(
       std::move(server),
       RequestHandler::Options{.progress_period = clock_.Real(Milliseconds(200)),
                               .facts = [this] { return Facts(); },
                               .log = [](const std::string& text) { spdlog::info("{}", text); },
                               .store_path = config_.store.path,
-                              .layout = layout_.get()});
-  if (const Status restored = handler_->RestoreModel(); !restored)
+                              .models = models_.get()});
+  if (const Status restored = RestoreLastModel(); !restored)
     spdlog::error("no model is in force: {}", restored.error().text);
   return {};
+}
+
+Status Daemon::RestoreLastModel() {
+  FOCALFLEET_TRY_ASSIGN(const auto reader, StoreReader::Open(config_.store.path));
+  return RestoreModel(reader.get(), models_.get());
 }
 
 void Daemon::OpenStatus() {
@@ -140,10 +163,10 @@ void Daemon::OpenStatus() {
     spdlog::warn("CYCLONEDDS_URI is set and is not used: dds.config says where status goes, {}",
                  config_.dds.config.empty() ? "the loopback interface only" : config_.dds.config);
   if (!config_.dds.enabled) return;
-  publisher_ = std::make_unique<BufferedStatusPublisher>(LateJoin<StatusPublisher>::Options{
+  status_.publisher = std::make_unique<BufferedStatusPublisher>(LateJoin<StatusPublisher>::Options{
       .join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
-      .tell = [this](const std::string& trouble) { dds_troubles_->Tell("status", trouble); }});
-  scheduler_ = std::make_unique<StatusScheduler>(
+      .tell = [this](const std::string& trouble) { status_.troubles->Report("status", trouble); }});
+  status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{
           .rate_hz = config_.dds.rate_hz, .version = Version(), .started = started_},
@@ -157,12 +180,12 @@ Status Daemon::OpenCamera() {
   if (config_.camera.dds) {
     port = std::make_unique<CameraDds>(CameraDds::Options{
         .dds = DdsOptionsOf(config_.dds), .sensor = site.sensor, .tell = [this](const auto& text) {
-          dds_troubles_->Tell("the camera", text);
+          status_.troubles->Report("the camera", text);
         }});
   } else {
     FOCALFLEET_TRY_ASSIGN(port, CameraFolder::Open(config_.camera.directory, site.sensor));
   }
-  camera_worker_ = std::make_unique<CameraWorker>(
+  measuring_.camera = std::make_unique<CameraWorker>(
       std::move(port),
       CameraWorker::Options{
           .layout = layout_.get(),
@@ -182,10 +205,10 @@ StoreThread::Sinks Daemon::StoreSinks() {
     return done;
   };
   sinks.publish = [this](const StatusBatch& status) {
-    return publisher_ != nullptr && publisher_->Publish(status);
+    return status_.publisher != nullptr && status_.publisher->Publish(status);
   };
   sinks.alarm = [this](const AlarmValue& alarm) {
-    if (publisher_ != nullptr) publisher_->Publish(alarm);
+    if (status_.publisher != nullptr) status_.publisher->Publish(alarm);
   };
   sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
   sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
@@ -201,12 +224,12 @@ Status Daemon::StartThreads() {
             return RunPlanJob(work.job, *layout, work.drives, [&ending] { return ending.load(); });
           },
           signal_.get()));
-  if (camera_worker_ != nullptr || carrier_worker_ != nullptr) {
-    FOCALFLEET_TRY_ASSIGN(camera_,
+  if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
+    FOCALFLEET_TRY_ASSIGN(measuring_.thread,
                           CameraThread::Create(
                               [this](const CameraWork& work, const std::atomic<bool>& ending) {
-                                return MeasureUnits(work, carrier_worker_.get(),
-                                                    camera_worker_.get(), ending);
+                                return MeasureUnits(work, measuring_.carriers.get(),
+                                                    measuring_.camera.get(), ending);
                               },
                               signal_.get()));
   }
@@ -214,12 +237,13 @@ Status Daemon::StartThreads() {
                                                   .coordinator = coordinator_.get(),
                                                   .lines = lines_.get(),
                                                   .handler = handler_.get(),
+                                                  .models = models_.get(),
                                                   .planner = planner_.get(),
-                                                  .camera = camera_.get(),
+                                                  .camera = measuring_.thread.get(),
                                                   .store = store_thread_.get(),
-                                                  .scheduler = scheduler_.get(),
+                                                  .scheduler = status_.scheduler.get(),
                                                   .sync = sync_.get(),
-                                                  .troubles = dds_troubles_.get(),
+                                                  .troubles = status_.troubles.get(),
                                                   .threads = signal_.get(),
                                                   .clock = clock_}));
   return {};
@@ -238,17 +262,17 @@ Status Daemon::Run() {
   return End();
 }
 
-/// In this order: nothing more goes to the buses, the last rows are stored, clients and readers are
-/// told, the store is whole by itself and free for the next daemon, the socket is gone. What may
-/// hang ends meanwhile, or is left.
+/// The order of the end: nothing more goes to the buses, then the last rows are stored, then
+/// clients and readers learn of the end. At last the store is one file and free for the next
+/// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
-                                    {"the camera", [this] { camera_.reset(); }}});
+                                    {"the camera", [this] { measuring_.thread.reset(); }}});
   const Status stored = store_thread_->Finish();
   handler_->Close();
-  publisher_.reset();
+  status_.publisher.reset();
   store_.reset();
   handler_.reset();
   const std::vector<std::string> left = ending_->Wait(kEndWithin);
@@ -272,11 +296,11 @@ ShellFacts Daemon::Facts() const {
   facts.batches_waiting = store_thread_->waiting();
   facts.store.transactions = counters_.transactions;
   facts.store.rows = counters_.rows;
-  facts.dds_enabled = publisher_ != nullptr;
-  facts.dds_trouble = dds_troubles_->Summary();
-  if (publisher_ != nullptr) {
-    facts.dds_samples = publisher_->samples();
-    facts.dds_bytes = publisher_->bytes();
+  facts.dds_enabled = status_.publisher != nullptr;
+  facts.dds_trouble = status_.troubles->Summary();
+  if (status_.publisher != nullptr) {
+    facts.dds_samples = status_.publisher->samples();
+    facts.dds_bytes = status_.publisher->bytes();
   }
   facts.steps = loop_->steps();
   facts.cpu_s = ProcessCpuSeconds();
@@ -295,7 +319,7 @@ DaemonEnd RunDaemon(const DaemonConfig& config) {
   Status ended = daemon->Start();
   if (ended) ended = daemon->Run();
   const bool left = daemon->left();
-  if (left) static_cast<void>(daemon.release());  // what hangs still uses it
+  if (left) static_cast<void>(daemon.release());  // a part that hangs still uses it
   return {std::move(ended), left};
 }
 

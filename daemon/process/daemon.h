@@ -1,5 +1,5 @@
-// focalfleetd put together: files, store, buses, threads, in the order in which each may refuse to
-// start, so that whatever is wrong is said before anything is touched.
+// The daemon put together: files, store, buses, threads. Parts that may refuse to start come first,
+// so that a fault is reported before anything is touched.
 #pragma once
 
 #include "daemon/process/config.h"
@@ -15,12 +15,12 @@ struct DaemonEnd {
   bool left = false;
 };
 
-/// Runs until SIGTERM or SIGINT. Errors: why it could not start (kRefused: another daemon holds the
-/// store or the socket), or that rows could not be stored at the end.
+/// The daemon ran until SIGTERM or SIGINT. Errors: the reason why it could not start (kRefused:
+/// another daemon holds the store or the socket), or that rows could not be stored at the end.
 DaemonEnd RunDaemon(const DaemonConfig& config);
 
-/// `--check`: the configuration and its files are good. The effective configuration, for people and
-/// programs.
+/// `--check`: the configuration and its files are good. The result is the effective configuration,
+/// as TOML.
 Result<std::string> CheckDaemon(const DaemonConfig& config);
 
 }  // namespace focalfleet

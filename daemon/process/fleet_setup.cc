@@ -18,7 +18,7 @@ namespace {
 
 using Ports = std::vector<std::unique_ptr<PollablePort>>;
 
-/// In real time; a link that is gone is looked for so often.
+/// Period, in real time, at which a lost link is tried again.
 constexpr DurationNs kRetryPeriod = Milliseconds(200);
 
 Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const HostClock& clock) {
@@ -35,7 +35,7 @@ Result<Ports> OpenUnix(const DaemonConfig& config, const Layout& layout, const H
   return ports;
 }
 
-/// A fleet that runs faster or slower than life is simulated, on interfaces that carry nothing
+/// Only a simulated fleet may run faster or slower than real time, on interfaces that carry nothing
 /// else.
 Status CheckSpeed(const DaemonConfig& config, const HostClock& clock, const SocketCanPort& port) {
   if (clock.speed() == 1 || (port.found() && !port.link().real())) return {};
@@ -63,8 +63,8 @@ Result<Ports> OpenSocketCan(const DaemonConfig& config, const Layout& layout,
     any |= (*port)->found();
     ports.push_back(std::move(*port));
   }
-  // One that is missing is an adapter that died; all of them, a driver that is not loaded or a file
-  // of another machine.
+  // A single missing interface is an adapter that died. If all are missing, the driver is not
+  // loaded, or the file belongs to another machine.
   if (!any && !ports.empty())
     return Fail(ErrorCode::kUnavailable,
                 config.bus.interfaces_at +

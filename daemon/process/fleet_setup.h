@@ -1,4 +1,5 @@
-// From the configuration to what the daemon works on: the layout out of its files, one port a bus.
+// Objects that the daemon makes of its configuration: the layout out of its files, the camera's
+// site, one port a bus, the SYNC line.
 #pragma once
 
 #include <memory>
@@ -19,26 +20,28 @@ namespace focalfleet {
 /// Errors: kUnavailable: a file cannot be read; kInvalid with file:line.
 Result<Layout> LoadLayout(const DaemonConfig::Fleet& fleet);
 
-/// The camera as configured, with its fiducials. Pre: there is one. Errors: as LoadLayout.
+/// The configured camera with its fiducials. Pre: a camera is configured. Errors: as LoadLayout.
 Result<CameraSite> LoadCameraSite(const DaemonConfig::Camera& camera);
 
-/// Who makes places of what units' own sensors show; none where [hall] has no model.
+/// The worker that makes places of the readings of the units' own sensors; none where [hall] has no
+/// model.
 /// Errors: as LoadLayout; kInvalid: a set of sensors that the model does not fit.
 Result<std::unique_ptr<FibreCarrierWorker>> OpenFibreCarriers(const DaemonConfig::Hall& hall,
                                                               const Layout& layout);
 
-/// What configuration and layout must agree on. Errors: kInvalid: not one interface a bus.
+/// Configuration and layout have the same number of buses, where the port is SocketCAN.
+/// Errors: kInvalid: not one interface a bus.
 Status CheckInterfaces(const DaemonConfig& config, const Layout& layout);
 
-/// In the order of layout.buses(). A bus that is not there is down, and takes only its units with
-/// it; it is looked for again.
-/// Errors: kInvalid: not one interface a bus; kUnavailable: none of the interfaces is there.
+/// The ports, one a bus, in the order of layout.buses(). A bus that is absent is down, which
+/// concerns its own units only; the port tries to open it again. Errors: kInvalid: not one
+/// interface a bus; kUnavailable: none of the interfaces is there.
 Result<std::vector<std::unique_ptr<PollablePort>>> OpenPorts(
     const DaemonConfig& config, const Layout& layout, const HostClock& clock,
     const InterfaceOpener& open = OpenInterface);
 
-/// None where the configuration has no [sync] chip. Errors: kUnavailable with file:line: the chip
-/// or line is not there, or in use.
+/// The SYNC line; none where the configuration has no [sync] chip. Errors: kUnavailable with
+/// file:line: the chip or line is absent, or in use.
 Result<std::unique_ptr<SyncLine>> OpenSync(const DaemonConfig::Sync& sync,
                                            GpioKernel& kernel = RealGpioKernel());
 

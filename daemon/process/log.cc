@@ -16,8 +16,8 @@
 namespace focalfleet {
 namespace {
 
-/// Makes each event one line, whatever is in its text: names of verbs, exposures and files come
-/// from outside.
+/// The formatter makes each event one line, whatever its text holds: names of verbs, exposures and
+/// files come from outside.
 class OneLine : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {
@@ -37,14 +37,14 @@ class OneLine : public spdlog::formatter {
 }  // namespace
 
 Status OpenLog(const DaemonConfig::Log& log) {
-  // spdlog would make the folders; of a misspelt path, too.
+  // spdlog would create missing folders, even those of a misspelt path.
   const std::filesystem::path folder = std::filesystem::path(log.file).parent_path();
   std::error_code failed;
   if (!folder.empty() && !std::filesystem::is_directory(folder, failed))
     return Fail(ErrorCode::kUnavailable,
                 log.file_at + ": log.file: there is no folder " + folder.string());
   std::shared_ptr<spdlog::logger> logger;
-  try {  // spdlog's own way of saying that a file cannot be opened
+  try {  // spdlog throws where a file cannot be opened
     spdlog::sink_ptr sink = std::make_shared<spdlog::sinks::stderr_sink_mt>();
     if (!log.file.empty()) sink = std::make_shared<spdlog::sinks::basic_file_sink_mt>(log.file);
     logger = std::make_shared<spdlog::logger>("focalfleetd", std::move(sink));

@@ -1,5 +1,5 @@
-// The daemon's log: one sentence an event, by spdlog, to standard error or a file. Any thread may
-// write. An event is one line of the log whatever its text holds (control/printable.h).
+// The daemon's log goes by spdlog to standard error or a file, one sentence an event. Any thread
+// may write. An event is one line of the log whatever its text holds (control/printable.h).
 #pragma once
 
 #include <string>
@@ -9,7 +9,8 @@
 
 namespace focalfleet {
 
-/// From now on the log goes where `log` says. Errors: kUnavailable: the file cannot be opened.
+/// The log goes from now on to the destination that `log` names. Errors: kUnavailable: the file
+/// cannot be opened.
 Status OpenLog(const DaemonConfig::Log& log);
 
 }  // namespace focalfleet

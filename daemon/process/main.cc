@@ -1,4 +1,4 @@
-// focalfleetd: one machine's buses, their store and their status.
+// The program focalfleetd: buses of one machine, their store and their status.
 
 #include <unistd.h>
 
@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("focalfleetd ") + focalfleet::Version());
   try {
     app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {  // CLI11's way to end, also after --help
+  } catch (const CLI::ParseError& error) {  // CLI11 throws to end, also after --help
     return app.exit(error) == 0 ? 0 : kUsage;
   }
   const auto config = focalfleet::LoadConfig(file);
@@ -50,6 +50,6 @@ int main(int argc, char** argv) {
   if (check) return Check(*config);
   const auto ended = focalfleet::RunDaemon(*config);
   const int code = ended.status ? 0 : Report(ended.status.error());
-  if (ended.left) ::_exit(code);  // no destructor may pull anything from under what hangs
+  if (ended.left) ::_exit(code);  // no destructor may destroy what a hanging part uses
   return code;
 }

@@ -9,11 +9,11 @@ namespace focalfleet {
 bool BufferedStatusPublisher::Publish(const StatusBatch& status) {
   Keep(status);
   if (joined_.get() == nullptr) return false;
-  Tell(&units_);
-  Tell(&orientations_);
-  Tell(&buses_);
-  Tell(&fleet_);
-  Tell(&configuration_);
+  Offer(&units_);
+  Offer(&orientations_);
+  Offer(&buses_);
+  Offer(&fleet_);
+  Offer(&configuration_);
   ReportAlarms();
   joined_.get()->Flush();
   Count();
@@ -38,16 +38,16 @@ void BufferedStatusPublisher::Keep(const StatusBatch& status) {
 }
 
 template <class Value>
-void BufferedStatusPublisher::Tell(Newest<Value>* kept) {
+void BufferedStatusPublisher::Offer(Newest<Value>* kept) {
   if (kept->values().empty()) return;
   const auto taken = joined_.get()->Publish(std::span<const Value>(kept->values()));
   if (!taken) Note(tl::unexpected<Error>(taken.error()));
-  // A value that DDS calls wrong would be wrong the next time, too.
+  // A value that DDS calls invalid would be invalid the next time, too.
   kept->DropFirst(taken ? *taken : kept->values().size());
 }
 
 template <class Value>
-void BufferedStatusPublisher::Tell(std::optional<Value>* kept) {
+void BufferedStatusPublisher::Offer(std::optional<Value>* kept) {
   if (*kept) Note(joined_.get()->Publish(**kept));
   kept->reset();
 }

@@ -1,6 +1,7 @@
-// The way of status to DDS, on the store's thread: what the publisher does not take now (a reader
-// lags) is kept, newest values only, and offered again. As long as the domain cannot be joined,
-// that is everything: whoever reads then gets the whole state at once, and the newest alarms.
+// The publisher of status to DDS, on the store's thread. Values that DDS does not take now, because
+// a reader lags, are kept and offered again, newest values only. While the domain cannot be joined,
+// all values are kept. A reader that joins later receives the whole state at once, and the newest
+// alarms.
 #pragma once
 
 #include <atomic>
@@ -14,7 +15,7 @@
 
 #include "daemon/dds/late_join.h"
 #include "daemon/dds/status_publisher.h"
-#include "daemon/loop/store_thread.h"
+#include "daemon/status/status_batch.h"
 
 namespace focalfleet {
 
@@ -23,21 +24,22 @@ class BufferedStatusPublisher {
   explicit BufferedStatusPublisher(LateJoin<StatusPublisher>::Options options)
       : joined_(std::move(options)) {}
 
-  /// True: some units still wait to be taken, and may be soon.
+  /// The newest values are published or kept. True: some still wait, and DDS may take them soon.
   bool Publish(const StatusBatch& status);
   void Publish(const AlarmValue& alarm);
 
-  // Any thread.
+  // ---- any thread may ask
+
   [[nodiscard]] std::uint64_t samples() const { return samples_; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
 
  private:
-  /// The newest value of each unit or bus that is not told yet.
+  /// The newest value of each unit or bus that is not published yet.
   template <class Value>
   class Newest {
    public:
     void Keep(const std::vector<Value>& values) {
-      if (values_.empty()) {  // as a rule: all was taken
+      if (values_.empty()) {  // the usual case: all were taken
         values_ = values;
         return;
       }
@@ -51,7 +53,7 @@ class BufferedStatusPublisher {
           values_[it->second] = value;
       }
     }
-    /// The first `count` are told.
+    /// The first `count` values are published.
     void DropFirst(std::size_t count) {
       values_.erase(values_.begin(), values_.begin() + static_cast<std::ptrdiff_t>(count));
       place_of_.clear();
@@ -65,14 +67,15 @@ class BufferedStatusPublisher {
       return value.unit.value;
     }
     std::vector<Value> values_;
-    std::unordered_map<std::uint32_t, std::size_t> place_of_;  // in values_; empty: not made yet
+    std::unordered_map<std::uint32_t, std::size_t>
+        place_of_;  // place in values_; empty: not made yet
   };
 
   void Keep(const StatusBatch& status);
   template <class Value>
-  void Tell(Newest<Value>* kept);
+  void Offer(Newest<Value>* kept);
   template <class Value>
-  void Tell(std::optional<Value>* kept);
+  void Offer(std::optional<Value>* kept);
   void ReportAlarms();
   void Note(const Status& status);
   void Count();

@@ -4,7 +4,7 @@
 
 namespace focalfleet {
 
-void DdsTroubles::Tell(const std::string& what, const std::string& trouble) {
+void DdsTroubles::Report(const std::string& what, const std::string& trouble) {
   {
     const std::lock_guard lock(mutex_);
     if (trouble.empty()) {
@@ -17,7 +17,7 @@ void DdsTroubles::Tell(const std::string& what, const std::string& trouble) {
            "no DDS for " + what + ", the rest goes on and it is tried again: " + trouble});
     }
   }
-  wake_->Raise();
+  wake_();
 }
 
 std::vector<ShellNote> DdsTroubles::TakeNotes() {

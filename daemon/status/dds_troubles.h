@@ -1,34 +1,35 @@
-// Why DDS is not there, for everybody who should know: `status` asks, the event loop takes what is
-// new to make alarms of it. Any thread may tell.
+// The troubles of DDS, for the answer to `status` and for alarms: the event loop takes new reports
+// and makes alarms of them. Any thread may report.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "daemon/loop/event_signal.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
 
 class DdsTroubles {
  public:
-  /// `wake` is raised with each news; it outlives this.
-  explicit DdsTroubles(const EventSignal* wake) : wake_(wake) {}
+  /// `wake` is called after each report, on the thread that reports.
+  explicit DdsTroubles(std::function<void()> wake) : wake_(std::move(wake)) {}
 
-  /// Reports that `what` does not work, and why; an empty text: it works again.
-  void Tell(const std::string& what, const std::string& trouble);
+  /// `what` does not work because of `trouble`; an empty text: it works again.
+  void Report(const std::string& what, const std::string& trouble);
 
-  /// Takes the reports since the last call.
+  /// The reports since the last call.
   std::vector<ShellNote> TakeNotes();
-  /// All that lasts; empty: nothing.
+  /// All lasting troubles in one text; empty: none.
   [[nodiscard]] std::string Summary() const;
 
  private:
-  const EventSignal* wake_;
+  std::function<void()> wake_;
   mutable std::mutex mutex_;
-  std::map<std::string, std::string> lasting_;  // by what
+  std::map<std::string, std::string> lasting_;  // by `what`
   std::vector<ShellNote> notes_;
 };
 

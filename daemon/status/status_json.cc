@@ -13,8 +13,6 @@
 namespace focalfleet {
 namespace {
 
-constexpr const char* kSeverities[] = {"info", "warning", "error"};
-
 Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 void PutUpload(const UploadView& upload, Json* out) {
@@ -53,7 +51,7 @@ Json ClockJson(const ClockView& clock) {
           {"bound_s", known ? Json(clock.bound_s) : Json(nullptr)}};
 }
 
-/// Of the units of a bus: the widest bound and the rate that is off most.
+/// The widest bound of a bus' units, and the rate that deviates most.
 struct BusClocks {
   std::uint32_t known = 0;
   double bound_s = 0;
@@ -138,28 +136,14 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"subdivision", drive.subdivision}};
 }
 
-Json FibreCarrierJson(const FibreCarrierReading& carrier) {
-  Json json = {
-      {"verdict", carrier.verdict}, {"trusted", carrier.trusted}, {"sensors_used", carrier.used}};
-  const auto put = [&](const char* name, double value) {
-    json[name] = carrier.solved ? Json(value) : Json();
-  };
-  const char* const angles[] = {"alpha_deg", "beta_deg", "gamma_deg"};
-  const char* const covariances[] = {"cov_aa_deg2", "cov_ab_deg2", "cov_ag_deg2",
-                                     "cov_bb_deg2", "cov_bg_deg2", "cov_gg_deg2"};
-  for (std::size_t k = 0; k < 3; ++k) put(angles[k], carrier.angles_deg[k]);
-  for (std::size_t k = 0; k < 6; ++k) put(covariances[k], carrier.covariance_deg2[k]);
-  return json;
-}
-
-/// The rounds that ended, and so much of the one under way.
+/// The makespan of the rounds that ended, and the time of the present one so far.
 double MakespanSoFar(const FleetView& view) {
   const ConfigurationView& c = view.coordinator->configuration();
   if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
   return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
 }
 
-/// How far along, 0..1: by time while it moves, by arrivals in the end.
+/// The progress of the configuration, 0..1: by time while units move, by arrivals in the end.
 double FractionOf(const FleetView& fleet) {
   const ConfigurationView& view = fleet.coordinator->configuration();
   if (view.state == ConfigurationState::kDone) return 1;
@@ -269,6 +253,20 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
           {"bus_load_max", HighestBusLoad(view)}};
 }
 
+Json FibreCarrierJson(const FibreCarrierReading& carrier) {
+  Json json = {
+      {"verdict", carrier.verdict}, {"trusted", carrier.trusted}, {"sensors_used", carrier.used}};
+  const auto put = [&](const char* name, double value) {
+    json[name] = carrier.solved ? Json(value) : Json();
+  };
+  const char* const angles[] = {"alpha_deg", "beta_deg", "gamma_deg"};
+  const char* const covariances[] = {"cov_aa_deg2", "cov_ab_deg2", "cov_ag_deg2",
+                                     "cov_bb_deg2", "cov_bg_deg2", "cov_gg_deg2"};
+  for (std::size_t k = 0; k < 3; ++k) put(angles[k], carrier.angles_deg[k]);
+  for (std::size_t k = 0; k < 6; ++k) put(covariances[k], carrier.covariance_deg2[k]);
+  return json;
+}
+
 Json UnitJson(const FleetView& view, PositionerIndex i) {
   const Unit& unit = view.layout->unit(i);
   const UnitView& seen = view.coordinator->unit(i);
@@ -342,133 +340,6 @@ std::string StateText(const FleetView& view) {
   }
   fmt::format_to(out, FMT_COMPILE("]}}"));
   return fmt::to_string(text);
-}
-
-Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
-  Json rows = Json::array();
-  for (const auto& [row, began, changed] : configurations)
-    rows.push_back({{"id", row.id},
-                    {"source", row.source},
-                    {"state", Name(row.state)},
-                    {"began", ToIso8601(began)},
-                    {"changed", ToIso8601(changed)},
-                    {"targeted", row.targeted},
-                    {"arrived", row.arrived},
-                    {"refused", row.refused},
-                    {"failed", row.failed},
-                    {"stopped", row.stopped},
-                    {"unmeasured", row.unmeasured},
-                    {"makespan_predicted_s", Number(row.makespan_predicted_s)},
-                    {"makespan_s", Number(row.makespan_s)},
-                    {"energy_J", Number(row.energy_J)},
-                    {"peak_power_W", Number(row.peak_power_W)},
-                    {"start_skew_s", Number(row.start_skew_s)},
-                    {"start_skew_bound_s", Number(row.start_skew_bound_s)}});
-  return rows;
-}
-
-Json HistoryJson(const std::vector<MeasurementHistory>& measurements) {
-  Json rows = Json::array();
-  for (const auto& [row, at, moved_since] : measurements) {
-    Json json = {{"unit_id", row.unit.value},
-                 {"configuration", row.configuration},
-                 {"status", Name(row.status)},
-                 {"source", Name(row.source)},
-                 {"x_mm", row.x_mm},
-                 {"y_mm", row.y_mm},
-                 {"sigma_um", SigmaUm(row.covariance)},
-                 {"var_x_mm2", row.covariance.xx},
-                 {"cov_xy_mm2", row.covariance.xy},
-                 {"var_y_mm2", row.covariance.yy},
-                 {"target_id", row.target_id},
-                 {"delay_s", row.delay_s ? Json(*row.delay_s) : Json()},
-                 {"target_x_mm", row.target_fp ? Json(row.target_fp->x_mm) : Json()},
-                 {"target_y_mm", row.target_fp ? Json(row.target_fp->y_mm) : Json()},
-                 {"error_um", row.error_um ? Json(*row.error_um) : Json()},
-                 {"moved_since", moved_since},
-                 {"other_unit_id", row.other ? Json(row.other->value) : Json()},
-                 {"orientation", row.carrier ? FibreCarrierJson(*row.carrier) : Json()},
-                 {"at", ToIso8601(at)}};
-    rows.push_back(std::move(json));
-  }
-  return rows;
-}
-Json HistoryJson(const std::vector<MoveHistory>& moves) {
-  Json rows = Json::array();
-  for (const MoveHistory& move : moves) {
-    Json row = {{"began", ToIso8601(move.began)},
-                {"ended", move.ended ? Json(ToIso8601(*move.ended)) : Json(nullptr)},
-                {"end", move.end ? Json(Name(*move.end)) : Json("open")},
-                {"configuration", move.configuration},
-                {"unit_id", move.unit.value},
-                {"serial", move.serial.value},
-                {"move", move.move.value}};
-    for (const Axis axis : kAxes) {
-      const std::size_t a = Index(axis);
-      const std::string name = Name(axis);
-      row[name + "_from_vectors"] = move.from[a];
-      row[name + "_to_vectors"] = move.to[a];
-      if (!move.ended_at) continue;
-      row[name + "_witness"] = Name((*move.ended_at)[a].witness);
-      row[name + "_low_vectors"] = (*move.ended_at)[a].low;
-      row[name + "_high_vectors"] = (*move.ended_at)[a].high;
-    }
-    rows.push_back(std::move(row));
-  }
-  return rows;
-}
-
-Json HistoryJson(const std::vector<ParameterHistory>& parameters) {
-  Json rows = Json::array();
-  for (const auto& [row, at] : parameters)
-    rows.push_back({{"axis", Name(row.axis)},
-                    {"parameter", Name(row.parameter)},
-                    {"value", row.value},
-                    {"origin", Name(row.origin)},
-                    {"serial", row.serial.value},
-                    {"at", ToIso8601(at)}});
-  return rows;
-}
-
-Json HistoryJson(const std::vector<TuningHistory>& tunings) {
-  Json rows = Json::array();
-  for (const auto& [row, at] : tunings)
-    rows.push_back({{"axis", Name(row.axis)},
-                    {"critical", row.critical},
-                    {"repeat", row.repeat},
-                    {"margin", row.margin},
-                    {"load_uNm", row.load_uNm},
-                    {"v_bus_V", row.v_bus_V},
-                    {"counter1", row.counter1},
-                    {"subdivision", row.subdivision},
-                    {"mode", Name(row.mode)},
-                    {"origin", Name(row.origin)},
-                    {"serial", row.serial.value},
-                    {"at", ToIso8601(at)}});
-  return rows;
-}
-
-Json HistoryJson(const std::vector<AlarmHistory>& alarms) {
-  Json rows = Json::array();
-  for (const auto& [row, at] : alarms)
-    rows.push_back({{"at", ToIso8601(at)},
-                    {"id", row.id},
-                    {"severity", kSeverities[static_cast<std::size_t>(row.severity)]},
-                    {"unit_id", row.unit ? Json(row.unit->value) : Json(nullptr)},
-                    {"bus_id", row.bus ? Json(row.bus->value) : Json(nullptr)},
-                    {"text", row.text}});
-  return rows;
-}
-
-Json HistoryJson(const std::vector<UnitHistory>& units) {
-  Json rows = Json::array();
-  for (const UnitHistory& unit : units)
-    rows.push_back({{"at", ToIso8601(unit.at)},
-                    {"unit_id", unit.unit.value},
-                    {"serial", unit.serial.value},
-                    {"enabled", unit.enabled},
-                    {"reason", unit.reason}});
-  return rows;
 }
 
 }  // namespace focalfleet

@@ -1,6 +1,6 @@
-// Which status goes out when: at most so many times a second, units that changed and units that
-// move; the fleet and its buses at least once a second. Everything once at the start, for those who
-// were there before us.
+// The scheduler decides which status goes out when. Units that changed and units that move go out
+// at a limited rate; the fleet and its buses go out at least once a second. At the start everything
+// goes out once, for readers that were there before the daemon.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/clock/clock.h"
-#include "daemon/loop/store_thread.h"
+#include "daemon/status/status_batch.h"
 #include "daemon/status/status_snapshot.h"
 
 namespace focalfleet {
@@ -27,9 +27,9 @@ class StatusScheduler {
   [[nodiscard]] bool due(HostInstant now) const { return now >= wake_at(); }
   [[nodiscard]] HostInstant wake_at() const;
 
-  /// What is to be told now. Pre: due.
+  /// The status to be published now. Pre: due.
   StatusBatch Take(const FleetView& view, std::uint64_t after_batch, bool store_failing);
-  /// It was not taken: all of it stays to be told.
+  /// The batch was not taken: all of it is to be published again.
   void GiveBack(const StatusBatch& batch, const Layout& layout);
 
  private:
@@ -38,8 +38,8 @@ class StatusScheduler {
   Options options_;
   DurationNs period_;
   DurationNs idle_period_;
-  HostInstant next_{0};       // not before
-  HostInstant next_idle_{0};  // by then in any case
+  HostInstant next_{0};       // the earliest instant of the next batch
+  HostInstant next_idle_{0};  // the latest instant of the next batch
   std::vector<std::uint8_t> changed_;
   bool any_changed_ = true;
   bool moving_ = false;

@@ -1,5 +1,5 @@
-// What is shown of the fleet, taken out of the coordinator as plain values, so that other threads
-// may have them.
+// The published state of the fleet, taken from the coordinator as plain values, so that other
+// threads may have them.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace focalfleet {
 
 class Compensation;
 
-/// What a snapshot is taken of.
+/// The objects of which a snapshot is taken, and its time.
 struct FleetView {
   const Layout* layout = nullptr;
   const Coordinator* coordinator = nullptr;
@@ -22,12 +22,12 @@ struct FleetView {
   const Compensation* compensation = nullptr;  // none: commands go as they are
 };
 
-/// The lesser of both axes: a unit is known no better than its worse axis.
+/// The lesser witness of both axes: a unit is known no better than its worse axis.
 Witness WitnessOf(const UnitKnowledge& knowledge);
 
-/// Moving units are shown where the plan has them now.
+/// The status of a unit. A moving unit stands where the plan has it at this time.
 UnitStatusValue SnapshotUnit(const FleetView& view, PositionerIndex i);
-/// Nothing where its sensors were never read.
+/// The orientation by the unit's sensors; none where they were never read.
 std::optional<UnitOrientationValue> SnapshotOrientation(const FleetView& view, PositionerIndex i);
 BusStatusValue SnapshotBus(const FleetView& view, BusId bus);
 
@@ -36,7 +36,7 @@ struct FleetCounts {
   std::array<std::uint32_t, kUnitPhaseCount> by_phase{};
   std::array<std::uint32_t, kWitnessCount> by_witness{};
 };
-/// Cost: one pass over the units.
+/// The number of units by phase and by witness. Cost: one pass over the units.
 FleetCounts CountFleet(const FleetView& view);
 double HighestBusLoad(const FleetView& view);
 

@@ -1,6 +1,6 @@
-// One row that came out of SQLite, read column by column with a range for each. The first value
-// that is not what it must be is kept as an error that names table, row and column; the rest of the
-// row then reads as zero.
+// A row that came out of SQLite, read column by column with a range for each. The first value out
+// of its range is kept as an error that names table, row and column; the rest of the row then reads
+// as zero.
 #pragma once
 
 #include <cstdint>
@@ -44,15 +44,15 @@ class Cells {
     return static_cast<Enum>(Integer(column, 0, static_cast<std::int64_t>(last)));
   }
   bool Flag(int column) { return Integer(column, 0, 1) == 1; }
-  SerialNumber Serial(int column) {  // of real hardware
+  SerialNumber Serial(int column) {  // not 0: of real hardware
     return {
         static_cast<std::uint32_t>(Integer(column, 1, std::numeric_limits<std::uint32_t>::max()))};
   }
   WallTime Time(int column) { return {Whole<std::int64_t>(column)}; }
   Axis AxisAt(int column) { return Code(column, Axis::kPhi); }
-  /// witness, low, high in three columns from `column` on.
+  /// The columns witness, low, high, from `column` on.
   AxisKnowledge Knowledge(int column);
-  /// A condition across columns; `what` says what is wrong where it does not hold.
+  /// A condition across columns; `what` is the text of the error where it does not hold.
   void Require(bool condition, const char* what);
 
   [[nodiscard]] const std::optional<Error>& error() const { return error_; }
@@ -68,17 +68,17 @@ class Cells {
 
 /// The columns id, source, state, targeted, arrived, refused, failed, makespan_predicted_s,
 /// makespan_s, energy_J, peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, in
-/// this order from the first on.
+/// this order from column 0 on.
 ConfigurationRow ReadConfiguration(Cells& cells);
 
-/// serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision, mode, origin,
-/// in this order from column `first` on.
+/// The columns serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision,
+/// mode, origin, in this order from column `first` on.
 TuningRow ReadTuning(Cells& cells, int first);
-/// trusted, verdict, used, three angles and six covariances, in this order from column `first` on;
-/// nothing where the first is NULL.
+/// The columns trusted, verdict, used, three angles and six covariances, in this order from column
+/// `first` on; no reading where the first is NULL.
 std::optional<FibreCarrierReading> ReadFibreCarrier(Cells& cells, int first);
 
-/// The tables as the coordinator wants them, in one read transaction.
+/// All tables that the coordinator needs, read in one transaction.
 Result<StoredFleet> LoadFleet(Connection& connection);
 
 }  // namespace focalfleet::store_internal

@@ -5,7 +5,7 @@
 namespace focalfleet::store_internal {
 namespace {
 
-// Steps `sql` to its end; `read` takes each row and leaves its faults in the cells.
+/// Steps `sql` to its end; `read` takes each row and leaves its faults in the cells.
 template <class Read>
 Status ForEach(Connection& connection, const char* table, int key_columns, const char* sql,
                Read read) {
@@ -33,8 +33,8 @@ Status LoadUnits(Connection& connection, StoredFleet* fleet) {
                  });
 }
 
-// vector and turns say the same as low, less the offset, once more: a row that disagrees with
-// itself is not believed.
+/// Checks a row against itself: vector and turns repeat low, less the offset. A row that
+/// contradicts itself is an error.
 void CheckVector(Cells& cells, const AxisKnowledge& knowledge, std::uint16_t subdivision,
                  std::int32_t offset) {
   const bool place = knowledge.witness >= Witness::kPredicted && subdivision != 0;
@@ -178,7 +178,7 @@ Result<StoredFleet> LoadFleet(Connection& connection) {
   StoredFleet fleet;
   FOCALFLEET_TRY(connection.Execute("BEGIN"));
   const Status loaded = LoadAll(connection, &fleet);
-  connection.Rollback();  // only read
+  connection.Rollback();  // nothing was written
   if (!loaded) return tl::unexpected<Error>(loaded.error());
   return fleet;
 }

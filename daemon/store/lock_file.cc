@@ -35,7 +35,7 @@ Result<std::unique_ptr<LockFile>> LockFile::Acquire(const std::string& path) {
                 path + " is held by " + HolderOf(descriptor) + ": one daemon a store");
   }
   const std::string pid = std::to_string(getpid()) + "\n";
-  // The lock holds without its label: a full disk must not keep the daemon from starting to say so.
+  // The lock holds without the pid in it: a daemon on a full disk must start, to report the disk.
   if (ftruncate(descriptor, 0) == 0 && pwrite(descriptor, pid.data(), pid.size(), 0) < 0) {
     return lock;
   }

@@ -161,7 +161,7 @@ PRAGMA application_id = 1179012180;
 )sql";
 static_assert(kApplicationId == 1179012180);
 
-// What tunings found; before, only the parameters that they set were kept.
+// Results of tunings; earlier versions kept only the parameters that tunings set.
 constexpr const char* kVersion2 = R"sql(
 CREATE TABLE tuning(
   serial INTEGER NOT NULL,
@@ -208,13 +208,13 @@ CREATE VIEW tuned AS SELECT
   FROM tuning LEFT JOIN unit ON unit.serial = tuning.serial;
 )sql";
 
-// How far apart the units of a configuration began.
+// Start skew: how far apart the units of a configuration began.
 constexpr const char* kVersion3 = R"sql(
 ALTER TABLE configuration ADD COLUMN start_skew_s REAL;        -- NULL: not known
 ALTER TABLE configuration ADD COLUMN start_skew_bound_s REAL;  -- the true skew is within +- of it
 )sql";
 
-// What a camera found, and by how much the place of an axis differs from its count of vectors.
+// Measurements of a camera, and the offset of an axis' place from its count of vectors.
 constexpr const char* kVersion4 = R"sql(
 ALTER TABLE axis_state ADD COLUMN offset INTEGER NOT NULL DEFAULT 0;
 
@@ -247,7 +247,7 @@ CREATE VIEW measured AS SELECT
   FROM measurement;
 )sql";
 
-// How well each coordinate was seen, what the target is called, how long after the motion.
+// Covariance of a measurement, name of the target, delay after the motion.
 constexpr const char* kVersion5 = R"sql(
 ALTER TABLE measurement ADD COLUMN var_x_mm2 REAL NOT NULL DEFAULT 0;
 ALTER TABLE measurement ADD COLUMN cov_xy_mm2 REAL NOT NULL DEFAULT 0;
@@ -268,7 +268,7 @@ CREATE VIEW measured AS SELECT
   FROM measurement;
 )sql";
 
-// Models that blind commands went through, and which one did when.
+// Models that blind commands went through, and the time of each change.
 constexpr const char* kVersion6 = R"sql(
 CREATE TABLE model(
   sha256 TEXT PRIMARY KEY,      -- of the text, in hex
@@ -289,7 +289,7 @@ CREATE TABLE model_change(
 ) STRICT;
 )sql";
 
-// Units that measure themselves: who saw a fibre, and what the sensors at a joint showed.
+// Units that measure themselves: source of a measurement, and readings of the sensors at a joint.
 constexpr const char* kVersion7 = R"sql(
 ALTER TABLE measurement ADD COLUMN source INTEGER NOT NULL DEFAULT 0;  -- 0 camera, 1 own sensors
 
@@ -353,7 +353,7 @@ tl::unexpected<Error> NotOurs(const std::string& path) {
 
 Status CheckVersion(const std::string& path, std::int32_t application_id, std::int32_t version,
                     std::int32_t version_max) {
-  // 0 and 0: nothing was written yet, or the first step was cut short.
+  // Both are 0 where nothing was written yet, or the first step was interrupted.
   const bool blank = application_id == 0 && version == 0;
   if ((application_id != kApplicationId && !blank) || version < 0) return NotOurs(path);
   if (version > version_max) {

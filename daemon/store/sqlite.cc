@@ -30,7 +30,7 @@ ErrorCode CodeOf(int sqlite_code) {
 
 Status Statement::Failed(int code) {
   Error error = ErrorOf(db_, code);
-  // A file that is damaged refuses good rows, too: no row may be set aside for it.
+  // A damaged file refuses good rows, too: no row may be set aside for that.
   const int primary = code & 0xff;
   if (primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB || primary == SQLITE_ERROR)
     error.code = ErrorCode::kUnavailable;
@@ -41,7 +41,7 @@ Status Statement::Failed(int code) {
 Result<std::unique_ptr<Connection>> Connection::Open(const std::string& path, Mode mode,
                                                      const char* vfs, int busy_wait_ms) {
   auto connection = std::unique_ptr<Connection>(new Connection(path));
-  // One thread at a time uses a connection, so SQLite need not lock around every bind.
+  // A connection is used by one thread at a time, so SQLite need not lock around every bind.
   const int flags =
       SQLITE_OPEN_NOMUTEX |
       (mode == Mode::kWrite ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
@@ -52,8 +52,8 @@ Result<std::unique_ptr<Connection>> Connection::Open(const std::string& path, Mo
     return tl::unexpected<Error>(connection->Named(ErrorOf(db, code)));
   }
   sqlite3_busy_timeout(db, busy_wait_ms);
-  // A file may come from anywhere: no functions with side effects from its schema, no writing of
-  // the schema.
+  // The file may come from anywhere, so its schema may not call functions with side effects, and
+  // the schema itself may not be written.
   sqlite3_db_config(db, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(db, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   return connection;
@@ -83,7 +83,7 @@ Result<std::int64_t> Connection::Integer(const char* sql) {
 }
 
 void Connection::Rollback() {
-  // SQLite has undone it by itself after some errors; then there is nothing to do.
+  // After some errors SQLite has undone the transaction by itself; then this does nothing.
   if (sqlite3_get_autocommit(db()) == 0) {
     sqlite3_exec(db(), "ROLLBACK", nullptr, nullptr, nullptr);
   }

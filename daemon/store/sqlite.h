@@ -1,5 +1,5 @@
-// SQLite's C interface, owned and typed: a connection, a prepared statement, and its failures as
-// our errors. Nothing of SQLite leaves daemon/store.
+// SQLite's C interface with owners and types: a connection, a prepared statement, its failures as
+// errors of this project. No part of SQLite is visible outside daemon/store.
 #pragma once
 
 #include <sqlite3.h>
@@ -13,7 +13,7 @@
 
 namespace focalfleet::store_internal {
 
-/// What SQLite's result code means to a caller of ours.
+/// The error code for a result code of SQLite.
 ErrorCode CodeOf(int sqlite_code);
 
 class Statement {
@@ -44,7 +44,7 @@ class Statement {
     return Failed(code);
   }
 
-  /// True: a row is there to be read. False: there is no further one, and the statement is reset.
+  /// True: a row can be read. False: there is no further row, and the statement is reset.
   Result<bool> Next() {
     const int code = sqlite3_step(statement_.get());
     if (code == SQLITE_ROW) return true;
@@ -71,7 +71,7 @@ class Connection {
  public:
   enum class Mode : std::uint8_t { kWrite, kRead };
 
-  /// Errors: as CodeOf; the text names the file.
+  /// The connection is open. Errors: as CodeOf; the text names the file.
   static Result<std::unique_ptr<Connection>> Open(const std::string& path, Mode mode,
                                                   const char* vfs, int busy_wait_ms);
   Connection(const Connection&) = delete;
@@ -81,7 +81,7 @@ class Connection {
   Status Execute(const char* sql);
   /// The one integer that `sql` yields.
   Result<std::int64_t> Integer(const char* sql);
-  /// Whatever transaction is open is undone. The connection can be used again.
+  /// An open transaction is undone. The connection can be used again.
   void Rollback();
 
   [[nodiscard]] sqlite3* db() const { return db_.get(); }

@@ -1,3 +1,5 @@
+#include "daemon/store/store_reader.h"
+
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -7,7 +9,6 @@
 #include "daemon/store/cells.h"
 #include "daemon/store/schema.h"
 #include "daemon/store/sqlite.h"
-#include "daemon/store/store.h"
 #include "protocol/base/limits.h"
 
 namespace focalfleet {
@@ -16,7 +17,7 @@ using namespace store_internal;
 
 namespace {
 
-// `sql` ends in "LIMIT ?1" and may filter by ?2; `read` makes one entry of one row.
+/// `sql` ends in "LIMIT ?1" and may filter by ?2; `read` makes one entry of one row.
 template <class Entry, class Read>
 Result<std::vector<Entry>> Query(Connection& connection, const char* table, const char* sql,
                                  std::uint32_t limit, std::optional<std::int64_t> filter,
@@ -61,7 +62,7 @@ MoveHistory ReadMove(Cells& cells) {
   if (cells.IsNull(15)) return move;
   move.ended = cells.Time(14);
   move.end = cells.Code(15, kLastIntentEnd);
-  // A unit whose knowledge was never written ends at no known place.
+  // Where knowledge of the unit was never written, its place at the end is unknown.
   if (!cells.IsNull(16) && !cells.IsNull(19)) {
     move.ended_at = UnitKnowledge{cells.Knowledge(16), cells.Knowledge(19)};
   }

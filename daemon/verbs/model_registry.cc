@@ -18,7 +18,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-/// One effect: of how many units, how large, how well known, what else it may be.
+/// An effect of the model: number of units, size, uncertainty, other candidates.
 Json TermJson(const sim::ModelTerm& term, const std::vector<std::string>& candidates) {
   std::vector<double> size, sigma;
   std::size_t units = 0;
@@ -124,9 +124,9 @@ WallTime ModelRegistry::since() const { return changes_[Origin(changes_.size() -
 Result<ModelRow> ModelRegistry::Rollback(
     const std::function<Result<std::string>(const std::string&)>& text_of) {
   if (changes_.empty()) return Fail(ErrorCode::kRefused, "there was never a model");
-  // What a rollback restored has its own past.
+  // A restored model has the past of the change that it restores.
   const std::size_t origin = Origin(changes_.size() - 1);
-  if (origin == 0) {  // before the first model there was none
+  if (origin == 0) {  // no model was in force before the first one
     if (compensation_) return Unload();
     return Fail(ErrorCode::kRefused, "there is no model before this");
   }

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/status/history_json.h"
+#include "daemon/status/status_json.h"
+#include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/requested_command.h"
 #include "fleet/files/bad_rows.h"
 #include "protocol/base/limits.h"
@@ -11,12 +14,6 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint64_t kHistoryRowsMax = 1000;
-
-AxisAngles CountOf(const FleetView& view, PositionerIndex i, const Pose& place) {
-  const Pose& offset = view.coordinator->unit(i).offset;
-  return AnglesOf(view.layout->unit(i), view.coordinator->drives()[i.value],
-                  {place[0] - offset[0], place[1] - offset[1]});
-}
 
 /// The newest value of each axis and parameter; `history` is newest first.
 Json NewestOf(const std::vector<ParameterHistory>& history) {
@@ -44,25 +41,13 @@ bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
 
-/// What all units count that rest.
-void NoteRests(const FleetView& view, Compensation* compensation) {
-  if (compensation == nullptr) return;
-  for (std::uint32_t n = 0; n < view.layout->size(); ++n) NoteRest(view, {n}, compensation);
-}
-
 }  // namespace
-
-void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation) {
-  const UnitView& unit = view.coordinator->unit(i);
-  if (unit.phase != UnitPhase::kReady || !IsPlace(unit.knowledge)) return;
-  compensation->Rests(i, CountOf(view, i, PlaceOf(unit.knowledge)));
-}
 
 void RequestHandler::Service(const FleetView& view, std::vector<Command>* commands) {
   stops_.clear();
   server_.Service(&stops_);
   for (const IncomingLine& line : stops_) Handle(view, line, commands);
-  // A flood of stops must not keep everybody else out, so every second turn is for all.
+  // A flood of stops must not keep other clients out, so every second turn is for all.
   stopped_ = !stops_.empty() && !stopped_;
   if (stopped_) return;
   spent_bytes_ = 0;
@@ -92,24 +77,24 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
                                              std::to_string(limits::kControlClients) +
                                              " places have requests open, try again later"));
   if (request->verb == "state") {
-    // Spliced in as text; the frame around it is the one that EncodeResult makes.
+    // The answer is spliced in as text, into the frame that EncodeResult makes.
     std::string answer = EncodeResult(request->id, nullptr);
     const std::size_t place = answer.find("null");
     answer.replace(place, 4, StateText(view));
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
-  pending.pursues =
+  pending.is_configuration =
       request->verb == "apply" || request->verb == "home" || request->verb == "measure";
-  pending.retargets = request->verb == "retarget";
-  if (line.overtaken && (pending.pursues || pending.retargets))
+  pending.is_retarget = request->verb == "retarget";
+  if (line.overtaken && (pending.is_configuration || pending.is_retarget))
     return Answer(pending, Fail(ErrorCode::kRefused,
                                 "a stop that came before " + request->verb +
                                     " was begun went ahead of it; command it again if it is still "
                                     "wanted"));
   const auto wait = FlagArgumentOr(request->args, "wait", false);
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
-  pending.wait = *wait && pending.pursues;
+  pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
@@ -131,7 +116,8 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
   if (request.verb == "params") return AskParameters(view, request);
   if (request.verb == "history") return AskHistory(view, request);
   if (request.verb == "measurements") return AskMeasurements(view, request);
-  if (request.verb == "model") return Result<Json>(models_.Show(kHistoryRowsMax));
+  if (request.verb == "model")
+    return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
   return std::nullopt;
 }
 
@@ -154,7 +140,7 @@ Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlR
       drive[std::string(axis) + "_" + name] = known[axis][name];
   return Json{{"unit_id", view.layout->unit(i).id.value},
               {"serial", serial.value},
-              {"drive", std::move(drive)},  // what holds now, whether stored or by default
+              {"drive", std::move(drive)},  // effective values, stored or by default
               {"parameters", NewestOf(history)},
               {"tuning", NewestOf(tunings)},
               {"tuning_history", HistoryJson(tunings)},
@@ -177,7 +163,7 @@ Result<Json> RequestHandler::AskHistory(const FleetView& view, const ControlRequ
   return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
 }
 
-/// {exposure?}: the newest of the last configuration without it.
+/// {exposure?}: without it, the newest exposure of the last configuration.
 Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const ControlRequest& request) {
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
   FOCALFLEET_TRY_ASSIGN(std::uint64_t exposure, UnsignedArgumentOr(request.args, "exposure", 0));
@@ -195,10 +181,11 @@ Result<Json> RequestHandler::AskMeasurements(const FleetView& view, const Contro
 
 std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view,
                                                            const ControlRequest& request) {
+  ModelRegistry& models = *options_.models;
   const auto change = [&]() -> Result<ModelRow> {
-    if (request.verb == "model_unload") return models_.Unload();
+    if (request.verb == "model_unload") return models.Unload();
     if (request.verb == "model_rollback")
-      return models_.Rollback([this](const std::string& sha256) -> Result<std::string> {
+      return models.Rollback([this](const std::string& sha256) -> Result<std::string> {
         FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
         return reader->ModelText(sha256);
       });
@@ -206,60 +193,39 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
                           TextArgument(request.args, "model_toml", kControlLineBytesMax));
     FOCALFLEET_TRY_ASSIGN(const std::string source,
                           TextArgumentOr(request.args, "source", "model.toml"));
-    return models_.Load(text, source);
+    return models.Load(text, source);
   };
   if (request.verb != "model_load" && request.verb != "model_unload" &&
       request.verb != "model_rollback")
     return std::nullopt;
-  // A change is numbered after those that the store has.
-  const Status known = models_.changes_known() ? Status() : TakeModelChanges();
+  // A change gets the number after those that the store has.
+  const auto know_changes = [&]() -> Status {
+    if (models.changes_known()) return {};
+    FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+    return TakeModelChanges(reader, &models);
+  };
+  const auto forget_strangers = [&]() -> Status {
+    if (models.compensation() == nullptr) return {};
+    FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
+    return ForgetStrangers(reader, &models);
+  };
+  const Status known = know_changes();
   auto row = known ? change() : Result<ModelRow>(tl::unexpected<Error>(known.error()));
   if (!row) return Result<Command>(tl::unexpected<Error>(std::move(row).error()));
-  if (const Status forgot = ForgetStrangers(); !forgot)
+  if (const Status forgot = forget_strangers(); !forgot)
     options_.log("model: " + forgot.error().text);
-  NoteRests(view, models_.compensation());
+  NoteRests(view, models.compensation());
   Command command;
   command.what = KeepModelCommand{std::move(*row)};
   return command;
 }
 
-Status RequestHandler::TakeModelChanges() {
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(auto changes, reader->Models(kHistoryRowsMax));
-  models_.TakeChanges(std::move(changes));
-  return {};
-}
-
-Status RequestHandler::RestoreModel() {
-  FOCALFLEET_TRY(TakeModelChanges());
-  if (models_.newest_sha256().empty()) return {};
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const std::string text, reader->ModelText(models_.newest_sha256()));
-  FOCALFLEET_TRY(models_.Restore(text));
-  return ForgetStrangers();
-}
-
-Status RequestHandler::ForgetStrangers() {
-  Compensation* const model = models_.compensation();
-  if (model == nullptr) return {};
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto counted_anew, reader->CountedAnewSince(models_.since()));
-  for (const UnitId id : counted_anew)
-    if (const auto i = options_.layout->Find(id)) model->Forget(*i);
-  FOCALFLEET_TRY_ASSIGN(const auto bindings, reader->Bindings());
-  for (const auto& [id, serial] : bindings) {
-    const auto i = options_.layout->Find(id);
-    if (i && model->serial(*i).value != 0 && model->serial(*i) != serial) model->Forget(*i);
-  }
-  return {};
-}
-
-/// Adopted hardware is not driven by the model of what sat there before, and the operator is told.
+/// Adopted hardware is not driven by the model of the hardware before it, and the answer says so.
 std::string RequestHandler::NoteOn(const FleetView& view, const Command& command) const {
   const auto* adopt = std::get_if<AdoptCommand>(&command.what);
   if (adopt == nullptr || view.compensation == nullptr || !view.compensation->Knows(adopt->unit))
     return "";
-  return "; the model in force (" + models_.name() +
+  return "; the model in force (" + options_.models->name() +
          ") was measured on the robot before it, so its commands go without one";
 }
 
@@ -284,24 +250,24 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   const auto it = pending_.find(reply.request);
   if (it == pending_.end()) return;
   const Pending pending = it->second;
-  // The first word on a configuration is that it began; who waits wants the last.
+  // The first reply on a configuration says that it began; clients that wait need the last one.
   it->second.began = true;
-  if (!reply.last && (pending.wait || pending.retargets)) return;
+  if (!reply.last && (pending.wait || pending.is_retarget)) return;
   pending_.erase(it);
   waiting_ -= pending.wait ? 1u : 0u;
   if (reply.error) {
     options_.log("refused or failed: " + reply.error->text);
-    if (pending.retargets && pending.began)
+    if (pending.is_retarget && pending.began)
       return Answer(pending, Json{{"goes", false}, {"text", reply.error->text}});
-    // An error means that nothing happened. What failed on the way is a summary with a reason.
+    // An error means that nothing happened. A failure after motion is a summary with a reason.
     if (!pending.began || !HasMoved(view.coordinator->configuration()))
       return Answer(pending, tl::unexpected<Error>(*reply.error));
     Json summary = ConfigurationJson(view);
     summary["error"] = reply.error->text;
     return Answer(pending, summary);
   }
-  if (pending.retargets) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
-  if (!pending.pursues) return Answer(pending, Json{{"text", reply.text + pending.note}});
+  if (pending.is_retarget) return Answer(pending, Json{{"goes", true}, {"text", reply.text}});
+  if (!pending.is_configuration) return Answer(pending, Json{{"text", reply.text + pending.note}});
   if (!pending.wait)
     return Answer(pending, Json{{"configuration", view.coordinator->configuration().id}});
   Answer(pending, ConfigurationJson(view));

@@ -1,13 +1,15 @@
-// Where the control socket meets the coordinator: requests become commands or are answered from
-// what is known; replies of the coordinator become answers; whoever waits for a configuration is
-// shown how it goes. All of it runs on the core thread, so that every answer is about one instant.
+// The requests of the control socket. A request becomes a command of the coordinator, or is
+// answered at once. Replies of the coordinator become answers, and clients that wait for a
+// configuration receive its progress. All of it runs on the core thread, so every answer is about
+// one instant.
 //
-// A stop goes before everything else that was read, in every turn, from behind other lines of its
-// client, too. In the turn that brings one no other line is handled, so that its frames are on the
-// buses before anything is reckoned for people; only behind a second one in a row are others heard.
-// Requests of other verbs share a budget a turn (kTurnBytes); behind it, buses, signals and the
-// next stop are looked at first. Motions that a stop overtook are refused: the stop was meant for
-// them, too.
+// A stop is handled before everything else that was read in a turn, even from behind other lines of
+// its client. A turn with a stop handles no other line, so that the frames of the stop are on the
+// buses before any answer is computed. Where the next turn brings a stop again, other lines are
+// handled too.
+// Requests of other verbs share a budget a turn (kTurnBytes); after it, the loop serves buses,
+// signals and the next stop first. Motions that a stop overtook are refused, because the stop was
+// meant for them, too.
 #pragma once
 
 #include <cstdint>
@@ -19,15 +21,13 @@
 #include <vector>
 
 #include "daemon/control/line_server.h"
-#include "daemon/status/status_json.h"
-#include "daemon/store/store.h"
+#include "daemon/status/shell_facts.h"
+#include "daemon/status/status_snapshot.h"
+#include "daemon/store/store_reader.h"
 #include "daemon/verbs/model_registry.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
-
-/// Tells the model what the unit counts, if it rests.
-void NoteRest(const FleetView& view, PositionerIndex i, Compensation* compensation);
 
 class RequestHandler {
  public:
@@ -36,67 +36,57 @@ class RequestHandler {
     std::function<ShellFacts()> facts;
     std::function<void(const std::string&)> log;  // one sentence for each command
     std::string store_path;
-    const Layout* layout = nullptr;
+    ModelRegistry* models = nullptr;  // outlives the handler
   };
   RequestHandler(LineServer server, Options options)
-      : server_(std::move(server)), options_(std::move(options)), models_(options_.layout) {}
+      : server_(std::move(server)), options_(std::move(options)) {}
 
-  /// Bytes of lines and answers of one turn, after which no further line is taken: a turn ends with
-  /// the line that exceeds them. The cost goes by the bytes, 10 to 30 ns each: so much is a
-  /// millisecond. Half of it makes two turns of most answers to `status`; twice as much lets a stop
-  /// wait a millisecond longer behind them. One `state` of 5000 units exceeds it by far.
+  /// Bytes of lines and answers of one turn; the line that exceeds them is the turn's last. A byte
+  /// costs 10 to 30 ns, so the budget is about a millisecond. With half of it most answers to
+  /// `status` would take two turns. With twice as much a stop would wait a millisecond longer. A
+  /// `state` of 5000 units exceeds the budget by far.
   static constexpr std::size_t kTurnBytes = std::size_t{64} << 10;
-  /// Cost of a line by itself, however short: some 20 us of parsing, system calls and bookkeeping,
-  /// as bytes.
+  /// Cost of a line however short, as bytes: some 20 us of parsing, system calls and bookkeeping.
   static constexpr std::size_t kLineBytes = 1024;
 
-  /// A stop, as LineServer::Options::urgent wants it. One that is written more lavishly than
-  /// programs do (over 512 bytes, or escapes in the word) is no less done, but in its turn.
+  /// Whether the line is a stop, for LineServer::Options::urgent. A stop that no program would
+  /// write so (over 512 bytes, or escapes in the word) is not urgent; it is handled in its turn.
   static bool IsStop(std::string_view line);
 
   [[nodiscard]] int fd() const { return server_.fd(); }
 
-  /// Does a turn: reads requests, answers questions, appends commands.
+  /// A turn: requests are read, questions answered, commands appended.
   void Service(const FleetView& view, std::vector<Command>* commands);
+  /// The client receives the coordinator's reply as its answer.
   void Reply(const FleetView& view, const ReplyEffect& reply);
-  /// Shows progress to those who wait, when it is time.
+  /// Clients that wait receive progress, when it is time.
   void ShowProgress(const FleetView& view);
-  /// When ShowProgress wants to be called; kNever while nobody waits.
+  /// The instant at which ShowProgress is due; kNever while no client waits.
   [[nodiscard]] HostInstant wake_at() const { return waiting_ > 0 ? progress_at_ : kNever; }
-  /// The model that was in force when the last daemon ended. Errors: those of the store; kInvalid:
-  /// it is none of this fleet any more. Then none is in force.
-  Status RestoreModel();
-  [[nodiscard]] ModelRegistry& models() { return models_; }
-  [[nodiscard]] const ModelRegistry& models() const { return models_; }
-
-  /// Tells all who wait that the daemon ends, and leaves the store: whoever closes it last makes
-  /// one file of it.
+  /// All clients that wait receive that the daemon ends, and the store's reader is closed, so that
+  /// the writer closes last and leaves one file.
   void Close();
 
  private:
   struct Pending {
     ClientId client = 0;
-    std::uint64_t id = 0;  // of the client's request
+    std::uint64_t id = 0;  // number of the client's request
     bool wait = false;
-    bool pursues = false;  // apply or home: its summary is the configuration
-    bool retargets = false;
-    bool began = false;  // and the coordinator took it up
-    std::string note;    // to go after the answer's text
+    bool is_configuration = false;  // apply, home or measure: its summary is the configuration
+    bool is_retarget = false;
+    bool began = false;  // the coordinator has begun it
+    std::string note;    // stands after the answer's text
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
-  /// None: the verb is no question.
+  /// The answer to a question; none: the verb is no question.
   std::optional<Result<Json>> Ask(const FleetView& view, const ControlRequest& request);
   Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
   Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
   Result<Json> AskHistory(const FleetView& view, const ControlRequest& request);
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
-  /// None: the verb changes no model.
+  /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
-  Status TakeModelChanges();
-  /// Units that are not any more what the model in force was measured on go without it: their count
-  /// began anew, or other hardware sits there.
-  Status ForgetStrangers();
   [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);
@@ -104,14 +94,13 @@ class RequestHandler {
 
   LineServer server_;
   Options options_;
-  ModelRegistry models_;
-  std::unique_ptr<StoreReader> reader_;                 // opened with the first question for it
+  std::unique_ptr<StoreReader> reader_;  // opened with the first question that needs it
   std::unordered_map<std::uint64_t, Pending> pending_;  // by the coordinator's request number
   std::uint64_t next_request_ = 1;
-  std::size_t waiting_ = 0;  // of pending_, those that wait
+  std::size_t waiting_ = 0;  // entries of pending_ with `wait`
   HostInstant progress_at_{0};
   std::vector<IncomingLine> stops_;
-  bool stopped_ = false;         // the last turn was for stops alone
+  bool stopped_ = false;         // the last turn handled stops alone
   std::size_t spent_bytes_ = 0;  // in this turn
 };
 

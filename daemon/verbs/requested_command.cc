@@ -14,8 +14,8 @@
 namespace focalfleet {
 namespace {
 
-/// Units of a request by their numbers, each once. Errors: kInvalid names the first that does not
-/// exist.
+/// The units of a request by their numbers, each once. Errors: kInvalid names the first unit that
+/// does not exist.
 Result<std::vector<PositionerIndex>> FindUnits(const Layout& layout,
                                                const std::vector<std::uint32_t>& ids) {
   if (ids.empty()) return Fail(ErrorCode::kInvalid, "no unit named");
@@ -50,7 +50,7 @@ Result<Parameter> ParameterArgument(const Json& args) {
 
 constexpr double kCorrectionsMax = 10;
 
-/// {corrections?, tolerance_um?, observe?}: nothing of it, and the camera is left alone.
+/// {corrections?, tolerance_um?, observe?}: without `corrections` nothing is measured.
 Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
   if (!args.contains("corrections")) return std::optional<ApplyCommand::Measure>();
   ApplyCommand::Measure measure;
@@ -70,8 +70,8 @@ Result<std::optional<ApplyCommand::Measure>> MeasureOf(const Json& args) {
   return std::optional(measure);
 }
 
-/// How much more than its count a unit's place will be at its target, by the model in force.
-/// A measured configuration ends each way with the piece `last_deg`.
+/// Offsets by which each unit's place will exceed its count at its target, by the model in force. A
+/// measured configuration ends each way with the piece `last_deg`.
 std::vector<std::optional<Pose>> OffsetsOf(const FleetView& view,
                                            const std::vector<std::optional<Pose>>& targets,
                                            const std::array<double, kAxisCount>& last_deg) {
@@ -96,7 +96,7 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
                         TextArgument(args, "targets_csv", kControlLineBytesMax));
   FOCALFLEET_TRY(CheckLines(csv, source, std::size_t{2} * limits::kUnits));
   FOCALFLEET_TRY_ASSIGN(const bool fixed, FlagArgumentOr(args, "fixed", false));
-  // First, because it is the answer that the operator needs whatever is in the file.
+  // This check comes first: the operator needs this answer whatever the file holds.
   if (view.coordinator->busy())
     return Fail(ErrorCode::kRefused, "configuration " +
                                          std::to_string(view.coordinator->configuration().id) +
@@ -121,7 +121,7 @@ Result<ApplyCommand> ApplyOf(const Json& args, const FleetView& view) {
   return command;
 }
 
-/// Where it will stand, for choosing a side of its neighbours' elbows.
+/// Where the unit will stand; the elbow side of its neighbours is chosen by it.
 UnitKnowledge GoesTo(const UnitView& unit) {
   const bool goes = unit.target && (unit.outcome == TargetOutcome::kPending ||
                                     unit.outcome == TargetOutcome::kArrived);
@@ -150,14 +150,14 @@ Result<RetargetCommand> RetargetOf(const Json& args, const FleetView& view) {
   const auto poses = ResolveTargets({.source = "retarget", .rows = {row}}, *view.layout,
                                     view.coordinator->drives(), now);
   if (!poses) {
-    // There is no file whose line would have to be named.
+    // The error begins with file and line, and a retarget has no file.
     const std::string& text = poses.error().text;
     return Fail(poses.error().code, text.substr(text.find(": ") + 2));
   }
   return RetargetCommand{i, *(*poses)[i.value]};
 }
 
-/// Units whose place is not known and that can be homed now.
+/// The units whose place is not known and that can be homed now.
 std::vector<PositionerIndex> NotKnown(const FleetView& view) {
   std::vector<PositionerIndex> units;
   for (std::uint32_t n = 0; n < view.layout->size(); ++n) {
@@ -199,7 +199,7 @@ Result<EnableCommand> EnableOf(const Json& args, const FleetView& view, bool ena
   return command;
 }
 
-/// As docs/protocol.md has them; the unit says the last word, on its own state too.
+/// Ranges as in docs/protocol.md. The unit may still refuse a value within them, by its own state.
 struct ParameterRange {
   std::int64_t low;
   std::int64_t high;

@@ -1,5 +1,5 @@
-// What a request asks the coordinator to do: its arguments read and checked against the fleet as it
-// stands, before anything happens.
+// The command that a request asks of the coordinator. The arguments are read and checked against
+// the fleet in its present state, before anything happens.
 #pragma once
 
 #include "daemon/control/messages.h"
@@ -8,12 +8,12 @@
 
 namespace focalfleet {
 
-/// The unit of the argument `unit_id`. Errors: kInvalid where there is none such.
+/// The unit of the argument `unit_id`. Errors: kInvalid where there is no such unit.
 Result<PositionerIndex> UnitArgument(const Json& args, const Layout& layout);
 
 /// A request that changes something, as the coordinator's command. Verbs: apply retarget stop home
-/// disable enable adopt params_set. Errors: kInvalid or kRefused for people; nothing has happened
-/// then.
+/// measure disable enable adopt params_set. Errors: kInvalid or kRefused, with a text for people;
+/// nothing has happened then.
 Result<Command> CommandOf(const ControlRequest& request, const FleetView& view);
 
 }  // namespace focalfleet

@@ -17,7 +17,7 @@
 #include <string>
 
 #include "daemon/control/line_client.h"
-#include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/files/state_file.h"

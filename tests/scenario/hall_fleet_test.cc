@@ -16,7 +16,7 @@
 
 #include "daemon/control/line_client.h"
 #include "daemon/dds/status_reader.h"
-#include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "fleet/files/layout_file.h"
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"

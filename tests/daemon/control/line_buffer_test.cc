@@ -69,7 +69,7 @@ TEST(LineBuffer, LooksAtABoundedPieceEachTime) {
   EXPECT_EQ(asked, 5001) << "no line is looked at twice";
 }
 
-TEST(LineBuffer, OvertakesWhatIsCompleteAndNothingElse) {
+TEST(LineBuffer, OvertakesCompleteLinesOnly) {
   LineBuffer buffer;
   buffer.Append("a\nb");
   buffer.Overtake();

@@ -36,7 +36,7 @@ class EchoServer {
     while (!end_) {
       pollfd poller{server_.fd(), POLLIN, 0};
       ::poll(&poller, 1, 10);
-      std::vector<IncomingLine> urgent;  // nothing is
+      std::vector<IncomingLine> urgent;  // stays empty
       server_.Service(&urgent);
       while (const auto line = server_.Next()) Answer(*line);
     }
@@ -109,7 +109,7 @@ TEST(LineClient, GivesUpASilentServer) {
   EXPECT_FALSE(client.connected());
 }
 
-TEST(LineClient, NamesASocketThatNobodyAnswers) {
+TEST(LineClient, NamesASocketThatNoServerAnswers) {
   const Scratch scratch;
   const auto client = LineClient::Connect(scratch / "s");
   ASSERT_FALSE(client);
@@ -117,7 +117,7 @@ TEST(LineClient, NamesASocketThatNobodyAnswers) {
   EXPECT_THAT(client.error().text, HasSubstr(scratch / "s"));
 }
 
-TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
+TEST(LineClient, ReportsAServerThatDiesOrSendsGarbage) {
   const Scratch scratch;
   auto server = std::make_unique<EchoServer>(scratch / "s");
   auto mumbled = LineClient::Connect(scratch / "s").value();
@@ -132,7 +132,7 @@ TEST(LineClient, SaysSoWhereTheServerDiesOrMumbles) {
   EXPECT_FALSE(client.connected());
 }
 
-// As a daemon that is stopped: it listens, and takes nobody.
+// The server stands for a stopped daemon: it listens, and accepts no connection.
 TEST(LineClient, GivesUpOnAServerThatTakesNoConnection) {
   const Scratch scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();

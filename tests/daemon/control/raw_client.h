@@ -14,7 +14,7 @@
 
 namespace focalfleet {
 
-/// A client that does exactly what it is told, byte by byte.
+/// A client that sends exactly the bytes that a test gives.
 class RawClient {
  public:
   explicit RawClient(const std::string& path) {
@@ -30,14 +30,14 @@ class RawClient {
     const ssize_t sent = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     return sent > 0 ? static_cast<std::size_t>(sent) : 0;
   }
-  /// All that is there; `ended` says whether the server closed.
+  /// All bytes that have come; `ended` says whether the server closed.
   std::string Receive(bool* ended = nullptr) const {
     std::string all;
     std::array<char, 65536> chunk;
     for (;;) {
       const ssize_t got = ::recv(fd_, chunk.data(), chunk.size(), 0);
       if (ended != nullptr) *ended = got == 0;
-      if (got < 0 && errno == ECONNRESET) continue;  // told once, before what was sent ahead of it
+      if (got < 0 && errno == ECONNRESET) continue;  // reported once, before earlier bytes
       if (got <= 0) return all;
       all.append(chunk.data(), static_cast<std::size_t>(got));
     }

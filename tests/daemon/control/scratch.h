@@ -1,4 +1,4 @@
-// A directory of its own for one test, gone afterwards; its path is short, as UNIX sockets need.
+// A directory for one test, removed afterwards. Its path is short, as UNIX sockets need.
 #pragma once
 
 #include <cstdlib>

@@ -54,7 +54,7 @@ class BusLinesTest : public ::testing::Test {
   const CanFrame frame_ = Encode(HostMessage(IdentifyRequest{}), {NodeId{1}, 1});
 };
 
-TEST_F(BusLinesTest, TellsEveryLinkAtFirstAndThenOnlyChanges) {
+TEST_F(BusLinesTest, ReportsEveryLinkAtFirstAndThenOnlyChanges) {
   Receive(1);
   EXPECT_EQ(links_.size(), 2u);
   Receive(2);
@@ -66,7 +66,7 @@ TEST_F(BusLinesTest, TellsEveryLinkAtFirstAndThenOnlyChanges) {
   EXPECT_EQ(links_[0].state, LinkState::kPassive);
 }
 
-TEST_F(BusLinesTest, TellsAnotherTroubleOfALinkThatIsThere) {
+TEST_F(BusLinesTest, ReportsAnotherTroubleOfALinkThatIsUp) {
   Receive(1);
   fakes_[0]->text = "the controller warns of errors";
   Receive(2);
@@ -100,7 +100,7 @@ TEST_F(BusLinesTest, ReceivesOnlyWhereSomethingIsReadyOrDue) {
   EXPECT_EQ(fakes_[0]->received, 2);
 }
 
-TEST_F(BusLinesTest, ADeadLinkLosesWhatWaitsAndTakesNothing) {
+TEST_F(BusLinesTest, ADeadLinkDiscardsWaitingFramesAndTakesNone) {
   Receive(1);
   fakes_[0]->room = 0;
   lines_->Put({BusId{2}, frame_}, HostInstant{1});

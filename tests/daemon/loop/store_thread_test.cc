@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// Everything that the thread did, in order, and a disk that can be broken.
+/// A record of the thread's calls, in order, and a disk that can be broken.
 class Disk {
  public:
   StoreThread::Sinks Sinks() {
@@ -81,8 +81,7 @@ StatusBatch UnitsAfter(std::uint64_t batch, std::size_t units, bool with_fleet =
   return status;
 }
 
-/// Sleeps until the thread says that something changed, as the event loop does. A hang ends as a
-/// failure.
+/// Sleeps until the thread raises its signal, as the event loop does. A hang ends as a failure.
 template <class Predicate>
 bool Await(const EventSignal& progressed, const Predicate& done) {
   for (int i = 0; i < 1000; ++i) {
@@ -94,7 +93,7 @@ bool Await(const EventSignal& progressed, const Predicate& done) {
   return done();
 }
 
-TEST(StoreThread, CommitsInOrderAndSaysHowFar) {
+TEST(StoreThread, CommitsInOrderAndReportsTheLastBatch) {
   Disk disk;
   const auto progressed = EventSignal::Create().value();
   const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
@@ -133,7 +132,7 @@ TEST(StoreThread, KeepsABatchThatCannotBeWrittenAndTriesAgain) {
 
 TEST(StoreThread, SetsAsideARowThatCanNeverBeWrittenAndGoesOn) {
   Disk disk;
-  disk.Break(true);  // so that all of it becomes one transaction
+  disk.Break(true);  // so that all batches become one transaction
   const auto progressed = EventSignal::Create().value();
   const auto thread = StoreThread::Create(disk.Sinks(), &progressed).value();
   thread->Commit(1, Named("first"));
@@ -173,7 +172,7 @@ TEST(StoreThread, ABatchOfRefusedRowsAloneIsOverToo) {
   EXPECT_TRUE(thread->Finish());
 }
 
-TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {
+TEST(StoreThread, PublishesStatusOnlyAfterTheCommitOfItsRows) {
   Disk disk;
   disk.Break(true);
   const auto progressed = EventSignal::Create().value();
@@ -187,7 +186,7 @@ TEST(StoreThread, TellsStatusOnlyAfterTheCommitOfWhatItTells) {
   ASSERT_TRUE(thread->Finish());
   const auto log = disk.log();
   ASSERT_EQ(log.size(), 4u);
-  EXPECT_EQ(log[1], "publish 0 failing") << "that the store fails is told at once";
+  EXPECT_EQ(log[1], "publish 0 failing") << "the failure of the store is published at once";
   EXPECT_EQ(log[2], "commit one");
   EXPECT_EQ(log[3], "publish 3");
 }

@@ -60,7 +60,7 @@ TEST(SyncPulse, IsLeftOutWhereUnitsHaveBegunByThemselves) {
   EXPECT_EQ(pulse.missed(), 1u);
 }
 
-TEST(SyncPulse, TellsOfALineThatFails) {
+TEST(SyncPulse, ReportsALineThatFails) {
   Recorded line;
   line.broken = true;
   SyncPulse pulse(std::make_unique<RecordingLine>(&line), {});

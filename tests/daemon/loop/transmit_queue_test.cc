@@ -9,7 +9,7 @@
 namespace focalfleet {
 namespace {
 
-/// Takes so many frames, and no more until it is given room again.
+/// A port that takes a number of frames, and no more until it gets room again.
 class NarrowPort : public FramePort {
  public:
   explicit NarrowPort(std::size_t room) : room_(room) {}
@@ -44,7 +44,7 @@ std::uint32_t DelayOf(const CanFrame& frame) {
   return start == nullptr ? 0 : start->delay_ticks;
 }
 
-TEST(TransmitQueue, SendsInOrderAndKeepsWhatThePortRefuses) {
+TEST(TransmitQueue, SendsInOrderAndKeepsFramesThatThePortRefuses) {
   TransmitQueue transmit_queue;
   NarrowPort port(70);
   for (std::uint8_t n = 0; n < 100; ++n) EXPECT_TRUE(transmit_queue.Put(Identify(n), kNow));

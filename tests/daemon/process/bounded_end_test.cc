@@ -13,7 +13,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr std::chrono::milliseconds kPatience{60'000};  // a hang ends here; nothing is timed
+constexpr std::chrono::milliseconds kPatience{60'000};  // limit for a hang; nothing is timed
 
 TEST(BoundedEnd, WaitsForAllThatEnd) {
   int ended = 0;
@@ -23,7 +23,7 @@ TEST(BoundedEnd, WaitsForAllThatEnd) {
   EXPECT_THAT(BoundedEnd({}).Wait(kPatience), IsEmpty());
 }
 
-TEST(BoundedEnd, NamesWhatHangsAndGoesOn) {
+TEST(BoundedEnd, NamesPartsThatHangAndGoesOn) {
   std::latch go(1);
   std::latch other_ended(1);
   BoundedEnd all({{"the camera", [&go] { go.wait(); }},

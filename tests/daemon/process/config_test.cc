@@ -166,7 +166,7 @@ TEST(Config, ValueOutOfRangeIsAnErrorWithItsLine) {
   EXPECT_THAT(ErrorOf(bus + "[log]\nlevel = \"loud\""), HasSubstr(":4: log.level must be one of"));
 }
 
-TEST(Config, WhatDoesNotGoTogetherIsSaid) {
+TEST(Config, KeysThatContradictEachOtherAreReported) {
   EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\""), HasSubstr("bus.interfaces must name"));
   EXPECT_THAT(ErrorOf("[bus]\nport = \"socketcan\"\ninterfaces = [\"a\", \"a\"]"),
               HasSubstr(":3: bus.interfaces must name each interface once"));
@@ -186,7 +186,7 @@ TEST(Config, ManyFaultsNameTheFirstAndCountTheRest) {
             "/etc/focalfleet/f.toml:3: unknown key 'bus.x' (and 2 more)");
 }
 
-TEST(Config, WhatIsNoTomlIsAnErrorWithItsLine) {
+TEST(Config, ATextThatIsNoTomlIsAnErrorWithItsLine) {
   EXPECT_THAT(ErrorOf("[bus]\nport = \n"), StartsWith("/etc/focalfleet/f.toml:2: "));
   EXPECT_THAT(ErrorOf(std::string_view("\x00\xff\xfe garbage", 11)),
               StartsWith("/etc/focalfleet/f.toml:1: "));

@@ -27,7 +27,7 @@ class OpenPortsTest : public ::testing::Test {
                                      const Listening&) -> Result<OpenedInterface> {
       if (name.size() > 15) return Fail(ErrorCode::kInvalid, "none can be called " + name);
       if (!there.contains(name)) return Fail(ErrorCode::kUnavailable, "no interface " + name);
-      return OpenedInterface{-1, {.kind = kind}};  // there, and down
+      return OpenedInterface{-1, {.kind = kind}};  // present, and down
     };
     return OpenPorts(*config, *layout, HostClock(speed), open);
   }
@@ -58,7 +58,7 @@ TEST_F(OpenPortsTest, OnlyVirtualInterfacesMayRunInAnotherTime) {
             "motors do not hurry");
   kind = "vcan";
   EXPECT_TRUE(Open(all));
-  EXPECT_FALSE(Open({"can0", "can2"})) << "nobody knows what can1 will be";
+  EXPECT_FALSE(Open({"can0", "can2"})) << "it is unknown what can1 will be";
 }
 
 TEST_F(OpenPortsTest, AnInterfaceThatIsMissingIsABusThatIsDown) {

@@ -1,4 +1,4 @@
-// Status from before the domain could be joined, through real DDS.
+// Status that was published before the domain could be joined, through real DDS.
 #include "daemon/status/buffered_status_publisher.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ namespace {
 
 using testing::OwnDomain;
 
-constexpr std::chrono::seconds kPatience(60);  // a hang ends here; nothing is timed
+constexpr std::chrono::seconds kPatience(60);  // limit for a hang; nothing is timed
 
 struct Seen {
   std::map<std::uint32_t, UnitStatusValue> units;
@@ -42,7 +42,7 @@ AlarmValue Alarm(std::uint64_t id) {
   return alarm;
 }
 
-TEST(BufferedStatusPublisher, TellsTheWholeStateOnceItCanJoin) {
+TEST(BufferedStatusPublisher, PublishesTheWholeStateOnceItCanJoin) {
   std::counting_semaphore<> may_join(0);
   std::vector<std::string> reported;
   BufferedStatusPublisher publisher(
@@ -75,7 +75,7 @@ TEST(BufferedStatusPublisher, TellsTheWholeStateOnceItCanJoin) {
            seen.alarms.size() == StatusPublisher::kAlarmsKept && seen.fleet && seen.configuration;
   };
   while (!enough() && std::chrono::steady_clock::now() < until) {
-    publisher.Publish(StatusBatch{});  // as the store's thread does, again and again
+    publisher.Publish(StatusBatch{});  // as the store's thread does repeatedly
     ASSERT_TRUE(reader->Wait(std::chrono::milliseconds(10)));
     ASSERT_TRUE(reader->Take(&update));
     for (const auto& unit : update.units) seen.units[unit.unit.value] = unit;

@@ -17,7 +17,7 @@ class StatusSchedulerTest : public ::testing::Test {
   StatusScheduler scheduler_{3, {.rate_hz = 10, .version = "1", .started = {}}, HostClock()};
 };
 
-TEST_F(StatusSchedulerTest, TellsAllUnitsAtTheStart) {
+TEST_F(StatusSchedulerTest, PublishesAllUnitsAtTheStart) {
   EXPECT_TRUE(scheduler_.due(HostInstant{}));
   const StatusBatch batch = TakeAt(0);
   EXPECT_EQ(batch.units.size(), 3u);
@@ -28,7 +28,7 @@ TEST_F(StatusSchedulerTest, TellsAllUnitsAtTheStart) {
   EXPECT_EQ(batch.after_batch, 7u);
 }
 
-TEST_F(StatusSchedulerTest, ThenOnlyWhatChangedAndNotFasterThanTheRate) {
+TEST_F(StatusSchedulerTest, ThenOnlyChangedUnitsAndNotFasterThanTheRate) {
   TakeAt(0);
   scheduler_.Changed(std::vector<PositionerIndex>{{1}});
   EXPECT_FALSE(scheduler_.due(HostInstant{} + Milliseconds(99)));
@@ -45,7 +45,7 @@ TEST_F(StatusSchedulerTest, TheFleetIsReportedEachSecondInAnyCase) {
   EXPECT_TRUE(TakeAt(1000).units.empty());
 }
 
-TEST_F(StatusSchedulerTest, WhatWasNotTakenIsReportedAgain) {
+TEST_F(StatusSchedulerTest, ABatchThatWasNotTakenIsPublishedAgain) {
   const StatusBatch batch = TakeAt(0);
   scheduler_.GiveBack(batch, fleet_.layout());
   EXPECT_EQ(TakeAt(100).units.size(), 3u);

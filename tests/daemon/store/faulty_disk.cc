@@ -85,7 +85,7 @@ int FileControl(sqlite3_file* file, int what, void* argument) {
 }
 int SectorSize(sqlite3_file* file) { return RealOf(file)->pMethods->xSectorSize(RealOf(file)); }
 int Device(sqlite3_file* file) {
-  // Claims nothing (no atomic or safe-append writes), so that SQLite relies on its syncs alone.
+  // The disk claims nothing (no atomic or safe-append writes), so SQLite relies on its syncs alone.
   static_cast<void>(file);
   return 0;
 }
@@ -166,7 +166,7 @@ void FaultyDisk::PowerCut(const std::string& path, const std::string& to, Rng* r
   for (const char* suffix : {"", "-wal"}) {
     std::string content = Slurp(path + suffix);
     if (const auto writes = unsynced_.find(path + suffix); writes != unsynced_.end()) {
-      // Back to the last sync, then forward with those that happened to get through.
+      // The file is as of the last sync, then with the writes that happened to reach the disk.
       for (auto write = writes->second.rbegin(); write != writes->second.rend(); ++write) {
         const auto offset = static_cast<std::size_t>(write->offset);
         if (write->before.size() < write->after.size()) {

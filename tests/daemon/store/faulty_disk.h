@@ -1,6 +1,6 @@
-// A disk that can fail: a file layer for SQLite between it and the real one. Two kinds of trouble:
-// an operation that returns an error (the n-th, or all from the n-th on), and a power cut, after
-// which each write since a file's last sync may or may not have reached the disk.
+// A disk that can fail: a file layer for SQLite above the real one. The disk fails in two ways. An
+// operation returns an error (the n-th, or all from the n-th on). Or the power is cut; then each
+// write since a file's last sync may or may not have reached the disk.
 #pragma once
 
 #include <cstddef>
@@ -17,14 +17,14 @@ class FaultyDisk {
  public:
   static constexpr const char* kVfsName = "faulty_disk";
 
-  /// One at a time: SQLite knows file layers by name, once a process.
+  /// Pre: there is no other such disk, because SQLite knows file layers by name, once a process.
   FaultyDisk();
   FaultyDisk(const FaultyDisk&) = delete;
   FaultyDisk& operator=(const FaultyDisk&) = delete;
   ~FaultyDisk();
 
-  /// The n-th write, sync or truncation from now on (from 1) gives `sqlite_code`; `lasting`: all
-  /// after it too.
+  /// The n-th write, sync or truncation from now on (from 1) gives `sqlite_code`; with `lasting`
+  /// all later ones, too.
   void FailAt(std::uint64_t n, int sqlite_code, bool lasting);
   void Heal();
   [[nodiscard]] std::uint64_t operations() const { return operations_; }
@@ -33,7 +33,7 @@ class FaultyDisk {
   /// Copies the store's file and its WAL as a power cut now might leave them.
   void PowerCut(const std::string& path, const std::string& to, Rng* rng) const;
 
-  // Called by the file layer.
+  // ---- called by the file layer
   int NextOperation();
   void Wrote(const std::string& path, std::int64_t offset, std::string before, std::string after);
   void Truncated(const std::string& path, std::int64_t size);

@@ -1,5 +1,6 @@
-// The store of the scenarios is worth what it refuses: both stores are fed the same batches, drawn
-// at random with flaws in them, and must answer alike, name the same row, and hold the same fleet.
+// The scenarios' store in memory must refuse what the real one refuses. Both get the same batches,
+// drawn at random with flaws in them. They must answer alike, name the same row, and hold the same
+// fleet.
 #include "tests/support/memory_store.h"
 
 #include <algorithm>
@@ -151,7 +152,7 @@ class RowSource {
   Rng rng_;
 };
 
-/// Numbers that do not exist compare equal.
+/// Equality by which NaNs are equal.
 StoredFleet Comparable(StoredFleet fleet) {
   for (ConfigurationRow& row : fleet.configurations)
     for (double* value : {&row.makespan_predicted_s, &row.makespan_s, &row.energy_J,
@@ -194,7 +195,7 @@ TEST_F(MemoryStoreTest, RefusesAndKeepsWhatTheStoreDoes) {
     ASSERT_EQ(stored_row, memory_row);
     (stored ? kept : refused) += 1;
     if (n % 50 != 0) continue;
-    const auto loaded = store->Load();  // whatever was kept can be read back
+    const auto loaded = store->Load();  // all kept rows can be read back
     ASSERT_TRUE(loaded) << loaded.error().text;
     ExpectSameFleet(Comparable(*loaded), Comparable(memory.fleet));
     if (HasFailure()) return;

@@ -1,6 +1,6 @@
 // The disk under the store fails: an error at the n-th operation for every n, a full disk, kill -9,
-// a power cut. What Commit acknowledged stays, what it refused leaves no trace, and the store goes
-// on when the disk does.
+// a power cut. Acknowledged batches stay, refused ones leave no trace, and the store works again
+// when the disk does.
 #include <fcntl.h>
 #include <sys/wait.h>
 
@@ -51,7 +51,7 @@ TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
     ASSERT_FALSE(status) << "operation " << n;  // every one of them matters
     EXPECT_EQ(status.error().code, GetParam().reported) << status.error().text;
     EXPECT_EQ(BatchIn(*store->Load(), kSerials), held) << "operation " << n;
-    // The disk is well again, and so is the store.
+    // The disk works again, and so does the store.
     ++held;
     testing::ExpectDone(store->Commit(Batch(held, kSerials), kNow));
     EXPECT_EQ(BatchIn(*store->Load(), kSerials), held);
@@ -62,8 +62,8 @@ TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
   EXPECT_EQ(BatchIn(*OpenStore()->Load(), kSerials), held);
 }
 
-// 2000 serials a batch reach the 1000 pages at which SQLite moves the WAL into the file within the
-// run.
+// With 2000 serials a batch, the run reaches the 1000 pages at which SQLite moves the WAL into the
+// file.
 TEST_P(StoreFaults, ACheckpointMayFail) {
   constexpr std::uint32_t kSerials = 2000;
   const std::uint64_t seed = testing::TestSeed(2);
@@ -103,8 +103,8 @@ TEST_F(StoreTest, AcknowledgedBatchesSurvivePowerCuts) {
   FaultyDisk disk;
   auto store = OpenStore(FaultyDisk::kVfsName);
   for (std::uint32_t k = 1; k <= 40; ++k) {
-    // Half of the cuts come in the midst of a batch: its operations fail from some point on, then
-    // the power goes.
+    // Half of the cuts come within a batch: its operations fail from some point on, then the power
+    // is cut.
     const bool within = rng.Below(2) == 0;
     if (within) disk.FailAt(1 + rng.Below(12), SQLITE_IOERR_WRITE, true);
     const Status status = store->Commit(Batch(k, kSerials), kNow);
@@ -157,7 +157,7 @@ TEST_F(StoreTest, AWalCutOrGarbledAnywhereHoldsAWholeBatch) {
   EXPECT_GT(versions_below, 30u);
 }
 
-// A child commits batch after batch and says each one's number when it is acknowledged.
+// A child commits batch after batch and writes the number of each acknowledged one.
 [[noreturn]] void CommitForEver(const std::string& path, std::uint32_t k, std::uint32_t serials,
                                 int acknowledge) {
   auto store = Store::Open(path);
@@ -185,7 +185,7 @@ TEST_F(StoreTest, AcknowledgedBatchesSurviveKill) {
       ASSERT_EQ(read(pipe_ends[0], &acknowledged, sizeof acknowledged),
                 static_cast<ssize_t>(sizeof acknowledged));
     }
-    // Some way into whatever comes next.
+    // The kill comes somewhere within the next batch.
     std::atomic<std::uint64_t> spin = 1 + rng.Below(2'000'000);
     while (spin.fetch_sub(1) > 1) {
     }
@@ -199,7 +199,7 @@ TEST_F(StoreTest, AcknowledgedBatchesSurviveKill) {
     const auto fleet = store->Load();
     ASSERT_TRUE(fleet) << fleet.error().text;
     held = BatchIn(*fleet, kSerials);
-    // One more may be durable, killed between its commit and its acknowledgement.
+    // The next batch may be durable, too: killed between its commit and its acknowledgement.
     ASSERT_TRUE(held == acknowledged || held == acknowledged + 1)
         << "holds " << held << ", acknowledged " << acknowledged;
   }

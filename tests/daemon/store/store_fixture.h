@@ -1,5 +1,4 @@
-// A folder for one test's store, and batches whose content tells by which of them the store was
-// written.
+// A folder for a test's store, and batches whose content shows which of them the store holds.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -12,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/clock/wall_time.h"
 #include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "tests/support/temporary_folder.h"
 
 namespace focalfleet::testing {
@@ -31,7 +32,7 @@ class StoreTest : public ::testing::Test {
     EXPECT_TRUE(reader) << (reader ? "" : reader.error().text);
     return reader ? std::move(*reader) : nullptr;
   }
-  /// Behind the store's back, as an operator with the sqlite3 shell.
+  /// SQL past the store, as an operator with the sqlite3 shell would run it.
   void Sql(const std::string& sql) {
     sqlite3* db = nullptr;
     ASSERT_EQ(sqlite3_open(Path().c_str(), &db), SQLITE_OK);
@@ -43,6 +44,16 @@ class StoreTest : public ::testing::Test {
 
   TemporaryFolder folder_;
 };
+
+inline constexpr WallTime kEight{1'700'000'000'000'000'000};
+inline constexpr WallTime kNine{1'700'003'600'000'000'000};
+
+/// The error of an operation that should have failed. A success reads as an error that no test
+/// expects.
+template <class T>
+Error ErrorOf(const Result<T>& result) {
+  return result ? Error{static_cast<ErrorCode>(99), "success"} : result.error();
+}
 
 inline void ExpectDone(const Status& status) { EXPECT_TRUE(status) << status.error().text; }
 
@@ -67,8 +78,22 @@ inline IntentRow Intent(std::uint32_t unit, std::uint32_t serial, std::uint16_t 
   return row;
 }
 
-/// Batch k says k everywhere: in the vectors of all serials, in a parameter, in the next move and
-/// in an alarm.
+/// The tuning of the phi axis of serial number 7.
+inline TuningRow Tuned(std::uint16_t critical, double margin) {
+  return {.serial = {7},
+          .axis = Axis::kPhi,
+          .critical = critical,
+          .repeat = 54,
+          .margin = margin,
+          .load_uNm = 4.07,
+          .v_bus_V = 1.8,
+          .counter1 = 500,
+          .subdivision = 96,
+          .mode = WaveMode::kSevenSegment};
+}
+
+/// Batch k holds k everywhere: in the vectors of all serials, in a parameter, in a tuning, in the
+/// next move and in an alarm.
 inline std::vector<Row> Batch(std::uint32_t k, std::uint32_t serials) {
   std::vector<Row> rows;
   for (std::uint32_t serial = 1; serial <= serials; ++serial) {
@@ -91,7 +116,7 @@ inline std::vector<Row> Batch(std::uint32_t k, std::uint32_t serials) {
   return rows;
 }
 
-/// Which batch a store holds; fails where it holds parts of two.
+/// The batch that a store holds; fails where it holds parts of two.
 inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   if (fleet.vectors.empty()) {
     EXPECT_EQ(fleet.next_alarm, 1u);

@@ -5,9 +5,9 @@
 
 #include <map>
 
-#include "daemon/campaign/campaign_log.h"
 #include "daemon/campaign/sha256.h"
 #include "fleet/hex_layout.h"
+#include "tests/daemon/verbs/model_text.h"
 
 namespace focalfleet {
 namespace {
@@ -18,26 +18,7 @@ class ModelRegistryTest : public ::testing::Test {
  protected:
   ModelRegistryTest() : layout_(*Layout::Create(MakeHexLayout({.count = 3}), {})) {}
 
-  [[nodiscard]] std::string Text(const std::string& name) const {
-    std::string text = "name = \"" + name + "\"\ncampaign = \"night\"\nverdict = \"explained\"\n";
-    text += "rms_before_um = 54\nrms_after_um = 9\n";
-    for (const Unit& described : layout_.units()) {
-      const sim::CampaignUnit unit = DescribeUnit(described);
-      const auto line = [&](const char* key, double value) {
-        text += std::string(key) + " = " + std::to_string(value) + "\n";
-      };
-      text += "[[unit]]\nunit_id = " + std::to_string(unit.id) + "\n";
-      line("base_x_mm", unit.base_x_mm);
-      line("base_y_mm", unit.base_y_mm);
-      line("arm_theta_mm", unit.arm_mm[0]);
-      line("arm_phi_mm", unit.arm_mm[1]);
-      line("theta_zero_deg", unit.zero_deg[0] + 1);
-      line("phi_zero_deg", unit.zero_deg[1]);
-      for (const char* key : {"left_theta_deg", "left_phi_deg", "added_theta_deg", "added_phi_deg"})
-        line(key, 0);
-    }
-    return text;
-  }
+  [[nodiscard]] std::string Text(const std::string& name) const { return ModelText(layout_, name); }
   ModelRow Load(ModelRegistry* registry, const std::string& name) {
     const auto row = registry->Load(Text(name), name + ".toml");
     EXPECT_TRUE(row) << row.error().text;
@@ -55,7 +36,7 @@ class ModelRegistryTest : public ::testing::Test {
   std::map<std::string, std::string> stored_;
 };
 
-TEST_F(ModelRegistryTest, WhatIsLoadedHoldsAndSaysWhereItIsFrom) {
+TEST_F(ModelRegistryTest, ALoadedModelIsInForceAndNamesItsOrigin) {
   ModelRegistry registry(&layout_);
   EXPECT_EQ(registry.compensation(), nullptr);
   const ModelRow row = Load(&registry, "one");
@@ -116,7 +97,7 @@ TEST_F(ModelRegistryTest, GoesBackStepByStepAndForwardAgainByLoading) {
   EXPECT_EQ(registry.compensation(), nullptr);
 }
 
-TEST_F(ModelRegistryTest, ARestartFindsWhatHeld) {
+TEST_F(ModelRegistryTest, ARestartRestoresTheModelInForce) {
   ModelRegistry registry(&layout_);
   std::vector<ModelHistory> newest_first;
   for (const char* name : {"one", "two"})
@@ -128,7 +109,7 @@ TEST_F(ModelRegistryTest, ARestartFindsWhatHeld) {
   EXPECT_EQ(after.since().ns, 5);
   ASSERT_TRUE(Rollback(&after));
   EXPECT_EQ(after.name(), "one");
-  // A layout that it is not of any more: none holds, and its past is known.
+  // The model does not belong to this layout: none is in force, and the past is known.
   const auto other = Layout::Create(MakeHexLayout({.count = 3, .pitch_mm = 60}), {});
   ASSERT_TRUE(other);
   ModelRegistry elsewhere(&*other);
@@ -139,7 +120,7 @@ TEST_F(ModelRegistryTest, ARestartFindsWhatHeld) {
 }
 
 TEST_F(ModelRegistryTest, AChangeIsNumberedAfterAllThatTheStoreHas) {
-  // Also where the text of the newest could not be read: no number is given twice.
+  // The same where the text of the newest model cannot be read: no number is given twice.
   ModelRegistry after(&layout_);
   after.TakeChanges({ModelHistory{{.entry = 7, .sha256 = "lost", .name = "two"}, {5}},
                      ModelHistory{{.entry = 6, .sha256 = "older", .name = "one"}, {4}}});

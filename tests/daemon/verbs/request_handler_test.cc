@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/control/line_client.h"
+#include "daemon/status/status_json.h"
 #include "protocol/base/limits.h"
 #include "tests/daemon/control/raw_client.h"
 #include "tests/daemon/control/scratch.h"
@@ -24,7 +25,7 @@ std::string Line(std::uint64_t id, const std::string& verb, const Json& args = J
   return EncodeRequest({id, verb, args}) + "\n";
 }
 
-/// A request handler, and the clients before it; its turns are taken one by one.
+/// A request handler and its clients; its turns are taken one by one.
 class RequestHandlerTest : public ::testing::Test {
  protected:
   explicit RequestHandlerTest(std::uint32_t units = 3)
@@ -33,7 +34,7 @@ class RequestHandlerTest : public ::testing::Test {
                  {.facts = [] { return ShellFacts{}; },
                   .log = [this](const std::string& text) { log_ += text + "\n"; },
                   .store_path = scratch_ / "none.db",
-                  .layout = &fleet_.layout()}) {}
+                  .models = &models_}) {}
 
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
@@ -61,14 +62,15 @@ class RequestHandlerTest : public ::testing::Test {
   const Scratch scratch_;
   SmallFleet fleet_;
   std::string log_;
+  ModelRegistry models_{&fleet_.layout()};
   RequestHandler handler_;
   std::vector<std::unique_ptr<RawClient>> clients_;
   std::vector<Command> commands_;
 };
 
-TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
+TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeAllOtherLines) {
   for (int i = 0; i < 10; ++i) Add(Line(1, "status"));
-  Turn();  // takes them in, in turns of its own size
+  Turn();  // accepts the clients, some in each turn
   TurnUntilQuiet();
   for (auto& client : clients_) {
     static_cast<void>(client->Receive());
@@ -87,7 +89,7 @@ TEST_F(RequestHandlerTest, AStopIsHandledAloneBeforeWhateverElseWasRead) {
   for (std::size_t i = 0; i < 10; ++i) EXPECT_THAT(clients_[i]->Receive(), HasSubstr(R"("id":3)"));
 }
 
-TEST_F(RequestHandlerTest, AFloodOfStopsKeepsNobodyOut) {
+TEST_F(RequestHandlerTest, AFloodOfStopsKeepsNoClientOut) {
   std::string flood;
   for (std::uint64_t id = 1; id <= 200; ++id) flood += Line(id, "stop");
   Add();
@@ -161,7 +163,7 @@ TEST_F(RequestHandlerTest, AMotionThatAStopOvertookIsRefused) {
 
 TEST_F(RequestHandlerTest, WhereAllPlacesAreBusyOnlyStopIsTaken) {
   for (std::uint32_t i = 0; i < limits::kControlClients; ++i) {
-    Add(Line(1, "adopt", {{"unit_id", 1}}));  // stays open: nobody steps the coordinator
+    Add(Line(1, "adopt", {{"unit_id", 1}}));  // stays open: the coordinator is not stepped
     TurnUntilQuiet();
   }
   Add(Line(7, "status"));

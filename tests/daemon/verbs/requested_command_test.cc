@@ -5,7 +5,6 @@
 
 #include <variant>
 
-#include "daemon/status/status_json.h"
 #include "tests/daemon/control/scratch.h"
 #include "tests/daemon/verbs/small_fleet.h"
 
@@ -113,7 +112,7 @@ TEST(RequestedCommand, RetargetTakesAPlaceOrTwoAngles) {
   EXPECT_THAT(far, HasSubstr("out of patrol"));
 }
 
-TEST(RequestedCommand, NamesWhatIsWrong) {
+TEST(RequestedCommand, NamesTheFault) {
   const SmallFleet fleet;
   EXPECT_THAT(ErrorOf(fleet, "dance", Json::object()), HasSubstr("no verb 'dance'"));
   EXPECT_THAT(ErrorOf(fleet, "adopt", {{"unit_id", 99}}), HasSubstr("no unit 99"));
@@ -150,28 +149,6 @@ TEST(RequestedCommand, RefusesValuesThatNoUnitTakes) {
   EXPECT_EQ(error("host_timeout_ms", 99), "host_timeout_ms must be 100..3600000, not 99");
   EXPECT_EQ(error("position", 8'388'608), "position must be -8388607..8388607, not 8388608");
   EXPECT_EQ(error("position", 5'000'000'000), "position must be -8388607..8388607, not 5000000000");
-}
-
-TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
-  const SmallFleet fleet;
-  const Json state = Json::parse(StateText(fleet.View()), nullptr, false);
-  ASSERT_TRUE(state.is_object());
-  ASSERT_EQ(state["rows"].size(), 3u);
-  EXPECT_EQ(state["rows"][1]["unit_id"], 2);
-  EXPECT_EQ(state["rows"][1]["theta_witness"], "unknown");
-  EXPECT_TRUE(state["rows"][1]["theta_low_deg"].is_null());
-}
-
-TEST(StatusJson, StatusCountsEveryUnitOnce) {
-  const SmallFleet fleet;
-  ShellFacts facts;
-  facts.buses.resize(1);
-  const Json status = StatusJson(fleet.View(), facts);
-  EXPECT_EQ(status["units"], 3);
-  EXPECT_EQ(status["phases"]["absent"], 3);
-  EXPECT_EQ(status["positions"]["unknown"], 3);
-  EXPECT_EQ(status["buses"].size(), 1u);
-  EXPECT_EQ(status["configuration"]["unserved"].size(), 0u);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A few units in a row, a coordinator that nobody answers, and a view of both.
+// A few units in a row, their coordinator without any replies, and a view of both.
 #pragma once
 
 #include <memory>

@@ -1,0 +1,70 @@
+// Entries of the history that the store keeps, as StoreReader lists them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "daemon/clock/wall_time.h"
+#include "fleet/records.h"
+
+namespace focalfleet {
+
+/// A motion of a unit, from the intent to its end. Units: vectors.
+struct MoveHistory {
+  std::uint64_t configuration = 0;
+  UnitId unit;
+  SerialNumber serial;
+  MoveId move;
+  Pose from{};
+  Pose to{};
+  UnitKnowledge hull;
+  WallTime began;
+  std::optional<WallTime> ended;          // none: the intent is open
+  std::optional<IntentEnd> end;           // present with `ended`
+  std::optional<UnitKnowledge> ended_at;  // knowledge of the unit at the end
+};
+
+struct ConfigurationHistory {
+  ConfigurationRow row;
+  WallTime began;
+  WallTime changed;  // time of the last write; where done, stopped or failed: the end
+};
+
+struct ParameterHistory {
+  ParameterRow row;
+  WallTime at;
+};
+
+struct TuningHistory {
+  TuningRow row;
+  WallTime at;
+};
+
+struct AlarmHistory {
+  AlarmRow row;
+  WallTime at;
+};
+
+/// A change of a place: bound to a serial number, disabled, enabled.
+struct UnitHistory {
+  UnitId unit;
+  SerialNumber serial;
+  bool enabled = true;
+  std::string reason;
+  WallTime at;
+};
+
+struct MeasurementHistory {
+  MeasurementRow row;
+  WallTime at;  // when it was stored
+  /// The unit was moved again after this exposure, in the same configuration: it is elsewhere now.
+  bool moved_since = false;
+};
+
+struct ModelHistory {
+  ModelRow row;  // without its text
+  WallTime at;
+};
+
+}  // namespace focalfleet

@@ -1,0 +1,63 @@
+// Readers of the store beside its writer: the history of the fleet, and all that the coordinator
+// needs to go on. A reader has a connection of its own; any number may read, in any process.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/clock/wall_time.h"
+#include "daemon/store/history.h"
+#include "daemon/store/store_options.h"
+#include "fleet/records.h"
+#include "protocol/base/result.h"
+
+namespace focalfleet {
+
+namespace store_internal {
+class Connection;
+}  // namespace store_internal
+
+/// A reader beside the writer, in any process. Each query sees one whole state. Lists are newest
+/// first. Errors of all queries: kInvalid names table and row; kUnavailable: the file cannot be
+/// read.
+class StoreReader {
+ public:
+  /// The store is open for reading. Errors: kUnavailable: no such file, or not readable; kNewer:
+  /// written by a later version; kInvalid: not a store.
+  static Result<std::unique_ptr<StoreReader>> Open(const std::string& path,
+                                                   const StoreOptions& options = {});
+  StoreReader(const StoreReader&) = delete;
+  StoreReader& operator=(const StoreReader&) = delete;
+  ~StoreReader();
+
+  Result<StoredFleet> Load();
+  Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit);
+  Result<std::vector<ConfigurationHistory>> Configurations(std::uint32_t limit);
+  Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
+  Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
+  Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
+  /// The measurements of one exposure, by unit id.
+  Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
+  /// The newest exposure of a configuration; none: it was never measured.
+  Result<std::optional<std::uint64_t>> LastExposure(std::uint64_t configuration);
+  Result<std::vector<ModelHistory>> Models(std::uint32_t limit);
+  /// The units whose count began anew after `since`: homed, set by hand, found by the camera, or
+  /// other hardware was adopted there.
+  Result<std::vector<UnitId>> CountedAnewSince(WallTime since);
+  /// The places and the hardware that is bound to each.
+  Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
+  /// The text of a model. Errors: kRefused: the store has none of that sha256.
+  Result<std::string> ModelText(const std::string& sha256);
+  Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
+
+ private:
+  StoreReader();
+
+  std::unique_ptr<store_internal::Connection> connection_;
+};
+
+}  // namespace focalfleet

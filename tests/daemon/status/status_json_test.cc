@@ -1,0 +1,33 @@
+#include "daemon/status/status_json.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/daemon/verbs/small_fleet.h"
+
+namespace focalfleet {
+namespace {
+
+TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
+  const SmallFleet fleet;
+  const Json state = Json::parse(StateText(fleet.View()), nullptr, false);
+  ASSERT_TRUE(state.is_object());
+  ASSERT_EQ(state["rows"].size(), 3u);
+  EXPECT_EQ(state["rows"][1]["unit_id"], 2);
+  EXPECT_EQ(state["rows"][1]["theta_witness"], "unknown");
+  EXPECT_TRUE(state["rows"][1]["theta_low_deg"].is_null());
+}
+
+TEST(StatusJson, StatusCountsEveryUnitOnce) {
+  const SmallFleet fleet;
+  ShellFacts facts;
+  facts.buses.resize(1);
+  const Json status = StatusJson(fleet.View(), facts);
+  EXPECT_EQ(status["units"], 3);
+  EXPECT_EQ(status["phases"]["absent"], 3);
+  EXPECT_EQ(status["positions"]["unknown"], 3);
+  EXPECT_EQ(status["buses"].size(), 1u);
+  EXPECT_EQ(status["configuration"]["unserved"].size(), 0u);
+}
+
+}  // namespace
+}  // namespace focalfleet

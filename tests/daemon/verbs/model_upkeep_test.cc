@@ -1,0 +1,74 @@
+#include "daemon/verbs/model_upkeep.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "daemon/store/store.h"
+#include "tests/daemon/control/scratch.h"
+#include "tests/daemon/verbs/model_text.h"
+#include "tests/daemon/verbs/small_fleet.h"
+
+namespace focalfleet {
+namespace {
+
+class ModelUpkeepTest : public ::testing::Test {
+ protected:
+  ModelUpkeepTest() : store_(Store::Open(scratch_ / "fleet.db").value()) {}
+
+  /// The store has one model, loaded at this time.
+  void StoreModel(WallTime at) {
+    ModelRegistry registry(&fleet_.layout());
+    const auto row = registry.Load(ModelText(fleet_.layout(), "night"), "night.toml");
+    ASSERT_TRUE(row) << row.error().text;
+    ASSERT_TRUE(store_->Commit(std::vector<Row>{*row}, at));
+  }
+  std::unique_ptr<StoreReader> Reader() { return StoreReader::Open(scratch_ / "fleet.db").value(); }
+
+  const Scratch scratch_;
+  SmallFleet fleet_;
+  std::unique_ptr<Store> store_;
+  ModelRegistry models_{&fleet_.layout()};
+};
+
+TEST_F(ModelUpkeepTest, WithoutAModelInTheStoreNoneIsInForce) {
+  ASSERT_TRUE(RestoreModel(Reader().get(), &models_));
+  EXPECT_EQ(models_.compensation(), nullptr);
+  EXPECT_TRUE(models_.changes_known());
+}
+
+TEST_F(ModelUpkeepTest, TheLastModelIsRestoredForUnitsWhoseCountDidNotBeginAnew) {
+  StoreModel({5});
+  ASSERT_TRUE(store_->Commit(std::vector<Row>{BindingRow{{2}, {7002}}}, {4}));
+  VectorRow set{{7002},           Exactly(Witness::kReported, Pose{1, 1}), {}, {96, 96}, {1},
+                Origin::kOperator};
+  ASSERT_TRUE(store_->Commit(std::vector<Row>{set}, {6}));
+  const Status restored = RestoreModel(Reader().get(), &models_);
+  ASSERT_TRUE(restored) << restored.error().text;
+  ASSERT_NE(models_.compensation(), nullptr);
+  EXPECT_TRUE(models_.compensation()->Knows({0}));
+  EXPECT_FALSE(models_.compensation()->Knows({1})) << "its count was set after the model came";
+  EXPECT_TRUE(models_.compensation()->Knows({2}));
+}
+
+TEST_F(ModelUpkeepTest, AModelOfAnotherFleetIsNotRestored) {
+  StoreModel({5});
+  const SmallFleet other(4);
+  ModelRegistry models(&other.layout());
+  EXPECT_FALSE(RestoreModel(Reader().get(), &models));
+  EXPECT_EQ(models.compensation(), nullptr);
+}
+
+TEST_F(ModelUpkeepTest, AUnitWhoseHardwareWasReplacedGoesWithoutTheModel) {
+  ASSERT_TRUE(models_.Load(ModelText(fleet_.layout(), "night"), "night.toml"));
+  Effects effects;
+  effects.rows = {BindingRow{{3}, {7003}}, BindingRow{{1}, {7001}, {6001}}};
+  NoteEffects(fleet_.View(), effects, models_.compensation());
+  EXPECT_FALSE(models_.compensation()->Knows({0}));
+  EXPECT_TRUE(models_.compensation()->Knows({2})) << "it was bound for the first time";
+  NoteEffects(fleet_.View(), effects, nullptr);
+}
+
+}  // namespace
+}  // namespace focalfleet
