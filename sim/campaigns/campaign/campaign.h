@@ -68,7 +68,6 @@ struct Campaign {
   [[nodiscard]] std::size_t rows() const { return move_id.size(); }
   /// None: empty.
   [[nodiscard]] std::span<const double> Find(std::string_view covariate) const;
-  [[nodiscard]] const WordColumn* FindWords(std::string_view column) const;
 };
 
 /// Rows of one exposure, that is, with one move_id.

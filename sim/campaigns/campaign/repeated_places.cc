@@ -66,8 +66,8 @@ double ShareByChance(const std::vector<Revisit>& revisits, double step_mm) {
   // are too coarse to tell. Double of it misses places that are carried on in steps of 10 um, half
   // of it sees some in those of a very good camera.
   constexpr double kGoodCamera_mm = 1e-3;
-  constexpr double kNormal = 0.6745;  // median of a normal variable's size
-  constexpr double kTells = 1.5;      // steps, by which places differ that do
+  constexpr double kNormal = 0.6745;        // median of a normal variable's size
+  constexpr double kDiffersBy_steps = 1.5;  // steps, by which places differ that do
   if (!(step_mm > 0)) return 0;
   std::vector<double> off_mm;
   for (const Revisit& revisit : revisits)
@@ -77,7 +77,7 @@ double ShareByChance(const std::vector<Revisit>& revisits, double step_mm) {
   if (!off_mm.empty()) {
     const auto middle = off_mm.begin() + static_cast<std::ptrdiff_t>(off_mm.size() / 2);
     std::nth_element(off_mm.begin(), middle, off_mm.end());
-    if (*middle > kTells * step_mm) spread_mm = *middle / kNormal;
+    if (*middle > kDiffersBy_steps * step_mm) spread_mm = *middle / kNormal;
   }
   const double same = SameStep(step_mm, spread_mm);
   return same * same;

@@ -26,10 +26,11 @@ struct PairTrial {
 };
 
 /// The most promising pairs in the place of a term of both axes; empty where it is of one, or none
-/// comes near. `pass`, `evidences`: of the templates, without the term. `kept_min`: of a signature,
-/// beside geometry and model.
+/// comes near. `pass`, `evidence_of`: of the templates, without the term. `kept_min`: of a
+/// signature, beside geometry and model.
 std::vector<PairTrial> TryPairs(const Fit& fit, std::size_t term, const ScorePass& pass,
-                                const Templates& templates, const std::vector<Evidence>& evidences,
-                                const FleetGroups& groups, double kept_min);
+                                const Templates& templates,
+                                const std::vector<Evidence>& evidence_of, const FleetGroups& groups,
+                                double kept_min);
 
 }  // namespace focalfleet::sim

@@ -18,10 +18,10 @@ struct CandidateShape {
 };
 
 /// The best templates of the causes that come near the best of all, `best`: an index, or kNoTerm.
-/// Shapes: pass and evidences (templates). `kept_min`: share of a signature that must be left of it
-/// beside geometry and model.
+/// Shapes: pass and evidence_of (templates). `kept_min`: share of a signature that must be left of
+/// it beside geometry and model.
 std::vector<CandidateShape> CandidateShapesOf(const ScorePass& pass,
-                                              const std::vector<Evidence>& evidences,
+                                              const std::vector<Evidence>& evidence_of,
                                               const Templates& templates, std::size_t best,
                                               double kept_min);
 

@@ -191,7 +191,7 @@ ModelComparison CompareModels(const ModelPair& models, const Campaign& given,
   std::vector<char> aside;
   out.left_out = FindBeforeFit(facts, repeated, &aside).why;
   CampaignModel a = *models.a, b = *models.b;
-  out.a.left_out = LeaveOutUntold(facts, &a), out.b.left_out = LeaveOutUntold(facts, &b);
+  out.a.left_out = LeaveOutUntestable(facts, &a), out.b.left_out = LeaveOutUntestable(facts, &b);
   const std::vector<double> lengths_a = LengthsOf(a, facts, aside, options.parallel);
   const std::vector<double> lengths_b = LengthsOf(b, facts, aside, options.parallel);
   const FarOff far_a = FindFarOff(campaign, lengths_a), far_b = FindFarOff(campaign, lengths_b);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "sim/campaigns/campaign/place_steps.h"
 #include "sim/campaigns/diagnosis/ahead.h"
 #include "sim/campaigns/diagnosis/model.h"
+#include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {
 
@@ -91,7 +93,7 @@ struct NextMoves {
   std::vector<ProposedMove> moves;
   std::vector<Prospect> prospects;
   std::vector<std::pair<std::string, std::string>>
-      untold;  // cause and rival that moves do not tell
+      inseparable;  // cause and rival that moves do not tell
 };
 
 enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };
@@ -121,8 +123,9 @@ struct Diagnosis {
 struct DiagnoseOptions {
   std::uint64_t seed = 1;
   double family_wise = 0.01;
+  std::span<const Effect> library =
+      EffectLibrary();                    // outlives the diagnosis, whose terms point to it
   std::vector<std::string> leave_out;     // causes that the library shall not have
-  std::vector<const Effect*> also;        // effects beside the library
   std::uint64_t shuffle_library = 0;      // not 0: another order of its templates
   const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
   bool patch = false;                     // empirical terms for what is unknown

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kEventsMax = 40;  // of a unit at once
 constexpr int kTurnsMax = 20;
-constexpr double kEventEvidence = 25;  // at least, of an event that was taken
+constexpr double kEventLogLikelihood = 25;  // at least, of an event that was taken
 
 // ---- slips near the noise: whole turns of the rotor, against the motion
 
@@ -73,8 +73,8 @@ double GainOfStep(const std::vector<AngleRow>& rows, const UnitTrack& track, std
 struct Jump {
   std::size_t move = 0;  // that it happened in
   double size_deg = 0, turns = 0;
-  bool whole = false;  // a whole number of turns, against the motion
-  bool holds = false;  // the next rows stand at the new level
+  bool whole = false;       // a whole number of turns, against the motion
+  bool is_lasting = false;  // the next rows stand at the new level
 };
 
 // The move between two rows that went the other way, the longest; 0: none.
@@ -108,7 +108,7 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
                    std::abs(tried - jump.turns * turn) < 0.25 * turn;
       if (jump.whole) break;
     }
-    jump.holds = GainOfStep(rows, track, k, jump.turns * turn, noise_mm) > kGainMin;
+    jump.is_lasting = GainOfStep(rows, track, k, jump.turns * turn, noise_mm) > kGainMin;
     jumps.push_back(jump);
   }
   return jumps;
@@ -153,7 +153,7 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   }
   const bool many = whole >= 4 && whole >= 0.8 * all;
   for (const Jump& jump : jumped)
-    if (jump.whole && (many || jump.holds) && events.size() < kEventsMax)
+    if (jump.whole && (many || jump.is_lasting) && events.size() < kEventsMax)
       events.push_back({unit, track.first_row + jump.move, axis, true, jump.turns * turn});
   return events;
 }
@@ -262,7 +262,7 @@ CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view parag
   cause.all_units = units.size() == fit.model.units.size();
   cause.ci95[0] = cause.ci95[1] = cause.amplitude;
   cause.size_um = std::sqrt(square / cause.amplitude);
-  cause.delta_log_likelihood = kEventEvidence * cause.amplitude;
+  cause.delta_log_likelihood = kEventLogLikelihood * cause.amplitude;
   cause.paragraph = paragraph;
   return cause;
 }
@@ -334,7 +334,7 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
   return causes;
 }
 
-std::vector<UnknownFound> StandOff(const Fit& fit) {
+std::vector<UnknownFound> UnexplainedSteps(const Fit& fit) {
   std::vector<UnknownFound> reported;
   if (AnyHasMet(fit)) return reported;
   for (const EventTerm& event : fit.model.events)

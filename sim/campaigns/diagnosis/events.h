@@ -28,6 +28,6 @@ bool IsOfContact(const Fit& fit, const EventTerm& event);
 std::vector<CauseFound> EventCauses(const Fit& fit);
 
 /// The steps that nobody has a cause for.
-std::vector<UnknownFound> StandOff(const Fit& fit);
+std::vector<UnknownFound> UnexplainedSteps(const Fit& fit);
 
 }  // namespace focalfleet::sim

@@ -43,7 +43,7 @@ struct GroupScore {
     price_ += price;
     chi_square = std::max(chi_square - 2 * price, 0.0);
   }
-  [[nodiscard]] double Evidence(double size) const {
+  [[nodiscard]] double LogEvidence(double size) const {
     double sum = -price_;
     const double a2 = size * size;
     for (const Direction2& d : along())
@@ -180,7 +180,7 @@ double LevelLogP(const Level& level) {
 }
 
 struct MixtureFit {
-  double evidence = -std::numeric_limits<double>::infinity();
+  double log_evidence = -std::numeric_limits<double>::infinity();
   double size = 0, share = 1;
 };
 
@@ -209,7 +209,7 @@ void SumTogether(const Level& level, double size, std::vector<double>* evidence)
   for (std::size_t k = 0; k < level.groups.size(); ++k) {
     if (level.groups[k].empty()) continue;
     double& sum = (*evidence)[level.as_one(k)];
-    sum = (std::isnan(sum) ? 0 : sum) + level.groups[k].Evidence(size);
+    sum = (std::isnan(sum) ? 0 : sum) + level.groups[k].LogEvidence(size);
   }
 }
 
@@ -232,14 +232,14 @@ MixtureFit Mix(const Level& level, double prior_size) {
       if (sum > most) most = sum, best.size = size, best.share = share;
     }
   }
-  best.evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
+  best.log_evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
   return best;
 }
 
 // Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
 // `price`: of each unit.
 struct ScatterFit {
-  double evidence = -std::numeric_limits<double>::infinity();
+  double log_evidence = -std::numeric_limits<double>::infinity();
   double spread = 0;
 };
 ScatterFit Scatter(const Score& score, double prior_size, double dispersion, double price) {
@@ -272,13 +272,13 @@ ScatterFit Scatter(const Score& score, double prior_size, double dispersion, dou
     terms.push_back(sum);
     if (sum > most) most = sum, best.spread = spread;
   }
-  best.evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
+  best.log_evidence = LogSum(terms) - std::log(static_cast<double>(terms.size()));
   return best;
 }
 
 void TakeMixture(const Level& level, const MixtureFit& fit, Evidence* out) {
   out->sharing = level.sharing;
-  out->evidence = fit.evidence;
+  out->log_evidence = fit.log_evidence;
   out->spread = fit.size;
   out->scattered = false;
   out->chi_square = 0;
@@ -372,7 +372,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
       look(Sharing::kBus, groups.bus, groups.buses);
     levels.push_back(std::move(all));
   }
-  best.evidence = -std::numeric_limits<double>::infinity();
+  best.log_evidence = -std::numeric_limits<double>::infinity();
   for (const Level& level : levels)
     if (level.sharing == Sharing::kUnit) best.log_p = std::min(best.log_p, LevelLogP(level));
   best.log_p = std::min(0.0, best.log_p + std::log(static_cast<double>(levels.size())));
@@ -382,21 +382,21 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
   // Chance explains it: no need to know who has it.
   constexpr double kWorthALook = -3;
   if (best.log_p > kWorthALook) {
-    best.evidence = 0;
+    best.log_evidence = 0;
     best.has.assign(units, 0);
     return best;
   }
   for (const Level& level : levels) {
     const MixtureFit fit = Mix(level, prior);
-    if (fit.evidence > best.evidence) TakeMixture(level, fit, &best);
+    if (fit.log_evidence > best.log_evidence) TakeMixture(level, fit, &best);
   }
   if (units > 2 && c == 1 && !of_the_whole) {
     const ScatterFit scatter = Scatter(score, prior, best.dispersion,
                                        form.shape_of_unit.empty() ? 0 : std::log(form.choices));
     // Only as a refinement of what is shared by all: a scatter that pays for itself.
-    if (scatter.evidence > best.evidence + 3) {
+    if (scatter.log_evidence > best.log_evidence + 3) {
       best.sharing = Sharing::kUnit;
-      best.evidence = scatter.evidence;
+      best.log_evidence = scatter.log_evidence;
       best.spread = 0;
       best.scattered = true;
       best.chi_square = 0;
@@ -408,7 +408,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
       }
     }
   }
-  best.evidence -= price;
+  best.log_evidence -= price;
   return best;
 }
 

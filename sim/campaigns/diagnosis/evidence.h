@@ -19,13 +19,13 @@ namespace focalfleet::sim {
 
 struct Evidence {
   Sharing sharing = Sharing::kFleet;
-  std::vector<char> has;   // Shape: (units)
-  double evidence = 0;     // natural logarithm
-  double chi_square = 0;   // explained at that level, by the units that have it
-  double log_p = 0;        // of the level that is least likely by chance, for all levels looked at
-  double dispersion = 1;   // of the noise along this template
-  double spread = 0;       // of the units' amplitudes, where they are their own
-  bool scattered = false;  // units' own amplitudes about a mean of the fleet
+  std::vector<char> has;    // Shape: (units)
+  double log_evidence = 0;  // natural logarithm of the marginal likelihood ratio
+  double chi_square = 0;    // explained at that level, by the units that have it
+  double log_p = 0;         // of the level that is least likely by chance, for all levels looked at
+  double dispersion = 1;    // of the noise along this template
+  double spread = 0;        // of the units' amplitudes, where they are their own
+  bool scattered = false;   // units' own amplitudes about a mean of the fleet
 };
 
 /// Pre: score belongs to form.

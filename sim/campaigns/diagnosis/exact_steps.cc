@@ -80,7 +80,7 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
 
 // What the rows from the move on stand off by, one and all: something kept the axes from their way.
 // An axis that was on its way stands short of it; one that was not may have been pushed.
-std::vector<Change> StandsOff(const UnitRows& rows, std::size_t move) {
+std::vector<Change> StoppedShort(const UnitRows& rows, std::size_t move) {
   constexpr std::size_t kRowsMin = 4, kRowsMax = 60;
   constexpr double kLeast_deg = 0.1;
   std::vector<double> off[2];
@@ -108,7 +108,7 @@ std::vector<Change> StandsOff(const UnitRows& rows, std::size_t move) {
 // against its motion.
 std::vector<Change> ChangesIn(const UnitRows& rows, std::size_t move, ChangeKind kind) {
   constexpr int kTurnsAtOnce = 4;
-  if (kind == ChangeKind::kBlocked) return StandsOff(rows, move);
+  if (kind == ChangeKind::kBlocked) return StoppedShort(rows, move);
   const UnitTrack& track = rows.track;
   const double steps[2] = {track.step_deg[kTheta][move], track.step_deg[kPhi][move]};
   std::vector<Change> changes;
@@ -318,8 +318,8 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     const bool large = std::ranges::all_of(
         one.changes, [](const Change& change) { return change.gained >= 0.9 * kCap_mm * kCap_mm; });
     const double left = before > of_noise ? (one.cost - of_noise) / (before - of_noise) : 1;
-    const bool others_tell = fit.model.units.size() >= kUnitsForNoise;
-    if (kind == ChangeKind::kBlocked && others_tell && left > kLeftOfAny) return false;
+    const bool noise_is_known = fit.model.units.size() >= kUnitsForNoise;
+    if (kind == ChangeKind::kBlocked && noise_is_known && left > kLeftOfAny) return false;
     return static_cast<double>(one.far) <= kLeftMax * static_cast<double>(far) ||
            (large && left <= kLeftMax);
   };

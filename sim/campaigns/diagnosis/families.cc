@@ -160,7 +160,8 @@ void ReportAsMisfitArtefact(double size_um, std::string_view looks_like, CauseFo
   of->misfit_artefacts.emplace_back(looks_like);
 }
 
-CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes) {
+CauseFound* CauseThatLeaves(const UnknownFound& left, double noise_um,
+                            std::vector<CauseFound>* causes) {
   constexpr double kOfNoise = 0.16;
   // Air is known from the neighbours only; the image's shifts are fitted at each exposure.
   constexpr double kOfCause = 0.1, kOfAir = 0.25;
@@ -176,6 +177,13 @@ CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<Cau
   };
   const auto most = std::ranges::max_element(*causes, {}, leaves_um);
   return most != causes->end() && left.size_um < leaves_um(*most) ? &*most : nullptr;
+}
+
+bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks_like,
+                                double noise_um, std::vector<CauseFound>* causes) {
+  CauseFound* of = CauseThatLeaves(left, noise_um, causes);
+  if (of != nullptr) ReportAsMisfitArtefact(left.size_um, looks_like, of);
+  return of != nullptr;
 }
 
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes) {
@@ -331,7 +339,7 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 }
 
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
-                 const RotorsReportedBy& reported, std::vector<CauseFound>* causes) {
+                 const RotorCauses& reported, std::vector<CauseFound>* causes) {
   // In 1200 hidden campaigns the sure names below 15 were right; later one at 14.95 was not.
   constexpr double kFar_deg = 12;
   constexpr double kSecond = 0.3;  // of the stronger one's evidence

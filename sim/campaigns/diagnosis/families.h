@@ -32,7 +32,13 @@ void ReportAsMisfitArtefact(double size_um, std::string_view looks_like, CauseFo
 /// size, or of the image the air, four times, where it is also far below the noise; pooled over
 /// many rows the least is significant. `noise_um`: rms of the residuals. nullptr: nobody's, it is
 /// worth telling.
-CauseFound* WhoLeaves(const UnknownFound& left, double noise_um, std::vector<CauseFound>* causes);
+CauseFound* CauseThatLeaves(const UnknownFound& left, double noise_um,
+                            std::vector<CauseFound>* causes);
+
+/// Reports the structure with the cause whose shape leaves it, where there is one
+/// (CauseThatLeaves). Returns whether there is.
+bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks_like,
+                                double noise_um, std::vector<CauseFound>* causes);
 
 /// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
 /// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
@@ -68,7 +74,7 @@ void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unk
 /// Where exact waves have told whose they are, it is that one's. Beside the stronger of the two the
 /// other, where it could be it, is what its shape leaves.
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
-                 const RotorsReportedBy& reported, std::vector<CauseFound>* causes);
+                 const RotorCauses& reported, std::vector<CauseFound>* causes);
 
 /// Where the column is missing that would tell two causes apart, who could not be tested is a
 /// candidate, too.

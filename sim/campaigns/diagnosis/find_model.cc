@@ -42,11 +42,11 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, Fit* fit, Diagnosis* diagnosis) {
   Selection selection = SelectMultiStart(templates, rule, fit);
   ImageFound image = AddImageTerms(fit, options.family_wise);
-  const auto tell_homings = [&] {
+  const auto report_homings = [&] {
     if (!fit->model.homing_zero_deg[kTheta].empty()) diagnosis->causes.push_back(HomingCause(*fit));
   };
   if (!image.moves) {
-    tell_homings();
+    report_homings();
     return selection;
   }
   // What the image's motion hid, or what stood in for it.
@@ -55,7 +55,7 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
   selection = Select(templates, rule, fit);
   selection.kept_share = std::move(kept);
   if (has_terms) TryImageFirst(templates, options, rule, fit, &image, &selection);
-  tell_homings();
+  report_homings();
   if (image.followed) diagnosis->unknown.push_back(std::move(*image.followed));
   if (image.cause && !IsLeftOut(options, image.cause->cause)) {
     std::erase_if(image.cause->candidates,

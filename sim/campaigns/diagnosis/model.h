@@ -103,7 +103,7 @@ struct NotTestable {
 
 /// Takes out the terms that this campaign cannot be predicted with: it lacks a column, or its units
 /// and moves have no such part. Returns which, and why.
-std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model);
+std::vector<NotTestable> LeaveOutUntestable(const CampaignFacts& facts, CampaignModel* model);
 
 struct Places {
   std::vector<double> x_mm;  // Shape: (rows)

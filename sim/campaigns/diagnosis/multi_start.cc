@@ -9,7 +9,7 @@
 namespace focalfleet::sim {
 namespace {
 
-double BicByNoise(Fit fit, const Noise& noise) {
+double NegativeBicWith(Fit fit, const Noise& noise) {
   fit.noise = noise;
   UpdateWeights(&fit);
   return NegativeBic(fit);
@@ -63,7 +63,7 @@ void TryHomings(const Templates& templates, const SelectionRule& rule, Selection
 double BetterBy(const Fit& fit, const Fit& than) {
   double sum = 0;
   for (const Noise* noise : {&fit.noise, &than.noise})
-    sum += BicByNoise(fit, *noise) - BicByNoise(than, *noise);
+    sum += NegativeBicWith(fit, *noise) - NegativeBicWith(than, *noise);
   return sum / 2;
 }
 

@@ -128,7 +128,7 @@ void TakeTerms(const Fit& fit, Ground* ground, std::vector<Pair>* pairs, NextMov
     }
   for (Pair& pair : *pairs) {
     pair.term = place[pair.term];
-    if (pair.term == kNoTerm) out->untold.push_back({pair.cause, pair.rival});
+    if (pair.term == kNoTerm) out->inseparable.push_back({pair.cause, pair.rival});
   }
   std::erase_if(*pairs, [](const Pair& pair) { return pair.term == kNoTerm; });
 }
@@ -422,7 +422,7 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
     const std::optional<std::size_t> term = TermOf(fit, cause);
     for (std::size_t k = 1; k < cause.candidates.size(); ++k) {
       if (!term || pairs.size() == kPairsMax || FindEffect(cause.candidates[k]) == nullptr)
-        none.untold.push_back({cause.cause, cause.candidates[k]});
+        none.inseparable.push_back({cause.cause, cause.candidates[k]});
       else
         pairs.push_back({*term, cause.cause, cause.candidates[k], {}, 1});
     }
@@ -442,7 +442,7 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
   }
   // Nobody who has the term was seen: no moves of theirs tell anything.
   if (units.empty()) {
-    for (const Pair& pair : pairs) none.untold.push_back({pair.cause, pair.rival});
+    for (const Pair& pair : pairs) none.inseparable.push_back({pair.cause, pair.rival});
     pairs.clear();
   }
   if (pairs.empty()) return none;
@@ -453,12 +453,12 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
   const FleetGroups groups = GroupsOf(*fit.facts);
   for (Pair& pair : pairs) pair.forms = NearestForms(start->fit, groups, pair.term, pair.rival);
   std::erase_if(pairs, [&](const Pair& pair) {
-    if (pair.forms.empty()) none.untold.push_back({pair.cause, pair.rival});
+    if (pair.forms.empty()) none.inseparable.push_back({pair.cause, pair.rival});
     return pair.forms.empty();
   });
   if (pairs.empty()) return none;
   NextMoves next = Chooser(fit, ground, pairs).Choose();
-  next.untold = std::move(none.untold);
+  next.inseparable = std::move(none.inseparable);
   return next;
 }
 

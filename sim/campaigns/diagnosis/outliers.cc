@@ -20,9 +20,9 @@ constexpr double kClusterLeast = 4;        // units and exposures
 constexpr std::size_t kClusterMost = 200;  // far visits in a window
 // Of those that are as near: some do not move, or touch little.
 constexpr double kTouchedLeast = 1.0 / 3;
-constexpr std::size_t kNextTouched = 12;  // visits by which to tell whether wider gaps touch, too
-constexpr double kBeyondMost = 0.1;       // of that share, of those that are farther apart
-constexpr double kTouchEvidence = 25;     // ln L of a row
+constexpr std::size_t kNextTouched = 12;    // visits by which to tell whether wider gaps touch, too
+constexpr double kBeyondMost = 0.1;         // of that share, of those that are farther apart
+constexpr double kTouchLogLikelihood = 25;  // ln L of a row
 constexpr std::string_view kClusterColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
 constexpr double kFarMore = 4;     // off than other units: so is it, whatever noise it passes for
@@ -313,7 +313,7 @@ CauseFound TouchCause(const Fit& fit, const std::vector<std::size_t>& rows) {
   cause.amplitude = static_cast<double>(exposures.size());
   cause.ci95[0] = cause.ci95[1] = cause.amplitude;
   cause.size_um = std::sqrt(square / static_cast<double>(rows.size()));
-  cause.delta_log_likelihood = kTouchEvidence * static_cast<double>(rows.size());
+  cause.delta_log_likelihood = kTouchLogLikelihood * static_cast<double>(rows.size());
   cause.paragraph =
       "Where arms come nearest to each other their fibres are far from their place, in these moves "
       "alone: they have touched. Look at the arms, and at the plans of these moves.";

@@ -110,7 +110,7 @@ Status ExchangeNames(const PlantedEffect& planted, const CampaignFacts& facts, R
   return {};
 }
 
-void MistellTemperatures(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
+void DistortTemperatures(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
                          Campaign* campaign) {
   std::vector<double> rails;
   for (const CampaignUnit& unit : campaign->units) rails.push_back(unit.rail);
@@ -183,7 +183,7 @@ Status PlantFault(const PlantedEffect& planted, const CampaignFacts& facts, std:
   else if (planted.cause == "identity_swap")
     return ExchangeNames(planted, facts, &rng, campaign);
   else if (planted.cause == "sensor_bias")
-    MistellTemperatures(planted, facts, &rng, campaign);
+    DistortTemperatures(planted, facts, &rng, campaign);
   else
     MoveAir(planted, facts, &rng, campaign);
   return {};

@@ -38,8 +38,8 @@ std::size_t StrongestOf(const Fit& fit, const CauseFound& cause) {
 
 }  // namespace
 
-void AskWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
-                               const Fit& fit, std::vector<CauseFound>* causes) {
+void ReassessWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
+                                    const Fit& fit, std::vector<CauseFound>* causes) {
   constexpr int kRounds = 2;
   for (CauseFound& cause : *causes) {
     Fit bare = fit;

@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 
 /// Asks who else a cause could be without its misfit artefacts in the model; they become
 /// candidates.
-void AskWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
-                               const Fit& fit, std::vector<CauseFound>* causes);
+void ReassessWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
+                                    const Fit& fit, std::vector<CauseFound>* causes);
 
 }  // namespace focalfleet::sim

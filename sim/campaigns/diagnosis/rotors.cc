@@ -284,11 +284,10 @@ double DetentError(double harmonic, double wave_deg, double detent) {
   return -sign * (low + high) / 2 / kRadians;
 }
 
-RotorsReportedBy SettleRotors(const Templates& templates, const SelectionRule& rule,
-                              const std::vector<std::string>& left_out, Fit* fit,
-                              Selection* selection) {
+RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
+                         const std::vector<std::string>& left_out, Fit* fit, Selection* selection) {
   constexpr double kFar_deg = 8;  // electrical: less is a sine by either
-  RotorsReportedBy reported;
+  RotorCauses reported;
   if (!fit->facts->Has("drive_amplitude")) return reported;
   for (const std::string_view name : {kCogging, kImbalance})
     if (std::ranges::find(left_out, name) != left_out.end()) return reported;

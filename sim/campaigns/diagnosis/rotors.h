@@ -23,14 +23,13 @@
 namespace focalfleet::sim {
 
 /// Of each axis the cause of its rotors' waves, where they are large enough to tell; else empty.
-using RotorsReportedBy = std::array<std::string_view, 2>;
+using RotorCauses = std::array<std::string_view, 2>;
 
 /// Asks it of the axes that have a term of either. Where the other one it is, the term is exchanged
 /// for a template of that one, whose rivals are sought anew. What is far from either is left as it
 /// is. `left_out`: causes that may not be named.
-RotorsReportedBy SettleRotors(const Templates& templates, const SelectionRule& rule,
-                              const std::vector<std::string>& left_out, Fit* fit,
-                              Selection* selection);
+RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
+                         const std::vector<std::string>& left_out, Fit* fit, Selection* selection);
 
 /// Turns of the motor per turn of the axis, of the units in the middle. Pre: there are units.
 double MedianGear(const CampaignModel& model, std::size_t axis);

@@ -39,7 +39,7 @@ Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template
   Template best = ripple;
   for (std::size_t k = 0; k < tried.size(); ++k) {
     Evidence one = Assess(pass.scores[k], tried[k], groups);
-    if (one.evidence > evidence->evidence) *evidence = std::move(one), best = tried[k];
+    if (one.log_evidence > evidence->log_evidence) *evidence = std::move(one), best = tried[k];
   }
   return best;
 }

@@ -30,20 +30,21 @@ constexpr double kBetterBy = 0.5;  // logarithm of evidence
 std::vector<Evidence> AssessAll(const ScorePass& pass, const Templates& templates,
                                 const Templates& library, const FleetGroups& groups,
                                 const ParallelFor& parallel) {
-  std::vector<Evidence> evidences(templates.size());
+  std::vector<Evidence> evidence_of(templates.size());
   constexpr std::size_t kBlock = 16;
   const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
   parallel(blocks, [&](std::size_t block) {
     const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
     for (std::size_t k = block * kBlock; k < end; ++k)
-      evidences[k] = Assess(pass.scores[k], templates[k], groups);
+      evidence_of[k] = Assess(pass.scores[k], templates[k], groups);
   });
   // Who comes in many shapes fits by chance more often: each shape has its share of the cause.
   std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
   for (const Template& form : library) shapes[{form.effect->cause, form.axis}] += 1;
   for (std::size_t k = 0; k < templates.size(); ++k)
-    evidences[k].evidence -= std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
-  return evidences;
+    evidence_of[k].log_evidence -=
+        std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
+  return evidence_of;
 }
 
 // Templates that leave the same trace tie: the name decides, not the order of the library.
@@ -56,24 +57,24 @@ bool ComesFirst(const Template& a, const Template& b) {
 }
 
 Best BestOf(const ScorePass& pass, const Templates& templates,
-            const std::vector<Evidence>& evidences, double tests, double family_wise,
+            const std::vector<Evidence>& evidence_of, double tests, double family_wise,
             double kept_min = kKeptMin) {
   constexpr double kTie = 1e-6;
   Best best;
   double most = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < evidences.size(); ++k) {
+  for (std::size_t k = 0; k < evidence_of.size(); ++k) {
     const Score& score = pass.scores[k];
     if (!(score.kept > kept_min * score.raw)) continue;
-    const double log_p = LogLeastOf(evidences[k].log_p, tests);
-    if (log_p > std::log(family_wise) || evidences[k].evidence < most - kTie) continue;
-    if (best.at != kNoTerm && evidences[k].evidence < most + kTie &&
+    const double log_p = LogLeastOf(evidence_of[k].log_p, tests);
+    if (log_p > std::log(family_wise) || evidence_of[k].log_evidence < most - kTie) continue;
+    if (best.at != kNoTerm && evidence_of[k].log_evidence < most + kTie &&
         !ComesFirst(templates[k], templates[best.at]))
       continue;
-    if (std::none_of(evidences[k].has.begin(), evidences[k].has.end(),
+    if (std::none_of(evidence_of[k].has.begin(), evidence_of[k].has.end(),
                      [](char h) { return h != 0; }))
       continue;
-    most = evidences[k].evidence;
-    best = {k, evidences[k], log_p};
+    most = evidence_of[k].log_evidence;
+    best = {k, evidence_of[k], log_p};
   }
   return best;
 }
@@ -94,7 +95,7 @@ void Refit(Fit* fit) { SettleFit(fit, 2); }
 
 struct Look {
   ScorePass pass;
-  std::vector<Evidence> evidences;
+  std::vector<Evidence> evidence_of;
 };
 
 // Looks at one state of the fit, with all of its terms (kNoTerm) and without each: whoever asks for
@@ -107,8 +108,8 @@ class LookBook {
   const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
     if (looks_.find(without) == looks_.end()) Open(fit, templates, without);
     Look& look = looks_.at(without);
-    if (look.evidences.empty())
-      look.evidences = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
+    if (look.evidence_of.empty())
+      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
     return look;
   }
   /// The fit has changed, or the templates.
@@ -136,9 +137,11 @@ Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& gr
                std::size_t begin, const Best& before, double tests, double family_wise) {
   const Templates refined(templates.begin() + static_cast<std::ptrdiff_t>(begin), templates.end());
   const ScorePass pass = ScoreTemplates(fit, refined);
-  const std::vector<Evidence> evidences = AssessAll(pass, refined, templates, groups, fit.parallel);
-  Best best = BestOf(pass, refined, evidences, tests, family_wise);
-  if (best.at == kNoTerm || best.evidence.evidence <= before.evidence.evidence) return before;
+  const std::vector<Evidence> evidence_of =
+      AssessAll(pass, refined, templates, groups, fit.parallel);
+  Best best = BestOf(pass, refined, evidence_of, tests, family_wise);
+  if (best.at == kNoTerm || best.evidence.log_evidence <= before.evidence.log_evidence)
+    return before;
   best.at += begin;
   return best;
 }
@@ -152,7 +155,7 @@ void DropTerm(std::size_t at, Fit* fit) {
 std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const FleetGroups& groups,
                             std::size_t own, const SelectionRule& rule) {
   std::map<std::string_view, Rival> by_cause;
-  const Evidence& best = look.evidences[own];
+  const Evidence& best = look.evidence_of[own];
   // Where geometry leaves little of the term's own signature, as little of a rival's is enough.
   const Score& mine = look.pass.scores[own];
   const double kept_min = std::min(kKeptMin, 0.5 * mine.kept / mine.raw);
@@ -160,7 +163,7 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const std::string_view cause = templates[k].effect->cause;
     if (cause == templates[own].effect->cause) continue;
     if (!(look.pass.scores[k].kept > kept_min * look.pass.scores[k].raw)) continue;
-    const double behind = 2 * (best.evidence - look.evidences[k].evidence);
+    const double behind = 2 * (best.log_evidence - look.evidence_of[k].log_evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
     const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
@@ -183,7 +186,7 @@ bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGr
                      const SelectionRule& rule, double tests, std::size_t at, Fit* fit) {
   if (fit->model.terms.size() >= rule.terms_max) return false;
   std::vector<PairTrial> trials =
-      TryPairs(*fit, at, look.pass, templates, look.evidences, groups, kKeptMin);
+      TryPairs(*fit, at, look.pass, templates, look.evidence_of, groups, kKeptMin);
   std::erase_if(trials, [&](const PairTrial& trial) {
     return LogLeastOf(trial.log_p, tests) > std::log(rule.family_wise);
   });
@@ -198,7 +201,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
                       const SelectionRule& rule, const Fit& fit, std::size_t at,
                       std::vector<Rival>* rivals) {
   for (const PairTrial& trial :
-       TryPairs(fit, at, look.pass, templates, look.evidences, groups, kKeptMin))
+       TryPairs(fit, at, look.pass, templates, look.evidence_of, groups, kKeptMin))
     if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
          trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
@@ -213,7 +216,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
   bool changed = false;
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
     const Look& look = looks->At(*fit, templates, t);
-    const Best best = BestOf(look.pass, templates, look.evidences, tests, rule.family_wise);
+    const Best best = BestOf(look.pass, templates, look.evidence_of, tests, rule.family_wise);
     if (best.at == kNoTerm) {
       looks->Forget();
       DropTerm(t, fit);
@@ -221,8 +224,8 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
     }
     const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
     const bool better =
-        best.at != own &&
-        (own == kNoTerm || best.evidence.evidence > look.evidences[own].evidence + kBetterBy);
+        best.at != own && (own == kNoTerm || best.evidence.log_evidence >
+                                                 look.evidence_of[own].log_evidence + kBetterBy);
     const bool other_level =
         best.at == own && (best.evidence.sharing != fit->model.terms[t].sharing);
     if (!better && ExchangeForPair(look, templates, groups, rule, tests, t, fit)) {
@@ -230,7 +233,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
       return true;
     }
     if (!better && !other_level) {
-      accepted->push_back({look.evidences[own], RivalsOf(look, templates, groups, own, rule)});
+      accepted->push_back({look.evidence_of[own], RivalsOf(look, templates, groups, own, rule)});
       continue;
     }
     looks->Forget();
@@ -248,7 +251,7 @@ void TakeRivals(const Templates& templates, const FleetGroups& groups, const Sel
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const Look& look = looks->At(fit, templates, t);
     const std::size_t own = IndexOf(templates, fit.model.terms[t].form);
-    accepted->push_back({look.evidences[own], RivalsOf(look, templates, groups, own, rule)});
+    accepted->push_back({look.evidence_of[own], RivalsOf(look, templates, groups, own, rule)});
   }
 }
 
@@ -332,13 +335,13 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
       selection->kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
   }
   if (full) return false;
-  Best best = BestOf(look.pass, *templates, look.evidences, selection->tests, rule.family_wise);
+  Best best = BestOf(look.pass, *templates, look.evidence_of, selection->tests, rule.family_wise);
   const std::size_t listed = templates->size();
   std::vector<CandidateShape> candidate_shapes =
-      CandidateShapesOf(look.pass, look.evidences, *templates, best.at, kKeptMin);
+      CandidateShapesOf(look.pass, look.evidence_of, *templates, best.at, kKeptMin);
   // Their evidence grows where each unit's shape is refined, too.
   constexpr double kOfBest = 0.3;
-  const double least = best.at == kNoTerm ? 0 : kOfBest * best.evidence.evidence;
+  const double least = best.at == kNoTerm ? 0 : kOfBest * best.evidence.log_evidence;
   for (CandidateShape& own : OwnShapes(look.pass, *templates, *fit->facts, groups, least))
     candidate_shapes.push_back(std::move(own));
   looks->Forget();

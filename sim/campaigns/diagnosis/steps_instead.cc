@@ -75,7 +75,7 @@ std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
 
 }  // namespace
 
-void AskStepsInstead(const Fit& fit, Selection* selection) {
+void CompareWithSteps(const Fit& fit, Selection* selection) {
   constexpr double kClearly = 20;  // what a step is to be better by: else none is named
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const TermTrace trace = TraceOf(fit, fit.model.terms[t]);

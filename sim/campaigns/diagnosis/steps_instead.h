@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 
 /// step_loss or lost_command as rivals of the terms in few units that steps explain as well, though
 /// not for their price.
-void AskStepsInstead(const Fit& fit, Selection* selection);
+void CompareWithSteps(const Fit& fit, Selection* selection);
 
 /// Takes out small steps of single units that the model does as well without.
 void DropNeedlessSteps(Fit* fit);

@@ -155,11 +155,11 @@ struct Settled {
   std::vector<char> suspect;
   std::vector<double> plane, gains;
   [[nodiscard]] std::ptrdiff_t suspects() const { return std::ranges::count(suspect, char{1}); }
-  [[nodiscard]] std::ptrdiff_t tell() const {
+  [[nodiscard]] std::ptrdiff_t reporting() const {
     return std::ranges::count_if(gains, [](double gain) { return std::isfinite(gain); });
   }
   // The many are believed.
-  [[nodiscard]] bool can_be() const { return tell() > 0 && 2 * suspects() <= tell(); }
+  [[nodiscard]] bool can_be() const { return reporting() > 0 && 2 * suspects() <= reporting(); }
 };
 
 // Wrong ones bend the plane: by who is left, until it rests.
@@ -224,7 +224,7 @@ std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts)
   auto truth = std::make_unique<TrueTemperatures>();
   for (std::size_t unit = 0; unit < best.suspect.size(); ++unit)
     if (best.suspect[unit] != 0) truth->units.push_back(unit);
-  truth->are_half = 2 * best.suspects() == best.tell();
+  truth->are_half = 2 * best.suspects() == best.reporting();
   truth->owner = OwnerOf(groups, best.suspect);
   const Usual theirs = UsualOf(best.gains, best.suspect, 1);
   truth->gain = theirs.middle;

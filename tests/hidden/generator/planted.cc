@@ -58,7 +58,7 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
   const Campaign& campaign = planted.campaign;
   const NoiseModel noise = ExpectedNoise(planted.spec, campaign, planted.truth);
   const Visibility v =
-      Assess(scene, noise, planted.measured.tells, Contribution(scene, planted.truth, effect));
+      Assess(scene, noise, planted.measured.counts, Contribution(scene, planted.truth, effect));
   const double scale = LambdaScale(effect);
   Json out;
   out["cause"] = effect.kind->cause;
@@ -84,7 +84,7 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
   Json rivals = Json::array();
   Json equivalent = Json::array();
   Json inseparable = Json::array();
-  for (const Rival& rival : FindRivals(scene, noise, planted.measured.tells, effect)) {
+  for (const Rival& rival : FindRivals(scene, noise, planted.measured.counts, effect)) {
     const double distance = v.lambda * (1 - rival.cosine * rival.cosine);
     rivals.push_back({{"cause", rival.cause}, {"cosine", rival.cosine}, {"distance", distance}});
     if (rival.cosine > 0.995) equivalent.push_back(rival.cause);
@@ -101,7 +101,7 @@ Json StaticJson(const Planted& planted) {
   const StaticErrors& e = planted.spec.static_errors;
   const NoiseModel noise = ExpectedNoise(planted.spec, planted.campaign, planted.truth);
   const StaticVisibility v =
-      AssessStatic(planted.campaign, planted.truth, noise, planted.measured.tells);
+      AssessStatic(planted.campaign, planted.truth, noise, planted.measured.counts);
   return {{"planted", e.base_um > 0 || e.arm_um > 0 || e.zero_deg > 0},
           {"base_um", e.base_um},
           {"arm_um", e.arm_um},

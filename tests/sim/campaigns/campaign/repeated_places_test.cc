@@ -16,7 +16,9 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-Campaign Plain(std::uint64_t seed = 7) { return Planted({}, {.moves = 40, .seed = seed}); }
+Campaign Plain(std::uint64_t seed = 7) {
+  return Planted({}, {.units = 24, .moves = 40, .seed = seed});
+}
 
 // Rows that were told to stay, and have the place before.
 std::vector<std::size_t> RowsThatRepeat(const Campaign& campaign) {

@@ -18,7 +18,7 @@ namespace {
 // Of some units; no gear has it.
 Campaign Rippled(double order, double size_deg, std::uint64_t seed,
                  const std::vector<std::size_t>& units = {4, 13}) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
   std::vector<double> size_of_row(campaign.rows(), 0);
   for (const std::size_t unit : units)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
@@ -64,7 +64,7 @@ TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
 // The teeth's own wave, and what one side of the gear has more of it, in each unit its own: a
 // ripple of their order is cheaper than both, and no better than the wave.
 TEST(Beaten, ARippleOfTheTeethsOwnOrderIsTheTeeth) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   std::vector<double> phase_of_row;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
     phase_of_row.resize(campaign.first_row[unit + 1], static_cast<double>(unit));
@@ -107,7 +107,7 @@ TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
       Verdicts(Planted(
           {{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"},
            {.cause = "tooth_damage", .amplitude = 0.15, .axis = "theta", .unit_share = 0.3}},
-          {.moves = 120, .seed = 4})));
+          {.units = 24, .moves = 120, .seed = 4})));
 }
 
 // A curve does for the scale of all units; the ripple, whose many amplitudes cost what they
@@ -118,7 +118,7 @@ TEST(Beaten, ARippleBesideAScaleOfAllUnitsIsNoSeries) {
       Verdicts(Planted(
           {{.cause = "gear_scale", .amplitude = 3e-4, .axis = "theta"},
            {.cause = "stage_ripple", .amplitude = 0.008, .axis = "theta", .unit_scatter = 0.3}},
-          {.moves = 120, .seed = 4})));
+          {.units = 24, .moves = 120, .seed = 4})));
 }
 
 TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
@@ -139,7 +139,7 @@ TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
 
 // Play that opens all at once as it grows cold, which no form of the library does.
 TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   const std::vector<double>& temperature =
       std::ranges::find(campaign.covariates, "temp_C", &Covariate::name)->values;
   std::vector<double> sorted = temperature;
@@ -165,7 +165,7 @@ TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
 TEST(Beaten, WhatFollowsTheSquareOfTheTemperatureIsNotWear) {
   for (const std::uint64_t seed : {3u, 4u}) {
     SCOPED_TRACE(seed);
-    Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+    Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
     const auto temperature = std::ranges::find(campaign.covariates, "temp_C", &Covariate::name);
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
       for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {

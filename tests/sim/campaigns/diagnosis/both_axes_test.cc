@@ -12,7 +12,7 @@ namespace {
 Campaign PlayOfBothAxes(double play_deg, std::uint64_t seed) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = play_deg, .axis = "theta"},
                                {.cause = "backlash", .amplitude = play_deg, .axis = "phi"}},
-                              {.moves = 80, .seed = seed});
+                              {.units = 24, .moves = 80, .seed = seed});
   std::ranges::fill(
       std::ranges::find(campaign.covariates, "movers_on_rail", &Covariate::name)->values, 12);
   return campaign;
@@ -52,8 +52,9 @@ TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
 }
 
 TEST(BothAxes, ADroopOfBothKeepsItsName) {
-  const Diagnosis diagnosis = Verdicts(Planted(
-      {{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = 3}));
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}},
+                       {.units = 24, .moves = 80, .seed = 3}));
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "supply_droop");
   EXPECT_EQ(diagnosis.causes[0].axis, "both");
@@ -63,8 +64,9 @@ TEST(BothAxes, ADroopOfBothKeepsItsName) {
 // parameters and no better than chance.
 TEST(BothAxes, AStartSkewIsNoPlayOfEachUnit) {
   for (const std::uint64_t seed : {3u, 4u}) {
-    const Diagnosis diagnosis = Verdicts(Planted(
-        {{.cause = "start_skew", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = seed}));
+    const Diagnosis diagnosis =
+        Verdicts(Planted({{.cause = "start_skew", .amplitude = 0.05, .axis = "both"}},
+                         {.units = 24, .moves = 80, .seed = seed}));
     ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
     EXPECT_THAT(diagnosis.causes[0].candidates, testing::ElementsAre("start_skew"))
         << Reported(diagnosis);

@@ -19,7 +19,8 @@ CampaignModel Nominal(const Campaign& campaign) {
 
 // Gears that turn by a share more than was thought.
 Campaign Geared(double share, std::uint64_t seed) {
-  return Planted({{.cause = "gear_scale", .amplitude = share}}, {.moves = 80, .seed = seed});
+  return Planted({{.cause = "gear_scale", .amplitude = share}},
+                 {.units = 24, .moves = 80, .seed = seed});
 }
 
 ModelComparison Compared(const CampaignModel& a, const CampaignModel& b, const Campaign& campaign) {
@@ -106,7 +107,7 @@ TEST(CompareModels, NoiseSeldomPrefersAModel) {
 
 TEST(CompareModels, WhatBothMissByFarIsLeftOutAndCounted) {
   const Campaign campaign =
-      Planted({}, {.moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02});
+      Planted({}, {.units = 24, .moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02});
   const CampaignModel ideal = Nominal(campaign);
   CampaignModel off = ideal;  // in one exposure, far off by this model alone: its rows stay
   off.exposures.assign(80, {});
@@ -134,7 +135,7 @@ TEST(CompareModels, AUnitThatStandsElsewhereIsLeftOutWhole) {
 }
 
 TEST(CompareModels, FewExposuresShowNoDifference) {
-  const Campaign campaign = Planted({}, {.moves = kExposuresForPreference - 1});
+  const Campaign campaign = Planted({}, {.units = 24, .moves = kExposuresForPreference - 1});
   CampaignModel a = Nominal(campaign), b = a;
   for (CampaignUnit& unit : b.units) unit.base_x_mm += 0.1;
   const ModelComparison result = Compared(a, b, campaign);
@@ -143,7 +144,8 @@ TEST(CompareModels, FewExposuresShowNoDifference) {
 }
 
 TEST(CompareModels, ATermWhoseColumnIsMissingIsLeftOutByName) {
-  Campaign campaign = Planted({{.cause = "gravity_sag", .amplitude = 20}}, {.seed = 3});
+  Campaign campaign =
+      Planted({{.cause = "gravity_sag", .amplitude = 20}}, {.units = 24, .seed = 3});
   const CampaignModel fitted = Verdicts(campaign).model;
   ASSERT_EQ(fitted.terms.size(), 1u);
   std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "elevation_deg"; });

@@ -41,7 +41,7 @@ std::size_t MoveTo(const Campaign& campaign, std::size_t unit, std::size_t from,
 }
 
 TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;
   const std::size_t move = MoveTo(campaign, kUnit, 30, 1);
   ASSERT_NE(move, 0u);
@@ -58,7 +58,7 @@ TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
 
 TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
   // Stretched, the arm's places do not tell theta from phi; small moves of theta all around.
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 4});
   constexpr std::size_t kUnit = 5, kFrom = 30, kSlipAt = 36, kBackAt = 81;
   const CampaignUnit& u = campaign.units[kUnit];
   const double turn_deg = 360 / u.gear[kTheta];
@@ -106,7 +106,7 @@ TEST(Events, NoiseOfAFoldedArmIsNoSlip) {
 }
 
 TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 4});
   std::vector<std::uint32_t> stayed;
   for (const std::size_t unit : {3u, 11u}) {
     const std::size_t last = campaign.first_row[unit + 1] - 1;
@@ -132,7 +132,7 @@ TEST(Events, CommandsLostOneSoonAfterTheOtherAreAllFound) {
   constexpr std::size_t kUnit = 7, kLost = 3;
   for (const std::uint64_t seed : {4u, 5u, 6u, 8u}) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+    Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});
     const std::size_t first = campaign.first_row[kUnit];
     const CampaignUnit& unit = campaign.units[kUnit];
     double off_deg[2] = {0, 0};
@@ -163,7 +163,7 @@ TEST(Events, CommandsLostOneSoonAfterTheOtherAreAllFound) {
 
 TEST(Events, AUnitThatDriftsStandsNowhereElse) {
   // Steps of any size follow a slow drift as far as the eye sees.
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 2});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 2});
   constexpr std::size_t kUnit = 5;
   const std::size_t moves = campaign.first_row[kUnit + 1] - campaign.first_row[kUnit];
   for (std::size_t i = 0; i < moves; ++i)
@@ -175,7 +175,7 @@ TEST(Events, AUnitThatDriftsStandsNowhereElse) {
 TEST(Events, ACommandLostNearTheBeginningIsFoundWhateverTheTableSays) {
   // A few places before it, and a table that is off by more than noise: neither the fitted geometry
   // nor the table's is that of the rows before and behind.
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 5});
   constexpr std::size_t kUnit = 7;
   const std::size_t first = campaign.first_row[kUnit];
   const auto step_deg = [&](std::size_t axis, std::size_t move) {
@@ -205,7 +205,7 @@ TEST(Events, ACommandLostNearTheBeginningIsFoundWhateverTheTableSays) {
 }
 
 TEST(Events, SlipsAreFoundAmongManyOutliers) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 6, .outlier_share = 0.02});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 6, .outlier_share = 0.02});
   std::vector<std::uint32_t> slipped;
   for (const std::size_t unit : {5u, 9u}) {
     const std::size_t move = MoveTo(campaign, unit, 90, 1);
@@ -220,7 +220,7 @@ TEST(Events, SlipsAreFoundAmongManyOutliers) {
 }
 
 TEST(Events, AUnitThatSlipsAgainAndAgainIsNoNoisyUnit) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 6});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 6});
   constexpr std::size_t kUnit = 5, kSlips = 9;
   const double turn_deg = 360 / campaign.units[kUnit].gear[kTheta];
   for (std::size_t k = 0; k < kSlips; ++k) {
@@ -236,7 +236,7 @@ TEST(Events, AUnitThatSlipsAgainAndAgainIsNoNoisyUnit) {
 }
 
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 5;
   const std::size_t move = MoveTo(campaign, kUnit, 30, 1);
   ASSERT_NE(move, 0u);
@@ -247,7 +247,7 @@ TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
 }
 
 TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 4});
   constexpr std::size_t kUnit = 7;
   std::size_t move = 40;
   const auto row_of = [&](std::size_t i) { return campaign.first_row[kUnit] + i; };
@@ -297,7 +297,7 @@ std::size_t MoveOfAll(const Campaign& campaign, std::vector<std::size_t> units, 
 }
 
 TEST(Events, ACommandOfOneAxisMayBeLost) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 6});
   constexpr std::size_t kUnit = 7;
   const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
   ASSERT_NE(move, 0u);
@@ -312,7 +312,7 @@ TEST(Events, ACommandOfOneAxisMayBeLost) {
 
 // Units 0 and 1 of the lattice are next to each other.
 TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
-  Campaign campaign = Planted({}, {.moves = 200, .seed = 6});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 200, .seed = 6});
   const std::size_t move = MoveOfAll(campaign, {0, 1}, 30);
   ASSERT_NE(move, 0u);
   for (const std::size_t unit : {std::size_t{0}, std::size_t{1}})
@@ -331,7 +331,7 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
 
 // Two turns lost by unit 0, in the move in which unit 1 stops short.
 Campaign StoppedAfterTurns(std::size_t move) {
-  Campaign campaign = Planted({}, {.moves = 200, .seed = 6});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 200, .seed = 6});
   const double turns_deg = 2 * 360 / campaign.units[0].gear[kTheta];
   StandElsewhere(0, move, std::copysign(turns_deg, -StepAt(campaign, 0, move, kTheta)), 0,
                  &campaign);
@@ -341,7 +341,8 @@ Campaign StoppedAfterTurns(std::size_t move) {
 }
 
 TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
-  const std::size_t move = MoveOfAll(Planted({}, {.moves = 200, .seed = 6}), {0, 1}, 30);
+  const std::size_t move =
+      MoveOfAll(Planted({}, {.units = 24, .moves = 200, .seed = 6}), {0, 1}, 30);
   ASSERT_NE(move, 0u);
   const Campaign campaign = StoppedAfterTurns(move);
   const Diagnosis diagnosis = Verdicts(campaign);
@@ -353,7 +354,7 @@ TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
 
 // Arms that met on their way may end far apart: their gap there says nothing about others.
 TEST(Events, SlipsOfOthersBesideAContactAreSlips) {
-  const Campaign plain = Planted({}, {.moves = 200, .seed = 6});
+  const Campaign plain = Planted({}, {.units = 24, .moves = 200, .seed = 6});
   const CampaignFacts facts = MakeFacts(plain);
   const std::vector<double>& gap_mm = facts.Find(kArmGap)->values;
   const auto is_apart = [&](std::size_t unit, std::size_t move) {
@@ -384,7 +385,7 @@ TEST(Events, SlipsOfOthersBesideAContactAreSlips) {
 }
 
 TEST(Events, AUnitThatStopsShortAloneIsUnknown) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 6});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 6});
   constexpr std::size_t kUnit = 3;
   const std::size_t move = MoveOfAll(campaign, {kUnit}, 30);
   ASSERT_NE(move, 0u);

@@ -38,7 +38,7 @@ TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
   for (const std::size_t since : {0u, 17u, 40u}) {
     SCOPED_TRACE(since);
     Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.05, .axis = "theta"}},
-                                {.moves = 60, .seed = 5});
+                                {.units = 24, .moves = 60, .seed = 5});
     ExchangeMoves(3, 11, since, &campaign);
     const Diagnosis diagnosis = Verdicts(campaign);
     ASSERT_THAT(diagnosis.causes, SizeIs(2)) << Reported(diagnosis);
@@ -72,7 +72,7 @@ TEST(Exchanged, FibresThatHaveEachOthersNameForAWhileAreFound) {
   for (const auto& [begin, end, shape] : cases) {
     SCOPED_TRACE(shape);
     Campaign campaign = Planted({{.cause = "gear_scale", .amplitude = 0.002, .axis = "theta"}},
-                                {.moves = 60, .seed = 5, .outlier_share = 0.01});
+                                {.units = 24, .moves = 60, .seed = 5, .outlier_share = 0.01});
     const Campaign right = campaign;
     ExchangePlacesOf(3, 9, begin, end, &campaign);
     const std::vector<FibreSwap> swaps = FindFibreSwaps(MakeFacts(campaign));
@@ -91,13 +91,13 @@ TEST(Exchanged, FibresThatHaveEachOthersNameForAWhileAreFound) {
 }
 
 TEST(Exchanged, APairOfOutliersIsNoName) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5, .outlier_share = 0.05});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5, .outlier_share = 0.05});
   for (const std::size_t move : {7u, 33u}) ExchangePlacesOf(3, 9, move, move + 1, &campaign);
   EXPECT_THAT(FindFibreSwaps(MakeFacts(campaign)), IsEmpty());
 }
 
 TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
-  const Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  const Campaign right = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   Campaign campaign = right;
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
   ExchangePlacesOf(3, 9, 25, 60, &campaign);
@@ -121,7 +121,7 @@ TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
 
 // Exposures have numbers in the order in which they are met, unit by unit.
 TEST(Exchanged, OfAFirstUnitThatLacksMovesFollowsNothing) {
-  Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  Campaign right = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::vector<bool> keep(right.rows(), true);
   for (std::size_t move = 20; move < 30; ++move) keep[right.first_row[0] + move] = false;
   right = Keep(right, keep);
@@ -148,7 +148,7 @@ TEST(Exchanged, NamesAreFoundWhereTheTableIsOffForAllUnits) {
 // Neighbours that are given each other's spot now and then: no cause of an axis, whatever they are
 // near to.
 TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::size_t exchanged = 0;
   for (std::size_t unit = 0; unit + 1 < campaign.units.size(); unit += 2)
     for (const std::size_t move : {5 + unit, 30 + unit}) {
@@ -176,7 +176,7 @@ TEST(Exchanged, WhereTheTableIsWrongNobodyIsAtAnothersPlace) {
 }
 
 TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
-  Campaign campaign = Planted({}, {.moves = 30, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 30, .seed = 5});
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
   const std::size_t gone = campaign.first_row[9] + 12;  // of the other: as if of another exposure
   campaign.move_id[gone] = 1'000'000;
@@ -191,7 +191,7 @@ TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
 }
 
 TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   Rng rng = Rng::Stream(5, "where they go");
   for (const std::size_t unit : {3u, 11u})
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
@@ -206,7 +206,7 @@ TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
 }
 
 TEST(Exchanged, WhatTheOtherHasNoRowOfIsMissing) {
-  Campaign campaign = Planted({}, {.moves = 20, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 20, .seed = 5});
   ExchangeMoves(3, 11, 5, &campaign);
   const std::size_t gone = campaign.first_row[11] + 12;  // of the other: as if of another exposure
   campaign.move_id[gone] = 1'000'000;

@@ -156,22 +156,23 @@ TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
   causes[0].size_um = 50;
   causes[1].size_um = 20;
   causes[2].size_um = 1;
-  const auto who = [&](const char* channel, double size_um, double noise_um) {
-    const CauseFound* of = WhoLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
+  const auto cause_that_leaves = [&](const char* channel, double size_um, double noise_um) {
+    const CauseFound* of =
+        CauseThatLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
     return of == nullptr ? "nobody" : of->cause;
   };
-  EXPECT_EQ(who("y", 0.8, 6), "gravity_sag");
-  EXPECT_EQ(who("y", 0.8, 4), "nobody");   // near the noise
-  EXPECT_EQ(who("y", 2.5, 60), "nobody");  // a large part of the strongest
+  EXPECT_EQ(cause_that_leaves("y", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(cause_that_leaves("y", 0.8, 4), "nobody");   // near the noise
+  EXPECT_EQ(cause_that_leaves("y", 2.5, 60), "nobody");  // a large part of the strongest
   causes[1].axis = "theta";
-  EXPECT_EQ(who("theta angle", 0.8, 6), "gravity_sag");
-  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("theta angle", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(cause_that_leaves("phi angle", 0.8, 6), "nobody");
   causes[1].all_units = false;
-  EXPECT_EQ(who("theta angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("theta angle", 0.8, 6), "nobody");
   causes.push_back(Cause("air_turbulence", "none", 900));
   causes.back().size_um = 4;
-  EXPECT_EQ(who("x", 0.8, 6), "air_turbulence");
-  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("x", 0.8, 6), "air_turbulence");
+  EXPECT_EQ(cause_that_leaves("phi angle", 0.8, 6), "nobody");
   ReportAsMisfitArtefact(0.8, "move order", &causes[1]);
   EXPECT_THAT(causes[1].shape, HasSubstr("0.8 um, looks like move order"));
 }
@@ -383,7 +384,7 @@ TEST(Families, ARotorThatIsTurnedFarIsEithersOfTwo) {
   model.units.resize(3);
   for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 337, unit.gear[kPhi] = 893;
   std::vector<std::string> left_out;
-  RotorsReportedBy reported;
+  RotorCauses reported;
   const auto judged = [&](const char* name, double rotor_deg) {
     std::vector<CauseFound> causes = {Cause(name, "phi", 300)};
     causes[0].amplitude = -rotor_deg / 893;
@@ -425,7 +426,7 @@ TEST(Families, ARotorsSecondNameInOtherUnitsIsNoMisfitArtefact) {
   CampaignModel model;
   model.units.resize(3);
   for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 893, unit.gear[kPhi] = 893;
-  RotorsReportedBy reported;
+  RotorCauses reported;
   reported[kPhi] = "cogging";
   const auto judged = [&](std::uint32_t unit) {
     std::vector<CauseFound> causes = {Cause("cogging", "phi", 2000),

@@ -20,7 +20,7 @@ UnknownFound OnlyUnknown(const Diagnosis& diagnosis) {
 }
 
 Campaign Rounded(double step_deg) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 3});
   TurnTheta(
       [&](std::size_t row) {
         const double commanded = campaign.cmd_deg[kTheta][row];
@@ -42,7 +42,7 @@ TEST(FineStructure, RoundedAnglesAreNoNoise) {
 
 TEST(FineStructure, AFractionOfAPixelIsSeenWithoutItsShape) {
   constexpr double kPixel_mm = 0.06;
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 3});
   Covariate pixel{.name = "pixel_y", .values = {}};
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     pixel.values.push_back(1000 + campaign.y_mm[row] / kPixel_mm);
@@ -58,9 +58,9 @@ TEST(FineStructure, AFractionOfAPixelIsSeenWithoutItsShape) {
 }
 
 TEST(FineStructure, ArmsThatLeanOnEachOtherAreSeenByTheirGap) {
-  const Diagnosis diagnosis = Verdicts(
-      Planted({{.cause = "collision_contact", .amplitude = 0.1}}, {.moves = 80, .seed = 3}),
-      {.leave_out = {"collision_contact"}});
+  const Diagnosis diagnosis = Verdicts(Planted({{.cause = "collision_contact", .amplitude = 0.1}},
+                                               {.units = 24, .moves = 80, .seed = 3}),
+                                       {.leave_out = {"collision_contact"}});
   const UnknownFound unknown = OnlyUnknown(diagnosis);
   EXPECT_EQ(unknown.covariate, "gap to the next arm");
   EXPECT_EQ(unknown.channel, "phi angle");
@@ -71,7 +71,7 @@ TEST(FineStructure, ChanceShowsItNoMoreOftenThanItSays) {
   constexpr double kRate = 1, kShareOfRate = 0.3;
   int shown = 0;
   for (std::uint64_t seed = 1; seed <= kCampaigns; ++seed) {
-    const Campaign campaign = Planted({}, {.moves = 40, .seed = seed});
+    const Campaign campaign = Planted({}, {.units = 24, .moves = 40, .seed = seed});
     const CampaignFacts facts = MakeFacts(campaign);
     // However small a share of the noise it is.
     if (FindFineStructure(StaticFit(facts), kRate, 0)) ++shown;
@@ -80,7 +80,7 @@ TEST(FineStructure, ChanceShowsItNoMoreOftenThanItSays) {
 }
 
 TEST(Cluster, ChanceShowsItNoMoreOftenThanItSays) {
-  const Campaign campaign = Planted({}, {.moves = 80, .seed = 2});
+  const Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 2});
   const CampaignFacts facts = MakeFacts(campaign);
   const Fit fit = StaticFit(facts);
   constexpr int kDraws = 400;
@@ -100,7 +100,7 @@ TEST(Cluster, ChanceShowsItNoMoreOftenThanItSays) {
 
 // Rows up to 2 mm off: anywhere, or only where theta stands between 40 and 48 degrees.
 Campaign WithFarRows(bool crowded) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   Rng rng = Rng::Stream(8, "far rows");
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     const double theta_deg = campaign.cmd_deg[kTheta][row];
@@ -121,7 +121,7 @@ TEST(Cluster, OutliersAtOneAngleAreUnknown) {
 
 // As many of the rows up to 2 mm off whose arm comes as near to a neighbour's; and some anywhere.
 Campaign Touched(double gap_mm, double share) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8, .outlier_share = 0.003});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8, .outlier_share = 0.003});
   const CampaignFacts facts = MakeFacts(campaign);
   const FilledColumn& gap = *facts.Find(kArmGap);
   Rng rng = Rng::Stream(8, "touched");
@@ -179,7 +179,7 @@ TEST(Cluster, ContactsAreUnknownToALibraryWithoutThem) {
 
 // A walk of its own is noise to a unit, and not to those who look after it.
 TEST(Cluster, AUnitThatIsFarMoreOffThanOthersIsNamed) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 8});
   Rng rng = Rng::Stream(8, "walks");
   double x_mm = 0, y_mm = 0;
   for (std::size_t row = campaign.first_row[5]; row < campaign.first_row[6]; ++row) {

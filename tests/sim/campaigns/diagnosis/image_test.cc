@@ -27,7 +27,7 @@ struct Shift {
 
 // A campaign whose image is shifted at each exposure; `shift` knows the exposure's index.
 Campaign Shifted(const std::function<Shift(std::size_t)>& shift) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   const Exposures exposures = FindExposures(campaign);
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     const Shift s = shift(exposures.of_row[row]);
@@ -274,7 +274,8 @@ TEST(Image, OneThatAlsoTurnsAndScalesAsItSwingsIsTheCameras) {
 }
 
 TEST(Image, ADriftIsAsGoodAsWhatGravitySeemsToDo) {
-  const Campaign campaign = Planted({{.cause = "gravity_sag", .amplitude = 6}}, {.moves = 60});
+  const Campaign campaign =
+      Planted({{.cause = "gravity_sag", .amplitude = 6}}, {.units = 24, .moves = 60});
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);
   ModelTerm sag;

@@ -146,7 +146,7 @@ TEST(NextMoves, TermsWhoseColumnsFewUnitsLackStayOut) {
 TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
   const Diagnosis diagnosis =
       Diagnose(Planted({{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"}},
-                       {.moves = 60, .seed = 7}),
+                       {.units = 24, .moves = 60, .seed = 7}),
                {.with_gain = false});
   ASSERT_EQ(diagnosis.verdict, Verdict::kExplained);
   EXPECT_THAT(diagnosis.next.moves, IsEmpty());
@@ -155,8 +155,8 @@ TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
 
 // All rows of the units that have a term may be set aside.
 TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
-  const Campaign campaign =
-      Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}}, {.moves = 40});
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
+                                    {.units = 24, .moves = 40});
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = FittedWith("backlash", Memory::kHold, facts);
   std::vector<std::uint32_t>& has = fit.model.terms[0].group_of_unit;
@@ -164,7 +164,7 @@ TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
   std::fill_n(fit.weight.begin(), campaign.first_row[1], 0.0);
   const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "friction_windup")});
   EXPECT_THAT(next.moves, IsEmpty());
-  EXPECT_THAT(next.untold, testing::ElementsAre(std::pair("backlash", "friction_windup")));
+  EXPECT_THAT(next.inseparable, testing::ElementsAre(std::pair("backlash", "friction_windup")));
 }
 
 TEST(Ahead, AUnitGoesWhereItIsSentAndStaysWhereItIsNot) {

@@ -15,7 +15,7 @@ namespace {
 
 // A ripple of order five, 0.05 degrees, with a phase of each unit's own.
 Campaign FiveTimesATurn() {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 12});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 12});
   std::vector<double> phase(campaign.rows());
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
@@ -73,7 +73,7 @@ TEST(Patch, ARippleOfNoGearIsCorrectedAndNotNamed) {
 }
 
 TEST(Patch, AnImageThatFollowsTheWindGetsCurvesInsteadOfShifts) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   const Exposures exposures = FindExposures(campaign);
   Rng rng = Rng::Stream(3, "wind");
   std::vector<double> wind(exposures.size());

@@ -17,11 +17,13 @@
 
 namespace focalfleet::sim {
 
-inline Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions options = {}) {
-  options.units = options.units == 60 ? 24 : options.units;
+/// A campaign of exactly `options.units` units; 24 are enough for most tests and quick to diagnose.
+inline Campaign Planted(std::vector<PlantedEffect> effects,
+                        PlantedOptions options = {.units = 24}) {
   options.effects = std::move(effects);
   auto campaign = PlantCampaign(options);
   EXPECT_TRUE(campaign) << campaign.error().text;
+  EXPECT_EQ(campaign->units.size(), options.units);
   return *campaign;
 }
 
@@ -51,7 +53,7 @@ inline void ExchangePlaces(std::size_t a, std::size_t b, Campaign* campaign) {
 
 /// A theta angle that follows the air's humidity, bent, up to 0.12 degrees.
 inline Campaign Damp(std::uint64_t seed) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});
   const Exposures exposures = FindExposures(campaign);
   Rng rng = Rng::Stream(seed, "humidity");
   std::vector<double> of_exposure(exposures.size());

@@ -57,7 +57,7 @@ double SinkingLag(double load, const Motion& motion) {
 }
 
 Campaign RotorsTurned(const Turned& turned, std::uint64_t seed) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
   std::vector<double> off_deg(campaign.rows(), 0);
   const auto column = [&](const char* name) -> std::vector<double>& {
     return std::ranges::find(campaign.covariates, name, &Covariate::name)->values;
@@ -132,7 +132,7 @@ ModelTerm OfEachUnit(const Template& form, std::size_t units) {
 }
 
 struct Settled {
-  RotorsReportedBy reported;
+  RotorCauses reported;
   std::size_t terms = 0;
   std::vector<std::string> rivals;
 };

@@ -21,7 +21,7 @@ constexpr std::size_t kMoves = 60, kUnit = 5, kHomedAt = 40;
 // One unit makes long moves, is homed, and makes short ones to the end, but for `long_again`;
 // where its moves are short its theta stands `off_turns` of the rotor's turns off.
 Campaign LongThenShort(double off_turns, std::size_t long_again = kMoves) {
-  Campaign campaign = Planted({}, {.moves = kMoves, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const CampaignUnit& u = campaign.units[kUnit];
   campaign.covariates.push_back({"rehomed", std::vector<double>(campaign.rows(), 0)});
   campaign.covariates.back().values[campaign.first_row[kUnit] + kHomedAt] = 1;
@@ -62,7 +62,7 @@ std::vector<std::string_view> StepsInsteadOf(const char* cause, std::size_t of_u
   SettleFit(&fit, 3);
   Selection selection;
   selection.accepted.resize(1);
-  AskStepsInstead(fit, &selection);
+  CompareWithSteps(fit, &selection);
   std::vector<std::string_view> names;
   for (const Rival& rival : selection.accepted[0].rivals) names.push_back(rival.cause);
   return names;
@@ -94,7 +94,7 @@ TEST(StepsInstead, ASlipAtTheFirstShortMoveHasItAmongItsCandidates) {
 // The unit's step of 0.3 degrees was taken before the causes were known; whether it is there is
 // planted. `also`: a neighbour that stands off by a degree since the same move.
 std::size_t StepsLeft(double planted_deg, const std::vector<std::size_t>& also = {}) {
-  Campaign campaign = Planted({}, {.moves = kMoves, .seed = 4});
+  Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const std::size_t move = 20;
   TurnTheta(
       [&](std::size_t row) {
@@ -127,7 +127,7 @@ TEST(StepsInstead, WhatTheModelDoesAsWellWithoutIsNone) {
 
 // Of a contact the weaker half is not asked alone: without it the other would have met nobody.
 TEST(StepsInstead, HalfOfAContactStays) {
-  const Campaign campaign = Planted({}, {.moves = kMoves, .seed = 4});
+  const Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const auto apart_mm = [&](std::size_t unit) {
     return std::hypot(campaign.units[unit].base_x_mm - campaign.units[kUnit].base_x_mm,
                       campaign.units[unit].base_y_mm - campaign.units[kUnit].base_y_mm);

@@ -45,7 +45,8 @@ TEST(Whiten, HeldRestErrorsBecomeIndependentNumbersOfUnitVariance) {
 TEST(NegativeBic, IsNotDecidedByOutliers) {
   // Noise that is two per cent smaller explains the others about as well; what is anywhere costs
   // next to nothing more.
-  const Campaign campaign = Planted({}, {.moves = 80, .seed = 6, .outlier_share = 0.02});
+  const Campaign campaign =
+      Planted({}, {.units = 24, .moves = 80, .seed = 6, .outlier_share = 0.02});
   const CampaignFacts facts = MakeFacts(campaign);
   const Fit fit = StaticFit(facts);
   Fit smaller = fit;
