@@ -45,7 +45,7 @@ std::map<double, double> MoversOf(const std::vector<CampaignUnit>& units, const 
   return movers;
 }
 
-// One unit on its way through the proposed moves.
+// A unit on its way through the proposed moves.
 struct Walker {
   double at_deg[2];
   double cycles[2];

@@ -29,8 +29,8 @@ struct PlateMove {
   std::vector<std::optional<std::array<double, 2>>> to_deg;
 };
 
-/// A move as a stance: all units have the same pose, as translated copies of each other, so that no
-/// unit comes near another on the way.
+/// A move as a stance: all units have the same pose, as translated copies of each other. No unit
+/// comes near another on the way.
 struct ProposedMove {
   double theta_fp_deg = 0;  // where the elbow points, in the plate's frame
   double phi_fp_deg = 90;   // 0 stretches the arm out, 180 folds it back

@@ -39,8 +39,8 @@ double MedianOf(std::span<const double> lengths) {
   return known.empty() ? 0 : Median(std::move(known));
 }
 
-// By the residuals of one model: units that are elsewhere, and rows far from where the rest of
-// their unit is. A unit that is off in all of its rows has no outliers.
+// Units that are elsewhere by one model's residuals, and rows far from where the rest of their unit
+// is. A unit that is off in all of its rows has no outliers.
 struct FarOff {
   std::vector<char> unit;  // Shape: (units)
   std::vector<char> row;   // Shape: (rows)

@@ -50,10 +50,10 @@ struct CompareOptions {
   ParallelFor parallel = OneAfterTheOther();
 };
 
-/// Compares the models on the rows that can be judged; rows == 0 where none can. Rows without a
-/// place, or with a repeated place, are left out. So are rows of units that do not move or stand
-/// elsewhere by both models, and rows far off by both. Exchanging the models changes the sign of
-/// the difference and nothing else.
+/// Compares the models on the rows that can be judged; rows == 0 where none can. The comparison
+/// leaves out rows without a place, or with a repeated place. Rows of units that do not move or
+/// stand elsewhere by both models are also left out, as are rows far off by both. Exchanging the
+/// models changes the sign of the difference and nothing else.
 /// Pre: Validate(campaign), whose units the models have.
 ModelComparison CompareModels(const ModelPair& models, const Campaign& campaign,
                               const CompareOptions& options);

@@ -153,8 +153,8 @@ double MedianMiss(const Fit& fit) {
   return misses.empty() ? 0 : Median(std::move(misses));
 }
 
-// The part that the given model already explains is no misfit of it: its effects are subtracted
-// from the measured places, and its geometry replaces the table's.
+// The part that the given model already explains is no misfit. Its effects are subtracted from the
+// measured places, and its geometry replaces the table's.
 void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
               Campaign* campaign) {
   campaign->units = model.units;

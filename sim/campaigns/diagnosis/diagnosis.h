@@ -125,14 +125,12 @@ struct Diagnosis {
 struct DiagnoseOptions {
   std::uint64_t seed = 1;
   double family_wise = 0.01;
-  std::span<const Effect> library =
-      // Templates of the model point into the library, which has to outlive the diagnosis.
-      EffectLibrary();
-  std::vector<std::string> leave_out;  // causes to leave out of the library
-  std::uint64_t shuffle_library = 0;   // not 0: seed of another order of its templates
-  const CampaignModel* before =
-      nullptr;         // an extended model to start from; nullptr: the nominal model
-  bool patch = false;  // add empirical terms for what is unknown
+  // Templates of the model point into the library, which has to outlive the diagnosis.
+  std::span<const Effect> library = EffectLibrary();
+  std::vector<std::string> leave_out;     // causes to leave out of the library
+  std::uint64_t shuffle_library = 0;      // not 0: seed of another order of its templates
+  const CampaignModel* before = nullptr;  // an extended model to start from; else the nominal one
+  bool patch = false;                     // add empirical terms for what is unknown
   bool with_gain = true;
   bool with_next_moves = true;
   ParallelFor parallel = OneAfterTheOther();
