@@ -1,8 +1,8 @@
 // A library's shape of a cause is never quite the true one. The misfit of a strong cause looks like
-// other causes, and no threshold of chance protects from it, because the misfit is certain. It is,
-// however, a distortion of that cause: its own amplitude in each unit, a bend where it is large,
-// another dependence on the drive. Each weak term is therefore fitted beside distortions of the
-// strong ones. A term that then explains nothing is a misfit artefact, whatever its name.
+// other causes, and no threshold of chance protects from it, because the misfit is certain. The
+// misfit is, however, a distortion of that cause: its own amplitude in each unit, a bend where it
+// is large, another dependence on the drive. Each weak term is therefore fitted beside distortions
+// of the strong ones. A term that then explains nothing is a misfit artefact, whatever its name.
 #pragma once
 
 #include <cstddef>

@@ -237,7 +237,7 @@ MixtureFit Mix(const Level& level, double prior_size) {
   return best;
 }
 
-// Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
+// Units' own amplitudes about a mean: evidence, and the spread that fits best. Pre: one column.
 // `price`: of each unit.
 struct ScatterFit {
   double log_evidence = -std::numeric_limits<double>::infinity();

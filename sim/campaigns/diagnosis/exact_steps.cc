@@ -62,7 +62,7 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
   const double a = unit.arm_mm[kTheta], b = unit.arm_mm[kPhi];
   const double x = rows.x_mm[i] - unit.base_x_mm, y = rows.y_mm[i] - unit.base_y_mm;
   const double cosine = (x * x + y * y - a * a - b * b) / (2 * a * b);
-  constexpr double kFlat = 0.9;  // sine: nearly stretched or folded arms do not separate the axes
+  constexpr double kFlat = 0.9;  // cosine: nearly stretched or folded arms do not separate the axes
   AnglesOff best{{std::nan(""), std::nan("")}};
   if (!(std::abs(cosine) < kFlat)) return best;
   double least = std::numeric_limits<double>::infinity();
