@@ -19,7 +19,8 @@ bool IsOfAngle(std::string_view cause);
 /// Whether the cause drifts over a night.
 bool IsOfNight(std::string_view cause);
 
-/// Whether effects of the two axes can touch each other. By name: "both" and "none" touch all.
+/// Whether effects of the two axes can touch each other. The axes are names, and "both" and "none"
+/// touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
 /// Whether `misfit_artefact` may be left by the shape of `of`. No shape leaves more than half of
@@ -44,18 +45,18 @@ bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks
                                 double noise_um, std::vector<CauseFound>* causes);
 
 /// Judges weak causes beside strong ones. A weak cause is uncertain where it may be a misfit of the
-/// strong one's shape, in units that have both. It is then a relative on the same axis, or a cause
-/// that only units of the strong one have, and gets the strong one as a candidate. A misfit
-/// artefact is a cause that is faint, in ln L or beside a cause of an axis, and less than that
+/// strong one's shape, in units that have both. Relatives on the same axis are such causes, and
+/// causes that only units of the strong one have. They get the strong one as a candidate. A cause
+/// is a misfit artefact where it is faint, in ln L or beside a cause of an axis, and less than that
 /// one's shape can leave. The same holds for a cause that is hardly there beside a strong cause of
 /// any axis. Pre: strongest first. `units`: of the campaign.
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes);
 
-/// Makes single units outliers that a cause moves by far more than noise, and whose rows it leaves
-/// nearly as far off: their behaviour is that of no cause.
+/// Makes single units outliers whose behaviour is that of no cause. A cause moves them by far more
+/// than noise, and leaves their rows nearly as far off.
 void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers);
 
-/// Makes a unit an outlier that would need three causes of its own or more: its behaviour is that
+/// Makes a unit an outlier that would need three causes of its own or more. Its behaviour is that
 /// of none of them, and becomes unknown.
 void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
                 std::vector<UnknownFound>* unknown);
@@ -65,8 +66,8 @@ void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFoun
 /// unknown, too. Pre: strongest first.
 void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// Moves a cause into the unknown where it explains less than an unknown structure of its axis, or
-/// of the angle that this follows: it names a part of that structure.
+/// Moves a cause into the unknown where it only names a part of an unknown structure. The cause
+/// explains less than the structure, which is of the same axis or follows the cause's angle.
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Judges three causes or more that depend on where one axis stands. They are a series of shapes
@@ -75,7 +76,7 @@ void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFoun
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
 /// Judges causes of rotors that are turned far out of their field. There the effects of phases bend
-/// like those of the rotor's poles, so that each is the other's candidate, unless it is left out of
+/// like those of the rotor's poles. Each is then the other's candidate, unless it is left out of
 /// the library. The model's gears decide which. The cause that exact waves have decided is final.
 /// The weaker of the two causes, where it could be the stronger, is a misfit artefact of it.
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,

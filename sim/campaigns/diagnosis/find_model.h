@@ -1,5 +1,5 @@
 // The search for the extended model of a campaign tries effects, steps, zeros of homings and motion
-// of the image, and begins with whichever explains best. Where sensors are suspect it also tries
+// of the image. It begins with whichever explains best. Where sensors are suspect it also tries
 // which of them to believe.
 #pragma once
 
@@ -21,7 +21,7 @@ double RmsOf(const Fit& fit);
 /// Makes the fit that of the extended model, and adds causes for the parts that are no terms
 /// (homings, image, sensors). With `truth` both temperatures are tried, as reported and, for
 /// suspect sensors, as around them, and the ones that explain the moves better are kept. Where
-/// neither does, the sensors of a whole rail are reported as a possibility; a single unit may well
+/// neither does, the sensors of a whole rail are reported as a possibility. A single unit may well
 /// be warmer. nullptr: no sensor is suspect.
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,

@@ -24,8 +24,8 @@ FleetGroups GroupsOf(const CampaignFacts& facts);
 /// Shape: (units).
 std::vector<std::uint32_t> Together(Owner owner, const FleetGroups& groups, std::size_t units);
 
-/// Whether the units with this flag can have an effect of such an owner: of each rail, or bus, that
-/// has any, most units must have it. Shape of has: (units).
+/// Whether the units with this flag can have an effect of such an owner. Most units of each rail,
+/// or bus, that has any such unit must have it. Shape of has: (units).
 bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups);
 
 }  // namespace focalfleet::sim

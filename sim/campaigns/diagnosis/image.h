@@ -22,8 +22,8 @@ struct ImageFound {
   double drift_um = 0;  // of an image that goes on from one exposure to the next
 };
 
-/// Fits shift, turn and scale of each exposure to the residuals where chance does not explain them,
-/// and adds them to the model in place of steps of the whole image.
+/// Fits shift, turn and scale of each exposure to the residuals where chance does not explain them.
+/// The model has them in place of steps of the whole image.
 ImageFound AddImageTerms(Fit* fit, double family_wise);
 
 /// Adds the drift of the image as a rival of terms whose column drifts as well: the drift may

@@ -1,5 +1,6 @@
-// The state in which a campaign left its units: their counts after the last move, and the errors
-// that had added up on each axis by then. A model predicts from there without the campaign's moves.
+// The state in which a campaign left its units. The state is their counts after the last move, and
+// the errors that had added up on each axis by then. A model predicts from there without the
+// campaign's moves.
 #pragma once
 
 #include <array>

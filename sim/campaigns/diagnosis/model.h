@@ -1,6 +1,6 @@
 // The extended model of a campaign has the fitted static geometry of each unit and the accepted
-// effects with their amplitudes. It is the simulation with its effects, and predicts the place of
-// every fibre after every move.
+// effects with their amplitudes. The model is the simulation with its effects, and predicts the
+// place of every fibre after every move.
 #pragma once
 
 #include <cstddef>
@@ -15,8 +15,8 @@
 
 namespace focalfleet::sim {
 
-/// Runs work(0) .. work(chunks - 1), in any order and on any threads; each chunk by itself is
-/// deterministic and results are merged in the order of the chunks.
+/// Runs work(0) .. work(chunks - 1), in any order and on any threads. Each chunk by itself is
+/// deterministic, and results are merged in the order of the chunks.
 using ParallelFor =
     std::function<void(std::size_t chunks, const std::function<void(std::size_t)>& work)>;
 ParallelFor OneAfterTheOther();

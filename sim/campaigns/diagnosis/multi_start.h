@@ -1,5 +1,5 @@
-// Selection begins from several starts, because a single one may be misleading: with and without
-// steps of single units, and with zeros that differ from homing to homing.
+// Selection begins from several starts, because a single one may be misleading. The starts are with
+// and without steps of single units, and with zeros that differ from homing to homing.
 #pragma once
 
 #include "sim/campaigns/diagnosis/select.h"
@@ -10,7 +10,7 @@ namespace focalfleet::sim {
 /// Afterwards the model's homing_zero_deg are empty where zeros are the same after each homing.
 Selection SelectMultiStart(const Templates& templates, const SelectionRule& rule, Fit* fit);
 
-/// The -BIC by which the fit is better than the other, by one noise for both: factors of units and
+/// The -BIC by which the fit is better than the other, by one noise for both. Factors of units and
 /// exposures wander by more than a step is worth. Each noise favours the fit that it comes from, so
 /// that the result is the mean of the two.
 double BetterBy(const Fit& fit, const Fit& than);

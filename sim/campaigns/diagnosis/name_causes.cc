@@ -68,7 +68,7 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
 // Merges causes of one name, of both axes or of several shapes, into one entry.
 void MergeCauses(std::vector<CauseFound>* causes) {
   // The strongest part comes first. A rival that the data do not separate from it is a rival of the
-  // whole, and a rival of a weak part only does not explain the whole.
+  // whole. A rival of a weak part alone does not explain the whole.
   std::stable_sort(causes->begin(), causes->end(), [](const CauseFound& a, const CauseFound& b) {
     return a.delta_log_likelihood > b.delta_log_likelihood;
   });
