@@ -1,8 +1,9 @@
 // A library's shape of a cause is never quite the true one. The misfit of a strong cause looks like
 // other causes, and no threshold of chance protects from it, because the misfit is certain. The
-// misfit is, however, a distortion of that cause: its own amplitude in each unit, a bend where it
-// is large, another dependence on the drive. Each weak term is therefore fitted beside distortions
-// of the strong ones. A term that then explains nothing is a misfit artefact, whatever its name.
+// misfit is, however, a distortion of that cause. The cause has its own amplitude in each unit,
+// bends where it is large, or depends on the drive in another way. Each weak term is therefore
+// fitted beside distortions of the strong ones. A term that then explains nothing is a misfit
+// artefact, whatever its name.
 #pragma once
 
 #include <cstddef>

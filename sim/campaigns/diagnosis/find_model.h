@@ -1,6 +1,6 @@
 // The search for the extended model of a campaign tries effects, steps, zeros of homings and motion
-// of the image. It begins with whichever explains best. Where sensors are suspect it also tries
-// which of them to believe.
+// of the image. The search begins with whichever explains best. Where sensors are suspect it also
+// tries which of them to believe.
 #pragma once
 
 #include <string_view>

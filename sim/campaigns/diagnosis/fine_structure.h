@@ -21,8 +21,8 @@
 namespace focalfleet::sim {
 
 /// The clearest structure. The result is nullopt where chance explains it, at a share of the
-/// family-wise rate, or where it is less than `share_min` of the variance along an angle or
-/// direction.
+/// family-wise rate. A structure is also ignored below `share_min` of the variance along an angle
+/// or direction.
 std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise,
                                               double share_min = 0.08);
 

@@ -86,9 +86,9 @@ std::vector<NoiseUnit> Sample(const Fit& fit) {
   return sample;
 }
 
-// The cost of a unit: the density of each place given those before it, and the part that the unit's
-// own unknowns have absorbed (restricted likelihood; the unknowns to second order about the
-// residuals).
+// The cost of a unit is the density of each place given those before it, and the part that the
+// unit's own unknowns have absorbed. The likelihood is restricted, with the unknowns to second
+// order about the residuals.
 // Source: Patterson and Thompson, Biometrika 58 (1971) 545.
 double CostOf(const NoiseUnit& unit, const Noise& noise) {
   constexpr double kLoose = 1e-12;  // of an unknown that the rows do not show

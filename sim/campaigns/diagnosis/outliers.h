@@ -1,5 +1,6 @@
-// Outliers are rows that no smooth effect makes. They are found, counted and named before and after
-// the fit: units that do not move, spots that were not seen, moves that did not happen.
+// Outliers are rows that no smooth effect makes. Examples are units that do not move, spots that
+// were not seen, and moves that did not happen. They are found, counted and named before and after
+// the fit.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,8 @@
-// A patch corrects what no cause explains: an empirical term for the clearest structure that the
-// screen finds, then for the next, until chance explains what is left. A term is a curve of all
-// cosines over the column, or the ripple of the order. The whole model is fitted anew with each. A
-// patch names nothing: the verdict stays "unknown", and held-out moves measure what the patch is
-// worth.
+// A patch corrects what no cause explains. An empirical term is added for the clearest structure
+// that the screen finds, then for the next, until chance explains what is left. A term is a curve
+// of all cosines over the column, or the ripple of the order. The whole model is fitted anew with
+// each. A patch names nothing: the verdict stays "unknown", and held-out moves measure what the
+// patch is worth.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // A planted campaign has chosen effects in it, for tests, load and demonstration. Units are on a
 // hexagonal lattice. Moves are a diagnostic campaign: long and short ones both ways, of single axes
-// and both, with few and many movers, several drive levels, delays and temperatures. Places are
-// measured with noise.
+// and both. They have few and many movers, several drive levels, delays and temperatures. Places
+// are measured with noise.
 //
 // The physics are those of the library. A test of the diagnosis that must not share them plants its
 // own campaigns (tests/hidden).
@@ -45,8 +45,8 @@ struct PlantedOptions {
   std::vector<PlateMove> next;  // made after the others, by the same units
 };
 
-/// A campaign with the effects, and with the causes of planted_faults.h, which are no effects. It
-/// has camera pixels where centroid_bias is planted.
+/// A campaign with the effects, and with the causes of planted_faults.h, which are no effects. The
+/// campaign has camera pixels where centroid_bias is planted.
 /// Errors: kInvalid: an effect, axis or shape that does not exist.
 Result<Campaign> PlantCampaign(const PlantedOptions& options);
 

@@ -1,5 +1,5 @@
-// Planted faults are causes that no effect of the library makes: lost moves, slips of the rotor,
-// fibres under each other's name, sensors with another gain, moving air.
+// Planted faults are causes that no effect of the library makes. They are lost moves, slips of the
+// rotor, fibres under each other's name, sensors with another gain, and moving air.
 #pragma once
 
 #include <cstdint>

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// Twice the vector spacing of an axis, and 3 um at 16.5 mm: a table that rounds its angles to
+// Two field vectors of an axis, which are 3 um at 16.5 mm: a table that rounds its angles to
 // hundredths is within it. Half of it would call such rounding a break. Twice of it is what a
 // camera sees.
 constexpr double kJoins_deg = 0.01;

@@ -165,9 +165,8 @@ class BlockScorer {
     MultiplyLanes(plane.shared, scratch_.m.data(), shared_cross_.data());
   }
 
-  // A bend of the plate or its image shifts each unit far more than it bends what the unit sees,
-  // and the shift belongs to the unit's base. The first two columns of the basis are those of the
-  // base.
+  // A bend of the plate or its image shifts each unit far more than it bends what the unit sees.
+  // The shift belongs to the unit's base. The first two columns of the basis are those of the base.
   void LeaveOutShifts() {
     constexpr double kRounding = 1e-9;  // of a signature that is all shift
     raw_ = whole_;
@@ -357,7 +356,7 @@ void Merge(const LookPart& from, LookPart* to) {
   to->values += from.values;
 }
 
-// One template's lanes, as numbers one after the other.
+// The lanes of one template, as numbers one after the other.
 std::vector<double> OutOfLanes(const Lanes* rows, std::size_t count, const Placed& placed,
                                std::size_t columns) {
   std::vector<double> values;

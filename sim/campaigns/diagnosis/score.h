@@ -1,8 +1,8 @@
 // Scores compare the signatures of all templates with the residuals of a fit. The signature of a
-// template is the displacement that its effect makes per unit of amplitude at the same commands and
-// conditions, [sim(+e) - sim(-e)] / 2e. It is whitened like the data. The part that static geometry
-// and the model's present terms can absorb is projected out (Frisch and Waugh). Only b = M'y and G
-// = M'M are kept of it per unit; sums over units score it for a rail, a bus, the fleet.
+// template is the displacement per unit of amplitude at the same commands and conditions, [sim(+e)
+// - sim(-e)] / 2e. Signatures are whitened like the data. The part that static geometry and the
+// model's present terms can absorb is projected out (Frisch and Waugh). Only b = M'y and G = M'M
+// are kept of it per unit. Sums over units score it for a rail, a bus, the fleet.
 //
 // Signatures are made anew in each pass and never stored: 5000 units x 250 moves x 400 templates
 // would be 8 GB. A pass costs some 40 ns a move and template.

@@ -13,7 +13,7 @@ namespace {
 // structure is a small part of the residuals, because named causes always leave a little by their
 // shapes.
 constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
-// Share of a look that has to be left beside the model: a cause is often nearly the true one, and
+// Share of a look that has to be left beside the model. A cause is often nearly the true one, and
 // the screen looks for the little that it leaves.
 constexpr double kKeptMin = 0.012;
 

@@ -1,8 +1,8 @@
-// The screen finds structure that no effect of the library explains. It looks at the residuals
-// along each axis' angle and each direction of the plate, with and without the direction of motion.
-// The looks are smooth curves over the ranks of every column of the table, and ripples of any order
-// of either axis. They are templates like those of effects, so that they are scored, shared and
-// gated the same way. Their finds are called empirical, never a cause.
+// The screen finds structure that no effect of the library explains. The screen examines the
+// residuals along each axis' angle and each direction of the plate, with and without the direction
+// of motion. The looks are smooth curves over the ranks of every column of the table, and ripples
+// of any order of either axis. They are templates like those of effects, so that they are scored,
+// shared and gated the same way. Their finds are called empirical, never a cause.
 #pragma once
 
 #include <cstdint>

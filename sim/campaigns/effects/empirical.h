@@ -1,8 +1,8 @@
-// Empirical terms are shapes that make no claim about physics. One kind is a smooth curve over the
-// ranks of a column, as five cosines. The other is a ripple of any order. Either acts on an angle
-// or a direction of the plate. The screen (diagnosis/screen.h) uses them to find what no effect of
-// the library explains, and the patch (diagnosis/patch.h) adds them to a model. They are no causes
-// and not in the library.
+// Empirical terms are shapes that make no claim about physics. The first kind is a smooth curve
+// over the ranks of a column, as five cosines. The second is a ripple of any order. Either acts on
+// an angle or a direction of the plate. The screen (diagnosis/screen.h) uses them to find what no
+// effect of the library explains, and the patch (diagnosis/patch.h) adds them to a model. They are
+// no causes and not in the library.
 //
 // A rank belongs to its campaign: a hundredth of another night's rows are at another humidity. A
 // curve for use with other campaigns has knots, the column's values at the ranks, and is read

@@ -1,5 +1,5 @@
 // The load angle is the angle by which a rotor stays behind the field that holds it. Its sine is
-// the ratio of the load's torque to the torque at pull-out, and the latter is in proportion to the
+// the ratio of the load's torque to the torque at pull-out. The latter is in proportion to the
 // drive and to the supply voltage.
 #pragma once
 
