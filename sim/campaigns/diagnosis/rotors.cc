@@ -201,7 +201,7 @@ std::vector<Rotor> TakeRotors(const Fit& fit, std::size_t axis,
 }
 
 // Whether one way is clearly better: beyond chance, and by a quarter of what it leaves itself above
-// noise. That part is no scatter but a misfit. A detent of order 1 and a circle beside the origin
+// noise. The excess is no scatter but a misfit. A detent of order 1 and a circle beside the origin
 // are one curve.
 bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
   constexpr double kOfNormal = 1.15;    // mean of 2 MinusLogDensity of a normal number's square

@@ -1,13 +1,15 @@
 // The cause that turned a rotor far is decided by its exact wave. At a small angle between rotor
-// and field, a detent of the motor and a field that points elsewhere are both a sine of the motor's
-// angle. Where the angle is large, each bends in its own way, and the templates' few harmonics
-// follow either. The waves are therefore compared by their physics: detent:           U sin(lag) =
-// t sin(n (angle - lag) + phase), the nearest rest; unequal gains:    the field goes round an
-// ellipse; an offset:        round a circle beside the origin, the more so the smaller U is; the
-// bridge's dead time: the same off the voltage against each phase's current, which turns in steps
-// of 60 degrees. Each unit has its own strength and phase, and U is the level of the drive. A rotor
-// in its field is pulled back by the sine of the angle between them (load_angle.h). The field is
-// the sum of those of the three phases.
+// and field, a detent of the motor and a field that points elsewhere are both a sine of the
+// motor's angle. At a large angle each bends in its own way, and the templates' few harmonics
+// follow either. The waves are therefore compared by their physics.
+//   detent:           U sin(lag) = t sin(n (angle - lag) + phase), the nearest rest;
+//   unequal gains:    the field goes round an ellipse;
+//   an offset:        round a circle beside the origin, the more so the smaller U is;
+//   the bridge's dead time: the same off the voltage against each phase's current, which turns in
+//                     steps of 60 degrees.
+// Each unit has its own strength and phase, and U is the level of the drive. A rotor in its field
+// is pulled back by the sine of the angle between them (load_angle.h). The field is the sum of
+// those of the three phases.
 #pragma once
 
 #include <array>
