@@ -1,4 +1,4 @@
-// The generator's physics and its keys: no effect gives no change, and a planted effect is as
+// Tests of the generator's physics and its keys. No effect gives no change. A planted effect is as
 // visible, and as like its rivals, as its key says.
 #include <gtest/gtest.h>
 

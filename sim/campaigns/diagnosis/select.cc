@@ -209,8 +209,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
       rivals->push_back({trial.cause, trial.behind, 0, false});
 }
 
-// Looks at each term once: it is exchanged, dropped, or kept with its rivals. True if anything
-// changed.
+// Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.
 bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
                double tests, LookBook* looks, Fit* fit, std::vector<Accepted>* accepted) {
   accepted->clear();

@@ -2,8 +2,8 @@
 // yet. Rows are move by move with every unit in each, so that row = move * units + unit. A unit
 // that is not moved is commanded to its present pose.
 //
-// The generator has physics of its own and shares no line with the simulation. It exists to test
-// the diagnosis, which must not be tested against its own assumptions.
+// The generator has physics of its own and shares no line with the simulation. Its purpose is to
+// test the diagnosis, which must not be tested against its own assumptions.
 #pragma once
 
 #include <array>

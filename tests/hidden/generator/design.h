@@ -1,4 +1,4 @@
-// A design is what is commanded in a campaign, and under which conditions. It is an ordinary
+// A design is what is commanded in a campaign, and under which conditions. Designs are an ordinary
 // survey, a campaign made to separate causes, or arcs from the hard stop as for a single unit on a
 // bench.
 #pragma once

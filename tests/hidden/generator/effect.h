@@ -1,14 +1,14 @@
 // An effect has a cause, an owner, a size for each unit, and the physics that carries it from the
 // drive to the camera. A unit's campaign is a Track of its axes' angles in every move. Each effect
-// changes the track at its own stage, so that effects act on each other as in a real unit: a
-// slipped revolution shifts the phase of a ripple, backlash follows the lagging rotor.
+// changes the track at its own stage, so that effects act on each other as in a real unit. A
+// slipped revolution shifts the phase of a ripple, and backlash follows the lagging rotor.
 //
 //   travel      the firmware and the gears turn a command into motion; errors stay until the next
-//   homing
+//               homing
 //   rest        the rotor comes to rest in its electrical field
 //   history     parts between rotor and arm with memory: play, bristles, stiction
 //   gear        transmission error of the gears, as a function of the arm's angle
-//   exposure    dependence on time, gravity, heat and neighbours at the picture
+//   exposure    dependence on time, gravity, heat and neighbours when the picture is taken
 //   plate       the fibre's place: plate, telescope
 //   camera      the measured place
 #pragma once

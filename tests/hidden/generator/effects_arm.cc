@@ -1,5 +1,5 @@
-// Effects that move an arm beside its drive: springs that creep, gravity, a crossing cable, wear, a
-// late start, a touched neighbour, an axis that leans.
+// Effects that move an arm beside its drive are springs that creep, gravity, a crossing cable and
+// wear. Others are a late start, a touched neighbour, and an axis that leans.
 #include <algorithm>
 #include <cmath>
 
@@ -43,8 +43,8 @@ void GravityTorque(const Scene& scene, const Effect& effect, std::size_t unit, T
   }
 }
 
-// The fibre bundle of phi runs through theta's axis. It twists theta as phi turns, or drags it in
-// the direction in which phi last went.
+// The fibre bundle of phi runs through theta's axis. The bundle twists theta as phi turns, or drags
+// it in the direction in which phi last went.
 void AxisCrosstalk(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const bool drags = effect.shape[0] > 0.6;

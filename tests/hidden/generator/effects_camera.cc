@@ -78,8 +78,9 @@ void CentroidBias(const Scene& scene, const Effect& effect, std::size_t, Track* 
   }
 }
 
-// Air between plate and camera: a Gaussian random field over the plate, new in every picture, as a
-// sum of plane waves with random directions and Gaussian wave numbers (Bochner's theorem).
+// Air between plate and camera is a Gaussian random field over the plate, new in every picture. The
+// field is a sum of plane waves with random directions and Gaussian wave numbers (Bochner's
+// theorem).
 void AirTurbulence(const Scene& scene, const Effect& effect, std::size_t, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double rms_mm = effect.kind->typical * effect.size;

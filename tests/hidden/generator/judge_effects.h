@@ -1,6 +1,6 @@
-// The truth about a planted campaign: the size and visibility of each effect, the other causes that
-// could have made the same picture, and the noise that is left for a perfect model. Such a model's
-// gain on moves that it has not seen is part of it.
+// The truth about a planted campaign is the size and visibility of each effect, and the other
+// causes that could have made the same picture. The noise that is left for a perfect model is part
+// of it. A perfect model's gain on moves that it has not seen is another.
 #pragma once
 
 #include <string>
@@ -27,7 +27,8 @@ Visibility Assess(const Scene& scene, const NoiseModel& noise, const std::vector
                   const std::vector<std::vector<Place>>& contribution_um);
 
 /// The factor on chi-square that makes the effect as easy to find as one with a single free
-/// coefficient at `lambda`. It is for several units, each by itself, or many phases.
+/// coefficient at `lambda`. The factor is above 1 for several units, each by itself, or many
+/// phases.
 double LambdaScale(const Effect& effect);
 
 /// Scales the effect until it explains `lambda_wanted` (or as much as physics allows).

@@ -1,5 +1,5 @@
-// The oracle has the planted effects, but not the noise. It takes the true contribution away, fits
-// the static geometry to four fifths of the moves, and is judged on the rest.
+// The oracle has the planted effects, but not the noise. The oracle takes the true contribution
+// away, fits the static geometry to four fifths of the moves, and is judged on the rest.
 #include <algorithm>
 #include <cmath>
 

@@ -167,7 +167,7 @@ Planted Plant(const Spec& spec) {
   }
   for (std::size_t i = 0; i < spec.causes.size(); ++i) {
     Effect& effect = planted.effects[i];
-    // The other effects come after sensor_bias, which is seen through a growth of its own.
+    // A sensor's bias is seen through the arms' growth, and is tuned after the growth.
     if (effect.kind->cause == "sensor_bias") continue;
     Tune(scene, planted.truth, noise, seen, spec.lambda_wanted[i] * LambdaScale(effect), &effect);
   }

@@ -1,7 +1,7 @@
 // A rival is another cause that could have made the same picture. Its own signature, run through
 // the same plant on the same commands, is fitted to the effect's, with the static geometry free. A
-// rival has the same freedom as the effect: one coefficient where the effect is common, one per
-// unit (and phase) where each unit has its own.
+// rival has the same freedom as the effect. Common effects have one coefficient, and others have
+// one per unit (and phase).
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -1,9 +1,9 @@
-// The spec of one campaign of the suite is drawn from (suite seed, index). It has the design, the
-// plate, the effects and their visibility, the noise, and other errors.
+// The spec of one campaign of the suite is drawn from (suite seed, index). The spec has the design,
+// the plate, the effects and their visibility, the noise, and other errors.
 //
-// Kinds come in shuffled blocks of twenty: 4 without an effect, 9 with one, 4 with two to four, 3
-// with one that no library holds. Single causes come in turns, so that a suite of any length covers
-// all of them.
+// Kinds come in shuffled blocks of twenty. Each block has 4 without an effect, 9 with one, 4 with
+// two to four, and 3 with one that no library holds. Single causes come in turns, so that a suite
+// of any length covers all of them.
 #pragma once
 
 #include <cstdint>
