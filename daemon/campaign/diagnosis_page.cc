@@ -132,7 +132,7 @@ std::string PercentOf(double share) {
 // The table of what further moves would decide, pair by pair.
 void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
   page->Heading("Moves to make next");
-  if (next.prospects.empty() && next.untold.empty()) {
+  if (next.prospects.empty() && next.inseparable.empty()) {
     page->Paragraph("Nothing is confusable: no further moves are needed to tell causes apart.");
     return;
   }
@@ -145,7 +145,7 @@ void AddNextMoves(const sim::NextMoves& next, report::Page* page) {
   std::vector<std::vector<std::string>> rows;
   for (const sim::Prospect& one : next.prospects)
     rows.push_back({one.cause, one.rival, Decimals(one.d, 1), PercentOf(sim::ConfusionAt(one.d))});
-  for (const auto& [cause, rival] : next.untold)
+  for (const auto& [cause, rival] : next.inseparable)
     rows.push_back({cause, rival, "-", "no move tells"});
   page->Table({"cause", "or", "set apart by (chi-square)", "still confused"}, rows,
               {Align::kLeft, Align::kLeft, Align::kRight, Align::kRight});

@@ -20,7 +20,7 @@ bool DifferInShapeAlone(const Template& a, const Template& b) {
 
 bool IsOfAll(const Template& form) { return form.shape_of_unit.empty(); }
 
-// To the nearest of other shapes of its kind; 0: it has none, or none between them.
+// The distance to the nearest other shape of its kind. 0 where there is none, or none between them.
 double GapTo(const Template& form, const Templates& kind) {
   double gap = kInfinity;
   for (const Template& other : kind)
@@ -37,7 +37,7 @@ Template Moved(const Template& form, double by) {
   return moved;
 }
 
-// What the unit's residuals gain by it; 0: nothing that can be.
+// Chi-square that the unit's residuals gain by the template; 0 where no possible amplitude gains.
 double ChiSquare(const Score& score, const Template& form, std::size_t unit) {
   const std::size_t c = form.columns;
   const auto size = static_cast<Eigen::Index>(c);
@@ -54,7 +54,7 @@ Template BestOfAll(std::span<const Score> scores, std::span<const Template> trie
   for (std::size_t k = 0; k < tried.size(); ++k) {
     if (tried[k].shape <= 0 && tried[0].shape > 0) continue;
     if (!Shows(facts, tried[k])) continue;
-    const double evidence = Assess(scores[k], tried[k], groups).evidence;
+    const double evidence = Assess(scores[k], tried[k], groups).log_evidence;
     if (evidence > most) most = evidence, best = k;
   }
   return tried[best];
@@ -88,25 +88,26 @@ Templates KindOf(const Template& form, const Templates& library) {
 }
 
 std::vector<CandidateShape> CandidateShapesOf(const ScorePass& pass,
-                                              const std::vector<Evidence>& evidences,
+                                              const std::vector<Evidence>& evidence_of,
                                               const Templates& templates, std::size_t best,
                                               double kept_min) {
-  constexpr double kNear = 15, kNearShare = 0.15;  // of the best one's chi-square
+  constexpr double kNear = 15, kNearShare = 0.15;  // of the best template's chi-square
   constexpr std::size_t kMost = 6;
   if (best == kNoTerm) return {};
-  const double far = std::max(kNear, kNearShare * evidences[best].chi_square);
+  const double far = std::max(kNear, kNearShare * evidence_of[best].chi_square);
   std::map<std::pair<std::string_view, EffectAxis>, std::size_t> at_of;
   for (std::size_t k = 0; k < templates.size(); ++k) {
-    if (evidences[k].evidence < evidences[best].evidence - far) continue;
+    if (evidence_of[k].log_evidence < evidence_of[best].log_evidence - far) continue;
     if (!(pass.scores[k].kept > kept_min * pass.scores[k].raw)) continue;
     const auto [it, fresh] =
         at_of.emplace(std::pair(templates[k].effect->cause, templates[k].axis), k);
-    if (!fresh && evidences[k].evidence > evidences[it->second].evidence) it->second = k;
+    if (!fresh && evidence_of[k].log_evidence > evidence_of[it->second].log_evidence)
+      it->second = k;
   }
   std::vector<std::size_t> order;
   for (const auto& [key, k] : at_of) order.push_back(k);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return evidences[a].evidence > evidences[b].evidence;
+    return evidence_of[a].log_evidence > evidence_of[b].log_evidence;
   });
   if (order.size() > kMost) order.resize(kMost);
   std::vector<CandidateShape> candidate_shapes;
@@ -139,7 +140,8 @@ std::vector<CandidateShape> OwnShapes(const ScorePass& pass, const Templates& te
     if (kind.size() < 2) continue;
     std::map<std::uint32_t, double> shapes;
     Score own = *scores.front();  // each unit's by its own shape
-    // About a wrong shape the right one's trace is spread: the least is the noise's.
+    // The trace of the right shape is spread about a wrong one: the least spread is that of the
+    // noise.
     for (const Score* one : scores)
       if (one->spread_sum * own.spread_count < own.spread_sum * one->spread_count)
         own.spread_sum = one->spread_sum, own.spread_count = one->spread_count;
@@ -164,7 +166,7 @@ std::vector<CandidateShape> OwnShapes(const ScorePass& pass, const Templates& te
     for (const Template& one : kind) choices = std::max(choices, one.choices);
     Template form = WithShapes(kind.front(), std::move(shapes));
     form.choices = choices;
-    if (Assess(own, form, groups).evidence > evidence_min)
+    if (Assess(own, form, groups).log_evidence > evidence_min)
       candidate_shapes.push_back({std::move(form), GapTo(kind.front(), kind)});
   }
   return candidate_shapes;

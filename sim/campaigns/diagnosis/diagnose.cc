@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <numbers>
-#include <numeric>
 #include <optional>
 #include <set>
 
@@ -10,15 +10,13 @@
 #include "sim/campaigns/diagnosis/beaten.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/diagnosis.h"
-#include "sim/campaigns/diagnosis/distortion.h"
 #include "sim/campaigns/diagnosis/events.h"
 #include "sim/campaigns/diagnosis/exchanged.h"
 #include "sim/campaigns/diagnosis/families.h"
 #include "sim/campaigns/diagnosis/find_model.h"
 #include "sim/campaigns/diagnosis/fine_structure.h"
 #include "sim/campaigns/diagnosis/gain.h"
-#include "sim/campaigns/diagnosis/geometry_causes.h"
-#include "sim/campaigns/diagnosis/image_followed.h"
+#include "sim/campaigns/diagnosis/name_causes.h"
 #include "sim/campaigns/diagnosis/next_moves.h"
 #include "sim/campaigns/diagnosis/outliers.h"
 #include "sim/campaigns/diagnosis/patch.h"
@@ -28,25 +26,21 @@
 #include "sim/campaigns/diagnosis/screen.h"
 #include "sim/campaigns/diagnosis/shared_walk.h"
 #include "sim/campaigns/diagnosis/steps_instead.h"
-#include "sim/campaigns/diagnosis/term_trace.h"
 #include "sim/campaigns/diagnosis/wrong_sensors.h"
-#include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kMovesMin = 8;  // of a unit, seen
-constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
+constexpr std::size_t kMovesMin = 8;  // seen moves of a unit
+constexpr double kMissMax_mm =
+    1;  // median; a larger miss means that the geometry is another unit's
 constexpr double kKeptMin = 0.03;
 
-// Templates that the data can test; why the others cannot.
+// Templates that the data can test; the reasons for the others go to `not_testable`.
 Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
                       std::vector<NotTestable>* not_testable) {
   Templates templates;
-  std::vector<const Effect*> effects = options.also;
-  for (const Effect& effect : EffectLibrary()) effects.push_back(&effect);
-  for (const Effect* one : effects) {
-    const Effect& effect = *one;
+  for (const Effect& effect : options.library) {
     if (IsLeftOut(options, effect.cause)) continue;
     const std::string_view missing = MissingCovariate(effect, facts);
     if (!missing.empty()) {
@@ -69,7 +63,7 @@ Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options
   return templates;
 }
 
-// Causes of which no template has a signature of its own in these moves.
+// Finds causes of which no template has a signature of its own in these moves.
 void FindNotExcited(const Templates& templates, const Selection& selection,
                     std::vector<NotTestable>* out) {
   std::map<std::string_view, double> best;
@@ -83,104 +77,9 @@ void FindNotExcited(const Templates& templates, const Selection& selection,
                                                    : "the moves never excite it"});
 }
 
-std::string ScopeOf(const ModelTerm& term, std::size_t units) {
-  if (term.sharing == Sharing::kUnit || units == 1)
-    return std::string(Name(units == 1 && term.form.effect->owner != Owner::kUnit
-                                ? term.form.effect->owner
-                                : Owner::kUnit));
-  if (term.sharing == Sharing::kRail || term.sharing == Sharing::kBus)
-    return std::string(Name(term.sharing));
-  return std::string(
-      Name(term.form.effect->owner == Owner::kUnit ? Owner::kPlate : term.form.effect->owner));
-}
-
-CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
-  const Effect& effect = *term.form.effect;
-  CauseFound cause = CauseNamed(effect.cause);
-  for (const Rival& rival : accepted.rivals)
-    (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
-  cause.axis = Name(term.form.axis);
-  cause.scope = ScopeOf(term, fit.model.units.size());
-  std::size_t have = 0, all = 0;
-  const Campaign& campaign = *fit.facts->campaign;
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
-    if (campaign.first_row[unit] == campaign.first_row[unit + 1]) continue;
-    ++all;
-    if (term.group_of_unit[unit] == kNoGroup) continue;
-    ++have;
-    cause.units.push_back(campaign.units[unit].id);
-  }
-  constexpr double kNearlyAll = 0.9;
-  cause.all_units = static_cast<double>(have) >= kNearlyAll * static_cast<double>(all);
-  cause.amplitude_unit = effect.amplitude_unit;
-  const AmplitudeSummary amplitude = Summarise(term);
-  cause.amplitude = amplitude.value;
-  cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
-  cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
-  const TermTrace trace = TraceOf(fit, term);
-  cause.size_um = trace.rms_um;
-  cause.delta_log_likelihood = accepted.evidence.chi_square / 2;
-  const double square = std::accumulate(trace.square_um2.begin(), trace.square_um2.end(), 0.0);
-  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
-    if (trace.square_um2[unit] > 0)
-      cause.evidence_of_unit[campaign.units[unit].id] =
-          cause.delta_log_likelihood * trace.square_um2[unit] / square;
-  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
-  cause.shape = term.form.label;
-  cause.paragraph = effect.paragraph;
-  return cause;
-}
-
-void AddUnits(const CauseFound& more, CauseFound* cause) {
-  std::set<std::uint32_t> units(cause->units.begin(), cause->units.end());
-  units.insert(more.units.begin(), more.units.end());
-  cause->units.assign(units.begin(), units.end());
-  cause->all_units = cause->all_units || more.all_units;
-}
-
-// One entry a cause: both axes, or several shapes, of one name belong together.
-void MergeCauses(std::vector<CauseFound>* causes) {
-  // Strongest first: what cannot be told of the strongest part cannot be told of the whole, and
-  // rivals of a weak part only do not explain it.
-  std::stable_sort(causes->begin(), causes->end(), [](const CauseFound& a, const CauseFound& b) {
-    return a.delta_log_likelihood > b.delta_log_likelihood;
-  });
-  std::vector<CauseFound> merged;
-  for (CauseFound& cause : *causes) {
-    const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
-      return other.cause == cause.cause;
-    });
-    if (same == merged.end()) {
-      merged.push_back(std::move(cause));
-      continue;
-    }
-    if (same->axis != cause.axis) same->axis = "both";
-    if (cause.size_um > same->size_um) {
-      same->amplitude = cause.amplitude;
-      same->ci95[0] = cause.ci95[0], same->ci95[1] = cause.ci95[1];
-      same->shape = cause.shape;
-      same->scope = cause.scope;
-    }
-    AddUnits(cause, &*same);
-    same->size_um = std::hypot(same->size_um, cause.size_um);
-    same->delta_log_likelihood += cause.delta_log_likelihood;
-    if (same->evidence_of_unit.empty()) cause.evidence_of_unit.clear();
-    if (cause.evidence_of_unit.empty()) same->evidence_of_unit.clear();
-    for (const auto& [unit, evidence] : cause.evidence_of_unit)
-      same->evidence_of_unit[unit] += evidence;
-    for (std::string& name : cause.misfit_artefacts)
-      same->misfit_artefacts.push_back(std::move(name));
-    for (std::string& name : cause.cannot_be) same->cannot_be.push_back(std::move(name));
-    same->predicted_gain_um += cause.predicted_gain_um;
-  }
-  std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
-    return a.delta_log_likelihood > b.delta_log_likelihood;
-  });
-  *causes = std::move(merged);
-}
-
-// What the screen sees joins what is told: a column once, but for each term that patches it.
-void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* reported) {
+// Adds what the screen found to what is reported: each column once, but for each term that patches
+// it.
+void AddUnknown(std::vector<UnknownFound> seen, std::vector<UnknownFound>* reported) {
   for (UnknownFound& one : seen) {
     const auto of_column = [&](const UnknownFound& other) {
       return other.covariate == one.covariate && (!one.patched || !other.patched);
@@ -193,15 +92,7 @@ void TakeSeen(std::vector<UnknownFound> seen, std::vector<UnknownFound>* reporte
   }
 }
 
-// Whether so little is told with the cause whose shape leaves it.
-bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks_like,
-                                double noise_um, std::vector<CauseFound>* causes) {
-  CauseFound* of = WhoLeaves(left, noise_um, causes);
-  if (of != nullptr) ReportAsMisfitArtefact(left.size_um, looks_like, of);
-  return of != nullptr;
-}
-
-// What is left that no cause explains; with `patch`, terms for it.
+// Finds what is left that no cause explains; with `patch`, adds terms for it.
 void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
   const double noise_um = RmsOf(*fit);
   const auto matters = [&](const UnknownFound& left) {
@@ -215,7 +106,7 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
   } else if (auto structure = FindStructure(*fit, options.family_wise, options.seed)) {
     if (matters(structure->reported)) seen.push_back(std::move(structure->reported));
   }
-  TakeSeen(std::move(seen), &diagnosis->unknown);
+  AddUnknown(std::move(seen), &diagnosis->unknown);
   if (!diagnosis->unknown.empty()) return;
   if (auto walk = FindSharedWalk(*fit, options.family_wise, options.seed); walk && matters(*walk)) {
     diagnosis->unknown.push_back(std::move(*walk));
@@ -223,6 +114,17 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
   }
   auto fine = FindFineStructure(*fit, options.family_wise);
   if (fine && matters(*fine)) diagnosis->unknown.push_back(std::move(*fine));
+}
+
+// Temperatures by the neighbours' sensors, where sensors are suspect; else nullptr.
+std::unique_ptr<TrueTemperatures> TestSensors(const CampaignFacts& facts,
+                                              const DiagnoseOptions& options,
+                                              std::vector<NotTestable>* not_testable) {
+  if (std::string why = WhyNoSensorIsTested(facts); !why.empty()) {
+    not_testable->push_back({std::string(kSensorBias), std::move(why)});
+    return nullptr;
+  }
+  return IsLeftOut(options, kSensorBias) ? nullptr : FindSuspectSensors(facts);
 }
 
 std::string WhyInsufficient(const CampaignFacts& facts, const std::vector<char>& aside) {
@@ -251,8 +153,8 @@ double MedianMiss(const Fit& fit) {
   return misses.empty() ? 0 : Median(std::move(misses));
 }
 
-// What the model that is there already explains is no misfit of it: its effects are taken off the
-// measured places, and its geometry stands for the table's.
+// The part that the given model already explains is no misfit. Its effects are subtracted from the
+// measured places, and its geometry replaces the table's.
 void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
               Campaign* campaign) {
   campaign->units = model.units;
@@ -265,68 +167,7 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
   }
 }
 
-// The causes of the model's terms. What a distortion of a stronger one explains as well is told as
-// what that one's shape leaves; what it explains in part has it as a candidate.
-std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
-  const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
-  const double rms_um = RmsOf(fit);
-  std::vector<CauseFound> all, kept;
-  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
-    all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
-  std::vector<char> is_misfit_artefact;
-  for (std::size_t t = 0; t < all.size(); ++t)
-    is_misfit_artefact.push_back(beside[t].is_misfit_artefact() &&
-                                 CanLeave(all[beside[t].of], all[t]));
-  // Whose misfit artefact a misfit artefact is: of is stronger each time, so that this ends.
-  const auto named = [&](std::size_t of) {
-    while (is_misfit_artefact[of] != 0) of = beside[of].of;
-    return of;
-  };
-  for (std::size_t t = 0; t < all.size(); ++t) {
-    if (!beside[t].is_doubtful()) continue;
-    CauseFound& strong = all[named(beside[t].of)];
-    if (is_misfit_artefact[t] != 0)
-      ReportAsMisfitArtefact(all[t].size_um, all[t].cause, &strong);
-    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
-      all[t].candidates.push_back(strong.cause);
-  }
-  for (std::size_t t = 0; t < all.size(); ++t)
-    if (is_misfit_artefact[t] == 0) kept.push_back(std::move(all[t]));
-  return kept;
-}
-
-// What the model means, by name.
-void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOptions& options,
-                Diagnosis* diagnosis) {
-  std::vector<CauseFound>& causes = diagnosis->causes;
-  for (CauseFound& cause : EventCauses(fit))
-    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
-  for (UnknownFound& step : StandOff(fit)) diagnosis->unknown.push_back(std::move(step));
-  for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
-  options.progress(0.8, "geometry against the table");
-  const double rms_um = RmsOf(fit);
-  for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
-    cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
-    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
-  }
-  JudgeStrays(fit, &causes, &diagnosis->outliers);
-  MergeCauses(&causes);
-  // Where the image's motion follows a column, steps of it are what is left of that.
-  if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
-                  [](const UnknownFound& reported) { return reported.channel == kImageShift; }))
-    std::erase_if(causes,
-                  [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
-  JudgeMisfitArtefacts(fit.model.units.size(), &causes);
-  std::vector<UnknownFound> nameless;
-  JudgeNames(&causes, &nameless);
-  for (UnknownFound& one : nameless)
-    if (!IsReportedAsMisfitArtefact(one, one.channel, rms_um, &causes))
-      diagnosis->unknown.push_back(std::move(one));
-  JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
-  JudgeSeries(&causes, &diagnosis->unknown);
-}
-
-// Where far rows cluster: arms have touched, or nobody knows.
+// Clusters of far rows are contacts of arms where these are nearest, and else unknown.
 void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOptions& options,
                     Diagnosis* diagnosis) {
   const auto is_contact = [](const CauseFound& cause) { return cause.cause == kContact; };
@@ -346,7 +187,16 @@ void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const Diagnose
     std::erase_if(far, [&](std::size_t row) { return touched.count(row) != 0; });
     cluster = FindCluster(fit, far, options.family_wise);
   }
-  if (cluster) TakeSeen({std::move(cluster->reported)}, &diagnosis->unknown);
+  if (cluster) AddUnknown({std::move(cluster->reported)}, &diagnosis->unknown);
+}
+
+// Rivals that only the likelihood excludes are candidates where the model leaves something
+// unexplained: a likelihood decides nothing there.
+void AddRivalsBehind(std::vector<CauseFound>* causes) {
+  for (CauseFound& cause : *causes)
+    for (const std::string& name : cause.behind)
+      if (std::ranges::find(cause.candidates, name) == cause.candidates.end())
+        cause.candidates.push_back(name);
 }
 
 void Conclude(Diagnosis* diagnosis) {
@@ -369,6 +219,19 @@ HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
   return MeasureGain(fit, &misnamed);
 }
 
+// Measures the gain on held-out moves, and proposes the moves to make next.
+void LookAhead(const Fit& fit, const std::optional<Campaign>& as_named,
+               const DiagnoseOptions& options, Diagnosis* diagnosis) {
+  if (options.with_gain) {
+    options.progress(0.9, "held-out moves");
+    diagnosis->gain = GainOf(fit, as_named, options);
+  }
+  if (options.with_next_moves) {
+    options.progress(0.95, "moves to make next");
+    diagnosis->next = ProposeMoves(fit, diagnosis->causes);
+  }
+}
+
 void Remark(std::vector<std::string> remarks, Diagnosis* diagnosis) {
   for (std::string& remark : remarks) diagnosis->remarks.push_back(std::move(remark));
 }
@@ -380,15 +243,15 @@ void RemarkOnRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
   diagnosis->steps = FindPlaceSteps(*facts.campaign);
 }
 
-// The steps of the places limit what is told where they make more of the noise than all else does.
+// The steps of the places limit the diagnosis where they make more of the noise than all else does.
 void RemarkOnNoise(const Fit& fit, Diagnosis* diagnosis) {
   const double of_steps_um = 1e3 * SpreadOfStep(diagnosis->steps.wider_mm());
   diagnosis->steps_limit = std::numbers::sqrt2 * of_steps_um > fit.noise.place_um;
   if (diagnosis->steps_limit) Remark({RemarkOnSteps(diagnosis->steps)}, diagnosis);
 }
 
-// A fit to rows that say nothing of a unit, or that are not its own, is no model of it: whoever
-// reads the model has the table's.
+// A unit's fit is no model of it where its rows show nothing of the unit, or belong to another. The
+// model then has the table's geometry for it.
 void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
   CampaignModel& model = diagnosis->model;
   for (std::size_t unit = 0; unit < model.units.size(); ++unit) {
@@ -441,7 +304,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   CampaignModel before;
   if (options.before != nullptr) {
     before = *options.before;
-    diagnosis.not_testable = LeaveOutUntold(facts, &before);
+    diagnosis.not_testable = LeaveOutUntestable(facts, &before);
     TakeAway(before, facts, options.parallel, &campaign);
   }
   diagnosis.model.units = campaign.units;
@@ -467,44 +330,28 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
     share += (0.75 - share) * 0.15;
     options.progress(share, stage);
   };
-  std::unique_ptr<TrueTemperatures> truth;
-  if (const std::string why = WhyNoSensorIsTested(facts); !why.empty())
-    diagnosis.not_testable.push_back({std::string(kSensorBias), why});
-  else if (!IsLeftOut(options, kSensorBias))
-    truth = FindSuspectSensors(facts);
-  // Without the wrong sensors a column may be gone that they alone made.
+  const std::unique_ptr<TrueTemperatures> truth =
+      TestSensors(facts, options, &diagnosis.not_testable);
+  // A column may be gone that only the wrong sensors made.
   if (truth != nullptr)
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);
   DropBeaten(options.family_wise, options.seed, &fit, &selection);
   DropNeedlessSteps(&fit);
-  AskStepsInstead(fit, &selection);
-  const RotorsReportedBy rotors =
-      SettleRotors(templates, rule, options.leave_out, &fit, &selection);
+  CompareWithSteps(fit, &selection);
+  const RotorCauses rotors = SettleRotors(templates, rule, options.leave_out, &fit, &selection);
   FindNotExcited(templates, selection, &diagnosis.not_testable);
   NameCauses(fit, selection, options, &diagnosis);
-  AskWithoutMisfitArtefacts(templates, rule, fit, &diagnosis.causes);
+  ReassessWithoutMisfitArtefacts(templates, rule, fit, &diagnosis.causes);
   JudgeRotors(fit.model, options.leave_out, rotors, &diagnosis.causes);
   JudgeUntested(diagnosis.not_testable, &diagnosis.causes);
   options.progress(0.85, "what is left");
   LookAtRest(options, &fit, &diagnosis);
   ReportClusters(fit, FindAfterFit(fit, &diagnosis.outliers), options, &diagnosis);
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
-  if (!diagnosis.unknown.empty())
-    for (CauseFound& cause : diagnosis.causes)
-      for (const std::string& name : cause.behind)
-        if (std::find(cause.candidates.begin(), cause.candidates.end(), name) ==
-            cause.candidates.end())
-          cause.candidates.push_back(name);
+  if (!diagnosis.unknown.empty()) AddRivalsBehind(&diagnosis.causes);
   Conclude(&diagnosis);
-  if (options.with_gain) {
-    options.progress(0.9, "held-out moves");
-    diagnosis.gain = GainOf(fit, as_named, options);
-  }
-  if (options.with_next_moves) {
-    options.progress(0.95, "moves to make next");
-    diagnosis.next = ProposeMoves(fit, diagnosis.causes);
-  }
+  LookAhead(fit, as_named, options, &diagnosis);
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),

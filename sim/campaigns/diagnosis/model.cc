@@ -24,23 +24,23 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
   }
 }
 
-// Why nobody can say what the term does in these moves; empty: it can be said.
-std::string WhyUntold(const Template& form, const CampaignFacts& facts) {
+// The reason why these moves cannot test the term; empty where they can.
+std::string WhyNotTestable(const Template& form, const CampaignFacts& facts) {
   const bool empirical = FindEmpirical(form.effect->cause) != nullptr;
   std::string_view missing = MissingCovariate(*form.effect, facts);
   if (empirical && !facts.Has(form.covariate)) missing = form.covariate;
   if (!missing.empty()) return "column " + std::string(missing) + " is missing";
   if (empirical) return {};
-  // What a form needs beyond its effect's columns is known to its list.
+  // The effect's own list checks what a form needs beyond its effect's columns.
   return IsOffered(form, facts) ? "" : "these units or moves have no such part";
 }
 
 }  // namespace
 
-std::vector<NotTestable> LeaveOutUntold(const CampaignFacts& facts, CampaignModel* model) {
+std::vector<NotTestable> LeaveOutUntestable(const CampaignFacts& facts, CampaignModel* model) {
   std::vector<NotTestable> left_out;
   std::erase_if(model->terms, [&](const ModelTerm& term) {
-    const std::string why = WhyUntold(term.form, facts);
+    const std::string why = WhyNotTestable(term.form, facts);
     if (!why.empty()) left_out.push_back({std::string(term.form.effect->cause), why});
     return !why.empty();
   });
@@ -144,10 +144,10 @@ void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack
 UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit) {
   UnitTrack track = MakeTrack(facts, unit, model.units[unit]);
   if (std::ranges::find(model.events, unit, &EventTerm::unit) == model.events.end()) return track;
-  PoseErrors stands;
-  stands.Reset(track.moves);
-  AddEvents(model, unit, track, &stands);
-  TurnPoses({stands.angle_deg[kTheta], stands.angle_deg[kPhi]}, &track);
+  PoseErrors errors;
+  errors.Reset(track.moves);
+  AddEvents(model, unit, track, &errors);
+  TurnPoses({errors.angle_deg[kTheta], errors.angle_deg[kPhi]}, &track);
   return track;
 }
 

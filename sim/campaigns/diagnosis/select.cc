@@ -19,31 +19,33 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kKeptMin = 0.03;  // of a signature: less is what geometry explains as well
-constexpr double kAlike = 4;       // times as far behind may be who leaves the same trace
+constexpr double kKeptMin = 0.03;  // of a signature: geometry explains a smaller rest as well
+constexpr double kAlike =
+    4;  // a rival that leaves the same trace may be so many times as far behind
 constexpr double kShapeDoubt = 0.002;
 constexpr double kHopeless = 0.3;  // of what the term explains
 constexpr int kSwapSweepsMax = 3;
-constexpr double kBetterBy = 0.5;  // logarithm of evidence
+constexpr double kBetterBy = 0.5;  // log evidence
 
-// `library`: of which the templates are some or all.
+// `library`: the templates are some or all of it.
 std::vector<Evidence> AssessAll(const ScorePass& pass, const Templates& templates,
                                 const Templates& library, const FleetGroups& groups,
                                 const ParallelFor& parallel) {
-  std::vector<Evidence> evidences(templates.size());
+  std::vector<Evidence> evidence_of(templates.size());
   constexpr std::size_t kBlock = 16;
   const std::size_t blocks = (templates.size() + kBlock - 1) / kBlock;
   parallel(blocks, [&](std::size_t block) {
     const std::size_t end = std::min(templates.size(), (block + 1) * kBlock);
     for (std::size_t k = block * kBlock; k < end; ++k)
-      evidences[k] = Assess(pass.scores[k], templates[k], groups);
+      evidence_of[k] = Assess(pass.scores[k], templates[k], groups);
   });
-  // Who comes in many shapes fits by chance more often: each shape has its share of the cause.
+  // A cause with many shapes fits by chance more often: each shape has its share of the cause.
   std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
   for (const Template& form : library) shapes[{form.effect->cause, form.axis}] += 1;
   for (std::size_t k = 0; k < templates.size(); ++k)
-    evidences[k].evidence -= std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
-  return evidences;
+    evidence_of[k].log_evidence -=
+        std::log(shapes[{templates[k].effect->cause, templates[k].axis}]);
+  return evidence_of;
 }
 
 // Templates that leave the same trace tie: the name decides, not the order of the library.
@@ -56,24 +58,24 @@ bool ComesFirst(const Template& a, const Template& b) {
 }
 
 Best BestOf(const ScorePass& pass, const Templates& templates,
-            const std::vector<Evidence>& evidences, double tests, double family_wise,
+            const std::vector<Evidence>& evidence_of, double tests, double family_wise,
             double kept_min = kKeptMin) {
   constexpr double kTie = 1e-6;
   Best best;
   double most = -std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < evidences.size(); ++k) {
+  for (std::size_t k = 0; k < evidence_of.size(); ++k) {
     const Score& score = pass.scores[k];
     if (!(score.kept > kept_min * score.raw)) continue;
-    const double log_p = LogLeastOf(evidences[k].log_p, tests);
-    if (log_p > std::log(family_wise) || evidences[k].evidence < most - kTie) continue;
-    if (best.at != kNoTerm && evidences[k].evidence < most + kTie &&
+    const double log_p = LogLeastOf(evidence_of[k].log_p, tests);
+    if (log_p > std::log(family_wise) || evidence_of[k].log_evidence < most - kTie) continue;
+    if (best.at != kNoTerm && evidence_of[k].log_evidence < most + kTie &&
         !ComesFirst(templates[k], templates[best.at]))
       continue;
-    if (std::none_of(evidences[k].has.begin(), evidences[k].has.end(),
+    if (std::none_of(evidence_of[k].has.begin(), evidence_of[k].has.end(),
                      [](char h) { return h != 0; }))
       continue;
-    most = evidences[k].evidence;
-    best = {k, evidences[k], log_p};
+    most = evidence_of[k].log_evidence;
+    best = {k, evidence_of[k], log_p};
   }
   return best;
 }
@@ -94,24 +96,24 @@ void Refit(Fit* fit) { SettleFit(fit, 2); }
 
 struct Look {
   ScorePass pass;
-  std::vector<Evidence> evidences;
+  std::vector<Evidence> evidence_of;
 };
 
-// Looks at one state of the fit, with all of its terms (kNoTerm) and without each: whoever asks for
-// one soon asks for the others, and the signatures are the same in all.
+// Looks at one state of the fit, with all of its terms (kNoTerm) and without each. All are made at
+// the first request, because the signatures are the same in all.
 class LookBook {
  public:
-  /// `one_by_one`: the others are not asked for.
+  /// `one_by_one`: only requested looks are made.
   LookBook(const FleetGroups& groups, bool one_by_one) : groups_(groups), one_by_one_(one_by_one) {}
 
   const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
     if (looks_.find(without) == looks_.end()) Open(fit, templates, without);
     Look& look = looks_.at(without);
-    if (look.evidences.empty())
-      look.evidences = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
+    if (look.evidence_of.empty())
+      look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
     return look;
   }
-  /// The fit has changed, or the templates.
+  /// Call after a change of the fit or the templates.
   void Forget() { looks_.clear(); }
 
  private:
@@ -131,14 +133,16 @@ class LookBook {
   std::map<std::size_t, Look> looks_;
 };
 
-// The best of the templates from `begin` on and of what was best before.
+// The best of the templates from `begin` on and the best of those before.
 Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& groups,
                std::size_t begin, const Best& before, double tests, double family_wise) {
   const Templates refined(templates.begin() + static_cast<std::ptrdiff_t>(begin), templates.end());
   const ScorePass pass = ScoreTemplates(fit, refined);
-  const std::vector<Evidence> evidences = AssessAll(pass, refined, templates, groups, fit.parallel);
-  Best best = BestOf(pass, refined, evidences, tests, family_wise);
-  if (best.at == kNoTerm || best.evidence.evidence <= before.evidence.evidence) return before;
+  const std::vector<Evidence> evidence_of =
+      AssessAll(pass, refined, templates, groups, fit.parallel);
+  Best best = BestOf(pass, refined, evidence_of, tests, family_wise);
+  if (best.at == kNoTerm || best.evidence.log_evidence <= before.evidence.log_evidence)
+    return before;
   best.at += begin;
   return best;
 }
@@ -152,7 +156,7 @@ void DropTerm(std::size_t at, Fit* fit) {
 std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const FleetGroups& groups,
                             std::size_t own, const SelectionRule& rule) {
   std::map<std::string_view, Rival> by_cause;
-  const Evidence& best = look.evidences[own];
+  const Evidence& best = look.evidence_of[own];
   // Where geometry leaves little of the term's own signature, as little of a rival's is enough.
   const Score& mine = look.pass.scores[own];
   const double kept_min = std::min(kKeptMin, 0.5 * mine.kept / mine.raw);
@@ -160,10 +164,10 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const std::string_view cause = templates[k].effect->cause;
     if (cause == templates[own].effect->cause) continue;
     if (!(look.pass.scores[k].kept > kept_min * look.pass.scores[k].raw)) continue;
-    const double behind = 2 * (best.evidence - look.evidences[k].evidence);
+    const double behind = 2 * (best.log_evidence - look.evidence_of[k].log_evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
-    const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
+    const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude is impossible
     // Signatures are as good as their shapes: of a large cause a small share decides nothing.
     const double near = std::max(rule.rival_behind, kShapeDoubt * best.chi_square);
     const bool alike = share >= rule.rival_share && !hopeless &&
@@ -178,12 +182,12 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
   return rivals;
 }
 
-// A cause of both axes gives way to one that has its own amplitude on each, if that is better.
+// Exchanges a cause of both axes for one with its own amplitude on each, if that is better.
 bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGroups& groups,
                      const SelectionRule& rule, double tests, std::size_t at, Fit* fit) {
   if (fit->model.terms.size() >= rule.terms_max) return false;
   std::vector<PairTrial> trials =
-      TryPairs(*fit, at, look.pass, templates, look.evidences, groups, kKeptMin);
+      TryPairs(*fit, at, look.pass, templates, look.evidence_of, groups, kKeptMin);
   std::erase_if(trials, [&](const PairTrial& trial) {
     return LogLeastOf(trial.log_p, tests) > std::log(rule.family_wise);
   });
@@ -193,27 +197,26 @@ bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGr
   return true;
 }
 
-// Who does as well as a term of both axes with a cause on each.
+// Adds pairs that do as well as a term of both axes, with a cause on each, as rivals.
 void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetGroups& groups,
                       const SelectionRule& rule, const Fit& fit, std::size_t at,
                       std::vector<Rival>* rivals) {
   for (const PairTrial& trial :
-       TryPairs(fit, at, look.pass, templates, look.evidences, groups, kKeptMin))
+       TryPairs(fit, at, look.pass, templates, look.evidence_of, groups, kKeptMin))
     if ((std::min(trial.behind, trial.behind_by_likelihood) < rule.rival_behind ||
          trial.beyond_chance) &&
         std::ranges::find(*rivals, trial.cause, &Rival::cause) == rivals->end())
       rivals->push_back({trial.cause, trial.behind, 0, false});
 }
 
-// One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if
-// anything changed.
+// Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.
 bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
                double tests, LookBook* looks, Fit* fit, std::vector<Accepted>* accepted) {
   accepted->clear();
   bool changed = false;
   for (std::size_t t = 0; t < fit->model.terms.size(); ++t) {
     const Look& look = looks->At(*fit, templates, t);
-    const Best best = BestOf(look.pass, templates, look.evidences, tests, rule.family_wise);
+    const Best best = BestOf(look.pass, templates, look.evidence_of, tests, rule.family_wise);
     if (best.at == kNoTerm) {
       looks->Forget();
       DropTerm(t, fit);
@@ -221,8 +224,8 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
     }
     const std::size_t own = IndexOf(templates, fit->model.terms[t].form);
     const bool better =
-        best.at != own &&
-        (own == kNoTerm || best.evidence.evidence > look.evidences[own].evidence + kBetterBy);
+        best.at != own && (own == kNoTerm || best.evidence.log_evidence >
+                                                 look.evidence_of[own].log_evidence + kBetterBy);
     const bool other_level =
         best.at == own && (best.evidence.sharing != fit->model.terms[t].sharing);
     if (!better && ExchangeForPair(look, templates, groups, rule, tests, t, fit)) {
@@ -230,7 +233,7 @@ bool SwapSweep(const Templates& templates, const FleetGroups& groups, const Sele
       return true;
     }
     if (!better && !other_level) {
-      accepted->push_back({look.evidences[own], RivalsOf(look, templates, groups, own, rule)});
+      accepted->push_back({look.evidence_of[own], RivalsOf(look, templates, groups, own, rule)});
       continue;
     }
     looks->Forget();
@@ -248,11 +251,11 @@ void TakeRivals(const Templates& templates, const FleetGroups& groups, const Sel
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const Look& look = looks->At(fit, templates, t);
     const std::size_t own = IndexOf(templates, fit.model.terms[t].form);
-    accepted->push_back({look.evidences[own], RivalsOf(look, templates, groups, own, rule)});
+    accepted->push_back({look.evidence_of[own], RivalsOf(look, templates, groups, own, rule)});
   }
 }
 
-// Terms that the others have made needless go, the weakest first.
+// Drops terms that the others have made needless, the weakest first.
 void DropTheNeedless(const Templates& templates, const FleetGroups& groups,
                      const SelectionRule& rule, double tests, LookBook* looks, Fit* fit,
                      std::vector<Accepted>* accepted) {
@@ -292,7 +295,7 @@ ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGr
     if (evidence.has[unit] == 0) term.group_of_unit[unit] = kNoGroup;
   term.amplitude.assign(count * form.columns, 0);
   term.sigma.assign(count * form.columns, 0);
-  // The mixture's size is a grid point: as a prior let it be loose.
+  // The mixture's size is a grid point, so that the prior is made loose.
   if (evidence.sharing == Sharing::kUnit && !evidence.scattered && units > 1)
     term.spread = 3 * evidence.spread;
   return term;
@@ -332,13 +335,13 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
       selection->kept_share.push_back(score.raw > 0 ? score.kept / score.raw : 0);
   }
   if (full) return false;
-  Best best = BestOf(look.pass, *templates, look.evidences, selection->tests, rule.family_wise);
+  Best best = BestOf(look.pass, *templates, look.evidence_of, selection->tests, rule.family_wise);
   const std::size_t listed = templates->size();
   std::vector<CandidateShape> candidate_shapes =
-      CandidateShapesOf(look.pass, look.evidences, *templates, best.at, kKeptMin);
-  // Their evidence grows where each unit's shape is refined, too.
+      CandidateShapesOf(look.pass, look.evidence_of, *templates, best.at, kKeptMin);
+  // Evidence may grow where each unit's shape is refined, too.
   constexpr double kOfBest = 0.3;
-  const double least = best.at == kNoTerm ? 0 : kOfBest * best.evidence.evidence;
+  const double least = best.at == kNoTerm ? 0 : kOfBest * best.evidence.log_evidence;
   for (CandidateShape& own : OwnShapes(look.pass, *templates, *fit->facts, groups, least))
     candidate_shapes.push_back(std::move(own));
   looks->Forget();
@@ -360,7 +363,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
 }
 
 Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* fit) {
-  Templates templates = library;  // and refined ones, and what the model has already
+  Templates templates = library;  // and refined ones, and those of the model
   for (const ModelTerm& term : fit->model.terms)
     if (IndexOf(templates, term.form) == kNoTerm) templates.push_back(term.form);
   const FleetGroups groups = GroupsOf(*fit->facts);
@@ -388,7 +391,7 @@ Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* 
   return selection;
 }
 
-// ---- large fleets: the model is sought on some units, and holds for all
+// ---- Large fleets: the model is found on some units, and then used for all.
 
 // The fit with all units but `keep` random ones aside.
 Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
@@ -407,8 +410,7 @@ Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
   return some;
 }
 
-// A term of units' own amplitudes belongs to all units if most of those that were looked at have
-// it.
+// Gives a term of units' own amplitudes to all units if most of the examined ones have it.
 void SpreadToAll(const Fit& some, ModelTerm* term) {
   if (term->sharing != Sharing::kUnit) return;
   const Campaign& campaign = *some.facts->campaign;
@@ -427,7 +429,7 @@ void SpreadToAll(const Fit& some, ModelTerm* term) {
   }
 }
 
-// Units that were not looked at get shapes of their own, too.
+// Gives shapes of their own to units that were not examined.
 void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t t, Fit* fit) {
   const auto at = fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t);
   ModelTerm term = std::move(*at);
@@ -440,7 +442,7 @@ void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t
   std::vector<CandidateShape> found =
       OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts, groups, kAny);
   RefineCandidateShapes(*fit, groups, &found);
-  // What units have that were looked at stays.
+  // Shapes of the examined units stay.
   for (CandidateShape& one : found) term.form.shape_of_unit.merge(one.form.shape_of_unit);
   for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
     if (!ShapeOf(term.form, fit->model.units[unit].id)) term.group_of_unit[unit] = kNoGroup;
@@ -480,7 +482,7 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
     if (!fit->model.terms[t].form.shape_of_unit.empty()) GiveShapes(library, groups, t, fit);
   StepFit(fit);
   Refit(fit);
-  // What only units have that were not looked at.
+  // Effects that only units have that were not examined.
   rule.progress("all units");
   Templates templates = library;
   LookBook of_library(groups, true);

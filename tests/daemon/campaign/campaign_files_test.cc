@@ -66,7 +66,9 @@ TEST(CampaignFiles, SortsRowsByUnitAndMove) {
   EXPECT_EQ(campaign->Find("oil")[0], 2);
   EXPECT_TRUE(std::isnan(campaign->Find("temp_C")[2]));
   EXPECT_TRUE(campaign->Find("delay_s").empty());
-  EXPECT_EQ(campaign->FindWords("mode")->values, (std::vector<int>{1, -1, 0, 2}));
+  ASSERT_EQ(campaign->word_columns.size(), 1u);
+  EXPECT_EQ(campaign->word_columns[0].name, "mode");
+  EXPECT_EQ(campaign->word_columns[0].values, (std::vector<int>{1, -1, 0, 2}));
 }
 
 // Rows come out of a database descending, by numbers as text, in any order.

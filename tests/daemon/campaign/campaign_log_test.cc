@@ -60,8 +60,9 @@ TEST(CampaignLog, HasEveryCovariateOfTheFormatThatIsKnownAndReadsBack) {
   // Of two units on the rail one moved in the first move, and both in the second.
   EXPECT_EQ(campaign.Find("movers_on_rail")[0], 1);
   EXPECT_EQ(campaign.Find("movers_on_rail")[1], 2);
-  const sim::WordColumn* mode = campaign.FindWords("mode");
-  ASSERT_NE(mode, nullptr);
+  const auto mode =
+      std::ranges::find(campaign.word_columns, std::string("mode"), &sim::WordColumn::name);
+  ASSERT_NE(mode, campaign.word_columns.end());
   EXPECT_EQ(mode->words.at(static_cast<std::size_t>(mode->values[0])), "asymmetric");
   EXPECT_EQ(mode->words.at(static_cast<std::size_t>(mode->values[2])), "seven_segment");
   const std::string moves = WriteMoves(campaign);

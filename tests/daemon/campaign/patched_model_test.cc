@@ -58,8 +58,8 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
 }
 
 TEST(ModelFile, KeepsTheShapeOfEachUnit) {
-  const sim::Campaign campaign =
-      sim::Planted({{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.moves = 80});
+  const sim::Campaign campaign = sim::Planted(
+      {{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.units = 24, .moves = 80});
   const sim::Diagnosis diagnosis = sim::Verdicts(campaign);
   ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Reported(diagnosis);
   ASSERT_EQ(diagnosis.model.terms[0].form.shape_of_unit.size(), campaign.units.size());

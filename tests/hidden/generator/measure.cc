@@ -19,7 +19,7 @@ double HeavyTailed(double freedom, Rng* rng) {
   return normal / std::sqrt(sum / n) * std::sqrt((n - 2.0) / n);  // variance 1
 }
 
-// A random field over the plate that changes from picture to picture and remembers the last.
+// A random field over the plate that changes from picture to picture with memory of the last.
 class Air {
  public:
   Air(const Campaign& campaign, Rng* rng) : rng_(rng) {
@@ -96,7 +96,7 @@ class Recorder {
     for (int i = 0; i < n_.stuck_units && units > 8; ++i) {
       const std::size_t u = rng.Below(units);
       for (std::size_t m = 0; m < campaign_.move_count(); ++m) {
-        out_->tells[m * units + u] = 0;
+        out_->counts[m * units + u] = 0;
         if (m > 0)
           out_->place_mm[m * units + u] = out_->place_mm[u] + out_->noise.centroid_um[u] / 1000 *
                                                                   Place(rng.Normal(), rng.Normal());
@@ -124,7 +124,7 @@ class Recorder {
         out_->place_mm[r] += std::polar(size_mm, rng.Uniform(0, 2 * kPi));
         out_->bad[r] = 1;
       }
-      if (rng.Uniform() < n_.missing_share) out_->seen[r] = out_->tells[r] = 0;
+      if (rng.Uniform() < n_.missing_share) out_->seen[r] = out_->counts[r] = 0;
       for (std::uint32_t cell = 0; cell < 20; ++cell)
         if (rng.Uniform() < n_.missing_cells) out_->blank[r] |= 1u << cell;
     }
@@ -141,7 +141,7 @@ class Recorder {
     for (std::size_t m = 0; m < campaign_.move_count(); ++m)
       out_->bad[m * campaign_.unit_count() + unit] = 1;
   }
-  // A few commands of one unit are logged a whole turn off; the unit went where it should.
+  // A few commands of one unit are logged a whole turn off; the unit went to the right place.
   void Wrap(std::size_t unit, Rng* rng) {
     const std::size_t units = campaign_.unit_count();
     const std::size_t from = 1 + rng->Below(campaign_.move_count() - 1);
@@ -193,7 +193,7 @@ Measurement Measure(const Spec& spec, const Scene& scene, const Truth& truth,
   Measurement out;
   out.place_mm.resize(rows);
   out.seen.resize(rows);
-  out.tells.resize(rows);
+  out.counts.resize(rows);
   out.bad.assign(rows, 0);
   out.blank.assign(rows, 0);
   out.reported_from_deg.resize(rows);
@@ -203,7 +203,7 @@ Measurement Measure(const Spec& spec, const Scene& scene, const Truth& truth,
   for (std::size_t r = 0; r < rows; ++r) {
     const Row& row = campaign.rows[r];
     out.place_mm[r] = places[r % units][r / units];
-    out.seen[r] = out.tells[r] = row.exposed ? 1 : 0;
+    out.seen[r] = out.counts[r] = row.exposed ? 1 : 0;
     out.reported_from_deg[r] = row.from_deg;
     out.reported_cmd_deg[r] = row.cmd_deg;
     out.reported_temp_C[r] = row.temp_C;

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The noise that visibility is counted against: of the spec, not of its accidents.
+// The noise that visibility is computed with: that of the spec, not of its random realisation.
 NoiseModel ExpectedNoise(const Spec& spec, const Campaign& campaign, const Truth& truth) {
   NoiseModel noise;
   noise.centroid_um.assign(campaign.unit_count(), spec.centroid_um);
@@ -39,7 +39,7 @@ Json UnitsOf(const Campaign& campaign, const Effect& effect) {
   return units;
 }
 
-// Where a common effect of the plate may as well be told as one of all its units.
+// The scopes that are right as well: a common effect of the plate is also one of all its units.
 Json AlsoScope(const Effect& effect) {
   Json also = Json::array();
   const bool mechanical = effect.kind->owners[0] == Owner::kUnit;
@@ -58,7 +58,7 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
   const Campaign& campaign = planted.campaign;
   const NoiseModel noise = ExpectedNoise(planted.spec, campaign, planted.truth);
   const Visibility v =
-      Assess(scene, noise, planted.measured.tells, Contribution(scene, planted.truth, effect));
+      Assess(scene, noise, planted.measured.counts, Contribution(scene, planted.truth, effect));
   const double scale = LambdaScale(effect);
   Json out;
   out["cause"] = effect.kind->cause;
@@ -84,13 +84,13 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
   Json rivals = Json::array();
   Json equivalent = Json::array();
   Json inseparable = Json::array();
-  for (const Rival& rival : FindRivals(scene, noise, planted.measured.tells, effect)) {
+  for (const Rival& rival : FindRivals(scene, noise, planted.measured.counts, effect)) {
     const double distance = v.lambda * (1 - rival.cosine * rival.cosine);
     rivals.push_back({{"cause", rival.cause}, {"cosine", rival.cosine}, {"distance", distance}});
     if (rival.cosine > 0.995) equivalent.push_back(rival.cause);
     if (rival.cosine <= 0.995 && distance < 21.6) inseparable.push_back(rival.cause);
   }
-  out["equivalent"] = equivalent;    // no data of these moves could tell them apart
+  out["equivalent"] = equivalent;    // no data of these moves could separate them
   out["inseparable"] = inseparable;  // data of this noise cannot, with 1 % confusion
   out["rivals"] = rivals;
   if (IsForeign(*effect.kind)) out["covariates"] = ForeignCovariates(effect.kind->cause);
@@ -101,7 +101,7 @@ Json StaticJson(const Planted& planted) {
   const StaticErrors& e = planted.spec.static_errors;
   const NoiseModel noise = ExpectedNoise(planted.spec, planted.campaign, planted.truth);
   const StaticVisibility v =
-      AssessStatic(planted.campaign, planted.truth, noise, planted.measured.tells);
+      AssessStatic(planted.campaign, planted.truth, noise, planted.measured.counts);
   return {{"planted", e.base_um > 0 || e.arm_um > 0 || e.zero_deg > 0},
           {"base_um", e.base_um},
           {"arm_um", e.arm_um},
@@ -167,7 +167,7 @@ Planted Plant(const Spec& spec) {
   }
   for (std::size_t i = 0; i < spec.causes.size(); ++i) {
     Effect& effect = planted.effects[i];
-    // A sensor's error is seen through the growth that it is read for: that one first.
+    // A sensor's bias is seen through the arms' growth, and is tuned after the growth.
     if (effect.kind->cause == "sensor_bias") continue;
     Tune(scene, planted.truth, noise, seen, spec.lambda_wanted[i] * LambdaScale(effect), &effect);
   }

@@ -15,7 +15,7 @@ namespace {
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 TEST(PlaceSteps, AreThoseOfWholePixels) {
-  const Campaign fine = Planted({}, {.moves = 40});
+  const Campaign fine = Planted({}, {.units = 24, .moves = 40});
   for (const double step_mm : {0.2, 0.1, 0.09, 0.05, 0.02, 0.0903271, 1.0 / 7}) {
     const PlaceSteps steps = FindPlaceSteps(InSteps(fine, step_mm));
     EXPECT_NEAR(steps.x_mm, step_mm, 1e-6 * step_mm);
@@ -24,7 +24,7 @@ TEST(PlaceSteps, AreThoseOfWholePixels) {
 }
 
 TEST(PlaceSteps, AreFoundWhereThePlacesAreRoundedOnceMore) {
-  const Campaign pixels = InSteps(Planted({}, {.moves = 40}), 1.0 / 7);
+  const Campaign pixels = InSteps(Planted({}, {.units = 24, .moves = 40}), 1.0 / 7);
   EXPECT_NEAR(FindPlaceSteps(InSteps(pixels, 1e-4)).x_mm, 1.0 / 7, 1e-4);
 }
 
@@ -37,19 +37,19 @@ TEST(PlaceSteps, AreNoneInPlacesOfManyDigits) {
 }
 
 TEST(PlaceSteps, AreNotHiddenByAFewOtherPlaces) {
-  Campaign campaign = InSteps(Planted({}, {.moves = 40}), 0.1);
+  Campaign campaign = InSteps(Planted({}, {.units = 24, .moves = 40}), 0.1);
   for (std::size_t row = 0; row < campaign.rows(); row += 200) campaign.x_mm[row] += 0.0123456;
   EXPECT_NEAR(FindPlaceSteps(campaign).x_mm, 0.1, 1e-6);
 }
 
 TEST(PlaceSteps, OfAFewPlacesAreTheirDigits) {
   EXPECT_NEAR(FindStep(std::vector<double>{1.2, kMissing, 3.4, 5.7}), 0.1, 1e-12);
-  EXPECT_EQ(FindStep(std::vector<double>{7, 7, kMissing}), 0);  // one place tells nothing
+  EXPECT_EQ(FindStep(std::vector<double>{7, 7, kMissing}), 0);  // a single place shows no step
   EXPECT_EQ(FindStep({}), 0);
 }
 
 TEST(PlaceSteps, AlongEachAxisAreItsOwn) {
-  Campaign campaign = InSteps(Planted({}, {.moves = 40}), 0.05);
+  Campaign campaign = InSteps(Planted({}, {.units = 24, .moves = 40}), 0.05);
   campaign.y_mm = InSteps(campaign, 0.1).y_mm;
   const PlaceSteps steps = FindPlaceSteps(campaign);
   EXPECT_NEAR(steps.x_mm, 0.05, 1e-9);
@@ -59,12 +59,12 @@ TEST(PlaceSteps, AlongEachAxisAreItsOwn) {
 
 // The variance of an even spread over one step is a twelfth of its square.
 TEST(LeastNoise, IsTheSpreadOfTheWiderStep) {
-  const Campaign campaign = InSteps(Planted({}, {.moves = 40}), 0.1);
+  const Campaign campaign = InSteps(Planted({}, {.units = 24, .moves = 40}), 0.1);
   EXPECT_NEAR(LeastNoise_um(campaign, FindPlaceSteps(campaign)), 28.8675, 1e-3);
 }
 
 TEST(LeastNoise, IsNeverNothing) {
-  Campaign campaign = Planted({}, {.moves = 40});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 40});
   std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "sigma_um"; });
   EXPECT_EQ(LeastNoise_um(campaign, {}), kNoiseLeast_um);
   campaign.covariates.push_back({"sigma_um", std::vector<double>(campaign.rows(), 0.3)});

@@ -1,4 +1,4 @@
-// Names against an empirical term that does better.
+// Names are compared with an empirical term that does better.
 #include "sim/campaigns/diagnosis/beaten.h"
 
 #include <gmock/gmock.h>
@@ -15,10 +15,10 @@
 namespace focalfleet::sim {
 namespace {
 
-// Of some units; no gear has it.
+// A ripple of some units that no gear has.
 Campaign Rippled(double order, double size_deg, std::uint64_t seed,
                  const std::vector<std::size_t>& units = {4, 13}) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
   std::vector<double> size_of_row(campaign.rows(), 0);
   for (const std::size_t unit : units)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
@@ -36,7 +36,7 @@ TEST(Beaten, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
   for (const double order : {5.0, 3.7}) {
     const Diagnosis diagnosis = Verdicts(Rippled(order, 0.1, 3));
     EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << order << Reported(diagnosis);
-    for (const CauseFound& cause : diagnosis.causes)  // half a wave is a zero that is off
+    for (const CauseFound& cause : diagnosis.causes)  // half a wave looks like a wrong zero
       EXPECT_EQ(cause.cause, "zero_offset") << order << Reported(diagnosis);
     ASSERT_EQ(diagnosis.unknown.size(), 1u);
     EXPECT_EQ(diagnosis.unknown[0].channel, "theta angle");
@@ -50,7 +50,7 @@ void ExpectNamed(const std::vector<std::string>& names, const Diagnosis& diagnos
   EXPECT_TRUE(diagnosis.unknown.empty()) << Reported(diagnosis);
 }
 
-// One unit's few moves see a few crests of it, which are as many bumps.
+// A single unit's few moves pass a few crests of the ripple, which look like as many bumps.
 TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
   for (const std::uint64_t seed : {3u, 4u}) {
     SCOPED_TRACE(seed);
@@ -61,10 +61,10 @@ TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
   }
 }
 
-// The teeth's own wave, and what one side of the gear has more of it, in each unit its own: a
-// ripple of their order is cheaper than both, and no better than the wave.
+// The teeth's wave is deeper on one side of the gear, differently in each unit. A ripple of the
+// teeth's order is cheaper than both parts, and no better than the wave.
 TEST(Beaten, ARippleOfTheTeethsOwnOrderIsTheTeeth) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   std::vector<double> phase_of_row;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
     phase_of_row.resize(campaign.first_row[unit + 1], static_cast<double>(unit));
@@ -107,10 +107,10 @@ TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
       Verdicts(Planted(
           {{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"},
            {.cause = "tooth_damage", .amplitude = 0.15, .axis = "theta", .unit_share = 0.3}},
-          {.moves = 120, .seed = 4})));
+          {.units = 24, .moves = 120, .seed = 4})));
 }
 
-// A curve does for the scale of all units; the ripple, whose many amplitudes cost what they
+// A curve replaces the scale of all units. The ripple, whose many amplitudes cost what they
 // explain, is no part of it.
 TEST(Beaten, ARippleBesideAScaleOfAllUnitsIsNoSeries) {
   ExpectNamed(
@@ -118,7 +118,7 @@ TEST(Beaten, ARippleBesideAScaleOfAllUnitsIsNoSeries) {
       Verdicts(Planted(
           {{.cause = "gear_scale", .amplitude = 3e-4, .axis = "theta"},
            {.cause = "stage_ripple", .amplitude = 0.008, .axis = "theta", .unit_scatter = 0.3}},
-          {.moves = 120, .seed = 4})));
+          {.units = 24, .moves = 120, .seed = 4})));
 }
 
 TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
@@ -137,9 +137,9 @@ TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
       << Reported(diagnosis);
 }
 
-// Play that opens all at once as it grows cold, which no form of the library does.
+// Play that opens suddenly as it grows cold, which no form of the library does.
 TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
-  Campaign campaign = Planted({}, {.moves = 120, .seed = 3});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   const std::vector<double>& temperature =
       std::ranges::find(campaign.covariates, "temp_C", &Covariate::name)->values;
   std::vector<double> sorted = temperature;
@@ -165,7 +165,7 @@ TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
 TEST(Beaten, WhatFollowsTheSquareOfTheTemperatureIsNotWear) {
   for (const std::uint64_t seed : {3u, 4u}) {
     SCOPED_TRACE(seed);
-    Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+    Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
     const auto temperature = std::ranges::find(campaign.covariates, "temp_C", &Covariate::name);
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
       for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {

@@ -1,4 +1,4 @@
-// Causes that have one amplitude for both axes, against those that have one on each.
+// Causes with one amplitude for both axes are compared with those that have one on each.
 #include "sim/campaigns/diagnosis/both_axes.h"
 
 #include <gmock/gmock.h>
@@ -8,11 +8,11 @@
 namespace focalfleet::sim {
 namespace {
 
-// As many move at once in all moves.
+// The same number of units moves at once in all moves.
 Campaign PlayOfBothAxes(double play_deg, std::uint64_t seed) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = play_deg, .axis = "theta"},
                                {.cause = "backlash", .amplitude = play_deg, .axis = "phi"}},
-                              {.moves = 80, .seed = seed});
+                              {.units = 24, .moves = 80, .seed = seed});
   std::ranges::fill(
       std::ranges::find(campaign.covariates, "movers_on_rail", &Covariate::name)->values, 12);
   return campaign;
@@ -35,8 +35,8 @@ TEST(BothAxes, PlayOfBothIsNoDroop) {
     }
 }
 
-// Of a large play each axis by itself explains next to nothing: the other's is noise to it. In
-// moves of one drive, with nobody's place on the rail, a droop is the same step of both axes.
+// Large play on one axis explains next to nothing, because the other axis' play is noise to it. In
+// moves of one drive, with no known places on the rail, a droop is the same step of both axes.
 TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
   Campaign campaign = PlayOfBothAxes(0.4, 3);
   std::erase_if(campaign.covariates,
@@ -52,8 +52,9 @@ TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
 }
 
 TEST(BothAxes, ADroopOfBothKeepsItsName) {
-  const Diagnosis diagnosis = Verdicts(Planted(
-      {{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = 3}));
+  const Diagnosis diagnosis =
+      Verdicts(Planted({{.cause = "supply_droop", .amplitude = 0.05, .axis = "both"}},
+                       {.units = 24, .moves = 80, .seed = 3}));
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "supply_droop");
   EXPECT_EQ(diagnosis.causes[0].axis, "both");
@@ -63,8 +64,9 @@ TEST(BothAxes, ADroopOfBothKeepsItsName) {
 // parameters and no better than chance.
 TEST(BothAxes, AStartSkewIsNoPlayOfEachUnit) {
   for (const std::uint64_t seed : {3u, 4u}) {
-    const Diagnosis diagnosis = Verdicts(Planted(
-        {{.cause = "start_skew", .amplitude = 0.05, .axis = "both"}}, {.moves = 80, .seed = seed}));
+    const Diagnosis diagnosis =
+        Verdicts(Planted({{.cause = "start_skew", .amplitude = 0.05, .axis = "both"}},
+                         {.units = 24, .moves = 80, .seed = seed}));
     ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
     EXPECT_THAT(diagnosis.causes[0].candidates, testing::ElementsAre("start_skew"))
         << Reported(diagnosis);

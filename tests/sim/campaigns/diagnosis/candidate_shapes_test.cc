@@ -19,7 +19,7 @@ double PlaceOf_deg(std::uint32_t unit) { return std::fmod(222.5 * (unit + 1), 36
 
 double Apart_deg(double a, double b) { return std::abs(std::remainder(a - b, 360)); }
 
-// A tooth elsewhere in each unit's pinion, broader than the library's.
+// A damaged tooth elsewhere in each unit's pinion, broader than the library's.
 void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* campaign,
                  double width_deg = 15) {
   std::vector<std::size_t> unit_of(campaign->rows());
@@ -38,7 +38,7 @@ void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* c
 }
 
 TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   DamageTeeth([](std::uint32_t) { return true; }, &campaign);
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
@@ -49,7 +49,7 @@ TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
   ASSERT_EQ(diagnosis.model.terms.size(), 1u);
   const auto& shapes = diagnosis.model.terms[0].form.shape_of_unit;
   ASSERT_EQ(shapes.size(), campaign.units.size());
-  // A few units hardly came by their tooth.
+  // A few units hardly passed their tooth.
   EXPECT_GE(std::ranges::count_if(
                 shapes,
                 [](const auto& own) { return Apart_deg(own.second, PlaceOf_deg(own.first)) < 8; }),
@@ -58,7 +58,7 @@ TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
 
 TEST(OwnShapes, ATeethsLongMeshIsNothingElse) {
   for (const double width_deg : {10.0, 32.0}) {
-    Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+    Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
     DamageTeeth([](std::uint32_t) { return true; }, &campaign, width_deg);
     const Diagnosis diagnosis = Verdicts(campaign);
     ASSERT_EQ(diagnosis.causes.size(), 1u) << width_deg << Reported(diagnosis);
@@ -68,7 +68,7 @@ TEST(OwnShapes, ATeethsLongMeshIsNothingElse) {
 }
 
 TEST(OwnShapes, FewUnitsAmongManyHaveTheirs) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 9});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 9});
   std::vector<std::uint32_t> damaged = {campaign.units[3].id, campaign.units[11].id,
                                         campaign.units[19].id};
   DamageTeeth([&](std::uint32_t unit) { return std::ranges::count(damaged, unit) != 0; },
@@ -81,10 +81,10 @@ TEST(OwnShapes, FewUnitsAmongManyHaveTheirs) {
   EXPECT_EQ(diagnosis.causes[0].units, damaged);
 }
 
-// The model is sought once more where the image moves.
+// The model is selected once more where the image moves.
 TEST(OwnShapes, StayWhereTheImageMoves) {
   Campaign campaign =
-      Planted({{.cause = "air_turbulence", .amplitude = 4}}, {.moves = 80, .seed = 8});
+      Planted({{.cause = "air_turbulence", .amplitude = 4}}, {.units = 24, .moves = 80, .seed = 8});
   DamageTeeth([](std::uint32_t) { return true; }, &campaign);
   const Diagnosis diagnosis = Verdicts(campaign);
   const auto teeth = std::ranges::find(diagnosis.causes, "tooth_damage", &CauseFound::cause);
@@ -128,7 +128,7 @@ TEST(OwnShapes, WhoHasAChoiceOfShapesPaysForIt) {
   const Evidence paid = Assess(pass.scores[0], chosen, groups);
   const Evidence unpaid = Assess(pass.scores[1], free, groups);
   const auto units = static_cast<double>(campaign.units.size());
-  EXPECT_NEAR(unpaid.evidence - paid.evidence, units * std::log(24.0), 1);
+  EXPECT_NEAR(unpaid.log_evidence - paid.log_evidence, units * std::log(24.0), 1);
   // No unit pays more than it has.
   EXPECT_LE(unpaid.chi_square - paid.chi_square, units * 2 * std::log(24.0) + 1e-9);
   EXPECT_GE(unpaid.chi_square - paid.chi_square, units * std::log(24.0));
@@ -138,7 +138,7 @@ TEST(OwnShapes, WhoHasAChoiceOfShapesPaysForIt) {
 TEST(OwnShapes, NoiseHasNone) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
-    const Campaign campaign = Planted({}, {.seed = seed});
+    const Campaign campaign = Planted({}, {.units = 24, .seed = seed});
     const CampaignFacts facts = MakeFacts(campaign);
     const Fit fit = StaticFit(facts);
     const Templates listed = ListTemplates(*FindEffect("tooth_damage"), facts);
@@ -150,7 +150,7 @@ TEST(OwnShapes, NoiseHasNone) {
     RefineCandidateShapes(fit, groups, &own);
     for (const CandidateShape& one : own) {
       const ScorePass pass = ScoreTemplates(fit, {one.form});
-      EXPECT_LE(Assess(pass.scores[0], one.form, groups).evidence, 0);
+      EXPECT_LE(Assess(pass.scores[0], one.form, groups).log_evidence, 0);
     }
   }
 }

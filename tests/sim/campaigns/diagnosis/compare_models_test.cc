@@ -17,9 +17,10 @@ CampaignModel Nominal(const Campaign& campaign) {
   return model;
 }
 
-// Gears that turn by a share more than was thought.
+// Gears that turn by a share more than in the table.
 Campaign Geared(double share, std::uint64_t seed) {
-  return Planted({{.cause = "gear_scale", .amplitude = share}}, {.moves = 80, .seed = seed});
+  return Planted({{.cause = "gear_scale", .amplitude = share}},
+                 {.units = 24, .moves = 80, .seed = seed});
 }
 
 ModelComparison Compared(const CampaignModel& a, const CampaignModel& b, const Campaign& campaign) {
@@ -89,7 +90,8 @@ TEST(CompareModels, AFleetThatHasDriftedIsFound) {
   EXPECT_EQ(gear.a->units, 24u);
 }
 
-// Models that are as far from the truth on either side: which of them wins is chance.
+// Both models are equally far from the truth on either side, so that chance decides which is
+// better.
 TEST(CompareModels, NoiseSeldomPrefersAModel) {
   int preferred = 0;
   constexpr std::uint64_t kCampaigns = 60;
@@ -100,15 +102,16 @@ TEST(CompareModels, NoiseSeldomPrefersAModel) {
     for (CampaignUnit& unit : b.units) unit.base_x_mm -= 0.003;
     if (Compared(a, b, campaign).preference != Preference::kNone) ++preferred;
   }
-  // Of 60 at 5 %; the rest errors of axes last longer than an exposure and add a few.
+  // The expected number of 60 at 5 % is 3; the axes' rest errors last longer than an exposure and
+  // add a few.
   EXPECT_LE(preferred, 10);
 }
 
 TEST(CompareModels, WhatBothMissByFarIsLeftOutAndCounted) {
   const Campaign campaign =
-      Planted({}, {.moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02});
+      Planted({}, {.units = 24, .moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02});
   const CampaignModel ideal = Nominal(campaign);
-  CampaignModel off = ideal;  // in one exposure, far off by this model alone: its rows stay
+  CampaignModel off = ideal;  // far off in one exposure, by this model alone: its rows stay
   off.exposures.assign(80, {});
   off.exposures[7].shift_x_um = 200;
   const ModelComparison result = Compared(ideal, off, campaign);
@@ -118,7 +121,7 @@ TEST(CompareModels, WhatBothMissByFarIsLeftOutAndCounted) {
   EXPECT_GT(result.left_out.at("not seen"), 20u);
   EXPECT_GT(result.left_out.at("far off by both models"), 10u);
   EXPECT_LT(result.left_out.at("far off by both models"), 30u);
-  EXPECT_LT(result.a.rms_um, 8);  // the outliers' is above 100
+  EXPECT_LT(result.a.rms_um, 8);  // that of the outliers is above 100
   EXPECT_GT(result.b.rms_um, 15);
   EXPECT_EQ(result.preference, Preference::kNone) << "by a single exposure";
 }
@@ -134,7 +137,7 @@ TEST(CompareModels, AUnitThatStandsElsewhereIsLeftOutWhole) {
 }
 
 TEST(CompareModels, FewExposuresShowNoDifference) {
-  const Campaign campaign = Planted({}, {.moves = kExposuresForPreference - 1});
+  const Campaign campaign = Planted({}, {.units = 24, .moves = kExposuresForPreference - 1});
   CampaignModel a = Nominal(campaign), b = a;
   for (CampaignUnit& unit : b.units) unit.base_x_mm += 0.1;
   const ModelComparison result = Compared(a, b, campaign);
@@ -143,7 +146,8 @@ TEST(CompareModels, FewExposuresShowNoDifference) {
 }
 
 TEST(CompareModels, ATermWhoseColumnIsMissingIsLeftOutByName) {
-  Campaign campaign = Planted({{.cause = "gravity_sag", .amplitude = 20}}, {.seed = 3});
+  Campaign campaign =
+      Planted({{.cause = "gravity_sag", .amplitude = 20}}, {.units = 24, .seed = 3});
   const CampaignModel fitted = Verdicts(campaign).model;
   ASSERT_EQ(fitted.terms.size(), 1u);
   std::erase_if(campaign.covariates, [](const Covariate& c) { return c.name == "elevation_deg"; });

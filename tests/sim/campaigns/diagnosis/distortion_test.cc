@@ -34,8 +34,8 @@ double Turn(const Campaign& campaign, std::size_t row) {
 }
 
 TEST(Distortion, WhatABentCauseLeavesGoesBesideItsBend) {
-  // Once a turn, bent: the third order is in it at a ninth of its size.
-  Campaign campaign = Planted({}, {.moves = 100, .seed = 21});
+  // A wave once a turn is bent: the third order is in it at a ninth of its size.
+  Campaign campaign = Planted({}, {.units = 24, .moves = 100, .seed = 21});
   TurnTheta(
       [&](std::size_t row) {
         const double once = 0.3 * std::sin(Turn(campaign, row) + 0.5);
@@ -50,7 +50,7 @@ TEST(Distortion, WhatABentCauseLeavesGoesBesideItsBend) {
 }
 
 TEST(Distortion, AWeakCauseBesideAStrongOneIsKept) {
-  Campaign campaign = Planted({}, {.moves = 100, .seed = 21});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 100, .seed = 21});
   TurnTheta(
       [&](std::size_t row) {
         return 0.5 * std::sin(Turn(campaign, row) + 0.5) +
@@ -62,7 +62,7 @@ TEST(Distortion, AWeakCauseBesideAStrongOneIsKept) {
   EXPECT_FALSE(judged[1].is_doubtful()) << judged[1].kept;
 }
 
-// The stop's angle in one unit is twice what the torque turns them all by.
+// The stop's angle in one unit is twice the angle by which the torque turns them all.
 TEST(Distortion, WhatIsLargerThanTheStrongOneIsNotWhatItsShapeLeaves) {
   for (const auto& [form, size] : {std::pair(11, 0.05), {13, 0.02}}) {
     const Diagnosis diagnosis =
@@ -72,7 +72,7 @@ TEST(Distortion, WhatIsLargerThanTheStrongOneIsNotWhatItsShapeLeaves) {
                            .axis = "phi",
                            .unit_share = 0.05,
                            .form = form}},
-                         {.moves = 150}));
+                         {.units = 24, .moves = 150}));
     ASSERT_EQ(diagnosis.causes.size(), 2u) << Reported(diagnosis);
     EXPECT_EQ(diagnosis.causes[1].cause, "hard_stop") << Reported(diagnosis);
   }

@@ -16,8 +16,8 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-// The table has one unit's moves under the other's name from this move on: what was measured is
-// what the other's moves did. Pre: both have as many rows; none is homed after it.
+// The table has one unit's moves under the other's name from this move on: the measured places are
+// those of the other's moves. Pre: both have as many rows; none is homed after it.
 void ExchangeMoves(std::size_t a, std::size_t b, std::size_t since, Campaign* campaign) {
   const std::size_t end = campaign->first_row[a + 1] - campaign->first_row[a];
   for (const std::size_t axis : {kTheta, kPhi}) {
@@ -38,7 +38,7 @@ TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
   for (const std::size_t since : {0u, 17u, 40u}) {
     SCOPED_TRACE(since);
     Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.05, .axis = "theta"}},
-                                {.moves = 60, .seed = 5});
+                                {.units = 24, .moves = 60, .seed = 5});
     ExchangeMoves(3, 11, since, &campaign);
     const Diagnosis diagnosis = Verdicts(campaign);
     ASSERT_THAT(diagnosis.causes, SizeIs(2)) << Reported(diagnosis);
@@ -53,7 +53,7 @@ TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
   }
 }
 
-/// The places of two units under each other's name in these moves.
+/// Exchanges the places of two units in these moves.
 void ExchangePlacesOf(std::size_t a, std::size_t b, std::size_t begin, std::size_t end,
                       Campaign* campaign) {
   for (std::size_t move = begin; move < end; ++move)
@@ -72,7 +72,7 @@ TEST(Exchanged, FibresThatHaveEachOthersNameForAWhileAreFound) {
   for (const auto& [begin, end, shape] : cases) {
     SCOPED_TRACE(shape);
     Campaign campaign = Planted({{.cause = "gear_scale", .amplitude = 0.002, .axis = "theta"}},
-                                {.moves = 60, .seed = 5, .outlier_share = 0.01});
+                                {.units = 24, .moves = 60, .seed = 5, .outlier_share = 0.01});
     const Campaign right = campaign;
     ExchangePlacesOf(3, 9, begin, end, &campaign);
     const std::vector<FibreSwap> swaps = FindFibreSwaps(MakeFacts(campaign));
@@ -91,17 +91,17 @@ TEST(Exchanged, FibresThatHaveEachOthersNameForAWhileAreFound) {
 }
 
 TEST(Exchanged, APairOfOutliersIsNoName) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5, .outlier_share = 0.05});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5, .outlier_share = 0.05});
   for (const std::size_t move : {7u, 33u}) ExchangePlacesOf(3, 9, move, move + 1, &campaign);
   EXPECT_THAT(FindFibreSwaps(MakeFacts(campaign)), IsEmpty());
 }
 
 TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
-  const Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  const Campaign right = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   Campaign campaign = right;
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
   ExchangePlacesOf(3, 9, 25, 60, &campaign);
-  // Off anywhere, and not seen: these say nothing about names.
+  // Rows that are off, or were not seen, are no evidence about names.
   campaign.x_mm[campaign.first_row[3] + 14] += 1.5;
   campaign.x_mm[campaign.first_row[9] + 59] = std::numeric_limits<double>::quiet_NaN();
   const CampaignFacts facts = MakeFacts(campaign);
@@ -119,9 +119,9 @@ TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
   EXPECT_EQ(diagnosis.causes[0].shape, "units 4 and 10 in moves 11 to 20 and since move 26");
 }
 
-// Exposures have numbers in the order in which they are met, unit by unit.
+// Exposures are numbered in the order in which they appear, unit by unit.
 TEST(Exchanged, OfAFirstUnitThatLacksMovesFollowsNothing) {
-  Campaign right = Planted({}, {.moves = 60, .seed = 5});
+  Campaign right = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::vector<bool> keep(right.rows(), true);
   for (std::size_t move = 20; move < 30; ++move) keep[right.first_row[0] + move] = false;
   right = Keep(right, keep);
@@ -145,10 +145,10 @@ TEST(Exchanged, NamesAreFoundWhereTheTableIsOffForAllUnits) {
   EXPECT_EQ(swaps[0].b, 9u);
 }
 
-// Neighbours that are given each other's spot now and then: no cause of an axis, whatever they are
-// near to.
+// Neighbours that sometimes get each other's spot are no cause of an axis, whatever they are near
+// to.
 TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::size_t exchanged = 0;
   for (std::size_t unit = 0; unit + 1 < campaign.units.size(); unit += 2)
     for (const std::size_t move : {5 + unit, 30 + unit}) {
@@ -161,7 +161,7 @@ TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
   EXPECT_EQ(diagnosis.outliers.why.at("at another unit's place"), exchanged);
 }
 
-// Zeros anywhere put fibres near others' places by chance, now and then.
+// Random zeros put fibres near others' places by chance, now and then.
 TEST(Exchanged, WhereTheTableIsWrongNobodyIsAtAnothersPlace) {
   std::size_t exchanged = 0;
   for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {
@@ -176,7 +176,7 @@ TEST(Exchanged, WhereTheTableIsWrongNobodyIsAtAnothersPlace) {
 }
 
 TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
-  Campaign campaign = Planted({}, {.moves = 30, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 30, .seed = 5});
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
   const std::size_t gone = campaign.first_row[9] + 12;  // of the other: as if of another exposure
   campaign.move_id[gone] = 1'000'000;
@@ -191,7 +191,7 @@ TEST(Exchanged, WhatOneFibreWasSeenAtAloneIsMissingWhileNamesAreWrong) {
 }
 
 TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
-  Campaign campaign = Planted({}, {.moves = 60, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   Rng rng = Rng::Stream(5, "where they go");
   for (const std::size_t unit : {3u, 11u})
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row) {
@@ -206,7 +206,7 @@ TEST(Exchanged, UnitsThatObeyNobodyAreNoPair) {
 }
 
 TEST(Exchanged, WhatTheOtherHasNoRowOfIsMissing) {
-  Campaign campaign = Planted({}, {.moves = 20, .seed = 5});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 20, .seed = 5});
   ExchangeMoves(3, 11, 5, &campaign);
   const std::size_t gone = campaign.first_row[11] + 12;  // of the other: as if of another exposure
   campaign.move_id[gone] = 1'000'000;

@@ -1,4 +1,4 @@
-// What weak names beside strong ones are worth.
+// Tests of what weak names beside strong ones are worth.
 #include "sim/campaigns/diagnosis/families.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ CauseFound Cause(const char* name, const char* axis, double delta_log_likelihood
   cause.axis = axis;
   cause.all_units = true;
   cause.delta_log_likelihood = delta_log_likelihood;
-  cause.size_um = std::sqrt(delta_log_likelihood);  // as where all have the same noise
+  cause.size_um = std::sqrt(delta_log_likelihood);  // all have the same noise
   return cause;
 }
 
@@ -97,7 +97,7 @@ TEST(Families, AShapeLeavesNothingWhereItIsNot) {
     ASSERT_THAT(causes, SizeIs(2));
     EXPECT_THAT(causes[1].candidates, ElementsAre("phase_imbalance"));
   }
-  // Where the weak one is, the strong one is not much stronger.
+  // In the weak one's units the strong one is not much stronger.
   const auto causes = beside({{1, 6400}, {2, 600}}, {{2, 180}});
   ASSERT_THAT(causes, SizeIs(2));
   EXPECT_THAT(causes[1].candidates, ElementsAre("phase_imbalance", "gear_scale"));
@@ -109,7 +109,7 @@ TEST(Families, WhatIsFaintBesideTheStrongestIsNoName) {
   JudgeMisfitArtefacts(kUnits, &causes);
   EXPECT_THAT(causes, SizeIs(1));
 
-  // What moves the image has nothing to do with it.
+  // A motion of the image has nothing to do with it.
   causes = {Cause("camera_similarity", "none", 30000), Cause("self_heating", "phi", 22)};
   JudgeMisfitArtefacts(kUnits, &causes);
   ASSERT_THAT(causes, SizeIs(2));
@@ -128,7 +128,7 @@ TEST(Families, WhatIsFaintByItselfIsNoNameBesideAStrongerOne) {
   EXPECT_THAT(beside("both", 32), SizeIs(2));
   EXPECT_THAT(beside("theta", 20), SizeIs(2));  // on another axis, and more than hardly there
 
-  // What moves the whole fibre leaves nothing that looks like an axis.
+  // An effect that moves the whole fibre leaves nothing that looks like an axis.
   std::vector<CauseFound> causes = {Cause("gravity_sag", "none", 92), Cause("wear", "phi", 22)};
   JudgeMisfitArtefacts(kUnits, &causes);
   EXPECT_THAT(causes, SizeIs(2));
@@ -137,7 +137,7 @@ TEST(Families, WhatIsFaintByItselfIsNoNameBesideAStrongerOne) {
   EXPECT_THAT(causes, SizeIs(1));
 }
 
-// One unit's stop among all units' fibres explains little in sum.
+// The stop of a single unit explains little in the sum over all units' fibres.
 TEST(Families, NoShapeLeavesMoreThanItIs) {
   const auto beside = [](double size_um) {
     std::vector<CauseFound> causes = {Cause("fibre_torque", "phi", 1000),
@@ -156,22 +156,23 @@ TEST(Families, WhatIsFarBelowNoiseAndAStrongCauseIsThatOnesShape) {
   causes[0].size_um = 50;
   causes[1].size_um = 20;
   causes[2].size_um = 1;
-  const auto who = [&](const char* channel, double size_um, double noise_um) {
-    const CauseFound* of = WhoLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
+  const auto cause_that_leaves = [&](const char* channel, double size_um, double noise_um) {
+    const CauseFound* of =
+        CauseThatLeaves({.channel = channel, .size_um = size_um}, noise_um, &causes);
     return of == nullptr ? "nobody" : of->cause;
   };
-  EXPECT_EQ(who("y", 0.8, 6), "gravity_sag");
-  EXPECT_EQ(who("y", 0.8, 4), "nobody");   // near the noise
-  EXPECT_EQ(who("y", 2.5, 60), "nobody");  // a large part of the strongest
+  EXPECT_EQ(cause_that_leaves("y", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(cause_that_leaves("y", 0.8, 4), "nobody");   // near the noise
+  EXPECT_EQ(cause_that_leaves("y", 2.5, 60), "nobody");  // a large part of the strongest
   causes[1].axis = "theta";
-  EXPECT_EQ(who("theta angle", 0.8, 6), "gravity_sag");
-  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("theta angle", 0.8, 6), "gravity_sag");
+  EXPECT_EQ(cause_that_leaves("phi angle", 0.8, 6), "nobody");
   causes[1].all_units = false;
-  EXPECT_EQ(who("theta angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("theta angle", 0.8, 6), "nobody");
   causes.push_back(Cause("air_turbulence", "none", 900));
   causes.back().size_um = 4;
-  EXPECT_EQ(who("x", 0.8, 6), "air_turbulence");
-  EXPECT_EQ(who("phi angle", 0.8, 6), "nobody");
+  EXPECT_EQ(cause_that_leaves("x", 0.8, 6), "air_turbulence");
+  EXPECT_EQ(cause_that_leaves("phi angle", 0.8, 6), "nobody");
   ReportAsMisfitArtefact(0.8, "move order", &causes[1]);
   EXPECT_THAT(causes[1].shape, HasSubstr("0.8 um, looks like move order"));
 }
@@ -256,7 +257,7 @@ TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
   fit.noise.typical_um = 3;
   fit.aside.assign(600, 0), fit.x_um.assign(600, 0), fit.y_um.assign(600, 2);
   OutliersFound outliers;
-  // Unit 37 stands off by `left_um` after the fit.
+  // Unit 37 is off by `left_um` after the fit.
   const auto judged = [&](const char* name, double size_um, double left_um,
                           std::vector<std::uint32_t> units, const char* scope = "unit") {
     std::vector<CauseFound> causes = {Cause(name, "phi", 23)};
@@ -269,8 +270,8 @@ TEST(Families, AUnitThatACauseMovesFarAndDoesNotExplainIsAnOutlier) {
   EXPECT_EQ(judged("scale_asymmetry", 6000, 4000, {37}), 0u);
   EXPECT_THAT(outliers.units, ElementsAre(37u));
   EXPECT_EQ(judged("zero_offset", 6000, 4000, {37}), 0u);
-  // One that puts its rows right, if not to the last micrometre; one that is no larger than some
-  // noise; what is found by its exact places; what a rail does.
+  // No stray is a unit that the cause puts right, if not to the last micrometre, or one that is no
+  // larger than some noise. The same holds for a cause found by exact places, or of a rail.
   EXPECT_EQ(judged("gear_scale", 6000, 100, {37}), 1u);
   EXPECT_EQ(judged("scale_asymmetry", 40, 30, {37}), 1u);
   EXPECT_EQ(judged("lost_command", 6000, 4000, {37}), 1u);
@@ -349,7 +350,7 @@ TEST(Families, WhatNearlyTheSameUnitsHaveBesideIsNotSure) {
   };
   EXPECT_EQ(judged({1, 2, 3, 4, 9}), 2u);
   EXPECT_EQ(judged({1, 2, 3, 8, 9}), 1u);
-  EXPECT_EQ(judged({1, 2, 3, 4, 9}, 9), 1u);  // of which six have the other: by accident
+  EXPECT_EQ(judged({1, 2, 3, 4, 9}, 9), 1u);  // six units have the other: by accident
 }
 
 TEST(Families, AUnitWithManyCausesIsNamedAsAUnit) {
@@ -383,7 +384,7 @@ TEST(Families, ARotorThatIsTurnedFarIsEithersOfTwo) {
   model.units.resize(3);
   for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 337, unit.gear[kPhi] = 893;
   std::vector<std::string> left_out;
-  RotorsReportedBy reported;
+  RotorCauses reported;
   const auto judged = [&](const char* name, double rotor_deg) {
     std::vector<CauseFound> causes = {Cause(name, "phi", 300)};
     causes[0].amplitude = -rotor_deg / 893;
@@ -415,17 +416,17 @@ TEST(Families, TheSecondOfTwoNamesOfARotorIsWhatTheFirstLeaves) {
   const std::vector<CauseFound> one = judged(20, 300, "phi");
   ASSERT_THAT(one, SizeIs(1));
   EXPECT_THAT(one[0].misfit_artefacts, ElementsAre("phase_imbalance"));
-  EXPECT_THAT(judged(10, 300, "phi"), SizeIs(2));  // surely not the first
+  EXPECT_THAT(judged(10, 300, "phi"), SizeIs(2));  // clearly not the first
   EXPECT_THAT(judged(20, 1000, "phi"), SizeIs(2));
   EXPECT_THAT(judged(20, 300, "theta"), SizeIs(2));
 }
 
-// Exact waves of some units' rotors say nothing of what others do.
+// Exact waves of some units' rotors are no evidence about those of others.
 TEST(Families, ARotorsSecondNameInOtherUnitsIsNoMisfitArtefact) {
   CampaignModel model;
   model.units.resize(3);
   for (CampaignUnit& unit : model.units) unit.gear[kTheta] = 893, unit.gear[kPhi] = 893;
-  RotorsReportedBy reported;
+  RotorCauses reported;
   reported[kPhi] = "cogging";
   const auto judged = [&](std::uint32_t unit) {
     std::vector<CauseFound> causes = {Cause("cogging", "phi", 2000),

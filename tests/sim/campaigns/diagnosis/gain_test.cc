@@ -15,8 +15,8 @@ namespace {
 TEST(HeldOutGain, OutliersOfAHomingThatNoFitHasSeenDoNotMoveItsZeros) {
   // The zeros of a held-out homing are fitted to its own few moves, of which some lie anywhere
   // within 2 mm.
-  const Campaign campaign =
-      Planted({}, {.moves = 100, .seed = 12, .outlier_share = 0.05, .homing_share = 0.1});
+  const Campaign campaign = Planted(
+      {}, {.units = 24, .moves = 100, .seed = 12, .outlier_share = 0.05, .homing_share = 0.1});
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);
   FreeHomings(&fit);

@@ -14,7 +14,7 @@ TEST(Mesh, TeethDeeperOnOneSideAreOneCause) {
   constexpr double kTeeth = 45, kDepth_deg = 0.06, kOff = 0.7;
   for (const std::uint64_t seed : {3u, 4u}) {
     SCOPED_TRACE(seed);
-    Campaign campaign = Planted({}, {.moves = 120, .seed = seed});
+    Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
     std::vector<std::uint32_t> unit_of(campaign.rows());
     for (std::size_t u = 0; u < campaign.units.size(); ++u)
       for (std::size_t row = campaign.first_row[u]; row < campaign.first_row[u + 1]; ++row)

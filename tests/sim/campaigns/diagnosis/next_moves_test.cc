@@ -1,4 +1,4 @@
-// Moves that are proposed to tell causes apart, held against what they do.
+// Moves that are proposed to separate causes are compared with their effect.
 #include "sim/campaigns/diagnosis/next_moves.h"
 
 #include <gmock/gmock.h>
@@ -18,8 +18,8 @@ using testing::Field;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-// Theta in steps of one length from the stop, again and again, by all units at once: what arcs over
-// the range show, and nothing else.
+// Theta moves in steps of one length from the stop, repeatedly, by all units at once. Such arcs
+// show what arcs over the range show, and nothing else.
 Campaign Arcs(double step_deg, std::vector<PlantedEffect> effects, std::uint64_t seed) {
   PlantedOptions options{.units = 6, .moves = 1, .seed = seed, .noise_um = 2};
   const Campaign first = Planted({}, options);
@@ -107,7 +107,7 @@ TEST(NextMoves, MadeAndMeasuredTheyDecide) {
   }
 }
 
-// Play and the lag of a loaded rotor are one at one drive.
+// Play and the lag of a loaded rotor are the same at one drive.
 TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
                               {.units = 6, .moves = 60, .seed = 5});
@@ -122,7 +122,7 @@ TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
   EXPECT_GT(next.prospects[0].d, 30);
 }
 
-// Two units have no gradient between them: a term of the plate's cannot be asked in their rows.
+// Two units have no gradient between them: their rows cannot test a term of the plate.
 TEST(NextMoves, TermsWhoseColumnsFewUnitsLackStayOut) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
                                     {.units = 20, .moves = 60, .seed = 5});
@@ -146,7 +146,7 @@ TEST(NextMoves, TermsWhoseColumnsFewUnitsLackStayOut) {
 TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
   const Diagnosis diagnosis =
       Diagnose(Planted({{.cause = "eccentricity", .amplitude = 0.1, .axis = "theta"}},
-                       {.moves = 60, .seed = 7}),
+                       {.units = 24, .moves = 60, .seed = 7}),
                {.with_gain = false});
   ASSERT_EQ(diagnosis.verdict, Verdict::kExplained);
   EXPECT_THAT(diagnosis.next.moves, IsEmpty());
@@ -155,8 +155,8 @@ TEST(NextMoves, ThereAreNoneWhereNothingIsConfusable) {
 
 // All rows of the units that have a term may be set aside.
 TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
-  const Campaign campaign =
-      Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}}, {.moves = 40});
+  const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
+                                    {.units = 24, .moves = 40});
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = FittedWith("backlash", Memory::kHold, facts);
   std::vector<std::uint32_t>& has = fit.model.terms[0].group_of_unit;
@@ -164,7 +164,7 @@ TEST(NextMoves, OfATermThatNobodySeenHasAreNone) {
   std::fill_n(fit.weight.begin(), campaign.first_row[1], 0.0);
   const NextMoves next = ProposeMoves(fit, {Ambiguous("backlash", "friction_windup")});
   EXPECT_THAT(next.moves, IsEmpty());
-  EXPECT_THAT(next.untold, testing::ElementsAre(std::pair("backlash", "friction_windup")));
+  EXPECT_THAT(next.inseparable, testing::ElementsAre(std::pair("backlash", "friction_windup")));
 }
 
 TEST(Ahead, AUnitGoesWhereItIsSentAndStaysWhereItIsNot) {

@@ -15,7 +15,7 @@ namespace {
 
 // A ripple of order five, 0.05 degrees, with a phase of each unit's own.
 Campaign FiveTimesATurn() {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 12});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 12});
   std::vector<double> phase(campaign.rows());
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)
@@ -46,7 +46,8 @@ TEST(Patch, AnAngleThatFollowsTheHumidityIsCorrectedAndNotNamed) {
   EXPECT_EQ(patched.unknown[0].covariate, "humidity_pct");
   ASSERT_TRUE(patched.unknown[0].patched);
   EXPECT_EQ(patched.unknown[0].patched->term, "empirical_curve");
-  // Of 0.12 degrees times a square of 0 to 1, about its mean, at some 11 mm from the base.
+  // The planted curve is 0.12 degrees times a square of 0 to 1, about its mean, at some 11 mm from
+  // the base.
   EXPECT_NEAR(patched.unknown[0].patched->size_um, 7, 2.5);
   EXPECT_EQ(patched.causes.size(), plain.causes.size()) << Reported(patched);
   ASSERT_EQ(EmpiricalTerms(patched).size(), 1u);
@@ -73,7 +74,7 @@ TEST(Patch, ARippleOfNoGearIsCorrectedAndNotNamed) {
 }
 
 TEST(Patch, AnImageThatFollowsTheWindGetsCurvesInsteadOfShifts) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = 8});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   const Exposures exposures = FindExposures(campaign);
   Rng rng = Rng::Stream(3, "wind");
   std::vector<double> wind(exposures.size());

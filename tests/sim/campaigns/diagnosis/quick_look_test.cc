@@ -14,7 +14,7 @@ namespace {
 
 // Theta commands of these units rounded, each to a step of its own.
 Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t seed) {
-  Campaign campaign = Planted({}, {.moves = 80, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});
   std::vector<double> step_of_row(campaign.rows(), 0);
   for (const auto& [unit, step] : step_deg)
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)

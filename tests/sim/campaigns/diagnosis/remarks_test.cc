@@ -1,4 +1,4 @@
-// Oddities of the data are told, and are no evidence.
+// Oddities of the data are reported, and are no evidence.
 #include "sim/campaigns/diagnosis/remarks.h"
 
 #include <gmock/gmock.h>
@@ -20,10 +20,10 @@ using ::testing::Not;
 
 constexpr double kPlane = 1.41421356;  // rms of a place to that of a coordinate
 
-// The rms that is left is that of rounding, and the noise that is believed is no less.
+// The remaining rms is that of rounding, and the noise that is believed is no less.
 TEST(WholePixels, AreTheNoiseOfACampaignWithoutMisfit) {
   for (const double step_mm : {0.2, 0.05}) {
-    const Campaign campaign = InSteps(Planted({}, {.moves = 40, .seed = 5}), step_mm);
+    const Campaign campaign = InSteps(Planted({}, {.units = 24, .moves = 40, .seed = 5}), step_mm);
     const Diagnosis diagnosis = Diagnose(campaign, {});
     const double rounding_um = kPlane * 1e3 * SpreadOfStep(step_mm);
     for (const CauseFound& cause : diagnosis.causes)
@@ -38,7 +38,7 @@ TEST(WholePixels, AreTheNoiseOfACampaignWithoutMisfit) {
 }
 
 TEST(WholePixels, AreNotReportedWhereTheNoiseIsWider) {
-  const Diagnosis diagnosis = Diagnose(InSteps(Planted({}, {.moves = 40}), 1e-3), {});
+  const Diagnosis diagnosis = Diagnose(InSteps(Planted({}, {.units = 24, .moves = 40}), 1e-3), {});
   EXPECT_NEAR(diagnosis.steps.x_mm, 1e-3, 1e-9);
   EXPECT_FALSE(diagnosis.steps_limit);
   EXPECT_THAT(diagnosis.remarks, IsEmpty());
@@ -47,16 +47,16 @@ TEST(WholePixels, AreNotReportedWhereTheNoiseIsWider) {
 TEST(WholePixels, LeaveAStrongCauseItsName) {
   const Campaign campaign =
       InSteps(Planted({{.cause = "eccentricity", .amplitude = 0.5, .axis = "theta"}},
-                      {.moves = 60, .seed = 2}),
+                      {.units = 24, .moves = 60, .seed = 2}),
               0.1);
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_FALSE(diagnosis.causes.empty());
   EXPECT_EQ(diagnosis.causes.front().cause, "eccentricity") << Reported(diagnosis);
 }
 
-// As if the places that were carried on had never been written.
+// The result is as if the places that were carried on had never been written.
 TEST(CarriedOn, IsNoEvidence) {
-  const Campaign plain = Planted({}, {.moves = 40, .seed = 7});
+  const Campaign plain = Planted({}, {.units = 24, .moves = 40, .seed = 7});
   const Diagnosis carried = Diagnose(MovedInTurns(plain, 0.5, true), {});
   const Diagnosis missing = Diagnose(MovedInTurns(plain, 0.5, false), {});
   EXPECT_EQ(Reported(carried), Reported(missing));
@@ -69,7 +69,7 @@ TEST(CarriedOn, IsNoEvidence) {
 
 TEST(CarriedOn, CampaignsWithoutCameraNoiseAreConsistent) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-    const Campaign campaign = Planted({}, {.moves = 40, .seed = seed, .noise_um = 0});
+    const Campaign campaign = Planted({}, {.units = 24, .moves = 40, .seed = seed, .noise_um = 0});
     const Diagnosis diagnosis = Diagnose(campaign, {});
     EXPECT_GT(diagnosis.gain.rms_after_um, 1) << seed;  // the axes' rests
     EXPECT_LT(diagnosis.gain.rms_after_um, 10) << seed;
@@ -78,7 +78,7 @@ TEST(CarriedOn, CampaignsWithoutCameraNoiseAreConsistent) {
 }
 
 TEST(ReadTwice, AnExposureIsSetAside) {
-  const Campaign fine = Planted({}, {.moves = 40, .seed = 3});
+  const Campaign fine = Planted({}, {.units = 24, .moves = 40, .seed = 3});
   const Diagnosis diagnosis = Verdicts(ReadTwice(fine, 22));
   EXPECT_EQ(diagnosis.verdict, Verdict::kConsistent) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.outliers.why.at("the exposure repeats the one before"), 24u);
@@ -92,11 +92,11 @@ std::vector<std::string> RemarksOn(const Campaign& campaign) {
 }
 
 TEST(Remarks, AreNoneOnACampaignInOrder) {
-  EXPECT_THAT(RemarksOn(Planted({}, {.moves = 40, .homing_share = 0.1})), IsEmpty());
+  EXPECT_THAT(RemarksOn(Planted({}, {.units = 24, .moves = 40, .homing_share = 0.1})), IsEmpty());
 }
 
 TEST(Remarks, TellTimesThatContradictTheNumbersOfMoves) {
-  Campaign campaign = Planted({}, {.moves = 40});
+  Campaign campaign = Planted({}, {.units = 24, .moves = 40});
   ASSERT_FALSE(campaign.Find("t_s").empty());
   std::swap(campaign.move_id[7], campaign.move_id[8]);
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(HasSubstr("in 1 of 960 rows t_s and move_id")));
@@ -105,9 +105,9 @@ TEST(Remarks, TellTimesThatContradictTheNumbersOfMoves) {
 }
 
 TEST(Remarks, TellRowsThatDoNotJoin) {
-  const Campaign whole = Planted({}, {.moves = 40});
+  const Campaign whole = Planted({}, {.units = 24, .moves = 40});
   std::vector<bool> keep(whole.rows(), true);
-  // A move away, of which the row behind it shows nothing.
+  // A move away, which the next row does not show.
   for (const std::size_t unit : {std::size_t{0}, std::size_t{5}}) {
     std::size_t row = whole.first_row[unit] + 1;
     while (whole.cmd_deg[kTheta][row] == whole.from_deg[kTheta][row]) ++row;
@@ -116,7 +116,7 @@ TEST(Remarks, TellRowsThatDoNotJoin) {
   Campaign campaign = Keep(whole, keep);
   const auto two_break = HasSubstr("2 of 958 rows do not begin where");
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));
-  // A command that is written a whole turn off is one slip of the table's; a hundredth is rounding.
+  // A command that is written a whole turn off is one slip of the table; a hundredth is rounding.
   for (double& from_deg : campaign.from_deg[kTheta]) from_deg += 360;
   for (double& from_deg : campaign.from_deg[kPhi]) from_deg += 0.009;
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));

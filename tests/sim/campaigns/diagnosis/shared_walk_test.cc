@@ -1,4 +1,4 @@
-// What all units do together while their noise remembers, against walks of each by itself.
+// Common motion of all units while their noise remembers is compared with independent walks.
 #include "sim/campaigns/diagnosis/shared_walk.h"
 
 #include <gmock/gmock.h>
@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::size_t kMoves = 120;
 
-// Theta of all units stands off by what is given for the exposure.
+// Theta of all units is off by the exposure's given angle.
 Campaign Together(const std::function<double(double share_of_night)>& off_deg, std::uint64_t seed) {
-  Campaign campaign = Planted({}, {.moves = kMoves, .seed = seed});
+  Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = seed});
   const Exposures exposures = FindExposures(campaign);
   TurnTheta(
       [&](std::size_t row) { return off_deg(static_cast<double>(exposures.of_row[row]) / kMoves); },
@@ -41,7 +41,7 @@ TEST(SharedWalk, NorOneThatStepsOnce) {
 TEST(SharedWalk, WalksOfTheirOwnAreNoise) {
   for (const std::uint64_t seed : {3u, 4u, 5u}) {
     SCOPED_TRACE(seed);
-    Campaign campaign = Planted({}, {.moves = kMoves, .seed = seed});
+    Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = seed});
     Rng rng = Rng::Stream(seed, "walks");
     std::vector<double> off_deg(campaign.rows());
     for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {

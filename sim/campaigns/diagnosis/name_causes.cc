@@ -1,0 +1,180 @@
+#include "sim/campaigns/diagnosis/name_causes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include "sim/campaigns/diagnosis/distortion.h"
+#include "sim/campaigns/diagnosis/events.h"
+#include "sim/campaigns/diagnosis/families.h"
+#include "sim/campaigns/diagnosis/find_model.h"
+#include "sim/campaigns/diagnosis/geometry_causes.h"
+#include "sim/campaigns/diagnosis/image_followed.h"
+#include "sim/campaigns/diagnosis/outliers.h"
+#include "sim/campaigns/diagnosis/term_trace.h"
+
+namespace focalfleet::sim {
+namespace {
+
+std::string ScopeOf(const ModelTerm& term, std::size_t units) {
+  if (term.sharing == Sharing::kUnit || units == 1)
+    return std::string(Name(units == 1 && term.form.effect->owner != Owner::kUnit
+                                ? term.form.effect->owner
+                                : Owner::kUnit));
+  if (term.sharing == Sharing::kRail || term.sharing == Sharing::kBus)
+    return std::string(Name(term.sharing));
+  return std::string(
+      Name(term.form.effect->owner == Owner::kUnit ? Owner::kPlate : term.form.effect->owner));
+}
+
+CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accepted, double rms_um) {
+  const Effect& effect = *term.form.effect;
+  CauseFound cause = CauseNamed(effect.cause);
+  for (const Rival& rival : accepted.rivals)
+    (rival.behind_by_likelihood ? cause.behind : cause.candidates).emplace_back(rival.cause);
+  cause.axis = Name(term.form.axis);
+  cause.scope = ScopeOf(term, fit.model.units.size());
+  std::size_t have = 0, all = 0;
+  const Campaign& campaign = *fit.facts->campaign;
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
+    if (campaign.first_row[unit] == campaign.first_row[unit + 1]) continue;
+    ++all;
+    if (term.group_of_unit[unit] == kNoGroup) continue;
+    ++have;
+    cause.units.push_back(campaign.units[unit].id);
+  }
+  constexpr double kNearlyAll = 0.9;
+  cause.all_units = static_cast<double>(have) >= kNearlyAll * static_cast<double>(all);
+  cause.amplitude_unit = effect.amplitude_unit;
+  const AmplitudeSummary amplitude = Summarise(term);
+  cause.amplitude = amplitude.value;
+  cause.ci95[0] = amplitude.value - 1.96 * amplitude.sigma;
+  cause.ci95[1] = amplitude.value + 1.96 * amplitude.sigma;
+  const TermTrace trace = TraceOf(fit, term);
+  cause.size_um = trace.rms_um;
+  cause.delta_log_likelihood = accepted.evidence.chi_square / 2;
+  const double square = std::accumulate(trace.square_um2.begin(), trace.square_um2.end(), 0.0);
+  for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
+    if (trace.square_um2[unit] > 0)
+      cause.evidence_of_unit[campaign.units[unit].id] =
+          cause.delta_log_likelihood * trace.square_um2[unit] / square;
+  cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+  cause.shape = term.form.label;
+  cause.paragraph = effect.paragraph;
+  return cause;
+}
+
+// Merges causes of one name, of both axes or of several shapes, into one entry.
+void MergeCauses(std::vector<CauseFound>* causes) {
+  // The strongest part comes first. A rival that the data do not separate from it is a rival of the
+  // whole. A rival of a weak part alone does not explain the whole.
+  std::stable_sort(causes->begin(), causes->end(), [](const CauseFound& a, const CauseFound& b) {
+    return a.delta_log_likelihood > b.delta_log_likelihood;
+  });
+  std::vector<CauseFound> merged;
+  for (CauseFound& cause : *causes) {
+    const auto same = std::find_if(merged.begin(), merged.end(), [&](const CauseFound& other) {
+      return other.cause == cause.cause;
+    });
+    if (same == merged.end()) {
+      merged.push_back(std::move(cause));
+      continue;
+    }
+    if (same->axis != cause.axis) same->axis = "both";
+    if (cause.size_um > same->size_um) {
+      same->amplitude = cause.amplitude;
+      same->ci95[0] = cause.ci95[0], same->ci95[1] = cause.ci95[1];
+      same->shape = cause.shape;
+      same->scope = cause.scope;
+    }
+    AddUnits(cause, &*same);
+    same->size_um = std::hypot(same->size_um, cause.size_um);
+    same->delta_log_likelihood += cause.delta_log_likelihood;
+    if (same->evidence_of_unit.empty()) cause.evidence_of_unit.clear();
+    if (cause.evidence_of_unit.empty()) same->evidence_of_unit.clear();
+    for (const auto& [unit, evidence] : cause.evidence_of_unit)
+      same->evidence_of_unit[unit] += evidence;
+    for (std::string& name : cause.misfit_artefacts)
+      same->misfit_artefacts.push_back(std::move(name));
+    for (std::string& name : cause.cannot_be) same->cannot_be.push_back(std::move(name));
+    same->predicted_gain_um += cause.predicted_gain_um;
+  }
+  std::stable_sort(merged.begin(), merged.end(), [](const CauseFound& a, const CauseFound& b) {
+    return a.delta_log_likelihood > b.delta_log_likelihood;
+  });
+  *causes = std::move(merged);
+}
+
+// The causes of the model's terms. A term that a distortion of a stronger one explains as well is
+// reported as a misfit of that one's shape. A term that it explains in part has the stronger one as
+// a candidate.
+std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
+  const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
+  const double rms_um = RmsOf(fit);
+  std::vector<CauseFound> all, kept;
+  for (std::size_t t = 0; t < fit.model.terms.size(); ++t)
+    all.push_back(CauseOf(fit, fit.model.terms[t], accepted[t], rms_um));
+  std::vector<char> is_misfit_artefact;
+  for (std::size_t t = 0; t < all.size(); ++t)
+    is_misfit_artefact.push_back(beside[t].is_misfit_artefact() &&
+                                 CanLeave(all[beside[t].of], all[t]));
+  // The term that a misfit artefact belongs to may be one itself: `of` is stronger each time, so
+  // that the loop ends.
+  const auto named = [&](std::size_t of) {
+    while (is_misfit_artefact[of] != 0) of = beside[of].of;
+    return of;
+  };
+  for (std::size_t t = 0; t < all.size(); ++t) {
+    if (!beside[t].is_doubtful()) continue;
+    CauseFound& strong = all[named(beside[t].of)];
+    if (is_misfit_artefact[t] != 0)
+      ReportAsMisfitArtefact(all[t].size_um, all[t].cause, &strong);
+    else if (std::ranges::find(all[t].candidates, strong.cause) == all[t].candidates.end())
+      all[t].candidates.push_back(strong.cause);
+  }
+  for (std::size_t t = 0; t < all.size(); ++t)
+    if (is_misfit_artefact[t] == 0) kept.push_back(std::move(all[t]));
+  return kept;
+}
+
+}  // namespace
+
+void AddUnits(const CauseFound& more, CauseFound* cause) {
+  std::set<std::uint32_t> units(cause->units.begin(), cause->units.end());
+  units.insert(more.units.begin(), more.units.end());
+  cause->units.assign(units.begin(), units.end());
+  cause->all_units = cause->all_units || more.all_units;
+}
+
+void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOptions& options,
+                Diagnosis* diagnosis) {
+  std::vector<CauseFound>& causes = diagnosis->causes;
+  for (CauseFound& cause : EventCauses(fit))
+    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
+  for (UnknownFound& step : UnexplainedSteps(fit)) diagnosis->unknown.push_back(std::move(step));
+  for (CauseFound& cause : TermCauses(fit, selection.accepted)) causes.push_back(std::move(cause));
+  options.progress(0.8, "geometry against the table");
+  const double rms_um = RmsOf(fit);
+  for (CauseFound& cause : FindGeometryCauses(fit, options.family_wise)) {
+    cause.predicted_gain_um = std::hypot(rms_um, cause.size_um) - rms_um;
+    if (!IsLeftOut(options, cause.cause)) causes.push_back(std::move(cause));
+  }
+  JudgeStrays(fit, &causes, &diagnosis->outliers);
+  MergeCauses(&causes);
+  // Steps of the image are a misfit of its motion where that follows a column.
+  if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
+                  [](const UnknownFound& reported) { return reported.channel == kImageShift; }))
+    std::erase_if(causes,
+                  [](const CauseFound& cause) { return cause.cause == "camera_similarity"; });
+  JudgeMisfitArtefacts(fit.model.units.size(), &causes);
+  std::vector<UnknownFound> nameless;
+  JudgeNames(&causes, &nameless);
+  for (UnknownFound& one : nameless)
+    if (!IsReportedAsMisfitArtefact(one, one.channel, rms_um, &causes))
+      diagnosis->unknown.push_back(std::move(one));
+  JudgeUnits(fit.model.units.size(), &causes, &diagnosis->outliers, &diagnosis->unknown);
+  JudgeSeries(&causes, &diagnosis->unknown);
+}
+
+}  // namespace focalfleet::sim
