@@ -38,7 +38,6 @@ class BitWalk {
   }
   void EndArbitration() { record_.EndArbitration(); }
   [[nodiscard]] std::uint32_t bits() const { return bits_; }
-  [[nodiscard]] std::uint16_t crc() const { return static_cast<std::uint16_t>(crc_); }
   [[nodiscard]] const Record& record() const { return record_; }
 
  private:
@@ -135,7 +134,5 @@ FrameLevels LevelsOf(const CanFrame& frame) {
   walk.Crc();
   return walk.record().levels;
 }
-
-std::uint16_t FrameCrc(const CanFrame& frame) { return Walk(frame).crc(); }
 
 }  // namespace focalfleet

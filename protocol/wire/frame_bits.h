@@ -32,9 +32,6 @@ namespace focalfleet {
 /// included.
 std::uint32_t FrameBits(const CanFrame& frame);
 
-/// CRC-15 of the frame as the controller computes it (polynomial 0x4599).
-std::uint16_t FrameCrc(const CanFrame& frame);
-
 /// Bits of a CAN FD frame at each of its two rates.
 struct FdFrameBits {
   std::uint32_t nominal = 0;
