@@ -28,9 +28,10 @@
 #include "protocol/wire/can_frame.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/stage_group.h"
-#include "protocol/wire/staged_move.h"
 #include "sim/world/unit/board.h"
 #include "sim/world/unit/flash.h"
+#include "sim/world/unit/homing.h"
+#include "sim/world/unit/staging.h"
 #include "sim/world/unit/transitions.h"
 #include "sim/world/unit/transmit_queue.h"
 
@@ -74,67 +75,41 @@ class UnitMachine {
   [[nodiscard]] bool runs() const {
     return powered_ && (state_ == UnitState::kMoving || state_ == UnitState::kHoming);
   }
-  [[nodiscard]] BoardInstant began_at() const { return began_at_; }
-  [[nodiscard]] BoardInstant end_at() const { return end_at_; }
+  [[nodiscard]] BoardInstant began_at() const { return motion_.began_at; }
+  [[nodiscard]] BoardInstant end_at() const { return motion_.end_at; }
   [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
 
  private:
-  struct Context {
-    Address address;
-    BoardInstant now;
-    const CanFrame* frame = nullptr;
-    TransmitQueue* out = nullptr;
-    [[nodiscard]] bool broadcast() const { return address.node == kBroadcastNode; }
-  };
-  struct Staged {
-    StageBegin begin;  // move 0: nothing is staged
-    std::array<std::array<Segment, limits::kSegmentsPerAxis>, kAxisCount> segments{};
-    std::array<std::uint16_t, kAxisCount> received{};  // bit per index
-  };
+  class RequestHandler;
+
   struct Granted {  // the last request of its kind that was granted
     bool any = false;
     CanFrame request;
   };
-
-  void On(const Stop& m, const Context& c);
-  void On(const Start& m, const Context& c);
-  void On(const Clock& m, const Context& c);
-  void On(const ClockRequest& m, const Context& c);
-  void On(const Arm& m, const Context& c);
-  void On(const Confirm& m, const Context& c);
-  void On(const StageBegin& m, const Context& c);
-  void On(const StageSegment& m, const Context& c);
-  void On(const Home& m, const Context& c);
-  void On(const ProgressRequest& m, const Context& c);
-  void On(const StatusRequest& m, const Context& c);
-  void On(const VectorRequest& m, const Context& c);
-  void On(const FaultRequest& m, const Context& c);
-  void On(const IdentifyRequest& m, const Context& c);
-  void On(const ParameterRead& m, const Context& c);
-  void On(const ParameterWrite& m, const Context& c);
-  void On(const SensorsRequest& m, const Context& c);
+  struct Restart {
+    bool unnoticed = false;       // powered on since the last request to resume
+    bool reported = false;        // in the answer to the last resume, for its repetition
+    std::uint32_t resume_id = 0;  // identifier of the last resume; 0: another request came since
+  };
+  struct Motion {
+    BoardInstant begin_at = kNever;  // armed: the start signal came
+    BoardInstant began_at;
+    std::uint32_t began_ticks = 0;  // the same by the unit's own clock
+    BoardInstant end_at = kNever;   // moving, homing: of this path
+  };
+  struct SensorReading {
+    std::array<std::uint16_t, limits::kSensorsPerUnit> counts{};
+    bool valid = false;  // taken since the last motion began
+  };
 
   void Enter(UnitState next);
-  void Say(const UnitMessage& message, const Context& c);
-  void SayDone(Outcome outcome, std::uint8_t sequence, TransmitQueue* out);
+  void SayDone(Outcome outcome, TransmitQueue* out);
   void Begin(BoardInstant now);
   void End(BoardInstant now, TransmitQueue* out);
   /// Both axes halt, FLASH takes what they show, the mark goes (unless an axis is lost).
   void HaltAndStore(BoardInstant now);
-  void RunHoming(Axis axis, BoardInstant now);
-  void EndHomingAxis(BoardInstant now);
-  void StoreCutHoming(BoardInstant now);
   void LoseHost();
   [[nodiscard]] UnitState AtRest() const;
-  [[nodiscard]] Answer JudgeMove(MoveId move) const;
-  [[nodiscard]] bool PathInRange() const;
-  [[nodiscard]] StagedMove Held() const;
-  [[nodiscard]] std::int32_t Position(Axis axis, BoardInstant now) const;
-  [[nodiscard]] std::int32_t Read(Axis axis, Parameter parameter, BoardInstant now) const;
-  [[nodiscard]] Answer Write(const ParameterWrite& m);
-  [[nodiscard]] Answer WritePosition(Axis axis, std::int32_t value);
-  [[nodiscard]] Answer WriteSubdivision(Axis axis, std::int32_t value);
-  [[nodiscard]] std::uint8_t ProgressPercent(BoardInstant now) const;
 
   NodeId node_;
   Board board_;
@@ -142,23 +117,16 @@ class UnitMachine {
   UnitState state_ = UnitState::kRest;
   bool powered_ = false;
   bool host_lost_ = false;
-  bool restarted_ = false;
-  bool restarted_reported_ = false;  // what the last resume was answered, for its repetition
-  std::uint32_t resume_id_ = 0;      // identifier of the last resume; 0: something else came since
+  Restart restart_;
   Trip trip_{FaultCode::kNone, Axis::kTheta};
   std::uint16_t fault_count_ = 0;
   BoardInstant heard_at_;
-  BoardInstant begin_at_ = kNever;  // armed: the start signal came
-  BoardInstant began_at_;
-  std::uint32_t began_ticks_ = 0;  // the same by the unit's own clock
-  BoardInstant end_at_ = kNever;   // moving, homing: of this path
-  Axis homing_axis_ = Axis::kPhi;
-  std::uint8_t lost_before_homing_ = 0;
-  Staged staged_;
+  Motion motion_;
+  Homing homing_;
+  Staging staging_;
   Granted granted_arm_;
   Granted granted_home_;
-  std::array<std::uint16_t, limits::kSensorsPerUnit> counts_{};  // the last reading
-  bool sensed_ = false;                                          // since the last motion began
+  SensorReading reading_;
   std::uint64_t malformed_ = 0;
 };
 

@@ -2,6 +2,9 @@
 // by hand.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -119,11 +122,22 @@ class FirmwareRig {
   HostInstant now_{1'000'000};
 };
 
+inline constexpr std::uint16_t kMove = 7;  // the move that is staged or runs
+inline constexpr std::uint16_t kNew = 8;
+
 inline StagedMove BenchMove(std::uint16_t id, std::int32_t theta = 400, std::int32_t phi = -300) {
   StagedMove move{{id}, WaveMode::kAsymmetric, {}};
   move.path[0].Append({0, theta, 108});
   move.path[1].Append({50, phi, 108});
   return move;
+}
+
+template <class M>
+M Get(const CanFrame& frame) {
+  const auto decoded = DecodeUnit(frame);
+  EXPECT_TRUE(decoded && std::holds_alternative<M>(decoded->message));
+  return decoded && std::holds_alternative<M>(decoded->message) ? std::get<M>(decoded->message)
+                                                                : M{};
 }
 
 }  // namespace focalfleet::sim::testing
