@@ -22,6 +22,34 @@ double Project(Complex vector, std::size_t leg) {
   return vector.real() * kPhase[leg].real() + vector.imag() * kPhase[leg].imag();
 }
 
+// A switching edge of one carrier period.
+struct Order {
+  double at_s;
+  std::size_t leg;
+  bool high;
+};
+
+// The edges of one carrier period in order of time.
+struct Orders {
+  Orders(const Pattern& pattern, const Modulation& modulation) {
+    for (std::size_t k = 0; k < kLegCount; ++k) {
+      if (pattern[k].none()) {
+        of[count++] = {0, k, false};
+        continue;
+      }
+      if (pattern[k].on > 0) of[count++] = {0, k, false};
+      of[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
+      if (pattern[k].off < modulation.counter1)
+        of[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
+    }
+    std::sort(of.begin(), of.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
+  }
+
+  std::array<Order, 3 * kLegCount> of;
+  std::size_t count = 0;
+};
+
 }  // namespace
 
 Complex Drive::Course::At(double t) const {
@@ -97,23 +125,20 @@ void Drive::CloseSwitches(double now_s) {
   }
 }
 
-double Drive::BackEmf(std::size_t leg) const {
-  return Project(kJ * (speed_ * setting_.motor.flux_linkage_Wb) * direction_, leg);
-}
-
 // The voltage that a leg without current takes from the others: that of the star plus its back-EMF.
 double Drive::FloatingVoltage(std::size_t leg) const {
+  const Complex back_emf_V = kJ * (speed_ * setting_.motor.flux_linkage_Wb) * direction_;
   double tied_V = 0;
   double tied_emf_V = 0;
   int tied = 0;
   for (std::size_t other = 0; other < kLegCount; ++other) {
     if (other == leg || legs_[other].path == Leg::Path::kFloats) continue;
     tied_V += legs_[other].voltage_V;
-    tied_emf_V += BackEmf(other);
+    tied_emf_V += Project(back_emf_V, other);
     ++tied;
   }
   if (tied == 0) return setting_.bridge.v_bus_V / 2;
-  return (tied_V - tied_emf_V) / tied + BackEmf(leg);
+  return (tied_V - tied_emf_V) / tied + Project(back_emf_V, leg);
 }
 
 // A leg floats only while its voltage stays between the rails; beyond, a diode takes it.
@@ -296,32 +321,13 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
   const double period_s = modulation.carrier_s();
   direction_ = std::polar(1.0, shaft_.angle_rad());
 
-  struct Order {
-    double at_s;
-    std::size_t leg;
-    bool high;
-  };
-  std::array<Order, 3 * kLegCount> orders;
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < kLegCount; ++k) {
-    if (pattern[k].none()) {
-      orders[count++] = {0, k, false};
-      continue;
-    }
-    if (pattern[k].on > 0) orders[count++] = {0, k, false};
-    orders[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
-    if (pattern[k].off < modulation.counter1)
-      orders[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
-  }
-  std::sort(orders.begin(), orders.begin() + static_cast<std::ptrdiff_t>(count),
-            [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
-
+  const Orders orders(pattern, modulation);
   double now_s = 0;
   std::size_t next = 0;
   while (true) {
-    while (next < count && orders[next].at_s <= now_s) {
+    while (next < orders.count && orders.of[next].at_s <= now_s) {
       // The switch opens in the middle of its gate's ramp: that current finds the diode.
-      const Order& order = orders[next];
+      const Order& order = orders.of[next];
       const double half_s = (order.high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
       Command(&legs_[order.leg], order.high, now_s,
               Project(CourseOf(speed_).At(half_s), order.leg));
@@ -339,7 +345,7 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
     if (now_s >= period_s) break;
 
     double until_s = std::min(period_s, now_s + kStepMax_s);
-    if (next < count) until_s = std::min(until_s, orders[next].at_s);
+    if (next < orders.count) until_s = std::min(until_s, orders.of[next].at_s);
     bool diode = false;
     for (const Leg& leg : legs_) {
       until_s = std::min({until_s, leg.closes_at_s, leg.ramp_ends_at_s});

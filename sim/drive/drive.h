@@ -110,7 +110,6 @@ class Drive {
   void Account(const Course& course, double now_s, double step_s, double decay);
   void Emit(const Course& course, double now_s, double step_s, double speed);
   [[nodiscard]] double FloatingVoltage(std::size_t leg) const;
-  [[nodiscard]] double BackEmf(std::size_t leg) const;
 
   Setting setting_;
   Shaft shaft_;

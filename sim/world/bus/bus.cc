@@ -15,26 +15,22 @@ constexpr std::size_t kKeptMax = 3;
 }  // namespace
 
 Bus::Bus(const Options& options, Rng chance)
-    : options_(options), chance_(chance), nodes_(1), idle_at_(options.start) {}
+    : options_(options), chance_(chance), nodes_(options.bit_rate_bps), idle_at_(options.start) {}
 
-std::uint32_t Bus::Attach() {
-  nodes_.emplace_back();
-  ++hearing_;
-  return static_cast<std::uint32_t>(nodes_.size() - 1);
-}
+std::uint32_t Bus::Attach() { return nodes_.Attach(); }
 
 DurationNs Bus::Bits(std::uint32_t bits) const { return BitTime(bits, options_.bit_rate_bps); }
 
 // ---- what waits
 
 bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
-  Entry entry{.ready = ready, .waiting = waiting};
-  Node& node = nodes_[entry.node()];
+  QueuedFrame entry{.ready = ready, .waiting = waiting};
+  BusNode& node = nodes_[entry.node()];
   if (dead_ || (entry.node() == kHost && node.off)) {
     ++counters_.dropped;
     return false;
   }
-  if (ready_.size() + later_.size() >= options_.mailboxes_max) {
+  if (queue_.size() >= options_.mailboxes_max) {
     ++counters_.refused;
     return false;
   }
@@ -52,113 +48,96 @@ bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
   return true;
 }
 
-void Bus::Admit(const Entry& entry) {
-  later_.push(entry);
+void Bus::Admit(const QueuedFrame& entry) {
+  queue_.Add(entry);
   counters_.waiting_max =
-      std::max(counters_.waiting_max, static_cast<std::uint32_t>(ready_.size() + later_.size()));
+      std::max(counters_.waiting_max, static_cast<std::uint32_t>(queue_.size()));
 }
 
 HostInstant Bus::NextEvent() const {
   if (dead_) return kNever;
-  if (stuck_at_ != kNever) return stuck_step_at_;
-  if (sending_) return idle_at_;
+  if (stuck_.at != kNever) return stuck_.step_at;
+  if (on_wire_.sending) return idle_at_;
   const HostInstant begin = NextBegin();
-  return off_nodes_.empty() ? begin : std::min(begin, NextRecovery());
+  return !nodes_.any_off() ? begin : std::min(begin, nodes_.NextRecovery(idle_at_));
 }
 
 HostInstant Bus::NextBegin() const {
-  if (!ready_.empty() && held_until_ <= idle_at_) return std::max(idle_at_, ready_.top().ready);
+  if (queue_.any_ready() && suspended_.held_until <= idle_at_)
+    return std::max(idle_at_, queue_.ready_since());
   HostInstant at = kNever;
-  if (!ready_.empty()) at = held_until_;
-  if (!later_.empty()) at = std::min(at, std::max(idle_at_, later_.top().ready));
+  if (queue_.any_ready()) at = suspended_.held_until;
+  at = std::min(at, std::max(idle_at_, queue_.next_ready()));
   for (const Babbler& babbler : babblers_) {
     if (!Hears(babbler.node)) continue;
     const HostInstant free =
-        babbler.node == suspended_ ? std::max(idle_at_, suspended_until_) : idle_at_;
+        babbler.node == suspended_.node ? std::max(idle_at_, suspended_.until) : idle_at_;
     at = std::min(at, std::max(free, babbler.since));
   }
   return at;
 }
 
 bool Bus::Advance(Heard* heard) {
-  if (stuck_at_ != kNever) {
-    StickOn(stuck_step_at_);
+  if (stuck_.at != kNever) {
+    StickOn(stuck_.step_at);
     return false;
   }
-  if (!sending_) {
-    if (!off_nodes_.empty() && NextRecovery() <= NextBegin()) {
-      RecoverThrough(NextRecovery());
+  if (!on_wire_.sending) {
+    if (nodes_.any_off() && nodes_.NextRecovery(idle_at_) <= NextBegin()) {
+      RecoverThrough(nodes_.NextRecovery(idle_at_));
       return false;
     }
     BeginFrame(NextBegin());
-    if (options_.bit_clock || !sending_) return false;
+    if (options_.bit_clock || !on_wire_.sending) return false;
   }
-  sending_ = false;
+  on_wire_.sending = false;
   return EndFrame(heard);
 }
 
 // ---- a frame begins
 
-std::optional<Bus::Entry> Bus::TakeReady(HostInstant now) {
-  while (!later_.empty() && later_.top().ready <= now) {
-    ready_.push(later_.top());
-    later_.pop();
-  }
-  if (ready_.empty()) return std::nullopt;
-  // Suspend transmission: who sent last and is passive leaves the next eight bits to the others.
-  std::vector<Entry> passed_over;
-  std::optional<Entry> best;
-  while (!best && !ready_.empty()) {
-    if (now < suspended_until_ && ready_.top().node() == suspended_) {
-      passed_over.push_back(ready_.top());
-    } else {
-      best = ready_.top();
-    }
-    ready_.pop();
-  }
-  for (const Entry& entry : passed_over) ready_.push(entry);
-  return best;
-}
-
-std::optional<Bus::Entry> Bus::Arbitrate(HostInstant now) {
-  std::optional<Entry> best = TakeReady(now);
-  babbling_ = false;
+std::optional<QueuedFrame> Bus::Arbitrate(HostInstant now) {
+  // Suspend transmission: a passive node that sent last leaves the next eight bits to the others.
+  std::optional<QueuedFrame> best =
+      queue_.Take(now, now < suspended_.until ? suspended_.node : kNobody);
+  on_wire_.babbling = false;
   for (const Babbler& babbler : babblers_) {
-    const bool suspended = babbler.node == suspended_ && now < suspended_until_;
+    const bool suspended = babbler.node == suspended_.node && now < suspended_.until;
     if (!Hears(babbler.node) || suspended || now < babbler.since) continue;
     if (best && best->waiting.frame.id <= babbler.frame.id) continue;
-    if (best && !babbling_) ready_.push(*best);
-    best = Entry{.ready = now, .waiting = {babbler.frame, babbler.node != kHost, babbler.node}};
-    babbling_ = true;
+    if (best && !on_wire_.babbling) queue_.Return(*best);
+    best =
+        QueuedFrame{.ready = now, .waiting = {babbler.frame, babbler.node != kHost, babbler.node}};
+    on_wire_.babbling = true;
   }
   return best;
 }
 
 void Bus::BeginFrame(HostInstant now) {
-  const std::optional<Entry> best = Arbitrate(now);
+  const std::optional<QueuedFrame> best = Arbitrate(now);
   if (!best) {
-    FOCALFLEET_CHECK(now < suspended_until_ && !ready_.empty());
-    held_until_ = suspended_until_;
+    FOCALFLEET_CHECK(now < suspended_.until && queue_.any_ready());
+    suspended_.held_until = suspended_.until;
     return;
   }
-  if (!off_nodes_.empty()) CountRowsWhileIdle(now);
-  on_wire_ = *best;
-  sending_ = true;
-  abandoned_ = false;
-  refusing_ = kNobody;
+  if (nodes_.any_off()) nodes_.CountRowsWhileIdle(idle_at_, now);
+  on_wire_.entry = *best;
+  on_wire_.sending = true;
+  on_wire_.abandoned = false;
+  on_wire_.refusing = kNobody;
   counters_.idle = counters_.idle + (now - idle_at_);
-  if (on_wire_.repeated) ++counters_.repeats;
-  began_at_ = idle_at_ = now;
-  course_ = DrawCourse();
-  if (options_.bit_clock) idle_at_ = now + Bits(course_.bits);
+  if (on_wire_.entry.repeated) ++counters_.repeats;
+  on_wire_.began_at = idle_at_ = now;
+  on_wire_.course = DrawCourse();
+  if (options_.bit_clock) idle_at_ = now + Bits(on_wire_.course.bits);
 }
 
 /// The first disturbed bit is geometric: P(none in b bits) = (1 - rate)^b.
 FrameCourse Bus::DrawCourse() {
-  const CanFrame& frame = on_wire_.waiting.frame;
-  const std::uint32_t sender = on_wire_.node();
+  const CanFrame& frame = on_wire_.entry.waiting.frame;
+  const std::uint32_t sender = on_wire_.entry.node();
   FrameCourse course;
-  if (options_.bit_clock) course = hearing_ > 1 ? WellSent(frame) : Unacknowledged(frame);
+  if (options_.bit_clock) course = nodes_.hearing() > 1 ? WellSent(frame) : Unacknowledged(frame);
   if (faults_.bit_error_rate > 0 && options_.bit_clock) {
     const double first =
         std::log1p(-chance_.Uniform()) / std::log1p(-std::min(faults_.bit_error_rate, 0.5));
@@ -174,55 +153,47 @@ FrameCourse Bus::DrawCourse() {
       chance_.Uniform() < faults_.duplicate) {
     course = RefusedByOne(frame);
     if (!options_.bit_clock) course.bits = 0;
-    if (hearing_ > 2) refusing_ = DrawReceiver(sender);
+    if (nodes_.hearing() > 2) on_wire_.refusing = nodes_.DrawReceiver(sender, &chance_);
   }
   return course;
-}
-
-std::uint32_t Bus::DrawReceiver(std::uint32_t sender) {
-  std::uint64_t skip = chance_.Below(hearing_ - 1);
-  for (std::uint32_t node = 0;; ++node) {
-    if (node == sender || !Hears(node)) continue;
-    if (skip-- == 0) return node;
-  }
 }
 
 // ---- a frame ends
 
 bool Bus::EndFrame(Heard* heard) {
-  Charge(idle_at_ - began_at_);
-  const std::uint32_t sender = on_wire_.node();
-  if (!off_nodes_.empty()) CountRowOfFrame();
-  if (course_.error == FrameError::kNone) {
-    counters_.bits += course_.bits;
-    if (unclean_ > 0) CountWell(sender);
+  Charge(idle_at_ - on_wire_.began_at);
+  const std::uint32_t sender = on_wire_.entry.node();
+  if (nodes_.any_off()) nodes_.CountRowOfFrame(idle_at_);
+  if (on_wire_.course.error == FrameError::kNone) {
+    counters_.bits += on_wire_.course.bits;
+    if (!nodes_.clean()) CountWell(sender);
   } else {
-    counters_.error_bits += course_.bits;
-    ++counters_.errors[static_cast<std::size_t>(course_.error)];
+    counters_.error_bits += on_wire_.course.bits;
+    ++counters_.errors[static_cast<std::size_t>(on_wire_.course.error)];
     CountError(sender);
-    if (course_.accepted) ++counters_.received_twice;
-    if (!babbling_ && !abandoned_) {
-      on_wire_.repeated = true;
+    if (on_wire_.course.accepted) ++counters_.received_twice;
+    if (!on_wire_.babbling && !on_wire_.abandoned) {
+      on_wire_.entry.repeated = true;
       if (Hears(sender)) {
-        ready_.push(on_wire_);
+        queue_.Return(on_wire_.entry);
       } else if (sender != kHost) {
-        nodes_[sender].kept.push_back(on_wire_);
+        nodes_[sender].kept.push_back(on_wire_.entry);
       } else {
         ++counters_.dropped;
       }
     }
   }
-  if (unclean_ > 0 && nodes_[sender].errors.state() == Confinement::kPassive) {
-    suspended_ = sender;
-    suspended_until_ = idle_at_ + Bits(kSuspendBits);
+  if (!nodes_.clean() && nodes_[sender].errors.state() == Confinement::kPassive) {
+    suspended_.node = sender;
+    suspended_.until = idle_at_ + Bits(kSuspendBits);
   }
-  if (!off_nodes_.empty()) RecoverThrough(idle_at_);
-  if (!course_.accepted) return false;
-  heard->sent = on_wire_.waiting;
+  if (nodes_.any_off()) RecoverThrough(idle_at_);
+  if (!on_wire_.course.accepted) return false;
+  heard->sent = on_wire_.entry.waiting;
   heard->at = idle_at_;
-  heard->but_not = refusing_;
+  heard->but_not = on_wire_.refusing;
   ++(heard->sent.from_unit ? counters_.unit_frames : counters_.host_frames);
-  if (babbling_) ++counters_.babbled;
+  if (on_wire_.babbling) ++counters_.babbled;
   heard->lost = faults_.drop > 0 && chance_.Uniform() < faults_.drop;
   if (heard->lost) ++counters_.dropped;
   return true;
@@ -230,7 +201,7 @@ bool Bus::EndFrame(Heard* heard) {
 
 void Bus::Charge(DurationNs taken) {
   counters_.busy = counters_.busy + taken;
-  if (course_.error != FrameError::kNone) counters_.destroyed = counters_.destroyed + taken;
+  if (on_wire_.course.error != FrameError::kNone) counters_.destroyed = counters_.destroyed + taken;
 }
 
 }  // namespace focalfleet::sim

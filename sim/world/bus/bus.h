@@ -16,59 +16,26 @@
 // the one of BusFaults::duplicate, and the up to 20 us in which two nodes may start together.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
-#include <queue>
 #include <vector>
 
 #include "protocol/base/instants.h"
 #include "protocol/base/rng.h"
 #include "protocol/wire/can_frame.h"
+#include "sim/world/bus/arbitration_queue.h"
+#include "sim/world/bus/bus_counters.h"
+#include "sim/world/bus/bus_nodes.h"
 #include "sim/world/bus/error_counters.h"
 #include "sim/world/bus/frame_course.h"
 #include "sim/world/faults.h"
 
 namespace focalfleet::sim {
 
-/// All time since the start is idle, busy or dead; of busy, `destroyed` and `stuck` were in vain.
-struct BusCounters {
-  std::uint64_t host_frames = 0;  // through the wire
-  std::uint64_t unit_frames = 0;
-  std::uint64_t bits = 0;  // of them; exact, stuff bits included
-  DurationNs busy{0};
-  std::uint64_t dropped = 0;      // by a planted fault, or because bus or sender went off or away
-  std::uint64_t refused = 0;      // no mailbox left
-  std::uint32_t waiting_max = 0;  // most frames that ever waited at once
-
-  std::array<std::uint64_t, kFrameErrorCount> errors{};  // error frames by what the sender saw
-  std::uint64_t error_bits = 0;      // of destroyed attempts with their error frames
-  std::uint64_t repeats = 0;         // attempts that follow a destroyed one
-  std::uint64_t received_twice = 0;  // accepted by receivers, and sent again all the same
-  std::uint64_t babbled = 0;         // frames of a babbling node that got through
-  std::uint64_t went_passive = 0;    // controllers, times
-  std::uint64_t went_off = 0;
-  std::uint64_t recovered = 0;  // from off
-  DurationNs destroyed{0};
-  DurationNs stuck{0};  // dominant without a frame
-  DurationNs dead{0};
-  DurationNs idle{0};  // until the last frame began
-
-  [[nodiscard]] std::uint64_t error_frames() const {
-    std::uint64_t sum = 0;
-    for (const std::uint64_t count : errors) sum += count;
-    return sum;
-  }
-  /// Share of the time in which the wire was taken.
-  [[nodiscard]] double Load(DurationNs elapsed) const {
-    return elapsed.ns > 0 ? static_cast<double>(busy.ns) / static_cast<double>(elapsed.ns) : 0;
-  }
-};
-
 class Bus {
  public:
-  static constexpr std::uint32_t kHost = 0;  // its node
-  static constexpr std::uint32_t kNobody = UINT32_MAX;
+  static constexpr std::uint32_t kHost = kHostNode;
+  static constexpr std::uint32_t kNobody = kNoNode;
 
   struct Options {
     std::uint32_t bit_rate_bps = 1'000'000;
@@ -84,11 +51,7 @@ class Bus {
   /// The number of another node, from 1 on. It is there and well.
   std::uint32_t Attach();
 
-  struct Waiting {
-    CanFrame frame;
-    bool from_unit = false;
-    std::uint32_t sender = 0;  // node of the unit, or the host's client
-  };
+  using Waiting = WaitingFrame;
   /// `waiting` takes part in arbitration from `ready` on. False: no mailbox left, the bus is dead,
   /// or the host's controller is off.
   bool Offer(const Waiting& waiting, HostInstant ready);
@@ -130,52 +93,37 @@ class Bus {
   // ---- what can be seen
 
   /// False: it is away or off, and neither sends nor hears.
-  [[nodiscard]] bool Hears(std::uint32_t node) const {
-    return nodes_[node].there && !nodes_[node].off;
-  }
+  [[nodiscard]] bool Hears(std::uint32_t node) const { return nodes_.Hears(node); }
   [[nodiscard]] const ErrorCounters& errors(std::uint32_t node) const {
     return nodes_[node].errors;
   }
   [[nodiscard]] Confinement state(std::uint32_t node) const {
     return nodes_[node].off ? Confinement::kOff : nodes_[node].errors.state();
   }
-  [[nodiscard]] std::size_t waiting() const {
-    return ready_.size() + later_.size() + (sending_ ? 1 : 0);
-  }
+  [[nodiscard]] std::size_t waiting() const { return queue_.size() + (on_wire_.sending ? 1 : 0); }
   [[nodiscard]] const BusCounters& counters() const { return counters_; }
   [[nodiscard]] BusFaults& faults() { return faults_; }
 
  private:
-  struct Entry {
-    HostInstant ready;
-    std::uint64_t order = 0;
-    Waiting waiting;
-    bool repeated = false;
-    [[nodiscard]] std::uint32_t node() const { return waiting.from_unit ? waiting.sender : kHost; }
+  struct FrameOnWire {
+    QueuedFrame entry;
+    FrameCourse course;
+    std::uint32_t refusing = kNobody;  // the receiver that refuses this frame
+    HostInstant began_at{0};
+    bool sending = false;
+    bool abandoned = false;  // its sender is gone
+    bool babbling = false;   // it is a babbler's
   };
-  struct LaterFirst {  // of a heap whose top is the one that is ready soonest
-    bool operator()(const Entry& a, const Entry& b) const {
-      return a.ready != b.ready ? a.ready > b.ready : a.order > b.order;
-    }
+  struct Suspension {
+    std::uint32_t node = kNobody;  // sent last and is passive
+    HostInstant until{0};
+    HostInstant held_until{0};  // all that is ready is the suspended node's
   };
-  struct HigherFirst {  // of a heap whose top wins arbitration
-    bool operator()(const Entry& a, const Entry& b) const {
-      return a.waiting.frame.id != b.waiting.frame.id ? a.waiting.frame.id > b.waiting.frame.id
-                                                      : a.order > b.order;
-    }
-  };
-  template <class Order>
-  struct Heap : std::priority_queue<Entry, std::vector<Entry>, Order> {
-    void MoveAllOf(std::uint32_t node, std::vector<Entry>* to);
-  };
-
-  struct Node {
-    ErrorCounters errors;
-    bool there = true;               // has power and is plugged in
-    bool off = false;                // bus-off
-    std::uint32_t rows_missing = 0;  // of eleven recessive bits, until it is back
-    HostInstant counts_from{0};      // those rows
-    std::vector<Entry> kept;         // while it cannot send
+  struct StuckWire {
+    HostInstant at = kNever;
+    HostInstant step_at = kNever;
+    std::uint32_t sender = kNobody;
+    std::uint32_t steps = 0;
   };
   struct Babbler {
     std::uint32_t node;
@@ -185,15 +133,11 @@ class Bus {
 
   [[nodiscard]] DurationNs Bits(std::uint32_t bits) const;
   [[nodiscard]] HostInstant NextBegin() const;
-  [[nodiscard]] HostInstant NextRecovery() const;
-  [[nodiscard]] HostInstant BackAt(const Node& node) const;
-  void Admit(const Entry& entry);
+  void Admit(const QueuedFrame& entry);
   /// The entry that wins arbitration at `now`; none: only a suspended node has any.
-  [[nodiscard]] std::optional<Entry> Arbitrate(HostInstant now);
-  [[nodiscard]] std::optional<Entry> TakeReady(HostInstant now);
+  [[nodiscard]] std::optional<QueuedFrame> Arbitrate(HostInstant now);
   void BeginFrame(HostInstant now);
   [[nodiscard]] FrameCourse DrawCourse();
-  [[nodiscard]] std::uint32_t DrawReceiver(std::uint32_t sender);
   bool EndFrame(Heard* heard);
   void Charge(DurationNs taken);
   void CountWell(std::uint32_t sender);
@@ -201,10 +145,8 @@ class Bus {
   template <class Change>
   void Count(std::uint32_t node, HostInstant now, const Change& change);
   void GoOff(std::uint32_t node, HostInstant now);
-  void CountRowsWhileIdle(HostInstant now);
-  void CountRowOfFrame();
   void RecoverThrough(HostInstant now);
-  void Leave(std::uint32_t node, HostInstant now);
+  void CutOff(std::uint32_t node, HostInstant now);
   void Rejoin(std::uint32_t node, HostInstant now);
   void StickOn(HostInstant now);
   [[nodiscard]] std::uint32_t BitsOnWire(HostInstant now) const;
@@ -213,32 +155,14 @@ class Bus {
   Rng chance_;
   BusFaults faults_;
   BusCounters counters_;
-  Heap<LaterFirst> later_;
-  Heap<HigherFirst> ready_;
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> off_nodes_;
+  ArbitrationQueue queue_;
+  BusNodes nodes_;
   std::vector<Babbler> babblers_;
-  std::uint32_t hearing_ = 1;  // nodes that are there and not off
-  std::uint32_t unclean_ = 0;  // nodes with a counter that is not zero
-
-  Entry on_wire_;
-  FrameCourse course_;
-  std::uint32_t refusing_ = kNobody;  // the receiver that does so, of this frame
-  HostInstant began_at_{0};           // the frame on the wire
-  HostInstant idle_at_{0};            // end of the frame on the wire, or of the last one
+  FrameOnWire on_wire_;
+  Suspension suspended_;
+  StuckWire stuck_;
+  HostInstant idle_at_{0};  // end of the frame on the wire, or of the last one
   std::uint64_t order_ = 0;
-  bool sending_ = false;
-  bool abandoned_ = false;  // whoever sends the frame on the wire is gone
-  bool babbling_ = false;   // it is a babbler's
-
-  std::uint32_t suspended_ = kNobody;  // sent last and is passive
-  HostInstant suspended_until_{0};
-  HostInstant held_until_{0};  // all that is ready is the suspended node's
-
-  HostInstant stuck_at_ = kNever;
-  HostInstant stuck_step_at_ = kNever;
-  std::uint32_t stuck_sender_ = kNobody;
-  std::uint32_t stuck_steps_ = 0;
   HostInstant dead_at_{0};
   bool dead_ = false;
 };
