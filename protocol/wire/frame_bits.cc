@@ -21,7 +21,8 @@ struct LevelRecord {
   FrameLevels levels;
 };
 
-// Walks the stuffed part of a frame bit by bit: CRC and stuff bits grow as the wire would see them.
+// The walk goes through the stuffed part of a frame bit by bit. CRC and stuff bits grow as on the
+// wire.
 template <class Record>
 class BitWalk {
  public:
@@ -32,7 +33,8 @@ class BitWalk {
     const std::uint32_t crc = crc_;
     for (int i = 14; i >= 0; --i) Stuff(crc >> i & 1);
   }
-  /// A stuff bit is sent with the bit after it; none follows the last bit before fixed stuffing.
+  /// A stuff bit is sent with the bit after it; no stuff bit follows the last bit before fixed
+  /// stuffing.
   void DropLastStuffBit() {
     if (stuffed_last_) --bits_;
   }
