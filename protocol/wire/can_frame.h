@@ -1,4 +1,4 @@
-// One CAN 2.0B data frame with a 29-bit identifier. focalfleet sends and understands no other kind;
+// A CAN 2.0B data frame with a 29-bit identifier. focalfleet sends and understands no other kind;
 // ports drop and count all others.
 #pragma once
 

@@ -1,4 +1,4 @@
-// One line as candump writes it, in both of its forms:
+// A line as candump writes it, in both of its forms:
 //
 //   (1436509052.249713) vcan0 1ABCDEF0#0011223344              candump -l, -L
 //    (1436509052.249713)  vcan0  TX - -  1ABCDEF0   [5]  00 11 22 33 44   candump, -t, -x, -a

@@ -62,7 +62,7 @@ constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {
 /// The bit rates of one bus.
 struct BusRates {
   std::uint32_t nominal_bps = 1'000'000;
-  // Of the inner part of CAN FD frames; 0: the bus carries no such frames.
+  // Bit rate of the inner part of CAN FD frames; 0: the bus carries no such frames.
   std::uint32_t data_bps = 0;
 };
 

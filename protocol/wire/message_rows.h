@@ -48,7 +48,7 @@ std::span<const MessageRow> MessageRows();
 /// direction and length.
 const MessageRow* RowOf(const CanFrame& frame);
 
-/// One field of a frame, taken from the data bytes as one number, or from the detail.
+/// A field of a frame, taken from the data bytes as one number, or from the detail.
 constexpr std::int64_t ValueOf(const FieldRow& field, std::uint64_t bits) {
   const unsigned above = 64u - field.bits - field.first_bit;
   const std::uint64_t left = bits << above;

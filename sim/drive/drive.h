@@ -34,7 +34,7 @@ struct DriveEnergy {
   double stored_J = 0;  // now: winding and rotor
 };
 
-/// One sample of a probe. Leg voltages are against the negative rail.
+/// A sample of a probe. Leg voltages are against the negative rail.
 struct DriveSample {
   double t_s = 0;
   std::array<double, kLegCount> current_A{};

@@ -55,9 +55,9 @@ struct MoveCount {
 MoveCount TryMoves(const Drive::Setting& setting, const Modulation& modulation,
                    const StartRule& rule, DriveLevel level);
 
-/// The trial begins the field at once at the place of the highest load. It succeeds where the rotor
-/// follows for `turns` electrical turns. A rotor that has caught up stays in step, so the trial
-/// decides the same as TryMoves at a hundredth of its cost.
+/// The trial begins the field at once at the place of the highest load. The trial succeeds where
+/// the rotor follows for `turns` electrical turns. A rotor that has caught up stays in step, so the
+/// trial decides the same as TryMoves at a hundredth of its cost.
 struct StartTrial {
   int turns = 60;
   Ramp ramp;
@@ -84,8 +84,8 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
 double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
                             int repeat);
 
-/// The inverse for many loads: the largest load that each n starts. By the reduced drive, without a
-/// ramp, to 1e-4 of the stall torque; each n is tried once.
+/// The inverse for many loads: the largest load that each n starts. Found by the reduced drive,
+/// without a ramp, to 1e-4 of the stall torque; each n is tried once.
 class CriticalLoads {
  public:
   CriticalLoads(const Drive::Setting& setting, const Modulation& modulation);

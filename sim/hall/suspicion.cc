@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kRowsTried = 12;
 constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
-// Of the variance that the best leaves: within it a hypothesis cannot be distinguished.
+// Share of the variance that the best leaves: within it a hypothesis cannot be distinguished.
 constexpr double kNear = 2;
 constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;

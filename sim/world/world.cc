@@ -63,11 +63,11 @@ Unit::Parts MakeParts(const UnitDescription& description, const WorldConfig& con
           config.joint_sensors.get()};
 }
 
-struct Wire {  // one bus with its nodes
+struct Wire {  // a bus with its nodes
   BusId id;
   Bus bus;
   std::array<std::uint32_t, 256> row_of_node{};
-  std::vector<std::uint32_t> rows;  // of the bus' nodes 1, 2 ... : it counts the host as 0
+  std::vector<std::uint32_t> rows;  // of the bus' nodes 1, 2 ...; node 0 is the host
 };
 
 Controller ControllerOf(const Bus& bus, std::uint32_t node) {
@@ -84,7 +84,8 @@ Status ValidateUnit(const UnitDescription& unit, const FactoryDrive& drive) {
   if (unit.sensors > 0 && !(unit.carrier_mm > 0 && std::isfinite(unit.carrier_mm)))
     return Complain(unit, "has sensors at its joint, and no spine on it");
   if (unit.node == kBroadcastNode) return Complain(unit, "node 255 is the broadcast address");
-  constexpr double kClockErrorMax = 0.5;  // a clock that stands still or runs back is none
+  // A larger error would be a clock that stands still or runs back.
+  constexpr double kClockErrorMax = 0.5;
   if (!(std::abs(unit.clock_error.value_or(0)) <= kClockErrorMax))
     return Complain(unit, "has a clock that is off by more than a half");
   for (const Axis which : kAxes) {
@@ -211,7 +212,7 @@ class World::Impl {
     OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->PowerOn(node, now_); });
     Reschedule(row);
   }
-  /// What is done to a bus changes when it next does something.
+  /// An act on a bus changes the instant of its next event.
   template <class Act>
   void OnBus(std::size_t slot, const Act& act) {
     act(&segments_[slot].bus);
@@ -312,8 +313,7 @@ class World::Impl {
     events_->Set(slot, segment.bus.NextEvent());
   }
 
-  // What the acceptance filters of the units let through: their own node's frames and the
-  // broadcast.
+  // The acceptance filters of the units let through their own node's frames and the broadcast.
   void Deliver(Wire& segment, const Bus::Heard& heard) {
     const auto node = static_cast<std::uint8_t>(heard.sent.frame.id >> 11);
     if (node == kBroadcastNode.value) {

@@ -39,7 +39,7 @@ struct SensorFit {
   double rms_held_out_V = 0;  // each fifth pose predicted by fits to the others
 };
 
-/// One fit for each sensor of `rig`. The rig holds what is known beforehand: directions,
+/// A fit for each sensor of `rig`. The rig holds what is known beforehand: directions,
 /// electronics, the rotor's centre and temperature. Pre: as many voltages a row as sensors. Cost:
 /// some ms for 150 poses.
 std::vector<SensorFit> CalibrateSensors(const HallCampaign& campaign, const HallRig& rig,

@@ -38,10 +38,10 @@ class ArbitrationQueue {
   void Add(const QueuedFrame& entry) { later_.push(entry); }
   /// A frame that was ready before takes part in the next arbitration.
   void Return(const QueuedFrame& entry) { ready_.push(entry); }
-  /// The frame that wins arbitration at `now` is taken out. Frames of `passed_over` stay; none: no
+  /// The frame that wins arbitration at `now`, taken out. Frames of `passed_over` stay. None: no
   /// other node has a frame that is ready.
   [[nodiscard]] std::optional<QueuedFrame> Take(HostInstant now, std::uint32_t passed_over);
-  /// All frames of `node` are moved behind the end of `to`.
+  /// Moves all frames of `node` behind the end of `to`.
   void TakeAllOf(std::uint32_t node, std::vector<QueuedFrame>* to) {
     ready_.MoveAllOf(node, to);
     later_.MoveAllOf(node, to);
@@ -49,20 +49,20 @@ class ArbitrationQueue {
 
   [[nodiscard]] std::size_t size() const { return ready_.size() + later_.size(); }
   [[nodiscard]] bool any_ready() const { return !ready_.empty(); }
-  /// Pre: any_ready().
+  /// The instant at which the best of the ready frames became ready. Pre: any_ready().
   [[nodiscard]] HostInstant ready_since() const { return ready_.top().ready; }
-  /// When the next of the other frames becomes ready; kNever: there are none.
+  /// The instant at which the next of the other frames becomes ready; kNever: there are none.
   [[nodiscard]] HostInstant next_ready() const {
     return later_.empty() ? kNever : later_.top().ready;
   }
 
  private:
-  struct LaterFirst {  // of a heap whose top is the one that is ready soonest
+  struct LaterFirst {  // orders a heap whose top is ready soonest
     bool operator()(const QueuedFrame& a, const QueuedFrame& b) const {
       return a.ready != b.ready ? a.ready > b.ready : a.order > b.order;
     }
   };
-  struct HigherFirst {  // of a heap whose top wins arbitration
+  struct HigherFirst {  // orders a heap whose top wins arbitration
     bool operator()(const QueuedFrame& a, const QueuedFrame& b) const {
       return a.waiting.frame.id != b.waiting.frame.id ? a.waiting.frame.id > b.waiting.frame.id
                                                       : a.order > b.order;

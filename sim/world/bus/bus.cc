@@ -9,7 +9,7 @@
 namespace focalfleet::sim {
 namespace {
 
-/// Transmit mailboxes of a unit's controller: what it keeps while it cannot send.
+/// The transmit mailboxes of a unit's controller, which hold frames while it cannot send.
 constexpr std::size_t kKeptMax = 3;
 
 }  // namespace
@@ -21,7 +21,7 @@ std::uint32_t Bus::Attach() { return nodes_.Attach(); }
 
 DurationNs Bus::Bits(std::uint32_t bits) const { return BitTime(bits, options_.bit_rate_bps); }
 
-// ---- what waits
+// ---- frames that wait
 
 bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
   QueuedFrame entry{.ready = ready, .waiting = waiting};
@@ -94,7 +94,7 @@ bool Bus::Advance(Heard* heard) {
   return EndFrame(heard);
 }
 
-// ---- a frame begins
+// ---- the begin of a frame
 
 std::optional<QueuedFrame> Bus::Arbitrate(HostInstant now) {
   // Suspend transmission: a passive node that sent last leaves the next eight bits to the others.
@@ -158,7 +158,7 @@ FrameCourse Bus::DrawCourse() {
   return course;
 }
 
-// ---- a frame ends
+// ---- the end of a frame
 
 bool Bus::EndFrame(Heard* heard) {
   Charge(idle_at_ - on_wire_.began_at);

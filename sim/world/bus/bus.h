@@ -1,19 +1,21 @@
-// One CAN segment: frames that wait, one frame on the wire, a bit clock, and the controllers that
-// stand on it. When the wire falls idle the lowest identifier of all that wait goes next (equal
-// ones in order of coming: only one node has that identifier); it holds the wire for its exact
-// number of bits, 131..160 us for eight bytes at 1 Mbit/s, and is heard at its end.
+// A CAN segment: frames that wait, the frame on the wire, a bit clock, and the controllers that
+// stand on the wire. When it falls idle the lowest identifier of all that wait goes next; equal
+// ones go in order of coming, because only one node has that identifier. The frame holds the wire
+// for its exact number of bits, 131..160 us for eight bytes at 1 Mbit/s, and is received at its
+// end.
 //
-// What goes wrong goes wrong by the standard (ISO 11898-1; Bosch CAN 2.0 part B): a frame that is
-// destroyed costs its bits so far and an error frame (frame_course.h), counts at every controller
-// (error_counters.h) and is sent again until it is through; a controller that goes passive waits 8
-// bits more behind its own frames; one that goes off neither sends nor hears until it has seen 128
-// times eleven recessive bits. A frame that nobody else is there to acknowledge is sent for ever.
+// Errors follow the standard (ISO 11898-1; Bosch CAN 2.0 part B). A destroyed frame costs its bits
+// so far and an error frame (frame_course.h), counts at every controller (error_counters.h), and is
+// sent again until it gets through. A passive controller waits 8 bits more behind its own frames. A
+// controller that is off neither sends nor receives until it has seen 128 times eleven recessive
+// bits. A frame that no other node acknowledges is sent for ever.
 //
-// Node 0 is the host's controller; every other is a unit's. A node without trouble costs nothing:
-// counters are only gone through while one of them is not zero.
+// Node 0 is the host's controller; every other is a unit's. A node without errors costs nothing:
+// counters are only updated while one of them is not zero.
 //
-// Left out: noise between frames (overload frames), disturbances that only one node sees but for
-// the one of BusFaults::duplicate, and the up to 20 us in which two nodes may start together.
+// Left out are noise between frames (overload frames) and the up to 20 us in which two nodes may
+// start together. Disturbances that only one node sees are left out too, but for that of
+// BusFaults::duplicate.
 #pragma once
 
 #include <cstdint>
@@ -42,13 +44,13 @@ class Bus {
     bool bit_clock = true;  // false: a frame takes no time, and nothing destroys it
     std::uint32_t mailboxes_max = 4096;
     HostInstant start{0};
-    /// From the host's bus-off to its restart; kNever: it waits for RestartHost. Units begin their
-    /// recovery at once.
+    /// The time from the host's bus-off to its restart; kNever: the host waits for RestartHost.
+    /// Units begin their recovery at once.
     DurationNs host_restart = Milliseconds(1000);
   };
   Bus(const Options& options, Rng chance);
 
-  /// The number of another node, from 1 on. It is there and well.
+  /// Returns the number of another node, from 1 on. The node is there and error-free.
   std::uint32_t Attach();
 
   using Waiting = WaitingFrame;
@@ -56,33 +58,33 @@ class Bus {
   /// or the host's controller is off.
   bool Offer(const Waiting& waiting, HostInstant ready);
 
-  /// When the wire next does something: a frame ends, or one can begin.
+  /// The next instant at which the wire does something: a frame ends, or one can begin.
   [[nodiscard]] HostInstant NextEvent() const;
 
   struct Heard {
     Waiting sent;
     HostInstant at;
-    bool lost = false;                // it took its time on the wire, and nobody understood it
+    bool lost = false;                // it took its time on the wire, and no node understood it
     std::uint32_t but_not = kNobody;  // the one node that refused it
   };
   /// Does what is due at NextEvent(); true: `heard` is a frame that was accepted.
   bool Advance(Heard* heard);
 
-  // ---- violence, at `now`. Pre: now is not before anything told so far, nor after NextEvent().
+  // ---- disturbances, at `now`. Pre: now is not before any earlier instant, nor after NextEvent().
 
   void Kill(HostInstant now);
   void Revive(HostInstant now);
   [[nodiscard]] bool dead() const { return dead_; }
-  /// A node loses its power, and what it wanted to say; with it comes back a controller as new.
+  /// A node loses its power and its waiting frames. When power returns its controller is as new.
   void PowerOff(std::uint32_t node, HostInstant now);
   void PowerOn(std::uint32_t node, HostInstant now);
-  /// A node's plug is open: it sends into the void, goes passive if it has something to say, and
-  /// keeps that, as far as it has mailboxes.
+  /// A node is unplugged: its frames go into the void, and it becomes passive if it has frames to
+  /// send. The frames stay, as far as it has mailboxes.
   void Unplug(std::uint32_t node, HostInstant now);
   void Plug(std::uint32_t node, HostInstant now);
-  /// From now on `node` sends this frame whenever arbitration lets it; none: no more.
+  /// `node` sends this frame from now on whenever arbitration lets it; none: no more.
   void Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now);
-  /// The wire is dominant, whatever anybody drives, until it is released.
+  /// The wire is dominant, whatever the nodes drive, until it is released.
   void Stick(HostInstant now);
   void Release(HostInstant now);
   /// The host's controller begins its recovery, if it is off.
@@ -90,9 +92,9 @@ class Bus {
   /// The host's controller is off from now on, as after a short circuit.
   void ThrowHostOff(HostInstant now);
 
-  // ---- what can be seen
+  // ---- the visible state
 
-  /// False: it is away or off, and neither sends nor hears.
+  /// False: the node is away or off, and neither sends nor receives.
   [[nodiscard]] bool Hears(std::uint32_t node) const { return nodes_.Hears(node); }
   [[nodiscard]] const ErrorCounters& errors(std::uint32_t node) const {
     return nodes_[node].errors;
@@ -112,12 +114,12 @@ class Bus {
     HostInstant began_at{0};
     bool sending = false;
     bool abandoned = false;  // its sender is gone
-    bool babbling = false;   // it is a babbler's
+    bool babbling = false;   // its sender is a babbling node
   };
   struct Suspension {
-    std::uint32_t node = kNobody;  // sent last and is passive
+    std::uint32_t node = kNobody;  // sent the last frame and is passive
     HostInstant until{0};
-    HostInstant held_until{0};  // all that is ready is the suspended node's
+    HostInstant held_until{0};  // until then only the suspended node has a ready frame
   };
   struct StuckWire {
     HostInstant at = kNever;

@@ -1,5 +1,5 @@
-// What a bus does when something is wrong: counters, controllers that go off and come back, nodes
-// that leave, a wire that is dead or stuck. A frame's usual way is in bus.cc.
+// The bus in trouble: counters, controllers that go off and come back, nodes that leave, a wire
+// that is dead or stuck. bus.cc has the usual course of a frame.
 #include <algorithm>
 
 #include "sim/world/bus/bus.h"
@@ -33,7 +33,7 @@ void Bus::CountError(std::uint32_t sender) {
         continue;
       Count(node, idle_at_, [](ErrorCounters* errors) { errors->TransmitError(); });
     } else if (node == on_wire_.refusing) {
-      // Its flag begins one bit before the others' and ends one bit before theirs.
+      // The flag of this node begins one bit before the others' flags and ends one bit before them.
       Count(node, idle_at_, [](ErrorCounters* errors) {
         errors->ReceiveError();
         errors->DominantBehindFlag();
@@ -44,7 +44,7 @@ void Bus::CountError(std::uint32_t sender) {
   }
 }
 
-// ---- off, and back
+// ---- bus-off and recovery
 
 void Bus::GoOff(std::uint32_t node, HostInstant now) {
   const bool waits = node == kHost && options_.host_restart == DurationNs{kNever.ns};
@@ -53,7 +53,7 @@ void Bus::GoOff(std::uint32_t node, HostInstant now) {
   std::vector<QueuedFrame>& kept = nodes_[node].kept;
   queue_.TakeAllOf(node, &kept);
   if (node != kHost) return;
-  counters_.dropped += kept.size();  // as a driver does with what it holds
+  counters_.dropped += kept.size();  // a driver drops the frames that it holds as well
   kept.clear();
 }
 
@@ -77,15 +77,15 @@ void Bus::ThrowHostOff(HostInstant now) {
     Count(kHost, now, [](ErrorCounters* errors) { errors->TransmitError(); });
 }
 
-// ---- who is there
+// ---- presence of nodes
 
-/// `now` is within the frame on the wire: bits of it that are over.
+/// The bits of the frame on the wire that are over at `now`. Pre: `now` is within the frame.
 std::uint32_t Bus::BitsOnWire(HostInstant now) const {
   return static_cast<std::uint32_t>((now - on_wire_.began_at).ns * options_.bit_rate_bps /
                                     1'000'000'000);
 }
 
-/// Its frame on the wire, if it is its own, ends here and is not sent again.
+/// The frame on the wire, if it is the node's own, ends here and is not sent again.
 void Bus::CutOff(std::uint32_t node, HostInstant now) {
   if (!on_wire_.sending || on_wire_.entry.node() != node || on_wire_.abandoned) return;
   on_wire_.abandoned = true;
@@ -144,7 +144,7 @@ void Bus::Plug(std::uint32_t number, HostInstant now) {
   if (node.there) return;
   node.there = true;
   if (node.off) node.counts_from = std::max(node.counts_from, now);
-  // Alone it was not acknowledged: rule 3 up to passive, then exception 1.
+  // Alone the node was not acknowledged: rule 3 up to passive, then exception 1.
   while (!node.kept.empty() && node.errors.state() == Confinement::kActive)
     Count(number, now, [](ErrorCounters* errors) { errors->TransmitError(); });
   Rejoin(number, now);
@@ -186,7 +186,7 @@ void Bus::Stick(HostInstant now) {
   stuck_.sender = kNobody;
   stuck_.at = now;
   if (on_wire_.sending) {
-    // From here on the sender sees what it does not send; its frame comes later.
+    // From here on the sender sees other levels than it drives; its frame is repeated later.
     stuck_.sender = on_wire_.abandoned ? kNobody : on_wire_.entry.node();
     on_wire_.course.error = FrameError::kBit;
     ++counters_.errors[static_cast<std::size_t>(FrameError::kBit)];
@@ -207,9 +207,9 @@ void Bus::Stick(HostInstant now) {
   stuck_.step_at = stuck_.at + Bits(kFlagBits);
 }
 
-/// A dominant wire, as the nodes see it: the sixth equal bit is an error (rules 1 and 3), their
-/// flag takes six, the bit behind it is dominant (rule 2), and so are the eight behind it, and the
-/// eight behind these (rule 6), until nobody has anything left to lose.
+/// A dominant wire, as the nodes see it. The sixth equal bit is an error (rules 1 and 3), and their
+/// flag takes six bits. The bit behind it is dominant (rule 2). Each further eight dominant bits
+/// count again (rule 6), until no node can lose any more.
 void Bus::StickOn(HostInstant now) {
   bool all_passive = true;
   for (std::uint32_t node = 0; node < nodes_.size(); ++node) {
@@ -230,7 +230,7 @@ void Bus::StickOn(HostInstant now) {
 
 void Bus::Release(HostInstant now) {
   if (stuck_.at == kNever) return;
-  // All wait for the end of the error frame that they see.
+  // All nodes wait for the end of the error frame that they see.
   idle_at_ = std::max(now, stuck_.at) + Bits(kDelimiterBits + kIntermissionBits);
   counters_.stuck = counters_.stuck + (idle_at_ - stuck_.at);
   counters_.busy = counters_.busy + (idle_at_ - stuck_.at);

@@ -1,4 +1,4 @@
-// The counters of one bus: its frames, its errors, and where its time went.
+// The counters of one bus: its frames, its errors, and how its time was spent.
 #pragma once
 
 #include <array>
@@ -9,17 +9,20 @@
 
 namespace focalfleet::sim {
 
-/// All time since the start is idle, busy or dead; of busy, `destroyed` and `stuck` were in vain.
+/// All time since the start is idle, busy or dead. Of the busy time, `destroyed` and `stuck`
+/// carried no frame through.
 struct BusCounters {
   std::uint64_t host_frames = 0;  // through the wire
   std::uint64_t unit_frames = 0;
-  std::uint64_t bits = 0;  // of them; exact, stuff bits included
+  std::uint64_t bits = 0;  // in these frames; exact, stuff bits included
   DurationNs busy{0};
-  std::uint64_t dropped = 0;      // by a planted fault, or because bus or sender went off or away
+  // By a planted fault, or because the bus or the sender went off or away.
+  std::uint64_t dropped = 0;
   std::uint64_t refused = 0;      // no mailbox left
-  std::uint32_t waiting_max = 0;  // most frames that ever waited at once
+  std::uint32_t waiting_max = 0;  // the most frames that ever waited at once
 
-  std::array<std::uint64_t, kFrameErrorCount> errors{};  // error frames by what the sender saw
+  // Error frames by the error that the sender saw.
+  std::array<std::uint64_t, kFrameErrorCount> errors{};
   std::uint64_t error_bits = 0;      // of destroyed attempts with their error frames
   std::uint64_t repeats = 0;         // attempts that follow a destroyed one
   std::uint64_t received_twice = 0;  // accepted by receivers, and sent again all the same
@@ -37,7 +40,7 @@ struct BusCounters {
     for (const std::uint64_t count : errors) sum += count;
     return sum;
   }
-  /// Share of the time in which the wire was taken.
+  /// The share of the time in which the wire was taken.
   [[nodiscard]] double Load(DurationNs elapsed) const {
     return elapsed.ns > 0 ? static_cast<double>(busy.ns) / static_cast<double>(elapsed.ns) : 0;
   }

@@ -26,29 +26,29 @@ class BusNodes {
   /// The host's controller is there, as number kHostNode.
   explicit BusNodes(std::uint32_t bit_rate_bps) : bit_rate_bps_(bit_rate_bps), nodes_(1) {}
 
-  /// The number of another node, which is there and well.
+  /// Returns the number of another node, which is there and error-free.
   std::uint32_t Attach();
 
   BusNode& operator[](std::uint32_t node) { return nodes_[node]; }
   const BusNode& operator[](std::uint32_t node) const { return nodes_[node]; }
   [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(nodes_.size()); }
-  /// False: the node is away or off, and neither sends nor hears.
+  /// False: the node is away or off, and neither sends nor receives.
   [[nodiscard]] bool Hears(std::uint32_t node) const {
     return nodes_[node].there && !nodes_[node].off;
   }
-  /// How many nodes hear.
+  /// The number of nodes that hear.
   [[nodiscard]] std::uint32_t hearing() const { return hearing_; }
   /// All error counters are zero.
   [[nodiscard]] bool clean() const { return unclean_ == 0; }
   [[nodiscard]] bool any_off() const { return !off_.empty(); }
-  /// One of the nodes that hear, other than `sender`. Pre: there is one.
+  /// A random one of the nodes that hear, other than `sender`. Pre: there is one.
   [[nodiscard]] std::uint32_t DrawReceiver(std::uint32_t sender, Rng* chance) const;
 
   struct Changed {
     bool became_passive = false;
     bool must_go_off = false;
   };
-  /// `change` is done to the error counters of `node`.
+  /// Applies `change` to the error counters of `node`.
   template <class Change>
   Changed Count(std::uint32_t node, const Change& change);
 
@@ -63,7 +63,7 @@ class BusNodes {
 
   // ---- the way back from bus-off; `idle_at` is when the wire fell idle
 
-  /// When the first of the nodes that are off is back; kNever: none will be by itself.
+  /// The instant at which the first of the off nodes is back; kNever: none will be by itself.
   [[nodiscard]] HostInstant NextRecovery(HostInstant idle_at) const;
   void CountRowsWhileIdle(HostInstant idle_at, HostInstant now);
   /// The end of a frame is one row.

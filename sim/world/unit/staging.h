@@ -15,7 +15,7 @@ namespace focalfleet::sim {
 
 class Staging {
  public:
-  /// Holds nothing: move 0.
+  /// Nothing is held: move 0.
   Staging() = default;
   explicit Staging(const StageBegin& begin) : begin_(begin) {}
 
@@ -28,7 +28,7 @@ class Staging {
   void Take(const StageSegment& segment);
   /// All segments have come.
   [[nodiscard]] bool complete() const;
-  /// What has come, as a move.
+  /// The segments that have come, as a move.
   [[nodiscard]] StagedMove Held() const;
   /// The path from the stored positions stays within both axes' ranges.
   [[nodiscard]] bool PathInRange(const Flash& flash) const;

@@ -4,7 +4,7 @@
 
 namespace focalfleet::sim {
 namespace {
-// Ids come round after 65536 moves; long before that the record starts anew.
+// Ids repeat after 65536 moves; long before that the record starts anew.
 constexpr std::size_t kBegunMax = 32'768;
 
 Firmware::Hardware::Joint JointOf(const Unit::Parts& parts, const Mechanism& mechanism) {

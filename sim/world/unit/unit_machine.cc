@@ -53,7 +53,7 @@ void UnitMachine::OnSync(BoardInstant now) {
 
 void UnitMachine::LoseHost() {
   host_lost_ = true;
-  // A motion that runs, and one whose start signal came, are finished first.
+  // A motion that runs is finished first, and so is one whose start signal came.
   if (state_ == UnitState::kRest || state_ == UnitState::kStaging ||
       (state_ == UnitState::kArmed && motion_.begin_at == kNever)) {
     staging_ = {};

@@ -1,24 +1,23 @@
-// The unit's side of the protocol: a state machine driven by (frame, now) and by time alone, and
-// what a firmware starts from. It needs no heap, no exceptions, no library: it compiles
-// freestanding with the codec (a test holds it to that), in less than a KiB of state, with integers
-// only. The simulated units run exactly this code; what is theirs alone (planted faults) is
-// firmware.h.
+// The unit's side of the protocol, and the code that a firmware starts from: a state machine driven
+// by (frame, now) and by time alone. It needs no heap, no exceptions and no library. With the codec
+// it compiles freestanding (a test holds it to that), with integers only and less than a KiB of
+// state. The simulated units run exactly this code; firmware.h adds the planted faults.
 //
-// It answers every
-// addressed request with exactly one frame that carries the request's sequence number; it speaks
-// unasked only to say that a motion ended (sequence 0). Its FLASH is written before the first step
-// and after the last.
+// The machine answers every addressed request with exactly one frame, which carries the request's
+// sequence number. Unasked it sends only the end of a motion (sequence 0). FLASH is written before
+// the first step and after the last.
 //
-// What keeps a repeated frame from becoming a second move: the move begun last stands in FLASH, and
-// that id is refused from then on; a repeated request that was granted is granted again without
-// being done again.
+// A repeated frame never becomes a second move. The id of the move begun last stands in FLASH and
+// is refused from then on. A repeated request that was granted is granted again without being done
+// again.
 //
 //   stage_begin, stage_segment...   no answer; a repeated one changes nothing
 //   confirm, arm                    answered by what is held; arm needs the digest of exactly that
-//   start                           begins the armed move `delay_ticks` later, by the unit's own
-//   clock stop                            answered by `done`, whatever the unit was doing
+//   start                           begins the armed move `delay_ticks` later, by its own clock
+//   stop                            answered by `done`, whatever the unit was doing
 //
-// Reads may be broadcast (every unit answers); of the rest only stop, start and clock.
+// Reads may be broadcast, and every unit answers. Stop, start and clock are the only other
+// broadcasts.
 #pragma once
 
 #include <array>
@@ -37,7 +36,8 @@
 
 namespace focalfleet::sim {
 
-/// An edge of SYNC means a start only so short before its own time; any other is none.
+/// An edge of SYNC starts a move only within this time before its own start. Any other edge is
+/// ignored.
 inline constexpr DurationNs kSyncWindow = Milliseconds(20);
 
 class UnitMachine {
@@ -46,21 +46,21 @@ class UnitMachine {
   UnitMachine(NodeId node, const Board& board, Flash* flash);
 
   void PowerOn(BoardInstant now);
-  /// Nothing is done or said until PowerOn.
+  /// The machine does and sends nothing until PowerOn.
   void PowerOff() { powered_ = false; }
 
   void OnFrame(const CanFrame& frame, BoardInstant now, TransmitQueue* out);
-  /// A CAN FD frame: of a group the unit's own entries, as if each had come alone.
+  /// Takes the unit's own entries of a group, as if each had come alone.
   void OnGroup(const FdFrame& group, BoardInstant now, TransmitQueue* out);
-  /// Does what is due. Pre: now is not before anything told so far.
+  /// Does everything that is due. Pre: now is not before any earlier instant.
   void OnTime(BoardInstant now, TransmitQueue* out);
-  /// An edge of the SYNC line, on boards that have one: a move whose start is due within
+  /// An edge of the SYNC line, on boards that have one. A move whose start is due within
   /// kSyncWindow of the unit's own time begins now. Pre: as OnTime, and OnTime was called.
   void OnSync(BoardInstant now);
-  /// When OnTime is due next; kNever without power.
+  /// The instant at which OnTime is due next; kNever without power.
   [[nodiscard]] BoardInstant deadline() const;
 
-  /// Stops at once and stays in kFault until the fault is cleared.
+  /// The fault that stops the unit at once and holds it in kFault until it is cleared.
   struct Trip {
     FaultCode code = FaultCode::kOverTemperature;
     Axis axis = Axis::kTheta;
@@ -71,7 +71,7 @@ class UnitMachine {
   [[nodiscard]] FaultCode fault() const { return trip_.code; }
   [[nodiscard]] bool powered() const { return powered_; }
   [[nodiscard]] bool interrupted() const;
-  /// Of the motion that runs: when it began, and when this path of it ends.
+  /// True while a motion runs; began_at() is its begin, and end_at() the end of its present path.
   [[nodiscard]] bool runs() const {
     return powered_ && (state_ == UnitState::kMoving || state_ == UnitState::kHoming);
   }
@@ -95,7 +95,7 @@ class UnitMachine {
     BoardInstant begin_at = kNever;  // armed: the start signal came
     BoardInstant began_at;
     std::uint32_t began_ticks = 0;  // the same by the unit's own clock
-    BoardInstant end_at = kNever;   // moving, homing: of this path
+    BoardInstant end_at = kNever;   // moving, homing: the end of the present path
   };
   struct SensorReading {
     std::array<std::uint16_t, limits::kSensorsPerUnit> counts{};
@@ -106,7 +106,8 @@ class UnitMachine {
   void SayDone(Outcome outcome, TransmitQueue* out);
   void Begin(BoardInstant now);
   void End(BoardInstant now, TransmitQueue* out);
-  /// Both axes halt, FLASH takes what they show, the mark goes (unless an axis is lost).
+  /// Both axes halt, FLASH takes the vectors that they show, and the mark is cleared (unless an
+  /// axis is lost).
   void HaltAndStore(BoardInstant now);
   void LoseHost();
   [[nodiscard]] UnitState AtRest() const;

@@ -18,14 +18,14 @@ bool IsPosition(std::int64_t value) {
   return value >= -limits::kPositionMax && value <= limits::kPositionMax;
 }
 
-// To the nearest whole number, halves away from zero. Pre: divisor > 0.
+// The quotient to the nearest whole number, halves away from zero. Pre: divisor > 0.
 std::int64_t RoundedQuotient(std::int64_t number, std::int64_t divisor) {
   const std::int64_t doubled = 2 * (number < 0 ? -number : number) + divisor;
   const std::int64_t quotient = doubled / (2 * divisor);
   return number < 0 ? -quotient : quotient;
 }
 
-// The rotor agrees with the vector that is applied, so only whole turns can be wrong: the place
+// The rotor agrees with the vector that is applied, so only whole turns can be wrong. The place
 // taken is the one nearest to the value that shows this vector.
 Answer WritePosition(const Board& board, Flash* flash, Axis axis, std::int32_t value) {
   AxisFlash& stored = flash->axis[Index(axis)];

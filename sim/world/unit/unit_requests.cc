@@ -14,10 +14,10 @@ constexpr std::uint8_t kHardware = 1;
 
 }  // namespace
 
-// One request to the unit, with one function for each kind.
+// The handler of a request to the unit, with a function for each kind.
 class UnitMachine::RequestHandler {
  public:
-  /// All that is given outlives the handler.
+  /// Lifetime: all arguments outlive the handler.
   RequestHandler(UnitMachine* unit, const Address& address, const CanFrame& frame, BoardInstant now,
                  TransmitQueue* out)
       : unit_(*unit), address_(address), frame_(&frame), now_(now), out_(out) {}
@@ -149,7 +149,7 @@ void UnitMachine::RequestHandler::On(const Confirm& m) {
 
 void UnitMachine::RequestHandler::On(const Arm& m) {
   if (broadcast()) return;
-  // Its answer may have been lost while the start signal was not.
+  // The answer may have been lost while the start signal was not.
   const bool begun = m.move == unit_.flash_->last_begun;
   if (begun && unit_.granted_arm_.any && unit_.granted_arm_.request == *frame_)
     return Say(ArmReply{m.move, Answer::kOk});
