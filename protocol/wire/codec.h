@@ -1,8 +1,7 @@
 // The codec turns values into frames and back. Encode is total. Decode is total over all frames:
-// any identifier and any bytes give a message or a Malformed that names the broken rule, never a
-// failed check. The codec uses no heap, clock or I/O. Numbers are little-endian. Reserved bits and
-// bytes are zero and checked, so that a later version can give them a meaning that this one does
-// not misread.
+// any identifier and any bytes give a message or a Malformed that names the broken rule. The codec
+// uses no heap, clock or I/O. Numbers are little-endian. Reserved bits and bytes are zero and
+// checked, so that a later version can give them a meaning that this one does not misread.
 #pragma once
 
 #include <tl/expected.hpp>

@@ -83,8 +83,8 @@ enum class Parameter : std::uint8_t {
 inline constexpr std::uint8_t kParameterCount = 9;
 const char* Name(Parameter parameter);
 
-/// A straight piece of an axis' path, which begins `start_ticks` after the start signal and goes
-/// `delta` vectors one by one, each shown for repeat * counter1 timer counts.
+/// A straight piece of an axis' path. The piece begins `start_ticks` after the start signal. The
+/// axis goes `delta` vectors one by one, each shown for repeat * counter1 timer counts.
 struct Segment {
   std::uint32_t start_ticks = 0;  // 24 bits
   std::int32_t delta = 0;         // vectors, 24 bits

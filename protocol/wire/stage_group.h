@@ -1,8 +1,8 @@
 // A group is one CAN FD frame that carries many staging frames. On a bus whose controllers all
 // speak CAN FD the host puts the begins, segments and read-backs of several units into one frame.
-// It has up to 64 bytes at the data bit rate. Every unit takes its own entries, as if each had come
-// alone. All other frames, every answer included, stay classic CAN; the rest of the protocol is
-// independent of groups.
+// The frame has up to 64 bytes at the data bit rate. Every unit takes its own entries, as if each
+// had come alone. All other frames, every answer included, stay classic CAN; the rest of the
+// protocol is independent of groups.
 //
 //   a group      id: priority 4, function 16, node 255 (all), sequence 0, detail 0
 //   its data     entries one after another: node, sequence, function << 3 | detail, then the

@@ -1,7 +1,7 @@
 // A two-level three-phase bridge has three legs, each with an upper and a lower switch and a diode
 // beside each. A command opens one switch and, after the dead time, closes the other. While both
-// are open the current decides: out of the leg (i > 0) it comes through the lower diode, into the
-// leg through the upper one. Where the current has died out the leg floats.
+// are open the current decides. Current out of the leg (i > 0) comes through the lower diode,
+// current into the leg through the upper one. Where the current has died out the leg floats.
 //
 // The leg's voltage changes along a ramp. Meanwhile the device that carries the current also
 // carries the voltage, and heats. A switch acts in the middle of its gate's ramp: a leg's own ramp

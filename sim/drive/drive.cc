@@ -99,7 +99,7 @@ void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
 }
 
 // At the end of a dead time the gate begins to rise. A leg that the other diode still holds begins
-// its ramp, which lies around the middle of the gate's. Any other leg waits until that middle: its
+// its ramp, which lies around the middle of the gate's. Any other leg waits until that middle. Its
 // own diode holds it at the rail already, or its current has died out (or is about to) and it
 // floats.
 void Drive::CloseSwitches(double now_s) {

@@ -23,8 +23,8 @@
 
 namespace focalfleet::sim {
 
-/// The energies since the start. Units: J. The supply gives copper + switching + load + viscous +
-/// the rise of stored, up to rounding and the constant speed between events.
+/// The energies since the start. Units: J. supply = copper + switching + load + viscous + the rise
+/// of stored, up to rounding and the constant speed between events.
 struct DriveEnergy {
   double supply_J = 0;
   double copper_J = 0;

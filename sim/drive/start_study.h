@@ -65,9 +65,9 @@ struct StartTrial {
 bool StartsAtWorstLoad(const Drive::Setting& setting, const Modulation& modulation,
                        const StartTrial& trial, DriveLevel level);
 
-/// The least n that starts the worst load; all n above it up to `highest` start it too (by
-/// bisection: more time a vector never makes a start harder). None: not even `highest` starts it;
-/// the load stalls.
+/// The least n that starts the worst load; all n above it up to `highest` start it too. The search
+/// is a bisection: more time a vector never makes a start harder. None: not even `highest` starts
+/// it; the load stalls.
 std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulation& modulation,
                                   const StartTrial& trial, DriveLevel level, int highest = 255);
 

@@ -3,12 +3,12 @@
 // with its uncertainty and a status.
 //
 // Faulty sensors. The eight sensors measure three angles, so five numbers a row check each other.
-// Hypotheses about all rows are compared by the variance that they leave: no fault; one sensor not
-// to be trusted (stuck, or off in gain or offset); two sensors swapped. A hypothesis is named where
-// it leaves a quarter or less of the variance and no other comes near. Where several do, the report
-// says that they cannot be distinguished. (A field that is the same above and below the equator
-// cannot distinguish an exchange of sensors 3 and 4 from one of 5 and 6: they are mirror images.) A
-// single row is judged against the noise of the others.
+// Hypotheses about all rows are compared by the variance that they leave. They are: no fault; one
+// sensor not to be trusted (stuck, or off in gain or offset); two sensors swapped. A hypothesis is
+// named where it leaves a quarter or less of the variance and no other comes near. Where several
+// do, the report says that they cannot be distinguished. (In a field that is the same above and
+// below the equator an exchange of sensors 3 and 4 looks like one of 5 and 6. They are mirror
+// images.) A single row is judged against the noise of the others.
 //
 // Statuses: `ok`; `saturated v3`, `missing v3`, `stuck v3`, `bad v3`, `swapped v3 v4` (the
 // orientation comes from the others, or with the two exchanged); `ambiguous` (another orientation

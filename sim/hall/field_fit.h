@@ -1,7 +1,7 @@
 // A fit turns a map of a rotor's radial field into a model of it, with uncertainty.
 //
 // Harmonic and surface models are fitted by plain least squares. The spherical one has more
-// coefficients than a sparse map has points, so it is fitted with a prior: coefficients fall off
+// coefficients than a sparse map has points. A prior therefore makes coefficients fall off
 // geometrically with the degree. The evidence (marginal likelihood) of the map itself sets how fast
 // and how far. The first fit has only orders 4, 12, 20, 28, which are all that eight equal
 // alternating poles make. All other orders, which unlike magnets make, follow and are kept where

@@ -2,7 +2,7 @@
 // Poles are tiles of a spherical shell, magnetised along the tile's middle direction or radially,
 // in turn outwards and inwards. Each tile is a cloud of dipoles at the nodes of a Gauss-Legendre
 // rule in radius, latitude and longitude. A sensor is never nearer to a tile than about a third of
-// a tile's width, so that 10 nodes a direction agree with 24 to 2e-6 of the peak.
+// a tile's width. At that distance 10 nodes a direction agree with 24 to 2e-6 of the peak.
 //
 // The paper's 2D array is one shell, its 3D array two. The sensors at 59 mm stand between the inner
 // and the outer shell, so part of the field comes from within and part from without.

@@ -62,8 +62,8 @@ FOCALFLEET_WIDE void Turn(const Rotation& rotation, const DirectionLanes& stator
   }
 }
 
-// Sums over the sensors, each in four lanes until the end, so that their order does not depend on
-// the width of the machine: J^T J by rows from the diagonal on, J^T r, r^T r.
+// The sums over the sensors: J^T J by rows from the diagonal on, J^T r, r^T r. Each stays in four
+// lanes until the end, so that its order does not depend on the machine's width.
 constexpr std::size_t kSums = 10;
 struct Sums {
   double lane[kSums][4];

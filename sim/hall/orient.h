@@ -6,11 +6,10 @@
 // where it does not descend. From within some degrees it converges quadratically, in three steps.
 // Where no start is known, an atlas of predicted readings over all orientations gives the starts.
 // The atlas has 13 x 13 x 16 nodes and is compared in one pass of some 10 us. Every local minimum
-// of the comparison is refined, and the distinct ends are kept. gamma has the period of the field,
-// 90 deg for eight equal poles, and is sought in -45..45 deg. Where only magnitudes are known (the
-// paper's
-// V - Vs/2|), a turn by half the period leaves all of them as they are. There are then always at
-// least two branches, and both are reported.
+// of the comparison is refined, and the distinct ends are kept. The angle gamma has the period of
+// the field, 90 deg for eight equal poles, and is sought in -45..45 deg. Where only magnitudes are
+// known (the paper's V - Vs/2|), a turn by half the period leaves all of them as they are. There
+// are then always at least two branches, and both are reported.
 //
 // Units: T, radians; the fields that the sensors should see at gain 1.
 #pragma once

@@ -2,8 +2,8 @@
 // sensors at an orientation. Calibration lives here alone. Rotor and sensors may be not concentric:
 // the rotor's centre is off the sensors' by d. A sensor then stands elsewhere in the rotor's field,
 // and its axis does not point at the rotor's centre. To first order both effects move the place
-// where the field is read, by (1 + tangential) d along the sphere, and scale it by (|p - d| /
-// R)^-decay. field_model.h has decay, and tangential follows from it (TangentialShare).
+// where the field is read, by (1 + tangential) d along the sphere. They scale the field by (|p - d|
+// / R)^-decay. field_model.h has decay, and tangential follows from it (TangentialShare).
 #pragma once
 
 #include <array>

@@ -56,7 +56,7 @@ struct UnitFaults {
 struct BusFaults {
   double bit_error_rate = 0;  // all nodes see a bit inverted: the frame is destroyed and repeated
   double drop = 0;  // the frame occupies the bus and is acknowledged, but no node takes it in
-  // One receiver refuses the frame when all others have it: they get it twice.
+  // A receiver refuses the frame when all others have it: they get it twice.
   double duplicate = 0;
   double late = 0;  // the frame enters arbitration only after `late_by`
   DurationNs late_by = Milliseconds(5);

@@ -1,4 +1,4 @@
-// Metrology is the view of a camera over the focal plane: the place of every fibre, with the
+// Metrology gives the place of every fibre as a camera over the focal plane sees it, with the
 // camera's own error where one is asked for. The camera sees fibres and no shafts, and it cannot
 // see which units have power.
 #pragma once

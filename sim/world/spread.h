@@ -1,9 +1,9 @@
 // The spread of units about their description. Nominal units do not differ from it, except in the
 // phase of the load over a turn and in the clock. Real units have the spread measured on robots in
-// service (a focal plane of 5000, 2021): backlash 1.4-1.6 deg, periodic error 0.1 deg, step scatter
-// 0.09-0.14 deg, scale sd 0.3 %, 8.5 % of units off scale, 4 % slipping or dead, arms sd 57 um,
-// zero angles sd 0.5 deg. Every draw has a stream of its own by (seed, purpose, unit id), so that a
-// unit keeps its character when others are added or removed.
+// service (a focal plane of 5000, 2021). The figures are: backlash 1.4-1.6 deg, periodic error 0.1
+// deg, step scatter 0.09-0.14 deg, scale sd 0.3 %, 8.5 % of units off scale, 4 % slipping or dead,
+// arms sd 57 um, zero angles sd 0.5 deg. Every draw has a stream of its own by (seed, purpose, unit
+// id). A unit therefore keeps its character when others are added or removed.
 #pragma once
 
 #include <array>

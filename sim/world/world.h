@@ -2,9 +2,9 @@
 // alone. The true state (shaft angles, fibre positions) is for tests and reports; the coordinator
 // never sees it.
 //
-// The world goes from event to event (the end of a frame, the begin or end of a motion, a time-out
-// of the host) and never in steps of time: motion in between is a closed form. 5000 units at rest
-// cost nothing but the frames that they are sent.
+// The world goes from event to event and never in steps of time. Events are the end of a frame, the
+// begin or end of a motion, and a time-out of the host; motion in between is a closed form. 5000
+// units at rest cost nothing but the frames that they are sent.
 //
 //   world.Inject(bus, frame, now);   the host's controller takes a frame
 //   world.AdvanceTo(t, &received);   the frames that the host receives up to and including t, in
@@ -122,8 +122,8 @@ class World {
   /// counted.
   bool Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32_t client = 0);
 
-  /// Lets time pass. Appends the frames that the host receives to `delivered`, and every frame of
-  /// every bus to `wire` where that is given, both in order of time.
+  /// Lets time pass. The frames that the host receives are appended to `delivered`, and every frame
+  /// of every bus to `wire` where that is given. Both are in order of time.
   void AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
                  std::vector<WireFrame>* wire = nullptr);
 

@@ -47,8 +47,9 @@ double TimeConstant_s(const Drive::Setting& setting) {
   return -step_s / std::log(ratio);
 }
 
-// The highest current of a blocked motor under vector 100 for a share of every carrier period, over
-// the current that it reaches when the vector stays. All of it repeats by then.
+// The highest current of a blocked motor under vector 100 for a share of every carrier period. The
+// result is relative to the current that the motor reaches when the vector stays. All of it repeats
+// by then.
 double PulseTrainPeak(const Drive::Setting& setting, int on_counts) {
   const Modulation modulation{};
   const double period = modulation.counter1;
@@ -353,7 +354,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
        .status = ClaimStatus::kNotTestable,
        .reason = "a misprint: the second is V_counter2; as V_counter1 the motor would turn at an "
                  "eighth of the speed"});
-  // Another motor gives the values that the paper leaves open: J 2 r / (3 flux^2) is its mechanical
+  // Other motors give the values that the paper leaves open. J 2 r / (3 flux^2) is the mechanical
   // time constant, 9.31 and 11.07 ms in the data sheets of two motors of 10 mm.
   const MotorParameters& motor = low_V.motor;
   const auto flux_mWb = [&](double constant_s) {

@@ -1,8 +1,8 @@
-// The view of a scope and a power meter on a motor that runs: samples of its first field turns, and
-// for every vector the rotor's lag and the mean torque. A recording begins in one of two ways. In
-// steady rotation the motor has been brought up to speed, as on a bench. At rest behind the vector
-// it starts as a unit does, and the load decides whether the rotor follows. A stall is recorded
-// like any other course and is no error.
+// A recording is the view of a scope and a power meter on a motor that runs. The recording holds
+// samples of the first field turns, and for every vector the rotor's lag and the mean torque. A
+// recording begins in one of two ways. In steady rotation the motor has been brought up to speed,
+// as on a bench. At rest behind the vector it starts as a unit does, and the load decides whether
+// the rotor follows. A stall is recorded like any other course and is no error.
 #pragma once
 
 #include <complex>
@@ -25,8 +25,9 @@ struct RecordingPlan {
   double sample_s = 0;  // 0: SampleTime
 };
 
-/// A power of two of samples a turn of the field: 32 or more a carrier period, or fewer (at least
-/// 8) where 32 would give more than about half a million in all.
+/// The time between samples, for a power of two of samples a turn of the field. They are 32 or more
+/// a carrier period, or fewer (at least 8) where 32 would give more than about half a million in
+/// all.
 double SampleTime(const Modulation& modulation, int turns);
 
 /// The samples that the plan takes, and the carrier periods that it runs.

@@ -243,10 +243,9 @@ class LoadTable {
   std::size_t done_ = 0;
 };
 
-// Where neither ramp nor temperature nor the PWM level is asked for, an n and the load that it
-// starts determine the tuning, without a trial for each load. Peaks: a motor that pulls its load
-// draws less than a blocked one, because the back-EMF never exceeds what the lag gives (V sin(lag)
-// >= flux w).
+// Without ramp, temperature and PWM level, an n and the load that it starts determine the tuning;
+// no trial for each load is needed. A motor that pulls its load has lower peaks than a blocked one.
+// Its back-EMF never exceeds what the lag gives (V sin(lag) >= flux w).
 std::vector<LoadTuning> TuneByCriticalLoads(const Drive::Setting& setting,
                                             const Modulation& modulation, const TuningRule& rule,
                                             const std::vector<double>& loads_Nm,

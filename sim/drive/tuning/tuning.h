@@ -72,7 +72,7 @@ struct LoadTuning {
 };
 /// The tuning, as by Tune, for each of `loads_Nm`, in that order. Loads are rounded up to 0.1 %.
 /// Cost: hundredths of a second for each n that occurs. With the cross-check or a winding that
-/// warms, each trial takes half a second and more; where two loads need the same n, those between
+/// warms, each trial takes half a second and more. Where two loads need the same n, those between
 /// need it, too, and are not tried. `progress` receives the share that is done.
 std::vector<LoadTuning> TuneLoads(const Drive::Setting& setting, const Modulation& modulation,
                                   const TuningRule& rule, std::span<const double> loads_Nm,

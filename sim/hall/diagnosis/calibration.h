@@ -4,9 +4,9 @@
 // misfit and leaves the field's amplitude and phase open. Here every number is asked for and the
 // field is taken as it stands, so an error of the field goes into gains and places.)
 //
-// Single readings far from all others are left out. Two kinds of sensor are not calibrated: one
-// that does not follow the field, and one that no gain, offset and place explain as well as they
-// explain the others. Such a sensor keeps its former values and is reported.
+// Single readings far from all others are left out. A sensor that does not follow the field is not
+// calibrated. Neither is one that no gain, offset and place explain as well as they explain the
+// others. Such a sensor keeps its former values and is reported.
 #pragma once
 
 #include <vector>

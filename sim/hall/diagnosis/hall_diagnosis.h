@@ -1,12 +1,12 @@
-// A diagnosis of a Hall rig's model from poses with known orientation: which of the model's causes
-// is wrong, by how much, and the gain of a corrected model. The method is that of all diagnosis
-// here. Signatures are the model itself with one parameter switched on. Amplitude and phase of the
-// field are unknown beforehand, so they are projected out first. Causes enter one by one by
-// evidence (explained chi^2 less ln n a parameter), after a gate that chance passes once in a
-// hundred thousand tries. Each entry is followed by a joint nonlinear fit. A cause is named alone
-// where every rival that could replace it is worse by 9 or more in 2 ln L; otherwise the whole set
-// is reported. Structure that remains is reported as `unknown`. So is an effect outside of the
-// causes (outside.h) that explains the readings clearly better.
+// The diagnosis of a Hall rig's model from poses with known orientation. The result says which of
+// the model's causes is wrong, by how much, and what a corrected model gains. The method is that of
+// all diagnosis here. Signatures are the model itself with one parameter switched on. Amplitude and
+// phase of the field are unknown beforehand, so they are projected out first. Causes enter one by
+// one by evidence (explained chi^2 less ln n a parameter). A gate comes first, which chance passes
+// once in a hundred thousand tries. Each entry is followed by a joint nonlinear fit. A cause is
+// named alone where every rival that could replace it is worse by 9 or more in 2 ln L. Otherwise
+// the whole set is reported. Structure that remains is reported as `unknown`, like an effect
+// outside of the causes (outside.h) that explains the readings clearly better.
 //
 // The noise is that of the residuals when every parameter is free, so it need not be known.
 // Readings far from all of that, at the ends of the range or missing are counted and left out.

@@ -2,7 +2,7 @@
 // takes them. The diagnosis switches these parameters on and fits them. Zero means "as the model
 // says" for each.
 //
-// The field's shape has two kinds of parameter. The latitude is stretched (width), and terms peak *
+// The field's shape has two kinds of parameter. The latitude is stretched (width). Terms peak *
 // He_k(latitude / c) exp(-(latitude / c)^2) cos or sin(m phi) are added, which together can form
 // any field. The amplitude and the phase of the model are free, because the paper gives neither.
 //

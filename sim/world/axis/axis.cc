@@ -169,8 +169,8 @@ void AxisModel::Turn(double rotor_turns, Moment* moment) const {
   moment->output_deg = std::clamp(moment->output_deg, driven_deg - half, driven_deg + half);
 }
 
-// The load is taken where a rotor without lag would stand: it varies over a whole output turn, so
-// the lag makes no difference to it.
+// The load is taken where a rotor without lag would stand. The load varies over a whole output
+// turn, so the lag makes no difference to it.
 double AxisModel::LoadShare(double rotor_turns) const {
   return 1 + motor_->parameters().load_variation *
                  SinDeg(DrivenDeg(rotor_turns) + traits_.load_phase_deg);

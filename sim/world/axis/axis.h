@@ -1,12 +1,12 @@
-// One axis in closed form: field -> rotor -> gear -> play -> output. Along a path the field is
+// An axis in closed form: field -> rotor -> gear -> play -> output. Along a path the field is
 // piecewise monotone. On a monotone piece a friction band (rotor) and a play (backlash) are a max
 // or a min with their former place. The state at any instant therefore costs O(segments), without
 // steps of time.
 //
 // The rotor keeps to the field only up to a whole electrical turn. `offset_turns_` counts the turns
-// between the firmware's count and the rotor. The count changes when the hard stop holds the rotor,
-// when the rotor cannot follow, and when a stored vector is applied to a rotor that stands
-// elsewhere.
+// between the firmware's count and the rotor. The offset changes when the hard stop holds the rotor
+// or the rotor cannot follow. Another reason is a stored vector that is applied to a rotor that
+// stands elsewhere.
 #pragma once
 
 #include <cstdint>

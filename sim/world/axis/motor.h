@@ -1,7 +1,8 @@
 // A motor at the level of the fleet: the lag of its rotor behind its field, and whether the rotor
-// follows. Three numbers stand for the drive: the mean length V of the voltage vectors, the highest
-// speed that a load starts with, and the time in which lag settles. All three come from the drive's
-// physics (sim/drive), so they contain the bus voltage, the modulation and the effect of dead time.
+// follows. Three numbers stand for the drive. They are the mean length V of the voltage vectors,
+// the highest speed that a load starts with, and the time in which lag settles. All three come from
+// the drive's physics (sim/drive), so they contain the bus voltage, the modulation and the effect
+// of dead time.
 //
 //   at rest      sin(lag) = T_load r / (1.5 flux V)
 //   running      sin(lag) = (flux w + r (b w + T_load) / (1.5 flux)) / V

@@ -1,5 +1,5 @@
-// The frames that wait for one bus. The one with the lowest identifier among those that are ready
-// goes next; equal identifiers go in order of coming (only one node has that identifier).
+// The frames that wait for one bus. Among those that are ready the lowest identifier goes next.
+// Equal identifiers go in order of coming, because only one node has that identifier.
 #pragma once
 
 #include <algorithm>

@@ -1,14 +1,14 @@
 // A CAN segment: frames that wait, the frame on the wire, a bit clock, and the controllers that
-// stand on the wire. When it falls idle the lowest identifier of all that wait goes next; equal
-// ones go in order of coming, because only one node has that identifier. The frame holds the wire
-// for its exact number of bits, 131..160 us for eight bytes at 1 Mbit/s, and is received at its
-// end.
+// stand on the wire. When the wire falls idle, the lowest identifier of all that wait goes next
+// (arbitration_queue.h). The frame holds the wire for its exact number of bits, 131..160 us for
+// eight bytes at 1 Mbit/s, and is received at its end.
 //
 // Errors follow the standard (ISO 11898-1; Bosch CAN 2.0 part B). A destroyed frame costs its bits
-// so far and an error frame (frame_course.h), counts at every controller (error_counters.h), and is
-// sent again until it gets through. A passive controller waits 8 bits more behind its own frames. A
-// controller that is off neither sends nor receives until it has seen 128 times eleven recessive
-// bits. A frame that no other node acknowledges is sent for ever.
+// so far and an error frame (frame_course.h). The error counts at every controller
+// (error_counters.h), and the frame is sent again until it gets through. A passive controller waits
+// 8 bits more behind its own frames. A controller that is off neither sends nor receives until it
+// has seen 128 times eleven recessive bits. A frame that no other node acknowledges is sent for
+// ever.
 //
 // Node 0 is the host's controller; every other is a unit's. A node without errors costs nothing:
 // counters are only updated while one of them is not zero.

@@ -1,5 +1,5 @@
-// The bus in trouble: counters, controllers that go off and come back, nodes that leave, a wire
-// that is dead or stuck. bus.cc has the usual course of a frame.
+// The bus in trouble: counters, controllers that go off and come back, nodes that leave, and a dead
+// or stuck wire. bus.cc has the usual course of a frame.
 #include <algorithm>
 
 #include "sim/world/bus/bus.h"

@@ -9,14 +9,14 @@
 
 namespace focalfleet::sim {
 
-/// All time since the start is idle, busy or dead. Of the busy time, `destroyed` and `stuck`
-/// carried no frame through.
+/// All time since the start is idle, busy or dead. The parts `destroyed` and `stuck` of the busy
+/// time carried no frame through.
 struct BusCounters {
   std::uint64_t host_frames = 0;  // through the wire
   std::uint64_t unit_frames = 0;
   std::uint64_t bits = 0;  // in these frames; exact, stuff bits included
   DurationNs busy{0};
-  // By a planted fault, or because the bus or the sender went off or away.
+  // Lost by a planted fault, or because the bus or the sender went off or away.
   std::uint64_t dropped = 0;
   std::uint64_t refused = 0;      // no mailbox left
   std::uint32_t waiting_max = 0;  // the most frames that ever waited at once

@@ -1,5 +1,5 @@
-// The controllers that stand on one bus: which of them are there, which are off, and how far each
-// has come on its way back from bus-off.
+// The controllers that stand on one bus: their presence, their error counters, and their progress
+// back from bus-off.
 #pragma once
 
 #include <cstdint>

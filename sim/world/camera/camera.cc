@@ -60,8 +60,8 @@ void AddExtras(const std::vector<LightSource>& sources, const CameraTraits& trai
   }
 }
 
-// The centroid is weighted by flux. The squares of the widths average by flux; so do the squares of
-// the distances to the centroid, halved because each counts in one of two directions.
+// The centroid is weighted by flux. The squares of the widths average by flux. The squares of the
+// distances to the centroid do so too, halved because each counts in one of two directions.
 Blob Merged(const std::vector<Blob>& blobs, const std::vector<std::uint32_t>& members) {
   constexpr double kFwhmPerSigma = 2.3548200450309493;
   Blob sum;

@@ -25,8 +25,8 @@ struct Field {
 };
 
 /// A path to be run from the vector that is applied now. Each segment begins at its start_ticks
-/// after `begin`, or when the one before has ended. It shows its |delta| vectors one by one, each
-/// for repeat * counter1 timer counts.
+/// after `begin`, or when the one before has ended. The segment shows its |delta| vectors one by
+/// one, each for repeat * counter1 timer counts.
 struct PathOrder {
   std::int32_t from = 0;  // vectors
   BoardInstant begin;

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 
 // The way is the whole range and two electrical turns more, so that the axis reaches its stop from
-// anywhere. It ends on the vector that the stop shows.
+// anywhere. The way ends on the vector that the stop shows.
 BoardInstant Homing::Drive(const Board& board, const Flash& flash, Axis next, BoardInstant now) {
   axis = next;
   const AxisFlash& stored = flash.axis[Index(axis)];

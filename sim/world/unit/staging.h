@@ -1,5 +1,5 @@
-// The move that a unit holds before its start: a stage_begin and as many of its segments as have
-// come, in any order and any number of times.
+// The move that a unit holds before its start: a stage_begin and the segments that have come.
+// Segments may come in any order and any number of times.
 #pragma once
 
 #include <array>

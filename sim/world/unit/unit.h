@@ -1,5 +1,6 @@
-// A complete unit: FLASH, firmware, two axes, its mechanism, and its planted faults. It also keeps
-// the simulation's own record of the moves that were begun, which the firmware has no access to.
+// A complete unit: FLASH, firmware, two axes, its mechanism, and its planted faults. The unit also
+// keeps the simulation's own record of the moves that were begun, to which the firmware has no
+// access.
 #pragma once
 
 #include <memory>

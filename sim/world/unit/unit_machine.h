@@ -1,7 +1,7 @@
 // The unit's side of the protocol, and the code that a firmware starts from: a state machine driven
-// by (frame, now) and by time alone. It needs no heap, no exceptions and no library. With the codec
-// it compiles freestanding (a test holds it to that), with integers only and less than a KiB of
-// state. The simulated units run exactly this code; firmware.h adds the planted faults.
+// by (frame, now) and by time alone. The machine needs no heap, no exceptions and no library. With
+// the codec it compiles freestanding (a test holds it to that), with integers only and less than a
+// KiB of state. The simulated units run exactly this code; firmware.h adds the planted faults.
 //
 // The machine answers every addressed request with exactly one frame, which carries the request's
 // sequence number. Unasked it sends only the end of a motion (sequence 0). FLASH is written before
