@@ -19,7 +19,7 @@ using testing::kNew;
 
 constexpr std::uint16_t kOld = 6;  // the move that was begun last
 
-/// The states of the wire, and armed with the start signal already there.
+/// The states of the wire, and the armed state in which the start signal has come.
 enum class At { kRest, kStaging, kArmed, kWaiting, kMoving, kHoming, kFault, kHostLost };
 constexpr At kAllAt[] = {At::kRest,   At::kStaging, At::kArmed, At::kWaiting,
                          At::kMoving, At::kHoming,  At::kFault, At::kHostLost};
@@ -60,7 +60,7 @@ void Bring(FirmwareRig* rig, At at) {
   ASSERT_EQ(rig->state(), kStateOf[static_cast<std::size_t>(at)]);
 }
 
-/// What came: a letter a state, in the order of At.
+/// The answers: a letter a state, in the order of At.
 ///   . nothing   + granted or plainly answered   w wrong_state   m wrong_move   b begun_before
 struct Row {
   const char* name;

@@ -185,7 +185,7 @@ TEST(Firmware, StopEndsAtTheVectorThatIsShown) {
   FirmwareRig rig;
   ASSERT_EQ(rig.StageAndArm(BenchMove(kMove)), Answer::kOk);
   rig.StartAll({kMove}, 0);
-  rig.Run(Microseconds(375 * 100 + 10));  // 100 vectors shown out, the next one applied
+  rig.Run(Microseconds(375 * 100 + 10));  // 100 vectors have been shown, the next one is applied
   const auto done = rig.Ask<Done>(Stop{}, 77);
   ASSERT_TRUE(done);
   EXPECT_EQ(done->outcome, Outcome::kStopped);
@@ -202,7 +202,7 @@ TEST(Firmware, HomingFindsTheStopsFromAnywhereAndEndsAllDoubt) {
   for (const std::int32_t lie : {0, 96, -96 * 7, 96 * 20}) {
     FirmwareRig rig;
     rig.Run(Milliseconds(1));
-    // What it believes is off by whole turns, as after a cut.
+    // The unit's position is off by whole turns, as after a power cut.
     for (const Axis axis : kAxes)
       EXPECT_EQ(
           rig.Ask<ParameterReply>(ParameterWrite{axis, Parameter::kPosition,
@@ -222,7 +222,7 @@ TEST(Firmware, HomingFindsTheStopsFromAnywhereAndEndsAllDoubt) {
     EXPECT_EQ(done.position[1], kBenchMax);
     EXPECT_NEAR(rig.AngleDeg(Axis::kTheta), -360, 6 * 360.0 / 9600);
     EXPECT_NEAR(rig.AngleDeg(Axis::kPhi), 360, 6 * 360.0 / 9600);
-    // And a move from there goes where it should.
+    // A move from there goes where it should.
     ASSERT_EQ(rig.StageAndArm(BenchMove(kNew, 960, -960)), Answer::kOk);
     rig.StartAll({kNew}, 0);
     rig.Run(Milliseconds(500));

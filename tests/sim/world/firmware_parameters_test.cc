@@ -1,4 +1,5 @@
-// What a unit keeps in FLASH and what its sensors show, as requests read and write them.
+// The parameters that a unit keeps in FLASH and the readings of its sensors, as requests read and
+// write them.
 #include <gtest/gtest.h>
 
 #include <array>

@@ -25,7 +25,7 @@ TEST(Firmware, AFaultStopsTheMoveAndHoldsUntilCleared) {
   const auto said = rig.Run(Milliseconds(300));
   ASSERT_EQ(said.size(), 1u);
   EXPECT_EQ(Get<Done>(said[0]).outcome, Outcome::kFault);
-  EXPECT_EQ(Get<Done>(said[0]).position[0], 81);  // 30 ms / 375 us and the one shown
+  EXPECT_EQ(Get<Done>(said[0]).position[0], 81);  // 30 ms / 375 us and the vector that is shown
   EXPECT_EQ(rig.state(), UnitState::kFault);
   EXPECT_FALSE(rig.flash().moving);
   const auto status = rig.Ask<StatusReply>(StatusRequest{});
@@ -124,7 +124,7 @@ TEST(Firmware, AnInterruptedUnitMovesAgainWhenBothPositionsAreSet) {
   rig.Run(Milliseconds(60));
   rig.CutPower();
   rig.GivePower();
-  rig.CutPower();  // and again: the doubt is in FLASH
+  rig.CutPower();  // a second time: the doubt is in FLASH
   rig.GivePower();
   for (const Axis axis : kAxes) {
     EXPECT_TRUE(rig.Ask<StatusReply>(StatusRequest{})->interrupted);
@@ -138,9 +138,10 @@ TEST(Firmware, AnInterruptedUnitMovesAgainWhenBothPositionsAreSet) {
   EXPECT_EQ(rig.StageAndArm(BenchMove(kNew, 10, 10)), Answer::kOk);
 }
 
-// ---- whatever comes
+// ---- random frames
 
-// A host that forgets, repeats and mixes; moves get ascending ids, power fails now and then.
+// The host forgets, repeats and mixes frames; moves get ascending ids, and power fails now and
+// then.
 TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
   for (std::uint64_t round = 0; round < 60; ++round) {
     const std::uint64_t seed = focalfleet::testing::TestSeed(1) + round;
@@ -203,7 +204,7 @@ TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
         if (rig.flash().moves_begun == counted) continue;
         counted = rig.flash().moves_begun;
         const std::uint16_t last = rig.flash().last_begun.value;
-        // Only an older id than the last could come again; this host's ids do not go back further.
+        // Only an id older than the last could come again; this host's ids do not go back further.
         if (begun.empty() || last != begun.back()) {
           begun.push_back(last);
         } else {
