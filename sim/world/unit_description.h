@@ -29,9 +29,9 @@ struct UnitDescription {
   double base_x_mm = 0;
   double base_y_mm = 0;
   std::array<AxisDescription, kAxisCount> axis;
-  std::uint8_t sensors = 0;  // Hall sensors at its joint (unit/joint_sensors.h)
-  double carrier_mm = 0;     // from the joint's centre to the fibre, where it has such sensors
-  bool enabled = true;       // false: only its default pose differs; it answers like any other
+  std::uint8_t sensors = 0;     // Hall sensors at its joint (unit/joint_sensors.h)
+  double fibre_carrier_mm = 0;  // from the joint's centre to the fibre, where it has such sensors
+  bool enabled = true;          // false: only its default pose differs; it answers like any other
   /// The seconds of its clock a true second, less 1; none: drawn (WorldConfig::clock_error_max).
   std::optional<double> clock_error = {};
 };

@@ -64,7 +64,8 @@ void Firmware::Sense(HostInstant now, std::span<std::uint16_t> counts) {
   const std::complex<double> tip = FibreAt(*joint.mechanism, {hardware_.axis[0]->AngleDeg(now),
                                                               hardware_.axis[1]->AngleDeg(now)}) -
                                    joint.mechanism->base_mm;
-  joint.magnets->Read(joint.unit, readings_++, {tip.real(), tip.imag(), joint.carrier_mm}, counts);
+  joint.magnets->Read(joint.unit, readings_++, {tip.real(), tip.imag(), joint.fibre_carrier_mm},
+                      counts);
   if (!hardware_.faults->sensor) return;
   using Kind = UnitFaults::Sensor::Kind;
   const UnitFaults::Sensor& lies = *hardware_.faults->sensor;

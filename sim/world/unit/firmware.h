@@ -31,7 +31,7 @@ class Firmware {
     struct Joint {
       UnitId unit;
       std::uint8_t sensors = 0;
-      double carrier_mm = 0;
+      double fibre_carrier_mm = 0;
       const Mechanism* mechanism = nullptr;
       const JointSensors* magnets = nullptr;
     };

@@ -9,8 +9,8 @@ constexpr std::size_t kBegunMax = 32'768;
 
 Firmware::Hardware::Joint JointOf(const Unit::Parts& parts, const Mechanism& mechanism) {
   if (parts.magnets == nullptr) return {};
-  return {parts.description.id, parts.description.sensors, parts.description.carrier_mm, &mechanism,
-          parts.magnets};
+  return {parts.description.id, parts.description.sensors, parts.description.fibre_carrier_mm,
+          &mechanism, parts.magnets};
 }
 }  // namespace
 
