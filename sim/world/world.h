@@ -30,6 +30,7 @@
 #include "protocol/link/frame_port.h"
 #include "sim/world/axis/axis_memory.h"
 #include "sim/world/bus/bus.h"
+#include "sim/world/disturbable.h"
 #include "sim/world/fault_plan.h"
 #include "sim/world/faults.h"
 #include "sim/world/spread.h"
@@ -105,7 +106,7 @@ struct WireFrame {
   std::uint32_t client = 0;  // the client that injected it, where it is not from a unit
 };
 
-class World {
+class World : public Disturbable {
  public:
   /// Returns the first fault in the units (bus, node or id used twice, range the wrong way round
   /// ...).
@@ -134,28 +135,6 @@ class World {
   /// Puts an edge on the SYNC line, which goes to every unit of every bus; at now().
   void PulseSync();
 
-  // ---- disturbances; all at now()
-
-  void PowerCut(UnitId unit);  // at once, whatever the unit does
-  void PowerOn(UnitId unit);
-  void KillBus(BusId bus);  // waiting frames are lost
-  void ReviveBus(BusId bus);
-  [[nodiscard]] bool dead(BusId bus) const;
-  void StickBus(BusId bus);  // dominant, until it is released
-  void ReleaseBus(BusId bus);
-  void RestartHost(BusId bus);   // the host's controller, if it is bus-off
-  void ThrowHostOff(BusId bus);  // as after a short circuit
-  void Unplug(UnitId unit);      // from its bus; it keeps its power
-  void Plug(UnitId unit);
-  /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
-  void Babble(UnitId unit, const std::optional<CanFrame>& frame);
-  /// The number of frames that wait or are on their way on this bus.
-  [[nodiscard]] std::size_t waiting(BusId bus) const;
-  void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
-  /// Null where there is no such unit.
-  [[nodiscard]] UnitFaults* faults(UnitId unit);
-  [[nodiscard]] BusFaults* faults(BusId bus);
-
   // ---- the true state
 
   [[nodiscard]] std::span<const UnitDescription> units() const;
@@ -164,6 +143,9 @@ class World {
   [[nodiscard]] UnitTruth Truth(std::size_t row) const;  // row in units()
   [[nodiscard]] UnitTruth Truth(UnitId unit) const;      // Pre: it exists
   [[nodiscard]] const Flash& flash(UnitId unit) const;   // Pre: it exists
+  [[nodiscard]] bool dead(BusId bus) const;
+  /// The number of frames that wait or are on their way on this bus.
+  [[nodiscard]] std::size_t waiting(BusId bus) const;
   [[nodiscard]] const BusCounters& counters(BusId bus) const;
   [[nodiscard]] Controller controller(BusId bus) const;    // the host's. Pre: there is such a bus
   [[nodiscard]] Controller controller(UnitId unit) const;  // Pre: it exists
@@ -171,8 +153,6 @@ class World {
   [[nodiscard]] std::vector<UnitMemory> Memory() const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
   FaultSchedule schedule_;
 };
 
