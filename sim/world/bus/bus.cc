@@ -1,207 +1,147 @@
 #include "sim/world/bus/bus.h"
 
 #include <algorithm>
-#include <cmath>
-
-#include "protocol/base/check.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet::sim {
-namespace {
 
-/// The transmit mailboxes of a unit's controller, which hold frames while it cannot send.
-constexpr std::size_t kKeptMax = 3;
-
-}  // namespace
-
-Bus::Bus(const Options& options, Rng chance)
-    : options_(options), chance_(chance), nodes_(options.bit_rate_bps), idle_at_(options.start) {}
-
-std::uint32_t Bus::Attach() { return nodes_.Attach(); }
-
-DurationNs Bus::Bits(std::uint32_t bits) const { return BitTime(bits, options_.bit_rate_bps); }
-
-// ---- frames that wait
-
-bool Bus::Offer(const Waiting& waiting, HostInstant ready) {
-  QueuedFrame entry{.ready = ready, .waiting = waiting};
-  BusNode& node = nodes_[entry.node()];
-  if (dead_ || (entry.node() == kHost && node.off)) {
-    ++counters_.dropped;
-    return false;
-  }
-  if (queue_.size() >= options_.mailboxes_max) {
-    ++counters_.refused;
-    return false;
-  }
-  entry.order = order_++;
-  if (!Hears(entry.node())) {
-    if (node.kept.size() >= kKeptMax) {
-      ++counters_.refused;
-      return false;
-    }
-    node.kept.push_back(entry);
-    return true;
-  }
-  if (faults_.late > 0 && chance_.Uniform() < faults_.late) entry.ready = ready + faults_.late_by;
-  Admit(entry);
-  return true;
+void Bus::RestartHost(HostInstant now) {
+  BusNode& host = nodes_[kHost];
+  if (host.off) host.counts_from = std::min(host.counts_from, now);
 }
 
-void Bus::Admit(const QueuedFrame& entry) {
-  queue_.Add(entry);
-  counters_.waiting_max =
-      std::max(counters_.waiting_max, static_cast<std::uint32_t>(queue_.size()));
+void Bus::ThrowHostOff(HostInstant now) {
+  if (nodes_[kHost].off || dead_) return;
+  if (on_wire_.sending && on_wire_.entry.node() == kHost) CutOff(kHost, now);
+  while (!nodes_[kHost].off)
+    Count(kHost, now, [](ErrorCounters* errors) { errors->TransmitError(); });
 }
 
-HostInstant Bus::NextEvent() const {
-  if (dead_) return kNever;
-  if (stuck_.at != kNever) return stuck_.step_at;
-  if (on_wire_.sending) return idle_at_;
-  const HostInstant begin = NextBegin();
-  return !nodes_.any_off() ? begin : std::min(begin, nodes_.NextRecovery(idle_at_));
+// ---- presence of nodes
+
+/// The bits of the frame on the wire that are over at `now`. Pre: `now` is within the frame.
+std::uint32_t Bus::BitsOnWire(HostInstant now) const {
+  return static_cast<std::uint32_t>((now - on_wire_.began_at).ns * options_.bit_rate_bps /
+                                    1'000'000'000);
 }
 
-HostInstant Bus::NextBegin() const {
-  if (queue_.any_ready() && suspended_.held_until <= idle_at_)
-    return std::max(idle_at_, queue_.ready_since());
-  HostInstant at = kNever;
-  if (queue_.any_ready()) at = suspended_.held_until;
-  at = std::min(at, std::max(idle_at_, queue_.next_ready()));
-  for (const Babbler& babbler : babblers_) {
-    if (!Hears(babbler.node)) continue;
-    const HostInstant free =
-        babbler.node == suspended_.node ? std::max(idle_at_, suspended_.until) : idle_at_;
-    at = std::min(at, std::max(free, babbler.since));
-  }
-  return at;
-}
-
-bool Bus::Advance(Heard* heard) {
-  if (stuck_.at != kNever) {
-    StickOn(stuck_.step_at);
-    return false;
-  }
-  if (!on_wire_.sending) {
-    if (nodes_.any_off() && nodes_.NextRecovery(idle_at_) <= NextBegin()) {
-      RecoverThrough(nodes_.NextRecovery(idle_at_));
-      return false;
-    }
-    BeginFrame(NextBegin());
-    if (options_.bit_clock || !on_wire_.sending) return false;
-  }
-  on_wire_.sending = false;
-  return EndFrame(heard);
-}
-
-// ---- the begin of a frame
-
-std::optional<QueuedFrame> Bus::Arbitrate(HostInstant now) {
-  // Suspend transmission: a passive node that sent last leaves the next eight bits to the others.
-  std::optional<QueuedFrame> best =
-      queue_.Take(now, now < suspended_.until ? suspended_.node : kNobody);
-  on_wire_.babbling = false;
-  for (const Babbler& babbler : babblers_) {
-    const bool suspended = babbler.node == suspended_.node && now < suspended_.until;
-    if (!Hears(babbler.node) || suspended || now < babbler.since) continue;
-    if (best && best->waiting.frame.id <= babbler.frame.id) continue;
-    if (best && !on_wire_.babbling) queue_.Return(*best);
-    best =
-        QueuedFrame{.ready = now, .waiting = {babbler.frame, babbler.node != kHost, babbler.node}};
-    on_wire_.babbling = true;
-  }
-  return best;
-}
-
-void Bus::BeginFrame(HostInstant now) {
-  const std::optional<QueuedFrame> best = Arbitrate(now);
-  if (!best) {
-    FOCALFLEET_CHECK(now < suspended_.until && queue_.any_ready());
-    suspended_.held_until = suspended_.until;
+/// The frame on the wire, if it is the node's own, ends here and is not sent again.
+void Bus::CutOff(std::uint32_t node, HostInstant now) {
+  if (!on_wire_.sending || on_wire_.entry.node() != node || on_wire_.abandoned) return;
+  on_wire_.abandoned = true;
+  const std::uint32_t at = BitsOnWire(now);
+  if (on_wire_.course.error != FrameError::kNone || at >= ExposedBits(on_wire_.entry.waiting.frame))
     return;
-  }
-  if (nodes_.any_off()) nodes_.CountRowsWhileIdle(idle_at_, now);
-  on_wire_.entry = *best;
-  on_wire_.sending = true;
-  on_wire_.abandoned = false;
+  on_wire_.course = CutOffAt(on_wire_.entry.waiting.frame, at);
+  idle_at_ = on_wire_.began_at + Bits(on_wire_.course.bits);
   on_wire_.refusing = kNobody;
-  counters_.idle = counters_.idle + (now - idle_at_);
-  if (on_wire_.entry.repeated) ++counters_.repeats;
-  on_wire_.began_at = idle_at_ = now;
-  on_wire_.course = DrawCourse();
-  if (options_.bit_clock) idle_at_ = now + Bits(on_wire_.course.bits);
 }
 
-/// The first disturbed bit is geometric: P(none in b bits) = (1 - rate)^b.
-FrameCourse Bus::DrawCourse() {
-  const CanFrame& frame = on_wire_.entry.waiting.frame;
-  const std::uint32_t sender = on_wire_.entry.node();
-  FrameCourse course;
-  if (options_.bit_clock) course = nodes_.hearing() > 1 ? WellSent(frame) : Unacknowledged(frame);
-  if (faults_.bit_error_rate > 0 && options_.bit_clock) {
-    const double first =
-        std::log1p(-chance_.Uniform()) / std::log1p(-std::min(faults_.bit_error_rate, 0.5));
-    const std::uint32_t exposed = ExposedBits(frame);
-    if (first < exposed) {
-      const FrameCourse disturbed =
-          DisturbedAt(frame, static_cast<std::uint32_t>(first),
-                      nodes_[sender].errors.state() == Confinement::kPassive);
-      if (course.accepted || disturbed.bits < course.bits) course = disturbed;
-    }
-  }
-  if (faults_.duplicate > 0 && course.error == FrameError::kNone &&
-      chance_.Uniform() < faults_.duplicate) {
-    course = RefusedByOne(frame);
-    if (!options_.bit_clock) course.bits = 0;
-    if (nodes_.hearing() > 2) on_wire_.refusing = nodes_.DrawReceiver(sender, &chance_);
-  }
-  return course;
+void Bus::PowerOff(std::uint32_t number, HostInstant now) {
+  BusNode& node = nodes_[number];
+  CutOff(number, now);
+  nodes_.Leave(number);
+  queue_.TakeAllOf(number, &node.kept);
+  counters_.dropped += node.kept.size();
+  node.kept.clear();
+  nodes_.ClearOff(number);
+  Count(number, now, [](ErrorCounters* errors) { errors->Recover(); });
 }
 
-// ---- the end of a frame
+void Bus::PowerOn(std::uint32_t number, HostInstant now) {
+  if (nodes_[number].there) return;
+  nodes_[number].there = true;
+  Rejoin(number, now);
+}
 
-bool Bus::EndFrame(Heard* heard) {
-  Charge(idle_at_ - on_wire_.began_at);
-  const std::uint32_t sender = on_wire_.entry.node();
-  if (nodes_.any_off()) nodes_.CountRowOfFrame(idle_at_);
-  if (on_wire_.course.error == FrameError::kNone) {
-    counters_.bits += on_wire_.course.bits;
-    if (!nodes_.clean()) CountWell(sender);
+void Bus::Unplug(std::uint32_t number, HostInstant now) {
+  BusNode& node = nodes_[number];
+  if (!node.there) return;
+  if (on_wire_.sending && on_wire_.entry.node() == number && !on_wire_.abandoned) {
+    CutOff(number, now);
+    if (!on_wire_.course.accepted) node.kept.push_back(on_wire_.entry);
+  }
+  nodes_.Leave(number);
+  queue_.TakeAllOf(number, &node.kept);
+  std::ranges::sort(node.kept, {}, &QueuedFrame::order);
+}
+
+void Bus::Plug(std::uint32_t number, HostInstant now) {
+  BusNode& node = nodes_[number];
+  if (node.there) return;
+  node.there = true;
+  if (node.off) node.counts_from = std::max(node.counts_from, now);
+  // Alone the node was not acknowledged: rule 3 up to passive, then exception 1.
+  while (!node.kept.empty() && node.errors.state() == Confinement::kActive)
+    Count(number, now, [](ErrorCounters* errors) { errors->TransmitError(); });
+  Rejoin(number, now);
+}
+
+void Bus::Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now) {
+  std::erase_if(babblers_, [node](const Babbler& babbler) { return babbler.node == node; });
+  if (frame) babblers_.push_back({node, *frame, now});
+}
+
+// ---- a wire that is dead or stuck
+
+void Bus::Kill(HostInstant now) {
+  if (dead_) return;
+  Release(now);
+  counters_.dropped += waiting();
+  if (on_wire_.sending) {
+    on_wire_.course.error =
+        on_wire_.course.error == FrameError::kNone ? FrameError::kForm : on_wire_.course.error;
+    counters_.Charge(now - on_wire_.began_at, true);
   } else {
-    counters_.error_bits += on_wire_.course.bits;
-    ++counters_.errors[static_cast<std::size_t>(on_wire_.course.error)];
-    CountError(sender);
-    if (on_wire_.course.accepted) ++counters_.received_twice;
-    if (!on_wire_.babbling && !on_wire_.abandoned) {
-      on_wire_.entry.repeated = true;
-      if (Hears(sender)) {
-        queue_.Return(on_wire_.entry);
-      } else if (sender != kHost) {
-        nodes_[sender].kept.push_back(on_wire_.entry);
-      } else {
-        ++counters_.dropped;
-      }
-    }
+    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
   }
-  if (!nodes_.clean() && nodes_[sender].errors.state() == Confinement::kPassive) {
-    suspended_.node = sender;
-    suspended_.until = idle_at_ + Bits(kSuspendBits);
-  }
-  if (nodes_.any_off()) RecoverThrough(idle_at_);
-  if (!on_wire_.course.accepted) return false;
-  heard->sent = on_wire_.entry.waiting;
-  heard->at = idle_at_;
-  heard->but_not = on_wire_.refusing;
-  ++(heard->sent.from_unit ? counters_.unit_frames : counters_.host_frames);
-  if (on_wire_.babbling) ++counters_.babbled;
-  heard->lost = faults_.drop > 0 && chance_.Uniform() < faults_.drop;
-  if (heard->lost) ++counters_.dropped;
-  return true;
+  dead_at_ = on_wire_.sending ? now : std::max(now, idle_at_);
+  queue_ = {};
+  on_wire_.sending = false;
+  dead_ = true;
 }
 
-void Bus::Charge(DurationNs taken) {
-  counters_.busy = counters_.busy + taken;
-  if (on_wire_.course.error != FrameError::kNone) counters_.destroyed = counters_.destroyed + taken;
+void Bus::Revive(HostInstant now) {
+  if (!dead_) return;
+  dead_ = false;
+  idle_at_ = std::max(now, dead_at_);
+  counters_.dead = counters_.dead + (idle_at_ - dead_at_);
+}
+
+void Bus::Stick(HostInstant now) {
+  if (dead_ || stuck_.at != kNever || !options_.bit_clock) return;
+  stuck_.sender = kNobody;
+  stuck_.at = now;
+  if (on_wire_.sending) {
+    // From here on the sender sees other levels than it drives; its frame is repeated later.
+    stuck_.sender = on_wire_.abandoned ? kNobody : on_wire_.entry.node();
+    on_wire_.course.error = FrameError::kBit;
+    ++counters_.errors[static_cast<std::size_t>(FrameError::kBit)];
+    counters_.error_bits += BitsOnWire(now);
+    counters_.Charge(now - on_wire_.began_at, true);
+    if (!on_wire_.abandoned && !on_wire_.babbling) {
+      on_wire_.entry.repeated = true;
+      queue_.Return(on_wire_.entry);
+    }
+    on_wire_.sending = false;
+  } else {
+    if (nodes_.any_off()) nodes_.CountRowsWhileIdle(idle_at_, now);
+    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
+    stuck_.at = std::max(now, idle_at_);
+  }
+  idle_at_ = stuck_.at;
+  stuck_.steps = 0;
+  stuck_.step_at = stuck_.at + Bits(kFlagBits);
+}
+
+void Bus::Release(HostInstant now) {
+  if (stuck_.at == kNever) return;
+  // All nodes wait for the end of the error frame that they see.
+  idle_at_ = std::max(now, stuck_.at) + Bits(kDelimiterBits + kIntermissionBits);
+  counters_.stuck = counters_.stuck + (idle_at_ - stuck_.at);
+  counters_.busy = counters_.busy + (idle_at_ - stuck_.at);
+  stuck_.at = stuck_.step_at = kNever;
+  stuck_.sender = kNobody;
+  nodes_.CountRowsNotBefore(now);
 }
 
 }  // namespace focalfleet::sim

@@ -40,6 +40,11 @@ struct BusCounters {
     for (const std::uint64_t count : errors) sum += count;
     return sum;
   }
+  /// A frame, or a part of one, took the wire. `in_vain`: it did not get through.
+  void Charge(DurationNs taken, bool in_vain) {
+    busy = busy + taken;
+    if (in_vain) destroyed = destroyed + taken;
+  }
   /// The share of the time in which the wire was taken.
   [[nodiscard]] double Load(DurationNs elapsed) const {
     return elapsed.ns > 0 ? static_cast<double>(busy.ns) / static_cast<double>(elapsed.ns) : 0;
