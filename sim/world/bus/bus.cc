@@ -32,7 +32,7 @@ void Bus::CutOff(std::uint32_t node, HostInstant now) {
   if (on_wire_.course.error != FrameError::kNone || at >= ExposedBits(on_wire_.entry.waiting.frame))
     return;
   on_wire_.course = CutOffAt(on_wire_.entry.waiting.frame, at);
-  idle_at_ = on_wire_.began_at + Bits(on_wire_.course.bits);
+  idle_at_ = on_wire_.began_at + options_.Bits(on_wire_.course.bits);
   on_wire_.refusing = kNobody;
 }
 
@@ -130,13 +130,13 @@ void Bus::Stick(HostInstant now) {
   }
   idle_at_ = stuck_.at;
   stuck_.steps = 0;
-  stuck_.step_at = stuck_.at + Bits(kFlagBits);
+  stuck_.step_at = stuck_.at + options_.Bits(kFlagBits);
 }
 
 void Bus::Release(HostInstant now) {
   if (stuck_.at == kNever) return;
   // All nodes wait for the end of the error frame that they see.
-  idle_at_ = std::max(now, stuck_.at) + Bits(kDelimiterBits + kIntermissionBits);
+  idle_at_ = std::max(now, stuck_.at) + options_.Bits(kDelimiterBits + kIntermissionBits);
   counters_.stuck = counters_.stuck + (idle_at_ - stuck_.at);
   counters_.busy = counters_.busy + (idle_at_ - stuck_.at);
   stuck_.at = stuck_.step_at = kNever;

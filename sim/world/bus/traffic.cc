@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "protocol/base/check.h"
-#include "protocol/wire/frame_bits.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -18,10 +17,6 @@ BusTraffic::BusTraffic(const Options& options, Rng chance)
     : options_(options), chance_(chance), nodes_(options.bit_rate_bps), idle_at_(options.start) {}
 
 std::uint32_t BusTraffic::Attach() { return nodes_.Attach(); }
-
-DurationNs BusTraffic::Bits(std::uint32_t bits) const {
-  return BitTime(bits, options_.bit_rate_bps);
-}
 
 // ---- frames that wait
 
@@ -131,7 +126,7 @@ void BusTraffic::BeginFrame(HostInstant now) {
   if (on_wire_.entry.repeated) ++counters_.repeats;
   on_wire_.began_at = idle_at_ = now;
   on_wire_.course = DrawCourse();
-  if (options_.bit_clock) idle_at_ = now + Bits(on_wire_.course.bits);
+  if (options_.bit_clock) idle_at_ = now + options_.Bits(on_wire_.course.bits);
 }
 
 /// The first disturbed bit is geometric: P(none in b bits) = (1 - rate)^b.
@@ -187,7 +182,7 @@ bool BusTraffic::EndFrame(Heard* heard) {
   }
   if (!nodes_.clean() && nodes_[sender].errors.state() == Confinement::kPassive) {
     suspended_.node = sender;
-    suspended_.until = idle_at_ + Bits(kSuspendBits);
+    suspended_.until = idle_at_ + options_.Bits(kSuspendBits);
   }
   if (nodes_.any_off()) RecoverThrough(idle_at_);
   if (!on_wire_.course.accepted) return false;
@@ -285,7 +280,7 @@ void BusTraffic::StickOn(HostInstant now) {
     });
     all_passive = all_passive && !sends && state(node) != Confinement::kActive;
   }
-  stuck_.step_at = all_passive ? kNever : now + Bits(stuck_.steps < 2 ? kFlagBits + 1 : 8);
+  stuck_.step_at = all_passive ? kNever : now + options_.Bits(stuck_.steps < 2 ? kFlagBits + 1 : 8);
   ++stuck_.steps;
 }
 

@@ -25,6 +25,7 @@
 #include "protocol/base/instants.h"
 #include "protocol/base/rng.h"
 #include "protocol/wire/can_frame.h"
+#include "protocol/wire/frame_bits.h"
 #include "sim/world/bus/arbitration_queue.h"
 #include "sim/world/bus/bus_counters.h"
 #include "sim/world/bus/bus_nodes.h"
@@ -47,6 +48,9 @@ class BusTraffic {
     /// The time from the host's bus-off to its restart; kNever: the host waits for RestartHost.
     /// Units begin their recovery at once.
     DurationNs host_restart = Milliseconds(1000);
+
+    /// The time of `bits` on the wire.
+    [[nodiscard]] DurationNs Bits(std::uint32_t bits) const { return BitTime(bits, bit_rate_bps); }
   };
   BusTraffic(const Options& options, Rng chance);
 
@@ -112,7 +116,6 @@ class BusTraffic {
     HostInstant since;
   };
 
-  [[nodiscard]] DurationNs Bits(std::uint32_t bits) const;
   [[nodiscard]] HostInstant NextBegin() const;
   void Admit(const QueuedFrame& entry);
   /// The entry that wins arbitration at `now`; none: only a suspended node has any.
