@@ -76,7 +76,7 @@ std::vector<sim::UnitDescription> DescribeUnits(const Layout& layout) {
     description.base_y_mm = unit.base_fp.y_mm;
     description.enabled = unit.enabled;
     description.sensors = unit.sensors;
-    description.carrier_mm = unit.carrier_mm;
+    description.fibre_carrier_mm = unit.carrier_mm;
     for (const Axis axis : kAxes) {
       const AxisGeometry& from = unit.axis[Index(axis)];
       sim::AxisDescription& to = description.axis[Index(axis)];

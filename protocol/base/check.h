@@ -1,10 +1,10 @@
-// FOCALFLEET_CHECK: the third kind of trouble, a bug in our own reasoning. It is always on, prints
-// what was believed and where, and aborts: a restart is safe, because the store holds the intent
-// before anything moves. Data from outside (a frame, a file, a row) never meets a CHECK before it
-// met a validator.
+// FOCALFLEET_CHECK guards against the third kind of trouble, a bug in this project's own reasoning.
+// The check is always on; it prints the condition and the place, and aborts. A restart is safe,
+// because the store holds the intent before anything moves. Data from outside (a frame, a file, a
+// row) passes a validator before any check.
 //
-// Without a hosted library (a unit's firmware) the board says what happens then: it stops the
-// motors and resets.
+// Without a hosted library (a unit's firmware) the board decides what follows a failed check: it
+// stops the motors and resets.
 #pragma once
 
 #if __STDC_HOSTED__

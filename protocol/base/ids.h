@@ -1,7 +1,8 @@
-// Who is who. Five kinds of integer that must never be swapped silently, so each is its own type.
-// A unit is one positioner with two axes; unit_id is the operators' number for a place on the
-// plate; (bus, node) is where it answers; the serial number is the hardware that sits there.
-// Vectors and tuned parameters belong to the serial number.
+// Five kinds of integer identify the parts of a fleet. Each is a type of its own, so that two of
+// them cannot be swapped silently. A unit is one positioner with two axes. `unit_id` is the
+// operators' number for a place on the plate, and (bus, node) is the address at which the unit
+// answers. The serial number identifies the hardware at that place; vectors and tuned parameters
+// belong to it.
 #pragma once
 
 #include <compare>
@@ -11,14 +12,14 @@
 
 namespace focalfleet {
 
-/// An integer that is an identity: comparable and hashable, without arithmetic.
+/// An integer that identifies: comparable and hashable, without arithmetic.
 template <class Tag, class Rep>
 struct StrongId {
   Rep value{};
   constexpr auto operator<=>(const StrongId&) const = default;
 };
 
-using UnitId = StrongId<struct UnitIdTag, std::uint32_t>;               // operators' number
+using UnitId = StrongId<struct UnitIdTag, std::uint32_t>;               // the operators' number
 using PositionerIndex = StrongId<struct PositionerTag, std::uint32_t>;  // row in the layout, 0..n-1
 using BusId = StrongId<struct BusIdTag, std::uint32_t>;
 using RailId = StrongId<struct RailIdTag, std::uint32_t>;
@@ -26,7 +27,7 @@ using NodeId = StrongId<struct NodeIdTag, std::uint8_t>;
 using SerialNumber = StrongId<struct SerialTag, std::uint32_t>;
 using MoveId = StrongId<struct MoveIdTag, std::uint16_t>;  // one round of motion; 0 is "none yet"
 
-/// Every node of a bus listens to this address; no unit has it.
+/// The broadcast address reaches every node of a bus; no unit has it.
 inline constexpr NodeId kBroadcastNode{255};
 
 enum class Axis : std::uint8_t { kTheta = 0, kPhi = 1 };
@@ -35,7 +36,8 @@ inline constexpr std::size_t kAxisCount = 2;
 constexpr std::size_t Index(Axis axis) { return static_cast<std::size_t>(axis); }
 constexpr const char* Name(Axis axis) { return axis == Axis::kTheta ? "theta" : "phi"; }
 
-/// How SVPWM forms its pulses; decides the switching loss (paper, section "Wave generation mode").
+/// The way in which SVPWM forms its pulses. The mode decides the switching loss. Source: paper 1,
+/// section "Wave generation mode".
 enum class WaveMode : std::uint8_t { kAsymmetric = 0, kFiveSegment = 1, kSevenSegment = 2 };
 constexpr const char* Name(WaveMode mode) {
   constexpr const char* kNames[] = {"asymmetric", "five_segment", "seven_segment"};

@@ -1,6 +1,6 @@
-// Time has types, never a bare number. HostInstant: nanoseconds of the coordinator's monotonic
-// clock (virtual in tests; scaled where a simulated fleet runs faster than life). DeviceTicks: 100
-// us counts of one unit's own clock. The wall clock lives in daemon/ only.
+// Time has types and is never a bare number. HostInstant counts nanoseconds of the coordinator's
+// monotonic clock; it is virtual in tests, and scaled where a simulated fleet runs faster than real
+// time. DeviceTicks counts 100 us by one unit's own clock. The wall clock exists in daemon/ only.
 #pragma once
 
 #include <compare>
@@ -30,7 +30,7 @@ struct HostInstant {
 };
 inline constexpr HostInstant kNever{INT64_MAX};
 
-/// One unit's own counter, one tick is 100 us by that unit's clock.
+/// A count of one unit's own clock. Units: 100 us by that clock.
 struct DeviceTicks {
   std::uint64_t count = 0;
   constexpr auto operator<=>(const DeviceTicks&) const = default;

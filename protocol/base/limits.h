@@ -1,5 +1,5 @@
-// Every maximum of the system, and the relations between them. A loop, a queue or a table without
-// an entry here has no business in the core.
+// The maxima of the whole system, and the relations between them. Every loop, queue and table of
+// the core is bounded by an entry here.
 #pragma once
 
 #include <cstdint>
@@ -10,33 +10,36 @@ inline constexpr std::uint32_t kUnits = 32'768;
 inline constexpr std::uint32_t kBuses = 512;
 inline constexpr std::uint32_t kNodesPerBus = 128;     // electrical: a CAN segment carries no more
 inline constexpr std::uint32_t kSegmentsPerAxis = 15;  // of a move; two 4-bit counts on the wire
-inline constexpr std::uint32_t kNeighboursPerUnit = 256;  // whose reach overlaps; 6 to 30 are usual
-inline constexpr std::uint32_t kSensorsPerUnit = 16;      // four a frame, parts in three bits
-inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;       // vectors; 24 bits on the wire
+// Units whose reach overlaps; 6 to 30 are usual.
+inline constexpr std::uint32_t kNeighboursPerUnit = 256;
+inline constexpr std::uint32_t kSensorsPerUnit = 16;         // four a frame, the part in three bits
+inline constexpr std::int32_t kPositionMax = (1 << 23) - 1;  // vectors; 24 bits on the wire
 inline constexpr std::uint32_t kOffsetTicksMax = (1u << 24) - 1;  // 100 us each: 28 minutes
-inline constexpr std::uint32_t kRequestRetries = 4;  // waits double: 31 times the first in all
+// The waits double: 31 times the first wait in all.
+inline constexpr std::uint32_t kRequestRetries = 4;
 inline constexpr std::uint32_t kStageRetries = 3;
 inline constexpr std::uint32_t kRoundsPerConfiguration = 6;
-inline constexpr std::uint32_t kMovesReserved = 1024;  // numbers that the store knows as taken
+inline constexpr std::uint32_t kMovesReserved = 1024;  // numbers that the store has marked as taken
 inline constexpr std::uint32_t kFramesPerBusQueued = 4096;
 inline constexpr std::uint32_t kFramesPerStep = 65'536;
 inline constexpr std::uint32_t kSpotsPerExposure = 131'072;  // fibres, fiducials, dust
 inline constexpr std::uint32_t kFiducials = 4096;
 inline constexpr std::uint32_t kCsvColumns = 1024;         // moves.csv has some 30
-inline constexpr std::uint32_t kCsvRowBytes = 1u << 20;    // a quote without an end stops here
+inline constexpr std::uint32_t kCsvRowBytes = 1u << 20;    // ends the search for the end of a quote
 inline constexpr std::uint32_t kBadRowsReported = 20;      // of a table; the others are counted
 inline constexpr std::uint32_t kExposureBytes = 1u << 28;  // an image of the sensor and its spots
-inline constexpr std::uint32_t kExposureIdBytes = 64;      // a name, told in logs and alarms
-inline constexpr std::uint32_t kCameraFiles = 16'384;      // seen in the camera's folder at once
+inline constexpr std::uint32_t kExposureIdBytes = 64;      // a name in logs and alarms
+inline constexpr std::uint32_t kCameraFiles = 16'384;      // in the camera's folder at once
 inline constexpr std::uint32_t kControlClients = 64;
-inline constexpr std::uint32_t kControlClientsReserved = 8;  // beside them, for who says stop
+inline constexpr std::uint32_t kControlClientsReserved =
+    8;                                              // besides those, for clients that send a stop
 inline constexpr std::uint32_t kControlDepth = 16;  // of lists and objects within one another
-inline constexpr std::uint32_t kControlValues = 2 * kUnits;  // of a request, all lists together
+inline constexpr std::uint32_t kControlValues = 2 * kUnits;  // of a request, over all its lists
 inline constexpr std::uint32_t kVerbBytes = 32;
-inline constexpr std::uint32_t kTextBytes =
-    255;  // reasons, names: what DDS carries (focalfleet.idl)
+// Reasons and names, as DDS carries them (focalfleet.idl).
+inline constexpr std::uint32_t kTextBytes = 255;
 
-// The largest focal plane in view (20,000 units at 100 a bus) fits with room.
+// The largest focal plane in view, 20,000 units at 100 a bus, fits with room.
 static_assert(kUnits >= 20'000 && kBuses * 100 >= kUnits);
 static_assert(kNodesPerBus < 255, "255 is the broadcast address");
 static_assert(kSensorsPerUnit <= 4 * 8, "four a frame, the part in three bits");
@@ -46,8 +49,8 @@ static_assert(kSpotsPerExposure >= 2 * (kUnits + kFiducials), "a plate seen with
 static_assert(kCsvRowBytes >= kUnits * 11, "faults.csv may name every unit in one cell");
 static_assert(kExposureBytes >= 11'000u * 11'000u * 2 + kSpotsPerExposure * 128,
               "16 bits a pixel, and 128 characters a spot");
-// A whole bus's upload (begin + all segments, both axes) may be queued at once at the usual 8
-// segments.
+// The upload of a whole bus may be queued at once: the begin and all segments of both axes, at the
+// usual 8 segments.
 static_assert(kFramesPerBusQueued >= kNodesPerBus * (1 + 2 * 8));
 
 }  // namespace focalfleet::limits

@@ -1,7 +1,7 @@
-// Chance as an argument. The generator is xoshiro256** seeded by splitmix64, and the distributions
-// are our own, because the standard ones differ between libraries and the same seed must give the
-// same bits. Sub-streams are keyed by (seed, purpose, index): a new draw in one place does not
-// shift the others.
+// Chance is an argument. The generator is xoshiro256** seeded by splitmix64. The distributions are
+// written here, because the standard ones differ between libraries and the same seed must give the
+// same bits. Sub-streams are keyed by (seed, purpose, index), so that a new draw in one place does
+// not shift the others.
 #pragma once
 
 #include <array>
@@ -54,8 +54,8 @@ class Rng {
     }
   }
 
-  /// Standard normal (Marsaglia's polar method; no cached second value, so a draw has no hidden
-  /// state).
+  /// A standard normal draw (Marsaglia's polar method). No second value is cached, so that a draw
+  /// has no hidden state.
   double Normal() {
     for (;;) {
       const double u = Uniform(-1, 1);

@@ -1,5 +1,5 @@
-// The characters of a text that may be anything: one after the other, what is no UTF-8 byte by
-// byte.
+// The characters of a text that may hold any bytes, one after the other. Bytes that are no UTF-8
+// come one by one.
 #pragma once
 
 #include <cstddef>
@@ -10,11 +10,11 @@ namespace focalfleet {
 struct Utf8Character {
   std::size_t bytes = 1;  // taken from the text, at least one
   char32_t code = 0;
-  bool valid = false;  // false: one byte that is none, `code` is 0
+  bool valid = false;  // false: one byte that is no UTF-8, and `code` is 0
 };
 
-/// Total over all bytes. Not valid: overlong forms, surrogates, what is beyond U+10FFFF. Pre:
-/// `text` is not empty.
+/// The first character of any bytes. Overlong forms, surrogates and codes beyond U+10FFFF are not
+/// valid. Pre: `text` is not empty.
 constexpr Utf8Character FirstCharacter(std::string_view text) {
   constexpr char32_t kLeastOfLength[] = {0, 0, 0x80, 0x800, 0x10000};
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };

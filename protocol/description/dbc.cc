@@ -43,7 +43,7 @@ std::vector<DescribedFrame> DescribedFrames() {
           Pack({row.function, row.from_unit, {}, static_cast<std::uint8_t>(value)});
       std::string name = row.name;
       if (detail != nullptr) {
-        // Two of one name would differ in a "yes" alone; the field says what it means.
+        // Two values of one name differ in a flag alone; the field's name says what it means.
         const std::string label = detail->names[static_cast<std::size_t>(value)];
         if (label == "yes") name += std::string("_") + detail->name;
         if (label != "yes" && label != "no") name += "_" + label;

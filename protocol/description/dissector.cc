@@ -147,7 +147,7 @@ std::string LuaField(const FieldRow& field) {
   return text + "},\n";
 }
 
-// Byte = mask of the bits that no field covers.
+// The masks of bits that no field covers, as byte = mask.
 std::string Reserved(const MessageRow& row) {
   std::string text;
   for (unsigned byte = 0; byte < row.length; ++byte) {

@@ -3,7 +3,7 @@
 namespace focalfleet {
 namespace {
 
-// 16-23, or 2.0-2.2 for bits within a byte, or "detail".
+// The place of a field: 16-23, or 2.0-2.2 for bits within a byte, or "detail".
 std::string Place(const FieldRow& field) {
   if (field.in_detail) return "detail";
   const unsigned last_bit = field.first_bit + field.bits - 1u;

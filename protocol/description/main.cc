@@ -1,5 +1,5 @@
-// describe_protocol dbc | dissector | frames: what is committed as protocol/focalfleet.dbc, as
-// protocol/focalfleet.lua, and between the marks of docs/protocol.md.
+// describe_protocol dbc | dissector | frames prints protocol/focalfleet.dbc,
+// protocol/focalfleet.lua, or the part of docs/protocol.md between its marks, as committed.
 #include <cstdio>
 #include <string_view>
 

@@ -1,6 +1,6 @@
 // The door between the coordinator and a bus. SocketCAN, a UNIX socket and the in-process simulated
-// bus are three implementations; the core cannot tell which. A port never blocks: what it cannot
-// take now it refuses, and the caller keeps it.
+// bus implement it, and the core cannot distinguish them. A port never blocks: it refuses the
+// frames that it cannot take now, and the caller keeps them.
 #pragma once
 
 #include <span>
@@ -14,7 +14,7 @@ namespace focalfleet {
 
 struct ReceivedFrame {
   BusId bus;
-  HostInstant at;  // the frame had ended by then, however long its reader was held up
+  HostInstant at;  // not before the end of the frame, and possibly later
   CanFrame frame;
 };
 
@@ -31,10 +31,12 @@ class FramePort {
   FramePort& operator=(const FramePort&) = delete;
   virtual ~FramePort() = default;
 
-  /// How many of `frames` were taken, from the front. Fewer than all: the link is full or down.
+  /// Returns how many of `frames` were taken, from the front. Fewer than all: the link is full or
+  /// down.
   virtual std::size_t Send(std::span<const CanFrame> frames) = 0;
 
-  /// Appends what has arrived; never waits. Frames that arrived while it ran are later than `now`.
+  /// Appends the frames that have arrived, without waiting. Frames that arrive during the call are
+  /// later than `now`.
   virtual void Receive(HostInstant now, std::vector<ReceivedFrame>* out) = 0;
 
   [[nodiscard]] virtual LinkState state() const = 0;

@@ -1,5 +1,5 @@
-// One CAN 2.0B data frame with a 29-bit identifier: the only kind that focalfleet sends or
-// understands. Ports drop (and count) everything else before it gets here.
+// A CAN 2.0B data frame with a 29-bit identifier. focalfleet sends and understands no other kind;
+// ports drop and count all others.
 #pragma once
 
 #include <array>

@@ -8,8 +8,9 @@ namespace {
 
 using Broken = tl::unexpected<const char*>;
 
-constexpr std::size_t kShortDigits = 3;     // candump writes 11-bit identifiers with 3 digits,
-constexpr std::size_t kExtendedDigits = 8;  // and all others with 8
+// candump writes 11-bit identifiers with 3 digits, and all others with 8.
+constexpr std::size_t kShortDigits = 3;
+constexpr std::size_t kExtendedDigits = 8;
 constexpr std::uint32_t kErrorFlag = 0x20000000;
 constexpr unsigned kFdBytesMax = 64;
 
@@ -19,7 +20,7 @@ constexpr const char* kNoData = "the data are not pairs of hexadecimal digits";
 constexpr const char* kNoLength = "the length is no number of bytes";
 constexpr const char* kTooMuch = "more bytes than a frame has";
 
-/// Cuts the next word off; empty at the end.
+/// Cuts off the next word; the result is empty at the end.
 std::string_view NextWord(std::string_view* rest) {
   const std::size_t begin = rest->find_first_not_of(" \t\r");
   if (begin == std::string_view::npos) return *rest = {};
@@ -41,7 +42,7 @@ bool TakePrefix(std::string_view* text, std::string_view prefix) {
   return true;
 }
 
-/// "(...)" at the front, with the blanks that a date has inside.
+/// Takes "(...)" from the front; a date has blanks inside.
 bool TakeTime(std::string_view* rest, std::string_view* time) {
   const std::size_t begin = rest->find_first_not_of(" \t");
   if (begin == std::string_view::npos || (*rest)[begin] != '(') return true;
@@ -76,7 +77,7 @@ bool MayBeGroup(const CandumpLine& line) {
   return line.foreign == nullptr && line.frame.id == kGroupId;
 }
 
-/// Data without blanks.
+/// Reads data bytes that stand without blanks.
 template <class Frame>
 tl::expected<void, const char*> ReadPairs(std::string_view data, Frame* frame) {
   for (; !data.empty(); data = data.substr(data.size() < 2 ? data.size() : 2)) {
@@ -86,8 +87,8 @@ tl::expected<void, const char*> ReadPairs(std::string_view data, Frame* frame) {
   return {};
 }
 
-/// As candump prints them behind the length: two digits a byte or eight bits, ascending after
-/// blanks or descending after a '`'.
+/// Reads data bytes as candump prints them after the length: two hexadecimal digits a byte, or
+/// eight bits. They ascend after blanks and descend after a '`'.
 template <class Frame>
 bool ReadPrinted(std::string_view* rest, unsigned count, Frame* frame) {
   bool descends = false;
@@ -108,7 +109,8 @@ bool ReadPrinted(std::string_view* rest, unsigned count, Frame* frame) {
   return true;
 }
 
-/// "[5]", "[05]" of CAN FD, "[0005]" of CAN XL, "{B}": eight bytes, with the length code B.
+/// The length as printed: "[5]", "[05]" for CAN FD, "[0005]" for CAN XL. "{B}" means eight bytes
+/// with the length code B.
 struct PrintedLength {
   unsigned bytes = 0;
   std::size_t digits = 0;
@@ -127,7 +129,8 @@ std::optional<PrintedLength> TakeLength(std::string_view* rest) {
   return length;
 }
 
-/// Two digits of the virtual network and three of the priority, then "81:00:12345678#...".
+/// CAN XL has two digits of the virtual network and three of the priority, then
+/// "81:00:12345678#...".
 bool IsXl(std::string_view identifier, std::string_view data) {
   std::uint32_t digits = 0;
   return identifier.size() == 5 && Parse(identifier, 16, &digits) && data.size() > 2 &&
@@ -142,7 +145,7 @@ tl::expected<CandumpLine, const char*> ParseLogged(std::string_view word, Candum
     return line;
   }
   if (!TakeIdentifier(word.substr(0, hash), &line)) return Broken(kNoIdentifier);
-  // The length code of eight bytes, where it is not 8.
+  // A length code of eight bytes other than 8 stands behind the data.
   if (data.size() == 18 && data[16] == '_') data.remove_suffix(2);
   if (MayBeGroup(line) && data.size() >= 2 && data[0] == '#') {
     line.group = FdFrame{.id = line.frame.id};
@@ -158,7 +161,7 @@ tl::expected<CandumpLine, const char*> ParseLogged(std::string_view word, Candum
 
 tl::expected<CandumpLine, const char*> ParsePlain(std::string_view word, std::string_view rest,
                                                   CandumpLine line) {
-  if (word == "TX" || word == "RX") {  // and two columns of flags
+  if (word == "TX" || word == "RX") {  // two columns of flags follow
     NextWord(&rest);
     NextWord(&rest);
     word = NextWord(&rest);
@@ -197,7 +200,7 @@ tl::expected<CandumpLine, const char*> ParsePlain(std::string_view word, std::st
 
 constexpr std::string_view kWarning = "Warning: console output active while logging!";
 
-// How lines begin that candump writes beside its frames, where both go into one file.
+// candump writes lines with these openings besides its frames, where both go into one file.
 constexpr std::string_view kSayings[] = {kWarning,
                                          "Enabling Logfile ",
                                          "Disabled standard output while logging.",
@@ -245,7 +248,7 @@ std::string WithoutDecoration(std::string_view line) {
       continue;
     }
     const std::size_t end = line.find_first_not_of("0123456789;", i + 2);
-    i = std::min(end, line.size() - 1);  // the letter that ends it
+    i = std::min(end, line.size() - 1);  // the letter that ends the colour
   }
   std::string_view rest = plain;
   if (TakePrefix(&rest, kWarning) && rest.find_first_not_of(" \r") != std::string_view::npos)

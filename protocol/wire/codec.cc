@@ -38,7 +38,7 @@ void SetDataBits(std::uint64_t word, CanFrame* frame) {
   for (unsigned i = 0; i < 8; ++i) frame->data[i] = static_cast<std::uint8_t>(word >> (8 * i));
 }
 
-// ---- what no table says
+// ---- what no table contains
 
 template <class Message>
 Function FunctionOf(const Message&) {
@@ -80,7 +80,7 @@ CanFrame EncodeOne(const Message& message, Address address, bool from_unit) {
   return frame;
 }
 
-// Which rule it breaks; nothing where it breaks none, and the message is filled.
+// Returns the rule that the frame breaks. Nothing: it breaks none, and the message is filled.
 template <class Message>
 std::optional<Malformed> DecodeOne(const CanFrame& frame, Message* message) {
   if (frame.length != Layout<Message>::kLength) return Malformed::kLength;
@@ -94,7 +94,7 @@ std::optional<Malformed> DecodeOne(const CanFrame& frame, Message* message) {
     const std::int64_t value = ValueOf(field.row, field.row.in_detail ? detail : word);
     const bool within = value >= field.row.min && value <= field.row.max;
     good &= within;
-    // A detail that its field does not know is reserved like one that no field has.
+    // A detail value without a name in its field is reserved, like a detail that no field has.
     reserved |= field.row.in_detail && !within;
     Store(value, &field.access(*message));
   };

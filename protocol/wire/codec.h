@@ -1,7 +1,7 @@
-// Values <-> frames. Encode is total; decode is total over all frames: any identifier and any bytes
-// give a message or a Malformed that says which rule was broken, never an assertion. No heap, no
-// clock, no I/O. Everything is little-endian; reserved bits and bytes are zero and checked, so that
-// a later version can give them a meaning without being misread by this one.
+// The codec turns values into frames and back. Encode is total. Decode is total over all frames:
+// any identifier and any bytes give a message or a Malformed that names the broken rule. The codec
+// uses no heap, clock or I/O. Numbers are little-endian. Reserved bits and bytes are zero and
+// checked, so that a later version can give them a meaning that this one does not misread.
 #pragma once
 
 #include <tl/expected.hpp>
@@ -15,11 +15,11 @@ namespace focalfleet {
 CanFrame Encode(const HostMessage& message, Address address);
 CanFrame Encode(const UnitMessage& message, Address address);
 
-/// Which rule a frame broke.
+/// The rule that a frame broke.
 enum class Malformed : std::uint8_t {
   kIdentifier,  // more than 29 bits
   kFunction,    // no such function, or the wrong priority for it
-  kDirection,   // a host frame where a unit's was expected, or no such message in this direction
+  kDirection,   // a host frame in place of a unit's, or no such message in this direction
   kNode,        // an answer from the broadcast address
   kLength,
   kValue,     // an enumerator, count or range

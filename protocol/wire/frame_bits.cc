@@ -21,7 +21,8 @@ struct LevelRecord {
   FrameLevels levels;
 };
 
-// Walks the stuffed part of a frame bit by bit: CRC and stuff bits grow as the wire would see them.
+// The walk goes through the stuffed part of a frame bit by bit. CRC and stuff bits grow as on the
+// wire.
 template <class Record>
 class BitWalk {
  public:
@@ -32,13 +33,13 @@ class BitWalk {
     const std::uint32_t crc = crc_;
     for (int i = 14; i >= 0; --i) Stuff(crc >> i & 1);
   }
-  /// A stuff bit is sent with the bit after it; none follows the last bit before fixed stuffing.
+  /// A stuff bit is sent with the bit after it; no stuff bit follows the last bit before fixed
+  /// stuffing.
   void DropLastStuffBit() {
     if (stuffed_last_) --bits_;
   }
   void EndArbitration() { record_.EndArbitration(); }
   [[nodiscard]] std::uint32_t bits() const { return bits_; }
-  [[nodiscard]] std::uint16_t crc() const { return static_cast<std::uint16_t>(crc_); }
   [[nodiscard]] const Record& record() const { return record_; }
 
  private:
@@ -135,7 +136,5 @@ FrameLevels LevelsOf(const CanFrame& frame) {
   walk.Crc();
   return walk.record().levels;
 }
-
-std::uint16_t FrameCrc(const CanFrame& frame) { return Walk(frame).crc(); }
 
 }  // namespace focalfleet

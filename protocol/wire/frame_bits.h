@@ -1,20 +1,23 @@
-// How long a frame occupies the bus, to the bit (ISO 11898-1, CAN 2.0B extended data frame):
+// The time for which a frame occupies the bus, to the bit (ISO 11898-1, CAN 2.0B extended data
+// frame):
 //
 //   stuffed    SOF 1, base id 11, SRR 1, IDE 1, id extension 18, RTR 1, r1 r0 2, DLC 4, data 8n,
 //              CRC 15
 //   unstuffed  CRC delimiter 1, ACK slot 1, ACK delimiter 1, EOF 7, intermission 3
 //
-// so 54 + 8n + 13 bits and a stuff bit after every five equal ones: 131..160 bits for 8 bytes.
+// These are 54 + 8n + 13 bits, and a stuff bit after every five equal ones: 131..160 bits for 8
+// bytes.
 //
-// A group is a CAN FD frame (extended format, with bit rate switch), the inner part of which goes
-// at the data bit rate:
+// A group is a CAN FD frame (extended format, with bit rate switch). Its inner part goes at the
+// data bit rate:
 //
 //   nominal    SOF 1, base id 11, SRR 1, IDE 1, id extension 18, RRS 1, FDF 1, res 1, BRS 1
 //   data rate  ESI 1, DLC 4, data 8n; stuff count 4 and CRC 17 (21 beyond 16 bytes), with a fixed
 //              stuff bit before the first and after every fourth of these; CRC delimiter 1
 //   nominal    ACK slot 1, ACK delimiter 1, EOF 7, intermission 3
 //
-// The rate changes at the sample points of BRS and of the CRC delimiter: this is exact to a bit.
+// The rate changes at the sample points of BRS and of the CRC delimiter, so these counts are exact
+// to a bit.
 #pragma once
 
 #include <bitset>
@@ -28,29 +31,27 @@
 
 namespace focalfleet {
 
-/// Bits from start of frame to the end of the intermission, stuff bits of this very content
-/// included.
+/// The bits from start of frame to the end of the intermission, with the stuff bits of this
+/// content.
 std::uint32_t FrameBits(const CanFrame& frame);
 
-/// CRC-15 of the frame as the controller computes it (polynomial 0x4599).
-std::uint16_t FrameCrc(const CanFrame& frame);
-
-/// Bits of a CAN FD frame at each of its two rates.
+/// The bits of a CAN FD frame at each of its two rates.
 struct FdFrameBits {
   std::uint32_t nominal = 0;
   std::uint32_t data = 0;
 };
 FdFrameBits FrameBits(const FdFrame& frame);
 
-inline constexpr std::uint32_t kFrameBitsMin = 67;   // no data, no stuffing; 8 bits a byte more
+inline constexpr std::uint32_t kFrameBitsMin = 67;   // no data, no stuffing; each byte adds 8 bits
 inline constexpr std::uint32_t kFrameBitsMax = 160;  // 8 bytes, worst stuffing
 
-/// What stands on the wire from start of frame to the end of the CRC sequence, bit by bit.
+/// The levels on the wire from start of frame to the end of the CRC sequence, bit by bit.
 struct FrameLevels {
   std::bitset<kFrameBitsMax> recessive;
   std::bitset<kFrameBitsMax> stuff;  // bits that carry nothing
-  std::uint32_t bits = 0;            // so far; the unstuffed rest follows
-  std::uint32_t arbitration = 0;     // bits until arbitration is over: RTR is the last of them
+  std::uint32_t bits = 0;            // recorded so far; the unstuffed rest follows
+  // The bits of the arbitration field; RTR is the last of them.
+  std::uint32_t arbitration = 0;
 };
 FrameLevels LevelsOf(const CanFrame& frame);
 
@@ -58,17 +59,19 @@ constexpr DurationNs BitTime(std::uint32_t bits, std::uint32_t bit_rate_bps) {
   return {static_cast<std::int64_t>(bits) * 1'000'000'000 / bit_rate_bps};
 }
 
-/// Of one bus.
+/// The bit rates of one bus.
 struct BusRates {
   std::uint32_t nominal_bps = 1'000'000;
-  std::uint32_t data_bps = 0;  // of the inner part of CAN FD frames; 0: the bus carries none
+  // Bit rate of the inner part of CAN FD frames; 0: the bus carries no such frames.
+  std::uint32_t data_bps = 0;
 };
 
 constexpr DurationNs BitTime(const FdFrameBits& bits, const BusRates& rates) {
   return BitTime(bits.nominal, rates.nominal_bps) + BitTime(bits.data, rates.data_bps);
 }
 
-/// In bits of the nominal rate, rounded up: what goes faster counts for the time that it takes.
+/// The duration in bits of the nominal rate, rounded up: bits at the data rate count for their
+/// time.
 constexpr std::uint32_t NominalBits(const FdFrameBits& bits, const BusRates& rates) {
   const std::uint64_t scaled = std::uint64_t{bits.data} * rates.nominal_bps;
   return bits.nominal + static_cast<std::uint32_t>((scaled + rates.data_bps - 1) / rates.data_bps);
@@ -83,16 +86,16 @@ constexpr std::uint32_t LongestFrameBits(const BusRates& rates) {
   return group > kFrameBitsMax ? group : kFrameBitsMax;
 }
 
-/// What goes over the bus as one frame: a group, or one frame alone.
+/// The frames that go over the bus as one: a group, or one frame alone.
 struct OnWire {
   std::size_t frames = 0;
   std::uint32_t bits = 0;  // of the nominal rate
 };
-/// Of frames that are handed down one behind the other: what the front of them becomes.
-/// Pre: `frames` is not empty. Cost: no more than the first kGroupEntriesMax are looked at.
+/// The front of a queue of frames, as the bus carries it: a group or one frame. Pre: `frames` is
+/// not empty. Cost: at most the first kGroupEntriesMax are looked at.
 OnWire NextOnWire(std::span<const CanFrame> frames, const BusRates& rates);
 
-/// Of all of them. Units: bits of the nominal rate.
+/// The time of all frames on the bus. Units: bits of the nominal rate.
 std::uint64_t BitsOnWire(std::span<const CanFrame> frames, const BusRates& rates);
 
 }  // namespace focalfleet

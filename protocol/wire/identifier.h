@@ -2,11 +2,11 @@
 //
 //   28..26 priority   25..20 function   19 from unit   18..11 node   10..3 sequence   2..0 detail
 //
-// Priority comes first so that a stop passes everything that waits; the node is part of the
-// identifier, so two units never send the same one; the sequence number is there, not in the
-// payload, so that all eight bytes carry data and an answer names the question it belongs to.
-// Begin, segments and read-back of an upload have one priority and ascending function numbers: a
-// controller that sends its lowest waiting identifier first still sends them in this order.
+// The priority comes first, so that a stop passes every frame that waits. The node is part of the
+// identifier, so that two units never send the same one. The sequence number is part of it as well:
+// all eight bytes carry data, and an answer names the request that it belongs to. Begin, segments
+// and read-back of an upload have one priority and ascending function numbers. A controller that
+// sends its lowest waiting identifier first therefore keeps them in this order.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +32,7 @@ enum class Function : std::uint8_t {
   kIdentify = 13,
   kParameterRead = 14,
   kParameterWrite = 15,
-  kStageGroup = 16,  // of CAN FD frames alone (stage_group.h)
+  kStageGroup = 16,  // in CAN FD frames alone (stage_group.h)
   kSensors = 17,
 };
 inline constexpr std::uint32_t kFunctionCount = 18;
@@ -43,7 +43,7 @@ struct FunctionRow {
   std::uint8_t priority;  // 0 wins; the same for both directions
 };
 
-/// The one table of functions, in the order of their numbers.
+/// The table of all functions, in the order of their numbers.
 inline constexpr FunctionRow kFunctions[kFunctionCount] = {
     {Function::kStop, "stop", 0},
     {Function::kStart, "start", 1},
@@ -70,8 +70,8 @@ constexpr const FunctionRow& InfoOf(Function function) {
 }
 constexpr const char* Name(Function function) { return InfoOf(function).name; }
 
-/// Where a frame goes to or comes from, and which exchange it belongs to. An answer repeats the
-/// sequence number of its request; a frame that a unit sends unasked carries 0.
+/// The address says where a frame goes to or comes from, and which exchange it belongs to. An
+/// answer repeats the sequence number of its request. A frame that a unit sends unasked carries 0.
 struct Address {
   NodeId node;
   std::uint8_t sequence = 0;
@@ -82,7 +82,7 @@ struct Identifier {
   Function function;
   bool from_unit = false;
   Address address;
-  std::uint8_t detail = 0;  // 3 bits, meaning by function
+  std::uint8_t detail = 0;  // 3 bits; its meaning depends on the function
 };
 
 constexpr std::uint32_t Pack(const Identifier& id) {

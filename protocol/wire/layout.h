@@ -1,7 +1,8 @@
-// What stands where in every frame: one table per message, and the only place that knows. The codec
-// runs over these tables, and `MessageRows` (message_rows.h) are the same for whoever prints them.
+// The layout of every frame: one table per message. No other file contains places of bits. The
+// codec runs over these tables, and `MessageRows` (message_rows.h) gives the same rows to programs
+// that print or describe frames.
 //
-// All of it is known to the compiler, so a frame is put together by shifts of constants.
+// The compiler has all of it at hand, so a frame is put together by shifts of constants.
 #pragma once
 
 #include <array>
@@ -45,7 +46,7 @@ constexpr FieldRow Within(FieldRow row, std::int64_t min, std::int64_t max) {
   row.max = max;
   return row;
 }
-/// A position: 24 bits, of which the lowest value is none.
+/// A position: 24 bits, of which the lowest value means no position.
 constexpr FieldRow Position(const char* name, unsigned first_bit) {
   return Within(Signed(name, first_bit, 24, "vectors"), -limits::kPositionMax,
                 limits::kPositionMax);
@@ -63,7 +64,7 @@ constexpr FieldRow InDetail(const char* name, std::span<const char* const> names
   return row;
 }
 
-// ---- where a field lives in its message
+// ---- the place of a field in its message
 
 template <class Message, class Member>
 struct Whole {
@@ -108,7 +109,8 @@ constexpr auto Bind(FieldRow row, Part Message::*part, Member Part::*member) {
 
 // ---- the tables
 
-/// Of one message: kName, kFunction, kLength, kFields, and kDetail where its detail is constant.
+/// The table of one message: kName, kFunction, kLength, kFields, and kDetail where its detail is
+/// constant.
 template <class Message>
 struct Layout;
 
@@ -369,7 +371,8 @@ struct Layout<IdentifyReply> : ConstantDetail {
 template <>
 struct Layout<ParameterReply> {
   static constexpr const char* kName = "parameter_read_reply";
-  static constexpr Function kFunction = Function::kParameterRead;  // of one to a write: the next
+  // A reply to a write has the next function.
+  static constexpr Function kFunction = Function::kParameterRead;
   static constexpr std::uint8_t kLength = 6;
   static constexpr std::tuple kFields{
       Bind(InDetail("axis", kAxisNames), &ParameterReply::axis),
@@ -390,9 +393,9 @@ struct Layout<SensorsReply> {
       BindAt(Unsigned("fourth", 48, 16, "counts"), &SensorsReply::counts, 3)};
 };
 
-// ---- what follows from them
+// ---- what follows from the tables
 
-/// A constant detail, where no field stands there.
+/// The constant detail of messages in which no field stands there.
 template <class Message>
 concept HasConstantDetail = requires {
   Layout<Message>::kDetail;

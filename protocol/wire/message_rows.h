@@ -1,9 +1,9 @@
-// Every kind of frame as rows: for what prints frames or describes them to other programs (the DBC
-// file, the dissector, docs/protocol.md, decoded logs). They are the codec's own tables (layout.h).
+// Every kind of frame as rows, for programs that print frames or describe them (the DBC file, the
+// dissector, docs/protocol.md, decoded logs). The rows are the codec's own tables (layout.h).
 //
-// The data bytes are one little-endian number of 8 * length bits, and a field is a run of its bits:
-// first bit 8 * byte + bit of the byte. A field may also stand in the identifier's three detail
-// bits. What no field covers is reserved.
+// The data bytes are one little-endian number of 8 * length bits, and a field is a run of its bits.
+// The first bit is 8 * byte + bit of the byte. A field may also stand in the identifier's three
+// detail bits. Bits that no field covers are reserved.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct FieldRow {
   const char* name;
   std::uint8_t first_bit;
   std::uint8_t bits;
-  bool in_detail = false;  // of the identifier; otherwise of the data
+  bool in_detail = false;  // within the identifier; otherwise within the data
   bool is_signed = false;
   std::int64_t min = 0;
   std::int64_t max = 0;
@@ -41,14 +41,14 @@ struct MessageRow {
   }
 };
 
-/// All kinds of frames, those from the host first, by function and detail.
+/// All kinds of frames, those from the host first, ordered by function and detail.
 std::span<const MessageRow> MessageRows();
 
-/// The row of a frame that DecodeHost or DecodeUnit takes; null where no row has its function,
+/// The row of a frame that DecodeHost or DecodeUnit accepts. Null: no row has its function,
 /// direction and length.
 const MessageRow* RowOf(const CanFrame& frame);
 
-/// One field of a frame, taken out of the data bytes as one number, or of the detail.
+/// A field of a frame, taken from the data bytes as one number, or from the detail.
 constexpr std::int64_t ValueOf(const FieldRow& field, std::uint64_t bits) {
   const unsigned above = 64u - field.bits - field.first_bit;
   const std::uint64_t left = bits << above;

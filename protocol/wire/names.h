@@ -1,4 +1,4 @@
-// What the numbers on the wire are called, in the order of the numbers.
+// The names of the numbers on the wire, in the order of the numbers.
 #pragma once
 
 #include "protocol/base/ids.h"

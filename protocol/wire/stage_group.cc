@@ -8,10 +8,11 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint8_t kFill = 0xff;  // where a node would stand: nobody's, so no more entries
+// This byte stands where a node would stand. No node has this number, so the entries end here.
+constexpr std::uint8_t kFill = 0xff;
 constexpr std::size_t kHeader = 3;
 
-// Of a function that groups carry.
+// The data length of a function that groups carry.
 std::optional<std::uint8_t> LengthOf(std::uint32_t function) {
   switch (static_cast<Function>(function)) {
     case Function::kStageBegin:

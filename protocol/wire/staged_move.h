@@ -1,5 +1,5 @@
-// A move as the wire carries it and as the unit holds it: both ends compute its digest from the
-// same bytes, so a confirmed digest means that the unit holds exactly the move that was planned.
+// A move as the wire carries it and as the unit holds it. Both ends compute its digest from the
+// same bytes, so an equal digest means that the unit holds exactly the planned move.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ struct StagedMove {
   std::array<AxisPath, kAxisCount> path;
 };
 
-/// CRC-32 (IEEE 802.3, reflected) of the payload bytes of StageBegin and of every StageSegment in
-/// the order theta 0.., phi 0...
+/// The digest is CRC-32 (IEEE 802.3, reflected) of the payload bytes of StageBegin and of every
+/// StageSegment, in the order theta 0.., phi 0...
 std::uint32_t Digest(const StagedMove& move);
 
 }  // namespace focalfleet

@@ -1,18 +1,19 @@
-// A two-level three-phase bridge: three legs, each with an upper and a lower switch and a diode
+// A two-level three-phase bridge has three legs, each with an upper and a lower switch and a diode
 // beside each. A command opens one switch and, after the dead time, closes the other. While both
-// are open the current decides: out of the leg (i > 0) it comes through the lower diode, into the
-// leg through the upper one, and where it has died out the leg floats. Whenever the leg's voltage
-// changes it does so along a ramp; while it does, the device that carries the current carries the
-// voltage, too, and heats. A switch acts in the middle of its gate's ramp: a leg's own ramp lies
-// around that instant, and a leg that floats or stands at the right rail already is taken over
-// then.
+// are open the current decides. Current out of the leg (i > 0) comes through the lower diode,
+// current into the leg through the upper one. Where the current has died out the leg floats.
+//
+// The leg's voltage changes along a ramp. Meanwhile the device that carries the current also
+// carries the voltage, and heats. A switch acts in the middle of its gate's ramp: a leg's own ramp
+// lies around that instant. A leg that floats, or stands at the right rail already, is taken over
+// at that instant.
 #pragma once
 
 #include <limits>
 
 namespace focalfleet::sim {
 
-/// Paper 1: STM32F302 with a MOSFET bridge of 10 ns, 10 ns and 50 ns.
+/// The values are those of paper 1: STM32F302 with a MOSFET bridge of 10 ns, 10 ns and 50 ns.
 struct Bridge {
   double v_bus_V = 1.8;
   double rise_s = 10e-9;
@@ -20,7 +21,7 @@ struct Bridge {
   double dead_time_s = 50e-9;
 };
 
-/// One leg as it is now. Times count from the begin of the carrier period.
+/// The present state of one leg. Times count from the begin of the carrier period.
 struct Leg {
   enum class Path { kUpper, kLower, kUpperDiode, kLowerDiode, kFloats };
 

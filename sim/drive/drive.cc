@@ -13,14 +13,43 @@ constexpr double kRoot3Half = 0.86602540378443864676;
 constexpr std::array<Complex, kLegCount> kPhase = {
     {{1, 0}, {-0.5, kRoot3Half}, {-0.5, -kRoot3Half}}};
 
-// No interval is longer: bounds the turn of the rotor and the change of its speed within one.
+// Every interval is at most this long. The bound limits the turn of the rotor and the change of its
+// speed within an interval.
 constexpr double kStepMax_s = 1e-6;
-// Below it a current that died out is not looked for again.
+// The search for the instant at which a current dies out advances by at least this much.
 constexpr double kCrossingMin_s = 1e-14;
 
 double Project(Complex vector, std::size_t leg) {
   return vector.real() * kPhase[leg].real() + vector.imag() * kPhase[leg].imag();
 }
+
+// A switching edge of one carrier period.
+struct Order {
+  double at_s;
+  std::size_t leg;
+  bool high;
+};
+
+// The edges of one carrier period in order of time.
+struct Orders {
+  Orders(const Pattern& pattern, const Modulation& modulation) {
+    for (std::size_t k = 0; k < kLegCount; ++k) {
+      if (pattern[k].none()) {
+        of[count++] = {0, k, false};
+        continue;
+      }
+      if (pattern[k].on > 0) of[count++] = {0, k, false};
+      of[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
+      if (pattern[k].off < modulation.counter1)
+        of[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
+    }
+    std::sort(of.begin(), of.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
+  }
+
+  std::array<Order, 3 * kLegCount> of;
+  std::size_t count = 0;
+};
 
 }  // namespace
 
@@ -70,8 +99,9 @@ void Drive::Command(Leg* leg, bool high, double now_s, double phase_A) {
 }
 
 // At the end of a dead time the gate begins to rise. A leg that the other diode still holds begins
-// its ramp, which lies around the middle of the gate's. Any other waits until there: its own diode
-// holds it at the rail already, or its current has died out (or is about to) and it floats.
+// its ramp, which lies around the middle of the gate's. Any other leg waits until that middle. Its
+// own diode holds it at the rail already, or its current has died out (or is about to) and it
+// floats.
 void Drive::CloseSwitches(double now_s) {
   for (std::size_t k = 0; k < kLegCount; ++k) {
     Leg& leg = legs_[k];
@@ -97,26 +127,24 @@ void Drive::CloseSwitches(double now_s) {
   }
 }
 
-double Drive::BackEmf(std::size_t leg) const {
-  return Project(kJ * (speed_ * setting_.motor.flux_linkage_Wb) * direction_, leg);
-}
-
-// The voltage that a leg without current takes from the others: that of the star plus its back-EMF.
+// A leg without current takes its voltage from the others: that of the star plus its back-EMF.
 double Drive::FloatingVoltage(std::size_t leg) const {
+  const Complex back_emf_V = kJ * (speed_ * setting_.motor.flux_linkage_Wb) * direction_;
   double tied_V = 0;
   double tied_emf_V = 0;
   int tied = 0;
   for (std::size_t other = 0; other < kLegCount; ++other) {
     if (other == leg || legs_[other].path == Leg::Path::kFloats) continue;
     tied_V += legs_[other].voltage_V;
-    tied_emf_V += BackEmf(other);
+    tied_emf_V += Project(back_emf_V, other);
     ++tied;
   }
   if (tied == 0) return setting_.bridge.v_bus_V / 2;
-  return (tied_V - tied_emf_V) / tied + BackEmf(leg);
+  return (tied_V - tied_emf_V) / tied + Project(back_emf_V, leg);
 }
 
-// A leg floats only while its voltage stays between the rails; beyond, a diode takes it.
+// A leg floats only while its voltage stays between the rails; beyond them a diode carries the
+// current.
 void Drive::SettleDiodes(double now_s) {
   for (std::size_t k = 0; k < kLegCount; ++k) {
     Leg& leg = legs_[k];
@@ -164,7 +192,7 @@ Drive::Course Drive::CourseOf(double speed) const {
   const Complex emf2 = emf1 * turn * 0.5;
   course.c = {(voltage - l * c1) / r + emf, c1 + emf1, emf2, emf2 * turn * (1.0 / 3)};
   if (floating == 1) {
-    // Two legs in series: only the direction across the floating phase is left.
+    // Two legs are in series: only the direction across the floating phase is left.
     const Complex across = kJ * kPhase[last_floating];
     // A floating leg's voltage lies along its own phase, so leaving it out above changes nothing.
     for (Complex& c : course.c) c = across * (c * std::conj(across)).real();
@@ -173,7 +201,8 @@ Drive::Course Drive::CourseOf(double speed) const {
   return course;
 }
 
-// When within the interval the current of a conducting diode dies out; `step_s` where it does not.
+// The instant within the interval at which the current of a conducting diode dies out; `step_s`
+// where none does.
 double Drive::Crossing(const Course& course, double step_s, std::size_t* crossed) const {
   double first = step_s;
   *crossed = kLegCount;
@@ -213,8 +242,8 @@ void Drive::Emit(const Course& course, double now_s, double step_s, double speed
   }
 }
 
-// Integrals over the interval: |i|^2, what the supply gives, what the switches take, and the
-// torque.
+// Integrals over the interval: |i|^2, the energy from the supply, the energy that the switches
+// take, and the torque.
 void Drive::Account(const Course& course, double now_s, double step_s, double decay) {
   const double tau = 1 / course.rate;
   // Integrals of t^k e^(-t/tau) and of t^k.
@@ -257,7 +286,7 @@ void Drive::Account(const Course& course, double now_s, double step_s, double de
     switching_J_ += given_J - out_J;
   }
 
-  // Torque: i seen from the rotor, whose turn is expanded as in the course.
+  // The torque's current is i seen from the rotor, whose turn is expanded as in the course.
   const Complex turn = -kJ * speed_;
   const Complex rotor =
       moments[0] + turn * (moments[1] + turn * (0.5 * moments[2] + turn / 6.0 * moments[3]));
@@ -283,7 +312,8 @@ void Drive::Advance(double now_s, double step_s) {
   current_ = course.c[0] + step_s * (course.c[1] + step_s * (course.c[2] + step_s * course.c[3])) +
              course.h * decay;
   const double turned = shaft_.angle_rad() - angle_before;
-  // e^(j turned) for a small turn, exact to 1e-15 of the step; made anew every carrier period.
+  // e^(j turned) for a small turn is exact to 1e-15 of the step. Every carrier period computes the
+  // direction anew.
   const double half = turned * turned / 2;
   direction_ *= Complex(1 - half + half * half / 6, turned * (1 - half / 3 + half * half / 30));
   for (std::size_t k = 0; k < kLegCount; ++k) {
@@ -296,32 +326,14 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
   const double period_s = modulation.carrier_s();
   direction_ = std::polar(1.0, shaft_.angle_rad());
 
-  struct Order {
-    double at_s;
-    std::size_t leg;
-    bool high;
-  };
-  std::array<Order, 3 * kLegCount> orders;
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < kLegCount; ++k) {
-    if (pattern[k].none()) {
-      orders[count++] = {0, k, false};
-      continue;
-    }
-    if (pattern[k].on > 0) orders[count++] = {0, k, false};
-    orders[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
-    if (pattern[k].off < modulation.counter1)
-      orders[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
-  }
-  std::sort(orders.begin(), orders.begin() + static_cast<std::ptrdiff_t>(count),
-            [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
-
+  const Orders orders(pattern, modulation);
   double now_s = 0;
   std::size_t next = 0;
   while (true) {
-    while (next < count && orders[next].at_s <= now_s) {
-      // The switch opens in the middle of its gate's ramp: that current finds the diode.
-      const Order& order = orders[next];
+    while (next < orders.count && orders.of[next].at_s <= now_s) {
+      // The switch opens in the middle of its gate's ramp; the current of that instant chooses the
+      // diode.
+      const Order& order = orders.of[next];
       const double half_s = (order.high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
       Command(&legs_[order.leg], order.high, now_s,
               Project(CourseOf(speed_).At(half_s), order.leg));
@@ -339,7 +351,7 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
     if (now_s >= period_s) break;
 
     double until_s = std::min(period_s, now_s + kStepMax_s);
-    if (next < count) until_s = std::min(until_s, orders[next].at_s);
+    if (next < orders.count) until_s = std::min(until_s, orders.of[next].at_s);
     bool diode = false;
     for (const Leg& leg : legs_) {
       until_s = std::min({until_s, leg.closes_at_s, leg.ramp_ends_at_s});

@@ -1,14 +1,14 @@
-// A motor on its bridge, exact between switching edges. With a floating star the three currents are
-// one complex number i (a, b, c are its projections on 0, 120, 240 degrees), and between two events
-// the circuit is linear:
+// A motor on its bridge, computed exactly between switching edges. With a floating star the three
+// currents are one complex number i (a, b, c are its projections on 0, 120, 240 degrees). Between
+// two events the circuit is linear:
 //
 //   L di/dt = v(t) - r i - j w flux e^(j theta)        v: the legs' voltages, constant or ramps
 //
-// so i(t) is a polynomial plus one exponential, written down and not stepped. Events are commands,
-// ends of dead times and ramps, and the instants at which a current dies out in a diode; the
-// rotor's speed is taken as constant between them (it changes by 1e-5 in a microsecond) at the
-// middle value. Losses are integrals of the same closed forms. Source: paper 1 eqs. 1, 2, 5, 9 with
-// Ld = Lq.
+// The current i(t) is therefore a polynomial plus one exponential; no integration in steps is
+// needed. Events are commands, ends of dead times and ramps, and the instants at which a current
+// dies out in a diode. The rotor's speed counts as constant between events, at the middle value; it
+// changes by 1e-5 in a microsecond. Losses are integrals of the same closed forms. Source: paper 1
+// eqs. 1, 2, 5, 9 with Ld = Lq.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@
 
 namespace focalfleet::sim {
 
-/// Where energy went since the start. Units: J. supply = copper + switching + load + viscous + rise
+/// The energies since the start. Units: J. supply = copper + switching + load + viscous + the rise
 /// of stored, up to rounding and the constant speed between events.
 struct DriveEnergy {
   double supply_J = 0;
@@ -34,7 +34,7 @@ struct DriveEnergy {
   double stored_J = 0;  // now: winding and rotor
 };
 
-/// What a probe sees at one instant. Leg voltages are against the negative rail.
+/// A sample of a probe. Leg voltages are against the negative rail.
 struct DriveSample {
   double t_s = 0;
   std::array<double, kLegCount> current_A{};
@@ -43,8 +43,8 @@ struct DriveSample {
   double angle_rad = 0;
 };
 
-/// What happened between two events, as integrals from `t_s` over `step_s`: of t^k i (t from the
-/// interval's begin), k = 0..3, and of the torque and of t times it.
+/// The interval between two events, as integrals from `t_s` over `step_s`: of t^k i (t from the
+/// interval's begin), k = 0..3, of the torque, and of t times the torque.
 struct DriveInterval {
   double t_s = 0;
   double step_s = 0;
@@ -62,17 +62,17 @@ class Drive {
   };
   explicit Drive(const Setting& setting);
 
-  /// Rotor only: currents and legs stay as they are (at first 0 and low).
+  /// Places the rotor only: currents and legs stay as they are (at first 0 and low).
   void Place(double angle_rad, double speed_rad_per_s) { shaft_.Place(angle_rad, speed_rad_per_s); }
   void SetCurrent(std::complex<double> current_A) { current_ = current_A; }
 
-  /// One carrier period.
+  /// Runs one carrier period.
   void RunCarrier(const Pattern& pattern, const Modulation& modulation);
 
-  /// `sink` sees samples every `period_s` from now on; none: an empty function.
+  /// `sink` receives samples every `period_s` from now on. An empty function ends the probe.
   using Sink = std::function<void(const DriveSample&)>;
   void Probe(double period_s, Sink sink);
-  /// `listener` hears every interval from now on; none: an empty function.
+  /// `listener` receives every interval from now on. An empty function ends that.
   using Listener = std::function<void(const DriveInterval&)>;
   void Listen(Listener listener) { listener_ = std::move(listener); }
 
@@ -81,19 +81,20 @@ class Drive {
   [[nodiscard]] double torque_Nm() const;
   [[nodiscard]] const Shaft& shaft() const { return shaft_; }
   [[nodiscard]] DriveEnergy energy() const;
-  /// Integral of |i|^2 since the start; half its mean is a phase's mean square.
+  /// The integral of |i|^2 since the start; half its mean is the mean square of a phase.
   [[nodiscard]] double square_A2s() const { return square_A2s_; }
-  /// Highest phase current since `ResetPeak`.
+  /// The highest phase current since `ResetPeak`.
   [[nodiscard]] double peak_A() const { return peak_A_; }
   void ResetPeak() { peak_A_ = 0; }
   [[nodiscard]] std::uint64_t edges() const { return edges_; }  // of commands, all legs
-  /// What went through diodes since the start, either way. They have no forward voltage here; times
-  /// one, this is what it would take, to first order.
+  /// The charge that went through diodes since the start, in either direction. The diodes have no
+  /// forward voltage here. The charge times a forward voltage is the energy that it would take, to
+  /// first order.
   [[nodiscard]] double diode_C() const { return diode_C_; }
 
  private:
-  // i(t) = c0 + c1 t + c2 t^2 + c3 t^3 + h e^(-t / tau) over one interval; the back-EMF's turn, at
-  // most 1e-2 rad in an interval, is expanded to third order.
+  // i(t) = c0 + c1 t + c2 t^2 + c3 t^3 + h e^(-t / tau) over one interval. The turn of the
+  // back-EMF, at most 1e-2 rad in an interval, is expanded to third order.
   struct Course {
     std::array<std::complex<double>, 4> c;
     std::complex<double> h;
@@ -110,7 +111,6 @@ class Drive {
   void Account(const Course& course, double now_s, double step_s, double decay);
   void Emit(const Course& course, double now_s, double step_s, double speed);
   [[nodiscard]] double FloatingVoltage(std::size_t leg) const;
-  [[nodiscard]] double BackEmf(std::size_t leg) const;
 
   Setting setting_;
   Shaft shaft_;

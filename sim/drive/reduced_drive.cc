@@ -9,7 +9,7 @@ using Complex = std::complex<double>;
 constexpr Complex kJ{0, 1};
 // A hundredth of the fastest swing of the rotor about its field (0.5 ms at 9 V and 0.3 mWb).
 constexpr double kStepMax_s = 20e-6;
-// Time constants until the currents of a blocked rotor repeat: e^-20.
+// The number of time constants until the currents of a blocked rotor repeat: e^-20.
 constexpr double kSettling = 20;
 
 }  // namespace
@@ -76,7 +76,7 @@ void ReducedDrive::RunVectors(std::int64_t first, std::int64_t count, double rep
     const std::int64_t index = (((first + k) % subdivision) + subdivision) % subdivision;
     const Vector& vector = vectors_[static_cast<std::size_t>(index)];
     for (double step = 0; step < steps; step += 1) {
-      // Midpoint rule: torque where the rotor is half a step on.
+      // Midpoint rule: the torque is taken where the rotor is half a step on.
       const double angle = shaft_.angle_rad();
       const double speed = shaft_.speed_rad_per_s();
       const Complex now = Current(vector, angle, speed);

@@ -1,13 +1,14 @@
-// The drive without its carrier: what is left of PWM when currents are averaged over a carrier
-// period and settle at once (their time constant is 2.5 us, a vector lasts 60 us and more). A
-// vector then is a mean voltage, and
+// The drive without its carrier. Currents are averaged over a carrier period and settle at once:
+// their time constant is 2.5 us, while a vector lasts 60 us and more. A vector is then a mean
+// voltage, and
 //
 //   i = (v_k - j w flux e^(j theta)) / (r + j w L),   T = 1.5 flux Im(i e^(-j theta))
 //
 // drives the same shaft as the drive at PWM level. The mean voltages v_k come from that level, with
-// the rotor blocked: so they know the mode, the rounding to counts, and what dead time takes.
-// Ripple and switching losses are taken from there too, as a resistance does not forget. Left out:
-// how back-EMF shifts the instants at which dead time changes sign, and the currents' settling.
+// the rotor blocked. They therefore contain the wave mode, the rounding to counts and the effect of
+// dead time. Ripple and switching losses come from that level too, because the mean current does
+// not contain them. Left out are the shift, by back-EMF, of the instants at which dead time changes
+// sign, and the settling of the currents.
 #pragma once
 
 #include <complex>
@@ -24,10 +25,10 @@ class ReducedDrive {
   ReducedDrive(const Drive::Setting& setting, const Modulation& modulation);
 
   void Place(double angle_rad, double speed_rad_per_s);
-  /// From now on every place has this load. The rotor stands at 0; place it.
+  /// Every place has this load from now on. The rotor stands at 0; place it.
   void SetLoad(double load_Nm);
-  /// Shows the vectors from `first` on, `count` of them (backwards for a negative count), each for
-  /// `repeat` carrier periods; `repeat` need not be whole.
+  /// Shows `count` vectors from `first` on (backwards for a negative count), each for `repeat`
+  /// carrier periods. `repeat` need not be whole.
   void RunVectors(std::int64_t first, std::int64_t count, double repeat);
   void RunVectors(std::int64_t first, std::int64_t count) {
     RunVectors(first, count, modulation_.repeat);
@@ -37,11 +38,12 @@ class ReducedDrive {
   [[nodiscard]] double t_s() const { return t_s_; }
   [[nodiscard]] double copper_J() const { return copper_J_; }
   [[nodiscard]] double switching_J() const { return switching_J_; }
-  /// Electrical input, copper, switching and what went into the shaft. Units: J.
+  /// Electrical input, copper, switching and energy into the shaft. Units: J.
   [[nodiscard]] double supply_J() const {
     return copper_J_ + switching_J_ + shaft_.load_J() + shaft_.viscous_J() + shaft_.kinetic_J();
   }
-  /// Torque on a blocked rotor that lags the vector by a right angle, mean over vectors. Units: Nm.
+  /// The torque on a blocked rotor that lags the vector by a right angle, mean over vectors. Units:
+  /// Nm.
   [[nodiscard]] double stall_Nm() const { return stall_Nm_; }
 
  private:

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kRealResolution = 1e-3;  // of a critical n that is not whole
-constexpr int kRepeatMax = 255;           // what a unit's timer table holds
+constexpr int kRepeatMax = 255;           // the most that a unit's timer table holds
 
-// Both levels behind one face.
+// Both levels have the same interface.
 class Reduced {
  public:
   Reduced(const Drive::Setting& setting, const Modulation& modulation)
@@ -53,8 +53,8 @@ class Pwm {
   std::vector<Pattern> table_;
 };
 
-// Rests behind `field` vectors as far as friction holds it. False: the load is more than the field
-// can ever give.
+// The rotor rests behind `field` vectors as far as friction holds it. False: the load exceeds the
+// torque that the field can give.
 template <class Level>
 bool Rest(Level* level, const Modulation& modulation, std::int64_t field, double stall_Nm,
           int direction) {
@@ -90,7 +90,7 @@ MoveCount TryMovesAt(Level level, double stall_Nm, const Drive::Setting& setting
       const std::int64_t end = field + direction * vectors;
       const double off =
           level.angle_rad() / kTurn - static_cast<double>(end) / modulation.subdivision;
-      // Turns that were lost stay lost: the next move starts where the rotor is.
+      // Lost turns stay lost: the next move starts where the rotor is.
       const auto lost = std::llround(off);
       count.succeeded += lost == 0 ? 1 : 0;
       field = end + lost * modulation.subdivision;
@@ -129,7 +129,7 @@ bool StartsReal(const ReducedDrive& rested, double load_Nm, const Modulation& mo
   constexpr int kTurns = 30;
   for (int turn = 0; turn < kTurns; ++turn) {
     drive.RunVectors(1, modulation.subdivision, repeat);
-    // A turn that is lost is not won back.
+    // A lost turn is not regained.
     if (drive.shaft().angle_rad() < (turn + 0.5) * kTurn) return false;
   }
   return true;
@@ -152,7 +152,7 @@ std::vector<Stage> MakeProfile(std::int64_t vectors, const Modulation& modulatio
     up.push_back({direction * count, repeat});
   }
   std::vector<Stage> profile = up;
-  // Full speed only after the whole ramp.
+  // Full speed comes only after the whole ramp.
   const bool whole = up.size() == static_cast<std::size_t>(ramp.stages);
   if (left > 0)
     profile.push_back(
@@ -191,7 +191,7 @@ std::optional<int> CriticalRepeat(const Drive::Setting& setting, const Modulatio
     at.repeat = repeat;
     return StartsAtWorstLoad(setting, at, trial, level);
   };
-  // Upwards: a slow field is dear to simulate, and mostly not needed.
+  // The search goes upwards: a slow field is costly to simulate, and mostly not needed.
   int fails = 0;
   int works = std::min(4, highest);
   while (!starts(works)) {
@@ -217,7 +217,7 @@ std::optional<double> CriticalRepeatReal(const ReducedDrive& drive, const Drive:
   const auto starts = [&](double repeat) {
     return StartsReal(drive, worst_Nm, modulation, repeat);
   };
-  // Upwards, for what fails does so within a turn or two.
+  // The search goes upwards, because a load that fails does so within a turn or two.
   double fails = 0.5;
   double works = 2;
   while (!starts(works)) {
@@ -239,7 +239,7 @@ double LoadOfCriticalRepeat(const Drive::Setting& setting, const Modulation& mod
   double stalls = rested.stall_Nm();
   for (int k = 0; k < 24; ++k) {
     const double worst = (starts + stalls) / 2;
-    // Critical for `repeat` is what half a count less would not start.
+    // The critical load for `repeat` is the one that half a count less would not start.
     (StartsReal(rested, worst, modulation, repeat - 0.5) ? starts : stalls) = worst;
   }
   return starts / (1 + setting.motor.load_variation);
@@ -253,7 +253,7 @@ CriticalLoads::CriticalLoads(const Drive::Setting& setting, const Modulation& mo
 double CriticalLoads::Of(int repeat) {
   const auto above = known_.lower_bound(repeat);
   if (above != known_.end() && above->first == repeat) return above->second;
-  // More time a vector never hurts: neighbours bound it.
+  // More time a vector never makes a start harder, so neighbours bound the result.
   double starts = above == known_.begin() ? 0 : std::prev(above)->second * (1 + variation_);
   double stalls = above == known_.end() ? rested_.stall_Nm() : above->second * (1 + variation_);
   const double fine_Nm = 1e-4 * rested_.stall_Nm();
@@ -265,7 +265,7 @@ double CriticalLoads::Of(int repeat) {
 }
 
 std::optional<int> CriticalLoads::RepeatFor(double load_Nm) {
-  // Upwards: a slow field is dear to simulate, and mostly not needed.
+  // The search goes upwards: a slow field is costly to simulate, and mostly not needed.
   int fails = 0;
   int works = 4;
   while (Of(works) < load_Nm) {

@@ -21,7 +21,7 @@ Drive::Setting HeldAtSpeed(Drive::Setting setting) {
 
 double FieldSpeed(const Modulation& modulation) { return kTurn * modulation.field_Hz(); }
 
-// The first vector is centred on the angle that it is shown for: the field stands still at angle 0
+// The first vector is centred on the angle that it is shown for. The field stands still at angle 0
 // while a turning rotor passes from half a vector before to half a vector after.
 double AngleAtBegin(const Modulation& modulation, double lag_rad) {
   return -lag_rad - std::numbers::pi / modulation.subdivision;
@@ -38,13 +38,13 @@ struct Trial {
   std::complex<double> current_A;
 };
 
-// Vectors until currents have settled to e^-20.
+// The number of vectors until currents have settled to e^-20.
 std::int64_t SettlingVectors(const Drive::Setting& setting, const Modulation& modulation) {
   const double tau_s = setting.motor.inductance_H / setting.motor.resistance_ohm;
   return static_cast<std::int64_t>(std::ceil(20 * tau_s / modulation.vector_s()));
 }
 
-// Starts a rotor held at speed so long before vector 0 that the currents have settled by then.
+// A rotor held at speed starts before vector 0 by as much as the currents need to settle.
 void RunIn(Drive* held, const Modulation& modulation, const std::vector<Pattern>& table,
            double lag_rad, std::int64_t vectors) {
   held->Place(AngleAtBegin(modulation, lag_rad) -
@@ -53,7 +53,7 @@ void RunIn(Drive* held, const Modulation& modulation, const std::vector<Pattern>
   RunVectors(held, modulation, table, -vectors, vectors);
 }
 
-// Mean torque at a lag, over a third of a turn: sectors repeat in pairs.
+// The mean torque at a lag, over a third of a turn: sectors repeat in pairs.
 Trial TorqueAt(const Drive::Setting& held, const Modulation& modulation,
                const std::vector<Pattern>& table, double lag_rad) {
   const double speed = FieldSpeed(modulation);
@@ -63,7 +63,7 @@ Trial TorqueAt(const Drive::Setting& held, const Modulation& modulation,
   const DriveEnergy before = drive.energy();
   const double begin_s = drive.t_s();
   RunVectors(&drive, modulation, table, 0, modulation.subdivision / 3);
-  // Mechanical work is what the winding and the switches did not take.
+  // Mechanical work is the energy that the winding and the switches did not take.
   const DriveEnergy after = drive.energy();
   const auto magnetic = [&](std::complex<double> current) {
     return 0.75 * held.motor.inductance_H * std::norm(current);
@@ -100,12 +100,12 @@ std::optional<SteadyState> FindSteadyState(const Drive::Setting& setting,
   double at_low = TorqueAt(held, modulation, table, low).torque_Nm - wanted_Nm;
   double at_high = TorqueAt(held, modulation, table, high).torque_Nm - wanted_Nm;
   if (at_high < 0) return std::nullopt;
-  for (int extended = 0; at_low > 0 && extended < 4; ++extended) {  // dragged by its load
+  for (int extended = 0; at_low > 0 && extended < 4; ++extended) {  // the load drags the rotor
     low -= std::numbers::pi / 8;
     at_low = TorqueAt(held, modulation, table, low).torque_Nm - wanted_Nm;
   }
   SteadyState state{.lag_rad = low, .speed_rad_per_s = speed};
-  // Regula falsi, the Illinois way: the end that stays counts half.
+  // Regula falsi by the Illinois rule: the end that stays counts half.
   for (int k = 0; k < 40; ++k) {
     state.lag_rad = low + (high - low) * at_low / (at_low - at_high);
     const Trial trial = TorqueAt(held, modulation, table, state.lag_rad);
@@ -131,7 +131,7 @@ double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation
   const std::vector<Pattern> table = VectorTable(modulation);
   double best_Nm = 0;
   const double top_rad = LagOfPullOut(held, FieldSpeed(modulation));
-  // The top of a sine is flat: within 3 degrees of it lies 0.14 % of it.
+  // The top of a sine is flat: values within 3 degrees of it differ by 0.14 %.
   for (int deg = -30; deg <= 12; deg += 6)
     best_Nm =
         std::max(best_Nm, TorqueAt(held, modulation, table, top_rad + deg * kTurn / 360).torque_Nm);
@@ -160,7 +160,8 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   const double diode_before_C = drive.diode_C();
   const double turn_s = 1 / modulation.field_Hz();
 
-  // Components e^(j m w t) of the current in the plane, m = -6..6; a phase sees m and -m as one.
+  // Components e^(j m w t) of the current in the plane, m = -6..6; a phase cannot distinguish m and
+  // -m.
   constexpr int kHarmonics = 6;
   std::array<std::complex<double>, 2 * kHarmonics + 1> components{};
   TorqueRipple ripple(modulation.carrier_s());

@@ -8,8 +8,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// Which legs a sector switches: high for T1 + T2, and for one of both. Even sectors begin with
-// their own vector (T1), odd ones with the next (T2); the leg that is high longest is theirs.
+// The legs that a sector switches: one is high for T1 + T2, another for one of both. Even sectors
+// begin with their own vector (T1), odd ones with the next (T2); the leg that is high longest
+// belongs to it.
 struct Sector {
   std::size_t longest;
   std::size_t second;
@@ -24,7 +25,7 @@ constexpr std::array<Sector, 6> kSectors = {{
     {0, 2, true},   // 101 100
 }};
 
-// As near to the middle as whole counts allow.
+// The pulse as near to the middle of the period as whole counts allow.
 Pulse Centred(double counts, double period) {
   const double width = std::round(counts);
   const double on = std::floor((period - width) / 2);
@@ -35,7 +36,7 @@ Pulse Centred(double counts, double period) {
 
 Pattern PatternOf(const Modulation& modulation, int index) {
   FOCALFLEET_CHECK(modulation.subdivision > 0 && index >= 0 && index < modulation.subdivision);
-  // In integers, so that vectors on a sector's border stand exactly there.
+  // The angle is computed in integers, so that vectors on a sector's border stand exactly there.
   const int sixfold = 6 * index;
   const auto sector = static_cast<std::size_t>(sixfold / modulation.subdivision);
   const double past = static_cast<double>(sixfold % modulation.subdivision) /

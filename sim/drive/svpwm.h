@@ -1,10 +1,10 @@
-// Space vector modulation as a timer does it: a table of `subdivision` voltage vectors of length
-// V_bus / sqrt(3), each shown for `repeat` carrier periods of `counter1` timer counts. Within a
-// carrier period a vector at angle a past its sector's first active vector is
+// Space vector modulation as a timer does it. A table of `subdivision` voltage vectors has length
+// V_bus / sqrt(3); each is shown for `repeat` carrier periods of `counter1` timer counts. A vector
+// at angle a past its sector's first active vector divides a carrier period into
 //
 //   T1 = C sin(60 deg - a),  T2 = C sin(a),  T0 = C - T1 - T2        (paper 1 eq. 4, all sectors)
 //
-// and the three wave modes differ only in where the three parts lie (paper 1 Fig. 14):
+// The three wave modes differ only in where these three parts lie (paper 1 Fig. 14):
 //
 //   asymmetric     000 100 110                   legs are low first; 4 edges
 //   five-segment   000 100 110 100 000           centred; 4 edges
@@ -37,7 +37,8 @@ struct Modulation {
   [[nodiscard]] double field_Hz() const { return 1 / (subdivision * vector_s()); }
 };
 
-/// When a leg is commanded high within a carrier period. Units: timer counts; on == off: stays low.
+/// The part of a carrier period in which a leg is commanded high. Units: timer counts. on == off:
+/// the leg stays low.
 struct Pulse {
   double on = 0;
   double off = 0;
@@ -45,10 +46,10 @@ struct Pulse {
 };
 using Pattern = std::array<Pulse, kLegCount>;
 
-/// Pattern of the vector at 2 pi * index / subdivision. Pre: 0 <= index < subdivision.
+/// The pattern of the vector at 2 pi * index / subdivision. Pre: 0 <= index < subdivision.
 Pattern PatternOf(const Modulation& modulation, int index);
 
-/// All of them. Shape: (subdivision).
+/// The patterns of all vectors. Shape: (subdivision).
 std::vector<Pattern> VectorTable(const Modulation& modulation);
 
 }  // namespace focalfleet::sim

@@ -8,7 +8,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// Between points the impulse is taken as a line: so short that rms is exact to 1e-3 of itself.
+// Between points the impulse is taken as a line: the pieces are so short that rms is exact to 1e-3
+// of itself.
 constexpr double kPiece_s = 1e-7;
 
 }  // namespace
@@ -28,13 +29,13 @@ void TorqueRipple::Hear(const DriveInterval& interval) {
 }
 
 void TorqueRipple::Add(double step_s, double impulse_Nms) {
-  // From steps, not from instants: those are counted from the drive's start and would round.
+  // The time is a sum of steps: instants count from the drive's start and would round.
   const Point& last = points_.back();
   points_.push_back({last.t_s + step_s, last.impulse_Nms + impulse_Nms});
   const Point& now = points_.back();
   const double from_s = now.t_s - window_s_;
   if (from_s < 0) return;
-  // A window ends at an event; where it begins, the impulse is a line between two events.
+  // A window ends at an event; at its begin the impulse is a line between two events.
   while (points_[1].t_s <= from_s) points_.pop_front();
   const Point& a = points_[0];
   const Point& b = points_[1];

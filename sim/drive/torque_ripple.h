@@ -1,6 +1,6 @@
-// Torque without its carrier: the running mean over one carrier period. Means over the carrier
-// periods themselves would be samples of it at one place in each, and miss its peaks: with six
-// vectors a turn 203.8 % from peak to peak where the running mean has 204.2 %.
+// The torque without its carrier is the running mean over one carrier period. Means over the
+// carrier periods themselves would be samples of it at one place in each, and miss its peaks. With
+// six vectors a turn they give 203.8 % from peak to peak where the running mean has 204.2 %.
 #pragma once
 
 #include <deque>
@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 
 class TorqueRipple {
  public:
-  /// Ripple is over the mean's size.
+  /// Ripple is relative to the size of the mean.
   struct Figures {
     double mean_Nm = 0;
     double peak_to_peak = 0;
@@ -20,9 +20,9 @@ class TorqueRipple {
 
   explicit TorqueRipple(double window_s) : window_s_(window_s) {}
 
-  /// Intervals follow each other without a gap. Keeps those of one window.
+  /// Intervals follow each other without a gap; those of one window are kept.
   void Hear(const DriveInterval& interval);
-  /// Pre: more than a window was heard.
+  /// Pre: the intervals that came cover more than a window.
   [[nodiscard]] Figures Judge() const;
 
  private:
@@ -34,7 +34,7 @@ class TorqueRipple {
 
   double window_s_;
   std::deque<Point> points_ = {{}};
-  // Of the running mean, from the first whole window on.
+  // The figures cover the running mean, from the first whole window on.
   double begin_s_ = 0;
   double last_Nm_ = 0;
   double last_s_ = 0;

@@ -6,7 +6,7 @@ namespace focalfleet::sim {
 namespace {
 
 double Gamma_rad(std::span<const double> b_T, const SensorAngles& angles) {
-  // Of the two angles with this tangent, the one that gives the sum its sign.
+  // Two angles have this tangent; the sign of the sum decides between them.
   return std::atan2((b_T[0] - b_T[1]) / std::sin(4 * angles.pair_xy_rad),
                     (b_T[0] + b_T[1]) / std::cos(4 * angles.pair_xy_rad)) /
          4;

@@ -1,16 +1,17 @@
-// Orientation in closed form, as the paper does it: no iteration, few sensors, and the error of the
-// model it stands on. The printed equations are lost; these are derived from its models and
-// checked against its surviving fragments. Voltages stand for fields, pole signs included.
+// Orientation in closed form, as the paper computes it: no iteration, few sensors, and the error of
+// the underlying model. The printed equations are lost. The ones here are derived from the paper's
+// models and checked against its surviving fragments. Voltages stand for fields, pole signs
+// included.
 //
 // Six sensors, harmonic model (sin^4 theta): with q = (V5 / V6)^(1/4) and the pair at +-a from the
 // equator, tan alpha = (q - 1) / (q + 1) cot a at beta = 0; beta likewise from 3 and 4 with the
-// other sign. Surface model: alpha = c^2 / (4 a) ln(V5 / V6). Eight sensors, width c unknown:
-// alpha = (a / 2) ln(V5 / V6) / ln(V8^2 / (V5 V6)); beta with 3, 4, 7. gamma from 1 and 2 at zero
-// tilt: tan 4 gamma = (V1 - V2) / (V1 + V2) / tan 4 a0.
+// other sign. Surface model: alpha = c^2 / (4 a) ln(V5 / V6). Eight sensors, width c unknown: alpha
+// = (a / 2) ln(V5 / V6) / ln(V8^2 / (V5 V6)); beta with 3, 4, 7. gamma from 1 and 2 at zero tilt:
+// tan 4 gamma = (V1 - V2) / (V1 + V2) / tan 4 a0.
 //
 // A ratio that is not positive has no logarithm: the pair stands beyond a pole's edge (gamma about
-// +-22.5 deg), and the closed form fails; it says so.
-// Source: [HallOrientation2014] "Derivation of orientation", reconstructed.
+// +-22.5 deg). The closed form then fails and returns nothing. Source: [HallOrientation2014]
+// "Derivation of orientation", reconstructed.
 #pragma once
 
 #include <optional>

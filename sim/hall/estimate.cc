@@ -29,7 +29,7 @@ void Append(std::string* text, const std::string& part) {
 
 std::string SensorName(std::size_t sensor) { return "v" + std::to_string(sensor + 1); }
 
-// What is said of single sensors in this row: not there, or at the end of its range.
+// The faults of single sensors in this row: a sensor is missing, or at the end of its range.
 std::string OfSensors(const HallRig& rig, const VoltageRow& row, bool magnitudes) {
   std::string saturated, missing;
   for (std::size_t k = 0; k < row.voltages_V.size(); ++k) {
@@ -51,7 +51,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// The median of chi^2 a degree of freedom is below 1: Wilson and Hilferty.
+// The median of chi^2 a degree of freedom is below 1 (Wilson and Hilferty).
 double MedianShare(int freedom) {
   const double part = 1 - 2.0 / (9.0 * freedom);
   return part * part * part;
@@ -71,7 +71,8 @@ class RowJudge {
  public:
   RowJudge(const OrientationSolver& solver, double noise_T) : solver_(solver), noise_T_(noise_T) {}
 
-  // Voltages of one row that contradict each other: is one sensor to blame?
+  // The voltages of one row contradict each other: the function asks whether one sensor is to
+  // blame.
   [[nodiscard]] std::vector<OrientationFit> Judge(const HallReading& reading,
                                                   std::vector<OrientationFit> fits,
                                                   std::string* status) const {
@@ -171,7 +172,7 @@ Estimates EstimateOrientations(HallRig rig, const std::shared_ptr<const FieldMod
 
   std::string of_all;
   for (const SensorVerdict& verdict : out.verdicts) {
-    if (verdict.fault == SensorFault::kMissing) continue;  // said in each row
+    if (verdict.fault == SensorFault::kMissing) continue;  // reported in each row
     std::string word(Name(verdict.fault));
     for (const std::size_t sensor : verdict.sensors) word += " " + SensorName(sensor);
     const bool pairs = verdict.fault == SensorFault::kSwapped;

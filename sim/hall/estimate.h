@@ -1,14 +1,14 @@
-// A table of voltages to a table of orientations: which sensors may be trusted, in all rows and in
-// each, what noise the residuals show, and of every row an orientation with its uncertainty and a
-// word on it.
+// A table of voltages becomes a table of orientations. The estimate finds the sensors that can be
+// trusted, in all rows and in each, and the noise of the residuals. Every row gets an orientation
+// with its uncertainty and a status.
 //
-// Sensors that lie. The eight sensors measure three angles, so five numbers a row check each other.
-// Hypotheses about all rows are compared by what they leave: nothing wrong; one sensor not to be
-// trusted (is it stuck, off in gain or offset?); two sensors swapped. One is named where it leaves
-// a quarter or less of the variance and no other comes near; where several do, it is said that they
-// cannot be told apart. (A field that is the same above and below the equator does not tell sensors
-// 3 and 4 exchanged from 5 and 6 exchanged: the one is the other's mirror image.) A row by itself
-// is judged against the noise of the others.
+// Faulty sensors. The eight sensors measure three angles, so five numbers a row check each other.
+// Hypotheses about all rows are compared by the variance that they leave. They are: no fault; one
+// sensor not to be trusted (stuck, or off in gain or offset); two sensors swapped. A hypothesis is
+// named where it leaves a quarter or less of the variance and no other comes near. Where several
+// do, the report says that they cannot be distinguished. (In a field that is the same above and
+// below the equator an exchange of sensors 3 and 4 looks like one of 5 and 6. They are mirror
+// images.) A single row is judged against the noise of the others.
 //
 // Statuses: `ok`; `saturated v3`, `missing v3`, `stuck v3`, `bad v3`, `swapped v3 v4` (the
 // orientation comes from the others, or with the two exchanged); `ambiguous` (another orientation
@@ -33,8 +33,8 @@ std::string_view Name(SensorFault fault);
 
 struct SensorVerdict {
   SensorFault fault = SensorFault::kBad;
-  std::vector<std::size_t> sensors;  // from 0; several of kSwapped are the two
-  /// Sensors that cannot be told from it; of kSwapped pairs, one after the other.
+  std::vector<std::size_t> sensors;  // from 0; kSwapped has its two sensors here
+  /// The sensors that cannot be distinguished from it. For kSwapped: pairs, one after the other.
   std::vector<std::size_t> or_else;
   double variance_left = 0;  // over that without the hypothesis
 };

@@ -8,7 +8,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// Four nodes less a direction than the array's own rule: 1e-4 of the peak, below the noise.
+// Four nodes fewer a direction than the array's own rule: the error is 1e-4 of the peak, below the
+// noise.
 constexpr int kNodes = 6;
 
 SensorElectronics BoardElectronics(double noise_T) {
@@ -27,7 +28,7 @@ TipEstimate TipOf(const Orientation& orientation,
   const double sin_beta = std::sin(orientation.beta_rad);
   const double cos_beta = std::cos(orientation.beta_rad);
   TipEstimate tip{.x_mm = length_mm * sin_beta, .y_mm = -length_mm * sin_alpha * cos_beta};
-  // By alpha and beta.
+  // The derivatives by alpha and beta.
   const double x_by[2] = {0, length_mm * cos_beta};
   const double y_by[2] = {-length_mm * cos_alpha * cos_beta, length_mm * sin_alpha * sin_beta};
   for (std::size_t i = 0; i < 2; ++i)

@@ -34,7 +34,7 @@ Wave FitWave(const FieldMap& map, Profile profile) {
     squares += point.b_T * point.b_T;
   }
   Wave wave;
-  // A map along one meridian does not tell the phase: it stays where it is then.
+  // A map along a single meridian does not determine the phase; the phase then stays as it is.
   normal += 1e-12 * (normal.trace() + 1e-300) * Matrix2d::Identity();
   wave.inverse = normal.inverse();
   wave.coefficients = wave.inverse * right;
@@ -51,7 +51,7 @@ double SurfaceSquares(const FieldMap& map, double width_rad) {
       .squares;
 }
 
-// The width by golden section about the best of a grid: the two wave coefficients are linear.
+// The width by golden section about the best of a grid; the two wave coefficients are linear.
 double BestWidth_rad(const FieldMap& map) {
   double best_deg = 5, best = SurfaceSquares(map, best_deg * kRadPerDeg);
   for (double width_deg = 6; width_deg <= 80; width_deg += 1)
@@ -92,7 +92,7 @@ FieldParameters FitSurface(const FieldMap& map) {
     return std::exp(-x * x);
   });
   const auto [amplitude_T, phase_rad] = PolarOf(wave);
-  // Of amplitude, width and phase together.
+  // The normal matrix of amplitude, width and phase together.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   for (const FieldPoint& point : map) {
     const double x = (point.theta_rad - std::numbers::pi / 2) / width_rad;
@@ -128,7 +128,7 @@ Status Check(const FieldMap& map) {
   return {};
 }
 
-// Moved to the mean radius, and how that goes: the exponent with the least residual.
+// The map moved to the mean radius by the exponent with the least residual.
 struct Moved {
   FieldMap map;
   double radius_mm = 59;

@@ -1,11 +1,12 @@
-// From a map of a rotor's radial field to a model of it, with uncertainty.
+// A fit turns a map of a rotor's radial field into a model of it, with uncertainty.
 //
 // Harmonic and surface models are fitted by plain least squares. The spherical one has more
-// coefficients than a sparse map has points, so it is fitted with what is known beforehand:
-// coefficients fall off geometrically with the degree, how fast and how far is chosen by the
-// evidence (marginal likelihood) of the map itself. First only orders 4, 12, 20, 28, which are all
-// that eight equal alternating poles make; then all orders, which unlike magnets make, kept where
-// the evidence says so. So two cuts are enough of an ideal array, and a full map tells each magnet.
+// coefficients than a sparse map has points. A prior therefore makes coefficients fall off
+// geometrically with the degree. The evidence (marginal likelihood) of the map itself sets how fast
+// and how far. The first fit has only orders 4, 12, 20, 28, which are all that eight equal
+// alternating poles make. All other orders, which unlike magnets make, follow and are kept where
+// the evidence supports them. Two cuts are therefore enough for an ideal array, and a full map
+// resolves each magnet.
 //
 // Units: T, radians, mm. Source of the evidence: [RasmussenWilliams2006] chapter 2.
 #pragma once
@@ -35,7 +36,7 @@ struct FieldFit {
   double rms_T = 0;  // of the residuals
   double worst_T = 0;
   double peak_T = 0;        // greatest magnitude in the map
-  double noise_T = 0;       // of one point, as far as the fit tells noise from field
+  double noise_T = 0;       // of one point, as far as the fit separates noise from field
   bool all_orders = false;  // unlike magnets were found
 };
 
@@ -44,8 +45,9 @@ inline constexpr FieldKind kFieldKinds[] = {FieldKind::kHarmonic, FieldKind::kSu
                                             FieldKind::kSpherical};
 std::string_view Name(FieldKind kind);
 
-/// Errors: kInvalid: too few points, no field, points that do not tell the model's parameters.
-/// Cost: spherical about points * 200^2 operations for ideal arrays, a second for 65,000 points.
+/// Errors: kInvalid: too few points, no field, or points that do not determine the model's
+/// parameters. Cost: spherical about points * 200^2 operations for ideal arrays, a second for
+/// 65,000 points.
 Result<FieldFit> FitField(const FieldMap& map, FieldKind kind);
 
 Vector3 DirectionAt(double theta_rad, double phi_rad);

@@ -21,7 +21,7 @@ struct Knot {
   double value = 0;
   double slope = 0;  // times the step
 };
-/// c[0] + c[1] t + c[2] t^2 + c[3] t^3 of each piece, t from 0 to 1.
+/// Each piece is c[0] + c[1] t + c[2] t^2 + c[3] t^3, with t from 0 to 1.
 struct Cubic {
   double c[4];
 };
@@ -42,7 +42,7 @@ FOCALFLEET_WIDE void Wave(const DirectionLanes& local, double real, double imagi
   }
 }
 
-// As complex numbers, one a lane.
+// The plane coordinates as complex numbers, one a lane.
 struct Flat {
   Lane x, y;
 };
@@ -60,7 +60,7 @@ struct Order {
   std::vector<Cubic> sine = {};
 };
 
-// Where each direction is in a table over z.
+// The place of each direction in a table over z.
 struct Places {
   std::int32_t piece[kLanes];
   Lane t;
@@ -75,7 +75,7 @@ inline void Find(const Lane& z, Places* __restrict out) {
   }
 }
 
-// w = x + i y and its powers, and w^(m - 1) of the order m at hand; orders of equal poles are 8
+// w = x + i y and its powers, up to w^(m - 1) of the current order m. Orders of equal poles are 8
 // apart, so the next is one product away.
 struct Powers {
   Flat w, w2, w4, w8, now;
@@ -102,9 +102,9 @@ FOCALFLEET_WIDE void Raise(int by, Powers* __restrict out) {
   if ((by & 1) != 0) Multiply(out->w, &out->now);
 }
 
-// Adds the cosine's part of Re[conj(C) w^m], one order m, and its slopes: `along` and sign *
-// `across` are the real and the imaginary part of w^(m - 1), conjugate. The sine's is that of
-// i w^(m - 1).
+// Adds the cosine part of Re[conj(C) w^m] for one order m, and its slopes. `along` and sign *
+// `across` are the real and the imaginary part of w^(m - 1), conjugate. The sine part is that of i
+// w^(m - 1).
 struct Part {
   const Cubic* table;
   double order;
@@ -129,7 +129,7 @@ FOCALFLEET_WIDE void Add(const Part& part, const Places& places, const Flat& w, 
     out->slope_y.at[k] += scaled * b;
   }
 }
-// Order 0: of z alone.
+// Order 0 depends on z alone.
 void AddZonal(const Cubic* table, const Places& places, SampleLanes* out) {
   for (std::size_t k = 0; k < kLanes; ++k) {
     const double t = places.t.at[k];
@@ -173,13 +173,13 @@ class SurfaceField final : public FieldModel {
 
  private:
   [[nodiscard]] FieldSample At(const Vector3& u) const {
-    // Longitude means nothing on the axis, where the field is nearly none.
+    // Longitude has no meaning on the axis, where the field is nearly zero.
     const double square = std::max(u.x * u.x + u.y * u.y, 1e-24);
     const double radius = std::sqrt(square);
     const double latitude_rad = std::atan2(u.z, radius);
     const double scaled = latitude_rad / parameters_.width_rad;
     const double peak_T = parameters_.amplitude_T * std::exp(-scaled * scaled);
-    // As real numbers: std::complex asks for infinities behind each product.
+    // Real numbers are used here: std::complex tests for infinities after each product.
     const double cosine = u.x / radius, sine = u.y / radius;
     const double cosine2 = cosine * cosine - sine * sine, sine2 = 2 * cosine * sine;
     const double cosine4 = cosine2 * cosine2 - sine2 * sine2, sine4 = 2 * cosine2 * sine2;
@@ -199,10 +199,10 @@ class SurfaceField final : public FieldModel {
   Complex turn_;
 };
 
-// B = sum over orders m of Re[conj(C_m(z)) (x + i y)^m], C_m a polynomial in z: the sum over
-// degrees. It is tabulated once, with slopes, and read by cubic Hermite pieces: 1024 of them leave
-// 1e-10 of a polynomial of degree 20, and value and slope belong together, so that an inversion of
-// the table's own values is exact.
+// The field is B = sum over orders m of Re[conj(C_m(z)) (x + i y)^m], with C_m a polynomial in z:
+// the sum over degrees. C_m is tabulated once, with slopes, and read by cubic Hermite pieces; 1024
+// of them leave 1e-10 of a polynomial of degree 20. Value and slope belong together, so that an
+// inversion of the table's own values is exact.
 class SphericalField final : public FieldModel {
  public:
   explicit SphericalField(const std::vector<SphericalTerm>& terms) {
@@ -263,7 +263,7 @@ class SphericalField final : public FieldModel {
     return table;
   }
 
-  // Value and derivative by the three-term recurrence.
+  // Value and derivative come from the three-term recurrence.
   static std::vector<Knot> KnotsOf(int order, const std::vector<double>& coefficients) {
     std::vector<Knot> knots;
     for (int k = 0; k <= kPieces; ++k) {
@@ -289,7 +289,7 @@ class SphericalField final : public FieldModel {
     return knots;
   }
 
-  // Hermite's, through both knots of a piece with their slopes.
+  // Hermite's cubics go through both knots of a piece with their slopes.
   static std::vector<Cubic> CubicsOf(int order, const std::vector<double>& coefficients) {
     const std::vector<Knot> knots = KnotsOf(order, coefficients);
     std::vector<Cubic> cubics;

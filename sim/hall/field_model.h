@@ -1,17 +1,17 @@
 // A rotor's radial field on the sphere of its sensors, in the rotor's frame, behind one interface.
-// Three models, from the paper's to a better one:
+// There are three models, from the paper's to a better one:
 //
 // - harmonic: B = A sin^4(theta) cos(4 (phi - phase)), the lowest term of the expansion that the
-//   paper begins with. It has one shape, whatever the magnets are.
+//   paper begins with. The shape is the same for all magnets.
 // - surface: B = A exp(-((theta - 90 deg) / c)^2) cos(4 (phi - phase)), the paper's fitted one.
 // - spherical: a sum of spherical harmonics about the centre. Between magnets the potential obeys
-//   Laplace's equation, so on a sphere any field is such a sum, and its coefficients fall off
-//   geometrically with the degree: where sources lie at 44 mm and at 85 mm around sensors at 59 mm,
-//   like 0.75^l and 0.69^l. Some dozens of numbers reach parts per million of the peak.
+//   Laplace's equation, so any field on a sphere is such a sum, and its coefficients fall off
+//   geometrically with the degree. For sources at 44 mm and at 85 mm around sensors at 59 mm they
+//   fall like 0.75^l and 0.69^l. Some dozens of numbers reach parts per million of the peak.
 //
-// How the field changes with radius matters where rotor and sensors are not concentric: near the
+// The change of the field with radius matters where rotor and sensors are not concentric: near the
 // sphere B_r ~ r^-decay. Sources within give decay = l + 2, sources without -(l - 1) for each
-// degree l; a map at one radius cannot tell, one at several (or poses) can.
+// degree l. A map at one radius cannot determine the decay; one at several radii (or poses) can.
 //
 // Units: T, radians. Source: [HallOrientation2014] "Derivation of orientation", as reconstructed.
 #pragma once
@@ -29,7 +29,8 @@ namespace focalfleet::sim {
 
 struct FieldSample {
   double b_T = 0;
-  Vector3 slope_T;  // change of b with the direction, a unit vector: only tangents may meet it
+  // The change of b with the direction, a unit vector. Only tangents may be multiplied with it.
+  Vector3 slope_T;
 };
 
 class FieldModel {
@@ -41,11 +42,11 @@ class FieldModel {
 
   /// "harmonic", "surface" or "spherical".
   [[nodiscard]] virtual std::string_view kind() const = 0;
-  /// After which turn about z the field is the same again: 90 deg for eight equal poles.
+  /// The turn about z after which the field repeats: 90 deg for eight equal poles.
   [[nodiscard]] virtual double period_rad() const { return 90 * kRadPerDeg; }
-  /// Pre: all are unit vectors. Cost: no allocation.
+  /// The fields of eight directions. Pre: all are unit vectors. Cost: no allocation.
   virtual void EvaluateLanes(const DirectionLanes& local, SampleLanes* out) const = 0;
-  /// The same of any number. Pre: as many samples as directions.
+  /// The fields of any number of directions. Pre: as many samples as directions.
   void Evaluate(std::span<const Vector3> local, std::span<FieldSample> out) const;
 
   [[nodiscard]] double Radial_T(const Vector3& local) const {
@@ -71,8 +72,8 @@ struct SurfaceParameters {
   double sd_phase_rad = 0;
 };
 
-/// One degree and order. Normalised so that the mean square of a harmonic over the sphere is 1: a
-/// coefficient is the rms of its term over the sphere.
+/// The term of one degree and order. The mean square of a harmonic over the sphere is normalised to
+/// 1, so a coefficient is the rms of its term over the sphere.
 struct SphericalTerm {
   int degree = 0;
   int order = 0;
@@ -83,15 +84,15 @@ struct SphericalTerm {
 };
 inline constexpr int kDegreeMax = 60;
 
-/// What a model is made from, and what a file of it holds.
+/// The parameters that a model is made from, and that a model's file holds.
 using FieldParameters =
     std::variant<HarmonicParameters, SurfaceParameters, std::vector<SphericalTerm>>;
 
-/// Pre: of spherical terms 0 <= order <= degree <= kDegreeMax, each pair once.
+/// Pre: spherical terms have 0 <= order <= degree <= kDegreeMax, each pair once.
 std::unique_ptr<FieldModel> MakeField(const FieldParameters& parameters);
 
-/// Normalised associated Legendre functions of one order without the factor sin^order(theta), which
-/// are polynomials in z: p[k] is degree order + k. The next is up z p - back (the one before).
+/// Normalised associated Legendre functions of one order, without the factor sin^order(theta), are
+/// polynomials in z: p[k] is degree order + k. The next one is up z p - back (the one before).
 struct LegendreStep {
   double up = 0;
   double back = 0;

@@ -1,7 +1,7 @@
 // Eight directions at a time, number by number, so that a loop over them becomes vector
-// instructions of whatever width the machine has: GCC compiles the functions marked
-// FOCALFLEET_WIDE twice and the loader picks one. Both do the same operations in the same order,
-// without fused ones, so the same bits come out.
+// instructions of the machine's width. GCC compiles the functions marked FOCALFLEET_WIDE twice and
+// the loader picks one. Both do the same operations in the same order, without fused ones, so the
+// results have the same bits.
 #pragma once
 
 #include <array>
@@ -9,7 +9,8 @@
 
 namespace focalfleet::sim {
 
-// Sanitizers and coverage instrument the resolver that picks, which runs before they do.
+// Sanitizers and coverage would instrument the resolver that picks, which runs before their own
+// start.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && defined(__OPTIMIZE__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define FOCALFLEET_WIDE __attribute__((target_clones("avx2", "default")))
@@ -25,7 +26,7 @@ struct alignas(64) Lane {
 struct DirectionLanes {
   Lane x, y, z;
 };
-/// Field and its change with the direction, as FieldSample.
+/// The field and its change with the direction, as in FieldSample.
 struct SampleLanes {
   Lane b_T, slope_x, slope_y, slope_z;
 };

@@ -10,7 +10,7 @@ struct Rule {
   std::vector<double> weight;
 };
 
-// Roots of the Legendre polynomial by Newton from Tricomi's guess.
+// The roots of the Legendre polynomial, by Newton's method from Tricomi's guess.
 Rule GaussLegendre(int n) {
   Rule rule;
   for (int k = 0; k < n; ++k) {

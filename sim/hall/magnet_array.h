@@ -1,14 +1,14 @@
 // The field of a rotor's magnets, from magnetised pieces in air (iron-free, mu_r = 1: pieces add).
 // Poles are tiles of a spherical shell, magnetised along the tile's middle direction or radially,
 // in turn outwards and inwards. Each tile is a cloud of dipoles at the nodes of a Gauss-Legendre
-// rule in radius, latitude and longitude: a sensor is never nearer to a tile than about a third of
-// a tile's width, so that 10 nodes a direction agree with 24 to 2e-6 of the peak.
+// rule in radius, latitude and longitude. A sensor is never nearer to a tile than about a third of
+// a tile's width. At that distance 10 nodes a direction agree with 24 to 2e-6 of the peak.
 //
-// One shell is the paper's 2D array, two are its 3D array: the sensors at 59 mm stand between the
-// inner and the outer shell, so part of the field comes from within and part from without.
+// The paper's 2D array is one shell, its 3D array two. The sensors at 59 mm stand between the inner
+// and the outer shell, so part of the field comes from within and part from without.
 //
-// Dimensions: the paper gives none. The defaults are iron-free shells whose equatorial field falls
-// off as its fitted surfaces do. Units: mm, T (remanence), radians.
+// The paper gives no dimensions. The defaults are iron-free shells whose equatorial field falls off
+// as its fitted surfaces do. Units: mm, T (remanence), radians.
 #pragma once
 
 #include <vector>
@@ -26,7 +26,7 @@ struct MagnetShell {
   double remanence_T = 1.2;
   bool radial = true;             // else parallel to the tile's middle
   double first_pole_rad = 0;      // longitude of a pole that points outwards
-  std::vector<double> strength;   // per pole, 1 where empty: magnets are never alike
+  std::vector<double> strength;   // per pole, 1 where empty: magnets always differ
   std::vector<double> shift_rad;  // per pole in longitude, 0 where empty
 };
 
@@ -39,10 +39,10 @@ class MagnetArray {
   /// Nodes a direction and tile. Cost of a field: poles * nodes^3 dipoles a shell.
   explicit MagnetArray(const std::vector<MagnetShell>& shells, int nodes = 10);
 
-  /// Flux density at a place outside the magnets. Frame: rotor. Units: mm in, T out.
+  /// The flux density at a place outside the magnets. Frame: rotor. Units: mm in, T out.
   [[nodiscard]] Vector3 Field_T(const Vector3& place_mm) const;
 
-  /// Its radial part in a direction (unit vector). Units: mm in, T out.
+  /// The radial part in a direction (unit vector). Units: mm in, T out.
   [[nodiscard]] double Radial_T(const Vector3& direction, double radius_mm) const {
     return Dot(Field_T(radius_mm * direction), direction);
   }

@@ -14,11 +14,12 @@ constexpr std::size_t kNodes = kTilts * kTilts * kSpins;
 constexpr std::size_t kStartsMax = 8;
 constexpr double kSame_rad = 1e-4;
 constexpr double kGammaRange_rad = 90 * kRadPerDeg;
-// Beyond the range where the field does not repeat itself: noise may lead a little out of it.
+// The search goes beyond the range where the field does not repeat itself: noise may lead a little
+// out of that range.
 constexpr double kGammaMargin_rad = 2 * kRadPerDeg;
 constexpr int kStepsMax = 25;
 
-// Symmetric 3 x 3, row by row.
+// A symmetric 3 x 3 matrix, row by row.
 using Matrix = std::array<std::array<double, 3>, 3>;
 using Triple = std::array<double, 3>;
 
@@ -39,8 +40,8 @@ bool Invert(const Matrix& a, Matrix* out) {
 
 // ---- eight sensors at a time
 
-// Directions in the rotor's frame and their derivatives by alpha and beta; that by gamma is
-// (y, -x, 0) of the direction.
+// Directions in the rotor's frame and their derivatives by alpha and beta. The derivative by gamma
+// is (y, -x, 0) of the direction.
 struct TurnedLanes {
   DirectionLanes local, by_alpha, by_beta;
 };
@@ -61,8 +62,8 @@ FOCALFLEET_WIDE void Turn(const Rotation& rotation, const DirectionLanes& stator
   }
 }
 
-// Sums over the sensors, each in four lanes until the end, so that their order does not depend on
-// the width of the machine: J^T J by rows from the diagonal on, J^T r, r^T r.
+// The sums over the sensors: J^T J by rows from the diagonal on, J^T r, r^T r. Each stays in four
+// lanes until the end, so that its order does not depend on the machine's width.
 constexpr std::size_t kSums = 10;
 struct Sums {
   double lane[kSums][4];
@@ -72,7 +73,7 @@ struct Sums {
 };
 struct Seen {
   const Lane& factor;
-  const Lane& weight;  // 0 of sensors that are not to be trusted
+  const Lane& weight;  // 0 for sensors that are not to be trusted
   const Lane& wanted_T;
 };
 FOCALFLEET_WIDE void Accumulate(const TurnedLanes& turned, const SampleLanes& field,
@@ -236,7 +237,7 @@ OrientationFit OrientationSolver::Refine(const HallReading& reading,
       damping = damping < 1e-6 ? 0 : damping / 10;
       if (done) break;
     } else {
-      // At the bottom rounding decides: a step too small to matter may go up.
+      // At the minimum rounding decides: a step too small to matter may go up.
       if (size < 1e-9) break;
       damping = damping == 0 ? 1e-4 : damping * 10;
       if (damping > 1e6) break;
@@ -281,7 +282,7 @@ std::vector<Orientation> OrientationSolver::Starts(const HallReading& reading) c
     for (std::size_t node = 0; node < kNodes; ++node)
       miss[node] += (row[node] - b_T) * (row[node] - b_T);
   }
-  // Lower than the six neighbours; gamma goes round.
+  // The nodes that are lower than their six neighbours; gamma is periodic.
   std::vector<std::size_t> lowest;
   for (std::size_t node = 0; node < kNodes; ++node) {
     const std::size_t spin = node % kSpins, rest = node / kSpins;

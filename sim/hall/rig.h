@@ -1,9 +1,9 @@
-// Sensors, electronics, joint and field put together: what a rig of Hall sensors puts out at an
-// orientation, and the one place where calibration lives. Not concentric: where the rotor's centre
-// is off the sensors' by d, a sensor stands elsewhere in the rotor's field and its axis does not
-// point at the rotor's centre. To first order both move the place where the field is read, by
-// (1 + tangential) d along the sphere, and scale it by (|p - d| / R)^-decay; field_model.h has
-// decay, and tangential follows from it (TangentialShare).
+// A rig puts sensors, electronics, joint and field together: it gives the outputs of its Hall
+// sensors at an orientation. Calibration lives here alone. Rotor and sensors may be not concentric:
+// the rotor's centre is off the sensors' by d. A sensor then stands elsewhere in the rotor's field,
+// and its axis does not point at the rotor's centre. To first order both effects move the place
+// where the field is read, by (1 + tangential) d along the sphere. They scale the field by (|p - d|
+// / R)^-decay. field_model.h has decay, and tangential follows from it (TangentialShare).
 #pragma once
 
 #include <array>
@@ -33,13 +33,13 @@ struct HallRig {
   [[nodiscard]] Seen SeenFromRotor(const HallSensor& sensor) const;
 };
 
-/// Degree of the harmonic that an eight-pole field of the paper's width is most like.
+/// The degree of the harmonic that is most like an eight-pole field of the paper's width.
 inline constexpr double kTypicalDegree = 5.5;
-/// By how much more than d the place moves, for a field with this decay: sources within and without
-/// share it so that their decays add up.
+/// The place moves by this share more than d, for a field with this decay. Sources within and
+/// without share the field so that their decays add up.
 double TangentialShare(double decay);
 
-/// Voltages of all sensors. Shape: as many as sensors; no noise, no clipping.
+/// The voltages of all sensors. Shape: as many as sensors; no noise, no clipping.
 void PredictVoltages(const HallRig& rig, const FieldModel& field, const Orientation& orientation,
                      std::span<double> voltages_V);
 

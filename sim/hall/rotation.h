@@ -1,11 +1,10 @@
-// Orientation of a ball joint, and where a fixed sensor stands as its rotor sees it. The rotor is
-// turned by R = Rx(alpha) Ry(beta) Rz(gamma); a sensor in direction p of the stator stands in
-// direction R^T p of the rotor. Each factor is undone by itself, so that the derivatives by the
-// three angles come at the cost of a few products.
+// The orientation of a ball joint, and the place of a fixed sensor as the joint's rotor sees it.
+// The rotor is turned by R = Rx(alpha) Ry(beta) Rz(gamma); a sensor in direction p of the stator
+// stands in direction R^T p of the rotor. Each factor is undone by itself, so that the derivatives
+// by the three angles cost only a few products.
 //
 // Frames: stator (X, Y, Z: sensors), rotor (x, y, z: magnets). They agree at alpha = beta = gamma =
-// 0.
-// Source: [HallOrientation2014] section "Results", its three rotations.
+// 0. Source: [HallOrientation2014] section "Results", its three rotations.
 #pragma once
 
 #include <cmath>

@@ -5,7 +5,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// An output nearer than this to the supply or to ground stands at the end of its range.
+// An output nearer than this to the supply or to ground counts as the end of its range.
 constexpr double kRail_V = 2e-3;
 
 }  // namespace
@@ -32,7 +32,7 @@ std::vector<HallSensor> EightSensors(const SensorAngles& angles) {
 Vector3 Shifted(const Vector3& direction, const SensorShift& shift) {
   if (shift.east_rad == 0 && shift.north_rad == 0) return direction;
   const Vector3 across{-direction.y, direction.x, 0};
-  // On the axis every direction is north; any east will do there.
+  // On the axis every direction is north, and any east will do.
   const Vector3 east = Length(across) > 1e-9 ? Unit(across) : Vector3{0, 1, 0};
   const Vector3 north = Cross(direction, east);
   return Unit(direction + shift.east_rad * east + shift.north_rad * north);

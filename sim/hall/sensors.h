@@ -1,10 +1,10 @@
-// Radial Hall sensors around a rotor, and what they put out: V = half of the supply + sensitivity
-// times the radial flux density, within the supply. 2.5 mV/G = 25 V/T about 2.5 V leaves +-0.1 T
-// between 0 and 5 V; the +-0.8 T that the paper states beside it would need 20 V.
+// Radial Hall sensors around a rotor, and their outputs: V = half of the supply + sensitivity times
+// the radial flux density, within the supply. 2.5 mV/G = 25 V/T about 2.5 V leaves +-0.1 T between
+// 0 and 5 V; the +-0.8 T that the paper states beside it would need 20 V.
 //
 // Frame: stator. Directions are unit vectors from the joint's centre; a sensor is `radius_mm` away
-// from it and measures along its own direction.
-// Source: [HallOrientation2014] sections "Distribution of Hall-effect sensors", "Methods".
+// from it and measures along its own direction. Source: [HallOrientation2014] sections
+// "Distribution of Hall-effect sensors", "Methods".
 #pragma once
 
 #include <cstdint>
@@ -36,7 +36,7 @@ struct SensorElectronics {
   [[nodiscard]] double range_T() const { return supply_V / 2 / sensitivity_V_per_T; }
 };
 
-/// Angles of the paper's figure 2: of sensors 1 and 2 from X, of 3 and 4 from Z, of 5 and 6 from Y.
+/// The angles of the paper's figure 2: sensors 1 and 2 from X, 3 and 4 from Z, 5 and 6 from Y.
 struct SensorAngles {
   double pair_xy_rad = 11.25 * kRadPerDeg;
   double pair_xz_rad = 75 * kRadPerDeg;
@@ -44,10 +44,10 @@ struct SensorAngles {
 };
 /// Sensors 1 to 6; 4 mirrors 3 in the plane XY.
 std::vector<HallSensor> SixSensors(const SensorAngles& angles = {});
-/// And 7 on X, 8 on Y.
+/// The six sensors, and 7 on X, 8 on Y.
 std::vector<HallSensor> EightSensors(const SensorAngles& angles = {});
 
-/// Along growing longitude, and towards +Z.
+/// A shift along growing longitude, and one towards +Z.
 struct SensorShift {
   double east_rad = 0;
   double north_rad = 0;
@@ -55,11 +55,11 @@ struct SensorShift {
 /// The direction moved along the sphere, to first order.
 Vector3 Shifted(const Vector3& direction, const SensorShift& shift);
 
-/// What a sensor in a field puts out. `noise` in standard deviations.
+/// The output of a sensor in a field. `noise` in standard deviations.
 double Voltage_V(const HallSensor& sensor, const SensorElectronics& electronics, double b_T,
                  double noise = 0);
 
-/// The field that a voltage stands for; none where the output is at an end of its range.
+/// The field that a voltage stands for. None: the output is at an end of its range.
 std::optional<double> Field_T(const HallSensor& sensor, const SensorElectronics& electronics,
                               double voltage_V);
 

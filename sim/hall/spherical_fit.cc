@@ -12,7 +12,7 @@ using Eigen::VectorXd;
 constexpr int kIdealDegree = 36;
 constexpr int kAnyDegree = 18;
 constexpr std::size_t kPointsForUnlike = 100;
-constexpr std::size_t kPointsForAllOrders = 12'000;  // more add time, not knowledge
+constexpr std::size_t kPointsForAllOrders = 12'000;  // more points cost time and gain nothing
 constexpr double kEvidenceForUnlike = 10;
 
 struct Column {
@@ -34,7 +34,7 @@ std::vector<Column> AllColumns() {
   std::vector<Column> columns = IdealColumns();
   for (int order = 0; order <= kAnyDegree; ++order) {
     if (order % 8 == 4) continue;
-    // No flux leaves a sphere around all of it: degree 0 is not there.
+    // No flux leaves a sphere around the whole rotor: degree 0 is absent.
     for (int degree = std::max(order, 1); degree <= kAnyDegree; ++degree) {
       columns.push_back({degree, order, false});
       if (order > 0) columns.push_back({degree, order, true});
@@ -43,7 +43,7 @@ std::vector<Column> AllColumns() {
   return columns;
 }
 
-// Basis functions of one point, by order: one pass of the recurrence each.
+// The basis functions of one point, by order: one pass of the recurrence each.
 void FillRow(const std::vector<Column>& columns, const FieldPoint& point, double* row) {
   const double z = std::cos(point.theta_rad), s = std::sin(point.theta_rad);
   std::vector<double> p(kDegreeMax + 1);
@@ -101,9 +101,10 @@ Normal Accumulate(const std::vector<Column>& columns, const FieldMap& map, std::
 }
 
 struct Prior {
-  double falloff = 0.8;  // of a coefficient's expected size a degree
-  double ratio = 1;      // noise variance over a coefficient's at degree 4
-  double unlike = 1;     // size of what only unlike magnets make, over the others
+  // The factor by which a coefficient's expected size falls from degree to degree.
+  double falloff = 0.8;
+  double ratio = 1;   // noise variance over a coefficient's at degree 4
+  double unlike = 1;  // size of the coefficients that only unlike magnets make, over the others
 };
 struct Posterior {
   Prior prior;
@@ -180,7 +181,7 @@ SphericalFit FitSpherical(const FieldMap& map) {
   const Normal ideal = Accumulate(columns, map, 1);
   Posterior posterior = BestOf(columns, ideal, Priors(ideal.points));
   SphericalFit fit;
-  // Unlike magnets: worth their coefficients where the same points are explained better.
+  // Unlike magnets deserve their coefficients where the same points are explained better.
   if (map.size() >= kPointsForUnlike) {
     const std::size_t stride = (map.size() + kPointsForAllOrders - 1) / kPointsForAllOrders;
     const Normal thinned = stride == 1 ? ideal : Accumulate(columns, map, stride);

@@ -1,4 +1,4 @@
-// The spherical model's coefficients from a map at one radius; field_fit.h says how.
+// The spherical model's coefficients from a map at one radius; field_fit.h describes the method.
 #pragma once
 
 #include <vector>

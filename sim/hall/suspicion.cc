@@ -9,7 +9,8 @@ namespace {
 constexpr std::size_t kRowsTried = 12;
 constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
-constexpr double kNear = 2;        // of the variance that the best leaves: cannot be told apart
+// Share of the variance that the best leaves: within it a hypothesis cannot be distinguished.
+constexpr double kNear = 2;
 constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;
 constexpr double kHarmless = 0.1;  // of the same: no orientation suffers from it
@@ -36,7 +37,7 @@ HallReading Under(const HallReading& reading, const Hypothesis& hypothesis) {
   return changed;
 }
 
-// Mean square residual a degree of freedom over some rows.
+// The mean square residual a degree of freedom over some rows.
 template <class Change>
 double VarianceLeft(const OrientationSolver& solver, const std::vector<HallReading>& readings,
                     const std::vector<std::size_t>& tried, Change change) {
@@ -69,9 +70,9 @@ struct Line {
   double slope = 0;
   double offset = 0;
   double rms = 0;
-  double spread = 0;  // of what it should see
+  double spread = 0;  // of the fields that it should see
 };
-// What the sensor says over what the others say that it should.
+// The line of a sensor's readings over the readings that the other sensors predict.
 Line AgainstTheOthers(const OrientationSolver& solver, const std::vector<HallReading>& readings,
                       const std::vector<std::size_t>& tried, std::size_t sensor) {
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
@@ -104,7 +105,7 @@ SensorFault KindOf(const Line& line) {
   return of_gain > std::abs(line.offset) ? SensorFault::kGain : SensorFault::kOffset;
 }
 
-// Columns that hold nothing, or one value while the others move.
+// Columns without readings, or with a single value while the others move.
 std::vector<SensorVerdict> SilentOrStill(const std::vector<VoltageRow>& rows,
                                          std::vector<HallReading>* readings, std::size_t count) {
   std::vector<SensorVerdict> verdicts;
@@ -190,8 +191,8 @@ std::vector<SensorVerdict> SuspectSensors(const OrientationSolver& solver,
       for (std::size_t k = 1; k < hypotheses.size(); ++k)
         if (near(hypotheses[k])) verdict.or_else.push_back(hypotheses[k].one);
     }
-    // Which of several it is cannot be told: nobody is left out. Of swaps one is as good as the
-    // other, and the orientation is one of two.
+    // Several hypotheses cannot be distinguished, so no sensor is left out. Among swaps one is as
+    // good as the other, and the orientation is one of two.
     if (verdict.or_else.empty() || best.fault == SensorFault::kSwapped)
       for (HallReading& reading : *readings) reading = Under(reading, best);
     verdicts.push_back(verdict);

@@ -1,11 +1,11 @@
-// Which sensors lie in all rows of a table; estimate.h says how it is decided.
+// The sensors that are faulty in all rows of a table; estimate.h describes the decision.
 #pragma once
 
 #include "sim/hall/estimate.h"
 
 namespace focalfleet::sim {
 
-/// Sensors that are found out are taken out of the readings, swapped ones exchanged in them.
+/// Faulty sensors are taken out of the readings, swapped ones are exchanged in them.
 std::vector<SensorVerdict> SuspectSensors(const OrientationSolver& solver,
                                           const std::vector<VoltageRow>& rows,
                                           std::vector<HallReading>* readings, double usual_noise_T);

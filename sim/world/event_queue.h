@@ -1,6 +1,6 @@
-// Whose turn is next: a binary heap of (instant, slot) in which a slot's instant can be moved.
-// Equal instants go by slot, so that the order of events does not depend on how the heap came to
-// be.
+// The queue of next events: a binary heap of (instant, slot) in which a slot's instant can be
+// moved. Equal instants go by slot, so that the order of events does not depend on the history of
+// the heap.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace focalfleet::sim {
 
 class EventQueue {
  public:
-  /// All slots at kNever.
+  /// All slots begin at kNever.
   explicit EventQueue(std::size_t slots) : at_(slots, kNever), place_(slots), heap_(slots) {
     for (std::size_t i = 0; i < slots; ++i) place_[i] = heap_[i] = static_cast<std::uint32_t>(i);
   }

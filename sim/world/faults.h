@@ -1,5 +1,5 @@
-// Planted misbehaviour, for tests and load testers. Each is switched on by name and stays until it
-// is switched off; none of them is chance: chance (of a bus that loses frames) is drawn from the
+// Planted misbehaviour, for tests and load testers. Each fault is switched on by name and stays
+// until it is switched off. Chance, such as that of a bus that loses frames, is drawn from the
 // world's seed.
 #pragma once
 
@@ -13,34 +13,34 @@
 
 namespace focalfleet::sim {
 
-/// How one unit misbehaves towards the host. Its motors obey as ever.
+/// The misbehaviour of one unit towards the host. Its motors are not affected.
 struct UnitFaults {
-  bool silent = false;        // hears, acts, never sends
-  bool deaf = false;          // hears nothing
+  bool silent = false;        // receives and acts, but never sends
+  bool deaf = false;          // receives nothing
   bool deaf_to_sync = false;  // its SYNC wire is broken
   DurationNs late{0};         // every answer comes this much later
-  std::uint8_t copies = 1;    // every answer is sent so many times
-  bool wrong_digest = false;  // what it says it holds is not what was staged
+  std::uint8_t copies = 1;    // number of copies of every answer
+  bool wrong_digest = false;  // the digest that it reports is not that of the staged move
   bool mute_done = false;     // answers, but the end of a motion is never reported unasked
   std::optional<SerialNumber> foreign_serial;  // other hardware sits at this place
-  /// In its next motion, so long after the first step: a fault. Used up when it happens.
+  /// A fault occurs in the next motion, this long after the first step. The entry is used up then.
   struct InMotion {
     DurationNs after{0};
     FaultCode code = FaultCode::kOverTemperature;
     Axis axis = Axis::kTheta;
   };
   std::optional<InMotion> in_motion;
-  std::optional<Function> ignores;  // such a request: hears it, does nothing, says nothing
-  /// Such a request (confirm, arm, home, parameter_write): does nothing, and answers so.
+  std::optional<Function> ignores;  // receives such a request, but neither acts nor answers
+  /// Such a request (confirm, arm, home, parameter_write) has no effect, and its answer says so.
   struct Refusal {
     Function what{};
     Answer answer = Answer::kWrongState;
   };
   std::optional<Refusal> refuses;
-  std::uint32_t loses_segments = 0;  // so many more stage_segment frames do not reach it
-  std::optional<std::uint8_t> protocol_version;  // that it says it speaks
+  std::uint32_t loses_segments = 0;  // this many more stage_segment frames do not reach it
+  std::optional<std::uint8_t> protocol_version;  // the version that it reports
   bool stale_sequence = false;  // answers under the sequence number of the request before
-  /// One sensor of its joint lies.
+  /// A sensor of its joint gives wrong readings.
   struct Sensor {
     enum class Kind : std::uint8_t { kStuck, kSaturated, kMissing, kSwapped, kGain };
     Kind kind = Kind::kStuck;
@@ -48,15 +48,17 @@ struct UnitFaults {
     std::uint8_t other = 0;   // of kSwapped
   };
   std::optional<Sensor> sensor;
-  bool claims_arrival = false;  // a start that it holds a move for: stays, and says `arrived`
+  // At the start of a move that it holds it stays where it is, and reports `arrived`.
+  bool claims_arrival = false;
 };
 
-/// How one bus misbehaves: chances per frame, but for noise.
+/// The misbehaviour of one bus: chances per frame, except for noise.
 struct BusFaults {
-  double bit_error_rate = 0;  // a bit is seen inverted by all: the frame is destroyed and repeated
-  double drop = 0;            // it occupies the bus and is acknowledged, but nobody takes it in
-  double duplicate = 0;       // one receiver refuses it when all others have it: they get it twice
-  double late = 0;            // it enters arbitration only after `late_by`
+  double bit_error_rate = 0;  // all nodes see a bit inverted: the frame is destroyed and repeated
+  double drop = 0;  // the frame occupies the bus and is acknowledged, but no node takes it in
+  // A receiver refuses the frame when all others have it: they get it twice.
+  double duplicate = 0;
+  double late = 0;  // the frame enters arbitration only after `late_by`
   DurationNs late_by = Milliseconds(5);
 };
 

@@ -15,7 +15,7 @@ Mechanism BuiltAsDescribed(const UnitDescription& description) {
 
 std::complex<double> FibreAt(const Mechanism& mechanism,
                              const std::array<double, kAxisCount>& angle_deg) {
-  // From the tip inwards: each joint turns all that lies beyond it.
+  // The sum goes from the tip inwards: each joint turns all that lies beyond it.
   std::complex<double> beyond = 0;
   for (std::size_t joint = kAxisCount; joint-- > 0;) {
     const double turn = (angle_deg[joint] + mechanism.zero_deg[joint]) * std::numbers::pi / 180;

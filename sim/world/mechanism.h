@@ -1,5 +1,5 @@
-// Where the fibre truly is. Two rotations, one inside the other, as products of unit complex
-// numbers; the geometry is what was built, which its maker's table need not say.
+// The true place of the fibre: two rotations, one inside the other, as products of unit complex
+// numbers. The geometry is the one that was built, which the description need not match.
 #pragma once
 
 #include <array>
@@ -10,17 +10,18 @@
 
 namespace focalfleet::sim {
 
-/// As built. Units: mm, degrees. Frame: focal plane, counter-clockwise from the sky side.
+/// The geometry as built. Units: mm, degrees. Frame: focal plane, counter-clockwise from the sky
+/// side.
 struct Mechanism {
   std::complex<double> base_mm;
   std::array<double, kAxisCount> arm_mm{};
   std::array<double, kAxisCount> zero_deg{};
 };
 
-/// Built exactly to its description.
+/// A mechanism built exactly to its description.
 Mechanism BuiltAsDescribed(const UnitDescription& description);
 
-/// The fibre with the axes at these output angles. Frame: focal plane, mm.
+/// The place of the fibre with the axes at these output angles. Frame: focal plane, mm.
 std::complex<double> FibreAt(const Mechanism& mechanism,
                              const std::array<double, kAxisCount>& angle_deg);
 

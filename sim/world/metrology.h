@@ -1,5 +1,6 @@
-// What a camera over the focal plane would see: the place of every fibre, with the camera's own
-// error where one is asked for. It sees fibres, not shafts, and it cannot tell whose power is off.
+// Metrology gives the place of every fibre as a camera over the focal plane sees it, with the
+// camera's own error where one is asked for. The camera sees fibres and no shafts, and it cannot
+// see which units have power.
 #pragma once
 
 #include <vector>
@@ -19,7 +20,7 @@ struct CameraError {
   double centroid_sigma_mm = 0;  // of one coordinate; 1-3 um on instruments in service
 };
 
-/// One exposure at world.now(). Frame: focal plane. Shape: as world.units(). The rng gives the
+/// An exposure at world.now(). Frame: focal plane. Shape: as world.units(). The rng gives the
 /// centroid noise.
 std::vector<Spot> Expose(const World& world, const CameraError& error, Rng* rng);
 

@@ -12,7 +12,8 @@ constexpr double kOffScaleShare = 0.085;
 constexpr double kSlippingShare = 0.02;
 constexpr double kDeadShare = 0.02;
 
-// One draw a unit decides whether, and one which axis: a unit has at most one of these.
+// A draw for each unit decides whether it has a bad axis, and another which axis. A unit has at
+// most one of these.
 void DrawBadAxes(const UnitDescription& description, std::uint64_t seed, UnitTraits* traits) {
   Rng rng = Rng::Stream(seed, "bad axis", description.id.value);
   const double lot = rng.Uniform();
@@ -97,8 +98,8 @@ UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& o
     AxisTraits& axis = traits.axis[Index(which)];
     axis.gear = described.gear;
     axis.load_phase_deg = rng.Uniform(0, 360);
-    // The stop stands a quarter of an electrical turn beyond the last vector, so that the rotor
-    // that is driven against it agrees with that vector and no other.
+    // The stop stands a quarter of an electrical turn beyond the last vector. A rotor that is
+    // driven against it then agrees with that vector and no other.
     const FactoryRange range = FactoryRangeOf(described, which, options.subdivision);
     const double deg_per_vector = 360 / (options.subdivision * described.gear);
     const double beyond = options.subdivision / 4.0;

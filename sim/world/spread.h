@@ -1,9 +1,9 @@
-// How units differ from their description. Nominal: not at all, but for the phase of the load over
-// a turn and the clock. Real: the spread measured on robots in service (a focal plane of 5000,
-// 2021): backlash 1.4-1.6 deg, periodic error 0.1 deg, step scatter 0.09-0.14 deg, scale sd 0.3
-// %, 8.5 % of units off scale, 4 % slipping or dead, arms sd 57 um, zero angles sd 0.5 deg. Every
-// draw has a stream of its own by (seed, purpose, unit id), so that a unit keeps its character when
-// others come or go.
+// The spread of units about their description. Nominal units do not differ from it, except in the
+// phase of the load over a turn and in the clock. Real units have the spread measured on robots in
+// service (a focal plane of 5000, 2021). The figures are: backlash 1.4-1.6 deg, periodic error 0.1
+// deg, step scatter 0.09-0.14 deg, scale sd 0.3 %, 8.5 % of units off scale, 4 % slipping or dead,
+// arms sd 57 um, zero angles sd 0.5 deg. Every draw has a stream of its own by (seed, purpose, unit
+// id). A unit therefore keeps its character when others are added or removed.
 #pragma once
 
 #include <array>
@@ -19,15 +19,15 @@ namespace focalfleet::sim {
 /// Nominal: quantisation and load-angle lag. Real: also the spread measured on robots in service.
 enum class Spread : std::uint8_t { kNominal, kReal };
 
-/// What is true of one unit and does not change.
+/// The constant traits of one unit.
 struct UnitTraits {
   std::array<AxisTraits, kAxisCount> axis;
   Mechanism mechanism;
   UnitClock clock;
 };
 
-/// One way in which the units differ from their description, for tests of what finds it: that of a
-/// cause of docs/diagnosis.md, drawn for each unit with a size of its own.
+/// A single way in which the units differ from their description, for tests of the diagnosis. Each
+/// is a cause of docs/diagnosis.md, drawn for each unit with a size of its own.
 enum class PlantedCause : std::uint8_t {
   kZeroOffset,    // zero angle, standard deviation in degrees
   kArmLength,     // standard deviation in mm
@@ -52,7 +52,7 @@ struct TraitsOptions {
 };
 UnitTraits DrawTraits(const UnitDescription& description, const TraitsOptions& options);
 
-/// Whole vectors between range's ends and home as the factory writes them: home is phi's upper and
+/// The range's ends and home in whole vectors, as the factory writes them: home is phi's upper and
 /// theta's lower end.
 struct FactoryRange {
   std::int32_t min_position = 0;
@@ -61,9 +61,9 @@ struct FactoryRange {
 };
 FactoryRange FactoryRangeOf(const AxisDescription& axis, Axis which, std::int32_t subdivision);
 
-/// Where the axes stand at first: as described, or folded back: theta in the middle of its range,
-/// phi as near to phi + phi_zero = 180 degrees as it gets; of a disabled unit anywhere with phi +
-/// phi_zero >= 120.
+/// The first pose of the axes: as described, or folded back. Folded back, theta stands in the
+/// middle of its range, and phi as near to phi + phi_zero = 180 degrees as it gets. A disabled unit
+/// stands anywhere with phi + phi_zero >= 120.
 std::array<double, kAxisCount> FirstPoseDeg(const UnitDescription& description, std::uint64_t seed);
 
 }  // namespace focalfleet::sim

@@ -1,6 +1,6 @@
-// One positioner as its maker describes it: where it sits, how long its arms are, where it answers.
-// The simulation's own words; it shares nothing with the coordinator's layout, so a mistake in one
-// is seen by the other.
+// A positioner as its maker describes it: its place, the lengths of its arms, its address. The
+// simulation has this type of its own and shares nothing with the coordinator's layout, so that a
+// mistake in one shows in the other.
 #pragma once
 
 #include <array>
@@ -17,7 +17,7 @@ struct AxisDescription {
   double gear = 1;      // motor revolutions per output revolution
   double min_deg = 0;   // range of the axis' own angle
   double max_deg = 0;
-  /// Where it stands at first; none: folded (FirstPoseDeg in spread.h). Snapped to a whole vector.
+  /// The angle at first; none: folded (FirstPoseDeg in spread.h). Snapped to a whole vector.
   std::optional<double> angle_deg;
 };
 
@@ -25,18 +25,18 @@ struct UnitDescription {
   UnitId id;
   BusId bus;
   NodeId node;
-  SerialNumber serial;  // 0: made up from the id
+  SerialNumber serial;  // 0: derived from the id
   double base_x_mm = 0;
   double base_y_mm = 0;
   std::array<AxisDescription, kAxisCount> axis;
-  std::uint8_t sensors = 0;  // Hall sensors at its joint (unit/joint_sensors.h)
-  double carrier_mm = 0;     // from the joint's centre to the fibre, where it has such sensors
-  bool enabled = true;       // false: only its default pose differs; it answers as any other
-  /// Its clock's seconds a true second, less 1; none: drawn (WorldConfig::clock_error_max).
+  std::uint8_t sensors = 0;     // Hall sensors at its joint (unit/joint_sensors.h)
+  double fibre_carrier_mm = 0;  // from the joint's centre to the fibre, where it has such sensors
+  bool enabled = true;          // false: only its default pose differs; it answers like any other
+  /// The seconds of its clock a true second, less 1; none: drawn (WorldConfig::clock_error_max).
   std::optional<double> clock_error = {};
 };
 
-/// What FLASH holds when a unit leaves the factory, both axes alike.
+/// The content of FLASH when a unit leaves the factory, both axes alike.
 struct FactoryDrive {
   std::int32_t counter1 = 500;
   std::int32_t repeat = 108;

@@ -1,20 +1,20 @@
-// The simulated fleet: every unit on every bus, on virtual time. It is what is true in a test. The
-// host speaks to it in frames alone; the truth (shaft angles, fibre positions) is for tests and
-// reports, and nothing that the coordinator may look at.
+// The simulated fleet: every unit on every bus, on virtual time. The host reaches it through frames
+// alone. The true state (shaft angles, fibre positions) is for tests and reports; the coordinator
+// never sees it.
 //
-// It runs from event to event (a frame's end, a motion's begin or end, a host given up), never in
-// steps of time: motion in between is a closed form. 5000 units at rest cost nothing but the frames
-// they are sent.
+// The world goes from event to event and never in steps of time. Events are the end of a frame, the
+// begin or end of a motion, and a time-out of the host; motion in between is a closed form. 5000
+// units at rest cost nothing but the frames that they are sent.
 //
-//   world.Inject(bus, frame, now);                 the host's controller takes a frame
-//   world.AdvanceTo(t, &received);                 what the host hears up to and including t, in
-//   order world.NextEvent()                              when the world would next do something by
+//   world.Inject(bus, frame, now);   the host's controller takes a frame
+//   world.AdvanceTo(t, &received);   the frames that the host receives up to and including t, in
+//   order world.NextEvent()                the instant at which the world next does something by
 //   itself
 //
-// One controller per bus on the host's side, with a mailbox for every waiting frame: of the frames
-// that wait anywhere on a bus the lowest identifier goes first, and of equal ones the first come.
-// An `arm` therefore passes an upload that still waits; begin, segments and read-back of an upload
-// keep their order by their identifiers.
+// Each bus has one controller on the host's side, with a mailbox for every waiting frame. The
+// lowest identifier among the frames that wait anywhere on a bus goes first, and of equal ones the
+// first come. An `arm` therefore passes an upload that still waits. Begin, segments and read-back
+// of an upload keep their order by their identifiers.
 #pragma once
 
 #include <array>
@@ -30,6 +30,7 @@
 #include "protocol/link/frame_port.h"
 #include "sim/world/axis/axis_memory.h"
 #include "sim/world/bus/bus.h"
+#include "sim/world/disturbable.h"
 #include "sim/world/fault_plan.h"
 #include "sim/world/faults.h"
 #include "sim/world/spread.h"
@@ -39,7 +40,7 @@
 
 namespace focalfleet::sim {
 
-/// What outlives the process: as found by a later run.
+/// The state of a unit that outlives the process, as a later run finds it.
 struct UnitMemory {
   UnitId id;
   Flash flash;
@@ -50,23 +51,25 @@ struct WorldConfig {
   std::vector<UnitDescription> units;
   std::uint64_t seed = 1;
   Spread spread = Spread::kNominal;
-  std::vector<PlantedTrait> planted = {};  // on top of it
+  std::vector<PlantedTrait> planted = {};  // on top of the spread
   std::uint32_t bit_rate_bps = 1'000'000;
   HostInstant start{0};  // power-on of all units
   FactoryDrive drive;
-  double clock_error_max = 50e-6;              // of each unit's clock, drawn evenly from -max..max
-  DurationNs answer_delay = Microseconds(30);  // a frame heard to its answer in the mailbox
+  double clock_error_max = 50e-6;  // of each unit's clock, drawn evenly from -max..max
+  // From the end of a frame to its answer in the mailbox.
+  DurationNs answer_delay = Microseconds(30);
   /// False where a real bus arbitrates and takes its time: frames pass at once, in order.
   bool bit_clock = true;
   std::vector<UnitMemory> memory;  // of an earlier run, matched by unit id
-  /// From the bus-off of a bus' host controller to its restart; kNever: it waits for RestartHost.
+  /// The time from the bus-off of a bus' host controller to its restart; kNever: it waits for
+  /// RestartHost.
   DurationNs host_restart = Milliseconds(1000);
-  /// Of units with sensors at their joint; none: there are no such units.
+  /// The sensors of units with a ball-jointed fibre carrier; none: there are no such units.
   std::shared_ptr<const JointSensors> joint_sensors = {};
   std::vector<PlannedFault> faults;  // by the clock, from `start` on
 };
 
-/// How a CAN controller stands.
+/// The state of a CAN controller.
 struct Controller {
   Confinement state = Confinement::kActive;
   bool warns = false;
@@ -74,15 +77,14 @@ struct Controller {
   std::uint32_t receive_errors = 0;
 };
 
-/// True things about one unit, at World::now().
+/// The true state of one unit, at World::now().
 struct UnitTruth {
   UnitId id;
   std::array<double, kAxisCount> angle_deg{};  // of the output shaft
   std::array<double, kAxisCount>
       vectors{};  // the same in vectors from the axis' zero, with fractions
-  std::array<std::int32_t, kAxisCount>
-      applied{};    // what its firmware believes: the vector applied now
-  double x_mm = 0;  // fibre, focal-plane frame
+  std::array<std::int32_t, kAxisCount> applied{};  // the vector that its firmware applies now
+  double x_mm = 0;                                 // fibre, focal-plane frame
   double y_mm = 0;
   UnitState state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
@@ -90,70 +92,50 @@ struct UnitTruth {
   bool interrupted = false;
   std::uint32_t moves_begun = 0;
   MoveId last_move;
-  std::uint32_t begun_twice = 0;  // a move begun that was begun before: must stay 0
-  HostInstant began = kNever;     // its last motion; kNever: none in this run
-  double clock_error = 0;         // its clock's seconds a second of the world's, less 1
+  std::uint32_t begun_twice = 0;  // moves that were begun a second time: must stay 0
+  HostInstant began = kNever;     // begin of its last motion; kNever: none in this run
+  double clock_error = 0;         // seconds of its clock a second of the world's, less 1
 };
 
-/// One frame as the wire carried it, for whoever listens beside the host.
+/// A frame as the wire carried it, for listeners beside the host.
 struct WireFrame {
   BusId bus;
   HostInstant at;  // its end
   CanFrame frame;
   bool from_unit = false;
-  std::uint32_t client = 0;  // who injected it, where it is not from a unit
+  std::uint32_t client = 0;  // the client that injected it, where it is not from a unit
 };
 
-class World {
+class World : public Disturbable {
  public:
-  /// Says what is wrong with the units (bus, node or id used twice, range the wrong way round ...).
+  /// Returns the first fault in the units (bus, node or id used twice, range the wrong way round
+  /// ...).
   static Status Validate(const WorldConfig& config);
 
-  /// Pre: Validate(config) is well.
+  /// Pre: Validate(config) succeeds.
   explicit World(WorldConfig config);
   World(const World&) = delete;
   World& operator=(const World&) = delete;
   ~World();
 
   /// The host's frame waits for the bus from `at` on (now, where `at` has passed). False: no
-  /// mailbox left, the bus is dead or there is none of that number; the frame is lost and counted.
+  /// mailbox is left, the bus is dead, or there is none of that number; the frame is lost and
+  /// counted.
   bool Inject(BusId bus, const CanFrame& frame, HostInstant at, std::uint32_t client = 0);
 
-  /// Lets time pass. Appends what the host hears to `delivered`, and every frame of every bus to
-  /// `wire` where that is given, both in order of time.
+  /// Lets time pass. The frames that the host receives are appended to `delivered`, and every frame
+  /// of every bus to `wire` where that is given. Both are in order of time.
   void AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
                  std::vector<WireFrame>* wire = nullptr);
 
-  /// kNever: only a frame from the host can make something happen.
+  /// The instant of the next event; kNever: only a frame from the host can make something happen.
   [[nodiscard]] HostInstant NextEvent() const;
   [[nodiscard]] HostInstant now() const;
 
-  /// An edge of the SYNC line, which goes to every unit of every bus; at now().
+  /// Puts an edge on the SYNC line, which goes to every unit of every bus; at now().
   void PulseSync();
 
-  // ---- chance and violence; all at now()
-
-  void PowerCut(UnitId unit);  // at once, whatever it does
-  void PowerOn(UnitId unit);
-  void KillBus(BusId bus);  // what waits is lost
-  void ReviveBus(BusId bus);
-  [[nodiscard]] bool dead(BusId bus) const;
-  void StickBus(BusId bus);  // dominant, until it is released
-  void ReleaseBus(BusId bus);
-  void RestartHost(BusId bus);   // its controller, if it is bus-off
-  void ThrowHostOff(BusId bus);  // as after a short circuit
-  void Unplug(UnitId unit);      // from its bus; it keeps its power
-  void Plug(UnitId unit);
-  /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
-  void Babble(UnitId unit, const std::optional<CanFrame>& frame);
-  /// Frames that wait or are on their way on this bus.
-  [[nodiscard]] std::size_t waiting(BusId bus) const;
-  void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
-  /// Nothing where there is no such unit.
-  [[nodiscard]] UnitFaults* faults(UnitId unit);
-  [[nodiscard]] BusFaults* faults(BusId bus);
-
-  // ---- truth
+  // ---- the true state
 
   [[nodiscard]] std::span<const UnitDescription> units() const;
   [[nodiscard]] std::span<const BusId> buses() const;  // ascending
@@ -161,6 +143,9 @@ class World {
   [[nodiscard]] UnitTruth Truth(std::size_t row) const;  // row in units()
   [[nodiscard]] UnitTruth Truth(UnitId unit) const;      // Pre: it exists
   [[nodiscard]] const Flash& flash(UnitId unit) const;   // Pre: it exists
+  [[nodiscard]] bool dead(BusId bus) const;
+  /// The number of frames that wait or are on their way on this bus.
+  [[nodiscard]] std::size_t waiting(BusId bus) const;
   [[nodiscard]] const BusCounters& counters(BusId bus) const;
   [[nodiscard]] Controller controller(BusId bus) const;    // the host's. Pre: there is such a bus
   [[nodiscard]] Controller controller(UnitId unit) const;  // Pre: it exists
@@ -168,8 +153,6 @@ class World {
   [[nodiscard]] std::vector<UnitMemory> Memory() const;
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
   FaultSchedule schedule_;
 };
 

@@ -10,8 +10,8 @@ template <class T>
 T Draw(Rng& rng, std::uint64_t count) {
   return static_cast<T>(rng.Below(count));
 }
-// Small, large and middle values alike: a width that is one bit short must not hide behind rare
-// draws.
+// Small, large and middle values come equally often: a width that is one bit short must not hide
+// behind rare draws.
 std::uint64_t Wide(Rng& rng, unsigned bits) {
   const std::uint64_t all = bits == 64 ? ~0ull : (1ull << bits) - 1;
   switch (rng.Below(6)) {
@@ -32,7 +32,7 @@ T Whole(Rng& rng) {
 std::int32_t Signed24(Rng& rng) {
   return static_cast<std::int32_t>(static_cast<std::uint32_t>(Wide(rng, 24)) << 8) >> 8;
 }
-// A position: one value of the 24 bits is none.
+// A position: one value of the 24 bits means no position.
 std::int32_t Position24(Rng& rng) {
   const std::int32_t drawn = Signed24(rng);
   return drawn < -8388607 ? -8388607 : drawn;
@@ -140,7 +140,7 @@ Variant Make(std::size_t alternative, Rng& rng) {
   return message;
 }
 
-// ---- showing
+// ---- text of a message
 
 class Text {
  public:

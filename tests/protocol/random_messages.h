@@ -1,6 +1,6 @@
-// Random messages of both directions with every field over its whole range on the wire, and each
-// message's fields as one comparable tuple. What is drawn here is what docs/protocol.md allows;
-// nothing is taken from the codec.
+// Random messages of both directions, with every field over its whole range on the wire. Each
+// message's fields can be had as one comparable text. The draws follow docs/protocol.md; nothing is
+// taken from the codec.
 #pragma once
 
 #include <string>
@@ -16,8 +16,8 @@ HostMessage RandomHost(std::size_t alternative, Rng& rng);
 UnitMessage RandomUnit(Rng& rng);
 UnitMessage RandomUnit(std::size_t alternative, Rng& rng);
 
-/// Every field of a message as text, its type's place in the variant first: equal texts, equal
-/// messages.
+/// Every field of a message as text, with its type's place in the variant first. Equal texts mean
+/// equal messages.
 std::string Show(const HostMessage& message);
 std::string Show(const UnitMessage& message);
 

@@ -34,7 +34,7 @@ sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDriv
                                  .base_y_mm = unit.base_fp.y_mm,
                                  .axis = {},
                                  .sensors = unit.sensors,
-                                 .carrier_mm = unit.carrier_mm,
+                                 .fibre_carrier_mm = unit.carrier_mm,
                                  .enabled = unit.enabled};
   for (const Axis axis : kAxes) {
     const AxisGeometry& g = unit.axis[Index(axis)];

@@ -1,7 +1,7 @@
-// What is true of one 4 mm motor and of the load on its shaft. Paper 1 prints resistance,
-// inductance and inertia; it prints neither flux nor load. Five sets are each consistent with its
-// critical n = 37 at 1.8 V, and none is singled out by what it measured: a result that needs one of
-// them says which.
+// The parameters of one 4 mm motor and of the load on its shaft. Paper 1 prints resistance,
+// inductance and inertia, but neither flux nor load. Five sets are each consistent with its
+// critical n = 37 at 1.8 V, and its measurements single out none of them. A result that needs one
+// of the sets says which.
 #pragma once
 
 #include <array>
@@ -10,7 +10,8 @@
 
 namespace focalfleet::sim {
 
-/// One pole pair: an electrical turn is a turn of the rotor. Units: SI, torques at the motor shaft.
+/// The motor has one pole pair: an electrical turn is a turn of the rotor. Units: SI, torques at
+/// the motor shaft.
 struct MotorParameters {
   double resistance_ohm = 14.85;  // of a phase, at 20 degrees Celsius
   double inductance_H = 37e-6;    // of a phase; the magnet has no saliency: Ld = Lq
@@ -21,14 +22,14 @@ struct MotorParameters {
   double load_variation = 0.20;  // amplitude over one output turn, as a share of the mean
 };
 
-/// A consistent choice of what the paper leaves open.
+/// A consistent choice of the parameters that the paper leaves open.
 struct ParameterSet {
   std::string_view name;
   MotorParameters motor;
 };
 
-/// C: constant torque, no viscous drag. V: V_bus * n falls nowhere. W: between. 9: the
-/// strongest magnet; without drag it starts bare at 9 V with n = 8. J2: as 9 with twice the
+/// Set C has constant torque and no viscous drag. V: V_bus * n falls nowhere. W lies between. 9 has
+/// the strongest magnet; without drag it starts bare at 9 V with n = 8. J2 is 9 with twice the
 /// inertia.
 inline constexpr std::array<ParameterSet, 5> kParameterSets = {{
     {"C", {.flux_linkage_Wb = 0.15e-3, .viscous_Nms = 0, .load_Nm = 5.93e-6}},
@@ -48,7 +49,7 @@ constexpr std::optional<MotorParameters> FindParameterSet(std::string_view name)
   return std::nullopt;
 }
 
-/// Load of a motor without its gearhead (paper 1's bench).
+/// The load of a motor without its gearhead (paper 1's bench).
 inline constexpr double kBareLoad_Nm = 1e-6;
 
 }  // namespace focalfleet::sim

@@ -43,12 +43,13 @@ void Shaft::Step(double impulse_Nms, double step_s) {
   const double load = InContact(direction) ? LoadTorque() : 0;
   if (before == 0 && std::abs(impulse_Nms) <= load * step_s) return;
   const double friction = std::copysign(load, direction) * step_s;
-  // Drag with the mean of the speeds before and after: solved for the latter.
+  // The drag acts with the mean of the speeds before and after; the equation is solved for the
+  // latter.
   const double drag = motor_.viscous_Nms * step_s / 2;
   const double inertia = motor_.inertia_kg_m2;
   const double after = ((inertia - drag) * before + impulse_Nms - friction) / (inertia + drag);
   if (before * after < 0) {
-    // Comes to rest within the step: friction takes what is left.
+    // The rotor comes to rest within the step: friction takes the rest of the energy.
     const double mean = before / 2;
     const double turned = mean * step_s * before / (before - after);
     load_J_ += kinetic_J() + impulse_Nms * mean - motor_.viscous_Nms * mean * mean * step_s;

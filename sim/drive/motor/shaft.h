@@ -1,11 +1,11 @@
-// The rotor and what hangs on it: inertia, viscous drag, and a gearhead whose dry friction opposes
-// motion and changes over an output turn. Between rotor and gearhead is play: while the rotor
-// crosses it, the friction is not felt.
+// The rotor and its load: inertia, viscous drag, and a gearhead. The gearhead's dry friction
+// opposes motion and changes over an output turn. Rotor and gearhead have play between them: while
+// the rotor crosses it, the friction does not act.
 //
 //   J w' = T - b w - T_load(output) sign(w)        at rest: w' = 0 while |T| <= T_load
 //
-// Time goes in steps over which the drive's torque is given as an impulse; speed is taken as linear
-// within a step, so a step's error is of third order.
+// Time goes in steps, for each of which the drive's torque is given as an impulse. The speed is
+// linear within a step, so the error of a step is of third order.
 #pragma once
 
 #include <numbers>
@@ -14,7 +14,7 @@
 
 namespace focalfleet::sim {
 
-/// What the gearhead adds. Angles in radians of the rotor.
+/// The contribution of the gearhead. Angles in radians of the rotor.
 struct Gearhead {
   double ratio = 337.0 * 45 / 17;  // rotor turns an output turn
   double load_phase_rad = 0;       // output angle of the highest load
@@ -25,17 +25,17 @@ class Shaft {
  public:
   Shaft(const MotorParameters& motor, const Gearhead& gearhead) : motor_(motor), gear_(gearhead) {}
 
-  /// Stands or turns at once so. The gearhead is in contact in the direction of `speed`, forward at
-  /// rest.
+  /// Sets the rotor to this angle and speed. The gearhead is in contact in the direction of
+  /// `speed`, forward at rest.
   void Place(double angle_rad, double speed_rad_per_s);
 
   [[nodiscard]] double angle_rad() const { return angle_rad_; }
   [[nodiscard]] double speed_rad_per_s() const { return speed_rad_per_s_; }
   [[nodiscard]] double output_rad() const { return gear_rad_ / gear_.ratio; }
 
-  /// Speed in the middle of a step of `step_s` that begins with drive torque `torque_Nm`.
+  /// The speed in the middle of a step of `step_s` that begins with drive torque `torque_Nm`.
   [[nodiscard]] double MiddleSpeed(double torque_Nm, double step_s) const;
-  /// A step of `step_s` with `impulse_Nms`, the drive torque's integral.
+  /// Advances by `step_s` with `impulse_Nms`, the integral of the drive's torque.
   void Step(double impulse_Nms, double step_s);
 
   [[nodiscard]] double LoadTorque() const;  // friction as of now, Nm, never negative

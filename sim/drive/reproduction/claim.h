@@ -1,6 +1,6 @@
-// What paper 1 says, and what comes out when it is simulated. A claim holds the paper's numbers as
-// they are printed and the simulation's as they came; the status follows from comparing them, so a
-// motor with other parameters gets other statuses.
+// A claim of paper 1, and the result when it is simulated. A claim holds the paper's numbers as
+// printed and the simulation's as computed. The status follows from comparing them, so a motor with
+// other parameters gets other statuses.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@ namespace focalfleet::sim {
 
 enum class ClaimStatus : std::uint8_t {
   kReproduced,   // every number within the claim's tolerance, without tuning on it
-  kOrdering,     // only the order of the numbers
-  kFitted,       // a parameter was set so that it comes out; the conditions name it
-  kDisagrees,    // both numbers stand; the reason is the likely one
+  kOrdering,     // only the order of the numbers agrees
+  kFitted,       // a parameter was fitted to this number; the conditions name it
+  kDisagrees,    // both numbers are given; the reason is the likely one
   kNotTestable,  // an input, or a sentence without a consequence
 };
 const char* Name(ClaimStatus status);
@@ -29,7 +29,7 @@ struct Claim {
   std::string reason;  // of a disagreement or a fit; else empty
 };
 
-/// Points of a plot that belongs to claims.
+/// The points of a plot that belongs to claims.
 struct ClaimCurve {
   std::string figure;  // curves of one figure share axes
   std::string name;

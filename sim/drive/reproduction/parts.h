@@ -1,4 +1,4 @@
-// The parts of a reproduction, one file each; they share how a claim is judged.
+// The parts of a reproduction, one file each, and the functions with which they judge claims.
 #pragma once
 
 #include <string>
@@ -9,15 +9,15 @@
 
 namespace focalfleet::sim::reproduction {
 
-/// Motor, bridge as printed, nominal gearhead.
+/// The motor, the bridge as printed, and the nominal gearhead.
 Drive::Setting PaperSetting(const ReproduceOptions& options, std::string_view set, double v_bus_V);
 /// The bridge without dead time and ramps.
 Drive::Setting Ideal(Drive::Setting setting);
 
-/// Reproduced where every simulated number is within `tolerance` of the paper's; else disagrees.
+/// kReproduced where every simulated number is within `tolerance` of the paper's; else kDisagrees.
 ClaimStatus Within(const Claim& claim, double tolerance);
 enum class Order { kRises, kFalls };
-/// Ordering where the simulated numbers rise (fall) strictly; else disagrees.
+/// kOrdering where the simulated numbers rise (or fall) strictly; else kDisagrees.
 ClaimStatus InOrder(const std::vector<double>& numbers, Order order);
 
 void AddTimes(const ReproduceOptions& options, Reproduction* out);

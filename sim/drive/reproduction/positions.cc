@@ -1,5 +1,5 @@
-// Where the axis ends: the paper's turns of 360 degrees there and back, and what the stored vector
-// is worth.
+// The end positions of the axis: the paper's turns of 360 degrees there and back, and the use of
+// the stored vector.
 
 #include <algorithm>
 #include <cmath>
@@ -17,12 +17,13 @@ namespace {
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kArm_um = 8250;  // assumed: the paper does not print it
 
-// Output errors of turns there and back, in um at the arm, from the drive with play in its gear.
+// The output errors of turns there and back, in um at the arm, from the drive with play in its
+// gear.
 std::vector<double> Closures_um(Drive::Setting setting, double play_um, int turns) {
   setting.gearhead.play_rad = play_um / kArm_um * setting.gearhead.ratio;
   const Modulation modulation{.repeat = 108};
   ReducedDrive drive(setting, modulation);
-  // A few electrical turns each way cross the play as 360 degrees do.
+  // A few electrical turns each way cross the play, as 360 degrees do.
   const double cross = setting.gearhead.play_rad / kTurn;
   const auto vectors = static_cast<std::int64_t>(cross + 5) * modulation.subdivision;
   drive.Place(0, 0);
@@ -35,7 +36,7 @@ std::vector<double> Closures_um(Drive::Setting setting, double play_um, int turn
     drive.RunVectors(way > 0 ? field + 1 : field - 1, way);
     field += way;
     const double after = drive.shaft().output_rad();
-    // Commanded and travelled: what is missing is play and lag.
+    // The difference of commanded and travelled is play and lag.
     const double commanded =
         static_cast<double>(way) / modulation.subdivision * kTurn / setting.gearhead.ratio;
     closures.push_back(std::abs(commanded - (after - before)) * kArm_um);
@@ -65,7 +66,7 @@ Spread SpreadOf(const std::vector<double>& errors, double bin) {
     ++counts[at];
   }
   spread.rms = std::sqrt(spread.rms / static_cast<double>(errors.size()));
-  // Seven bins together, so that the draw's noise does not choose among neighbours.
+  // Seven bins count together, so that the noise of the draw does not choose among neighbours.
   constexpr std::size_t kWindow = 7;
   counts.resize(counts.size() + kWindow);
   int most = 0;
@@ -86,7 +87,8 @@ double Exponential(Rng* rng) { return -std::log(1 - rng->Uniform()); }
 void AddPositions(const ReproduceOptions& options, Reproduction* out) {
   const auto setting = Ideal(PaperSetting(options, options.wave_set, 1.8));
 
-  // At a reversal the output misses the play and what the rotor's lag changes; fitted is the play.
+  // At a reversal the output lacks the play and the change of the rotor's lag. The fit sets the
+  // play.
   const double lag_um = MeanClosure_um(setting, 0);
   Rng rng = Rng::Stream(options.seed, "positioning");
   constexpr int kStops = 200'000;
@@ -129,14 +131,14 @@ void AddPositions(const ReproduceOptions& options, Reproduction* out) {
   const double wide_um = MeanClosure_um(setting, kWidePlay_um);
   errors.clear();
   for (int k = 0; k < kStops; ++k) {
-    // Each of the two ends of a closure has given up some of the play.
+    // Each of the two ends of a closure has taken up some of the play.
     const double left = 1 - kTakeUp * (Exponential(&rng) + Exponential(&rng));
     errors.push_back(std::max(0.0, wide_um * left));
   }
   add("positioning_take_up", "play that is partly taken up at each stop", moves,
       "parameters: play of 167 um at the arm, 9.5 % of it taken up at a stop on average");
 
-  // A bias of 140 um with the noise that makes it 146 um RMS.
+  // A bias of 140 um with noise that gives 146 um RMS.
   errors.clear();
   for (int k = 0; k < kStops; ++k)
     errors.push_back(std::hypot(140 + 29.3 * rng.Normal(), 29.3 * rng.Normal()));
@@ -144,7 +146,7 @@ void AddPositions(const ReproduceOptions& options, Reproduction* out) {
       "noise about a bias makes RMS the greater one; a tail towards zero is needed, as play gives "
       "that is not always closed");
 
-  // Start with the stored vector, and with others: where the rotor goes when power comes back.
+  // Starts with the stored vector and with others show where the rotor goes when power comes back.
   ClaimCurve curve{.figure = "what a wrong stored vector costs",
                    .name = "position error after power-on",
                    .x = {},
@@ -155,12 +157,12 @@ void AddPositions(const ReproduceOptions& options, Reproduction* out) {
   for (int off = -96; off <= 96; off += 4) {
     ReducedDrive drive(setting, modulation);
     drive.Place(0, 0);
-    // Vector `off` is held for a second instead of the one that the rotor stands at.
+    // Vector `off` is held for a second in place of the one that the rotor stands at.
     drive.RunVectors(off, 1, 1 / modulation.carrier_s());
     const double error_um = drive.shaft().angle_rad() * um_per_rad;
     const double turn = static_cast<double>(off) / modulation.subdivision;
     curve.x.push_back(360 * turn);
-    // What firmware believes less what is so.
+    // The error is the firmware's position less the true one.
     curve.y.push_back(turn * kTurn * um_per_rad - error_um);
     worst_um = std::max(worst_um, std::abs(curve.y.back()));
   }

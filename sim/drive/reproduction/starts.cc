@@ -1,5 +1,5 @@
-// Critical n and what the paper builds on it. The sets' loads were fitted to n = 37 without dead
-// time, so the bridge is ideal here unless said otherwise.
+// The critical n and the paper's conclusions from it. The sets' loads were fitted to n = 37 without
+// dead time, so the bridge is ideal here unless stated otherwise.
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +23,7 @@ struct SetResult {
   int critical_dead_time = 0;
 };
 
-// The share done, step by step; the steps of one stage are of about equal cost.
+// The share done, step by step; the steps of one stage have about equal cost.
 class Steps {
  public:
   Steps(const ReproduceProgress& progress, double from, double to, int steps)
@@ -41,7 +41,8 @@ DriveLevel LevelOf(const ReproduceOptions& options) {
   return options.full ? DriveLevel::kPwm : DriveLevel::kReduced;
 }
 
-// With `--full` found at PWM level; what the reduced drive finds is told where it differs.
+// With `--full` the critical n is found at PWM level; a different result of the reduced drive is
+// reported.
 struct Searched {
   int repeat = 0;
   double real = 0;  // not rounded, by the reduced drive
@@ -50,7 +51,8 @@ struct Searched {
 Searched Search(const ReproduceOptions& options, const Drive::Setting& setting) {
   Searched found;
   found.real = CriticalRepeatReal(setting, {}).value_or(std::nan(""));
-  // As CriticalRepeat rounds: the real one is the upper end of a bracket of a thousandth.
+  // The rounding is that of CriticalRepeat: the real n is the upper end of a bracket of a
+  // thousandth.
   if (std::isfinite(found.real)) found.reduced = static_cast<int>(std::ceil(found.real - 1e-3));
   found.repeat =
       options.full ? CriticalRepeat(setting, {}, {}, DriveLevel::kPwm).value_or(0) : found.reduced;
@@ -63,8 +65,8 @@ void AddStarts(const ReproduceOptions& options, const ReproduceProgress& progres
                Reproduction* out) {
   const auto add = [out](Claim claim) { out->claims.push_back(std::move(claim)); };
   std::vector<SetResult> sets;
-  double loaded_9V = 1e9;  // least critical n of a loaded motor at 9 V
-  // Of a set: three searches or so at 1.8 V, the moves with two n, then the voltages.
+  double loaded_9V = 1e9;  // the least critical n of a loaded motor at 9 V
+  // The steps of one set: three searches or so at 1.8 V, the moves with two n, then the voltages.
   constexpr int kMovesReported = 24;
   constexpr int kStepsBefore = 3;
   Steps steps(progress, 0.2, 0.9,
@@ -84,7 +86,7 @@ void AddStarts(const ReproduceOptions& options, const ReproduceProgress& progres
     set.critical_dead_time = Search(options, PaperSetting(options, name, 1.8)).repeat;
     for (int k = 0; k < kStepsBefore; ++k) steps.Done();
 
-    // Whole moves with the n found and one less, and the first turns at PWM level for both.
+    // Whole moves run with the n found and one less, and for both the first turns at PWM level.
     int moves_reported = 0;
     const auto on_move = [&] {
       ++moves_reported;
@@ -167,8 +169,8 @@ void AddStarts(const ReproduceOptions& options, const ReproduceProgress& progres
                        : ClaimStatus::kDisagrees;
     const auto least = std::min_element(product_curve.y.begin(), product_curve.y.end());
     product.simulated = {product_curve.y.front(), *least, product_curve.y.back()};
-    // No fall from any earlier voltage by more than 1 %, which is flat to a reader of Fig. 9; and
-    // more at the end than at the begin.
+    // No fall from any earlier voltage exceeds 1 %, which looks flat in Fig. 9; the end is higher
+    // than the begin.
     double highest = 0;
     double deepest = 0;
     for (const double at : product_curve.y) {
@@ -225,7 +227,8 @@ void AddStarts(const ReproduceOptions& options, const ReproduceProgress& progres
   torque.status = near_two(torque.simulated);
   add(std::move(torque));
 
-  // The paper's outlook: a ramp lets a load start with a smaller n, so its move is shorter.
+  // The paper's outlook is that a ramp lets a load start with a smaller n, so that its move is
+  // shorter.
   progress(0.91, "ramps");
   constexpr Ramp kRamp{.stages = 8, .stage_s = 0.02};
   Claim heat{
@@ -255,7 +258,7 @@ void AddStarts(const ReproduceOptions& options, const ReproduceProgress& progres
   heat.simulated.insert(heat.simulated.end(), with_ramp.begin(), with_ramp.end());
   add(std::move(heat));
 
-  // The bench point: a bare motor from rest at 9 V with n 8.
+  // The bench point is a bare motor from rest at 9 V with n 8.
   progress(0.92, "bare motor at 9 V");
   Claim bare{.id = "bare_motor_9V",
              .text = "a bare motor starts at 9 V with n 8",

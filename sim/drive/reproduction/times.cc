@@ -1,4 +1,4 @@
-// Times, counts and what follows from them, and what the circuit does without a rotor that turns.
+// Times and counts with their consequences, and the circuit without a rotor that turns.
 
 #include <cmath>
 #include <complex>
@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-// An output turn, from the drive's own clock: an electrical turn is simulated and geared down.
+// The duration of an output turn by the drive's own clock: an electrical turn is simulated and
+// geared down.
 double OutputTurn_s(const ReproduceOptions& options, int repeat) {
   const auto setting = PaperSetting(options, options.wave_set, 1.8);
   const Modulation modulation{.repeat = repeat};
@@ -28,7 +29,7 @@ Drive::Setting Blocked(Drive::Setting setting) {
   return setting;
 }
 
-// Phase current of a blocked rotor under vector 100 for good, after `after_s`.
+// The phase current of a blocked rotor `after_s` after vector 100 is applied for good.
 double StepResponse_A(const Drive::Setting& setting, double after_s) {
   const int counts = 10;
   const Pattern whole{{{0, counts}, {counts, counts}, {counts, counts}}};
@@ -40,14 +41,15 @@ double StepResponse_A(const Drive::Setting& setting, double after_s) {
 }
 
 double TimeConstant_s(const Drive::Setting& setting) {
-  // Two points of an exponential that begins at 0: (1 - x^2) / (1 - x) = 1 + x.
+  // Two points of an exponential that begins at 0 give (1 - x^2) / (1 - x) = 1 + x.
   const double step_s = 2e-6;
   const double ratio = StepResponse_A(setting, 2 * step_s) / StepResponse_A(setting, step_s) - 1;
   return -step_s / std::log(ratio);
 }
 
-// Highest current of a blocked motor under vector 100 for a share of every carrier period, over
-// what it reaches when the vector stays: once everything repeats.
+// The highest current of a blocked motor under vector 100 for a share of every carrier period. The
+// result is relative to the current that the motor reaches when the vector stays. All of it repeats
+// by then.
 double PulseTrainPeak(const Drive::Setting& setting, int on_counts) {
   const Modulation modulation{};
   const double period = modulation.counter1;
@@ -60,7 +62,7 @@ double PulseTrainPeak(const Drive::Setting& setting, int on_counts) {
   return drive.peak_A() / (2 * setting.bridge.v_bus_V / (3 * setting.motor.resistance_ohm));
 }
 
-// What the rotor does in steady rotation. Four turns let die out that it swings within a vector.
+// The rotor's speed in steady rotation. Its swing within a vector dies out over four turns.
 double RotorSpeed_rpm(Drive::Setting setting, const Modulation& modulation, double load_Nm) {
   setting.motor.load_Nm = load_Nm;
   setting.motor.load_variation = 0;
@@ -95,7 +97,8 @@ double BlockedFundamental_A(const Drive::Setting& setting) {
   return std::abs(component) * field_Hz;
 }
 
-// Eq. 12's first term is printed as 3 P / L |flux_s| flux_f sin(delta): over the torque simulated.
+// The first term of eq. 12 is printed as 3 P / L |flux_s| flux_f sin(delta); the factor is over the
+// simulated torque.
 double PrintedTorqueFactor(const Drive::Setting& setting) {
   const Modulation modulation{.repeat = 37};
   const auto state = FindSteadyState(setting, modulation, setting.motor.load_Nm);
@@ -161,8 +164,8 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
   equal.paper.assign(4, 22'500);  // follows from V_counter2 = 4000
   within(std::move(equal), 1e-9);
 
-  // Table 2 is known only by its rule, "same speed": V_counter2 = n V_counter1 doubles as vectors
-  // halve.
+  // Table 2 is known only by its rule, "same speed": V_counter2 = n V_counter1 doubles as the
+  // vectors halve.
   Claim vectors{.id = "speed_equal_subdivision",
                 .text = "speed is equal in all tests of the subdivision",
                 .unit = "rpm",
@@ -244,7 +247,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
           .conditions = "10 + 10 + 50 ns"},
          0.02);
 
-  // The paper's "steady" currents are fundamentals; what a phase can reach is 15.5 % more.
+  // The paper's "steady" currents are fundamentals; a phase can reach 15.5 % more.
   const double reached_9V = 1e3 * StepResponse_A(nine_V, 40 * tau_s);
   const double reached_1V8 = 1e3 * StepResponse_A(low_V, 40 * tau_s);
   const auto steady = [&](const char* id, double printed_mA, const Drive::Setting& setting,
@@ -290,7 +293,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
        .status = ClaimStatus::kNotTestable,
        .reason = "p is missing; here p = 1, and the term is 0 as Ld = Lq. Eq. 13 inherits it"});
   {
-    // Eq. 4 in all sectors: volt-seconds of every vector against its angle.
+    // Eq. 4 in all sectors: the volt-seconds of every vector against its angle.
     double worst = 0;
     const Modulation modulation{.counter1 = 6000};
     for (int k = 0; k < modulation.subdivision; ++k) {
@@ -322,7 +325,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
                         "elsewhere is 1 / (V_counter1 t_base)"};
   within(std::move(fundamental), 0.005);
   {
-    // Basic vectors are where a table of six stands.
+    // The basic vectors stand at the places of a table of six.
     const auto angle_deg = [](int k) {
       const Pattern pattern = PatternOf({.counter1 = 6000, .subdivision = 6}, k);
       std::complex<double> sum;
@@ -351,8 +354,8 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
        .status = ClaimStatus::kNotTestable,
        .reason = "a misprint: the second is V_counter2; as V_counter1 the motor would turn at an "
                  "eighth of the speed"});
-  // What the paper leaves open, from another motor: J 2 r / (3 flux^2) is its mechanical time
-  // constant, 9.31 and 11.07 ms in the data sheets of two motors of 10 mm.
+  // Other motors give the values that the paper leaves open. J 2 r / (3 flux^2) is the mechanical
+  // time constant, 9.31 and 11.07 ms in the data sheets of two motors of 10 mm.
   const MotorParameters& motor = low_V.motor;
   const auto flux_mWb = [&](double constant_s) {
     return 1e3 * std::sqrt(2 * 8.7e-11 * motor.resistance_ohm / (3 * constant_s));
@@ -366,7 +369,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
        .reason = "parameter: mechanical time constant, taken from Orbray's BMS10-1003 and "
                  "BMS10-1008"});
   {
-    // Four equal stages of 46 and 14 teeth: a gearhead for 4 mm motors that is sold as 337:1.
+    // Four equal stages of 46 and 14 teeth form a gearhead for 4 mm motors that is sold as 337:1.
     const double ratio = std::pow(46.0 / 14 + 1, 4);
     const double off = ratio / 337 - 1;
     add({.id = "gear_ratio",

@@ -1,6 +1,6 @@
-// What the paper's scope saw: currents, their spectrum, ripple and power over carrier, subdivision
-// and wave mode. The motor turns steadily at the worst load of an output turn, however it got
-// there.
+// The signals on the paper's scope: currents, their spectrum, ripple and power over carrier,
+// subdivision and wave mode. The motor turns steadily at the worst load of an output turn; its
+// start is left out.
 
 #include <array>
 #include <cmath>
@@ -22,7 +22,7 @@ double WorstLoad(const Drive::Setting& setting) {
   return setting.motor.load_Nm * (1 + setting.motor.load_variation);
 }
 
-// Not a number where the motor cannot turn so.
+// The figures are not a number where the motor cannot turn at this load.
 WaveFigures Measure(const Drive::Setting& setting, const Modulation& modulation, double load_Nm) {
   const auto state = FindSteadyState(setting, modulation, load_Nm);
   if (state) return MeasureSteadyWave(setting, modulation, *state);
@@ -65,8 +65,8 @@ void AddCarrierStudy(const ReproduceOptions& options, Reproduction* out) {
                      : ClaimStatus::kDisagrees;
   snr.status = InOrder(snr.simulated, Order::kRises);
   const double peak_2000_mA = peaks.simulated.back();
-  // The same with the rotor blocked, by an ideal bridge for the SNR: nothing but winding and
-  // carrier.
+  // The SNR is measured with the rotor blocked and an ideal bridge, so that only winding and
+  // carrier count.
   Drive::Setting blocked = setting;
   blocked.motor.flux_linkage_Wb = 0;
   blocked.motor.viscous_Nms = 0;
@@ -112,7 +112,7 @@ void AddCarrierStudy(const ReproduceOptions& options, Reproduction* out) {
         "lowers it";
   add(std::move(peak));
 
-  // How much hotter the winding would be for the fundamental to be 288 mA.
+  // The factor by which the winding would have to be hotter for a fundamental of 288 mA.
   const Modulation slow{.counter1 = 2000, .repeat = 2};
   double cold = 1;
   double hot = 1.6;
@@ -216,7 +216,7 @@ void AddModeStudy(const ReproduceOptions& options, Reproduction* out) {
       "lose more; see rms_of_modes_half_carrier";
   add(std::move(rms));
 
-  // What a warmer winding does to the same current.
+  // A warmer winding changes the same current.
   {
     constexpr double kCopper_per_K = 0.00393;
     constexpr double kWarmer_K = 10;
@@ -236,7 +236,8 @@ void AddModeStudy(const ReproduceOptions& options, Reproduction* out) {
                    "and at this point it warms by far more"});
   }
 
-  // A centre-aligned timer counts up and down: with the same period register its carrier is half.
+  // A centre-aligned timer counts up and down: with the same period register its carrier frequency
+  // is half.
   const auto nine_V = PaperSetting(options, options.wave_set, 9);
   std::vector<double> half_rms;
   std::vector<double> half_snr;
@@ -303,7 +304,8 @@ void AddModeStudy(const ReproduceOptions& options, Reproduction* out) {
   }
 
   // Modes with more edges lose more voltage to dead time: at one bus voltage their field is weaker.
-  // At one field, so at one torque margin, what is left is the price of the edges.
+  // At equal field, and so at equal torque margin, the remaining difference is the cost of the
+  // edges.
   for (const AtVoltage& rail : {nine, low}) {
     const auto setting = PaperSetting(options, options.wave_set, rail.v_bus_V);
     const double field_Nm = ReducedDrive(setting, {.repeat = rail.repeat}).stall_Nm();
@@ -326,7 +328,7 @@ void AddModeStudy(const ReproduceOptions& options, Reproduction* out) {
     for (const WaveMode mode : {WaveMode::kFiveSegment, WaveMode::kSevenSegment}) {
       const Modulation modulation{.repeat = rail.repeat, .mode = mode};
       Drive::Setting raised = setting;
-      for (int k = 0; k < 3; ++k)  // dead time's part hardly depends on the voltage
+      for (int k = 0; k < 3; ++k)  // the share of dead time hardly depends on the voltage
         raised.bridge.v_bus_V *= field_Nm / ReducedDrive(raised, modulation).stall_Nm();
       const WaveFigures figures = Measure(raised, modulation, WorstLoad(setting));
       const double more_W = figures.power.supply_W - rail.modes[0].power.supply_W;
@@ -364,7 +366,7 @@ void AddModeStudy(const ReproduceOptions& options, Reproduction* out) {
              .reason = "the paper does not print it; a 4 mm motor at the former is hot"};
   add(std::move(heat));
 
-  // Where the rotor is against its vector: the paper sets the torque angle to a vector's width.
+  // The rotor against its vector: the paper sets the torque angle to the width of a vector.
   Claim lag{.id = "torque_angle",
             .text = "the torque angle is about 360 / subdivision",
             .paper = {},

@@ -15,7 +15,7 @@ namespace {
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSamplesWanted = 600'000;
 
-// What of a drive grows with time, read at two instants.
+// The quantities of a drive that grow with time, read at one instant.
 struct Meter {
   double t_s = 0;
   DriveEnergy energy;
@@ -35,8 +35,8 @@ DriveEnergy Difference(const DriveEnergy& after, const DriveEnergy& before) {
           .stored_J = after.stored_J - before.stored_J};
 }
 
-// What is shown: from rest a ramp up, then the full speed until the rotor's fate is clear. The
-// field does not slow down again.
+// The stages that are shown: from rest a ramp up, then full speed until the rotor's fate is clear.
+// The field does not slow down again.
 std::vector<Stage> StagesOf(const Modulation& modulation, const RecordingPlan& plan) {
   const auto vectors = [&](int turns) {
     return static_cast<std::int64_t>(turns) * modulation.subdivision;
@@ -59,8 +59,7 @@ struct Begun {
 Begun BeginInStep(Drive::Setting setting, const Modulation& modulation) {
   setting.motor.load_variation = 0;
   const auto state = FindSteadyState(setting, modulation, setting.motor.load_Nm);
-  // Without a lag that holds the load the rotor begins with the most torque there is, and falls
-  // behind.
+  // Where no lag holds the load, the rotor begins with the most torque there is, and falls behind.
   const SteadyState begun = state.value_or(
       SteadyState{.lag_rad = kTurn / 4, .speed_rad_per_s = kTurn * modulation.field_Hz()});
   return {InSteadyRotation(setting, modulation, begun), 0, state.has_value()};
@@ -75,7 +74,7 @@ Begun BeginFromRest(const Drive::Setting& setting, const Modulation& modulation)
   return {std::move(drive), 1, share < 1};
 }
 
-// Runs what was begun and keeps what is seen.
+// The recorder runs the begun drive and keeps the samples.
 class Recorder {
  public:
   Recorder(const Modulation& modulation, const RecordingPlan& plan, Begun begun)
@@ -102,7 +101,7 @@ class Recorder {
       for (std::int64_t k = 0; k < stage.vectors; ++k) ShowVector(shown++, stage.repeat);
     Judge(shown);
     if (!recording_.in_step) {
-      // Over a mean that is anything, zero too, ripple says nothing.
+      // Over a mean that may be zero the ripple has no meaning.
       recording_.figures.torque_ripple_rms = std::nan("");
       recording_.figures.torque_ripple_peak_to_peak = std::nan("");
     }
@@ -134,7 +133,7 @@ class Recorder {
     Drive& drive = begun_.drive;
     drive.Probe(recording_.sample_s, {});
     const Meter end = Read(drive);
-    // Rounding may leave a sample on the border; it belongs to what follows.
+    // Rounding may leave a sample on the border; it belongs to the next turn.
     while (!recording_.samples.empty() &&
            recording_.samples.back().t_s > end.t_s - recording_.sample_s / 2)
       recording_.samples.pop_back();
@@ -165,8 +164,8 @@ class Recorder {
     recording_.figures.torque_ripple_rms = torque.rms;
   }
 
-  // The last turn's samples at a power of two of instants: where they are not so already, a line
-  // from sample to sample.
+  // The last turn's samples at instants whose number is a power of two. Where they do not stand
+  // there already, they are interpolated linearly.
   [[nodiscard]] std::vector<std::complex<double>> Resampled(const Meter& end) const {
     const std::vector<DriveSample>& samples = recording_.samples;
     const double turn_s = end.t_s - last_turn_.t_s;
@@ -211,7 +210,7 @@ class Recorder {
     const std::size_t from = static_cast<std::size_t>(shown) - turn;
     for (std::size_t k = from; k < vectors.size(); ++k)
       recording_.lag_rad += vectors[k].lag_rad / static_cast<double>(turn);
-    // The field turned once between the first and the last lag that are a turn apart.
+    // The field turned once between the first and the last lag, which are a turn apart.
     const std::size_t start = from > 0 ? from - 1 : 0;
     const double field = static_cast<double>(vectors.size() - 1 - start) * kTurn /
                          static_cast<double>(modulation_.subdivision);

@@ -1,8 +1,8 @@
-// What a scope and a power meter see of a motor that runs: samples of its first field turns, and
-// of every vector the rotor's lag and the mean torque. Two beginnings: in steady rotation, as on a
-// bench where somebody has brought the motor up to speed; or at rest behind the vector, as a unit
-// starts, where the load decides whether the rotor follows. Whatever happens is recorded; a stall
-// is no error.
+// A recording is the view of a scope and a power meter on a motor that runs. The recording holds
+// samples of the first field turns, and for every vector the rotor's lag and the mean torque. A
+// recording begins in one of two ways. In steady rotation the motor has been brought up to speed,
+// as on a bench. At rest behind the vector it starts as a unit does, and the load decides whether
+// the rotor follows. A stall is recorded like any other course and is no error.
 #pragma once
 
 #include <complex>
@@ -19,24 +19,25 @@ namespace focalfleet::sim {
 struct RecordingPlan {
   int turns = 2;  // of the field, sampled
   bool from_rest = false;
-  /// From rest: the field turns so often at full speed at least, so that the rotor's fate shows.
+  /// From rest the field turns at least this often at full speed, so that the rotor's fate shows.
   int turns_to_judge = StartTrial{}.turns;
   Ramp ramp;            // from rest only
   double sample_s = 0;  // 0: SampleTime
 };
 
-/// A power of two of samples a turn of the field: 32 or more a carrier period, fewer (8 at least)
-/// where that would be more than about half a million in all.
+/// The time between samples, for a power of two of samples a turn of the field. They are 32 or more
+/// a carrier period, or fewer (at least 8) where 32 would give more than about half a million in
+/// all.
 double SampleTime(const Modulation& modulation, int turns);
 
-/// Samples that the plan will take, and carrier periods that it will run.
+/// The samples that the plan takes, and the carrier periods that it runs.
 struct RecordingSize {
   double samples = 0;
   double carriers = 0;
 };
 RecordingSize SizeOf(const Modulation& modulation, const RecordingPlan& plan);
 
-/// At the end of a vector.
+/// The state at the end of a vector.
 struct VectorRecord {
   double t_s = 0;
   double lag_rad = 0;  // of the rotor behind the middle of the vector
@@ -47,13 +48,14 @@ struct Recording {
   std::vector<DriveSample> samples;
   double sample_s = 0;
   std::vector<VectorRecord> vectors;  // of the whole run
-  /// Over all turns that were sampled; what is periodic (harmonics, ripple) in the last of them.
-  /// The ripple of a stall is not a number.
+  /// The figures cover all sampled turns; periodic quantities (harmonics, ripple) cover the last of
+  /// them. The ripple of a stall is not a number.
   WaveFigures figures;
   std::vector<double> harmonics_A;     // of that turn: amplitudes, from 0 (the mean)
   std::vector<double> carrier_peak_A;  // of that turn: highest current of a phase, per carrier
   DriveEnergy spent;                   // over all turns sampled; stored: its rise
-  /// The rotor ends in the field's turn; and, begun in rotation, the load has a lag at all.
+  /// The rotor ends in the field's turn. A recording that began in rotation also needs a lag that
+  /// carries the load.
   bool in_step = false;
   double lag_rad = 0;          // mean over the run's last turn
   double speed_rad_per_s = 0;  // likewise
@@ -63,8 +65,8 @@ struct Recording {
   }
 };
 
-/// The gearhead's load begins at its highest place from rest; a steady rotation has the mean load
-/// throughout. Pre: plan.turns > 0. Cost: some microseconds a carrier period.
+/// The load of the gearhead begins at its highest place from rest; a steady rotation has the mean
+/// load throughout. Pre: plan.turns > 0. Cost: some microseconds a carrier period.
 Recording Record(const Drive::Setting& setting, const Modulation& modulation,
                  const RecordingPlan& plan);
 

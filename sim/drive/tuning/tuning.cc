@@ -12,7 +12,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr int kRepeatMax = 255;            // what a unit's table holds
+constexpr int kRepeatMax = 255;            // the most that a unit's table holds
 constexpr double kCopper_per_K = 0.00393;  // rise of resistance, from 20 degrees Celsius
 constexpr int kSettlingCarriers = 30;      // e^-20 at 250 counts
 
@@ -41,7 +41,7 @@ std::optional<Critical> FindCritical(Drive::Setting setting, const Modulation& m
   return critical;
 }
 
-// Highest current while the field turns once over a rotor that cannot.
+// The highest current while the field turns once over a blocked rotor.
 double BlockedPeak(Drive::Setting setting, Modulation modulation) {
   setting.motor.load_Nm = 1;
   setting.motor.load_variation = 0;
@@ -59,7 +59,7 @@ double Reachable(const Drive::Setting& setting) {
   return 2 * setting.bridge.v_bus_V / (3 * setting.motor.resistance_ohm);
 }
 
-// Currents of the setting as it is, at the tuned n.
+// The currents of the setting as it is, at the tuned n.
 void MeasureCurrents(const Drive::Setting& setting, const Modulation& modulation, Tuning* tuning) {
   if (const auto state = FindSteadyState(setting, modulation, setting.motor.load_Nm)) {
     const WaveFigures figures = MeasureSteadyWave(setting, modulation, *state);
@@ -90,7 +90,7 @@ void FindRepeat(const Drive::Setting& setting, const Modulation& modulation, con
   tuning->repeat = std::max(tuned->repeat, critical->repeat);
 }
 
-// Temperature at which the copper loses what heats it so. Warmer copper takes less from the same
+// The temperature at which the copper's losses sustain it. Warmer copper takes less from the same
 // voltage, so the steps shrink.
 double WindingTemperature(const Drive::Setting& cold, const Modulation& modulation,
                           const TuningRule& rule, Drive::Setting* warm) {
@@ -101,7 +101,7 @@ double WindingTemperature(const Drive::Setting& cold, const Modulation& modulati
     const double copper_W = state ? MeasureSteadyWave(*warm, modulation, *state).power.copper_W : 0;
     const double next = rule.ambient_C + *rule.winding_K_per_W * copper_W;
     const double step = next - celsius;
-    celsius += step / 2;  // half: a winding far beyond what copper bears would swing
+    celsius += step / 2;  // half a step: a winding far beyond what copper bears would swing
     if (std::abs(step) < 0.01) break;
   }
   return celsius;
@@ -124,15 +124,16 @@ void MeasureMove(const Drive::Setting& setting, const Modulation& modulation,
   tuning->move_J = drive.supply_J();
 }
 
-// The search has shown that n starts the load with the rule's margin, whatever half a count says.
+// The search has shown that n starts the load with the rule's margin, whatever the figure half a
+// count lower says.
 double MarginAtLeast(const TuningRule& rule, double margin) {
   return std::max(rule.margin, margin);
 }
 
-// All but margin and move, which need no trial of their own in a fleet.
+// All parts of a tuning but margin and move, which need no trial of their own in a fleet.
 struct Tried {
   Tuning tuning;
-  Drive::Setting setting;  // as warm as it gets
+  Drive::Setting setting;  // as warm as the winding gets
 };
 Tried Try(const Drive::Setting& setting, const Modulation& modulation, const TuningRule& rule) {
   Tuning tuning;
@@ -143,7 +144,8 @@ Tried Try(const Drive::Setting& setting, const Modulation& modulation, const Tun
   if (tuning.outcome != TuningOutcome::kTuned) return {tuning, now};
   at.repeat = tuning.repeat;
   MeasureCurrents(now, at, &tuning);
-  // A warm winding starts less, so a larger n may be needed; that changes its losses little.
+  // A warm winding starts a smaller load, so a larger n may be needed; that changes its losses
+  // little.
   for (int k = 0; rule.winding_K_per_W && k < 5; ++k) {
     tuning.winding_C = WindingTemperature(setting, at, rule, &now);
     tuning.resistance_ohm = now.motor.resistance_ohm;
@@ -158,7 +160,7 @@ Tried Try(const Drive::Setting& setting, const Modulation& modulation, const Tun
   return {tuning, now};
 }
 
-// Between two indices of ascending loads that need the same, all need it.
+// Where two ascending loads need the same n, all loads between them need it.
 class LoadTable {
  public:
   LoadTable(const Drive::Setting& setting, const Modulation& modulation, const TuningRule& rule,
@@ -241,9 +243,9 @@ class LoadTable {
   std::size_t done_ = 0;
 };
 
-// Where neither ramp nor temperature nor the PWM level is asked for, an n and what it starts are
-// all that there is to know: no trial for each load. Peaks: a motor that pulls its load draws less
-// than a blocked one, for the back-EMF is never beyond what the lag gives (V sin(lag) >= flux w).
+// Without ramp, temperature and PWM level, an n and the load that it starts determine the tuning;
+// no trial for each load is needed. A motor that pulls its load has lower peaks than a blocked one.
+// Its back-EMF never exceeds what the lag gives (V sin(lag) >= flux w).
 std::vector<LoadTuning> TuneByCriticalLoads(const Drive::Setting& setting,
                                             const Modulation& modulation, const TuningRule& rule,
                                             const std::vector<double>& loads_Nm,
@@ -269,7 +271,7 @@ std::vector<LoadTuning> TuneByCriticalLoads(const Drive::Setting& setting,
     if (critical) tuning.critical = *critical;
     if (critical && repeat) {
       tuning.repeat = *repeat;
-      // Half a count on the safe side.
+      // The load is taken half a count on the safe side.
       const double holds_Nm =
           *repeat > 1 ? (critical_loads.Of(*repeat) + critical_loads.Of(*repeat - 1)) / 2
                       : critical_loads.Of(*repeat);
@@ -285,7 +287,7 @@ std::vector<LoadTuning> TuneByCriticalLoads(const Drive::Setting& setting,
       progress(static_cast<double>(tunings.size()) / static_cast<double>(loads_Nm.size()));
   }
   if (!rule.measure_move) return tunings;
-  // Loads ascend, so those of one n are neighbours; between the ends power is a line.
+  // Loads ascend, so those of one n are neighbours; between the ends the power is linear.
   for (std::size_t first = 0, last = 0; first < tunings.size(); first = last + 1) {
     const int repeat = tunings[first].repeat;
     last = first;
@@ -324,7 +326,7 @@ Tuning Tune(const Drive::Setting& setting, const Modulation& modulation, const T
   if (tuning.repeat == 0) return tuning;
   Modulation at = modulation;
   at.repeat = tuning.repeat;
-  // With a ramp the margin is known only as what was asked for and is there at least.
+  // With a ramp the margin is only known to be at least the one asked for.
   if (rule.ramp.stages > 0) {
     tuning.margin = rule.margin;
   } else if (setting.motor.load_Nm > 0) {

@@ -18,13 +18,14 @@ constexpr std::size_t kReadingsMin = 12;
 constexpr std::size_t kFolds = 5;
 constexpr int kSteps = 60;
 constexpr int kPasses = 4;
-constexpr double kFarOff = 6;           // robust standard deviations
-constexpr double kHuber = 2;            // of them, from where on a reading pulls no harder
-constexpr std::size_t kFarOffMost = 8;  // one in so many; more is structure
-constexpr double kFollows = 5;          // standard deviations of a gain that is none of chance
-constexpr double kContradicts = 3;      // times what the median sensor leaves
+constexpr double kFarOff = 6;  // robust standard deviations
+constexpr double kHuber = 2;   // of robust standard deviations; larger residuals pull no harder
+constexpr std::size_t kFarOffMost = 8;  // one in this many; more is structure
+constexpr double kFollows = 5;          // standard deviations of a gain that is not chance
+constexpr double kContradicts = 3;      // times the residual of the median sensor
 constexpr double kLeast_V = 1e-6;
-constexpr double kReported_rad = 10 * kRadPerDeg;  // a place less certain than this is not known
+// A place less certain than this counts as unknown.
+constexpr double kReported_rad = 10 * kRadPerDeg;
 constexpr double kGainReported = 0.5;
 
 struct Own {
@@ -60,7 +61,7 @@ double Rms(const VectorXd& residuals) {
                    static_cast<double>(std::max<Index>(1, residuals.size())));
 }
 
-// Huber's cost: squares up to `limit`, straight beyond.
+// Huber's cost: squares up to `limit`, linear beyond.
 double Cost(const VectorXd& residuals, double limit) {
   double cost = 0;
   for (const double residual : residuals) {
@@ -112,7 +113,7 @@ FourFit Fit(const HallForward& forward, const Own& own, const VectorXd& start, d
   return fit;
 }
 
-// Robust first, then plain without what is far off.
+// The fit is robust first, then plain without the readings that are far off.
 FourFit FitRobustly(const HallForward& forward, const HallCampaign& campaign, const VectorXd& zero,
                     Own* own, std::size_t* far_off) {
   FourFit fit = Fit(forward, *own, zero, 1e300);
@@ -146,7 +147,7 @@ double HeldOut(const HallForward& forward, const HallCampaign& campaign, const O
   return std::sqrt(squares / static_cast<double>(own.readings.size()));
 }
 
-// The standard deviations of the four; none where the readings do not tell them apart.
+// The standard deviations of the four numbers. None: the readings do not determine all of them.
 std::optional<Vector4d> Deviations(const FourFit& fit) {
   const Vector4d scale = fit.normal.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Matrix4d scaled = scale.asDiagonal() * fit.normal * scale.asDiagonal();
@@ -195,7 +196,8 @@ SensorFit CalibrateOne(const HallForward& forward, const HallCampaign& campaign,
   };
   const double gain = 1 + found(0);
   const std::optional<Vector4d> sd = Deviations(fit);
-  // By itself: where it stands still nothing tells its place, and that is not the poses' fault.
+  // The gain is judged by itself: where the sensor does not follow the field nothing determines its
+  // place, and the poses are not the cause.
   const double sd_gain_alone = out.rms_after_V / std::sqrt(std::max(fit.normal(0, 0), 1e-300));
   out.status = CalibrationStatus::kStuck;
   if (std::abs(gain) < kFollows * sd_gain_alone || std::abs(gain) < 1e-4) return out;

@@ -15,7 +15,7 @@ constexpr std::size_t kFolds = 5;
 
 Index At(std::size_t k) { return static_cast<Index>(k); }
 
-// All accepted hypotheses of one cause as one.
+// All accepted hypotheses of one cause, merged.
 struct Merged {
   HallHypothesis all;
   std::vector<HallCause> rivals;
@@ -26,7 +26,7 @@ bool ShapesThePole(const HallHypothesis& one, const ParameterLayout& layout) {
          layout.terms[one.parameters.front() - layout.term(0)].order == 4;
 }
 
-// A pole that no width fits has another shape: what the width took is part of that.
+// A pole that no width fits has another shape, and the change of the width belongs to that shape.
 std::vector<Merged> Merge(const Selected& selected, const ParameterLayout& layout) {
   const bool other_shape =
       std::any_of(selected.on.begin(), selected.on.end(),
@@ -74,7 +74,7 @@ struct Size {
   std::string text;
 };
 
-// A vector's length, and its uncertainty along itself.
+// The length of a vector, and its uncertainty along itself.
 Size LengthOf(std::span<const std::size_t> parts, const HallDiagnosis& found) {
   double squares = 0, variance = 0;
   for (const std::size_t part : parts) squares += std::pow(found.parameters[At(part)], 2);
@@ -126,7 +126,7 @@ Size OfShifts(const HallHypothesis& one, const HallDiagnosis& found) {
           SensorsText(one)};
 }
 
-// The largest of its parameters, or the length of a vector.
+// The largest of the cause's parameters, or the length of a vector.
 Size SizeOf(const HallHypothesis& one, const HallDiagnosis& found) {
   const std::size_t largest = LargestOf(one, found, 0);
   const double value = found.parameters[At(largest)], sd = found.sd[At(largest)];
@@ -184,7 +184,7 @@ HallGain GainOf(const HallForward& forward, const HallCampaign& campaign, const 
     HallSearch part(forward, campaign, train);
     const HallFit simple = part.Free();
     HallFit full = part.Fit(selected.on, selected.fit.parameters);
-    // What no model can hold does not help to predict.
+    // Effects outside of the library do not help to predict.
     full.parameters.tail(full.parameters.size() - At(forward.layout().library())).setZero();
     part.set_readings(test);
     part.TakeMeasured();
@@ -204,12 +204,12 @@ HallGain GainOf(const HallForward& forward, const HallCampaign& campaign, const 
   gain.mad_after_V = MedianSize(a);
   const double wrong = gain.rms_before_V * gain.rms_before_V - noise_V * noise_V;
   const double gone = gain.rms_before_V * gain.rms_before_V - gain.rms_after_V * gain.rms_after_V;
-  // Where there is nothing to explain, nothing is.
+  // Where there is nothing to explain, nothing is explained.
   gain.explained = selected.on.empty() || wrong <= 0 ? 0 : std::clamp(gone / wrong, -1.0, 1.0);
   return gain;
 }
 
-// How much a tilt of the rotor changes a voltage.
+// The change of a voltage by a tilt of the rotor.
 double Sensitivity(const HallForward& forward, const HallCampaign& campaign,
                    const HallSearch& search, const Selected& selected) {
   constexpr double kStep_rad = 1e-4;
@@ -227,7 +227,7 @@ double Sensitivity(const HallForward& forward, const HallCampaign& campaign,
   return std::sqrt(squares / (2 * static_cast<double>(std::max<Index>(1, here.size()))));
 }
 
-// What is none of the causes, each with what its absence would cost.
+// The effects outside of the causes, each with the cost of its absence.
 std::vector<HallUnknown> OutsideFound(const HallForward& forward, const HallSearch& search,
                                       const Selected& selected) {
   std::vector<HallUnknown> found;
@@ -247,7 +247,7 @@ std::vector<HallUnknown> OutsideFound(const HallForward& forward, const HallSear
   return found;
 }
 
-// What its absence would cost, all else fitted anew.
+// The cost of the cause's absence, with all other parameters fitted anew.
 void AddWorth(const HallSearch& search, const Selected& selected, HallCauseFound* cause) {
   std::vector<HallHypothesis> rest;
   VectorXd start = selected.fit.parameters;

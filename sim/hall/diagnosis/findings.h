@@ -1,5 +1,5 @@
-// From what was selected to what is said: causes with sizes and intervals, structure that remains,
-// the gain on poses that no fit has seen, and the poses to make next.
+// The findings that follow from the selected causes. They are causes with sizes and intervals,
+// structure that remains, the gain on poses that no fit has seen, and the poses to make next.
 #pragma once
 
 #include "sim/hall/diagnosis/hall_diagnosis.h"

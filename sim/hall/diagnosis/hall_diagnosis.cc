@@ -21,8 +21,9 @@ constexpr double kSwapLeaves = 0.3;  // of the squares
 constexpr int kPassesMax = 8;
 constexpr double kFarOff = 6;  // robust standard deviations
 constexpr double kPosesSpread_rad = 0.5 * kRadPerDeg;
-// By how much in 2 ln L, less ln n a number, what is none of the causes has to be the better
-// explanation: the margin of every rival, and that some 140 of them are tried.
+// The margin by which an effect outside of the causes has to be the better explanation, in 2 ln L
+// less ln n a number. The margin is that of every rival, plus an allowance for the some 140 effects
+// tried.
 constexpr double kOutsideMargin = 9 + 10;
 
 struct Column {
@@ -42,7 +43,7 @@ Column ColumnOf(const HallCampaign& campaign, std::size_t sensor) {
   return column;
 }
 
-// Readings that can be used, after sensors that say nothing.
+// The readings that can be used, without sensors that give none.
 std::vector<Reading> Usable(const HallCampaign& campaign, const HallRig& rig, HallDiagnosis* out) {
   std::vector<Reading> readings;
   bool beyond = false;
@@ -110,7 +111,7 @@ std::string Insufficient(const HallCampaign& campaign, const std::vector<Reading
   return {};
 }
 
-// Two columns exchanged, where that takes most of the misfit away.
+// Two columns are exchanged where that removes most of the misfit.
 void FindSwaps(const HallForward& forward, const HallRig& rig, HallCampaign* campaign,
                HallSearch* search, HallDiagnosis* out) {
   for (int round = 0; round < 2; ++round) {
@@ -157,8 +158,9 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// Single readings that nothing in the library comes near to. One far enough off pulls the fit, and
-// its neighbours seem far off: only those of the size of the worst go at a time.
+// Drops single readings that nothing in the library comes near to. A reading that is far enough off
+// pulls the fit, so that its neighbours seem far off. Therefore only those of the size of the worst
+// go at a time.
 bool DropFarOff(const Selected& selected, HallSearch* search, HallDiagnosis* out) {
   HallFit fit = selected.fit;
   std::size_t dropped = 0;
@@ -172,7 +174,7 @@ bool DropFarOff(const Selected& selected, HallSearch* search, HallDiagnosis* out
     for (std::size_t k = 0; k < sizes.size(); ++k)
       if (sizes[k] <= limit_V) kept.push_back(search->readings()[k]);
     const std::size_t now = sizes.size() - kept.size();
-    // Many that are far off are no accidents but structure.
+    // Many readings that are far off are structure and no accidents.
     if (now == 0 || (dropped + now) * 20 > sizes.size()) break;
     dropped += now;
     search->set_readings(std::move(kept));
@@ -226,7 +228,7 @@ HallDiagnosis DiagnoseHall(const HallCampaign& given, const HallRig& rig, const 
   HallSearch search(forward, campaign, std::move(readings));
   FindSwaps(forward, rig, &campaign, &search, &out);
   Selected selected = SelectHall(search);
-  // Twice at most: without the far ones the noise is smaller.
+  // Two rounds at most: without the far readings the noise is smaller.
   for (int round = 0; round < 2; ++round) {
     if (!DropFarOff(selected, &search, &out)) break;
     selected = SelectHall(search);

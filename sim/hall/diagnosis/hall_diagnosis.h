@@ -1,15 +1,16 @@
-// What poses with known orientation say about a Hall rig's model: which of its causes is wrong, by
-// how much, and what the model gains. The way is that of all diagnosis here: signatures are the
-// model itself with one parameter switched on; amplitude and phase of the field, which nobody knows
-// beforehand, are projected out first; causes enter one by one by evidence (explained chi^2 less ln
-// n a parameter), after a gate that chance passes once in a hundred thousand tries; each entry is
-// followed by a joint nonlinear fit. A name is given alone where every rival that could replace it
-// is worse by 9 or more in 2 ln L; else the set is told. What remains with structure is `unknown`,
-// and so is what something that is none of the causes (outside.h) explains clearly better.
+// The diagnosis of a Hall rig's model from poses with known orientation. The result says which of
+// the model's causes is wrong, by how much, and what a corrected model gains. The method is that of
+// all diagnosis here. Signatures are the model itself with one parameter switched on. Amplitude and
+// phase of the field are unknown beforehand, so they are projected out first. Causes enter one by
+// one by evidence (explained chi^2 less ln n a parameter). A gate comes first, which chance passes
+// once in a hundred thousand tries. Each entry is followed by a joint nonlinear fit. A cause is
+// named alone where every rival that could replace it is worse by 9 or more in 2 ln L. Otherwise
+// the whole set is reported. Structure that remains is reported as `unknown`, like an effect
+// outside of the causes (outside.h) that explains the readings clearly better.
 //
-// The noise is that of the residuals when every parameter is free, so nothing has to be known about
-// it. Readings far from all of that, at the ends of the range or missing are counted and left out;
-// sensors that stand still or are swapped are found before anything is fitted.
+// The noise is that of the residuals when every parameter is free, so it need not be known.
+// Readings far from all of that, at the ends of the range or missing are counted and left out.
+// Sensors that stand still or are swapped are found before any fit.
 #pragma once
 
 #include <array>
@@ -22,16 +23,16 @@
 namespace focalfleet::sim {
 
 struct HallCauseFound {
-  std::vector<HallCause> candidates;  // itself first
+  std::vector<HallCause> candidates;  // the cause itself first
   std::vector<std::size_t> sensors;   // from 0; empty: the rotor's field
   std::vector<std::size_t> parameters;
   double amplitude = 0;
   std::string amplitude_unit;
   std::array<double, 2> ci95{};
-  double size_V = 0;            // rms over the readings that it acts on, free ones projected out
-  double chi2 = 0;              // explained
+  double size_V = 0;  // rms over the readings that it acts on, free parameters projected out
+  double chi2 = 0;    // explained
   double predicted_gain_V = 0;  // in rms over all readings
-  std::string text;             // which term, which sensor, in words
+  std::string text;             // the term and the sensor, in words
 };
 
 struct HallUnknown {
@@ -56,12 +57,12 @@ const char* Name(HallVerdict verdict);
 
 struct HallDiagnosis {
   HallVerdict verdict = HallVerdict::kInsufficient;
-  std::string missing;                 // of kInsufficient
+  std::string missing;                 // the missing data, of kInsufficient
   std::vector<HallCauseFound> causes;  // strongest first
   std::vector<HallUnknown> unknown;
   std::vector<std::pair<HallCause, std::string>> not_testable;
   std::vector<HallSensorTrouble> troubles;
-  std::map<std::string, std::size_t> outliers;  // readings left out, by why
+  std::map<std::string, std::size_t> outliers;  // readings left out, by reason
   std::size_t outlier_rows = 0;
   HallGain gain;
   double noise_V = 0;
@@ -69,12 +70,12 @@ struct HallDiagnosis {
   Eigen::VectorXd parameters;        // the extended model
   Eigen::VectorXd sd;                // 0 where not fitted
   ParameterLayout layout;
-  std::vector<Reading> readings;          // judged
+  std::vector<Reading> readings;          // the judged readings
   std::vector<double> before_V, after_V;  // residuals of the readings
   std::vector<Orientation> next_poses;
 };
 
-/// Cost: a second or so for 150 poses: the search is made twice.
+/// Cost: a second or so for 150 poses, because the search is made twice.
 HallDiagnosis DiagnoseHall(const HallCampaign& campaign, const HallRig& rig,
                            const FieldModel& field);
 

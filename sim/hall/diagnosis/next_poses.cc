@@ -1,6 +1,6 @@
-// Poses that would best separate what is still confusable: one after the other the one whose
-// voltages are least foreseen, given the campaign and the poses chosen before it (greedy
-// D-optimal design over all parameters).
+// The poses that would best separate the remaining rivals. Each pose is the one whose voltages are
+// least foreseen, given the campaign and the poses chosen before it (greedy D-optimal design over
+// all parameters).
 
 #include "sim/hall/diagnosis/findings.h"
 
@@ -35,7 +35,7 @@ std::vector<Orientation> ProposePoses(const HallForward& forward, const VectorXd
     if (k != ParameterLayout::kDecay && k != ParameterLayout::kTemperature) all.push_back(k);
   const MatrixXd known = forward.Slopes(parameters, readings, all) / noise_V;
   MatrixXd information = known.transpose() * known;
-  // What nobody would expect to be larger than some hundredths.
+  // The prior: no parameter is expected to exceed some hundredths.
   for (Index i = 0; i < information.rows(); ++i) information(i, i) += 1e3;
   MatrixXd covariance =
       information.llt().solve(MatrixXd::Identity(information.rows(), information.cols()));

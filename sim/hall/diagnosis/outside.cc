@@ -73,7 +73,7 @@ std::vector<OutsideEffect> OutsideEffects(std::size_t sensors, bool has_temperat
   for (int sensor = -1; sensor < count; ++sensor)
     for (const OutsideKind kind : {kBendsSquare, kBendsCube, kDrifts, kGainDrifts, kLag})
       effects.push_back({.kind = kind, .sensor = sensor});
-  // Of all sensors' gains it is the field's temperature coefficient.
+  // A gain that all sensors share is the field's temperature coefficient.
   for (int sensor = 0; has_temperature && sensor < count; ++sensor)
     for (const OutsideKind kind : {kFeelsTemperature, kGainFeelsTemperature})
       effects.push_back({.kind = kind, .sensor = sensor});

@@ -9,7 +9,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// Hermite polynomials that belong to exp(-x^2): x^2 and x^4 without what lower ones already are.
+// Hermite polynomials belong to exp(-x^2): x^2 and x^4 are taken without their lower ones.
 double Hermite(int degree, double x) {
   switch (degree) {
     case 0:
@@ -27,7 +27,7 @@ double Hermite(int degree, double x) {
   }
 }
 
-// Peak and width of a field as its own values on the sphere tell them.
+// Peak and width of a field from its own values on the sphere.
 void Measure(const FieldModel& field, double* peak_T, double* width_rad) {
   double best_rad = 0;
   for (int k = 0; k < 720; ++k) {
@@ -38,7 +38,7 @@ void Measure(const FieldModel& field, double* peak_T, double* width_rad) {
       best_rad = phi_rad;
     }
   }
-  // Second moment along the meridian of the highest pole: exp(-(x/c)^2) has c^2 / 2.
+  // The second moment along the meridian of the highest pole: exp(-(x/c)^2) has c^2 / 2.
   double sum = 0, moment = 0;
   for (int k = -60; k <= 60; ++k) {
     const double latitude_rad = k * kRadPerDeg;
@@ -81,9 +81,9 @@ ParameterLayout LayoutOf(std::size_t sensors) {
     layout.terms.push_back({order, degree, false});
     if (order > 0) layout.terms.push_back({order, degree, true});
   };
-  // Along phi: unlike poles (all but 4), edges of poles (12, 20).
+  // Orders along phi: unlike poles (all but 4), edges of poles (12, 20).
   for (const int order : {12, 20, 8, 16, 0, 1, 2, 3, 5, 6, 7}) add(order, 0);
-  // Along theta: the shape of a pole; 0 of order 4 is amplitude and phase.
+  // Degrees along theta: the shape of a pole; degree 0 of order 4 is amplitude and phase.
   for (const int degree : {4, 5, 1, 3}) add(4, degree);
   add(12, 2);
   return layout;
@@ -177,7 +177,7 @@ double HallForward::Signal_V(const Eigen::VectorXd& p, const Reading& reading,
 
   const double flat = std::max(1e-12, std::sqrt(local.x * local.x + local.y * local.y));
   const double latitude_rad = std::atan2(local.z, flat);
-  // The wider field at this latitude is the model's nearer to the equator.
+  // The wider field at this latitude is the model's field nearer to the equator.
   const double stretched = latitude_rad * std::exp(-at(ParameterLayout::kWidth));
   const double shrink = std::cos(stretched) / flat;
   double b_T = field_.Radial_T({shrink * local.x, shrink * local.y, std::sin(stretched)});
@@ -248,7 +248,8 @@ Eigen::MatrixXd HallForward::EffectSlopes(const Eigen::VectorXd& p,
                                           const std::vector<Reading>& readings) const {
   constexpr double kStep_rad = 1e-5;
   const auto at = [](std::size_t k) { return static_cast<Eigen::Index>(k); };
-  // What every sensor shows in every row, also where a reading is not judged: others hear it.
+  // The signals of every sensor in every row, also of readings that are not judged: other sensors
+  // pick them up.
   Eigen::MatrixXd signals_V(at(rotations_.size()), at(layout_.sensors));
   std::vector<Orientation> truly;
   for (std::size_t row = 0; row < rotations_.size(); ++row) {

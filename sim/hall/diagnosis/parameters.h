@@ -1,10 +1,10 @@
-// Everything that a Hall rig can differ by from its model, as one list of numbers, and the forward
-// model that takes them: what the diagnosis switches on and fits. Zero is "as the model says" for
-// all of them.
+// All deviations of a Hall rig from its model, as one list of numbers, and the forward model that
+// takes them. The diagnosis switches these parameters on and fits them. Zero means "as the model
+// says" for each.
 //
-// Field shape: the latitude is stretched (width), and to the field are added terms
-// peak * He_k(latitude / c) exp(-(latitude / c)^2) cos or sin(m phi), which together can make any
-// field; the amplitude and the phase of the model are free, the paper gives neither.
+// The field's shape has two kinds of parameter. The latitude is stretched (width). Terms peak *
+// He_k(latitude / c) exp(-(latitude / c)^2) cos or sin(m phi) are added, which together can form
+// any field. The amplitude and the phase of the model are free, because the paper gives neither.
 //
 // Units: gains and terms relative, offsets V, shifts and phases rad, centre mm, temperature 1/K.
 #pragma once
@@ -28,7 +28,7 @@ enum class HallCause {
   kSensorPosition,
   kCentreOffset,
   kTemperatureCoefficient,
-  kOutside,  // none of them: what outside.h has
+  kOutside,  // none of the causes: an effect of outside.h
 };
 inline constexpr HallCause kHallCauses[] = {
     HallCause::kFieldHarmonics,        HallCause::kFieldWidth,     HallCause::kSensorGain,
@@ -43,18 +43,18 @@ struct FieldTerm {
   bool sine = false;
 };
 
-/// Where each kind of parameter begins in the list.
+/// The index at which each kind of parameter begins in the list.
 struct ParameterLayout {
   std::size_t sensors = 8;
   std::vector<FieldTerm> terms;
-  std::vector<OutsideEffect> effects;  // none where only causes are fitted
+  std::vector<OutsideEffect> effects;  // empty where only causes are fitted
 
   static constexpr std::size_t kAmplitude = 0;
   static constexpr std::size_t kPhase = 1;
   static constexpr std::size_t kWidth = 2;  // of the logarithm
   static constexpr std::size_t kTemperature = 3;
-  static constexpr std::size_t kCentre = 4;  // three
-  static constexpr std::size_t kDecay = 7;   // times the offset: only seen where that is not 0
+  static constexpr std::size_t kCentre = 4;  // three numbers
+  static constexpr std::size_t kDecay = 7;   // times the offset: visible only where that is not 0
   static constexpr std::size_t kFirstSensor = 8;
 
   [[nodiscard]] std::size_t gain(std::size_t sensor) const { return kFirstSensor + sensor; }
@@ -66,7 +66,7 @@ struct ParameterLayout {
   }
   [[nodiscard]] std::size_t term(std::size_t k) const { return kFirstSensor + 4 * sensors + k; }
   [[nodiscard]] std::size_t effect(std::size_t k) const { return term(terms.size()) + k; }
-  /// Of the causes alone.
+  /// The number of parameters of the causes alone.
   [[nodiscard]] std::size_t library() const { return effect(0); }
   [[nodiscard]] std::size_t size() const { return effect(effects.size()); }
 };
@@ -80,7 +80,7 @@ struct HallCampaign {
   double temperature_mean_C = 20;
 };
 
-/// One reading that is judged: row and sensor.
+/// A judged reading: its row and sensor.
 struct Reading {
   std::size_t row = 0;
   std::size_t sensor = 0;
@@ -88,7 +88,7 @@ struct Reading {
 
 class HallForward {
  public:
-  /// Lifetime: keeps all three. `effects`: what it can do beyond the causes.
+  /// Lifetime: keeps all three. `effects`: effects beyond the causes that the model can take.
   HallForward(const HallCampaign& campaign, const HallRig& rig, const FieldModel& field,
               std::vector<OutsideEffect> effects = {});
 
@@ -102,23 +102,23 @@ class HallForward {
   [[nodiscard]] double peak_T() const { return peak_T_; }
   [[nodiscard]] double width_rad() const { return width_rad_; }
 
-  /// Voltages of the readings. Shape: as many as readings.
+  /// The voltages of the readings. Shape: as many as readings.
   void Predict(const Eigen::VectorXd& parameters, const std::vector<Reading>& readings,
                Eigen::VectorXd* voltages_V) const;
-  /// Derivatives by central differences of the same. Shape: (readings, chosen).
-  /// Cost: two predictions a parameter; of a sensor's own parameters only of its readings.
+  /// Their derivatives by central differences. Shape: (readings, chosen). Cost: two predictions a
+  /// parameter; for a sensor's own parameters only of its readings.
   [[nodiscard]] Eigen::MatrixXd Slopes(const Eigen::VectorXd& parameters,
                                        const std::vector<Reading>& readings,
                                        const std::vector<std::size_t>& chosen) const;
 
-  /// The same of all effects, which are straight in their sizes. Shape: (readings, effects).
+  /// The derivatives by all effects, which are linear in their sizes. Shape: (readings, effects).
   /// Cost: six predictions, and a product a number.
   [[nodiscard]] Eigen::MatrixXd EffectSlopes(const Eigen::VectorXd& parameters,
                                              const std::vector<Reading>& readings) const;
 
  private:
   [[nodiscard]] double One(const Eigen::VectorXd& parameters, const Reading& reading) const;
-  // Without offsets.
+  // The voltage without offsets.
   [[nodiscard]] double Signal_V(const Eigen::VectorXd& parameters, const Reading& reading,
                                 const Rotation& rotation) const;
   [[nodiscard]] OutsideMoment MomentOf(const Reading& reading, double signal_V) const;
@@ -126,7 +126,8 @@ class HallForward {
                                  const Rotation& rotation, double signal_V) const;
   [[nodiscard]] Orientation Misread(const Eigen::VectorXd& parameters, std::size_t row) const;
   [[nodiscard]] double Step(std::size_t parameter) const;
-  [[nodiscard]] int SensorOf(std::size_t parameter) const;  // -1: of all
+  // -1: the parameter belongs to all sensors.
+  [[nodiscard]] int SensorOf(std::size_t parameter) const;
 
   const HallCampaign& campaign_;
   const HallRig& rig_;
@@ -134,7 +135,7 @@ class HallForward {
   ParameterLayout layout_;
   std::vector<Rotation> rotations_;
   std::vector<std::size_t> pose_effects_;
-  std::vector<std::vector<std::size_t>> effects_of_;  // of each sensor, common ones in all
+  std::vector<std::vector<std::size_t>> effects_of_;  // of each sensor; common effects are in all
   double peak_T_ = 0;
   double width_rad_ = 0;
 };

@@ -220,13 +220,13 @@ std::vector<double> HallSearch::Explained(const HallFit& fit) const {
 
 namespace {
 
-// Evidence of a hypothesis that explains `squares`.
+// The evidence of a hypothesis that explains `squares`.
 double Score(double squares, double variance, std::size_t freedom, std::size_t readings) {
   return squares / variance -
          static_cast<double>(freedom) * std::log(static_cast<double>(readings));
 }
 
-// 0.01 % of the range: a field model itself is no better, and nobody would act on less.
+// 0.01 % of the range: a field model itself is no better, and a smaller effect calls for no action.
 constexpr double kLeast_V = 2.5e-4;
 double Variance(const HallSearch::Rich& rich) {
   return std::max(rich.variance, kLeast_V * kLeast_V);
@@ -288,7 +288,7 @@ void Prune(const HallSearch& search, Selected* selected) {
   }
 }
 
-// Rivals of one accepted hypothesis; true where a rival was better and took its place.
+// Compares an accepted hypothesis with its rivals. True: a rival was better and took its place.
 bool Swap(const HallSearch& search, std::size_t k, Selected* selected) {
   const HallHypothesis own = selected->on[k];
   const std::vector<HallHypothesis> rest = Without(selected->on, k);
@@ -314,7 +314,7 @@ bool Swap(const HallSearch& search, std::size_t k, Selected* selected) {
     if (std::count(causes_tried.begin(), causes_tried.end(), rival.cause) >= 2) continue;
     causes_tried.push_back(rival.cause);
     ++tried;
-    // Far behind already where the slopes are all that it has.
+    // The rival is far behind already in the linear estimate, which is the most that it has.
     if (linear(order[r]) < 0.5 * own_score - 20) break;
     std::vector<HallHypothesis> with = rest;
     with.push_back(rival);
@@ -322,7 +322,7 @@ bool Swap(const HallSearch& search, std::size_t k, Selected* selected) {
     const double score = Score(without.squares - fit.squares, variance, rival.parameters.size(), n);
     if (score > own_score + 1e-6) {
       selected->on[k] = rival;
-      // Kept in the place of the one it replaces.
+      // The fit is kept in place of the former one.
       selected->fit = search.Fit(selected->on, fit.parameters);
       selected->variance = Variance(search.AllFree(selected->fit));
       return true;

@@ -14,7 +14,7 @@ struct HallHypothesis {
   HallCause cause = HallCause::kSensorGain;
   std::vector<std::size_t> parameters;
   std::vector<std::size_t> sensors;
-  double decay = 0;  // of kCentreOffset: the shape that the search tries
+  double decay = 0;  // of kCentreOffset: the decay that the search tries
 };
 
 struct HallFit {
@@ -30,18 +30,20 @@ class HallSearch {
   HallSearch(const HallForward& forward, const HallCampaign& campaign,
              std::vector<Reading> readings);
 
-  /// Amplitude and phase alone.
+  /// The fit of amplitude and phase alone.
   [[nodiscard]] HallFit Free() const;
-  /// They and the hypotheses', jointly and nonlinearly, from `start`.
+  /// The fit of amplitude, phase and the hypotheses' parameters, jointly and nonlinearly, from
+  /// `start`.
   [[nodiscard]] HallFit Fit(const std::vector<HallHypothesis>& on,
                             const Eigen::VectorXd& start) const;
-  /// Residual variance and residuals with every parameter free, linear about `fit`.
+  /// The residual variance and the residuals with every parameter free, linear about `fit`.
   struct Rich {
     double variance = 0;
     Eigen::VectorXd residuals;
   };
   [[nodiscard]] Rich AllFree(const HallFit& fit) const;
-  /// Explained squares of each hypothesis about `fit`, those of `fit` projected out.
+  /// The squares that each hypothesis explains about `fit`, with the parameters of `fit` projected
+  /// out.
   [[nodiscard]] std::vector<double> Explained(const HallFit& fit) const;
 
   [[nodiscard]] const std::vector<HallHypothesis>& hypotheses() const { return hypotheses_; }
@@ -58,16 +60,16 @@ class HallSearch {
   std::vector<HallHypothesis> hypotheses_;
 };
 
-/// chi^2 that chance exceeds with about the probability of `sigmas` of a normal variable.
+/// The chi^2 that chance exceeds with about the probability of `sigmas` of a normal variable.
 double ChanceChi2(std::size_t freedom, double sigmas);
-/// Probability that chance exceeds chi2.
+/// The probability that chance exceeds chi2.
 double ChanceOf(double chi2, std::size_t freedom);
 
 struct Selected {
   std::vector<HallHypothesis> on;
   HallFit fit;
   double variance = 0;
-  /// Of each of `on`: other causes that would explain its share nearly as well.
+  /// For each of `on`: the other causes that would explain its share nearly as well.
   std::vector<std::vector<HallCause>> rivals;
 };
 Selected SelectHall(const HallSearch& search);

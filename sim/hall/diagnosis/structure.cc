@@ -1,5 +1,6 @@
-// Structure that no candidate explains: the residuals of the selected model against smooth
-// functions of what is known of each reading, sensor by sensor, each family in one F-like test.
+// Structure that no candidate explains. The residuals of the selected model are compared with
+// smooth functions of the known covariates of each reading, sensor by sensor. Each family is one
+// F-like test.
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +20,7 @@ std::vector<double> Smooth(double x) {  // x in -1..1
   return {x, x * x, std::sin(3 * x), std::cos(3 * x), std::sin(6 * x), std::cos(6 * x)};
 }
 
-// Explained squares of per-sensor functions of one covariate.
+// The squares that functions of one covariate explain, each sensor with its own.
 double ExplainedBy(const std::vector<double>& covariate, const HallSearch& search,
                    const VectorXd& residuals, std::size_t sensors, std::size_t* freedom) {
   double low = 1e300, high = -1e300;
@@ -53,7 +54,7 @@ double ExplainedBy(const std::vector<double>& covariate, const HallSearch& searc
   return explained;
 }
 
-// One scale for all sensors of a pose: what an unseen temperature would do.
+// A common scale for all sensors of a pose is the effect of an unseen temperature.
 double ExplainedByScales(const HallForward& forward, const HallSearch& search,
                          const Selected& selected, std::size_t rows, std::size_t* freedom) {
   std::vector<double> top(rows, 0), bottom(rows, 0);
@@ -101,7 +102,7 @@ std::vector<HallUnknown> RemainingStructure(const HallForward& forward,
   std::vector<HallUnknown> unknown;
   const auto judge = [&](const std::string& name, double explained, std::size_t freedom) {
     if (freedom == 0) return;
-    // Against what is left once it is explained; near that the fit has taken its own share.
+    // The explained squares are compared with the rest; the fit has taken its own share of that.
     const double left = n - static_cast<double>(freedom + selected.fit.free.size());
     const double variance =
         std::max((residuals.squaredNorm() - explained) / std::max(left, 1.0), 2.5e-9);

@@ -1,4 +1,4 @@
-// What paper 2 claims, in its order, each compared with the computed fields of both arrays.
+// The claims of paper 2, in its order, each compared with the computed fields of both arrays.
 
 #include <algorithm>
 
@@ -20,7 +20,7 @@ SurfaceParameters SurfaceOf(const HallArray& array) {
       array.fits[static_cast<std::size_t>(FieldKind::kSurface)].parameters);
 }
 
-// The paper's fits are of cuts; along phi = 0 the points of one meridian.
+// The paper fits cuts; along phi = 0 these are the points of one meridian.
 SurfaceParameters FitOfMeridian(const HallArray& array) {
   FieldMap cut;
   for (double theta_deg = 0; theta_deg <= 180; theta_deg += 0.9) {
@@ -33,7 +33,7 @@ SurfaceParameters FitOfMeridian(const HallArray& array) {
   return fit ? std::get<SurfaceParameters>(fit->parameters) : SurfaceOf(array);
 }
 
-// Of all theta below the equator the one where the field of a pole is steepest, by search.
+// The theta below the equator at which the field of a pole is steepest, by search.
 double SteepestTheta_deg(const FieldModel& field) {
   const auto slope = [&](double theta_deg) {
     constexpr double kStep_rad = 1e-5;
@@ -57,7 +57,7 @@ double Steepest_T_per_rad(const SurfaceParameters& surface) {
   return surface.amplitude_T / surface.width_rad * std::sqrt(2 * std::exp(-1.0));
 }
 
-// Noise of a tilt from the logarithm of a pair's ratio, for unit noise of the field.
+// The noise of a tilt from the logarithm of a pair's ratio, for unit noise of the field.
 double NoiseGain(const SurfaceParameters& surface) {
   const double scaled = kPairLatitude_rad / surface.width_rad;
   const double b_T = surface.amplitude_T * std::exp(-scaled * scaled);
@@ -160,7 +160,8 @@ std::vector<Orientation> Poses(const HallReproduceOptions& options) {
   return poses;
 }
 
-// Least squares with all eight sensors, from the truth: the model's own error, not the search's.
+// Least squares with all eight sensors, started at the truth: the result is the model's own error
+// and not that of the search.
 Errors ErrorsOf(const HallArray& array, FieldKind kind, const std::vector<Orientation>& poses) {
   HallRig rig;
   rig.electronics.clips = false;
@@ -214,7 +215,7 @@ void AddModels(const HallReproduceOptions& options, const HallArray& three, Repr
                                            Order::kFalls)});
 }
 
-// The paper's experiment: one tilt, the closed form with the width unknown.
+// The paper's experiment: a single tilt, by the closed form with the width unknown.
 double WorstClosedForm_deg(const HallArray& array, double tilt_deg) {
   double worst_deg = 0;
   for (double angle_deg = -tilt_deg; angle_deg <= tilt_deg + 1e-9; angle_deg += 0.5) {

@@ -1,4 +1,4 @@
-// What the parts of ReproduceHall share: both arrays, their maps and models, made once.
+// The data that the parts of ReproduceHall share: both arrays, their maps and models, made once.
 #pragma once
 
 #include <memory>

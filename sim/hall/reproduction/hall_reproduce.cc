@@ -46,7 +46,7 @@ ClaimCurve Truth(const std::string& figure, double reach_deg) {
   return {figure, "actual", {-reach_deg, reach_deg}, {-reach_deg, reach_deg}};
 }
 
-// Field along a line of directions, by the magnets and by a fit.
+// The field along a line of directions, by the magnets and by a fit.
 template <class Direction>
 void AddCut(const std::string& figure, const HallArray& array, double from_deg, double to_deg,
             Direction direction, Reproduction* out) {
@@ -64,8 +64,8 @@ void AddCut(const std::string& figure, const HallArray& array, double from_deg, 
   for (ClaimCurve* curve : {&computed, &fitted, &ours}) out->curves.push_back(std::move(*curve));
 }
 
-// The fitted surface over theta and phi, seen obliquely: what is farther in theta is farther up and
-// to the right. Lines of equal theta and of equal phi, apart from each other by a gap.
+// The fitted surface over theta and phi, seen obliquely: points farther in theta stand farther up
+// and to the right. Lines of equal theta and of equal phi have a gap between them.
 void AddView(const HallArray& array, Reproduction* out) {
   constexpr double kGap = std::numeric_limits<double>::quiet_NaN();
   const FieldModel& surface = *array.models[static_cast<std::size_t>(FieldKind::kSurface)];
@@ -105,7 +105,7 @@ std::vector<double> HallArray::Fields(const Orientation& orientation) const {
 
 HallArray MakeHallArray(const char* name, const std::vector<MagnetShell>& shells) {
   HallArray array{.name = name, .magnets = MagnetArray(shells, 8)};
-  // One period in longitude is computed, the others are it with the other sign.
+  // A single period in longitude is computed; the others repeat it with the other sign.
   for (double theta_deg = 0; theta_deg <= 180; theta_deg += kMapStep_deg)
     for (double phi_deg = 0; phi_deg < 45; phi_deg += kMapStep_deg) {
       const double theta_rad = theta_deg * kRadPerDeg;

@@ -1,7 +1,8 @@
-// Paper 2, claim by claim, on magnets whose field is computed: steepest angles, slopes, precision,
-// errors of its models and of ours, its sensors' range; and its figures 4, 5, 6 and 8. The paper
-// gives no dimensions, so the magnets are a stated geometry (magnet_array.h) whose fitted widths
-// come near to the paper's; what rests on that choice is `fitted`.
+// Paper 2, claim by claim, on magnets whose field is computed. The claims are steepest angles,
+// slopes, precision, the errors of its models and of those here, and the range of its sensors. The
+// curves are those of its figures 4, 5, 6 and 8. The paper gives no dimensions, so the magnets have
+// a stated geometry (magnet_array.h) whose fitted widths come near to the paper's. Claims that rest
+// on that choice are `fitted`.
 #pragma once
 
 #include "sim/drive/reproduction/claim.h"

@@ -14,7 +14,8 @@ double SinDeg(double deg) { return std::sin(deg * std::numbers::pi / 180); }
 
 AxisMemory Fresh(const AxisModel::Start& start) {
   const double turns = static_cast<double>(start.position) / start.subdivision;
-  // The factory set zero where the unit now stands; a gear that is off shows on the way from here.
+  // The factory sets zero where the unit stands now. An error of the gear shows on the way from
+  // here.
   const double output_deg = turns * 360 / start.believed_gear;
   return {.rotor_turns = turns,
           .output_deg = output_deg,
@@ -128,11 +129,11 @@ void AxisModel::FollowPiece(const FieldPath::Piece& piece, double now_ns, bool s
   Drag({field_turns, extra, piece.delta > 0}, moment);
 }
 
-// One monotone turn of the field, upwards or downwards by the sign of the way from where it was;
-// the friction band is a max (or min) with where the rotor stood. Against a hard stop the field
-// runs ahead, and after half a turn the rotor belongs to the turn below.
+// A monotone turn of the field goes upwards or downwards by the sign of the way from its begin. The
+// friction band is a max (or min) with the rotor's former place. Against a hard stop the field runs
+// ahead, and after half a turn the rotor belongs to the turn below.
 void AxisModel::Drag(const Pull& pull, Moment* moment) const {
-  // Downwards is upwards in a mirror.
+  // The downward case is the upward case in a mirror.
   const double sign = pull.up ? 1 : -1;
   const double stop = sign * (pull.up ? stop_high_turns_ : stop_low_turns_);
   double field = sign * (pull.field_turns + static_cast<double>(moment->offset_turns));
@@ -168,8 +169,8 @@ void AxisModel::Turn(double rotor_turns, Moment* moment) const {
   moment->output_deg = std::clamp(moment->output_deg, driven_deg - half, driven_deg + half);
 }
 
-// The load where a rotor without lag would stand: it varies over a whole output turn, so the lag
-// makes no difference to it.
+// The load is taken where a rotor without lag would stand. The load varies over a whole output
+// turn, so the lag makes no difference to it.
 double AxisModel::LoadShare(double rotor_turns) const {
   return 1 + motor_->parameters().load_variation *
                  SinDeg(DrivenDeg(rotor_turns) + traits_.load_phase_deg);

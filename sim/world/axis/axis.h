@@ -1,12 +1,12 @@
-// One axis as it truly turns: field -> rotor -> gear -> play -> output. Nothing is stepped: along a
-// path the field is piecewise monotone, and on a monotone piece a friction band (rotor) and a play
-// (backlash) are a max or a min with where they stood before, so the state at any instant costs
-// O(segments).
+// An axis in closed form: field -> rotor -> gear -> play -> output. Along a path the field is
+// piecewise monotone. On a monotone piece a friction band (rotor) and a play (backlash) are a max
+// or a min with their former place. The state at any instant therefore costs O(segments), without
+// steps of time.
 //
 // The rotor keeps to the field only up to a whole electrical turn. `offset_turns_` counts the turns
-// between what the firmware counts and what the rotor does: it changes when the rotor is held by
-// the hard stop, when it cannot follow, and when a stored vector is applied to a rotor that stands
-// elsewhere.
+// between the firmware's count and the rotor. The offset changes when the hard stop holds the rotor
+// or the rotor cannot follow. Another reason is a stored vector that is applied to a rotor that
+// stands elsewhere.
 #pragma once
 
 #include <cstdint>
@@ -20,25 +20,26 @@
 
 namespace focalfleet::sim {
 
-/// What an axis' place differs from the same place at another time changes with the way between,
-/// and forgets itself over this much of it (an Ornstein-Uhlenbeck process in the travelled angle):
-/// after a way d the scatter x becomes x exp(-d/L) + s sqrt(1 - exp(-2d/L)) N(0, 1), so two places
-/// that lie a short way apart differ by s sqrt(2d/L), and a correction of some degrees hardly
-/// scatters. With s = 0.1 deg that is 0.040 deg after 30 deg and 0.028 deg after 15; a positioner
-/// on a bench shows 0.04 and at most 0.03 (tests/sim/drive/measured_moves_test.cc).
+/// The deviation of an axis' place from its place at another time changes with the way between. The
+/// axis loses its memory over this much of way (an Ornstein-Uhlenbeck process in the travelled
+/// angle). After a way d the scatter x becomes x exp(-d/L) + s sqrt(1 - exp(-2d/L)) N(0, 1). Two
+/// places that lie a short way apart differ by s sqrt(2d/L), so a correction of some degrees hardly
+/// scatters. With s = 0.1 deg the difference is 0.040 deg after 30 deg and 0.028 deg after 15. A
+/// positioner on a bench shows 0.04 and at most 0.03 (tests/sim/drive/measured_moves_test.cc).
 inline constexpr double kScatterTravelDeg = 360;
 
-/// What is true of one axis and does not change. Angles are the output's, in degrees.
+/// The constant traits of one axis. Angles are the output's, in degrees.
 struct AxisTraits {
-  double gear = 1;             // as built; its maker may believe otherwise
+  double gear = 1;             // as built; the description may say otherwise
   double stop_low_deg = -1e9;  // hard stops
   double stop_high_deg = 1e9;
-  double load_phase_deg = 0;  // where over an output turn the load is highest
+  double load_phase_deg = 0;  // the place over an output turn where the load is highest
   double backlash_deg = 0;    // full width
   double periodic_deg = 0;    // amplitude, one period an output turn
   double periodic_phase_deg = 0;
   double scatter_deg = 0;  // standard deviation after a long way, see kScatterTravelDeg
-  double grip = 1;  // share of the gear's motion that arrives: below 1 it slips, at 0 it is dead
+  // Share of the gear's motion that arrives: below 1 the axis slips, at 0 it is dead.
+  double grip = 1;
   std::uint64_t scatter_seed = 0;
 };
 
@@ -51,10 +52,10 @@ class AxisModel {
     double believed_gear = 1;
   };
   AxisModel(const AxisTraits& traits, const Motor* motor, const Start& start);
-  /// An axis found again; without power.
+  /// An axis restored from its memory; without power.
   AxisModel(const AxisTraits& traits, const Motor* motor, const AxisMemory& memory);
 
-  // ---- what the unit's bridge does
+  // ---- the operations of the unit's bridge
 
   /// Applies a vector after power was off: the rotor turns to the nearest place that agrees with
   /// it.
@@ -73,19 +74,20 @@ class AxisModel {
   /// `subdivision`.
   void Recount(std::int32_t position);
 
-  // ---- truth
+  // ---- the true state
 
   [[nodiscard]] double AngleDeg(HostInstant at) const;
   [[nodiscard]] AxisMemory Memory(HostInstant at) const;
   [[nodiscard]] std::int32_t Applied(HostInstant at) const { return path_.Applied(at); }
 
  private:
-  struct Moment {  // all that changes along a path
+  struct Moment {  // the quantities that change along a path
     double rotor_turns = 0;
     double output_deg = 0;
     std::int64_t offset_turns = 0;
   };
-  /// Settled: the field stays where it is, and the rotor has come to rest behind it.
+  /// The state at `at`. Settled: the field stays where it is, and the rotor has come to rest behind
+  /// it.
   [[nodiscard]] Moment At(HostInstant at, bool settled) const;
   void FollowPiece(const FieldPath::Piece& piece, double now_ns, bool settled,
                    Moment* moment) const;

@@ -1,4 +1,4 @@
-// What an axis' mechanics remember; together with FLASH all that outlives power-off and the
+// The state of an axis' mechanics. Together with FLASH it is all that outlives power-off and the
 // process.
 #pragma once
 

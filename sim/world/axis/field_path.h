@@ -1,7 +1,7 @@
-// Where a motor's field stands while it runs its segments, in closed form. A segment shows its
-// vectors one by one, each for repeat * counter1 counts of the 144 MHz timer, the first at once
-// when the segment begins; a segment waits for the one before it. All by the unit's own clock,
-// which runs fast or slow by a share.
+// The position of a motor's field while it runs its segments, in closed form. A segment shows its
+// vectors one by one, each for repeat * counter1 counts of the 144 MHz timer. The first vector is
+// shown at once when the segment begins; a segment waits for the one before it. All times are by
+// the unit's own clock, which runs fast or slow by a share.
 #pragma once
 
 #include <array>
@@ -26,7 +26,7 @@ struct UnitClock {
 
 class FieldPath {
  public:
-  /// Stands at `position` for ever.
+  /// The field stands at `position` for ever.
   explicit FieldPath(std::int32_t position = 0) : from_(position), to_(position) {}
 
   struct Run {
@@ -41,7 +41,8 @@ class FieldPath {
   [[nodiscard]] std::int32_t Applied(HostInstant at) const;
   [[nodiscard]] std::int32_t from() const { return from_; }
   [[nodiscard]] std::int32_t to() const { return to_; }
-  /// When the last vector has been shown for its time; the beginning where there is none.
+  /// The instant at which the last vector has been shown for its time; the beginning where there is
+  /// none.
   [[nodiscard]] HostInstant end() const { return end_; }
 
   struct Piece {
@@ -52,7 +53,7 @@ class FieldPath {
     [[nodiscard]] double end_ns() const;
   };
   [[nodiscard]] std::span<const Piece> pieces() const { return {pieces_.data(), count_}; }
-  /// Unit's clock since the start; negative before it.
+  /// The time by the unit's clock since the start; negative before it.
   [[nodiscard]] double UnitNs(HostInstant at) const { return clock_.ToUnitNs(at - begin_); }
 
  private:

@@ -1,12 +1,13 @@
-// One motor as the fleet sees it: where its rotor is behind its field, and whether it comes along.
-// Three numbers stand for the drive; all come from the drive's physics (sim/drive), so they know
-// the bus voltage, the modulation and what dead time takes: the mean length V of the voltage
-// vectors, the highest speed that a load starts with, and the time in which lag settles.
+// A motor at the level of the fleet: the lag of its rotor behind its field, and whether the rotor
+// follows. Three numbers stand for the drive. They are the mean length V of the voltage vectors,
+// the highest speed that a load starts with, and the time in which lag settles. All three come from
+// the drive's physics (sim/drive), so they contain the bus voltage, the modulation and the effect
+// of dead time.
 //
 //   at rest      sin(lag) = T_load r / (1.5 flux V)
 //   running      sin(lag) = (flux w + r (b w + T_load) / (1.5 flux)) / V
 //
-// With 1.8 V that is 15 degrees electrical at rest, 24 at n = 108. Against the PWM level the
+// With 1.8 V these are 15 degrees electrical at rest and 24 at n = 108. Against the PWM level the
 // running lag is within a degree (tests/sim/world/axis_test.cc).
 #pragma once
 
@@ -19,21 +20,21 @@ class Motor {
   /// Pre: the bus voltage is above 0. Cost: 30 ms of CPU time; make one per kind of motor.
   Motor(const Drive::Setting& setting, const Modulation& modulation);
 
-  /// Load angle at rest in electrical turns, 0..0.25, for `share` of the mean load.
+  /// The load angle at rest for `share` of the mean load. Units: electrical turns, 0..0.25.
   [[nodiscard]] double StaticLagTurns(double share) const;
 
-  /// Load angle while the field turns at `turns_per_s` (electrical), electrical turns; 0.25 beyond
-  /// pull-out.
+  /// The load angle while the field turns at `turns_per_s` (electrical); 0.25 beyond pull-out.
+  /// Units: electrical turns.
   [[nodiscard]] double RunningLagTurns(double turns_per_s, double share) const;
 
-  /// Whether the rotor, at rest, comes up to a field that turns at once at `turns_per_s`, at the
+  /// True where the rotor, from rest, follows a field that turns at once at `turns_per_s`, at the
   /// worst load of an output turn.
   [[nodiscard]] bool Follows(double turns_per_s) const {
     return turns_per_s <= pull_in_turns_per_s_;
   }
   [[nodiscard]] double pull_in_turns_per_s() const { return pull_in_turns_per_s_; }
 
-  /// How fast lag settles after the field starts or stops. Units: s.
+  /// The time in which lag settles after the field starts or stops. Units: s.
   [[nodiscard]] double settling_s() const { return settling_s_; }
   [[nodiscard]] const MotorParameters& parameters() const { return parameters_; }
 

@@ -1,5 +1,6 @@
-// Fault confinement of one CAN controller: its two error counters and what it may still do. The
-// rule numbers are those of Bosch CAN 2.0 part B, section 8, which ISO 11898-1 took over:
+// Fault confinement of one CAN controller: its two error counters and the actions that they still
+// allow. The rule numbers are those of Bosch CAN 2.0 part B, section 8, which ISO 11898-1 took
+// over:
 //
 //   1  a receiver that detects an error:                          REC + 1
 //   2  a receiver that sees dominant right behind its error flag: REC + 8
@@ -47,14 +48,14 @@ class ErrorCounters {
     if (transmit_ >= kOff) return Confinement::kOff;
     return std::max(transmit_, receive_) >= kPassive ? Confinement::kPassive : Confinement::kActive;
   }
-  /// So many errors that somebody should look; the controller works as ever.
+  /// The errors deserve attention, while the controller works as usual.
   [[nodiscard]] bool warns() const { return std::max(transmit_, receive_) >= kWarning; }
   [[nodiscard]] bool clean() const { return transmit_ == 0 && receive_ == 0; }
   [[nodiscard]] std::uint32_t transmit() const { return transmit_; }
   [[nodiscard]] std::uint32_t receive() const { return receive_; }
 
  private:
-  // Rule 8 forgets what is above 127, and a controller's register has eight bits.
+  // Rule 8 drops the part above 127, and a controller's register has eight bits.
   void Receive(std::uint32_t more) { receive_ = std::min<std::uint32_t>(receive_ + more, 255); }
 
   std::uint32_t transmit_ = 0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t kRowMax = 5;  // equal bits that may follow one another
 
-/// Equal bits of `recessive` that stand right before bit `end`.
+/// The number of equal bits of `recessive` that stand right before bit `end`.
 std::uint32_t RowBefore(const FrameLevels& levels, std::uint32_t end, bool recessive) {
   std::uint32_t row = 0;
   while (row < kRowMax && row < end && levels.recessive[end - 1 - row] == recessive) ++row;
@@ -21,7 +21,7 @@ std::uint32_t WithErrorFrame(std::uint32_t bits, std::uint32_t flags) {
   return bits + flags + kDelimiterBits + kIntermissionBits;
 }
 
-/// Bits before the acknowledgement slot: the CRC delimiter is the last of them.
+/// The number of bits before the acknowledgement slot; the CRC delimiter is the last of them.
 std::uint32_t SlotOf(const CanFrame& frame) { return ExposedBits(frame) - kEndOfFrameBits - 2; }
 
 }  // namespace
@@ -38,7 +38,7 @@ FrameCourse Unacknowledged(const CanFrame& frame) {
 }
 
 FrameCourse RefusedByOne(const CanFrame& frame) {
-  // The one flags from the last bit of the frame on, all others one bit later.
+  // The refusing receiver flags from the last bit of the frame on, all others one bit later.
   return {.bits = WithErrorFrame(ExposedBits(frame) - 1, kFlagBits + 1),
           .error = FrameError::kForm,
           .accepted = true};
@@ -46,7 +46,8 @@ FrameCourse RefusedByOne(const CanFrame& frame) {
 
 FrameCourse CutOffAt(const CanFrame& frame, std::uint32_t at) {
   const FrameLevels levels = LevelsOf(frame);
-  std::uint32_t seen = at + 1;  // in a fixed form the first wrong bit tells; here at the latest
+  // In a fixed form the first wrong bit shows the error; here at the latest.
+  std::uint32_t seen = at + 1;
   if (at < levels.bits) seen = at + kRowMax + 1 - RowBefore(levels, at, true);
   return {.bits = WithErrorFrame(seen, kFlagBits), .error = FrameError::kStuff, .accepted = false};
 }
@@ -54,7 +55,8 @@ FrameCourse CutOffAt(const CanFrame& frame, std::uint32_t at) {
 FrameCourse DisturbedAt(const CanFrame& frame, std::uint32_t at, bool transmitter_passive) {
   FOCALFLEET_CHECK(at < ExposedBits(frame));
   const FrameLevels levels = LevelsOf(frame);
-  if (at >= levels.bits) {  // delimiters, slot, end of frame: everybody knows what belongs there
+  // Delimiters, slot, end of frame: every node knows the levels of these bits.
+  if (at >= levels.bits) {
     const bool slot = at == SlotOf(frame);
     const bool last = at + 1 == ExposedBits(frame);
     return {.bits = WithErrorFrame(at + 1, kFlagBits),
@@ -69,14 +71,15 @@ FrameCourse DisturbedAt(const CanFrame& frame, std::uint32_t at, bool transmitte
               .error = FrameError::kStuff,
               .accepted = false,
               .excused = true};
-    // Nobody drives the wire any more; six recessive bits later all see it at once.
+    // No node drives the wire any more; six recessive bits later all see it at once.
     return {.bits = WithErrorFrame(at + 1 + kRowMax + 1, kFlagBits),
             .error = FrameError::kStuff,
             .accepted = false,
             .lost_arbitration = true};
   }
-  // The transmitter's flag continues the row that receivers see, or begins it; where the row would
-  // outlast the CRC they see a dominant delimiter, or that the CRC is wrong, told behind the slot.
+  // The transmitter's flag continues the row that receivers see, or begins it. Where the row would
+  // outlast the CRC, they see a dominant delimiter, or a wrong CRC, which they signal behind the
+  // slot.
   const bool flag_recessive = transmitter_passive;
   const std::uint32_t before = seen_recessive == flag_recessive ? row : 0;
   const std::uint32_t at_latest = levels.bits - at + (flag_recessive ? 2 : 0);

@@ -60,8 +60,8 @@ void AddExtras(const std::vector<LightSource>& sources, const CameraTraits& trai
   }
 }
 
-// Flux-weighted; the widths' squares and the squares of the distances to the centroid, halved as
-// each counts in one of two directions, average by flux.
+// The centroid is weighted by flux. The squares of the widths average by flux. The squares of the
+// distances to the centroid do so too, halved because each counts in one of two directions.
 Blob Merged(const std::vector<Blob>& blobs, const std::vector<std::uint32_t>& members) {
   constexpr double kFwhmPerSigma = 2.3548200450309493;
   Blob sum;
@@ -78,7 +78,7 @@ Blob Merged(const std::vector<Blob>& blobs, const std::vector<std::uint32_t>& me
   return sum;
 }
 
-// Rows of the sensor first. Chains blend as a whole.
+// Spots are sorted by the rows of the sensor. Chains blend as a whole.
 std::vector<Blob> Blended(std::vector<Blob> blobs, double length_px) {
   std::sort(blobs.begin(), blobs.end(),
             [](const Blob& a, const Blob& b) { return a.at_px.imag() < b.at_px.imag(); });

@@ -1,12 +1,14 @@
-// The fibre-view camera: back-lit fibres and fiducials go in, a list of spots comes out, in the
-// order of the rows of the sensor as a detector of spots finds them, without a name on any. What
-// it does to the truth, in this order: the air and the optics displace, a fibre may be dark, noise
-// moves each centroid, spots nearer than the blend length become one (flux-weighted centroid,
-// width by the second moment: 2.355^2 f1 f2 / (f1 + f2)^2 d^2 / 2 is added to the square of the
-// width for two), dust and cosmic rays add spots, the sensor's edge cuts off.
+// The fibre-view camera: back-lit fibres and fiducials go in, and a list of spots comes out. The
+// spots have no names and stand in the order of the sensor's rows, as a detector of spots finds
+// them. The camera changes the truth in this order:
 //
-// Centroid noise is sigma / sqrt(flux); flux 1 is a usual fibre. Which light is in which spot is
-// told beside the spots, for tests and reports.
+// - The air and the optics displace each light, and a fibre may be dark.
+// - Noise moves each centroid by sigma / sqrt(flux); flux 1 is a usual fibre.
+// - Spots nearer than the blend length become one. Its centroid is weighted by flux, and its width
+//   is the second moment: for two, 2.355^2 f1 f2 / (f1 + f2)^2 d^2 / 2 is added to its square.
+// - Dust and cosmic rays add spots, and the sensor's edge cuts spots off.
+//
+// The lights in each spot are listed beside the spots, for tests and reports.
 #pragma once
 
 #include <complex>
@@ -41,7 +43,7 @@ struct CameraTraits {
   double blend_fwhm = 1;     // spots nearer than this many widths become one
   double missing_share = 0;  // of fibres; fiducials too
   double extra_share = 0;    // of the count of sources, rounded; anywhere within their rim
-  // Each exposure's own change, one standard deviation.
+  // Each exposure has its own change; the values are standard deviations.
   double scale_change_ppm = 0;
   double rotation_change_deg = 0;
   double shift_change_px = 0;
@@ -56,11 +58,11 @@ struct ImageSpot {
 
 struct Image {
   std::vector<ImageSpot> spots;
-  /// Whose light is in each spot: indices into the sources; none: an extra. Shape: as spots.
+  /// The lights in each spot: indices into the sources; none: an extra spot. Shape: as spots.
   std::vector<std::vector<std::uint32_t>> light;
 };
 
-/// One exposure. Cost: O(n log n), about 15 ms for 5000 fibres with air.
+/// A single exposure. Cost: O(n log n), about 15 ms for 5000 fibres with air.
 Image TakeImage(const std::vector<LightSource>& sources, const CameraTraits& traits, Rng* rng);
 
 /// Every fibre of the world at world.now(), row by row, at flux 1.

@@ -16,7 +16,7 @@ Turbulence::Turbulence(const TurbulenceLaw& law, Rng* rng) {
   amplitude_mm_ = law.sigma_mm * std::sqrt(2.0 / kWaves);
   for (std::vector<Wave>& waves : waves_) {
     for (int j = 0; j < kWaves; ++j) {
-      // 1 - u is never 0.
+      // 1 - u is never 0, so the logarithm is finite.
       const double gamma = -std::log((1 - rng->Uniform()) * (1 - rng->Uniform()));
       const double deviation = std::sqrt(gamma / kShape) / law.length_mm;
       const double kx = deviation * rng->Normal();

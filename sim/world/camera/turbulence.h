@@ -1,15 +1,18 @@
-// What the air between plate and camera does to one exposure: every spot is displaced by a smooth
-// random field, the same for neighbours, new in each exposure. Each coordinate is a Gaussian
+// The air between plate and camera displaces every spot of an exposure by a smooth random field.
+// Neighbours share the displacement, and each exposure has a new one. Each coordinate is a Gaussian
 // process over the plate with the covariance
 //
 //   C(r) = sigma^2 (1 + r^2 / (2 a l^2))^-a,   a = 2 (rational quadratic)
 //
-// a mixture of Gaussian correlations of many lengths around l, as eddies are of many sizes. It is
-// drawn as a sum of M waves (random Fourier features): d(x) = sigma sqrt(2/M) sum cos(k_j x + f_j),
-// f_j even over a turn, k_j normal with deviation sqrt(g_j / a) / l and g_j of a Gamma
-// distribution of shape a. The covariance over realisations is C exactly, for any M; with M = 96
-// one realisation is near enough to normal. Cost: M cosines a coordinate and spot, about 10 ms for
-// 5000 fibres. Source: [RahimiRecht2007].
+// This is a mixture of Gaussian correlations of many lengths around l, as eddies have many sizes.
+// The field is drawn as a sum of M waves (random Fourier features):
+//
+//   d(x) = sigma sqrt(2/M) sum cos(k_j x + f_j)
+//
+// f_j is even over a turn, k_j is normal with deviation sqrt(g_j / a) / l, and g_j has a Gamma
+// distribution of shape a. The covariance over realisations is C exactly, for any M; with M = 96 a
+// realisation is near enough to normal. Cost: M cosines a coordinate and spot, about 10 ms for 5000
+// fibres. Source: [RahimiRecht2007].
 #pragma once
 
 #include <array>
@@ -25,11 +28,11 @@ struct TurbulenceLaw {
   double length_mm = 150;  // l
 };
 
-/// One realisation: the air during one exposure.
+/// A realisation: the air during one exposure.
 class Turbulence {
  public:
   Turbulence(const TurbulenceLaw& law, Rng* rng);
-  /// Displacement of light from this place. Frame: focal plane, mm.
+  /// The displacement of light from this place. Frame: focal plane, mm.
   [[nodiscard]] std::complex<double> At(std::complex<double> place_mm) const;
 
  private:

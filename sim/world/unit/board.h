@@ -1,8 +1,8 @@
-// What a unit's protocol asks of the board that it runs on: two motors, a clock and a FLASH, as a
+// The board on which a unit's protocol runs: two motors, a clock and a FLASH. The interface is a
 // table of plain functions, so that C can fill it in. `context` is the board's own and handed back.
 //
-// The simulator fills it in with axes that turn and a clock that runs fast or slow; firmware fills
-// it in with a timer interrupt, the bridge's PWM and a page of FLASH.
+// The simulator fills the table with axes that turn and a clock that runs fast or slow. Firmware
+// fills it with a timer interrupt, the bridge's PWM and a page of FLASH.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +14,8 @@
 
 namespace focalfleet::sim {
 
-/// Nanoseconds of whatever clock the board counts in. The protocol only compares them and asks
-/// `after` for later ones, so the board alone knows how its clock runs.
+/// Nanoseconds of the clock in which the board counts. The protocol only compares them and asks
+/// `after` for later ones, so it need not know how the board's clock runs.
 using BoardInstant = HostInstant;
 
 /// A vector to be applied, whole turns included: `position` vectors from the axis' zero.
@@ -25,8 +25,8 @@ struct Field {
 };
 
 /// A path to be run from the vector that is applied now. Each segment begins at its start_ticks
-/// after `begin`, or when the one before has ended, and shows its |delta| vectors one by one, each
-/// for repeat * counter1 timer counts.
+/// after `begin`, or when the one before has ended. The segment shows its |delta| vectors one by
+/// one, each for repeat * counter1 timer counts.
 struct PathOrder {
   std::int32_t from = 0;  // vectors
   BoardInstant begin;
@@ -53,21 +53,21 @@ struct Board {
 
   // ---- clock
 
-  /// When `duration` of the unit's own time has passed since `from`.
+  /// The instant at which `duration` of the unit's own time has passed since `from`.
   BoardInstant (*after)(void* context, BoardInstant from, DurationNs duration) = nullptr;
-  /// 100 us counts of the unit's own clock since power-on, low 32 bits.
+  /// The counts of the unit's own clock since power-on, low 32 bits. Units: 100 us.
   std::uint32_t (*ticks)(void* context, BoardInstant now) = nullptr;
 
   // ---- sensors; a board without any leaves both as they are, and speaks protocol version 1
 
   std::uint8_t sensors = 0;  // at most limits::kSensorsPerUnit
-  /// What all of them show at `now`, averaged over the time that the board takes for it: `counts`
-  /// has a place for each, to be filled with 0..kFullCount, or kNoCount.
+  /// Reads all sensors at `now`, averaged over the time that the board takes for it. `counts` has a
+  /// place for each, to be filled with 0..kFullCount, or kNoCount.
   void (*sense)(void* context, BoardInstant now, std::uint16_t* counts) = nullptr;
 
   // ---- FLASH
 
-  /// What stands in Flash now outlives a power cut from the return of this call on.
+  /// The content of Flash outlives a power cut from the return of this call on.
   void (*keep)(void* context) = nullptr;
 };
 

@@ -54,7 +54,7 @@ Board Firmware::MakeBoard() {
             auto& firmware = *static_cast<Firmware*>(context);
             firmware.Sense(now, {counts, firmware.hardware_.joint.sensors});
           },
-      // A simulated FLASH keeps what is written to it at once.
+      // A simulated FLASH keeps a value as soon as it is written.
       .keep = [](void*) {},
   };
 }
@@ -64,7 +64,8 @@ void Firmware::Sense(HostInstant now, std::span<std::uint16_t> counts) {
   const std::complex<double> tip = FibreAt(*joint.mechanism, {hardware_.axis[0]->AngleDeg(now),
                                                               hardware_.axis[1]->AngleDeg(now)}) -
                                    joint.mechanism->base_mm;
-  joint.magnets->Read(joint.unit, readings_++, {tip.real(), tip.imag(), joint.carrier_mm}, counts);
+  joint.magnets->Read(joint.unit, readings_++, {tip.real(), tip.imag(), joint.fibre_carrier_mm},
+                      counts);
   if (!hardware_.faults->sensor) return;
   using Kind = UnitFaults::Sensor::Kind;
   const UnitFaults::Sensor& lies = *hardware_.faults->sensor;
@@ -140,7 +141,7 @@ void Firmware::RaiseFault(const Trip& trip, HostInstant now, TransmitQueue* out)
   Pass(said, Cause::kTime, out);
 }
 
-// ---- what is planted
+// ---- planted faults
 
 void Firmware::FollowMotion() {
   if (!machine_.runs()) trip_at_ = kNever;
@@ -166,7 +167,7 @@ bool Firmware::Withheld(const CanFrame& frame, HostInstant now, TransmitQueue* o
   if (!request) return false;
   const NodeId node = request->address.node;
   if (node != hardware_.node && node != kBroadcastNode) return false;
-  // A repeat has the number of the request that it repeats.
+  // A repeated request has the sequence number of the original.
   if (node == hardware_.node && request->address.sequence != sequence_)
     sequence_before_ = std::exchange(sequence_, request->address.sequence);
   const auto function = static_cast<Function>(frame.id >> 20 & 63);
@@ -200,7 +201,7 @@ std::optional<UnitMessage> Firmware::Refused(const Addressed<HostMessage>& reque
   if (const auto* home = std::get_if<Home>(&request.message)) return HomeReply{home->move, answer};
   const auto* write = std::get_if<ParameterWrite>(&request.message);
   if (write == nullptr) return std::nullopt;
-  TransmitQueue said;  // what it keeps instead
+  TransmitQueue said;  // the answers that it withholds
   machine_.OnFrame(
       Encode(HostMessage{ParameterRead{write->axis, write->parameter}}, request.address), now,
       &said);
@@ -215,7 +216,7 @@ std::optional<UnitMessage> Firmware::Refused(const Addressed<HostMessage>& reque
 
 void Firmware::Pass(const TransmitQueue& said, Cause cause, TransmitQueue* out) const {
   for (const CanFrame& frame : said.frames()) {
-    // What comes with time is the end of a motion.
+    // The only frame that comes with time is the end of a motion.
     if (cause == Cause::kTime && hardware_.faults->mute_done) continue;
     out->Add(Distorted(frame));
   }
@@ -235,7 +236,7 @@ CanFrame Firmware::Distorted(const CanFrame& frame) const {
     identify->serial = faults.foreign_serial.value_or(identify->serial);
     identify->protocol_version = faults.protocol_version.value_or(identify->protocol_version);
   }
-  // Sequence number 0 is of what it says unasked.
+  // Sequence number 0 belongs to frames that are sent unasked.
   if (faults.stale_sequence && decoded->address.sequence != 0)
     decoded->address.sequence = sequence_before_;
   return Encode(decoded->message, decoded->address);

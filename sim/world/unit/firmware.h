@@ -1,6 +1,6 @@
-// One simulated unit's firmware: the protocol's state machine (unit_machine.h), the very code that
-// firmware starts from, on a board whose motors are simulated axes and whose clock runs by its own
-// rate; and around it the misbehaviour that tests plant.
+// The firmware of one simulated unit. The protocol's state machine (unit_machine.h) is the very
+// code that real firmware starts from. Its board has simulated axes as motors and a clock that runs
+// by its own rate. Around it stands the misbehaviour that tests plant.
 #pragma once
 
 #include <array>
@@ -31,7 +31,7 @@ class Firmware {
     struct Joint {
       UnitId unit;
       std::uint8_t sensors = 0;
-      double carrier_mm = 0;
+      double fibre_carrier_mm = 0;
       const Mechanism* mechanism = nullptr;
       const JointSensors* magnets = nullptr;
     };
@@ -48,14 +48,14 @@ class Firmware {
   void PowerOff(HostInstant now);
 
   void OnFrame(const CanFrame& frame, HostInstant now, TransmitQueue* out);
-  /// Does what is due. Pre: now is not before anything told so far.
+  /// Does everything that is due. Pre: now is not before any earlier instant.
   void OnTime(HostInstant now, TransmitQueue* out);
   /// An edge of the SYNC line.
   void OnSync(HostInstant now, TransmitQueue* out);
-  /// When OnTime is due next; kNever without power.
+  /// The instant at which OnTime is due next; kNever without power.
   [[nodiscard]] HostInstant deadline() const;
 
-  /// Stops at once and stays in kFault until the fault is cleared.
+  /// The unit stops at once and stays in kFault until the fault is cleared.
   void RaiseFault(const Trip& trip, HostInstant now, TransmitQueue* out);
 
   [[nodiscard]] UnitState state() const { return machine_.state(); }
@@ -67,12 +67,13 @@ class Firmware {
  private:
   [[nodiscard]] Board MakeBoard();
   void Sense(HostInstant now, std::span<std::uint16_t> counts);
-  /// After whatever may have begun or ended a motion: when the planted fault is due.
+  /// Sets the instant of the planted fault. To be called after any frame or event that may begin or
+  /// end a motion.
   void FollowMotion();
   void TripIfDue(HostInstant now, TransmitQueue* out);
-  /// Hands on what the machine said, with what is planted done to it.
+  /// Hands on the machine's answers, changed by the planted faults.
   enum class Cause { kFrame, kTime };
-  /// True where what is planted keeps the machine from hearing the frame.
+  /// True where a planted fault keeps the frame from the machine.
   bool Withheld(const CanFrame& frame, HostInstant now, TransmitQueue* out);
   [[nodiscard]] std::optional<UnitMessage> Refused(const Addressed<HostMessage>& request,
                                                    HostInstant now);
@@ -83,8 +84,8 @@ class Firmware {
   UnitMachine machine_;
   HostInstant powered_at_;
   std::uint32_t motions_seen_ = 0;  // of Flash::moves_begun
-  HostInstant trip_at_ = kNever;    // planted
-  // Of the requests to it alone, for answers under the wrong one.
+  HostInstant trip_at_ = kNever;    // the instant of the planted fault
+  // The sequence number of the last request to this unit alone, for answers under the wrong one.
   std::uint8_t sequence_ = 0;
   std::uint32_t readings_ = 0;  // of the sensors
   std::uint8_t sequence_before_ = 0;

@@ -1,7 +1,7 @@
-// What survives power-off. The motor has no encoder: the stored vector is applied first at
-// power-on, so that rotor and field agree, and turns say which of the gear*range electrical turns
-// that is. The mark `moving` is set before the first step and cleared together with the final
-// vectors, so that a cut in mid-move can never look like rest.
+// FLASH survives power-off. The motor has no encoder, so the stored vector is applied first at
+// power-on: rotor and field then agree. The turns say in which of the gear * range electrical turns
+// they do. The mark `moving` is set before the first step and cleared together with the final
+// vectors. A power cut in mid-move therefore never looks like rest.
 #pragma once
 
 #include <array>
@@ -23,7 +23,7 @@ struct AxisFlash {
   std::int32_t max_position = 0;   // vectors
   std::int32_t home_position = 0;  // vectors
 
-  /// Vectors from the axis' zero.
+  /// The position from the axis' zero. Units: vectors.
   [[nodiscard]] std::int32_t position() const { return turns * subdivision + vector; }
   void set_position(std::int32_t position) {
     turns = position / subdivision - (position % subdivision < 0 ? 1 : 0);
@@ -36,9 +36,10 @@ struct Flash {
   SerialNumber serial;
   std::array<AxisFlash, kAxisCount> axis;
   std::uint32_t moves_begun = 0;
-  MoveId last_begun;           // 0: none yet
-  bool moving = false;         // the mark
-  std::uint8_t lost_axes = 0;  // bit per axis: its position must be set or homed before it may move
+  MoveId last_begun;    // 0: none yet
+  bool moving = false;  // the mark
+  // Bit per axis: the axis must be homed or its position set before it may move.
+  std::uint8_t lost_axes = 0;
   std::int32_t host_timeout_ms = 5000;
   bool operator==(const Flash&) const = default;
 };

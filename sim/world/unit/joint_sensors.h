@@ -1,5 +1,6 @@
-// What a unit's board reads where its fibre stands on a ball joint with sensors: a door, because
-// magnets and their field are a library of their own (sim/hall) that knows nothing of units.
+// The sensors that a unit's board reads where its fibre stands on a ball-jointed fibre carrier. The
+// interface stands here because magnets and their field are a library of their own (sim/hall),
+// which does not depend on units.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +24,8 @@ class JointSensors {
   JointSensors& operator=(const JointSensors&) = delete;
   virtual ~JointSensors() = default;
 
-  /// Reading number `reading` of this unit, with noise of its own: the same again for the same
-  /// three. Shape: one count a sensor.
+  /// A reading of the sensors of this unit, with noise of its own. The same unit, number and tip
+  /// give the same reading again. Shape: one count a sensor.
   virtual void Read(UnitId unit, std::uint32_t reading, const FibreCarrierTip& tip,
                     std::span<std::uint16_t> counts) const = 0;
 };

@@ -7,7 +7,7 @@
 
 namespace focalfleet::sim {
 
-// Of Flash::lost_axes.
+// The bits of Flash::lost_axes.
 inline constexpr std::uint8_t kBothAxes = 3;
 constexpr std::uint8_t Bit(Axis axis) { return static_cast<std::uint8_t>(1u << Index(axis)); }
 

@@ -1,5 +1,5 @@
-// What a unit may become, as one table. Everything that the firmware does to its state goes through
-// here; a transition that is not in the table is a bug in the firmware, not an event.
+// The transitions of a unit's state, as one table. Every change of the firmware's state goes
+// through this table. A transition that is not in it is a bug in the firmware, not an event.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// What one frame or one instant made a unit say.
+// The frames that a unit sends because of one frame or at one instant.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace focalfleet::sim {
 
-/// Never more than an answer to each entry of a group, and the end of a motion.
+/// The queue holds at most an answer to each entry of a group, and the end of a motion.
 class TransmitQueue {
  public:
   void Add(const CanFrame& frame) {

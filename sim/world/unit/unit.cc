@@ -4,13 +4,13 @@
 
 namespace focalfleet::sim {
 namespace {
-// Ids come round after 65536 moves; long before that the record starts anew.
+// Ids repeat after 65536 moves; long before that the record starts anew.
 constexpr std::size_t kBegunMax = 32'768;
 
 Firmware::Hardware::Joint JointOf(const Unit::Parts& parts, const Mechanism& mechanism) {
   if (parts.magnets == nullptr) return {};
-  return {parts.description.id, parts.description.sensors, parts.description.carrier_mm, &mechanism,
-          parts.magnets};
+  return {parts.description.id, parts.description.sensors, parts.description.fibre_carrier_mm,
+          &mechanism, parts.magnets};
 }
 }  // namespace
 

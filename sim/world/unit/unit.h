@@ -1,6 +1,6 @@
-// One unit put together: FLASH, firmware, two axes, its mechanism, and what is planted in it. Also
-// keeps the simulation's own record of the moves that were begun, which the firmware does not know
-// of.
+// A complete unit: FLASH, firmware, two axes, its mechanism, and its planted faults. The unit also
+// keeps the simulation's own record of the moves that were begun, to which the firmware has no
+// access.
 #pragma once
 
 #include <memory>
@@ -37,7 +37,7 @@ class Unit {
   [[nodiscard]] UnitFaults& faults() { return faults_; }
   [[nodiscard]] const UnitFaults& faults() const { return faults_; }
   [[nodiscard]] std::uint32_t begun_twice() const { return begun_twice_; }
-  /// Its last motion; kNever: none in this run.
+  /// The begin of its last motion; kNever: none in this run.
   [[nodiscard]] HostInstant began() const { return began_; }
 
  private:
@@ -48,7 +48,7 @@ class Unit {
   std::array<AxisModel, kAxisCount> axis_;
   UnitFaults faults_;
   Firmware firmware_;
-  std::uint32_t recorded_ = 0;        // flash_.moves_begun that is in begun_
+  std::uint32_t recorded_ = 0;        // the part of flash_.moves_begun that is in begun_
   std::vector<std::uint16_t> begun_;  // sorted
   std::uint32_t begun_twice_ = 0;
   HostInstant began_ = kNever;

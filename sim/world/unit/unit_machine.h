@@ -1,24 +1,23 @@
-// The unit's side of the protocol: a state machine driven by (frame, now) and by time alone, and
-// what a firmware starts from. It needs no heap, no exceptions, no library: it compiles
-// freestanding with the codec (a test holds it to that), in less than a KiB of state, with integers
-// only. The simulated units run exactly this code; what is theirs alone (planted faults) is
-// firmware.h.
+// The unit's side of the protocol, and the code that a firmware starts from: a state machine driven
+// by (frame, now) and by time alone. The machine needs no heap, no exceptions and no library. With
+// the codec it compiles freestanding (a test holds it to that), with integers only and less than a
+// KiB of state. The simulated units run exactly this code; firmware.h adds the planted faults.
 //
-// It answers every
-// addressed request with exactly one frame that carries the request's sequence number; it speaks
-// unasked only to say that a motion ended (sequence 0). Its FLASH is written before the first step
-// and after the last.
+// The machine answers every addressed request with exactly one frame, which carries the request's
+// sequence number. Unasked it sends only the end of a motion (sequence 0). FLASH is written before
+// the first step and after the last.
 //
-// What keeps a repeated frame from becoming a second move: the move begun last stands in FLASH, and
-// that id is refused from then on; a repeated request that was granted is granted again without
-// being done again.
+// A repeated frame never becomes a second move. The id of the move begun last stands in FLASH and
+// is refused from then on. A repeated request that was granted is granted again without being done
+// again.
 //
 //   stage_begin, stage_segment...   no answer; a repeated one changes nothing
 //   confirm, arm                    answered by what is held; arm needs the digest of exactly that
-//   start                           begins the armed move `delay_ticks` later, by the unit's own
-//   clock stop                            answered by `done`, whatever the unit was doing
+//   start                           begins the armed move `delay_ticks` later, by its own clock
+//   stop                            answered by `done`, whatever the unit was doing
 //
-// Reads may be broadcast (every unit answers); of the rest only stop, start and clock.
+// Reads may be broadcast, and every unit answers. Stop, start and clock are the only other
+// broadcasts.
 #pragma once
 
 #include <array>
@@ -28,15 +27,17 @@
 #include "protocol/wire/can_frame.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/stage_group.h"
-#include "protocol/wire/staged_move.h"
 #include "sim/world/unit/board.h"
 #include "sim/world/unit/flash.h"
+#include "sim/world/unit/homing.h"
+#include "sim/world/unit/staging.h"
 #include "sim/world/unit/transitions.h"
 #include "sim/world/unit/transmit_queue.h"
 
 namespace focalfleet::sim {
 
-/// An edge of SYNC means a start only so short before its own time; any other is none.
+/// An edge of SYNC starts a move only within this time before its own start. Any other edge is
+/// ignored.
 inline constexpr DurationNs kSyncWindow = Milliseconds(20);
 
 class UnitMachine {
@@ -45,21 +46,21 @@ class UnitMachine {
   UnitMachine(NodeId node, const Board& board, Flash* flash);
 
   void PowerOn(BoardInstant now);
-  /// Nothing is done or said until PowerOn.
+  /// The machine does and sends nothing until PowerOn.
   void PowerOff() { powered_ = false; }
 
   void OnFrame(const CanFrame& frame, BoardInstant now, TransmitQueue* out);
-  /// A CAN FD frame: of a group the unit's own entries, as if each had come alone.
+  /// Takes the unit's own entries of a group, as if each had come alone.
   void OnGroup(const FdFrame& group, BoardInstant now, TransmitQueue* out);
-  /// Does what is due. Pre: now is not before anything told so far.
+  /// Does everything that is due. Pre: now is not before any earlier instant.
   void OnTime(BoardInstant now, TransmitQueue* out);
-  /// An edge of the SYNC line, on boards that have one: a move whose start is due within
+  /// An edge of the SYNC line, on boards that have one. A move whose start is due within
   /// kSyncWindow of the unit's own time begins now. Pre: as OnTime, and OnTime was called.
   void OnSync(BoardInstant now);
-  /// When OnTime is due next; kNever without power.
+  /// The instant at which OnTime is due next; kNever without power.
   [[nodiscard]] BoardInstant deadline() const;
 
-  /// Stops at once and stays in kFault until the fault is cleared.
+  /// The fault that stops the unit at once and holds it in kFault until it is cleared.
   struct Trip {
     FaultCode code = FaultCode::kOverTemperature;
     Axis axis = Axis::kTheta;
@@ -70,71 +71,46 @@ class UnitMachine {
   [[nodiscard]] FaultCode fault() const { return trip_.code; }
   [[nodiscard]] bool powered() const { return powered_; }
   [[nodiscard]] bool interrupted() const;
-  /// Of the motion that runs: when it began, and when this path of it ends.
+  /// True while a motion runs; began_at() is its begin, and end_at() the end of its present path.
   [[nodiscard]] bool runs() const {
     return powered_ && (state_ == UnitState::kMoving || state_ == UnitState::kHoming);
   }
-  [[nodiscard]] BoardInstant began_at() const { return began_at_; }
-  [[nodiscard]] BoardInstant end_at() const { return end_at_; }
+  [[nodiscard]] BoardInstant began_at() const { return motion_.began_at; }
+  [[nodiscard]] BoardInstant end_at() const { return motion_.end_at; }
   [[nodiscard]] std::uint64_t malformed() const { return malformed_; }
 
  private:
-  struct Context {
-    Address address;
-    BoardInstant now;
-    const CanFrame* frame = nullptr;
-    TransmitQueue* out = nullptr;
-    [[nodiscard]] bool broadcast() const { return address.node == kBroadcastNode; }
-  };
-  struct Staged {
-    StageBegin begin;  // move 0: nothing is staged
-    std::array<std::array<Segment, limits::kSegmentsPerAxis>, kAxisCount> segments{};
-    std::array<std::uint16_t, kAxisCount> received{};  // bit per index
-  };
+  class RequestHandler;
+
   struct Granted {  // the last request of its kind that was granted
     bool any = false;
     CanFrame request;
   };
-
-  void On(const Stop& m, const Context& c);
-  void On(const Start& m, const Context& c);
-  void On(const Clock& m, const Context& c);
-  void On(const ClockRequest& m, const Context& c);
-  void On(const Arm& m, const Context& c);
-  void On(const Confirm& m, const Context& c);
-  void On(const StageBegin& m, const Context& c);
-  void On(const StageSegment& m, const Context& c);
-  void On(const Home& m, const Context& c);
-  void On(const ProgressRequest& m, const Context& c);
-  void On(const StatusRequest& m, const Context& c);
-  void On(const VectorRequest& m, const Context& c);
-  void On(const FaultRequest& m, const Context& c);
-  void On(const IdentifyRequest& m, const Context& c);
-  void On(const ParameterRead& m, const Context& c);
-  void On(const ParameterWrite& m, const Context& c);
-  void On(const SensorsRequest& m, const Context& c);
+  struct Restart {
+    bool unnoticed = false;       // powered on since the last request to resume
+    bool reported = false;        // in the answer to the last resume, for its repetition
+    std::uint32_t resume_id = 0;  // identifier of the last resume; 0: another request came since
+  };
+  struct Motion {
+    BoardInstant begin_at = kNever;  // armed: the start signal came
+    BoardInstant began_at;
+    std::uint32_t began_ticks = 0;  // the same by the unit's own clock
+    BoardInstant end_at = kNever;   // moving, homing: the end of the present path
+  };
+  struct SensorReading {
+    std::array<std::uint16_t, limits::kSensorsPerUnit> counts{};
+    bool valid = false;  // taken since the last motion began
+  };
 
   void Enter(UnitState next);
-  void Say(const UnitMessage& message, const Context& c);
-  void SayDone(Outcome outcome, std::uint8_t sequence, TransmitQueue* out);
+  void SayDone(Outcome outcome, TransmitQueue* out);
   void Begin(BoardInstant now);
   void End(BoardInstant now, TransmitQueue* out);
-  /// Both axes halt, FLASH takes what they show, the mark goes (unless an axis is lost).
+  /// Both axes halt, FLASH takes the vectors that they show, and the mark is cleared (unless an
+  /// axis is lost).
   void HaltAndStore(BoardInstant now);
-  void RunHoming(Axis axis, BoardInstant now);
-  void EndHomingAxis(BoardInstant now);
-  void StoreCutHoming(BoardInstant now);
   void LoseHost();
   [[nodiscard]] UnitState AtRest() const;
-  [[nodiscard]] Answer JudgeMove(MoveId move) const;
-  [[nodiscard]] bool PathInRange() const;
-  [[nodiscard]] StagedMove Held() const;
-  [[nodiscard]] std::int32_t Position(Axis axis, BoardInstant now) const;
-  [[nodiscard]] std::int32_t Read(Axis axis, Parameter parameter, BoardInstant now) const;
-  [[nodiscard]] Answer Write(const ParameterWrite& m);
-  [[nodiscard]] Answer WritePosition(Axis axis, std::int32_t value);
-  [[nodiscard]] Answer WriteSubdivision(Axis axis, std::int32_t value);
-  [[nodiscard]] std::uint8_t ProgressPercent(BoardInstant now) const;
 
   NodeId node_;
   Board board_;
@@ -142,23 +118,16 @@ class UnitMachine {
   UnitState state_ = UnitState::kRest;
   bool powered_ = false;
   bool host_lost_ = false;
-  bool restarted_ = false;
-  bool restarted_reported_ = false;  // what the last resume was answered, for its repetition
-  std::uint32_t resume_id_ = 0;      // identifier of the last resume; 0: something else came since
+  Restart restart_;
   Trip trip_{FaultCode::kNone, Axis::kTheta};
   std::uint16_t fault_count_ = 0;
   BoardInstant heard_at_;
-  BoardInstant begin_at_ = kNever;  // armed: the start signal came
-  BoardInstant began_at_;
-  std::uint32_t began_ticks_ = 0;  // the same by the unit's own clock
-  BoardInstant end_at_ = kNever;   // moving, homing: of this path
-  Axis homing_axis_ = Axis::kPhi;
-  std::uint8_t lost_before_homing_ = 0;
-  Staged staged_;
+  Motion motion_;
+  Homing homing_;
+  Staging staging_;
   Granted granted_arm_;
   Granted granted_home_;
-  std::array<std::uint16_t, limits::kSensorsPerUnit> counts_{};  // the last reading
-  bool sensed_ = false;                                          // since the last motion began
+  SensorReading reading_;
   std::uint64_t malformed_ = 0;
 };
 

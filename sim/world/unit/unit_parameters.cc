@@ -1,6 +1,9 @@
+#include "sim/world/unit/unit_parameters.h"
+
+#include <algorithm>
+
 #include "protocol/base/limits.h"
 #include "sim/world/unit/places.h"
-#include "sim/world/unit/unit_machine.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -15,20 +18,58 @@ bool IsPosition(std::int64_t value) {
   return value >= -limits::kPositionMax && value <= limits::kPositionMax;
 }
 
-// To the nearest whole number, halves away from zero. Pre: divisor > 0.
+// The quotient to the nearest whole number, halves away from zero. Pre: divisor > 0.
 std::int64_t RoundedQuotient(std::int64_t number, std::int64_t divisor) {
   const std::int64_t doubled = 2 * (number < 0 ? -number : number) + divisor;
   const std::int64_t quotient = doubled / (2 * divisor);
   return number < 0 ? -quotient : quotient;
 }
 
+// The rotor agrees with the vector that is applied, so only whole turns can be wrong. The place
+// taken is the one nearest to the value that shows this vector.
+Answer WritePosition(const Board& board, Flash* flash, Axis axis, std::int32_t value) {
+  AxisFlash& stored = flash->axis[Index(axis)];
+  if (value < -limits::kPositionMax || value > limits::kPositionMax) return Answer::kBadValue;
+  const std::int32_t place = NearestCongruent(value, stored.position(), stored.subdivision);
+  if (!IsPosition(place)) return Answer::kBadValue;
+  board.recount(board.context, axis, place);
+  stored.set_position(place);
+  flash->lost_axes = static_cast<std::uint8_t>(flash->lost_axes & ~Bit(axis));
+  if (flash->lost_axes == 0) flash->moving = false;
+  return Answer::kOk;
+}
+
+// All places keep their angle; the field goes to the nearest vector of the new division.
+Answer WriteSubdivision(const Board& board, Flash* flash, Axis axis, std::int32_t value) {
+  AxisFlash& stored = flash->axis[Index(axis)];
+  if (value < 6 || value > kSubdivisionMax || value % 6 != 0) return Answer::kBadValue;
+  const auto rescaled = [&](std::int32_t old) {
+    return RoundedQuotient(std::int64_t{old} * value, stored.subdivision);
+  };
+  for (const std::int32_t old :
+       {stored.position(), stored.min_position, stored.max_position, stored.home_position})
+    if (!IsPosition(rescaled(old))) return Answer::kBadValue;
+  const auto position = static_cast<std::int32_t>(rescaled(stored.position()));
+  stored.min_position = static_cast<std::int32_t>(rescaled(stored.min_position));
+  stored.max_position = static_cast<std::int32_t>(rescaled(stored.max_position));
+  stored.home_position = static_cast<std::int32_t>(rescaled(stored.home_position));
+  stored.subdivision = static_cast<std::uint16_t>(value);
+  stored.set_position(position);
+  board.energise(board.context, axis, {position, stored.subdivision});
+  return Answer::kOk;
+}
+
 }  // namespace
 
-// ---- parameters
+std::int32_t AppliedPosition(const Board& board, Axis axis, BoardInstant now) {
+  return std::clamp(board.applied(board.context, axis, now), -limits::kPositionMax,
+                    limits::kPositionMax);
+}
 
-std::int32_t UnitMachine::Read(Axis axis, Parameter parameter, BoardInstant now) const {
-  const AxisFlash& stored = flash_->axis[Index(axis)];
-  switch (parameter) {
+std::int32_t ReadParameter(const Board& board, const Flash& flash, const ParameterRead& m,
+                           BoardInstant now) {
+  const AxisFlash& stored = flash.axis[Index(m.axis)];
+  switch (m.parameter) {
     case Parameter::kCounter1:
       return stored.counter1;
     case Parameter::kRepeat:
@@ -38,7 +79,7 @@ std::int32_t UnitMachine::Read(Axis axis, Parameter parameter, BoardInstant now)
     case Parameter::kMode:
       return static_cast<std::int32_t>(stored.mode);
     case Parameter::kPosition:
-      return Position(axis, now);
+      return AppliedPosition(board, m.axis, now);
     case Parameter::kMinPosition:
       return stored.min_position;
     case Parameter::kMaxPosition:
@@ -46,24 +87,13 @@ std::int32_t UnitMachine::Read(Axis axis, Parameter parameter, BoardInstant now)
     case Parameter::kHomePosition:
       return stored.home_position;
     case Parameter::kHostTimeoutMs:
-      return flash_->host_timeout_ms;
+      return flash.host_timeout_ms;
   }
   return 0;
 }
 
-void UnitMachine::On(const ParameterRead& m, const Context& c) {
-  Say(ParameterReply{false, m.axis, m.parameter, Answer::kOk, Read(m.axis, m.parameter, c.now)}, c);
-}
-
-void UnitMachine::On(const ParameterWrite& m, const Context& c) {
-  if (c.broadcast()) return;
-  const Answer answer = state_ == UnitState::kRest ? Write(m) : Answer::kWrongState;
-  if (answer == Answer::kOk) board_.keep(board_.context);
-  Say(ParameterReply{true, m.axis, m.parameter, answer, Read(m.axis, m.parameter, c.now)}, c);
-}
-
-Answer UnitMachine::Write(const ParameterWrite& m) {
-  AxisFlash& stored = flash_->axis[Index(m.axis)];
+Answer WriteParameter(const Board& board, Flash* flash, const ParameterWrite& m) {
+  AxisFlash& stored = flash->axis[Index(m.axis)];
   const auto within = [&](std::int32_t low, std::int32_t high) {
     return m.value >= low && m.value <= high;
   };
@@ -78,13 +108,13 @@ Answer UnitMachine::Write(const ParameterWrite& m) {
       stored.repeat = static_cast<std::uint8_t>(m.value);
       return Answer::kOk;
     case Parameter::kSubdivision:
-      return WriteSubdivision(m.axis, m.value);
+      return WriteSubdivision(board, flash, m.axis, m.value);
     case Parameter::kMode:
       if (!within(0, 2)) break;
       stored.mode = static_cast<WaveMode>(m.value);
       return Answer::kOk;
     case Parameter::kPosition:
-      return WritePosition(m.axis, m.value);
+      return WritePosition(board, flash, m.axis, m.value);
     case Parameter::kMinPosition:
       if (!place || m.value > stored.max_position) break;
       stored.min_position = m.value;
@@ -99,45 +129,10 @@ Answer UnitMachine::Write(const ParameterWrite& m) {
       return Answer::kOk;
     case Parameter::kHostTimeoutMs:
       if (!within(kHostTimeoutMinMs, kHostTimeoutMaxMs)) break;
-      flash_->host_timeout_ms = m.value;
+      flash->host_timeout_ms = m.value;
       return Answer::kOk;
   }
   return Answer::kBadValue;
-}
-
-// The rotor agrees with the vector that is applied, so only whole turns can be wrong: the place
-// taken is the one nearest to the value that shows this vector.
-Answer UnitMachine::WritePosition(Axis axis, std::int32_t value) {
-  Flash& flash = *flash_;
-  AxisFlash& stored = flash.axis[Index(axis)];
-  if (value < -limits::kPositionMax || value > limits::kPositionMax) return Answer::kBadValue;
-  const std::int32_t place = NearestCongruent(value, stored.position(), stored.subdivision);
-  if (!IsPosition(place)) return Answer::kBadValue;
-  board_.recount(board_.context, axis, place);
-  stored.set_position(place);
-  flash.lost_axes = static_cast<std::uint8_t>(flash.lost_axes & ~Bit(axis));
-  if (flash.lost_axes == 0) flash.moving = false;
-  return Answer::kOk;
-}
-
-// All places keep their angle; the field goes to the nearest vector of the new division.
-Answer UnitMachine::WriteSubdivision(Axis axis, std::int32_t value) {
-  AxisFlash& stored = flash_->axis[Index(axis)];
-  if (value < 6 || value > kSubdivisionMax || value % 6 != 0) return Answer::kBadValue;
-  const auto rescaled = [&](std::int32_t old) {
-    return RoundedQuotient(std::int64_t{old} * value, stored.subdivision);
-  };
-  for (const std::int32_t old :
-       {stored.position(), stored.min_position, stored.max_position, stored.home_position})
-    if (!IsPosition(rescaled(old))) return Answer::kBadValue;
-  const auto position = static_cast<std::int32_t>(rescaled(stored.position()));
-  stored.min_position = static_cast<std::int32_t>(rescaled(stored.min_position));
-  stored.max_position = static_cast<std::int32_t>(rescaled(stored.max_position));
-  stored.home_position = static_cast<std::int32_t>(rescaled(stored.home_position));
-  stored.subdivision = static_cast<std::uint16_t>(value);
-  stored.set_position(position);
-  board_.energise(board_.context, axis, {position, stored.subdivision});
-  return Answer::kOk;
 }
 
 }  // namespace focalfleet::sim

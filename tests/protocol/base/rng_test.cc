@@ -9,8 +9,8 @@
 namespace focalfleet {
 namespace {
 
-// xoshiro256** and splitmix64 as their authors' C programs have them, another time, checked against
-// their published outputs; then the class under test against these.
+// A second implementation of xoshiro256** and splitmix64, after their authors' C programs. This
+// implementation is checked against their published outputs, and the class under test against it.
 struct Xoshiro {
   std::array<std::uint64_t, 4> s;
   std::uint64_t Next() {
@@ -58,8 +58,8 @@ TEST(Rng, IsXoshiroSeededBySplitMix) {
   }
 }
 
-// Stored numbers: a stored configuration, a scenario's seed and a bug report all rest on them. They
-// came from gcc 12 and clang 14 alike.
+// These stored numbers must never change: a stored configuration, a scenario's seed and a bug
+// report all rest on them. They came from gcc 12 and clang 14 alike.
 TEST(Rng, StreamsGiveTheStoredNumbers) {
   Rng rng = Rng::Stream(1, "targets", 0);
   EXPECT_EQ(rng.Bits(), 16874408451438560316ull);
@@ -77,12 +77,12 @@ TEST(Rng, StreamsOfDifferentKeysDiffer) {
 }
 
 TEST(Rng, BelowHasNoModuloBias) {
-  // Of n = 3 * 2^62, a plain remainder of 64 bits gives the lowest third half of all draws.
+  // For n = 3 * 2^62, a plain remainder of 64 bits would give the lowest third half of all draws.
   Rng rng(3);
   const std::uint64_t third = 1ull << 62;
   std::array<int, 3> count{};
   for (int i = 0; i < 30'000; ++i) ++count[rng.Below(3 * third) / third];
-  // 10000 +- 82 (one sigma) each; six sigma.
+  // The expected count is 10000 +- 82 (one sigma); the bounds are six sigma.
   for (const int c : count) EXPECT_NEAR(c, 10'000, 500);
 }
 

@@ -1,5 +1,5 @@
-// random_frames [COUNT [SEED]]: random frames of every kind, and some spoilt ones, each on a line
-// with what the codec takes it for: for other programs to be compared with.
+// random_frames [COUNT [SEED]] prints random frames of every kind, and some spoilt ones. Each
+// stands on a line with the codec's decoding of it, for other programs to be compared with.
 //   08295287#FFFFFF0201003412 done node=42 sequence=81 outcome=7 ...
 //   08295287#FFFFFF02010034 malformed length
 #include <cstdio>

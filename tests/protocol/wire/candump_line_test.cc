@@ -14,7 +14,7 @@ CanFrame Frame(std::uint32_t id, const std::vector<std::uint8_t>& data) {
   return frame;
 }
 
-// Lines as candump 2020.11 printed them.
+// The lines are as candump 2020.11 printed them.
 TEST(CandumpLine, ReadsBothFormsOfCandump) {
   struct Case {
     const char* line;
@@ -33,14 +33,14 @@ TEST(CandumpLine, ReadsBothFormsOfCandump) {
       {"  vcan0  TX - -  04007F80   [2]  41 42   'AB'", "", Frame(0x04007F80, {0x41, 0x42})},
       {"  vcan0  RX B E  04007F80   [1]  41\r", "", Frame(0x04007F80, {0x41})},
       {"  vcan0  04007F80   [3]  41 20 60   'A `'", "", Frame(0x04007F80, {0x41, 0x20, 0x60})},
-      // -S, -i, both; and with the letters of -a.
+      // Options -S, -i and both, with the letters of -a.
       {"  vcan0  04007F80   [3]  03`02`01", "", Frame(0x04007F80, {1, 2, 3})},
       {"  vcan0  04007F80   [3]  43`42`41                `CBA`", "",
        Frame(0x04007F80, {0x41, 0x42, 0x43})},
       {"  vcan0  04007F80   [1]  41                      `A`", "", Frame(0x04007F80, {0x41})},
       {"  vcan0  04007F80   [2]  00000001 10101011", "", Frame(0x04007F80, {1, 0xAB})},
       {"  vcan0  04007F80   [2]  10101011`00000001", "", Frame(0x04007F80, {1, 0xAB})},
-      // -8: eight bytes with another length code.
+      // Option -8: eight bytes with another length code.
       {"  vcan0  04007F80   {B}  01 02 03 04 05 06 07 08", "",
        Frame(0x04007F80, {1, 2, 3, 4, 5, 6, 7, 8})},
       {"(1.000000) vcan0 04007F80#0102030405060708_B", "1.000000",

@@ -39,7 +39,7 @@ Address RandomAddress(Rng& rng, bool from_unit) {
   return {{node}, static_cast<std::uint8_t>(rng.Below(256))};
 }
 
-// Whatever a frame decodes to, it is the only frame that says so.
+// The frame that a message encodes to is the only one that decodes to it.
 void ExpectInjective(const CanFrame& frame) {
   if (const auto host = DecodeHost(frame)) {
     const CanFrame again = Encode(host->message, host->address);
@@ -117,7 +117,7 @@ TEST(Codec, EveryNodeAndSequenceNumberComesBack) {
   }
 }
 
-// The bytes as docs/protocol.md has them, worked out by hand.
+// The bytes of docs/protocol.md, worked out by hand.
 struct Golden {
   const char* candump;
   CanFrame frame;
@@ -225,7 +225,7 @@ TEST(Codec, EveryIdentifierWithAnyBytesDecodesToOneFrameOrNone) {
               prefix << 19 | static_cast<std::uint32_t>(rng.Below(1u << 16)) << 3 | detail,
               length,
               {}};
-          // Small bytes: enumerators and counts get past their checks often enough.
+          // Small bytes let enumerators and counts pass their checks often enough.
           for (auto& byte : frame.data)
             byte = static_cast<std::uint8_t>(rng.Below(draw % 2 == 0 ? 4 : 256));
           ExpectInjective(frame);
@@ -237,7 +237,7 @@ TEST(Codec, EveryIdentifierWithAnyBytesDecodesToOneFrameOrNone) {
   EXPECT_GT(decoded, 200);
 }
 
-// One malformation at a time, each with its own name.
+// Each frame is malformed in a single way, and each malformation has its own name.
 TEST(Codec, EachBrokenRuleIsNamed) {
   const Address unit{{3}, 9};
   const CanFrame confirm = Encode(HostMessage{Confirm{{7}}}, unit);
@@ -271,7 +271,7 @@ TEST(Codec, EachBrokenRuleIsNamed) {
   EXPECT_EQ(unit_error(status), Malformed::kValue);
 }
 
-// Every enumerator byte over its whole domain: exactly the documented values are taken.
+// Every enumerator byte takes all values: exactly the documented ones are accepted.
 TEST(Codec, EnumeratorsAreCheckedOverAll256Values) {
   struct Field {
     CanFrame frame;
@@ -313,7 +313,7 @@ TEST(Codec, EnumeratorsAreCheckedOverAll256Values) {
 }
 
 TEST(Codec, DetailBitsAreCheckedForEveryFunction) {
-  // Highest detail that each function takes, by direction; -1: no such message.
+  // The highest detail that each function takes, by direction; -1: no such message.
   const int host_max[kFunctionCount] = {0, 0, -1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 1, 0, 1, 1, -1, 3};
   const int unit_max[kFunctionCount] = {-1, -1, 3, 0, 0, -1, -1, 0, 0, 6, 0, 1, 0, 0, 1, 1, -1, 3};
   for (std::uint32_t f = 0; f < kFunctionCount; ++f) {
@@ -382,7 +382,7 @@ TEST(Codec, UsesNoHeap) {
 TEST(AllocGuard, CountsWhatItShouldForbid) {
   const testing::AllocGuard guard;
   int* volatile number =
-      new int(3);  // volatile: an optimiser may leave a pair out that nobody sees
+      new int(3);  // volatile: an optimiser may remove an allocation without effect
   delete number;
   EXPECT_GE(guard.allocations(), 1u);
 }

@@ -13,8 +13,8 @@
 namespace focalfleet {
 namespace {
 
-// The oracle: a frame as a string of '0' and '1', by the field list of ISO 11898-1, the check
-// sequence by long division and the stuffing by looking at the string.
+// The oracle writes a frame as a string of '0' and '1', by the field list of ISO 11898-1. The check
+// sequence comes from long division, and the stuffing from the string.
 std::string Binary(std::uint32_t value, int count) {
   std::string text;
   for (int i = count - 1; i >= 0; --i) text += (value >> i & 1) != 0 ? '1' : '0';
@@ -45,6 +45,13 @@ std::string BeforeCrc(const CanFrame& frame) {
   std::string bits = "0" + Binary(frame.id >> 18, 11) + "11" + Binary(frame.id, 18) + "000" +
                      Binary(frame.length, 4);
   for (const std::uint8_t byte : frame.payload()) bits += Binary(byte, 8);
+  return bits;
+}
+
+std::string WithoutStuffing(const FrameLevels& levels) {
+  std::string bits;
+  for (std::uint32_t i = 0; i < levels.bits; ++i)
+    if (!levels.stuff[i]) bits += levels.recessive[i] ? '1' : '0';
   return bits;
 }
 
@@ -83,7 +90,9 @@ TEST(FrameBits, EqualsTheLengthOfTheFrameWrittenOut) {
   for (int i = 0; i < 20'000; ++i) {
     const CanFrame frame = RandomFrame(rng);
     ASSERT_EQ(FrameBits(frame), OracleBits(frame)) << std::hex << frame.id;
-    ASSERT_EQ(Binary(FrameCrc(frame), 15), CrcByDivision(BeforeCrc(frame))) << std::hex << frame.id;
+    const std::string before_crc = BeforeCrc(frame);
+    ASSERT_EQ(WithoutStuffing(LevelsOf(frame)), before_crc + CrcByDivision(before_crc))
+        << std::hex << frame.id;
   }
 }
 
@@ -109,7 +118,7 @@ TEST(FrameBits, StaysWithinTheKnownBounds) {
   static_assert(kFrameBitsMax == 54 + 64 + 13 + (54 + 64 - 1) / 4);
 }
 
-// The same for CAN FD: what is stuffed by looking at the string, the rest by counting its fields.
+// The same for CAN FD: the stuffed part comes from the string, the rest from counting its fields.
 FdFrameBits OracleBits(const FdFrame& frame) {
   const std::string nominal = "0" + Binary(frame.id >> 18, 11) + "11" + Binary(frame.id, 18) +
                               "0"
@@ -120,7 +129,7 @@ FdFrameBits OracleBits(const FdFrame& frame) {
   std::string all =
       nominal + "0" + Binary(static_cast<std::uint32_t>(code - kFdLengths.begin()), 4);
   for (const std::uint8_t byte : frame.payload()) all += Binary(byte, 8);
-  // Nothing is stuffed behind the last bit, where the fixed stuff bits begin.
+  // No stuff bit follows the last bit, where the fixed stuff bits begin.
   const std::string wire = Stuffed(all.substr(0, all.size() - 1)) + all.back();
   const std::string start = Stuffed(nominal);
   const std::uint32_t fixed = frame.length > 16 ? 4 + 21 + 7 : 4 + 17 + 6;
@@ -158,9 +167,10 @@ TEST(FrameBits, NoGroupIsLongerThanTheLongest) {
     ASSERT_EQ(bits.nominal, kGroupBitsMax.nominal);
     ASSERT_LE(bits.data, kGroupBitsMax.data);
   }
-  // ESI, DLC, data; a stuff bit before each fifth; stuff count, CRC, fixed stuff bits, delimiter.
+  // ESI, DLC and data; a stuff bit before each fifth bit; stuff count, CRC, fixed stuff bits,
+  // delimiter.
   static_assert(kGroupBitsMax.data == 1 + 4 + 512 + 516 / 4 + 4 + 21 + 7 + 1);
-  // The pattern that is stuffed most: four equal bits again and again.
+  // The pattern with the most stuff bits: four equal bits again and again.
   FdFrame worst{.id = kGroupId, .length = 64, .data = {}};
   worst.data.fill(0x87);
   EXPECT_GE(FrameBits(worst).data, kGroupBitsMax.data - 1);

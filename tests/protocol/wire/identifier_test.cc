@@ -22,14 +22,14 @@ TEST(Identifier, TableNumbersEqualTheirIndex) {
   }
 }
 
-// A written-down promise: firmware in the field is built on these numbers.
+// Firmware in the field is built on these numbers, so they must not change.
 TEST(Identifier, PrioritiesAreAsDocumented) {
   const int priorities[kFunctionCount] = {0, 1, 2, 2, 3, 4, 4, 4, 4, 5, 5, 5, 5, 6, 6, 6, 4, 5};
   for (std::uint32_t i = 0; i < kFunctionCount; ++i)
     EXPECT_EQ(kFunctions[i].priority, priorities[i]) << kFunctions[i].name;
 }
 
-// docs/adr/0009: a boot loader may have them one day.
+// docs/adr/0009 reserves these functions for a boot loader.
 TEST(Identifier, ThoseForUpdatesOfFirmwareAreFree) {
   for (const FunctionRow& row : kFunctions) {
     EXPECT_LT(row.priority, 7) << row.name;
@@ -75,11 +75,11 @@ TEST(Identifier, ABroadcastStopWinsAgainstAllButStopsOfSingleUnits) {
   }
 }
 
-// A controller may send its lowest waiting identifier first, whatever came first.
+// A controller may send its lowest waiting identifier first, in whatever order the frames came.
 TEST(Identifier, AnUploadsFramesKeepTheirOrderUnderArbitration) {
   for (unsigned i = 0; i < 256; ++i) {
     const Address first{{9}, static_cast<std::uint8_t>(i)};
-    const Address next{{9}, static_cast<std::uint8_t>(i + 1)};  // wraps: 0 follows 255
+    const Address next{{9}, static_cast<std::uint8_t>(i + 1)};  // after 255 follows 0
     const std::uint32_t begin = Encode(HostMessage{StageBegin{{1}, {}, {}}}, first).id;
     const std::uint32_t segment = Encode(HostMessage{StageSegment{}}, next).id;
     EXPECT_LT(begin, segment);

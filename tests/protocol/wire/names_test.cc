@@ -10,7 +10,7 @@
 namespace focalfleet {
 namespace {
 
-// Names go into files, rows and answers: each enumerator has its own, in lower case with
+// Names go into files, rows and answers. Each enumerator therefore has its own, in lower case with
 // underscores.
 template <class Enumeration>
 void ExpectGoodNames(std::uint32_t count) {

@@ -22,7 +22,7 @@ CanFrame Groupable(Rng& rng) {
 }
 
 TEST(StageGroup, IsTheBytesOfThePage) {
-  // docs/protocol.md, "CAN FD": worked out by hand.
+  // The example of docs/protocol.md, "CAN FD", worked out by hand.
   const CanFrame begin =
       Encode(StageBegin{MoveId{0x0201}, {1, 2}, WaveMode::kFiveSegment}, {NodeId{7}, 0});
   const CanFrame confirm = Encode(Confirm{MoveId{0x0201}}, {NodeId{7}, 9});
@@ -51,7 +51,7 @@ TEST(StageGroup, GivesBackWhatWasPutIn) {
     ASSERT_TRUE(entries.has_value()) << Name(entries.error());
     ASSERT_EQ(entries->count, taken);
     for (std::size_t i = 0; i < taken; ++i) ASSERT_EQ(entries->frame[i], frames[i]) << i;
-    // The next one would not have fitted.
+    // The next frame would not have fitted.
     std::size_t size = 0;
     for (std::size_t i = 0; i < taken; ++i) size += GroupedSize(frames[i]);
     if (taken < frames.size()) {
@@ -113,7 +113,7 @@ TEST(StageGroup, DropsTheWholeGroupForOneWrongByte) {
   EXPECT_STREQ(broken([](FdFrame& f) { f.data[2] = 4 << 3; }), Name(Malformed::kFunction));
   EXPECT_STREQ(broken([](FdFrame& f) { f.data[15] = 0; }), Name(Malformed::kReserved));
   EXPECT_STREQ(broken([](FdFrame& f) { f.data[8] = 0xff; }), Name(Malformed::kReserved));
-  // Filled up farther than it needs.
+  // The data are longer than the entries need.
   EXPECT_STREQ(broken([](FdFrame& f) {
                  f.length = 20;
                  for (std::size_t i = 16; i < 20; ++i) f.data[i] = 0xff;
@@ -121,7 +121,7 @@ TEST(StageGroup, DropsTheWholeGroupForOneWrongByte) {
                Name(Malformed::kLength));
 }
 
-// Well formed as a group, but one entry is no message: nobody gets any of it.
+// The group is well formed, but one entry is no message: no unit takes any of it.
 TEST(StageGroup, AnEntryThatNoUnitWouldTakeDropsItAll) {
   const std::vector<CanFrame> frames{Encode(StageBegin{MoveId{1}, {1, 1}, {}}, {NodeId{1}, 0}),
                                      Encode(Confirm{MoveId{1}}, {NodeId{2}, 5})};

@@ -11,8 +11,8 @@
 namespace focalfleet {
 namespace {
 
-// CRC-32 (IEEE 802.3) bit by bit, most significant bit first on reflected bytes: another derivation
-// than the table-driven one under test.
+// CRC-32 (IEEE 802.3) bit by bit, most significant bit first on reflected bytes. The derivation
+// differs from the table-driven one under test.
 std::uint32_t Reflected(std::uint32_t value, int count) {
   std::uint32_t out = 0;
   for (int i = 0; i < count; ++i) out |= (value >> i & 1) << (count - 1 - i);

@@ -1,4 +1,4 @@
-// The motor of all benches: finding its pull-in speed takes an integration, so it is made once.
+// The motor of all benches. Its pull-in speed comes from an integration, so it is made once.
 #pragma once
 
 #include "sim/world/axis/motor.h"

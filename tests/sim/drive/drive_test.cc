@@ -1,5 +1,5 @@
-// The drive against closed forms, against an integration in small steps with a bridge of its own,
-// and against its own balance of energy.
+// The drive against closed forms, against an integration in small steps with its own bridge, and
+// against its own balance of energy.
 #include "sim/drive/drive.h"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ Drive::Setting Setting(const Bridge& bridge, const char* set = "9") {
   return {*FindParameterSet(set), {}, bridge};
 }
 
-// A rotor that nothing moves.
+// A rotor that stays at rest under any torque.
 Drive::Setting Blocked(const Bridge& bridge) {
   Drive::Setting setting = Setting(bridge);
   setting.motor.load_Nm = 1;
@@ -32,8 +32,8 @@ Drive::Setting Blocked(const Bridge& bridge) {
 }
 
 TEST(Drive, PeakOfABlockedMotorIsThePeriodicOneOfItsLongestPulse) {
-  // i = 2 V / (3 r) (1 - e^(-on / tau)) / (1 - e^(-T / tau)): vector 100 alone, sin 60 of the
-  // period.
+  // The expected current is i = 2 V / (3 r) (1 - e^(-on / tau)) / (1 - e^(-T / tau)). Vector 100
+  // alone is on for sin 60 of the period.
   for (const int counter1 : {250, 500, 1000, 2000}) {
     const Modulation modulation{.counter1 = counter1, .repeat = 40, .subdivision = 6};
     const auto setting = Blocked(kIdeal9V);
@@ -50,8 +50,8 @@ TEST(Drive, PeakOfABlockedMotorIsThePeriodicOneOfItsLongestPulse) {
 }
 
 TEST(Drive, PeaksAreThoseOfTheIndependentCalculation) {
-  // Blocked and turning at 375 Hz, set 9 at its worst load, asymmetric (an independent PWM-resolved
-  // calculation; figures to three digits).
+  // The figures are for a blocked motor and one at 375 Hz, set 9 at its worst load, asymmetric.
+  // They come from an independent PWM-resolved calculation and have three digits.
   const int counter1[] = {250, 500, 1000, 2000};
   const double turning_mA[] = {335, 352, 372, 392};
   const double blocked_mA[] = {359, 376, 392, 402};
@@ -99,7 +99,7 @@ TEST(Drive, EnergyIsAccountedForWhateverTheSetting) {
   }
 }
 
-// ---- the same circuit in small steps, each phase for itself; no dead time
+// ---- the same circuit in small steps, each phase by itself; no dead time
 
 struct SmallSteps {
   std::vector<double> current_a_A;  // at the end of each carrier period
@@ -170,8 +170,8 @@ TEST(Drive, CurrentsAreThoseOfAnIntegrationInSmallSteps) {
 }
 
 TEST(Drive, DeadTimeTakesVoltageFromAPulseAndGivesItToItsFall) {
-  // A blocked rotor and one leg that pulses: current flows out of it, so its rise waits and its
-  // fall does not; the two others stay low.
+  // The rotor is blocked and one leg pulses. Current flows out of that leg, so its rise waits and
+  // its fall does not; the two others stay low.
   const Modulation modulation{.repeat = 40, .subdivision = 6};
   const auto mean = [&](double dead_s) {
     Bridge bridge = kIdeal9V;
@@ -189,7 +189,7 @@ TEST(Drive, DeadTimeTakesVoltageFromAPulseAndGivesItToItsFall) {
 }
 
 TEST(Drive, CurrentThatDiesInADiodeLeavesTheLegFloating) {
-  // Short pulses against a long dead time: the current ends within it and must not turn round.
+  // Pulses are short against a long dead time: the current ends within it and must not reverse.
   Bridge bridge = kIdeal9V;
   bridge.dead_time_s = 12e-6;
   const Modulation modulation{.counter1 = 4000};

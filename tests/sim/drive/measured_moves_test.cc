@@ -1,5 +1,6 @@
-// The law of the scatter against a positioner on a bench: arcs of 30 deg of theta and 15 deg of
-// phi, there and back, from its hard stop (DESI 4852, May 2023). Only where the data are.
+// The law of the scatter against a positioner on a bench (DESI 4852, May 2023). The moves are arcs
+// of 30 deg of theta and 15 deg of phi, there and back, from its hard stop. The test runs only
+// where the data exist.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -26,7 +27,7 @@ std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
-/// Moves by arc, in order; rows that were not seen are left out.
+/// Moves by arc, in order; rows without a measured place are left out.
 std::map<int, std::vector<Row>> Arcs(const std::string& folder) {
   std::ifstream file(FOCALFLEET_MEASURED_MOVES "/" + folder + "/moves.csv");
   EXPECT_TRUE(file.good()) << folder;
@@ -47,7 +48,7 @@ std::map<int, std::vector<Row>> Arcs(const std::string& folder) {
   return arcs;
 }
 
-/// Centre of the circle that fits best (linear least squares in x^2 + y^2).
+/// The centre of the circle that fits best (linear least squares in x^2 + y^2).
 std::complex<double> CentreOf(const std::vector<std::complex<double>>& points) {
   double m[3][4] = {};
   for (const auto& p : points) {
@@ -70,8 +71,8 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Whether the moves that end at `first` .. `last` go one way, and those before and after them,
-/// too: the first after a reversal and the last before it have play and the hard stop in them.
+/// True where the moves that end at `first` .. `last` go one way, and those before and after them,
+/// too. The first move after a reversal and the last before it contain play and the hard stop.
 bool AreInTheMiddle(const std::vector<double>& commanded, std::size_t first, std::size_t last) {
   if (first < 2 || last + 1 >= commanded.size()) return false;
   const bool up = commanded[first] > commanded[first - 1];
@@ -80,8 +81,8 @@ bool AreInTheMiddle(const std::vector<double>& commanded, std::size_t first, std
   return true;
 }
 
-/// Standard deviation, over the arcs, of how far one and the same way of `moves` moves goes; the
-/// median over all ways in the middle of the arcs. Units: degrees.
+/// The standard deviation, over the arcs, of the distance that the same `moves` moves go. The
+/// result is the median over all such ways in the middle of the arcs. Units: degrees.
 double ScatterOfAWay(const std::string& folder, const std::string& axis, std::size_t moves = 1) {
   std::map<std::pair<int, int>, std::vector<double>> ways;
   for (const auto& [arc, rows] : Arcs(folder)) {
@@ -122,9 +123,9 @@ double LawDeg(double scatter_deg, double way_deg) {
 }
 
 TEST(MeasuredMoves, ScatterAsTheLawHasItForShortMoves) {
-  // Centroids scatter by 1 um and more and are in the measured figure twice; the arms are 3 mm
-  // long, stretched out 6 mm. One unit and a median of twenty spreads of 7 or 14 arcs: to a
-  // quarter.
+  // Centroids scatter by 1 um and more, and are in the measured figure twice. The arms are 3 mm
+  // long, stretched out 6 mm. The data are from a single unit, as a median of twenty spreads of 7
+  // or 14 arcs, so the comparison holds to a quarter.
   const auto seen_as = [](double way_deg, double radius_mm) {
     const double noise_deg = std::sqrt(2.0) * 1e-3 / radius_mm * 180 / std::numbers::pi;
     return std::hypot(LawDeg(0.1, way_deg), noise_deg);
@@ -135,14 +136,14 @@ TEST(MeasuredMoves, ScatterAsTheLawHasItForShortMoves) {
               theta, seen_as(30, 6), phi, seen_as(15, 3));
   EXPECT_NEAR(theta / seen_as(30, 6), 1, 0.25);
   EXPECT_NEAR(phi / seen_as(15, 3), 1, 0.25);
-  // A scatter that is drawn anew by every move, however short, it is not.
+  // The scatter is not one that every move, however short, draws anew.
   EXPECT_LT(theta, 0.5 * std::sqrt(2.0) * 0.09);
   EXPECT_LT(phi, 0.5 * std::sqrt(2.0) * 0.09);
 }
 
 TEST(MeasuredMoves, LongerWaysScatterMoreInPhiAndNeverMoreThanTwiceTheLaw) {
-  // One unit. Its phi grows somewhat faster than the law, its theta stays what it is after 30 deg:
-  // the law stands between the two, and at no length is a way half as good as it says.
+  // The unit's phi grows somewhat faster than the law, and its theta stays the same after 30 deg.
+  // The law stands between the two. At no length is the measured scatter twice that of the law.
   std::vector<double> phi;
   for (const std::size_t moves : {1u, 2u, 3u, 4u, 5u, 6u}) {
     const double way_deg = 15.0 * static_cast<double>(moves);
@@ -153,7 +154,7 @@ TEST(MeasuredMoves, LongerWaysScatterMoreInPhiAndNeverMoreThanTwiceTheLaw) {
     EXPECT_LT(phi.back(), 2 * LawDeg(0.1, way_deg));
     EXPECT_LT(theta, 2 * LawDeg(0.1, 2 * way_deg));
   }
-  EXPECT_GT(phi[5], 2 * phi[0]);  // and not the same for every length, either
+  EXPECT_GT(phi[5], 2 * phi[0]);  // the scatter is not the same for every length, either
 }
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(StartStudy, ALoadBeyondStallNeverStarts) {
 
 TEST(StartStudy, TheLoadIsFoundAgainFromTheCriticalRepeat) {
   const auto setting = Ideal(*FindParameterSet("9"), 1.8);
-  // Between 36 and 37 lies 1 % of load.
+  // Between 36 and 37 lies 1 % of the load.
   EXPECT_NEAR(LoadOfCriticalRepeat(setting, {}, 37) / setting.motor.load_Nm, 1, 0.02);
 }
 
@@ -104,7 +104,7 @@ TEST(Profile, AddsUpAndMirrors) {
 // ---- the reduced drive against PWM level
 
 struct Compared {
-  double angle_deg = 0;  // largest difference of the rotor, electrical
+  double angle_deg = 0;  // of the rotor, electrical; the largest difference
   double power = 0;      // of the mean supply power, relative
 };
 
@@ -137,7 +137,8 @@ TEST(ReducedDrive, FollowsTheDriveAtPwmLevel) {
         kParameterSets[rng.Below(5)].motor, {}, {.v_bus_V = rng.Uniform(1.7, 9.2)}};
     Modulation modulation{.subdivision = 12 << rng.Below(4),
                           .mode = static_cast<WaveMode>(rng.Below(3))};
-    // Comfortably above critical: near it a hair decides, and the two may differ.
+    // n is well above critical: near it the outcome depends on tiny differences, and the levels may
+    // differ.
     const int critical = CriticalRepeat(setting, {}, {}, DriveLevel::kReduced).value_or(100);
     modulation.repeat = critical * 96 * 3 / 2 / modulation.subdivision;
     const Compared compared = Compare(setting, modulation, 12);
@@ -162,7 +163,8 @@ TEST(ReducedDrive, FollowsTheDriveUpAndDownARamp) {
     Modulation modulation{.mode = static_cast<WaveMode>(rng.Below(3))};
     const Ramp ramp{.stages = static_cast<int>(2 + rng.Below(7)),
                     .stage_s = rng.Uniform(5e-3, 20e-3)};
-    // Comfortably above what the ramp starts, and for most below what starts without it.
+    // n is well above the one that starts with the ramp, and for most below the one that starts
+    // without it.
     const int critical =
         CriticalRepeat(setting, modulation, {.ramp = ramp}, DriveLevel::kReduced).value_or(100);
     modulation.repeat = critical * 5 / 4 + 1;

@@ -12,7 +12,7 @@ namespace {
 constexpr WaveMode kModes[] = {WaveMode::kAsymmetric, WaveMode::kFiveSegment,
                                WaveMode::kSevenSegment};
 
-// Mean voltage of a carrier period in the plane, in units of the bus voltage.
+// The mean voltage of a carrier period in the plane. Units: the bus voltage.
 std::complex<double> MeanVector(const Pattern& pattern, double period) {
   std::complex<double> sum;
   for (std::size_t leg = 0; leg < kLegCount; ++leg) {

@@ -10,7 +10,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// `torque` in intervals of `step_s`, each with its exact impulse and moment (Gauss, three points).
+// Feeds `torque` in intervals of `step_s`, each with its exact impulse and moment (Gauss, three
+// points).
 void Feed(TorqueRipple* ripple, const std::function<double(double)>& torque, double step_s,
           int steps) {
   const double x = std::sqrt(0.6);
@@ -31,7 +32,7 @@ TEST(TorqueRipple, OfASinusoidIsItLessWhatTheWindowTakes) {
   constexpr double kPeriod_s = 16e-6;
   constexpr double kShare = 0.25;
   TorqueRipple ripple(kShare * kPeriod_s);
-  // 17 steps a window: windows do not begin where steps do.
+  // A window has 17 steps, so windows do not begin where steps do.
   Feed(
       &ripple, [](double t) { return 3 + 2 * std::sin(2 * std::numbers::pi * t / kPeriod_s); },
       kPeriod_s / 68.5, 20 * 137 / 2);
@@ -43,7 +44,8 @@ TEST(TorqueRipple, OfASinusoidIsItLessWhatTheWindowTakes) {
 }
 
 TEST(TorqueRipple, PeaksLieWhereverTheyAreNotWhereWindowsBegin) {
-  // One window high, between two borders of windows: means over windows would see half of it.
+  // The pulse is a window long and lies between two borders of windows: means over windows would
+  // see half of it.
   TorqueRipple ripple(1e-6);
   Feed(
       &ripple, [](double t) { return t > 2.5e-6 && t < 3.5e-6 ? 2.0 : 1.0; }, 0.5e-6, 12);
@@ -51,7 +53,8 @@ TEST(TorqueRipple, PeaksLieWhereverTheyAreNotWhereWindowsBegin) {
 }
 
 TEST(TorqueRipple, LongIntervalsKeepTheirSlope) {
-  // Sawtooth of the winding's charging, one interval a tooth: its mean over one is constant.
+  // The winding's charging is a sawtooth, with an interval for each tooth: its mean over a tooth is
+  // constant.
   TorqueRipple ripple(1e-6);
   Feed(
       &ripple, [](double t) { return 1 + std::fmod(t, 1e-6) / 1e-6; }, 1e-6, 8);

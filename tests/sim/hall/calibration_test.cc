@@ -1,5 +1,5 @@
-// Sensors calibrated from poses, against a plant of its own: numbers within their standard
-// deviations, and sensors that cannot be calibrated said.
+// Sensors are calibrated from poses of an independent plant. Numbers lie within their standard
+// deviations, and sensors that cannot be calibrated are reported.
 #include "sim/hall/diagnosis/calibration.h"
 
 #include <gmock/gmock.h>
@@ -33,7 +33,8 @@ std::vector<SensorFit> Calibrated(const HallCampaign& campaign) {
   return CalibrateSensors(campaign, {}, *MakeField(SurfaceParameters{.amplitude_T = kAmplitude_T}));
 }
 
-// What was planted lies within the standard deviations told, and these are no larger than needed.
+// The planted numbers lie within the reported standard deviations, and these are no larger than
+// needed.
 TEST(HallCalibration, NumbersLieWithinTheirDeviations) {
   double squares = 0, count = 0;
   for (std::uint64_t seed = 0; seed < 12; ++seed) {

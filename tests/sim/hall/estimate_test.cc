@@ -1,5 +1,5 @@
-// Sensors that lie are found and named, or it is said that they cannot be told; noise and
-// covariance are those of the data.
+// Faulty sensors are found and named, or the estimate says that they cannot be distinguished. Noise
+// and covariance are those of the data.
 #include "sim/hall/estimate.h"
 
 #include <gmock/gmock.h>
@@ -98,7 +98,7 @@ TEST(Estimate, SwappedSensorsAreNamedAndExchanged) {
   }
 }
 
-// The mirror image of 3 and 4 exchanged is 5 and 6 exchanged, and another one's 1 and 2.
+// The mirror image of 3 and 4 exchanged is 5 and 6 exchanged; another pair's is 1 and 2.
 TEST(Estimate, SwapsThatAMirrorCannotTellAreSaidToBeSo) {
   Table table = Drawn(40);
   for (VoltageRow& row : table.rows) std::swap(row.voltages_V[2], row.voltages_V[3]);

@@ -1,4 +1,5 @@
-// Where a fibre carrier's tip is at an orientation, and what its joint's sensors show there.
+// The tip of a ball-jointed fibre carrier at an orientation, and the readings of its joint's
+// sensors.
 #include "sim/hall/fibre_carrier.h"
 
 #include <gtest/gtest.h>
@@ -34,13 +35,13 @@ TEST(FibreCarrier, TheTipIsWhereTheRotorsAxisPoints) {
   }
 }
 
-// Drawn orientations scatter their tips as the covariance says.
+// The tips of drawn orientations scatter as the covariance says.
 TEST(FibreCarrier, TheTipsCovarianceIsThatOfDrawnOrientations) {
   const auto seed = TestSeed(2);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const Orientation at{0.5, -0.4, 0.1};
-  // L L^T of a lower triangle: correlated angles.
+  // L L^T of a lower triangle gives correlated angles.
   const double a = 1e-4, b = 6e-5, c = 1.2e-4;
   Covariance covariance{};
   covariance[0] = {a * a, a * b, 0};
@@ -74,8 +75,8 @@ class FibreCarrierReading : public ::testing::Test {
   }
 };
 
-// From counts back to the tip: a model fitted to the magnets' map, readings with noise; the errors
-// are those that the covariance says.
+// From counts back to the tip: a model is fitted to the magnets' map, and the readings have noise.
+// The errors are those that the covariance says.
 TEST_F(FibreCarrierReading, GivesTheTipWithinItsCovariance) {
   const auto seed = TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
@@ -111,7 +112,7 @@ TEST_F(FibreCarrierReading, GivesTheTipWithinItsCovariance) {
     worst_sigma_um =
         std::max(worst_sigma_um, 1e3 * std::sqrt((reported.var_x_mm2 + reported.var_y_mm2) / 2));
   }
-  // chi^2 of two numbers each: 2 +- 2 / sqrt(readings); the model's own error adds a little.
+  // chi^2 of two numbers each is 2 +- 2 / sqrt(readings); the model's own error adds a little.
   EXPECT_GT(normalised / kReadings, 2 - 5 * 2 / std::sqrt(kReadings));
   EXPECT_LT(normalised / kReadings, 2 + 10 * 2 / std::sqrt(kReadings));
   EXPECT_LT(worst_sigma_um, 5);

@@ -1,4 +1,4 @@
-// Fits give back what was planted, know their uncertainty, and hold where they were not fitted.
+// Fits return the planted field, state their uncertainty, and hold where they were not fitted.
 #include "sim/hall/field_fit.h"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// A map of a law at 59 mm (or where `radius_mm` says), every `step_deg`.
+// The map of a law at 59 mm (or at `radius_mm`), every `step_deg`.
 FieldMap MapOf(const testing::FieldLaw& law, int step_deg, double noise_T, std::uint64_t seed,
                double radius_mm = 59) {
   Rng rng(seed);
@@ -114,7 +114,7 @@ TEST(FieldFit, FindsHowTheFieldFallsOffFromMapsAtTwoRadii) {
   ASSERT_TRUE(fit);
   ASSERT_TRUE(fit->decay);
   EXPECT_NEAR(fit->radius_mm, 59, 1e-9);
-  // Sources within: at least the lowest degree's l + 2 = 6.
+  // The sources lie within: the decay is at least the lowest degree's l + 2 = 6.
   EXPECT_GT(*fit->decay, 6);
   EXPECT_LT(*fit->decay, 9);
 }

@@ -1,5 +1,5 @@
-// Each model against its formula written down anew, its slopes against differences; spherical
-// harmonics against the standard library's Legendre functions.
+// Each model against its formula written down anew, and its slopes against differences. Spherical
+// harmonics stand against the standard library's Legendre functions.
 #include "sim/hall/field_model.h"
 
 #include <gtest/gtest.h>

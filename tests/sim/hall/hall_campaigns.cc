@@ -1,8 +1,9 @@
-// Campaigns with planted causes or none, drawn by an independent plant and diagnosed from what a
-// file would hold, with the figures of merit of every diagnosis (docs/hall.md). Lambda is the chi^2
-// of what was planted after amplitude and phase of the field, which nobody knows, are projected
-// out; it is drawn from 15 to 4000. Ends with 1 where a figure is missed by more than its few
-// campaigns allow: nulls named 1 % (dirty 2 %), exact at lambda >= 100 97 %, wrong and sure 0.5 %.
+// Campaigns with planted causes or none, drawn by an independent plant. They are diagnosed from the
+// content of their file, with the figures of merit of every diagnosis (docs/hall.md). Lambda is
+// drawn from 15 to 4000. Lambda is the chi^2 of the planted cause after the unknown amplitude and
+// phase of the field are projected out. The program ends with 1 where a figure is missed by more
+// than its few campaigns allow. The figures: nulls named 1 % (dirty 2 %), exact at lambda >= 100 97
+// %, wrong and sure 0.5 %.
 //   hall_campaigns [--per 6] [--nulls 20] [--dirty 10] [--pairs 6] [--outside 6] [--unforeseen 0]
 //                  [--magnets 0] [--seed 1]
 #include <algorithm>
@@ -68,7 +69,7 @@ FieldLaw Wrong(const FieldLaw& law, const Planted& planted) {
   return [law, planted](const Vec& place, const Vec& axis) {
     constexpr int kOrders[] = {12, 8, 2, 20, 4};
     const double x = Latitude(place) / 0.3665, phi = std::atan2(place[1], place[0]);
-    // Another wave along phi; or a pole of another shape along theta.
+    // The cause is another wave along phi, or a pole of another shape along theta.
     const double shape = planted.variant == 4 ? x * x * x * x : 1;
     return law(place, axis) + planted.size * kAmplitude_T * shape * std::exp(-x * x) *
                                   std::cos(kOrders[planted.variant] * phi + 0.3 * planted.variant);
@@ -106,7 +107,7 @@ Planted Some(const char* cause, Rng* rng) {
   return planted;
 }
 
-// Its size so that it is worth `wanted` by itself.
+// The cause with the size at which it is worth `wanted` by itself.
 Planted Sized(const Plant& plant, const CampaignPlan& plan, Planted planted, double wanted) {
   for (int pass = 0; pass < 2; ++pass) {  // not quite linear
     const auto made = testing::MakeCampaign(plan, plant.law, Wrong(plant.law, planted), planted);
@@ -137,11 +138,11 @@ Drawn Draw(const Plant& plant, const std::vector<const char*>& causes, double la
 
 struct Outcome {
   std::string said;
-  std::vector<std::string> first;  // of each cause found
-  std::vector<std::string> all;    // its candidates, too
+  std::vector<std::string> first;  // the first name of each cause found
+  std::vector<std::string> all;    // with its candidates
   bool sure = false;               // explained, each cause with a single name
-  bool flagged = false;            // says that something is not known
-  double gain = 0;                 // of what an oracle gains, in variance
+  bool flagged = false;            // reports an unknown
+  double gain = 0;                 // share of an oracle's gain, in variance
 };
 
 Outcome Diagnose(const Plant& plant, const Drawn& drawn) {
@@ -171,7 +172,7 @@ bool Has(const std::vector<std::string>& list, const std::string& what) {
   return std::find(list.begin(), list.end(), what) != list.end();
 }
 
-// The 95 % interval of a share, Wilson's.
+// The 95 % interval of a share, after Wilson.
 void Line(const char* what, int count, int of, const char* wanted) {
   if (of == 0) return;
   const double n = of, p = count / n, z2 = 1.96 * 1.96;
@@ -185,7 +186,7 @@ class Suite {
  public:
   Suite(const Plant* plant, std::uint64_t seed) : plant_(*plant), seed_(seed) {}
 
-  /// How many of them a cause was named in.
+  /// The number of null campaigns in which a cause was named.
   int Nulls(int count, bool dirty) {
     int named = 0;
     for (int k = 0; k < count; ++k) {
@@ -259,7 +260,7 @@ class Suite {
     Gain("two causes", std::move(gains), ">= 0.90");
   }
 
-  // Of a kind that is among the diagnosis' rivals; or of one that was never thought of there.
+  // Effects outside of the causes: `foreseen` ones are among the diagnosis' rivals, others are not.
   void Outside(int per, bool foreseen) {
     int flagged = 0, misnamed = 0, count = 0;
     const std::array<const char*, 3> effects = foreseen

@@ -1,5 +1,5 @@
-// The diagnosis of a Hall rig where a single campaign shows it: names, sizes, honesty. How often it
-// is right over many campaigns is hall_campaigns' to say.
+// The diagnosis of a Hall rig where a single campaign shows it: names, sizes, honesty.
+// hall_campaigns measures its rates over many campaigns.
 #include "sim/hall/diagnosis/hall_diagnosis.h"
 
 #include <gmock/gmock.h>
@@ -96,7 +96,7 @@ TEST(HallDiagnosis, SaysWhatCannotBeTested) {
   EXPECT_TRUE(diagnosis.causes.empty());
 }
 
-// Some causes together imitate these nearly to within the noise; none is named surely.
+// Some causes together imitate these effects nearly to within the noise; none is named as sure.
 TEST(HallDiagnosis, WhatIsNoneOfTheCausesIsUnknown) {
   const std::pair<testing::Planted, const char*> outside[] = {
       {{"pose_scale", -0.02}, "alpha_deg is told wrongly, by alpha: its scale"},

@@ -1,4 +1,4 @@
-// The field of magnetised pieces against dipoles summed by other code, by the midpoint rule,
+// The field of magnetised pieces against dipoles that other code sums by the midpoint rule,
 // extrapolated from two step sizes.
 #include "sim/hall/magnet_array.h"
 
@@ -21,7 +21,7 @@ void ExpectSameField(const std::vector<MagnetShell>& shells,
   const testing::DipoleRotor coarse(planted, 12), fine(planted, 24);
   const double peak_T = std::abs(array.Radial_T({1, 0, 0}, 59));
   for (int k = 0; k < 12; ++k) {
-    // Within 40 deg of the equator, where sensors stand, and anywhere.
+    // Half of the places lie within 40 deg of the equator, where sensors stand, half anywhere.
     const double z = rng.Uniform(-1, 1) * (k % 2 == 0 ? 0.64 : 1);
     const double phi = rng.Uniform(0, 6.28), flat = std::sqrt(1 - z * z);
     const Vector3 u{flat * std::cos(phi), flat * std::sin(phi), z};

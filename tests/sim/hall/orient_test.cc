@@ -1,5 +1,5 @@
 // Orientation from voltages: exact where the model is, as good as noise allows where it is not, and
-// honest about branches. The plant is the independent one.
+// with all branches reported. The plant is the independent one.
 #include "sim/hall/orient.h"
 
 #include <gtest/gtest.h>
@@ -114,7 +114,7 @@ TEST(Orient, ReachesTheCramerRaoBound) {
   const OrientationSolver solver(Rig(), Surface());
   Rng rng(seed);
   for (const Orientation truth : {Orientation{0.05, -0.1, 0.1}, Orientation{-0.15, 0.12, -0.3}}) {
-    // The bound from differences of the plant's own prediction, not from the solver's slopes.
+    // The bound comes from differences of the plant's own prediction, not from the solver's slopes.
     std::array<std::array<double, 3>, 8> slope{};
     constexpr double kStep = 1e-5;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -184,7 +184,8 @@ TEST(Orient, OnMagnetsOursErrsLessThanATwentiethOfADegree) {
       const Orientation truth{pose.alpha_deg * kRadPerDeg, pose.beta_deg * kRadPerDeg,
                               pose.gamma_deg * kRadPerDeg};
       const HallReading reading = ReadingOf(solver.rig(), pose.volts);
-      // The harmonic model has wrong branches that fit better: its own is asked for from the truth.
+      // The harmonic model has wrong branches that fit better; the test refines its own from the
+      // truth.
       OrientationFit found = solver.Refine(reading, truth);
       if (kind == FieldKind::kSpherical) found = solver.Solve(reading).front();
       auto& worst = worst_deg[static_cast<std::size_t>(kind)];

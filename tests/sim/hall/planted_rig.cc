@@ -106,7 +106,7 @@ FieldLaw OfSurface(double amplitude_T, double width_deg) {
 
 namespace {
 
-// What chi^2 is left of a change when two directions are free: Gram and Schmidt.
+// The chi^2 of a change after two free directions are projected out (Gram and Schmidt).
 class FreeDirections {
  public:
   void Add(double change, double amplitude, double phase) {
@@ -139,7 +139,7 @@ struct AsMade {
 void Displace(const Planted& planted, Rng* rng, AsMade* made) {
   const double turn = rng->Uniform(0, 6.283185307179586);
   if (planted.cause == "sensor_position") {
-    // Size in degrees along the sphere, in a direction by chance.
+    // The size is in degrees along the sphere, in a random direction.
     Vec& s = made->sensors[planted.sensor];
     const Vec other = std::abs(s[2]) < 0.9 ? Vec{0, 0, 1} : Vec{1, 0, 0};
     Vec east = {other[1] * s[2] - other[2] * s[1], other[2] * s[0] - other[0] * s[2],
@@ -192,7 +192,7 @@ double Dirt(double volts, double noise_V, Rng* rng) {
 struct Angles {
   double alpha_deg, beta_deg, gamma_deg;
 };
-// Where the rotor stands when it is told to be somewhere.
+// The true orientation of the rotor for a reported one.
 Angles Truly(const PlantedPose& reported, double alpha_before_deg,
              const std::vector<Planted>& causes) {
   Angles truly{reported.alpha_deg, reported.beta_deg, reported.gamma_deg};

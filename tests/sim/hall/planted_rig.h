@@ -1,7 +1,7 @@
 // A rotor, its sensors and their campaigns with physics of their own: nothing here comes from
-// sim/hall. Magnets are plain cubes of dipoles by the midpoint rule, the rotation is a product of
-// three written-out matrices, sensors are read one by one in a full field vector at their true
-// place. What is planted is named as in the reports.
+// sim/hall. Magnets are plain cubes of dipoles by the midpoint rule. The rotation is a product of
+// three written-out matrices. Sensors are read one by one in a full field vector at their true
+// place. The planted effects are named as in the reports.
 #pragma once
 
 #include <array>
@@ -24,11 +24,12 @@ struct Shell {
   std::vector<double> strength = std::vector<double>(8, 1.0);
 };
 
-/// Eight tiles a shell, radial magnetisation, pole width 0.9 of the pitch, remanence 1.2 T.
+/// A rotor with eight tiles a shell, radial magnetisation, pole width 0.9 of the pitch, remanence
+/// 1.2 T.
 class DipoleRotor {
  public:
   DipoleRotor(const std::vector<Shell>& shells, int cuts);
-  /// T at a place in mm, rotor frame.
+  /// The field at a place, rotor frame. Units: mm in, T out.
   [[nodiscard]] Vec Field(const Vec& place_mm) const;
 
  private:
@@ -41,10 +42,10 @@ std::vector<Shell> PlantedTwoShells();
 /// The eight sensors of the paper: unit directions for 11.25, 75, 15 deg.
 std::vector<Vec> PlantedSensors();
 
-/// Field in T that a sensor at `place_mm` with axis `axis` reads, both in the rotor's frame.
+/// The field in T that a sensor at `place_mm` with axis `axis` reads, both in the rotor's frame.
 using FieldLaw = std::function<double(const Vec& place_mm, const Vec& axis)>;
 FieldLaw OfRotor(const DipoleRotor& rotor);
-/// A exp(-(latitude / width)^2) cos 4 phi, whatever the radius.
+/// The law A exp(-(latitude / width)^2) cos 4 phi, at any radius.
 FieldLaw OfSurface(double amplitude_T, double width_deg);
 
 struct PlantedPose {
@@ -53,10 +54,11 @@ struct PlantedPose {
   std::vector<double> volts;
 };
 
-/// Causes of the library, or what is outside of it: `drift` of a sensor's offset over the rows (V
-/// in all), `pose_scale` of the told alpha, `crosstalk` of a sensor with the next; and what the
-/// diagnosis has no number for either: `play` of the told alpha (deg), `cogging` of gamma (deg),
-/// `iron` that turns with alpha and changes a sensor's gain.
+/// A planted effect is a cause of the library, or one outside of it. Foreseen outside effects are
+/// `drift` of a sensor's offset over the rows (V in all), `pose_scale` of the reported alpha, and
+/// `crosstalk` of a sensor with the next. The diagnosis has no number for the other three. They are
+/// `play` of the reported alpha (deg), `cogging` of gamma (deg), and `iron` that turns with alpha
+/// and changes a sensor's gain.
 struct Planted {
   std::string cause = "none";
   double size = 0;  // in the cause's own unit
@@ -67,8 +69,9 @@ struct Planted {
 struct PlantedCampaign {
   std::vector<PlantedPose> poses;
   Planted planted;
-  double lambda = 0;       // chi^2 of what was planted, before anything is projected out
-  double lambda_free = 0;  // and after the field's amplitude and phase, which nobody knows, are
+  double lambda = 0;  // chi^2 of the planted effect, before anything is projected out
+  // After the field's amplitude and phase, which are unknown, are projected out.
+  double lambda_free = 0;
 };
 
 struct CampaignPlan {
@@ -76,12 +79,12 @@ struct CampaignPlan {
   double tilt_deg = 12;
   double noise_T = 5e-4;
   bool temperatures = true;
-  bool dirty = false;  // 1 % of readings missing, 1 % anything, 5 % four times as noisy
+  bool dirty = false;  // 1 % of readings missing, 1 % arbitrary, 5 % four times as noisy
   std::vector<Planted> also = {};
   std::uint64_t seed = 1;
 };
 
-/// `law` without the cause, `wrong` with it: the same but for field causes.
+/// `law` is without the cause, `wrong` with it: the same but for field causes.
 PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, const FieldLaw& wrong,
                              const Planted& planted);
 

@@ -18,7 +18,7 @@ using testing::BenchMotor;
 
 constexpr double kTurnElectricalDeg = 360;
 
-// Without dead time: the closed forms of paper 1's motor.
+// Without dead time the closed forms of paper 1's motor hold.
 constexpr Bridge kIdeal1V8{.rise_s = 0, .fall_s = 0, .dead_time_s = 0};
 
 TEST(Motor, LagsFifteenDegreesAtRestAndTwentyThreeAtTheTunedSpeed) {
@@ -33,7 +33,7 @@ TEST(Motor, LagsFifteenDegreesAtRestAndTwentyThreeAtTheTunedSpeed) {
   EXPECT_GT(Motor({}, {}).StaticLagTurns(1), motor.StaticLagTurns(1)) << "dead time takes voltage";
 }
 
-// The critical n of this motor by bus voltage, from an independent integration of the averaged
+// The critical n of this motor by bus voltage comes from an independent integration of the averaged
 // equation.
 TEST(Motor, ComesUpExactlyFromItsCriticalSpeed) {
   struct Row {
@@ -69,7 +69,8 @@ TEST(Motor, IsWithinADegreeOfPwmLevelAndStartsWhatItStarts) {
     const auto state = FindSteadyState(setting, modulation, setting.motor.load_Nm);
     ASSERT_TRUE(state);
     const double lag_deg = motor.RunningLagTurns(modulation.field_Hz(), 1) * kTurnElectricalDeg;
-    // The PWM level lags the middle of the vector that is shown; the field here begins a vector.
+    // The PWM level lags the middle of the vector that is shown; the field here is at a vector's
+    // begin.
     worst_deg = std::max(worst_deg, std::abs(lag_deg - state->lag_rad * 180 / M_PI));
     EXPECT_NEAR(lag_deg, state->lag_rad * 180 / M_PI, 1.0);
 
@@ -94,7 +95,7 @@ TEST(FieldPath, ShowsEachVectorForItsTime) {
   EXPECT_EQ(at(1375), 102);
   EXPECT_EQ(at(1750), 103);
   EXPECT_EQ(at(2124.9), 103);
-  EXPECT_EQ(at(2125), 102);  // the second waited for the first
+  EXPECT_EQ(at(2125), 102);  // the second segment waited for the first
   EXPECT_EQ(at(2125 + 37 * 500 / 144.0 + 0.1), 101);
   EXPECT_EQ(at(9999), 101);
   EXPECT_EQ(at(20'000), 106);
@@ -201,7 +202,7 @@ TEST(Axis, BacklashIsLostWhenTheDirectionTurns) {
   clean.Move(4000);
   const double clean_up = clean.Deg();
   clean.Move(-4000);
-  // The load, and with it the lag, differs a little where the two stand.
+  // The load, and with it the lag, differs a little between the places of the two.
   EXPECT_NEAR((up - rig.Deg()) - (clean_up - clean.Deg()), -1.5, 0.01);
 }
 
@@ -223,8 +224,8 @@ TEST(Axis, TheStopHoldsTheShaftAndTheFieldSlipsWholeTurns) {
 }
 
 TEST(Axis, PowerOnAlignsWithTheNearestTurnOfTheStoredVector) {
-  // FLASH says 0 while the rotor stands elsewhere: it ends whole turns off, by less than half a
-  // turn of motion.
+  // FLASH says 0 while the rotor stands elsewhere. The rotor ends whole turns off, after less than
+  // half a turn of motion.
   for (std::int32_t stands = -300; stands <= 300; stands += 7) {
     AxisRig rig({}, stands);
     const double before = rig.Deg();
@@ -250,7 +251,7 @@ TEST(Axis, SlippingAndDeadAxesArriveShort) {
   EXPECT_EQ(none.Deg(), 0);
 }
 
-// Of `moves` there and back over `way_deg`: the spread of the place, and of its change in a move.
+// The spread of the place, and of its change in a move, over `moves` there and back by `way_deg`.
 struct Scattered {
   double place_deg = 0;
   double change_deg = 0;

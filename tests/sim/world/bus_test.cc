@@ -34,8 +34,8 @@ std::vector<Bus::Heard> Drain(Bus* bus, HostInstant until = {INT64_MAX - 1}) {
   return all;
 }
 
-// Bits of an extended frame without stuff bits by the standard's fields, and stuff bits counted on
-// a string.
+// The bits of an extended frame without stuff bits, by the standard's fields, and stuff bits
+// counted on a string.
 std::uint32_t BitsByHand(const CanFrame& frame) {
   std::string bits;
   const auto add = [&](std::uint32_t value, int count) {
@@ -48,7 +48,7 @@ std::uint32_t BitsByHand(const CanFrame& frame) {
   bits += "000";
   add(frame.length, 4);
   for (int i = 0; i < frame.length; ++i) add(frame.data[static_cast<std::size_t>(i)], 8);
-  // CRC by long division, as on paper.
+  // The CRC comes from long division.
   std::string dividend = bits + std::string(15, '0');
   const std::string divisor = "1100010110011001";
   for (std::size_t i = 0; i + 15 < dividend.size(); ++i)
@@ -105,7 +105,7 @@ TEST(Bus, LowestIdentifierWinsAmongAllThatWait) {
   for (const std::uint32_t id : ids) bus.Offer({FrameOf(id), true, sender++}, {0});
   const auto heard = Drain(&bus);
   ASSERT_EQ(heard.size(), 6u);
-  const std::uint32_t senders[] = {6, 2, 4, 5, 3, 1};  // equal ones in order of coming
+  const std::uint32_t senders[] = {6, 2, 4, 5, 3, 1};  // equal identifiers in order of coming
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(heard[i].sent.sender, senders[i]);
   EXPECT_EQ(bus.counters().waiting_max, 6u);
 }
@@ -164,7 +164,8 @@ TEST(Bus, PlantedChanceDropsDuplicatesAndDelaysAtItsRate) {
       late += (heard.at - at).ns > 5'000'000 ? 1 : 0;
     }
   }
-  // What is sent again may be heard twice again: 1 / (1 - 0.05) times. Five standard deviations.
+  // A frame that is sent again may be received twice again: 1 / (1 - 0.05) times. The bound is five
+  // standard deviations.
   EXPECT_NEAR(heard_count, kFrames * 1.0526, 5 * 24);
   EXPECT_NEAR(lost, kFrames * 0.10526, 5 * 32);
   EXPECT_NEAR(late, kFrames * 0.3158, 5 * 50);

@@ -1,7 +1,10 @@
-// One unit's firmware on the bench: its FLASH, its axes, no bus. Frames go in by hand, time passes
-// by hand.
+// The firmware of a single unit on the bench: its FLASH and its axes, without a bus. The test hands
+// in frames and lets time pass.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -47,7 +50,7 @@ class FirmwareRig {
   [[nodiscard]] UnitState state() const { return firmware_.state(); }
   [[nodiscard]] double AngleDeg(Axis which) const { return axes_[Index(which)].AngleDeg(now_); }
 
-  /// Lets time pass from deadline to deadline; what the unit said by itself.
+  /// Lets time pass from deadline to deadline, and returns the frames that the unit sent unasked.
   std::vector<CanFrame> Run(DurationNs duration) {
     std::vector<CanFrame> said;
     const HostInstant end = now_ + duration;
@@ -69,7 +72,7 @@ class FirmwareRig {
                              NodeId node = kNode) {
     return Give(Encode(message, {node, sequence}));
   }
-  /// The one answer; none where there is none or it is of another kind.
+  /// The answer to a message. None: there is no answer, more than one, or one of another kind.
   template <class M>
   std::optional<M> Ask(const HostMessage& message, std::uint8_t sequence = 1) {
     const auto frames = Give(message, sequence);
@@ -119,11 +122,22 @@ class FirmwareRig {
   HostInstant now_{1'000'000};
 };
 
+inline constexpr std::uint16_t kMove = 7;  // the move that is staged or runs
+inline constexpr std::uint16_t kNew = 8;
+
 inline StagedMove BenchMove(std::uint16_t id, std::int32_t theta = 400, std::int32_t phi = -300) {
   StagedMove move{{id}, WaveMode::kAsymmetric, {}};
   move.path[0].Append({0, theta, 108});
   move.path[1].Append({50, phi, 108});
   return move;
+}
+
+template <class M>
+M Get(const CanFrame& frame) {
+  const auto decoded = DecodeUnit(frame);
+  EXPECT_TRUE(decoded && std::holds_alternative<M>(decoded->message));
+  return decoded && std::holds_alternative<M>(decoded->message) ? std::get<M>(decoded->message)
+                                                                : M{};
 }
 
 }  // namespace focalfleet::sim::testing

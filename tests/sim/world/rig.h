@@ -1,5 +1,5 @@
-// A host for tests of the simulation: speaks to one world in frames, keeps what it heard, and knows
-// how to carry one unit through a whole move.
+// A host for tests of the simulation. The host exchanges frames with one world, keeps the received
+// ones, and can carry one unit through a whole move.
 #pragma once
 
 #include <optional>
@@ -55,7 +55,7 @@ class Rig {
   }
   void Run(DurationNs duration) { world_.AdvanceTo(world_.now() + duration, &heard_, &wire_); }
 
-  /// As Run, with a clock frame every second on every bus, so that no unit gives the host up.
+  /// Like Run, with a clock frame every second on every bus, so that no unit enters kHostLost.
   void RunWatched(DurationNs duration) {
     const HostInstant end = world_.now() + duration;
     while (world_.now() < end) {
@@ -64,7 +64,7 @@ class Rig {
     }
   }
 
-  /// Sends and gives what this node says within 5 ms: the first message, if any.
+  /// Sends a message and returns the first message of this node within 5 ms, if any.
   std::optional<UnitMessage> Ask(std::uint32_t bus, std::uint8_t node, const HostMessage& message,
                                  std::optional<std::uint8_t> sequence = std::nullopt) {
     heard_.clear();
@@ -94,7 +94,7 @@ class Rig {
     }
     Run(Milliseconds(8));
   }
-  /// Stages and arms; what the unit answered to the arm.
+  /// Stages and arms a move; returns the unit's answer to the arm.
   Answer StageAndArm(std::uint32_t bus, std::uint8_t node, const StagedMove& move) {
     Stage(bus, node, move);
     const auto reply = AskFor<ArmReply>(bus, node, Arm{move.move, Digest(move)});

@@ -45,7 +45,7 @@ TEST(World, CarriesAUnitThroughAMoveAndSaysSo) {
   EXPECT_EQ(after.moves_begun, 1u);
   EXPECT_EQ(after.begun_twice, 0u);
   EXPECT_FALSE(rig.world().flash(UnitId{2}).moving);
-  // 15 electrical degrees are 4 of 96 vectors; the load varies by a fifth.
+  // The lag of 15 electrical degrees is 4 of 96 vectors; the load varies by a fifth.
   EXPECT_NEAR(after.vectors[0], said.position[0] - 4, 1.0);
   EXPECT_NEAR(after.vectors[1], said.position[1] + 4, 1.0);
   EXPECT_NEAR(after.angle_deg[0], after.vectors[0] * kDegPerVector, 1e-9);
@@ -73,7 +73,7 @@ TEST(World, EveryUnitAnswersABroadcastOnceInOrderOfNodes) {
   const BusCounters& counters = rig.world().counters({1});
   EXPECT_EQ(counters.host_frames, 1u);
   EXPECT_EQ(counters.unit_frames, 100u);
-  // 64 + 0 to 64 + 8 * 8 + stuffing: 100 frames of 8 bytes take 13.1 to 16 ms.
+  // A frame has 64 + 0 to 64 + 8 * 8 bits and stuffing: 100 frames of 8 bytes take 13.1 to 16 ms.
   EXPECT_GT(counters.busy, Milliseconds(13));
   EXPECT_LT(counters.busy, Milliseconds(17));
   EXPECT_EQ(rig.world().counters({0}).bits, 0u);
@@ -125,7 +125,7 @@ TEST(World, PlantedMisbehaviourIsHeardAsNamed) {
   const auto confirm = rig.AskFor<ConfirmReply>(0, 6, Confirm{{1}});
   EXPECT_EQ(confirm->answer, Answer::kOk);
   EXPECT_NE(confirm->digest, Digest(move));
-  // A silent unit still does as it is told.
+  // A silent unit still carries out its requests.
   rig.Stage(0, 1, move);
   rig.Send(0, 1, Arm{{1}, Digest(move)});
   rig.Run(Milliseconds(5));
@@ -168,14 +168,14 @@ TEST(World, AllMemorySurvivesAndNothingElseDoes) {
     const bool cut = was.state == UnitState::kMoving;
     EXPECT_EQ(cut, was.id == UnitId{7});
     EXPECT_EQ(is.interrupted, cut);
-    // Half an electrical turn of 0.4 degrees, where a stored vector is applied to a rotor that
-    // stands elsewhere.
+    // Half an electrical turn of 0.4 degrees is the most, where a stored vector is applied to a
+    // rotor that stands elsewhere.
     for (std::size_t i = 0; i < kAxisCount; ++i)
       EXPECT_NEAR(is.angle_deg[i], was.angle_deg[i], cut ? 0.25 : 1e-9);
   }
 }
 
-// Digest over all that any bus carried, in order.
+// The digest covers all frames of every bus, in order.
 std::uint64_t DigestOf(const std::vector<WireFrame>& wire) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   const auto add = [&](std::uint64_t value) { hash = (hash ^ value) * 0x100000001b3u; };
@@ -301,7 +301,8 @@ TEST(World, RefusesUnitsThatCannotBe) {
             "unit 2: theta has more vectors than the wire can carry");
 }
 
-// Frames lost, doubled and late, power failing anywhere: a start may be missed, never doubled.
+// Frames are lost, doubled and late, and power fails anywhere. A start may be missed, never
+// doubled.
 TEST(World, NoUnitBeginsAMoveTwiceOnBadBuses) {
   const std::uint64_t seed = focalfleet::testing::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);

@@ -1,6 +1,6 @@
 // The claims of paper 1 against an independent calculation of each (PWM-resolved motor, start-up
-// dynamics, positioning), made for this project by other means. Its figures are printed to the
-// digits given here.
+// dynamics, positioning), made for this project by other means. The figures have the digits printed
+// there.
 #include "sim/drive/reproduction/reproduce.h"
 
 #include <gtest/gtest.h>
@@ -82,7 +82,7 @@ TEST(Reproduce, EverySetIsCriticalWhereItWasFittedAndFallsAsIndependently) {
     EXPECT_NE(claim.conditions.find("12 of 12 with n 37"), std::string::npos);
     EXPECT_NE(claim.conditions.find("starts with 37, fails with 36"), std::string::npos);
   }
-  // V_bus n at 1.7 V, at its least, at 9.2 V; and which sets rise to within 1 % all the way.
+  // V_bus n at 1.7 V, at its least, and at 9.2 V; and the sets that rise to within 1 % all the way.
   const std::vector<std::tuple<const char*, std::vector<double>, ClaimStatus>> products = {
       {"v_bus_times_n_C", {66.4, 65.0, 98.4}, ClaimStatus::kDisagrees},
       {"v_bus_times_n_V", {65.7, 65.7, 103.1}, ClaimStatus::kOrdering},
@@ -93,7 +93,7 @@ TEST(Reproduce, EverySetIsCriticalWhereItWasFittedAndFallsAsIndependently) {
     ExpectNumbers(id, oracle, 0.01);
     EXPECT_EQ(Find(AsPrinted(), id).status, status) << id;
   }
-  // The figure itself, not only its ends.
+  // The whole curve counts, not only its ends.
   for (const ClaimCurve& curve : AsPrinted().curves) {
     if (curve.figure != "V_bus n over V_bus") continue;
     ASSERT_EQ(curve.y.size(), 13u);
@@ -111,7 +111,7 @@ TEST(Reproduce, EverySetIsCriticalWhereItWasFittedAndFallsAsIndependently) {
     const auto from = std::find(curve.x.begin(), curve.x.end(), 4.0) - curve.x.begin();
     EXPECT_TRUE(std::is_sorted(curve.y.begin() + from, curve.y.end())) << curve.name;
   }
-  // The independent one does not say its drag: here it is none.
+  // The independent calculation does not state its drag; here it is zero.
   ExpectNumbers("bare_motor_9V", {10.3, 8.96, 8.07, 7.44, 6.58}, 0.015);
 }
 
@@ -131,7 +131,7 @@ TEST(Reproduce, WhatDoesNotHoldIsShownWithBothNumbersAndAReason) {
   ExpectNumbers("edges_per_carrier", {3.81, 3.83, 5.77}, 0.006);
   EXPECT_NEAR(Find(AsPrinted(), "torque_equation").simulated[0], 2, 1e-6);
   ExpectNumbers("steady_current_1V8_as_printed", {209.95}, 1e-4);
-  // Lags of all sets, mean load: 24 to 33 degrees with n 108, 27 to 59 with n 37.
+  // The lags of all sets at mean load are 24 to 33 degrees with n 108, and 27 to 59 with n 37.
   const std::vector<double>& lags = Find(AsPrinted(), "torque_angle").simulated;
   ASSERT_EQ(lags.size(), 10u);
   const auto [least_108, most_108] = std::minmax_element(lags.begin(), lags.begin() + 5);
@@ -143,7 +143,8 @@ TEST(Reproduce, WhatDoesNotHoldIsShownWithBothNumbersAndAReason) {
 }
 
 TEST(Reproduce, WhatFollowsFromPrintedNumbersIsComputedFromThem) {
-  // i_pk = i_inf (1 - e^(-359/358.79)) / (1 - e^(-500/358.79)): simulated edge by edge.
+  // The expected value is i_pk = i_inf (1 - e^(-359/358.79)) / (1 - e^(-500/358.79)), simulated
+  // edge by edge.
   const double train = (1 - std::exp(-359 / 358.788)) / (1 - std::exp(-500 / 358.788));
   EXPECT_NEAR(Find(AsPrinted(), "pulse_train").simulated[0], train, 1e-5);
   ExpectNumbers("rms_in_kelvin", {0.600, 1.5}, 0.02);
@@ -166,7 +167,7 @@ TEST(Reproduce, AtEqualFieldMoreEdgesCostMore) {
 }
 
 TEST(Reproduce, WithDiodesTheSavingIsTheIndependentOne) {
-  // The independent one: -1.6 and 8.2 mW at 9 V; 0.01 and 1.2 to 1.3 mW at 1.8 V.
+  // The independent calculation has -1.6 and 8.2 mW at 9 V, and 0.01 and 1.2 to 1.3 mW at 1.8 V.
   const std::vector<double>& high = Find(AsPrinted(), "saving_with_diodes_9V").simulated;
   const std::vector<double>& low = Find(AsPrinted(), "saving_with_diodes_1V8").simulated;
   ASSERT_EQ(high.size(), 2u);

@@ -20,7 +20,8 @@ void ExpectNear(double value, double wanted, double share) {
   EXPECT_NEAR(value, wanted, share * std::abs(wanted));
 }
 
-// Exact integrals over a rotor held at its speed against samples of one of its own inertia.
+// Exact integrals over a rotor held at its speed are compared with samples of one with its own
+// inertia.
 TEST(Recording, InStepAgreesWithTheExactFiguresOfSteadyRotation) {
   for (const WaveMode mode :
        {WaveMode::kAsymmetric, WaveMode::kFiveSegment, WaveMode::kSevenSegment}) {
@@ -85,7 +86,7 @@ TEST(Recording, EnergyCloses) {
 }
 
 TEST(Recording, FromRestTheCriticalRepeatTurnsAndOneLessStalls) {
-  // As the sets were fitted: without dead time and ramps.
+  // The sets were fitted without dead time and ramps, so the bridge has none.
   const Drive::Setting setting{
       *FindParameterSet("9"), {}, {.rise_s = 0, .fall_s = 0, .dead_time_s = 0}};
   const Recording turns = Record(setting, {.repeat = 37}, {.turns = 1, .from_rest = true});

@@ -38,7 +38,7 @@ TEST(Spectrum, APhaseSeesBothDirectionsAsOneHarmonic) {
   std::vector<Complex> samples(32);
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const double angle = 2 * std::numbers::pi * static_cast<double>(k) / 32;
-    // Forward, backwards five times, and a mean.
+    // The signal goes forward once and backwards five times, and has a mean.
     samples[k] = std::polar(3.0, angle) + std::polar(2.0, -5 * angle) + 0.5;
   }
   const auto harmonics = PhaseHarmonics(Components(samples));

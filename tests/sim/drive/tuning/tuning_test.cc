@@ -19,11 +19,11 @@ TEST(Tuning, FindsThePapersCriticalRepeatAndKeepsTheMargin) {
   EXPECT_EQ(tuning.critical, 37);
   EXPECT_EQ(tuning.critical_reduced, 37);
   EXPECT_NEAR(tuning.margin, 0.5, 0.02);
-  // Half as much load again, by itself.
+  // The load is half as much again by itself.
   Drive::Setting heavier = Ideal(1.8);
   heavier.motor.load_Nm *= 1.5;
   EXPECT_EQ(CriticalRepeat(heavier, {}, {}, DriveLevel::kReduced), tuning.repeat);
-  // 743 turns of 96 vectors.
+  // The gearhead makes 743 turns of 96 vectors.
   EXPECT_NEAR(tuning.move_s, 300.0 / 360 * 337 * 45 / 17 * 96 * tuning.repeat * 500 / 144e6, 1e-3);
   EXPECT_GT(tuning.move_J, tuning.copper_W * tuning.move_s * 0.99);
 }
@@ -76,12 +76,13 @@ TEST(Tuning, AFleetIsTunedAsEachOfItsLoads) {
     EXPECT_EQ(fleet[k].outcome, alone.outcome);
     EXPECT_EQ(fleet[k].critical, alone.critical);
     EXPECT_EQ(fleet[k].repeat, alone.repeat);
-    // What n starts is known to 1e-4 of the stall torque, and half a count is a line there.
+    // The load that n starts is known to 1e-4 of the stall torque, and half a count is
+    // interpolated.
     EXPECT_NEAR(fleet[k].margin, alone.margin, 5e-3);
     EXPECT_GE(fleet[k].margin, alone.outcome == TuningOutcome::kTuned ? rule.margin : 0);
     EXPECT_NEAR(fleet[k].peak_share, alone.peak_share, 1e-6);
     EXPECT_NEAR(fleet[k].move_s, alone.move_s, 1e-9);
-    // From steady rotation with the mean load, against the whole move from rest.
+    // The fleet's figure is from steady rotation with the mean load, the other from the whole move.
     EXPECT_NEAR(fleet[k].move_J, alone.move_J, 0.005 * alone.move_J);
   }
 }

@@ -1,5 +1,5 @@
-// What a bus does when things go wrong, against the standard's rules
-// (sim/world/bus/error_counters.h has their numbers) as a table of its own.
+// The bus in trouble, against the standard's rules as a table of its own
+// (sim/world/bus/error_counters.h has their numbers).
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ std::vector<Bus::Heard> RunUntil(Bus* bus, HostInstant until) {
   return all;
 }
 
-// ---- a small oracle: one node's counters as the rules have them
+// ---- a small oracle: the counters of one node by the rules
 
 struct OracleNode {
   int transmit = 0;
@@ -51,7 +51,8 @@ class Oracle {
   explicit Oracle(std::size_t nodes) : nodes_(nodes) {}
   std::vector<OracleNode>& nodes() { return nodes_; }
 
-  // `bus` did something: what its counters tell of it, and nothing of how it counts errors.
+  // `bus` did something. The oracle takes the event from its counters, and nothing of how it counts
+  // errors.
   void Follow(const BusCounters& before, const Bus& bus, std::size_t sender) {
     const BusCounters& after = bus.counters();
     for (OracleNode& node : nodes_)
@@ -108,7 +109,7 @@ class Oracle {
     const auto hearing = std::ranges::count_if(nodes_, [](const auto& n) { return n.hears(); });
     OracleNode& from = nodes_[sender];
     if (kind == FrameError::kStuff) {
-      // In arbitration: the sender sees it as a receiver, or by exception 2 not at all.
+      // In arbitration the sender sees the error as a receiver, or by exception 2 not at all.
       const int more =
           static_cast<int>(bus.errors(IndexOf(from)).receive()) - std::min(from.receive, 255);
       EXPECT_TRUE(more == 0 || more == 1);
@@ -124,7 +125,7 @@ class Oracle {
       if (!passed) {
         node.receive += 1;
       } else if (bus.errors(IndexOf(node)).receive() != static_cast<unsigned>(node.receive)) {
-        node.receive += 9;  // rules 1 and 2: the one that refused what the others have
+        node.receive += 9;  // rules 1 and 2: the node that refused the frame that the others have
         ++refusing;
       }
     }
@@ -147,7 +148,7 @@ class RandomFaults {
       if (::testing::Test::HasFatalFailure()) return;
     }
     const BusCounters& c = bus_.counters();
-    // All time is accounted for, and every bit of it.
+    // All time is accounted for, to the bit.
     EXPECT_EQ((c.busy + c.idle).ns, ended_.ns);
     EXPECT_EQ(c.busy.ns, static_cast<std::int64_t>(c.bits + c.error_bits) * kBit);
     EXPECT_EQ(c.destroyed.ns, static_cast<std::int64_t>(c.error_bits) * kBit);
@@ -178,13 +179,14 @@ class RandomFaults {
                           static_cast<std::uint8_t>(rng_.Below(9))),
                   sender != 0, sender},
                  at);
-    // Until it is through, or has been tried so often that somebody is off or nobody is there.
+    // The bus runs until the frame is through, or a node is off after many attempts, or no node is
+    // there.
     const std::string when = "round " + std::to_string(round);
     for (int i = 0; i < 80 && bus_.NextEvent() != kNever; ++i) {
       AdvanceOnce(sender, when);
       if (::testing::Test::HasFatalFailure()) return;
     }
-    // Whoever still tries gets company between two attempts, and peace.
+    // A node that still tries gets another one between two attempts, and a bus without errors.
     if (bus_.waiting() > 0) {
       for (const auto busy = bus_.counters().busy; busy == bus_.counters().busy;)
         AdvanceOnce(sender, when);
@@ -218,7 +220,7 @@ class RandomFaults {
   std::uint32_t units_;
   Bus bus_;
   Oracle oracle_;
-  HostInstant ended_{0};  // the last frame
+  HostInstant ended_{0};  // end of the last frame
 };
 
 TEST(FaultConfinement, CountersAndTimeFollowTheRulesOnAnySequenceOfFaults) {
@@ -235,20 +237,20 @@ TEST(FaultConfinement, CountersAndTimeFollowTheRulesOnAnySequenceOfFaults) {
     off += run.counters().went_off;
     back += run.counters().recovered;
   }
-  // The sequences get to where it matters.
+  // The sequences must reach the passive and the off state often.
   EXPECT_GT(passive, 100u);
   EXPECT_GT(off, 20u);
   EXPECT_GT(back, 10u);
 }
 
-// ---- one by one
+// ---- single rules
 
 TEST(FaultConfinement, AFrameIsDestroyedWithTheProbabilityOfItsBits) {
   const std::uint64_t seed = focalfleet::testing::TestSeed(52);
   FOCALFLEET_TRACE_SEED(seed);
   const CanFrame frame = FrameOf(0x12345);
   const double bits = ExposedBits(frame);
-  for (const double rate : {1e-4, 5e-4}) {  // more than one in nine, and the sender goes off
+  for (const double rate : {1e-4, 5e-4}) {  // with more than one error in nine the sender goes off
     Bus bus = BusOf(2, seed);
     bus.faults().bit_error_rate = rate;
     constexpr int kFrames = 40'000;
@@ -273,7 +275,7 @@ TEST(FaultConfinement, AloneOnTheBusTheHostGoesPassiveAndNeverOff) {
   EXPECT_EQ(bus.state(Bus::kHost), Confinement::kPassive);
   EXPECT_EQ(bus.errors(Bus::kHost).transmit(), 128u);
   EXPECT_EQ(bus.waiting(), 1u);
-  // Once it is passive, each attempt costs its bits and the eight of suspend transmission.
+  // Once the host is passive, each attempt costs its bits and the eight of suspend transmission.
   const std::int64_t attempt = (Unacknowledged(FrameOf(7)).bits + 8) * kBit;
   EXPECT_NEAR(static_cast<double>(bus.counters().error_frames()),
               1e9 / static_cast<double>(attempt), 2);
@@ -292,7 +294,8 @@ TEST(FaultConfinement, APassiveSenderLeavesEightBitsToTheOthers) {
   ASSERT_EQ(bus.state(Bus::kHost), Confinement::kPassive);
   bus.PowerOn(1, {Milliseconds(100).ns});
   RunUntil(&bus, {Milliseconds(101).ns});
-  // Back in the active state for one more: now passive again, and two frames after one another.
+  // The host is active again for one more frame. Then it is passive, with two frames after one
+  // another.
   for (int i = 0; i < 5; ++i) bus.Offer({FrameOf(9), false, 0}, {Milliseconds(200).ns});
   bus.faults().bit_error_rate = 1;
   while (bus.state(Bus::kHost) != Confinement::kPassive) {
@@ -321,7 +324,7 @@ TEST(FaultConfinement, AUnitThatIsOffComesBackAfter128TimesElevenRecessiveBits) 
   bus.faults().bit_error_rate = 0;
   const std::int64_t off_at = bus.counters().busy.ns + bus.counters().idle.ns;
   EXPECT_EQ(bus.NextEvent().ns, off_at + 128 * 11 * kBit);
-  // Frames of others count one each: their end is eleven recessive bits.
+  // Frames of other nodes count a row each: their end is eleven recessive bits.
   for (int i = 0; i < 50; ++i) bus.Offer({FrameOf(9), false, 0}, {off_at});
   const auto heard = RunUntil(&bus, {Seconds(2).ns});
   ASSERT_EQ(heard.size(), 51u);

@@ -12,8 +12,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// One transmitter and two receivers, bit by bit on a wired AND: what each drives and sees. It knows
-// the frame as a string of levels and the rules of error signalling, and no formula.
+// A transmitter and two receivers go bit by bit over a wired AND: the levels that each drives and
+// sees. The model has the frame as a string of levels and the rules of error signalling, and no
+// formula.
 class BitByBit {
  public:
   BitByBit(const CanFrame& frame, bool passive) : passive_(passive) {
@@ -83,7 +84,7 @@ class BitByBit {
     if (t < sent_.size()) {
       error = row_ >= 6;
     } else if (t == slot_) {
-      error = level && !crc_wrong_;  // its own acknowledgement is not there
+      error = level && !crc_wrong_;  // its own acknowledgement is missing
     } else if (t == slot_ + 1) {
       error = !level || crc_wrong_;
     } else {
@@ -148,7 +149,7 @@ TEST(FrameCourse, EveryDisturbedBitCostsWhatNodesThatSignalItBitByBitTake) {
 
 TEST(FrameCourse, WithoutAnAcknowledgementItEndsBehindTheSlot) {
   const CanFrame frame{0x1abcdef, 8, {1, 2, 3, 4, 5, 6, 7, 8}};
-  // Of the good frame acknowledgement delimiter, end of frame and intermission are missing.
+  // The good frame's acknowledgement delimiter, end of frame and intermission are missing.
   EXPECT_EQ(Unacknowledged(frame).bits, FrameBits(frame) - 1 - 7 - 3 + 6 + 8 + 3);
   EXPECT_FALSE(Unacknowledged(frame).accepted);
 }

@@ -145,7 +145,7 @@ TEST(Camera, NoiseFallsWithTheRootOfTheFlux) {
 
 TEST(Camera, TwoNearLightsAreOneSpotAtTheirCentreOfLight) {
   Rng rng(1);
-  CameraTraits traits = Quiet();  // 2.2 px wide, 5 px a mm: one within 0.44 mm
+  CameraTraits traits = Quiet();  // 2.2 px wide, 5 px a mm: spots within 0.44 mm become one
   const std::vector<LightSource> sources = {{LightKind::kFibre, 1, {0, 0}, 1},
                                             {LightKind::kFibre, 2, {0.3, 0}, 2},
                                             {LightKind::kFibre, 3, {0, 0.6}, 1}};
@@ -156,7 +156,7 @@ TEST(Camera, TwoNearLightsAreOneSpotAtTheirCentreOfLight) {
             (std::set<std::uint32_t>{0, 1}));
   EXPECT_NEAR(image.spots[blend].flux, 3, 1e-12);
   EXPECT_NEAR(image.spots[blend].x_px, traits.optics.centre_px.real() + 5 * 0.2, 1e-9);
-  // 2/9 of the squared distance of 1.5 px, half of it in each direction.
+  // The blend adds 2/9 of the squared distance of 1.5 px, half of it in each direction.
   EXPECT_NEAR(image.spots[blend].fwhm_px,
               std::sqrt(2.2 * 2.2 + 2.35482 * 2.35482 * 2.25 * 2 / 9 / 2), 1e-4);
 }
@@ -175,7 +175,7 @@ TEST(Camera, LosesItsShareAndAddsItsShare) {
     for (const auto& light : TakeImage(sources, traits, &rng).light)
       light.empty() ? ++extra : lit += light.size();
   EXPECT_NEAR(static_cast<double>(lit), 40 * 2500 * 0.98, 5 * std::sqrt(40 * 2500 * 0.02));
-  // Some extras fall onto a fibre's spot, none is lost otherwise.
+  // Some extras fall onto a fibre's spot; no other is lost.
   EXPECT_LE(extra, 40u * 25);
   EXPECT_GE(extra, 40u * 25 - 10);
 }

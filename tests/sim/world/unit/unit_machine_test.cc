@@ -1,5 +1,5 @@
-// What only a board sees of the machine: when FLASH is kept, and that C can drive it. What the unit
-// says and does is firmware_test.cc's, on simulated axes.
+// The behaviour of the machine that only a board sees: when FLASH is kept, and that C can drive it.
+// The firmware_*_test.cc files test the unit's answers and motions, on simulated axes.
 #include "sim/world/unit/unit_machine.h"
 
 #include <gtest/gtest.h>
@@ -19,10 +19,10 @@ namespace {
 
 constexpr NodeId kNode{9};
 
-// A board that writes down what it is asked, and whose paths take a second.
+// A board that records its calls, and whose paths take a second.
 struct Asked {
   std::string what;
-  Flash flash;  // as it stood then
+  Flash flash;  // as it stood at the call
 };
 struct PaperBoard {
   Flash flash;
@@ -106,13 +106,13 @@ class UnitMachineTest : public ::testing::Test {
 
 TEST_F(UnitMachineTest, KeepsTheMarkBeforeTheFirstStepAndThePlaceAfterTheLast) {
   StageArmStart();
-  Pass();  // begins
+  Pass();  // the motion begins
   EXPECT_EQ(Asked(), (std::vector<std::string>{"keep", "run", "run"}));
   EXPECT_TRUE(board_.kept.moving);
   EXPECT_EQ(board_.kept.last_begun, MoveId{5});
   EXPECT_EQ(board_.kept.moves_begun, 1u);
   board_.asked.clear();
-  Pass();  // ends
+  Pass();  // the motion ends
   EXPECT_EQ(Asked(), (std::vector<std::string>{"halt", "halt", "keep"}));
   EXPECT_FALSE(board_.kept.moving);
   EXPECT_EQ(board_.kept.axis[0].position(), 100);
@@ -141,13 +141,13 @@ TEST_F(UnitMachineTest, TakesItsOwnEntriesOfAGroupAndNobodyElses) {
   EXPECT_EQ(out.frames()[0],
             Encode(UnitMessage(ConfirmReply{{5}, Digest(move), {1, 0}, {}}), {kNode, 3}));
   EXPECT_EQ(machine_.malformed(), 0u);
-  // A group of others says nothing to it, not even that the host is there.
+  // A group for other units has no effect on it, and does not count as a sign of the host.
   const BoardInstant deadline = machine_.deadline();
   TransmitQueue nothing;
   machine_.OnGroup(GroupOf(stage({8}, 100)), now_ + Milliseconds(100), &nothing);
   EXPECT_TRUE(nothing.frames().empty());
   EXPECT_EQ(machine_.deadline(), deadline);
-  // One wrong byte, in another's entry: all of it goes, and counts once.
+  // A wrong byte in another unit's entry drops the whole group, and counts once.
   FdFrame broken = GroupOf(frames);
   broken.data[2] |= 7;
   machine_.OnGroup(broken, now_, &nothing);
@@ -163,7 +163,7 @@ TEST_F(UnitMachineTest, HasRoomForTheAnswersToTheFullestGroup) {
   EXPECT_EQ(out.frames().size(), kGroupEntriesMax);
 }
 
-// Whatever staging comes, in whatever portions: what is answered and held is the same.
+// Staging in any portions gives the same answers and the same staged move.
 TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
   const auto seed = focalfleet::testing::TestSeed(41);
   FOCALFLEET_TRACE_SEED(seed);
@@ -177,7 +177,7 @@ TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
     std::vector<CanFrame> frames;
     while (frames.size() < 1 + rng.Below(12)) {
       HostMessage message = focalfleet::testing::RandomHost(rng);
-      // Few moves, so that some of them are complete.
+      // Few move ids, so that some of the moves are complete.
       const MoveId move{static_cast<std::uint16_t>(1 + rng.Below(2))};
       if (auto* begin = std::get_if<StageBegin>(&message)) *begin = {move, {1, 0}, begin->mode};
       if (auto* segment = std::get_if<StageSegment>(&message)) segment->index = 0;
@@ -211,7 +211,7 @@ TEST_F(UnitMachineTest, KeepsTheMarkBeforeHoming) {
   EXPECT_EQ(Asked(), (std::vector<std::string>{"keep", "run"}));
   EXPECT_TRUE(board_.kept.moving);
   EXPECT_EQ(board_.kept.last_begun, MoveId{6});
-  Pass();  // phi is there, theta begins
+  Pass();  // phi has arrived, theta begins
   EXPECT_TRUE(board_.kept.moving);
   Pass();
   EXPECT_FALSE(board_.kept.moving);
@@ -224,8 +224,8 @@ TEST_F(UnitMachineTest, KeepsWhateverItAnsweredOf) {
   EXPECT_EQ(Asked(), (std::vector<std::string>{"keep"})) << "a refused value wears no FLASH";
 }
 
-// Whenever power goes, what was kept is what the unit will wake up with: after every request and
-// every deadline the FLASH that it works on is the one that is kept.
+// Whenever power fails, the unit will start from the FLASH that was kept last. After every request
+// and every deadline the FLASH that it works on is therefore the one that is kept.
 TEST_F(UnitMachineTest, LeavesNothingUnkept) {
   StageArmStart();
   EXPECT_EQ(board_.kept, board_.flash);

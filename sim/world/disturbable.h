@@ -1,0 +1,48 @@
+// The disturbances of a world: tests, load testers and planned faults cut power, break buses and
+// make units and buses misbehave.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "protocol/base/ids.h"
+#include "protocol/wire/can_frame.h"
+#include "protocol/wire/messages.h"
+#include "sim/world/faults.h"
+
+namespace focalfleet::sim {
+
+class WorldCore;
+
+/// Every disturbance acts at the world's now().
+class Disturbable {
+ public:
+  Disturbable(const Disturbable&) = delete;
+  Disturbable& operator=(const Disturbable&) = delete;
+
+  void PowerCut(UnitId unit);  // at once, whatever the unit does
+  void PowerOn(UnitId unit);
+  void KillBus(BusId bus);  // waiting frames are lost
+  void ReviveBus(BusId bus);
+  void StickBus(BusId bus);  // dominant, until it is released
+  void ReleaseBus(BusId bus);
+  void RestartHost(BusId bus);   // the host's controller, if it is bus-off
+  void ThrowHostOff(BusId bus);  // as after a short circuit
+  void Unplug(UnitId unit);      // from its bus; it keeps its power
+  void Plug(UnitId unit);
+  /// The unit's controller sends this frame whenever arbitration lets it; none: no more.
+  void Babble(UnitId unit, const std::optional<CanFrame>& frame);
+  void RaiseFault(UnitId unit, FaultCode code, Axis axis = Axis::kTheta);
+  /// Null where there is no such unit.
+  [[nodiscard]] UnitFaults* faults(UnitId unit);
+  [[nodiscard]] BusFaults* faults(BusId bus);
+
+ protected:
+  Disturbable();
+  ~Disturbable();
+
+  std::unique_ptr<WorldCore> core_;
+};
+
+}  // namespace focalfleet::sim
