@@ -1,6 +1,6 @@
 #include "tests/can/bus_story.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 // Segments may come twice (a retry); their index says where they belong.
@@ -108,4 +108,4 @@ BusStory Listen(const CandumpLog& log) {
   return listener.Take();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -15,8 +15,16 @@
 #include "protocol/wire/codec.h"
 #include "tests/can/configuration_frames.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::BusNode;
+using test::CandumpLog;
+using test::ConfigurationFrames;
+using test::LoggedFrame;
+using test::MaskedFrame;
+using test::ParseCandump;
+using test::SortOut;
 
 // The daemon's defaults, in the fleet's time, and what they allow.
 constexpr double kClockPeriod_s = 0.5;
@@ -170,12 +178,12 @@ int Run(const char* reference_path, const char* path, double speed) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet
 
 int main(int count, char** arguments) {
   if (count != 4) {
     std::fputs("usage: same_frames REFERENCE_LOG LOG SPEED\n", stderr);
     return 2;
   }
-  return focalfleet::testing::Run(arguments[1], arguments[2], std::atof(arguments[3]));
+  return focalfleet::Run(arguments[1], arguments[2], std::atof(arguments[3]));
 }

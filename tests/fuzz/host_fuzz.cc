@@ -358,7 +358,7 @@ class Theatre {
   Layout layout_;
   std::array<Puppet, kUnits> puppets_;
   std::unique_ptr<Coordinator> coordinator_;
-  testing::MemoryStore store_;
+  test::MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
   struct Commit {

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -14,30 +13,14 @@
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/spots_file.h"
 #include "protocol/base/check.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
+
 constexpr SensorLimits kSensor{11'000, 11'000};
-
-/// On a file system in memory where there is one; gone when the process ends.
-class Scratch {
- public:
-  Scratch() {
-    const char* where = access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp";
-    std::string name = std::string(where) + "/spots_fuzz.XXXXXX";
-    FOCALFLEET_CHECK(mkdtemp(name.data()) != nullptr);
-    folder_ = name;
-  }
-  ~Scratch() {
-    unlink((folder_ + "/again.fits").c_str());
-    rmdir(folder_.c_str());
-  }
-  [[nodiscard]] std::string File(const char* name) const { return folder_ + "/" + name; }
-
- private:
-  std::string folder_;
-};
 
 void ExpectSame(const Exposure& one, const Result<Exposure>& other) {
   FOCALFLEET_CHECK(other.has_value());
@@ -57,7 +40,8 @@ void TryCsv(std::string_view text) {
 
 /// FITS, or whatever a camera may hand over, packed by gzip, too.
 void TryBytes(std::string_view bytes) {
-  static const Scratch scratch;
+  // In memory, where a file system in memory can be written.
+  static const ScratchFolder scratch(access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
   const auto exposure = ParseExposure(std::string(bytes), "in.fits", kSensor);
   if (!exposure) {
     FOCALFLEET_CHECK(exposure.error().text.find("in.fits") == 0);
@@ -65,7 +49,7 @@ void TryBytes(std::string_view bytes) {
   }
   FOCALFLEET_CHECK(CheckSpots(*exposure, kSensor).has_value());
   FOCALFLEET_CHECK(CheckExposureId(exposure->id).has_value());
-  FOCALFLEET_CHECK(WriteSpotsFits(scratch.File("again.fits"), *exposure).has_value());
+  FOCALFLEET_CHECK(WriteSpotsFits(scratch / "again.fits", *exposure).has_value());
 }
 
 void TryFiducials(std::string_view text) {

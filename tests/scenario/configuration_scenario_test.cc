@@ -11,8 +11,15 @@
 #include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::ExpectOthersArrive;
+using test::HasAlarm;
+using test::InProcessFleet;
+using test::RunIntoMotion;
+using test::SomebodyMoving;
+using test::Unserved;
 
 InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
 
@@ -510,7 +517,7 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
 
 // Answers that come late or twice, to stops of ours of which there may be several.
 TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
-  for (std::uint64_t seed = testing::TestSeed(60); seed < testing::TestSeed(60) + 30; ++seed) {
+  for (std::uint64_t seed = test::TestSeed(60); seed < test::TestSeed(60) + 30; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet(Small(seed));
     fleet.Run(Seconds(2));
@@ -880,4 +887,4 @@ TEST(Configuration, SameSeedSameFrames) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -6,9 +6,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -23,10 +20,17 @@
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::Pause;
+using test::Process;
+using test::ScratchFolder;
+using test::TestSeed;
+using test::WaitUntil;
 
 constexpr int kTrials = 50;
 constexpr std::uint32_t kUnits = 60;
@@ -47,43 +51,33 @@ struct Truth {
 class Observatory {
  public:
   explicit Observatory(std::uint64_t seed)
-      : directory_(std::filesystem::temp_directory_path() /
-                   ("focalfleet_crash_" + std::to_string(getpid()))),
-        layout_(*Layout::Create(MakeHexLayout({.count = kUnits, .units_per_bus = 10}), {})),
+      : layout_(*Layout::Create(MakeHexLayout({.count = kUnits, .units_per_bus = 10}), {})),
         drives_(kUnits) {
-    std::filesystem::create_directories(directory_);
-    Write("units.csv", WriteUnits(layout_.units()));
+    folder_.Put("units.csv", WriteUnits(layout_.units()));
     const auto start = DrawConfiguration(layout_, drives_, {}, Rng::Stream(seed, "start"));
-    Write("state.csv", WriteState(layout_, drives_,
-                                  std::vector<std::optional<Pose>>(start->begin(), start->end())));
+    folder_.Put("state.csv",
+                WriteState(layout_, drives_,
+                           std::vector<std::optional<Pose>>(start->begin(), start->end())));
     // Deadlines are of the fleet's time; what real processes need does not shrink with it.
-    Write("focalfleet.toml",
-          "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
-          "[control]\nsocket = \"daemon.sock\"\n[dds]\nenabled = false\n"
-          "[bus]\nport = \"unix\"\nunix_directory = \"" +
-              directory_.string() +
-              "\"\n"
-              "[clock]\nspeed = " +
-              std::to_string(kSpeed) +
-              ".0\n"
-              "[timing]\nreply_wait_ms = 2000\nstart_delay_ms = 3000\nsettle_margin_ms = 2000\n"
-              "silence_limit_ms = 30000\npoll_period_ms = 5000\n");
+    folder_.Put(
+        "focalfleet.toml",
+        "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
+        "[control]\nsocket = \"daemon.sock\"\n[dds]\nenabled = false\n"
+        "[bus]\nport = \"unix\"\nunix_directory = \"" +
+            folder_.path() +
+            "\"\n"
+            "[clock]\nspeed = " +
+            std::to_string(kSpeed) +
+            ".0\n"
+            "[timing]\nreply_wait_ms = 2000\nstart_delay_ms = 3000\nsettle_margin_ms = 2000\n"
+            "silence_limit_ms = 30000\npoll_period_ms = 5000\n");
     simulator_.emplace(
         std::vector<std::string>{FOCALFLEET_SIM, "--units", Path("units.csv"), "--state",
-                                 Path("state.csv"), "--unix-directory", directory_.string(),
-                                 "--control", Path("sim.sock"), "--speed", std::to_string(kSpeed)},
+                                 Path("state.csv"), "--unix-directory", folder_.path(), "--control",
+                                 Path("sim.sock"), "--speed", std::to_string(kSpeed)},
         Path("sim.log"));
     EXPECT_TRUE(
         WaitUntil([&] { return LineClient::Connect(Path("sim.sock")).has_value(); }, kPatienceMs));
-  }
-  ~Observatory() {
-    if (::testing::Test::HasFailure()) {
-      std::fprintf(stderr, "files of the failed run are in %s\n", directory_.c_str());
-    } else {
-      daemon_.reset();
-      simulator_.reset();
-      std::filesystem::remove_all(directory_);
-    }
   }
 
   void StartDaemon() {
@@ -165,9 +159,7 @@ class Observatory {
     return csv;
   }
 
-  [[nodiscard]] std::string Path(const std::string& name) const {
-    return (directory_ / name).string();
-  }
+  [[nodiscard]] std::string Path(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] const Layout& layout() const { return layout_; }
 
  private:
@@ -176,11 +168,8 @@ class Observatory {
     if (!client) return tl::unexpected<Error>(client.error());
     return client->Call(verb, args, {.silence_max = Seconds(60), .on_progress = {}});
   }
-  void Write(const std::string& name, const std::string& text) {
-    std::ofstream(Path(name)) << text;
-  }
 
-  std::filesystem::path directory_;
+  ScratchFolder folder_;  // outlives the processes that write into it
   Layout layout_;
   std::vector<UnitDrive> drives_;
   std::optional<Process> simulator_;
@@ -301,4 +290,4 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

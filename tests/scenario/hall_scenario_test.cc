@@ -11,8 +11,12 @@
 #include "tests/scenario/steps.h"
 #include "tests/support/spine_model.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::FittedFibreCarrierModel;
+using test::HasAlarm;
+using test::InProcessFleet;
 
 class HallScenario : public ::testing::Test {
  protected:
@@ -152,4 +156,4 @@ TEST_F(HallScenario, ASensorsReadingTakesHalfAMillisecondOfItsBus) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

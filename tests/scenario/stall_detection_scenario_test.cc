@@ -11,8 +11,11 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::TestSeed;
 
 constexpr double kSlackS = 1.2;  // both still move for so long
 
@@ -266,4 +269,4 @@ TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -6,7 +6,7 @@
 
 #include "tests/scenario/in_process_fleet.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// Until somebody moves, and then a little longer: in the middle of the motion.
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further);
@@ -22,4 +22,4 @@ std::string Unserved(InProcessFleet& fleet);
 /// All but so many have arrived, the store knows the truth, and no intent is open.
 void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

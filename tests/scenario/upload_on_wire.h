@@ -12,7 +12,7 @@
 #include "protocol/wire/stage_group.h"
 #include "sim/world/world.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// Of one bus, all in bits of its own clock. Needed is each frame without which a unit is not
 /// armed, once: stage_begin, stage_segment, confirm and its answer, arm and its answer. Repeats,
@@ -97,4 +97,4 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
   return out;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

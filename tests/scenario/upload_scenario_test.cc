@@ -7,8 +7,13 @@
 #include "tests/scenario/upload_on_wire.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::MeasureUpload;
+using test::TestSeed;
+using test::UploadOnWire;
 
 /// Of the first upload of a random configuration: what passed the wire until the units move.
 std::vector<sim::WireFrame> UploadOf(InProcessFleet* fleet, std::uint64_t seed) {
@@ -107,4 +112,4 @@ TEST(Upload, SaysWhatRepeatsCost) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -42,8 +42,8 @@ void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { s
 
 // NOLINTEND(cppcoreguidelines-no-malloc)
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 std::uint64_t AllocationCount() { return allocation_count; }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

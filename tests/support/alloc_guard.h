@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// Allocations by operator new on this thread since it began.
 std::uint64_t AllocationCount();
@@ -19,4 +19,4 @@ class AllocGuard {
   std::uint64_t before_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// The users that tests can be: root and nobody where root runs them, else whoever does.
 inline std::vector<uid_t> UsersOfTests() {
@@ -40,4 +40,4 @@ class AsUser {
   uid_t before_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -5,7 +5,7 @@
 
 #include "fleet/targets.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr double kAlikeMm = 0.7;  // twice the widest gate
@@ -296,4 +296,4 @@ Judgement Judge(const CameraField& field, const sim::Image& image, const Identif
   return Judging(field, image, result).Run();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -16,7 +16,7 @@
 #include "sim/world/camera/camera.h"
 #include "sim/world/mechanism.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct FieldTroubles {
   double blind_sigma_deg = 0.22;      // of each axis: 54 um rms over the patrol area
@@ -101,4 +101,4 @@ struct Judgement {
 /// `light`: of the image, sources as of CameraField::Sources.
 Judgement Judge(const CameraField& field, const sim::Image& image, const Identification& result);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -6,7 +6,7 @@
 
 #include "fleet/row_check.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 /// The element of a list that is sorted by `key`, put there where there is none.
@@ -130,4 +130,4 @@ void MemoryStore::Keep(const NextMoveRow& row) { fleet.next_move = row.next; }
 
 void MemoryStore::Keep(const ModelRow& row) { model_entries_.insert(row.entry); }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -11,7 +11,7 @@
 #include "fleet/records.h"
 #include "protocol/base/result.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class MemoryStore {
  public:
@@ -49,4 +49,4 @@ class MemoryStore {
   std::set<std::uint64_t> model_entries_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -497,4 +497,4 @@ CheckReport CheckPlanFiles(const std::string& units_path, const std::string& sta
   return CheckPlan(std::move(units), rows, obstacles, options);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

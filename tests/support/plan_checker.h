@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct CheckedAxis {
   double arm_mm = 0;
@@ -81,4 +81,4 @@ CheckReport CheckPlanFiles(const std::string& units_path, const std::string& sta
                            const std::string& plan_path, const std::string& obstacles_path,
                            const CheckOptions& options);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

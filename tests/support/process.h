@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class Process {
  public:
@@ -44,4 +44,4 @@ bool WaitUntil(const Predicate& done, int limit_ms) {
   return done();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

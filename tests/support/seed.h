@@ -8,13 +8,13 @@
 #include <cstdlib>
 #include <string>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline std::uint64_t TestSeed(std::uint64_t otherwise) {
   const char* text = std::getenv("FOCALFLEET_SEED");
   return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test
 
 #define FOCALFLEET_TRACE_SEED(seed) SCOPED_TRACE("FOCALFLEET_SEED=" + std::to_string(seed))

@@ -6,7 +6,7 @@
 #include "sim/hall/fibre_carrier.h"
 #include "sim/hall/field_fit.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline HallModelFile FittedFibreCarrierModel() {
   constexpr int kStepDeg = 4;
@@ -22,4 +22,4 @@ inline HallModelFile FittedFibreCarrierModel() {
   return model;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -17,13 +17,13 @@
 #include "protocol/base/limits.h"
 #include "tests/support/as_user.h"
 #include "tests/support/gzip.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AsUser;
+using test::AsUser;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -36,25 +36,25 @@ Exposure Three(const std::string& id) {
 
 class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
-  CameraFolderTest() : user_(GetParam()), files_(std::make_unique<testing::TemporaryFolder>()) {
-    std::ofstream(files_->File("secret")) << "secret";
+  CameraFolderTest() : user_(GetParam()), files_(std::make_unique<test::ScratchFolder>()) {
+    std::ofstream(*files_ / "secret") << "secret";
   }
   ~CameraFolderTest() override {
-    EXPECT_EQ(ReadTextFile(files_->File("secret")).value_or("none"), "secret");
+    EXPECT_EQ(ReadTextFile(*files_ / "secret").value_or("none"), "secret");
     std::error_code ignored;
     fs::permissions(File(""), fs::perms::owner_all, ignored);
     fs::permissions(File("taken"), fs::perms::owner_all, ignored);
   }
-  void Open() { folder_ = CameraFolder::Open(files_->File("camera"), kSensor).value(); }
+  void Open() { folder_ = CameraFolder::Open(*files_ / "camera", kSensor).value(); }
   [[nodiscard]] std::string File(const std::string& name) const {
-    return files_->File("camera/" + name);
+    return *files_ / ("camera/" + name);
   }
   void Put(const std::string& name, const std::string& bytes) const {
     ASSERT_TRUE(WriteFileAtomically(File(name), bytes));
   }
   [[nodiscard]] std::string FitsOf(const Exposure& exposure) const {
-    EXPECT_TRUE(WriteSpotsFits(files_->File("made.fits"), exposure));
-    return ReadFile(files_->File("made.fits")).value();
+    EXPECT_TRUE(WriteSpotsFits(*files_ / "made.fits", exposure));
+    return ReadFile(*files_ / "made.fits").value();
   }
   [[nodiscard]] static bool Exists(const std::string& path) {
     struct stat status {};
@@ -75,12 +75,12 @@ class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
   }
 
   AsUser user_;
-  std::unique_ptr<testing::TemporaryFolder> files_;
+  std::unique_ptr<test::ScratchFolder> files_;
   std::unique_ptr<CameraFolder> folder_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Users, CameraFolderTest, ::testing::ValuesIn(testing::UsersOfTests()),
-                         testing::NameOfUser);
+INSTANTIATE_TEST_SUITE_P(Users, CameraFolderTest, ::testing::ValuesIn(test::UsersOfTests()),
+                         test::NameOfUser);
 
 TEST_P(CameraFolderTest, AsksByAFileThatIsThereAsAWhole) {
   Open();
@@ -96,10 +96,10 @@ TEST_P(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesWhateverHoldsThem) 
   const std::string csv = WriteSpots(Three("csv"));
   Put("a.csv", csv);
   Put("b.fits", FitsOf(Three("fits")));
-  Put("c.csv.gz", testing::Gzipped(WriteSpots(Three("csv.gz"))));
-  Put("d.fits.gz", testing::Gzipped(FitsOf(Three("fits.gz"))));
+  Put("c.csv.gz", test::Gzipped(WriteSpots(Three("csv.gz"))));
+  Put("d.fits.gz", test::Gzipped(FitsOf(Three("fits.gz"))));
   Put("e.FIT", FitsOf(Three("fit")));
-  Put("f.fts.GZ", testing::Gzipped(FitsOf(Three("fts.gz"))));
+  Put("f.fts.GZ", test::Gzipped(FitsOf(Three("fts.gz"))));
   Put("g.csv", FitsOf(Three("fits called csv")));
   for (const char* id : {"csv", "fits", "csv.gz", "fits.gz", "fit", "fts.gz", "fits called csv"}) {
     const auto taken = folder_->Take();
@@ -117,7 +117,7 @@ TEST_P(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesWhateverHoldsThem) 
 TEST_P(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
   Open();
   const std::string csv = WriteSpots(Three("x"));
-  const std::string packed = testing::Gzipped(csv);
+  const std::string packed = test::Gzipped(csv);
   const struct {
     const char* name;
     std::string bytes;
@@ -127,7 +127,7 @@ TEST_P(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
       {"bad.fits", "no table", "bad.fits"},
       {"empty.fits", "", "empty.fits"},
       {"cut.csv.gz", packed.substr(0, packed.size() / 2), "its gzip stream is cut short"},
-      {"plain.csv.gz.csv", testing::Gzipped(packed), "this is compressed with gzip"},
+      {"plain.csv.gz.csv", test::Gzipped(packed), "this is compressed with gzip"},
       {"x.csv.bz2", "BZh9", "spots come as .csv, .fits, .fit or .fts"},
       {"x.fits.fz", "SIMPLE  =", "spots come as .csv"},
       {"spots.txt", csv, "spots come as .csv"},
@@ -208,9 +208,9 @@ TEST_P(CameraFolderTest, WhatIsNoFileIsRefusedWithoutLookingIntoIt) {
 TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
   for (const char* part : {"taken", "refused"}) {
     fs::create_directories(File(""));
-    fs::create_directories(files_->File("theirs"));
+    fs::create_directories(*files_ / "theirs");
     ASSERT_EQ(symlink("../theirs", File(part).c_str()), 0);
-    const auto folder = CameraFolder::Open(files_->File("camera"), kSensor);
+    const auto folder = CameraFolder::Open(*files_ / "camera", kSensor);
     ASSERT_FALSE(folder);
     EXPECT_EQ(folder.error().code, ErrorCode::kUnavailable);
     EXPECT_THAT(folder.error().text, HasSubstr(std::string(part) + ": a symbolic link"));
@@ -223,7 +223,7 @@ TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
   Put("bad.csv", "no spots\n");
   EXPECT_THAT(TakenId(), HasSubstr("bad.csv"));
   EXPECT_TRUE(Exists(File("gone/bad.csv")));
-  EXPECT_TRUE(fs::is_empty(files_->File("theirs")));
+  EXPECT_TRUE(fs::is_empty(*files_ / "theirs"));
   EXPECT_THAT(folder_->Request(1, kSince).error().text, HasSubstr("refused: a symbolic link"));
 }
 

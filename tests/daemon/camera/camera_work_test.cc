@@ -13,7 +13,7 @@
 namespace focalfleet {
 namespace {
 
-using testing::CameraField;
+using test::CameraField;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -40,12 +40,12 @@ class ScriptedPort : public CameraPort {
 class CameraWorkTest : public ::testing::Test {
  protected:
   CameraWorkTest() : field_({.count = 300, .units_per_bus = 100, .fiducials = 40}, 7) {
-    const testing::FieldTroubles none{
+    const test::FieldTroubles none{
         .tail_share = 0, .dead_share = 0, .slipping_share = 0, .disabled_share = 0, .swaps = 0};
     field_.Move(none);
-    const sim::CameraTraits traits = testing::TestCamera(kRimMm);
+    const sim::CameraTraits traits = test::TestCamera(kRimMm);
     options_ = {.layout = &field_.layout(),
-                .site = {.model = testing::ModelOf(traits),
+                .site = {.model = test::ModelOf(traits),
                          .sensor = {traits.sensor_px.real(), traits.sensor_px.imag()},
                          .fiducials = field_.fiducials(),
                          .options = {}},
@@ -74,9 +74,9 @@ class CameraWorkTest : public ::testing::Test {
     return knowledge;
   }
   Exposure Take(const std::string& id) {
-    sim::CameraTraits traits = testing::TestCamera(kRimMm);
+    sim::CameraTraits traits = test::TestCamera(kRimMm);
     Exposure exposure =
-        testing::ExposureOf(sim::TakeImage(field_.Sources(), traits, &field_.rng()), id);
+        test::ExposureOf(sim::TakeImage(field_.Sources(), traits, &field_.rng()), id);
     exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;
     return exposure;
   }
@@ -130,7 +130,7 @@ TEST_F(CameraWorkTest, WhatMayNotAnswerIsRefusedWithItsReason) {
   future.taken_unix_ns = now_ns_ + 10 * kSecondNs;
   ExpectRefused(future, "future");
   Exposure turned = Take("turned");
-  const std::complex<double> far_corner = testing::TestCamera(kRimMm).sensor_px - 1.0;
+  const std::complex<double> far_corner = test::TestCamera(kRimMm).sensor_px - 1.0;
   for (Spot& spot : turned.spots) {
     spot.x_px = far_corner.real() - spot.x_px;
     spot.y_px = far_corner.imag() - spot.y_px;
@@ -148,9 +148,8 @@ TEST_F(CameraWorkTest, AnotherFieldIsRefused) {
   const Exposure other = [&] {
     CameraField elsewhere({.count = 300, .units_per_bus = 100, .fiducials = 40}, 8);
     elsewhere.Move({});
-    return testing::ExposureOf(
-        sim::TakeImage(elsewhere.Sources(), testing::TestCamera(kRimMm), &elsewhere.rng()),
-        "other");
+    return test::ExposureOf(
+        sim::TakeImage(elsewhere.Sources(), test::TestCamera(kRimMm), &elsewhere.rng()), "other");
   }();
   Exposure exposure = other;
   exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;

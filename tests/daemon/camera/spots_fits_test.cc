@@ -13,8 +13,8 @@
 
 #include "daemon/files/text_file.h"
 #include "protocol/base/rng.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
-#include "tests/support/temporary_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -84,8 +84,8 @@ class SpotFile {
   Result<Exposure> Read() { return ParseSpotsFits(Bytes(), "s.fits", kSensor); }
 
  private:
-  [[nodiscard]] std::string Path() const { return folder_.File("s.fits"); }
-  testing::TemporaryFolder folder_;
+  [[nodiscard]] std::string Path() const { return folder_ / "s.fits"; }
+  test::ScratchFolder folder_;
   fitsfile* file_ = nullptr;
   int status_ = 0;
 };
@@ -320,7 +320,7 @@ TEST(SpotsFits, AnyHeaderGivesSpotsOrAnError) {
   file.Table(With({{"NAME", "16A"}, {"LIST", "1PJ(3)"}, {"SUM", "1I"}}));
   file.Spots(4);
   const std::string bytes = file.Bytes();
-  const std::uint64_t seed = testing::TestSeed(17);
+  const std::uint64_t seed = test::TestSeed(17);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   constexpr const char* kValues[] = {"0",

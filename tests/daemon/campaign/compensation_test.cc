@@ -149,7 +149,7 @@ Misses MissesOf(const sim::CampaignModel& model, const Layout& layout, const Mov
 // The oracle is the model's own prediction of the whole campaign with all moves since: the
 // compensation has neither the campaign's moves nor a track of facts.
 TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const Layout layout = SmallLayout();

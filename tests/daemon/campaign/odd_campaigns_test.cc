@@ -27,6 +27,9 @@ namespace {
 using sim::Campaign;
 using sim::kPhi;
 using sim::kTheta;
+using sim::test::InSteps;
+using sim::test::MovedInTurns;
+using sim::test::ReadTwice;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 

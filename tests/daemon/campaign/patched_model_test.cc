@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 const ReportNames kNames{.sha256 = "12ab", .campaign = "damp"};
 
-sim::Campaign DampCampaign() { return sim::Damp(11); }
+sim::Campaign DampCampaign() { return sim::test::Damp(11); }
 
 sim::Diagnosis PatchedDiagnosis(const sim::Campaign& campaign) {
   return sim::Diagnose(campaign, {.patch = true, .with_gain = false});
@@ -49,7 +49,7 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
   EXPECT_EQ(read->units_known, campaign.units.size());
   EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, campaign), 1e-6);
   // On another night, wetter than any that was seen, too.
-  sim::Campaign wetter = sim::Damp(12);
+  sim::Campaign wetter = sim::test::Damp(12);
   for (double& humidity : wetter.covariates.back().values) humidity += 15;
   EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, wetter), 1e-6);
   sim::CampaignModel plain = read->model;
@@ -58,10 +58,10 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
 }
 
 TEST(ModelFile, KeepsTheShapeOfEachUnit) {
-  const sim::Campaign campaign =
-      sim::Planted({{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.moves = 80});
-  const sim::Diagnosis diagnosis = sim::Verdicts(campaign);
-  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Reported(diagnosis);
+  const sim::Campaign campaign = sim::test::Planted(
+      {{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.moves = 80});
+  const sim::Diagnosis diagnosis = sim::test::Verdicts(campaign);
+  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::test::Reported(diagnosis);
   ASSERT_EQ(diagnosis.model.terms[0].form.shape_of_unit.size(), campaign.units.size());
   const std::string text = WriteModel(diagnosis, kNames, campaign);
   const auto read = ReadModelFile(text, "model.toml", campaign.units);
@@ -115,7 +115,7 @@ TEST(PatchedModel, IsCalledEmpiricalInEveryReport) {
 }
 
 TEST(PatchedModel, AFileThatNoPatchWroteIsRefused) {
-  const std::vector<sim::CampaignUnit> units = sim::Planted({}).units;
+  const std::vector<sim::CampaignUnit> units = sim::test::Planted({}).units;
   const auto error_of = [&](const std::string& text) {
     const auto read = ReadModelFile(text, "m.toml", units);
     return read ? std::string() : read.error().text;

@@ -6,6 +6,7 @@
 
 #include "daemon/cli/completion.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -88,7 +89,7 @@ TEST(CommandLine, NoCommandAndAnUnknownCommandAreWrongUsage) {
 }
 
 TEST(CommandLine, AnAnswerThatStdoutDoesNotTakeIsNotDone) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string units = scratch / "u.csv";
   for (const std::string into : {">/dev/full", ">&-"}) {
     for (const std::vector<std::string>& words :
@@ -160,7 +161,7 @@ TEST(Completion, BashOffersEverySubcommandAndOptionOfTheTree) {
 }
 
 TEST(Completion, BashOffersFilesAndWordsWhereTheTreeTakesThem) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string file = scratch.Put("targets with blank.csv", "");
   for (const CompletionNode& node : Nodes()) {
     for (const auto& option : node.options) {

@@ -5,6 +5,7 @@
 #include "daemon/files/text_file.h"
 #include "tests/daemon/cli/fake_daemon.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -13,7 +14,7 @@ using test::FakeAnswer;
 using test::FakeDaemon;
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -90,7 +91,7 @@ class DaemonCommands : public ::testing::Test {
     return Ask(words, {{"apply", std::move(answer)}, {"status", {.result = Status()}}});
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::vector<ControlRequest> requests_;
 };
 

@@ -8,16 +8,17 @@
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::HasSubstr;
 
-std::string MadeCampaign(const ScratchDirectory& scratch, const std::string& name,
+std::string MadeCampaign(const ScratchFolder& scratch, const std::string& name,
                          const std::string& gear_scale, const std::string& seed) {
   const auto made =
       Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--seed", seed,
@@ -33,7 +34,7 @@ std::string FittedModel(const std::string& campaign) {
 }
 
 TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string old_model = FittedModel(MadeCampaign(scratch, "then", "4e-4", "1"));
   const std::string today = MadeCampaign(scratch, "today", "8e-4", "2");
   const std::string new_model = FittedModel(today);
@@ -67,7 +68,7 @@ TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
 }
 
 TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
   const std::string model = FittedModel(campaign);
   const auto result = Focalfleet({"diagnose", campaign, "--against", model});
@@ -83,7 +84,7 @@ TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
 }
 
 TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreReported) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
   const std::string bad = scratch.Put("bad.toml", "[[effect]]\ncause = \"moods\"\n");
   const auto neither = Focalfleet({"diagnose", campaign});
@@ -103,7 +104,7 @@ TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreReported) {
 
 // What the model before could be is not asked again, and is not sure for that.
 TEST(DiagnoseModel, WhatIsTakenOverKeepsItsCandidates) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string first = FittedModel(MadeCampaign(scratch, "night", "8e-4", "1"));
   std::string text = Slurp(first);
   const std::string own = "candidates = [\"gear_scale\"]";
@@ -118,7 +119,7 @@ TEST(DiagnoseModel, WhatIsTakenOverKeepsItsCandidates) {
 }
 
 TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto made = Focalfleet({"simulate", "campaign", "--units", "24", "--moves", "60",
                                 "--effect", "stage_ripple:theta=0.1", "--out", scratch / "night"});
   ASSERT_EQ(made.exit, 0) << made.err;
@@ -154,7 +155,7 @@ std::vector<double> PlacesIn(const std::string& file) {
 
 // The extended model predicts the campaign that it was found in.
 TEST(SimulateCampaign, AModelPredictsTheCampaign) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string night = scratch / "night", report = scratch / "report";
   const auto made =
       Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "60", "--noise-um", "2",
@@ -199,7 +200,7 @@ TEST(SimulateCampaign, AModelPredictsTheCampaign) {
 }
 
 TEST(Diagnose, SaysHowManyRowsAreSetAside) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--outliers",
                         "0.05", "--out", scratch / "night"})
                 .exit,
@@ -232,7 +233,7 @@ void MakeOdd(const std::string& campaign, double step_mm) {
 
 // Oddities of the data are said, and the model is one that every command reads.
 TEST(Diagnose, SaysWhatIsOddAboutTheData) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string night = MadeCampaign(scratch, "night", "8e-4", "1");
   MakeOdd(night, 0.1);
   const auto result = Focalfleet({"diagnose", night, "--out", scratch / "report"});
@@ -255,7 +256,7 @@ TEST(Diagnose, SaysWhatIsOddAboutTheData) {
 
 // No fit, no figures: what is not known is null, and no line of the model.
 TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "5", "--moves", "3", "--out",
                         scratch / "night"})
                 .exit,
@@ -271,7 +272,7 @@ TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
 }
 
 TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto made = [&](const std::string& effect) {
     return Focalfleet({"simulate", "campaign", "--units", "3", "--moves", "8", "--effect", effect,
                        "--out", scratch / "made"});

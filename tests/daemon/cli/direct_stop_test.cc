@@ -16,12 +16,13 @@
 #include "daemon/ports/socket_frames.h"
 #include "protocol/wire/codec.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -99,7 +100,7 @@ class PlayedBus {
 class DirectStop : public ::testing::Test {
  protected:
   std::string Config(const std::string& text) { return scratch_.Put("fleet.toml", text); }
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
 };
 
 bool StopsNode(const CanFrame& frame, NodeId node) {

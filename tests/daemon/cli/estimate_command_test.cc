@@ -10,13 +10,14 @@
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -60,7 +61,7 @@ class EstimateCommand : public ::testing::Test {
     EXPECT_THAT(scratch_.List(), Not(Contains("curve.csv")));
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string targets_ = scratch_ / "targets.csv";

@@ -8,13 +8,14 @@
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -64,7 +65,7 @@ class ForeignFiles : public ::testing::Test {
   }
   void Put(std::string* file, const std::string& text) { *file = scratch_.Put("changed", text); }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string targets_ = scratch_ / "targets.csv";

@@ -13,6 +13,7 @@
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
@@ -20,7 +21,7 @@ namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -59,7 +60,7 @@ class OfflineCommands : public ::testing::Test {
     EXPECT_THAT(scratch_.List(), ElementsAre("bad.csv", "state.csv", "units.csv")) << text;
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string plan_ = scratch_ / "plan.csv";

@@ -25,24 +25,6 @@ ProgramResult Focalfleet(std::vector<std::string> arguments);
 /// them: `>/dev/full`, `>&-`.
 ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::string> arguments);
 
-/// A directory of its own, removed with all that is in it.
-class ScratchDirectory {
- public:
-  ScratchDirectory();
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-  ~ScratchDirectory();
-  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  [[nodiscard]] const std::string& path() const { return path_; }
-  /// Writes a file and returns its path.
-  [[nodiscard]] std::string Put(const std::string& name, const std::string& text) const;
-  /// Names of all that is in it, sorted.
-  [[nodiscard]] std::vector<std::string> List() const;
-
- private:
-  std::string path_;
-};
-
 std::string Slurp(const std::string& path);
 
 }  // namespace focalfleet::test

@@ -7,13 +7,14 @@
 #include "daemon/control/messages.h"
 #include "fleet/files/csv.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -36,7 +37,7 @@ class SimulateDrive : public ::testing::Test {
     return Json::parse(Slurp(out_ + "/summary.json"), nullptr, false);
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string out_ = scratch_ / "wave";
 };
 

@@ -5,13 +5,14 @@
 #include "daemon/store/store.h"
 #include "fleet/files/csv.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -32,7 +33,7 @@ class TuneCommand : public ::testing::Test {
     ASSERT_EQ(Focalfleet({"layout", "hex", "--count", "3", "--out", units_}).exit, 0);
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string tuned_ = scratch_ / "tuned.csv";
 };

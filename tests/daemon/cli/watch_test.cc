@@ -11,9 +11,9 @@ namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
+using test::OwnDomain;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::OwnDomain;
 
 UnitStatusValue UnitAt(std::uint32_t id, UnitPhase phase) {
   UnitStatusValue unit;

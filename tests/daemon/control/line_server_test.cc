@@ -16,11 +16,13 @@
 
 #include "daemon/control/unix_address.h"
 #include "tests/daemon/control/raw_client.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::RawClient;
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
 bool Readable(int fd) {
@@ -52,7 +54,7 @@ std::vector<IncomingLine> OnlyUrgent(LineServer* server) {
 bool IsStop(std::string_view line) { return line.starts_with("stop"); }
 
 TEST(LineServer, HandsOutWholeLinesOnly) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("{\"a\"");
@@ -67,7 +69,7 @@ TEST(LineServer, HandsOutWholeLinesOnly) {
 }
 
 TEST(LineServer, OnlyOwnerAndGroupMayConnect) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto server = LineServer::Create(scratch / "s").value();
   struct stat info {};
   ASSERT_EQ(::stat((scratch / "s").c_str(), &info), 0);
@@ -75,7 +77,7 @@ TEST(LineServer, OnlyOwnerAndGroupMayConnect) {
 }
 
 TEST(LineServer, ClientsTakeTurns) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient greedy(scratch / "s");
   const RawClient modest(scratch / "s");
@@ -92,7 +94,7 @@ TEST(LineServer, ClientsTakeTurns) {
 }
 
 TEST(LineServer, IsReadableAsLongAsALineIsLeft) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("1\n2\n");
@@ -107,7 +109,7 @@ TEST(LineServer, IsReadableAsLongAsALineIsLeft) {
 }
 
 TEST(LineServer, WhatIsUrgentGoesBeforeEverythingElseThatWasRead) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> askers;
   for (int i = 0; i < 40; ++i) {
@@ -123,7 +125,7 @@ TEST(LineServer, WhatIsUrgentGoesBeforeEverythingElseThatWasRead) {
 }
 
 TEST(LineServer, WhatIsUrgentComesFromBehindOtherLinesOfItsClientWhichSaySo) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   const RawClient client(scratch / "s");
   const RawClient other(scratch / "s");
@@ -144,7 +146,7 @@ TEST(LineServer, WhatIsUrgentComesFromBehindOtherLinesOfItsClientWhichSaySo) {
 }
 
 TEST(LineServer, HearsAStopOfAClientThatReadsNoAnswers) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .urgent = IsStop}).value();
   const RawClient client(scratch / "s");
@@ -160,7 +162,7 @@ TEST(LineServer, HearsAStopOfAClientThatReadsNoAnswers) {
 }
 
 TEST(LineServer, AFloodOfStopsIsOneStopOfEachClientATurn) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   const RawClient client(scratch / "s");
   std::vector<IncomingLine> lines;
@@ -174,7 +176,7 @@ TEST(LineServer, AFloodOfStopsIsOneStopOfEachClientATurn) {
 }
 
 TEST(LineServer, ReadsNoFurtherAheadThanItsBound) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop, .ahead_bytes = 1000}).value();
   const RawClient client(scratch / "s");
   std::string lines;
@@ -188,7 +190,7 @@ TEST(LineServer, ReadsNoFurtherAheadThanItsBound) {
 }
 
 TEST(LineServer, RefusesALineThatIsTooLongAndHangsUp) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.line_bytes_max = 1000}).value();
   const RawClient client(scratch / "s");
   client.Send(std::string(1001, 'x'));
@@ -200,7 +202,7 @@ TEST(LineServer, RefusesALineThatIsTooLongAndHangsUp) {
 }
 
 TEST(LineServer, TakesALineOfTheGreatestLength) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.line_bytes_max = 100'000}).value();
   const RawClient client(scratch / "s");
   const std::string line = std::string(100'000, 'x') + "\n";
@@ -214,7 +216,7 @@ TEST(LineServer, TakesALineOfTheGreatestLength) {
 }
 
 TEST(LineServer, PassesBinaryGarbageOnAsItCame) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send(std::string_view("\0\xff\x80\n", 4));
@@ -224,7 +226,7 @@ TEST(LineServer, PassesBinaryGarbageOnAsItCame) {
 }
 
 TEST(LineServer, TakesNoMoreLinesOfAClientThatDoesNotRead) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000}).value();
   const RawClient client(scratch / "s");
   std::string asked;
@@ -252,7 +254,7 @@ TEST(LineServer, TakesNoMoreLinesOfAClientThatDoesNotRead) {
 }
 
 TEST(LineServer, DropsAClientForWhomTooMuchWaits) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.output_bytes_max = 1'000'000}).value();
   const RawClient client(scratch / "s");
   client.Send("a\n");
@@ -263,7 +265,7 @@ TEST(LineServer, DropsAClientForWhomTooMuchWaits) {
 }
 
 TEST(LineServer, SkipsProgressForAClientThatDoesNotRead) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.progress_bytes_max = 1000}).value();
   const RawClient client(scratch / "s");
   client.Send("wait\n");
@@ -282,7 +284,7 @@ TEST(LineServer, SkipsProgressForAClientThatDoesNotRead) {
 }
 
 TEST(LineServer, HearsTheLastWordsOfAClientThatHangsUp) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   RawClient client(scratch / "s");
   client.Send("stop\nstop again\n");
@@ -295,7 +297,7 @@ TEST(LineServer, HearsTheLastWordsOfAClientThatHangsUp) {
 }
 
 TEST(LineServer, AnswersAClientThatEndedItsInputAndThenHangsUp) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("status\n");
@@ -342,7 +344,7 @@ bool Ended(const RawClient& client, std::string* said) {
 }
 
 TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 3}).value();
   Crowd crowd(scratch / "s", &server);
   for (int i = 0; i < 3; ++i) crowd.Add();
@@ -363,7 +365,7 @@ TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
 }
 
 TEST(LineServer, AClientThatNeverCompletesALineAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 2}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add("drip");
@@ -380,7 +382,7 @@ TEST(LineServer, AClientThatNeverCompletesALineAgesAsAnIdleOne) {
 }
 
 TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .clients_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
@@ -396,7 +398,7 @@ TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
 
 // Lines that such a client sends are not taken before it reads, so they keep no place.
 TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s",
                          {.output_bytes_pause = 10'000, .clients_max = 1, .reserved_max = 0})
@@ -414,7 +416,7 @@ TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
 }
 
 TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add();
@@ -429,7 +431,7 @@ TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
 }
 
 TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.clients_max = 2, .urgent = IsStop, .reserved_max = 2})
           .value();
@@ -452,7 +454,7 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
 }
 
 TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 20}).value();
   Crowd crowd(scratch / "s", &server);
   for (int i = 0; i < 20; ++i) crowd.AddBusy();
@@ -463,7 +465,7 @@ TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) 
 }
 
 TEST(LineServer, WhoHasAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1, .urgent = IsStop}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.AddBusy();
@@ -477,7 +479,7 @@ TEST(LineServer, WhoHasAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
 }
 
 TEST(LineServer, AFloodOfConnectionsDoesNotKeepOutWhoIsThere) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 64, .urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> flood;
   for (int i = 0; i < 64; ++i) flood.push_back(std::make_unique<RawClient>(scratch / "s"));
@@ -508,7 +510,7 @@ class NoDescriptors {
 };
 
 TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add();
@@ -523,7 +525,7 @@ TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
 }
 
 TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop, .reserved_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.AddBusy();
@@ -540,7 +542,7 @@ TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
 }
 
 TEST(LineServer, AcceptsAgainAfterAPauseWhenDescriptorsAreThere) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.accept_pause = std::chrono::milliseconds(20)}).value();
   const RawClient client(scratch / "s");
@@ -555,7 +557,7 @@ TEST(LineServer, AcceptsAgainAfterAPauseWhenDescriptorsAreThere) {
 }
 
 TEST(LineServer, ReplacesASocketFileThatNobodyAnswers) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();
   const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
   ASSERT_EQ(::bind(dead, address.get(), address.length()), 0);
@@ -568,7 +570,7 @@ TEST(LineServer, ReplacesASocketFileThatNobodyAnswers) {
 }
 
 TEST(LineServer, RefusesASocketThatALiveServerHolds) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto first = LineServer::Create(scratch / "s").value();
   const auto second = LineServer::Create(scratch / "s");
   ASSERT_FALSE(second);
@@ -578,7 +580,7 @@ TEST(LineServer, RefusesASocketThatALiveServerHolds) {
 }
 
 TEST(LineServer, DoesNotTakeAFileThatIsNoSocket) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   std::ofstream(scratch / "s") << "precious";
   const auto server = LineServer::Create(scratch / "s");
   ASSERT_FALSE(server);
@@ -591,7 +593,7 @@ TEST(LineServer, NamesAPathThatIsTooLongOrNotThere) {
 }
 
 TEST(LineServer, RemovesItsSocketFileButNotItsSuccessors) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   { const auto server = LineServer::Create(scratch / "s").value(); }
   EXPECT_NE(::access((scratch / "s").c_str(), F_OK), 0);
   {

@@ -12,7 +12,7 @@
 
 #include "daemon/control/unix_address.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 /// A client that does exactly what it is told, byte by byte.
 class RawClient {
@@ -52,4 +52,4 @@ class RawClient {
   int fd_ = -1;
 };
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -18,9 +18,9 @@
 namespace focalfleet {
 namespace {
 
-using testing::ClientProcess;
+using test::ClientProcess;
+using test::OwnDomain;
 using ::testing::HasSubstr;
-using testing::OwnDomain;
 
 constexpr SensorLimits kSensor{1000, 1000};
 constexpr std::int64_t kSinceNs = 1'795'316'645'678'000'000;
@@ -99,7 +99,7 @@ TEST_F(CameraDdsTest, NothingComesWhereNobodyAnswers) {
 }
 
 TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
-  auto taken = std::make_unique<testing::TakenPorts>(OwnDomain());
+  auto taken = std::make_unique<test::TakenPorts>(OwnDomain());
   std::mutex mutex;
   std::vector<std::string> reported;
   port_ = std::make_unique<CameraDds>(

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class ClientProcess {
  public:
@@ -70,4 +70,4 @@ class ClientProcess {
   int status_ = -1;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline std::uint32_t OwnDomain() {
   static const std::uint32_t domain = [] {
@@ -26,4 +26,4 @@ inline std::uint32_t OwnDomain() {
   return domain;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

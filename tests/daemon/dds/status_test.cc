@@ -18,9 +18,9 @@
 namespace focalfleet {
 namespace {
 
-using testing::ClientProcess;
+using test::ClientProcess;
+using test::OwnDomain;
 using ::testing::HasSubstr;
-using testing::OwnDomain;
 
 constexpr std::chrono::seconds kPatience(20);  // far above anything that is measured
 
@@ -395,7 +395,7 @@ TEST(Status, FortyReadersOnOneHostAllSeeEverything) {
 
 TEST(Status, WithoutAFreePortJoiningFailsAndGoesLaterInTheSameProcess) {
   {
-    const testing::TakenPorts taken(OwnDomain());
+    const test::TakenPorts taken(OwnDomain());
     const auto publisher = StatusPublisher::Create(Options());
     ASSERT_FALSE(publisher);
     EXPECT_EQ(publisher.error().code, ErrorCode::kUnavailable);

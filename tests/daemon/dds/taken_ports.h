@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class TakenPorts {
  public:
@@ -37,4 +37,4 @@ class TakenPorts {
   std::vector<int> sockets_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

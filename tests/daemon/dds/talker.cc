@@ -8,8 +8,10 @@
 
 #include "daemon/dds/status_publisher.h"
 
-int main(int argc, char** argv) {
-  using namespace focalfleet;
+namespace focalfleet {
+namespace {
+
+int Main(int argc, char** argv) {
   if (argc != 4) return 2;
   DdsOptions options;
   options.domain = static_cast<std::uint32_t>(std::atoi(argv[1]));
@@ -36,3 +38,8 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

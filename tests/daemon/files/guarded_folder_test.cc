@@ -18,12 +18,12 @@
 
 #include "daemon/files/text_file.h"
 #include "tests/support/as_user.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
-using testing::AsUser;
+using test::AsUser;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -32,7 +32,7 @@ constexpr std::size_t kMax = 1 << 20;
 /// Beside the guarded folder lies what is somebody else's: "secret", and a folder "theirs".
 class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
-  GuardedFolderTest() : user_(GetParam()), files_(std::make_unique<testing::TemporaryFolder>()) {
+  GuardedFolderTest() : user_(GetParam()), files_(std::make_unique<test::ScratchFolder>()) {
     std::ofstream(Beside("secret")) << "secret";
     std::filesystem::create_directory(Beside("theirs"));
     folder_ = std::make_unique<GuardedFolder>(GuardedFolder::Open(In("")).value());
@@ -41,7 +41,7 @@ class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
     EXPECT_EQ(Text(Beside("secret")), "secret") << "it was written through a link";
     std::filesystem::permissions(In(""), std::filesystem::perms::owner_all);
   }
-  [[nodiscard]] std::string Beside(const std::string& name) const { return files_->File(name); }
+  [[nodiscard]] std::string Beside(const std::string& name) const { return *files_ / name; }
   [[nodiscard]] std::string In(const std::string& name) const { return Beside("camera/" + name); }
   static std::string Text(const std::string& path) { return ReadTextFile(path).value_or("none"); }
   void Link(const std::string& to, const std::string& name) const {
@@ -66,12 +66,12 @@ class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
   }
 
   AsUser user_;  // from here on, the temporary folder included
-  std::unique_ptr<testing::TemporaryFolder> files_;
+  std::unique_ptr<test::ScratchFolder> files_;
   std::unique_ptr<GuardedFolder> folder_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Users, GuardedFolderTest, ::testing::ValuesIn(testing::UsersOfTests()),
-                         testing::NameOfUser);
+INSTANTIATE_TEST_SUITE_P(Users, GuardedFolderTest, ::testing::ValuesIn(test::UsersOfTests()),
+                         test::NameOfUser);
 
 TEST_P(GuardedFolderTest, ReadsAndWritesWholeFiles) {
   ASSERT_TRUE(folder_->Write("b", "one"));

@@ -17,15 +17,15 @@
 namespace focalfleet {
 namespace {
 
+using test::TestSeed;
 using ::testing::HasSubstr;
-using testing::TestSeed;
 
 constexpr std::uint32_t kUnits = 40;
 
 class FibreCarrierWork : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    model_ = std::make_unique<HallModelFile>(testing::FittedFibreCarrierModel());
+    model_ = std::make_unique<HallModelFile>(test::FittedFibreCarrierModel());
   }
   static void TearDownTestSuite() { model_.reset(); }
 

@@ -147,7 +147,7 @@ TEST(CanNetlink, CutAndSpoiltAnswersAreRefusedOrRead) {
     const std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<long>(size));
     EXPECT_FALSE(ReadLink(cut)) << size;
   }
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   int read = 0;

@@ -11,11 +11,12 @@
 
 #include "daemon/control/unix_address.h"
 #include "daemon/ports/socket_frames.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
 /// The simulator's end of one bus.
@@ -79,7 +80,7 @@ bool Readable(int fd) {
 }
 
 TEST(UnixPort, CarriesFramesBothWays) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();
@@ -107,7 +108,7 @@ std::int64_t ReadHeldUp() {
 }
 
 TEST(UnixPort, AFrameThatWasReadLateIsNotStampedEarlier) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const HostClock clock(1, ReadHeldUp);
   const auto port =
@@ -126,7 +127,7 @@ TEST(UnixPort, AFrameThatWasReadLateIsNotStampedEarlier) {
 }
 
 TEST(UnixPort, IsDownUntilTheSimulatorIsThere) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto port = Open(scratch / "bus3.sock");
   EXPECT_EQ(port->state(), LinkState::kDown);
   EXPECT_THAT(port->trouble(), HasSubstr("cannot connect"));
@@ -142,7 +143,7 @@ TEST(UnixPort, IsDownUntilTheSimulatorIsThere) {
 }
 
 TEST(UnixPort, SurvivesThePeersDeathAndConnectsAgain) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   const int fd = port->fd();
@@ -165,7 +166,7 @@ TEST(UnixPort, SurvivesThePeersDeathAndConnectsAgain) {
 }
 
 TEST(UnixPort, NoticesAtSendingThatThePeerDied) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();
@@ -175,7 +176,7 @@ TEST(UnixPort, NoticesAtSendingThatThePeerDied) {
 }
 
 TEST(UnixPort, TakesAPartWhenThePeerDoesNotReadAndTheRestLater) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();

@@ -22,18 +22,19 @@
 #include "fleet/targets.h"
 #include "protocol/base/rng.h"
 #include "protocol/wire/messages.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/dds/own_domain.h"
 #include "tests/daemon/dds/taken_ports.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::Process;
+using test::ScratchFolder;
+using test::WaitUntil;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::Process;
-using testing::WaitUntil;
 
 constexpr int kPatienceMs = 30'000;  // a hang ends here; nothing is timed
 
@@ -81,7 +82,7 @@ class FocalfleetdTest : public ::testing::Test {
         kPatienceMs);
   }
 
-  const Scratch scratch_;
+  const ScratchFolder scratch_;
 };
 
 TEST_F(FocalfleetdTest, EndsCleanlyOnSigterm) {
@@ -458,10 +459,10 @@ TEST_F(FocalfleetdTest, IdleConnectionsKeepNobodyOut) {
 }
 
 TEST_F(FocalfleetdTest, RunsWithoutDdsAndPublishesEverythingWhenItIsThere) {
-  const std::uint32_t domain = testing::OwnDomain();
+  const std::uint32_t domain = test::OwnDomain();
   std::ofstream(scratch_ / "f.toml")
       << "[dds]\ndomain = " << domain << "\n[bus]\nport = \"simulated\"\n";
-  auto taken = std::make_unique<testing::TakenPorts>(domain);
+  auto taken = std::make_unique<test::TakenPorts>(domain);
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   auto status = Ask("status");
@@ -501,10 +502,10 @@ TEST_F(FocalfleetdTest, RunsWithoutDdsAndPublishesEverythingWhenItIsThere) {
 }
 
 TEST_F(FocalfleetdTest, EndsWhileItStillTriesToJoinDds) {
-  const std::uint32_t domain = testing::OwnDomain();
+  const std::uint32_t domain = test::OwnDomain();
   std::ofstream(scratch_ / "f.toml")
       << "[dds]\ndomain = " << domain << "\n[bus]\nport = \"simulated\"\n";
-  const testing::TakenPorts taken(domain);
+  const test::TakenPorts taken(domain);
   auto daemon = Start();
   ASSERT_TRUE(Answers()) << Log();
   daemon.Signal(SIGTERM);
@@ -513,7 +514,7 @@ TEST_F(FocalfleetdTest, EndsWhileItStillTriesToJoinDds) {
 
 TEST_F(FocalfleetdTest, SaysThatTheEnvironmentDoesNotDecideWhereStatusGoes) {
   std::ofstream(scratch_ / "f.toml")
-      << "[dds]\ndomain = " << testing::OwnDomain() << "\n[bus]\nport = \"simulated\"\n";
+      << "[dds]\ndomain = " << test::OwnDomain() << "\n[bus]\nport = \"simulated\"\n";
   ::setenv("CYCLONEDDS_URI", "<Nonsense/>", 1);
   auto daemon = Start();
   ::unsetenv("CYCLONEDDS_URI");

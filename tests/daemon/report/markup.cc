@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 namespace {
 
 bool IsNameCharacter(char c) {
@@ -123,4 +123,4 @@ std::string TextOf(const std::vector<MarkupElement>& elements) {
   return text;
 }
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 
 struct MarkupElement {
   std::string name;
@@ -26,4 +26,4 @@ std::vector<MarkupElement> Select(const std::vector<MarkupElement>& elements, st
 /// The texts of all elements, one a line.
 std::string TextOf(const std::vector<MarkupElement>& elements);
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

@@ -13,13 +13,16 @@
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/kinematics.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/report/plan_page_scene.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::report {
 namespace {
 
+using focalfleet::test::ScratchFolder;
+using test::MakeSceneData;
+using test::SceneData;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
@@ -66,9 +69,9 @@ Visit VisitPage(const SceneData& data) {
   Insert("<script>const probeTimes = " + Json(Times(data.plan)).dump() + ";\n" +
              Slurp(PLAN_PAGE_PROBE) + "</script>\n",
          "</body>", &html);
-  const Scratch scratch;
+  const ScratchFolder scratch;
   std::ofstream(scratch / "plan.html", std::ios::binary) << html;
-  testing::Process browser(
+  focalfleet::test::Process browser(
       {"/usr/bin/timeout", "100", "chromium", "--headless", "--no-sandbox", "--disable-gpu",
        "--window-size=1280,900", "--user-data-dir=" + (scratch / "profile"),
        "--virtual-time-budget=60000", "--dump-dom", "file://" + (scratch / "plan.html")},

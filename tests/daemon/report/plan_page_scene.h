@@ -11,7 +11,7 @@
 #include "fleet/knowledge.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 
 struct SceneData {
   static constexpr std::uint32_t kUnits = 61;
@@ -21,7 +21,7 @@ struct SceneData {
   static constexpr PositionerIndex kUnknown{12};
   static constexpr PositionerIndex kWithoutTarget{30};
 
-  testing::PlanningFleet fleet;
+  test::PlanningFleet fleet;
   std::vector<std::optional<Pose>> start;
   Plan plan;
 
@@ -52,8 +52,8 @@ inline SceneData MakeSceneData() {
   }
   // Between three bases, out of everybody's reach but that of the tips.
   const Layout::Options options{.obstacles = {{7, {12.8, 7.39}, 0.5}}};
-  SceneData data{testing::FleetOf(units, options), {}, {}};
-  testing::DrawStartAndTargets(&data.fleet, testing::TestSeed(3));
+  SceneData data{test::FleetOf(units, options), {}, {}};
+  test::DrawStartAndTargets(&data.fleet, test::TestSeed(3));
   data.fleet.frozen[SceneData::kDisabled.value] = 1;
   data.fleet.targets[SceneData::kWithoutTarget.value].reset();
   auto plan = MakePlan(data.fleet.request(), {.fixed = true});
@@ -70,4 +70,4 @@ inline SceneData MakeSceneData() {
   return data;
 }
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

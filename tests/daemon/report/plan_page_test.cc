@@ -18,6 +18,11 @@
 namespace focalfleet::report {
 namespace {
 
+using test::MakeSceneData;
+using test::ReadMarkup;
+using test::SceneData;
+using test::Select;
+using test::Unpack;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using Json = nlohmann::json;
@@ -175,7 +180,7 @@ TEST(PlanPage, ShowsTheTightestPairsFirstAndNotTooMany) {
 }
 
 TEST(PlanPage, OfFiveThousandUnitsWithFourRowsEachStaysBelowTwoMegabytes) {
-  testing::PlanningFleet fleet = testing::HexFleet(5000);
+  focalfleet::test::PlanningFleet fleet = focalfleet::test::HexFleet(5000);
   Rng rng = Rng::Stream(1, "rows");
   const auto draw = [&](std::uint32_t below) {
     return static_cast<std::int32_t>(rng.Bits() % below);

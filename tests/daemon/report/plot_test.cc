@@ -20,6 +20,10 @@
 namespace focalfleet::report {
 namespace {
 
+using test::MarkupElement;
+using test::ReadMarkup;
+using test::Select;
+using test::TextOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 

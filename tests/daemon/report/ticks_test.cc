@@ -45,7 +45,7 @@ TEST(LinearTicks, ShareAFactorWhereNumbersAreLargeOrSmall) {
 // Whatever the range: 1-2-5, evenly apart, inside, as many as allowed but not needlessly few, and a
 // label read back is the value.
 TEST(LinearTicks, AreRegularForRandomRanges) {
-  const std::uint64_t seed = testing::TestSeed(4711);
+  const std::uint64_t seed = test::TestSeed(4711);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 20000; ++i) {

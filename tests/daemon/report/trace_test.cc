@@ -51,7 +51,7 @@ TEST(Trace, BreaksAtGapsAndKeepsALonePointVisible) {
 
 // The oracle bins the same points by column on its own.
 TEST(Trace, KeepsTheExtremesOfEveryColumnOfALongSeries) {
-  const std::uint64_t seed = testing::TestSeed(4711);
+  const std::uint64_t seed = test::TestSeed(4711);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   struct Extremes {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 
 /// Empty where the text is no base64 of whole groups.
 std::vector<std::uint8_t> FromBase64(const std::string& text);
@@ -16,4 +16,4 @@ std::vector<std::uint8_t> FromBase64(const std::string& text);
 std::vector<std::uint64_t> UnpackBits(const nlohmann::json& packed, std::size_t count);
 std::vector<double> Unpack(const nlohmann::json& packed, std::size_t count);
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

@@ -15,7 +15,7 @@
 
 extern char** environ;
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr int kPatienceMs = 20'000;
@@ -128,4 +128,4 @@ Said RunToEnd(std::vector<std::string> arguments) {
   return said;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

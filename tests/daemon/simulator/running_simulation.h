@@ -10,7 +10,7 @@
 
 #include "protocol/wire/codec.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class RunningSimulation {
  public:
@@ -66,4 +66,4 @@ struct Said {
 /// Runs focalfleet-sim to its end.
 Said RunToEnd(std::vector<std::string> arguments);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -10,15 +10,16 @@
 #include "daemon/simulator/memory_file.h"
 #include "daemon/simulator/truth_report.h"
 #include "fleet/files/targets_file.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/simulator/running_simulation.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::simulator {
 namespace {
 
-using testing::BusClient;
-using testing::RunningSimulation;
-using testing::RunToEnd;
+using test::BusClient;
+using test::RunningSimulation;
+using test::RunToEnd;
+using test::ScratchFolder;
 
 constexpr const char* kUnits =
     "unit_id,base_x_mm,base_y_mm,arm_theta_mm,arm_phi_mm,theta_zero_deg,phi_zero_deg,theta_gear,"
@@ -144,7 +145,7 @@ class Simulation : public ::testing::Test {
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
-  Scratch scratch_;
+  ScratchFolder scratch_;
 };
 
 TEST_F(Simulation, AnswersOnEachBusAndEndsCleanly) {
@@ -375,8 +376,8 @@ TEST_F(Simulation, SaysWhatIsWrongAndEnds) {
 
 TEST_F(Simulation, AStateFilePlacesTheUnits) {
   Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n");
-  const auto lacks = RunToEnd({"--units", units(), "--state", scratch_ / "state.csv",
-                               "--unix-directory", scratch_.path()});
+  const auto lacks = RunToEnd(
+      {"--units", units(), "--state", scratch_ / "state.csv", "--unix-directory", scratch_.path()});
   EXPECT_EQ(lacks.exit, 1);
   EXPECT_NE(lacks.err.find("state.csv: no row for units 11, 13"), std::string::npos) << lacks.err;
   Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n11,0,180\n13,0,180\n");

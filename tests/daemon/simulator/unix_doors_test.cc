@@ -6,10 +6,12 @@
 
 #include "daemon/ports/unix_port.h"
 #include "protocol/wire/codec.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::simulator {
 namespace {
+
+using test::ScratchFolder;
 
 // A process that is held up for a tenth of a second whenever it has read the time. In the midst of
 // the hold-up behind one of these readings something happens.
@@ -41,7 +43,7 @@ sim::WorldConfig OneUnit() {
 }
 
 TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const HostClock clock(1, ReadHeldUp);
   sim::World world(OneUnit());
   const auto doors = UnixDoors::Create({scratch.path(), {BusId{3}}}).value();

@@ -13,13 +13,13 @@
 #include <vector>
 
 #include "daemon/store/store.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class StoreTest : public ::testing::Test {
  protected:
-  [[nodiscard]] std::string Path() const { return folder_.File("fleet.db"); }
+  [[nodiscard]] std::string Path() const { return folder_ / "fleet.db"; }
 
   std::unique_ptr<Store> OpenStore(const char* vfs = nullptr) {
     auto store = Store::Open(Path(), {.vfs = vfs});
@@ -41,7 +41,7 @@ class StoreTest : public ::testing::Test {
     sqlite3_close(db);
   }
 
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
 };
 
 inline void ExpectDone(const Status& status) { EXPECT_TRUE(status) << status.error().text; }
@@ -114,4 +114,4 @@ inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   return k;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

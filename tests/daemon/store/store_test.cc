@@ -13,10 +13,10 @@
 namespace focalfleet {
 namespace {
 
+using test::Intent;
+using test::StoreTest;
+using test::Vector;
 using ::testing::HasSubstr;
-using testing::Intent;
-using testing::StoreTest;
-using testing::Vector;
 
 // The error of what should have failed; a success reads as one that no test expects.
 template <class T>
@@ -67,7 +67,7 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
       ConfigurationRow{5, "night.csv", ConfigurationState::kMoving, 5000, 3, 2, 1, 22.5,
                        std::nan(""), 1.25, 9.0},
       AlarmRow{9, Severity::kError, UnitId{12}, BusId{3}, "over_temperature"}};
-  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+  test::ExpectDone(OpenStore()->Commit(rows, kEight));
 
   const auto fleet = OpenStore()->Load();
   ASSERT_TRUE(fleet) << fleet.error().text;
@@ -109,12 +109,12 @@ ModelRow Loaded(std::uint64_t entry, const std::string& sha256, const std::strin
 
 TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Loaded(1, "aa", "name = 'a'\n")}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 2}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Loaded(1, "aa", "name = 'a'\n")}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 2}}, kNine));
   ModelRow back = Loaded(3, "aa", "");
   back.text.reset();
   back.restores = 1;
-  testing::ExpectDone(store->Commit(std::vector<Row>{back}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{back}, kNine));
   const auto reader = OpenReader();
   const auto changes = reader->Models(10);
   ASSERT_TRUE(changes) << changes.error().text;
@@ -146,7 +146,7 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
 TEST_F(StoreTest, TellsWhoseCountBeganAnewSince) {
   auto store = OpenStore();
   const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
-    testing::ExpectDone(store->Commit(
+    test::ExpectDone(store->Commit(
         std::vector<Row>{Intent(unit, serial, 3, {0, 0}, {5, 5}), IntentEndRow{{serial}, {3}, end}},
         at));
   };
@@ -155,13 +155,13 @@ TEST_F(StoreTest, TellsWhoseCountBeganAnewSince) {
   home(14, 7003, IntentEnd::kArrived, kNine);
   // Set by hand, found by the camera, corrected by it (no new count), bound first, replaced.
   const auto stands = [](std::uint32_t serial, Origin origin) {
-    return testing::Vector(serial, Witness::kReported, 5, 5, 1, origin);
+    return test::Vector(serial, Witness::kReported, 5, 5, 1, origin);
   };
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{BindingRow{{15}, {7004}}, BindingRow{{16}, {7005}}, BindingRow{{17}, {7006}},
                        BindingRow{{19}, {7008}}, BindingRow{{20}, {7009}}},
       kEight));
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{stands(7004, Origin::kOperator), stands(7005, Origin::kFound),
                        stands(7006, Origin::kCamera), BindingRow{{18}, {7007}},
                        BindingRow{{19}, {7999}}, BindingRow{{20}, {0}}, BindingRow{{20}, {7009}}},
@@ -191,8 +191,8 @@ TuningRow Tuned(std::uint16_t critical, double margin) {
 
 TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(37, 0.5)}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(38, 0.25)}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Tuned(37, 0.5)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Tuned(38, 0.25)}, kNine));
   const auto fleet = store->Load();
   ASSERT_TRUE(fleet) << fleet.error().text;
   ASSERT_EQ(fleet->tunings.size(), 1u);
@@ -219,8 +219,7 @@ TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
 
 TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
   auto store = OpenStore();
-  testing::ExpectDone(
-      store->Commit(std::vector<Row>{Vector(1, Witness::kReported, -1, 193)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, -1, 193)}, kEight));
   Sql("CREATE TEMP TABLE t(ok INTEGER CHECK(ok)); INSERT INTO t SELECT vector = 95 AND turns = -1 "
       "FROM axis_state WHERE axis = 0; INSERT INTO t SELECT vector = 1 AND turns = 2 FROM "
       "axis_state "
@@ -229,12 +228,12 @@ TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
 
 TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
   // The end stands before the vectors in the batch, and still tells where they are.
-  testing::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
-                                                     Vector(40, Witness::kReported, 10, 20)},
-                                    kNine));
-  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 2, {10, 20}, {0, 0})}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
+                                                  Vector(40, Witness::kReported, 10, 20)},
+                                 kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 2, {10, 20}, {0, 0})}, kNine));
 
   EXPECT_EQ(store->Load()->open_intents.size(), 1u);
   const auto moves = OpenReader()->Moves(UnitId{4}, 10);
@@ -254,12 +253,12 @@ TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
 TEST_F(StoreTest, AnIntentEndsOnceAndCanBeWrittenTwice) {
   auto store = OpenStore();
   const std::vector<Row> begin = {Intent(4, 40, 1, {0, 0}, {10, 20})};
-  testing::ExpectDone(store->Commit(begin, kEight));
-  testing::ExpectDone(store->Commit(begin, kEight));
+  test::ExpectDone(store->Commit(begin, kEight));
+  test::ExpectDone(store->Commit(begin, kEight));
   EXPECT_EQ(store->Load()->open_intents.size(), 1u);
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kFault}}, kEight));
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived}}, kNine));
   const auto moves = OpenReader()->Moves({}, 10);
   ASSERT_EQ(moves->size(), 1u);
@@ -269,9 +268,9 @@ TEST_F(StoreTest, AnIntentEndsOnceAndCanBeWrittenTwice) {
 
 TEST_F(StoreTest, ASerialNumberSitsAtOnePlace) {
   auto store = OpenStore();
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{BindingRow{{1}, {11}}, BindingRow{{2}, {22}}}, kEight));
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{BindingRow{{1}, {22}}, BindingRow{{2}, {11}}}, kNine));
   const auto units = store->Load()->units;
   ASSERT_EQ(units.size(), 2u);
@@ -286,12 +285,12 @@ TEST_F(StoreTest, ASerialNumberSitsAtOnePlace) {
 TEST_F(StoreTest, ParametersAndPlacesKeepTheirHistory) {
   auto store = OpenStore();
   ParameterRow row{{7}, Axis::kTheta, Parameter::kRepeat, 108, Origin::kFactory};
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));  // nothing new
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));  // nothing new
   row.value = 37;
   row.origin = Origin::kTuning;
-  testing::ExpectDone(store->Commit(std::vector<Row>{row, EnableRow{{3}, false, "spare"}}, kNine));
-  testing::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{3}, true, "mended"}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{row, EnableRow{{3}, false, "spare"}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{3}, true, "mended"}}, kNine));
 
   const auto parameters = OpenReader()->Parameters({7}, 10);
   ASSERT_EQ(parameters->size(), 2u);
@@ -309,13 +308,13 @@ TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
   ConfigurationRow row;
   row.source = "a.csv";
   for (row.id = 1; row.id <= 3; ++row.id) {
-    testing::ExpectDone(store->Commit(
+    test::ExpectDone(store->Commit(
         std::vector<Row>{row, AlarmRow{row.id, Severity::kWarning, {}, BusId{2}, "x\0y"}}, kEight));
   }
   row.id = 3;
   row.state = ConfigurationState::kDone;
   row.makespan_s = std::nan("");
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));
   const auto configurations = OpenReader()->Configurations(2);
   ASSERT_EQ(configurations->size(), 2u);
   EXPECT_EQ((*configurations)[0].row.id, 3u);
@@ -332,7 +331,7 @@ TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
 
 TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{Intent(1, 1, 1, {0, 0}, {1, 1}), Intent(2, 2, 1, {0, 0}, {1, 1}),
                        IntentEndRow{{1}, {1}, IntentEnd::kArrived},
                        ConfigurationRow{.id = 8, .source = "", .state = ConfigurationState::kDone},
@@ -378,8 +377,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
   }
   EXPECT_TRUE(store->Load()->vectors.empty());  // not even the good rows beside them
   EXPECT_EQ(store->counters().failed, std::size(wrong));
-  testing::ExpectDone(
-      store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1)}, kEight));
   EXPECT_EQ(store->Load()->vectors.size(), 1u);
 }
 
@@ -391,7 +389,7 @@ struct Garbage {
 class StoreGarbage : public StoreTest, public ::testing::WithParamInterface<Garbage> {};
 
 TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
-  testing::ExpectDone(OpenStore()->Commit(
+  test::ExpectDone(OpenStore()->Commit(
       std::vector<Row>{BindingRow{{12}, {7}}, Vector(7, Witness::kReported, 10, 20),
                        Intent(12, 7, 3, {0, 0}, {1, 1}),
                        ParameterRow{{7}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
@@ -404,7 +402,7 @@ TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
   EXPECT_EQ(fleet.error().code, ErrorCode::kInvalid);
   EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().reported));
   // The store is not stuck in the read.
-  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -442,11 +440,11 @@ INSTANTIATE_TEST_SUITE_P(
         Garbage{"INSERT INTO meta VALUES('next_mood', 1)", "next_mood: nobody reads"}));
 
 TEST_F(StoreTest, GarbageInHistoryIsAnErrorToo) {
-  testing::ExpectDone(OpenStore()->Commit(
-      std::vector<Row>{
-          Intent(12, 7, 3, {0, 0}, {1, 1}), IntentEndRow{{7}, {3}, IntentEnd::kArrived},
-          Vector(7, Witness::kReported, 1, 1), AlarmRow{1, Severity::kInfo, {}, {}, ""}},
-      kEight));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{Intent(12, 7, 3, {0, 0}, {1, 1}),
+                                                        IntentEndRow{{7}, {3}, IntentEnd::kArrived},
+                                                        Vector(7, Witness::kReported, 1, 1),
+                                                        AlarmRow{1, Severity::kInfo, {}, {}, ""}},
+                                       kEight));
   Sql("UPDATE intent SET end = 77; UPDATE alarm SET severity = 3");
   auto reader = OpenReader();
   EXPECT_THAT(ErrorOf(reader->Moves({}, 9)).text, HasSubstr("end is 77"));
@@ -477,7 +475,7 @@ TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
                       .error_um = {},
                       .target_id = {},
                       .delay_s = {}};
-  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, bare}, {6}));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, bare}, {6}));
   const auto read = OpenReader()->Measurements(7);
   ASSERT_TRUE(read) << read.error().text;
   ASSERT_EQ(read->size(), 2u);
@@ -517,7 +515,7 @@ TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithWhoeverMeasured) {
   lying.unit = {13};
   lying.status = MeasurementStatus::kSensorsDoubted;
   lying.carrier = FibreCarrierReading{.used = 0x7, .verdict = "too few sensors"};
-  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
   const auto read = OpenReader()->Measurements(8);
   ASSERT_TRUE(read) << read.error().text;
   ASSERT_EQ(read->size(), 2u);
@@ -538,9 +536,9 @@ TEST_F(StoreTest, ASecondWriterIsRefusedAndTheFirstNamed) {
   EXPECT_EQ(second.error().code, ErrorCode::kRefused);
   EXPECT_THAT(second.error().text, HasSubstr("process " + std::to_string(getpid())));
   // By another name of the same file, too.
-  std::filesystem::create_symlink(Path(), folder_.File("link.db"));
-  EXPECT_EQ(ErrorOf(Store::Open(folder_.File("link.db"))).code, ErrorCode::kRefused);
-  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
+  std::filesystem::create_symlink(Path(), folder_ / "link.db");
+  EXPECT_EQ(ErrorOf(Store::Open(folder_ / "link.db")).code, ErrorCode::kRefused);
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
   store.reset();
   EXPECT_EQ(OpenStore()->Load()->vectors.size(), 1u);
 }
@@ -573,18 +571,18 @@ TEST_F(StoreTest, AReaderSeesWholeBatchesBesideTheWriter) {
   auto store = OpenStore();
   auto reader = OpenReader();
   for (std::uint32_t k = 1; k <= 50; ++k) {
-    testing::ExpectDone(store->Commit(testing::Batch(k, 20), kEight));
+    test::ExpectDone(store->Commit(test::Batch(k, 20), kEight));
     const auto fleet = reader->Load();
     ASSERT_TRUE(fleet) << fleet.error().text;
-    EXPECT_EQ(testing::BatchIn(*fleet, 20), k);
+    EXPECT_EQ(test::BatchIn(*fleet, 20), k);
   }
   store.reset();
-  EXPECT_EQ(testing::BatchIn(*reader->Load(), 20), 50u);  // and after it
-  EXPECT_EQ(testing::BatchIn(*OpenReader()->Load(), 20), 50u);
+  EXPECT_EQ(test::BatchIn(*reader->Load(), 20), 50u);  // and after it
+  EXPECT_EQ(test::BatchIn(*OpenReader()->Load(), 20), 50u);
 }
 
 TEST_F(StoreTest, ANewerStoreIsLeftAsItIs) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 3), kEight));
   Sql("PRAGMA user_version = 99");
   const std::string before = Bytes(Path());
   const auto store = Store::Open(Path());
@@ -598,7 +596,7 @@ TEST_F(StoreTest, ANewerStoreIsLeftAsItIs) {
 }
 
 TEST_F(StoreTest, ANewerStoreIsSeenInItsWalToo) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 3), kEight));
   // A later version that was killed before its WAL reached the file.
   const pid_t child = fork();
   if (child == 0) {
@@ -639,7 +637,7 @@ TEST_F(StoreTest, AnEmptyFileBecomesAStore) {
 }
 
 TEST_F(StoreTest, DamagedPagesAreAnError) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 200), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 200), kEight));
   std::string content = Bytes(Path());
   for (std::size_t i = 4096; i < content.size(); ++i) content[i] = static_cast<char>(i * 37);
   std::ofstream(Path(), std::ios::binary) << content;
@@ -653,7 +651,7 @@ TEST_F(StoreTest, DamagedPagesAreAnError) {
 
 TEST_F(StoreTest, ADamagedTableIsNoFaultOfTheRow) {
   const std::vector<Row> rows = {AlarmRow{.id = 1, .text = "the first"}};
-  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+  test::ExpectDone(OpenStore()->Commit(rows, kEight));
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(Path().c_str(), &db), SQLITE_OK);
   const auto number = [&](const char* sql) {
@@ -678,13 +676,13 @@ TEST_F(StoreTest, ADamagedTableIsNoFaultOfTheRow) {
 }
 
 TEST_F(StoreTest, AMissingFolderIsUnavailable) {
-  EXPECT_EQ(ErrorOf(Store::Open(folder_.File("none/fleet.db"))).code, ErrorCode::kUnavailable);
-  EXPECT_EQ(ErrorOf(StoreReader::Open(folder_.File("none.db"))).code, ErrorCode::kUnavailable);
+  EXPECT_EQ(ErrorOf(Store::Open(folder_ / "none/fleet.db")).code, ErrorCode::kUnavailable);
+  EXPECT_EQ(ErrorOf(StoreReader::Open(folder_ / "none.db")).code, ErrorCode::kUnavailable);
 }
 
 TEST_F(StoreTest, AnEmptyBatchIsNoTransaction) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit({}, kEight));
+  test::ExpectDone(store->Commit({}, kEight));
   EXPECT_EQ(store->counters().transactions, 0u);
 }
 

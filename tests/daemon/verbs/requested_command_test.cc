@@ -6,12 +6,12 @@
 #include <variant>
 
 #include "daemon/status/status_json.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/verbs/small_fleet.h"
 
 namespace focalfleet {
 namespace {
 
+using test::SmallFleet;
 using ::testing::HasSubstr;
 
 Result<Command> Try(const SmallFleet& fleet, const std::string& verb, const Json& args) {

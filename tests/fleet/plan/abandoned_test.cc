@@ -14,11 +14,11 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::Seed;
+using ::focalfleet::test::DrawStartAndTargets;
+using ::focalfleet::test::FleetOf;
+using ::focalfleet::test::HexFleet;
+using ::focalfleet::test::PlanningFleet;
+using ::focalfleet::test::Seed;
 using ::testing::HasSubstr;
 
 /// An answer to the planner's question: false for so many times.

@@ -13,8 +13,15 @@
 #include "fleet/files/layout_file.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
 
 /// Makespan over the slowest unit's time alone.
 double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
@@ -87,4 +94,4 @@ INSTANTIATE_TEST_SUITE_P(Seeds, DesiScale, ::testing::Range(0, 2));
 #endif
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -11,17 +11,17 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckedRow;
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::ExpectSound;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::MoveOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::Seed;
-using ::focalfleet::testing::UnitAt;
+using ::focalfleet::test::CheckedRow;
+using ::focalfleet::test::CheckOptions;
+using ::focalfleet::test::DrawStartAndTargets;
+using ::focalfleet::test::ExpectSound;
+using ::focalfleet::test::FleetOf;
+using ::focalfleet::test::HexFleet;
+using ::focalfleet::test::MoveOf;
+using ::focalfleet::test::PlanningFleet;
+using ::focalfleet::test::PoseDeg;
+using ::focalfleet::test::Seed;
+using ::focalfleet::test::UnitAt;
 using ::testing::HasSubstr;
 
 /// Two arms side by side between the bases, each below or above the other so that folding back (phi
@@ -234,7 +234,7 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
       }
       truth.start[0] = Exactly(Witness::kReported, pose);
       // Neighbours that cannot be proven free of it must not have moved; they may stand inside.
-      const auto report = focalfleet::testing::Witnessed(truth, *plan);
+      const auto report = focalfleet::test::Witnessed(truth, *plan);
       for (const std::string& fault : report.faults) {
         if (!fault.starts_with("units ")) {
           ADD_FAILURE() << fault;
@@ -292,7 +292,7 @@ TEST(Planner, KeepsTheMarginsThatItIsAskedFor) {
   const auto tight =
       MakePlan(fleet.request(), {.fixed = false, .start_skew_s = 0, .clock_error = 0});
   ASSERT_TRUE(tight);
-  EXPECT_FALSE(focalfleet::testing::Witnessed(fleet, *tight, check).ok());
+  EXPECT_FALSE(focalfleet::test::Witnessed(fleet, *tight, check).ok());
 }
 
 /// A unit ends early at `t_s`; its followers are stopped as late as UnitPlan::followers allows.
@@ -315,7 +315,7 @@ std::vector<CheckedRow> CutShort(const PlanningFleet& fleet, const Plan& plan, s
     }
   }
   std::vector<CheckedRow> rows;
-  for (CheckedRow row : focalfleet::testing::CheckedRows(plan, fleet.layout, fleet.drives)) {
+  for (CheckedRow row : focalfleet::test::CheckedRows(plan, fleet.layout, fleet.drives)) {
     const double stop = stops[fleet.layout.Find(UnitId{row.unit})->value];
     if (row.t0_s >= stop) continue;
     if (row.t1_s > stop) {
@@ -343,8 +343,8 @@ TEST(Planner, StoppingTheFollowersOfAUnitThatEndsEarlyKeepsAllClear) {
     const double t_s = rng.Uniform(0, plan->makespan_s);
     for (const bool heed_left : {false, true}) {
       const auto rows = CutShort(fleet, *plan, unit, t_s, heed_left);
-      const auto report = focalfleet::testing::CheckPlan(
-          focalfleet::testing::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+      const auto report = focalfleet::test::CheckPlan(
+          focalfleet::test::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
           rows, {}, options);
       EXPECT_TRUE(report.ok()) << "unit index " << unit << " ends at " << t_s << " s\n"
                                << report.Text();
@@ -353,9 +353,9 @@ TEST(Planner, StoppingTheFollowersOfAUnitThatEndsEarlyKeepsAllClear) {
     for (UnitPlan& move : alone.moves) move.followers.clear();
     const auto rows = CutShort(fleet, alone, unit, t_s, false);
     touched_without +=
-        focalfleet::testing::CheckPlan(focalfleet::testing::CheckedUnits(fleet.layout, fleet.drives,
-                                                                         fleet.start, fleet.frozen),
-                                       rows, {}, options)
+        focalfleet::test::CheckPlan(
+            focalfleet::test::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+            rows, {}, options)
                 .ok()
             ? 0
             : 1;

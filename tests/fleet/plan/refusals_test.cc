@@ -9,14 +9,14 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::ExpectSound;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::Seed;
-using ::focalfleet::testing::UnitAt;
+using ::focalfleet::test::CheckOptions;
+using ::focalfleet::test::DrawStartAndTargets;
+using ::focalfleet::test::ExpectSound;
+using ::focalfleet::test::FleetOf;
+using ::focalfleet::test::PlanningFleet;
+using ::focalfleet::test::PoseDeg;
+using ::focalfleet::test::Seed;
+using ::focalfleet::test::UnitAt;
 using ::testing::HasSubstr;
 
 TEST(Planner, PassesOverDisabledAndUnknownUnitsByName) {
@@ -85,7 +85,7 @@ TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
   EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
   EXPECT_TRUE(plan->unserved.empty());
   // Never nearer than they start, by the checker's own distance.
-  const auto before = focalfleet::testing::Witnessed(fleet, {});
+  const auto before = focalfleet::test::Witnessed(fleet, {});
   ASSERT_LT(before.worst_margin_mm, -0.1);
   CheckOptions options;
   options.tolerance_mm = -before.worst_margin_mm + 2e-4;

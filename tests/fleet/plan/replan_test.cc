@@ -17,8 +17,23 @@
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::CheckedObstacles;
+using test::CheckedRow;
+using test::CheckedRows;
+using test::CheckedUnit;
+using test::CheckedUnits;
+using test::CheckOptions;
+using test::CheckPlan;
+using test::CheckReport;
+using test::DegreesOf;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kLateSkewS = 0.040;
@@ -754,4 +769,4 @@ TEST_F(ReplanErrors, ADisabledUnitStays) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -11,10 +11,10 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::UnitAt;
+using ::focalfleet::test::FleetOf;
+using ::focalfleet::test::PlanningFleet;
+using ::focalfleet::test::PoseDeg;
+using ::focalfleet::test::UnitAt;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

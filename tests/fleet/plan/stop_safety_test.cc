@@ -22,8 +22,22 @@
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::CheckedRow;
+using test::CheckedRows;
+using test::CheckedUnit;
+using test::CheckedUnits;
+using test::CheckOptions;
+using test::CheckPlan;
+using test::CheckReport;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr double kBeforeS = 0.1;  // walked before the first stop
@@ -620,4 +634,4 @@ INSTANTIATE_TEST_SUITE_P(Seeds, StopSafetyInOrder, ::testing::Values(1));
 INSTANTIATE_TEST_SUITE_P(Seeds, StopSafetyOnce, ::testing::Values(1));
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

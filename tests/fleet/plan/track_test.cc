@@ -14,9 +14,9 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::testing::HexFleet;
-using focalfleet::testing::PlanningFleet;
-using focalfleet::testing::TestSeed;
+using focalfleet::test::HexFleet;
+using focalfleet::test::PlanningFleet;
+using focalfleet::test::TestSeed;
 
 TEST(DirectionOf, IsCosineAndSine) {
   Rng rng(TestSeed(11));

@@ -13,7 +13,7 @@
 #include "sim/world/unit/firmware.h"
 #include "tests/sim/drive/bench_motor.h"
 
-namespace focalfleet::sim::testing {
+namespace focalfleet::sim::test {
 
 inline constexpr double kBenchGear = 100;
 inline constexpr std::int32_t kBenchMin = -9600;  // one output turn is 9600 vectors
@@ -126,4 +126,4 @@ inline StagedMove BenchMove(std::uint16_t id, std::int32_t theta = 400, std::int
   return move;
 }
 
-}  // namespace focalfleet::sim::testing
+}  // namespace focalfleet::sim::test

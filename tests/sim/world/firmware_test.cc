@@ -12,10 +12,10 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::BenchMove;
-using testing::FirmwareRig;
-using testing::kBenchMax;
-using testing::kBenchMin;
+using test::BenchMove;
+using test::FirmwareRig;
+using test::kBenchMax;
+using test::kBenchMin;
 
 constexpr std::uint16_t kOld = 6;   // the move that was begun last
 constexpr std::uint16_t kMove = 7;  // the one that is staged or runs
@@ -678,7 +678,7 @@ TEST(Firmware, AnInterruptedUnitMovesAgainWhenBothPositionsAreSet) {
 // A host that forgets, repeats and mixes; moves get ascending ids, power fails now and then.
 TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
   for (std::uint64_t round = 0; round < 60; ++round) {
-    const std::uint64_t seed = focalfleet::testing::TestSeed(1) + round;
+    const std::uint64_t seed = focalfleet::test::TestSeed(1) + round;
     FOCALFLEET_TRACE_SEED(seed);
     Rng rng(seed);
     FirmwareRig rig;
@@ -751,7 +751,7 @@ TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
 }
 
 TEST(Firmware, AnyFrameIsTakenOrLeftButMovesNoUnitThatIsNotArmed) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(2);
+  const std::uint64_t seed = focalfleet::test::TestSeed(2);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   FirmwareRig rig;

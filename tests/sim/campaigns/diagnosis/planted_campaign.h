@@ -15,7 +15,7 @@
 #include "sim/campaigns/diagnosis/fit.h"
 #include "sim/campaigns/diagnosis/planted.h"
 
-namespace focalfleet::sim {
+namespace focalfleet::sim::test {
 
 inline Campaign Planted(std::vector<PlantedEffect> effects, PlantedOptions options = {}) {
   options.units = options.units == 60 ? 24 : options.units;
@@ -88,4 +88,4 @@ inline std::string Reported(const Diagnosis& diagnosis) {
   return text;
 }
 
-}  // namespace focalfleet::sim
+}  // namespace focalfleet::sim::test

@@ -165,7 +165,7 @@ TEST_F(UnitMachineTest, HasRoomForTheAnswersToTheFullestGroup) {
 
 // Whatever staging comes, in whatever portions: what is answered and held is the same.
 TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
-  const auto seed = focalfleet::testing::TestSeed(41);
+  const auto seed = focalfleet::test::TestSeed(41);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   PaperBoard other_board;
@@ -176,7 +176,7 @@ TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
   for (int round = 0; round < 3000; ++round) {
     std::vector<CanFrame> frames;
     while (frames.size() < 1 + rng.Below(12)) {
-      HostMessage message = focalfleet::testing::RandomHost(rng);
+      HostMessage message = focalfleet::test::RandomHost(rng);
       // Few moves, so that some of them are complete.
       const MoveId move{static_cast<std::uint16_t>(1 + rng.Below(2))};
       if (auto* begin = std::get_if<StageBegin>(&message)) *begin = {move, {1, 0}, begin->mode};
@@ -253,7 +253,7 @@ TEST_F(UnitMachineTest, LeavesNothingUnkept) {
 
 TEST_F(UnitMachineTest, UsesNoHeap) {
   board_.writes = false;
-  const focalfleet::testing::AllocGuard guard;
+  const focalfleet::test::AllocGuard guard;
   StageArmStart();
   Pass();
   Pass();
