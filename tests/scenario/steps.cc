@@ -6,6 +6,8 @@
 
 namespace focalfleet::test {
 
+InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
+
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further) {
   ASSERT_TRUE(fleet->RunUntil(
       [&] { return fleet->coordinator().configuration().state == ConfigurationState::kMoving; },

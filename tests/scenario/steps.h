@@ -8,6 +8,9 @@
 
 namespace focalfleet::test {
 
+/// 37 units, which make a hexagon with four units a side. The rest is as by default.
+InProcessFleet::Options Small(std::uint64_t seed);
+
 /// Until somebody moves, and then a little longer: in the middle of the motion.
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further);
 
