@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-// NOLINTBEGIN(cppcoreguidelines-no-malloc): this is what operator new is made of.
+// NOLINTBEGIN(cppcoreguidelines-no-malloc): operator new is made of malloc.
 namespace {
 
 thread_local std::uint64_t allocation_count = 0;

@@ -1,4 +1,4 @@
-// Bytes packed as gzip packs them, by zlib's own compressor.
+// Packs bytes as gzip does, with zlib's own compressor.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
-// The scratch folder is one test's place for files and sockets. It goes with the test, but stays
-// where the test failed, so that its files can be read.
+// The scratch folder is one test's place for files and sockets. The folder goes with the test.
+// Where the test failed, the folder stays, so that its files can be read.
 #pragma once
 
 #include <string>

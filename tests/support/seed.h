@@ -1,5 +1,5 @@
-// One seed for a random test, printed with every failure inside its scope and taken from the
-// environment when it is to be seen again: FOCALFLEET_SEED=4711 ctest -R Codec.
+// The seed of a random test. Every failure inside its scope prints the seed, and the environment
+// variable repeats it: FOCALFLEET_SEED=4711 ctest -R Codec.
 #pragma once
 
 #include <gtest/gtest.h>

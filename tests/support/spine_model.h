@@ -1,5 +1,5 @@
-// The model of the simulated joints' field, fitted to a map of their magnets as an instrument maker
-// would measure it.
+// The model of the simulated joints' field, fitted to a map of their magnets as the maker of an
+// instrument would measure it.
 #pragma once
 
 #include "daemon/hall/field_model_file.h"

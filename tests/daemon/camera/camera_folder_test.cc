@@ -64,7 +64,7 @@ class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
     const auto taken = folder_->Take();
     return !taken ? taken.error().text : !*taken ? "nothing" : (*taken)->id;
   }
-  /// The file stands in refused/ now, with the reason, and the next is looked at.
+  /// The file is in refused/ with its reason, and the folder takes the next file.
   void ExpectRefused(const std::string& name, const std::string& reason) const {
     EXPECT_THAT(TakenId(), HasSubstr(reason)) << name;
     EXPECT_FALSE(Exists(File(name)));
@@ -173,8 +173,6 @@ TEST_P(CameraFolderTest, WhatLayThereBeforeAnswersNothing) {
   EXPECT_TRUE(Exists(File("refused/old.fits")));
 }
 
-// ---- a camera that is broken or hostile
-
 TEST_P(CameraFolderTest, ARequestIsWrittenIntoNothingOfOthers) {
   Open();
   ASSERT_EQ(symlink("../secret", File("request.json").c_str()), 0);
@@ -216,7 +214,7 @@ TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
     EXPECT_THAT(folder.error().text, HasSubstr(std::string(part) + ": a symbolic link"));
     fs::remove(File(part));
   }
-  // Also when it comes later: what is held open is the folder that it was.
+  // A folder that is exchanged later changes nothing: the port holds the first one open.
   Open();
   fs::rename(File("refused"), File("gone"));
   ASSERT_EQ(symlink("../theirs", File("refused").c_str()), 0);
@@ -250,13 +248,13 @@ TEST_P(CameraFolderTest, WhatCannotBeMovedIsTakenOnceAndStays) {
   Put("a.csv", WriteSpots(Three("a")));
   Put("b.csv", "no spots\n");
   fs::permissions(File(""), fs::perms::owner_read | fs::perms::owner_exec);
-  const bool root = GetParam() == 0;  // may move them all the same
+  const bool root = GetParam() == 0;  // root may move files all the same
   EXPECT_EQ(TakenId(), "a");
   EXPECT_THAT(TakenId(), HasSubstr("b.csv"));
   EXPECT_EQ(TakenId(), "nothing");
   EXPECT_EQ(Exists(File("a.csv")), !root);
   EXPECT_EQ(folder_->Request(1, kSince).has_value(), root);
-  // At the start, too, it would be refused for ever.
+  // At the next start the file would be refused again and again.
   folder_.reset();
   Open();
   EXPECT_EQ(TakenId(), "nothing");
@@ -278,7 +276,7 @@ TEST_P(CameraFolderTest, LongNamesAndStrangeOnesAreSetAsideToo) {
   EXPECT_EQ(TakenId(), "nothing");
 }
 
-// The camera's thread ends when the daemon does, whatever lies in the folder.
+// The camera's thread ends when the daemon ends, whatever the folder contains.
 TEST_P(CameraFolderTest, NothingInTheFolderHoldsTheCamerasThread) {
   Open();
   for (const char* name : {"request.json", "a.csv", "b.fits", "c.csv.gz"})

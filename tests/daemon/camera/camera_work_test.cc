@@ -1,4 +1,4 @@
-// What becomes of exposures that may not answer: nothing of them is used, and the reason is told.
+// Exposures that do not answer the request are not used, and the reason is reported.
 #include "daemon/camera/camera_work.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +21,7 @@ constexpr std::int64_t kNowNs = 1'795'316'645'000'000'000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr double kRimMm = 260;  // beyond the outermost fibre
 
-/// Gives what it was filled with, one after the other.
+/// The port hands over the exposures that it was filled with, one after the other.
 class ScriptedPort : public CameraPort {
  public:
   explicit ScriptedPort(std::deque<Exposure>* exposures) : exposures_(exposures) {}
@@ -115,7 +115,7 @@ TEST_F(CameraWorkTest, PutsEachUnitWhereItIs) {
     const Unit& unit = field_.layout().unit(measurement.unit);
     const std::complex<double> truth = field_.units()[measurement.unit.value].place_mm;
     EXPECT_LT(std::hypot(measurement.x_mm - truth.real(), measurement.y_mm - truth.imag()), 0.015);
-    // The place in vectors is where the camera saw it, to half a vector of each axis.
+    // The place in vectors is where the camera saw the fibre, to half a vector of each axis.
     const PointFp at = FibreAt(unit, UnitDrive{}, *measurement.place);
     EXPECT_LT(std::hypot(at.x_mm - measurement.x_mm, at.y_mm - measurement.y_mm), 0.004);
   }
@@ -176,13 +176,13 @@ TEST_F(CameraWorkTest, AGoodExposureAfterABadOneIsTaken) {
   EXPECT_THAT(log_[0], HasSubstr("early"));
 }
 
-/// Gives an exposure of long ago, again and again, and counts.
+/// The port hands over the same old exposure again and again, and counts the calls.
 class ChatteringPort : public CameraPort {
  public:
   explicit ChatteringPort(Exposure exposure) : exposure_(std::move(exposure)) {}
   Status Request(std::uint64_t, WallTime) override { return {}; }
   Result<std::optional<Exposure>> Take() override {
-    constexpr int kPatience = 100'000;  // many times what the worker's lasts
+    constexpr int kPatience = 100'000;  // calls; many times what the worker makes until it gives up
     if (++given_ > kPatience) return Fail(ErrorCode::kInvalid, "it was not given up");
     exposure_.id = "chatter " + std::to_string(given_);
     return std::optional(exposure_);

@@ -1,5 +1,4 @@
-// focalfleet apply: what it sends, how it reports a configuration, and with which exit code it
-// ends.
+// focalfleet apply: the request that it sends, its report of a configuration, and its exit codes.
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
@@ -149,7 +148,7 @@ TEST_F(DaemonCommands, ManyUnservedUnitsAreReportedByReason) {
   EXPECT_THAT(text.out,
               HasSubstr("  319 units (1, 2, 3, 4, 5, ...): failed: no answer (now silent)\n"
                         "  unit 30: failed: stalled (now silent)\n"));
-  // What it is, what it took, its upload and starts; a line a reason.
+  // The five lines are the summary, its figures, the upload and the starts; each reason adds one.
   EXPECT_EQ(std::count(text.out.begin(), text.out.end(), '\n'), 5 + 2);
 }
 

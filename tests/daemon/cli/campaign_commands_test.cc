@@ -1,5 +1,5 @@
-// campaign run, and the model that comes of it in force: what is refused before anything moves, and
-// what a model that is loaded says of itself.
+// campaign run and the model in force that comes of it. Errors are refused before anything moves,
+// and a loaded model reports what it contains.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/cli/fake_daemon.h"

@@ -1,4 +1,4 @@
-// can decode as a process: words, JSON lines, bad lines, pipes.
+// can decode as a process: words, JSON lines, bad lines and pipes.
 #include <gmock/gmock.h>
 
 #include <sstream>
@@ -70,7 +70,7 @@ TEST(CanDecodeCommand, GivesAnObjectALine) {
   EXPECT_EQ(objects[4]["malformed"], "length");
 }
 
-// The example of docs/protocol.md, and one with a wrong byte.
+// The input is the example of docs/protocol.md and the same with a wrong byte.
 TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
   const ScratchFolder scratch;
   const std::string log =
@@ -91,7 +91,7 @@ TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
   EXPECT_EQ(objects[2]["malformed"], "function");
 }
 
-// As candump -e -d prints them.
+// The lines are as candump -e -d prints them.
 constexpr const char* kErrors =
     "  can0  10501800   [5]  07 00 01 00 00\n"
     "  can0  20000088   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"

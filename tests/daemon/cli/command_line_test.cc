@@ -1,5 +1,4 @@
-// What holds for every command: the exit codes of wrong usage, help, JSON, and completion for all
-// of the tree.
+// Rules of every command: exit codes of wrong usage, help, JSON, and completion for the whole tree.
 #include "daemon/cli/command_line.h"
 
 #include <gmock/gmock.h>
@@ -26,7 +25,7 @@ std::vector<std::string> Words(const std::string& path) {
   return path.empty() ? std::vector<std::string>{} : CLI::detail::split(path, ' ');
 }
 
-// What bash would offer after these words; the last one is being typed.
+// Returns what bash would offer after these words, the last of which is being typed.
 std::vector<std::string> BashOffers(std::vector<std::string> words) {
   std::vector<std::string> command = {
       "bash",

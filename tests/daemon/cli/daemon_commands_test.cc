@@ -55,7 +55,7 @@ TEST_F(DaemonCommands, NothingThatADaemonSaysMovesTheCursorOrForgesALine) {
     const std::string said = result.out + result.err;
     EXPECT_THAT(said, Not(HasSubstr("\x1b"))) << words[0];
     EXPECT_THAT(said, Not(HasSubstr("\xc2\x9b"))) << words[0];
-    // The text of an error may have lines of its own.
+    // The text of an error may contain line breaks of its own.
     EXPECT_TRUE(words[0] == "enable" || said.find("x\n") == std::string::npos) << said;
     EXPECT_TRUE(words[0] == "stop" || said.find("forged") != std::string::npos) << said;
   }

@@ -1,5 +1,5 @@
-// Files as other people's programs write them: what is read, what is passed over and told once, and
-// that a refusal tells all that is wrong.
+// Files as other programs write them. Known columns are read, others are passed over and reported
+// once, and a refusal names all that is wrong.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-/// Each line as `change` makes it; 0 is the header.
+/// Returns the text with each line as `change` makes it; line 0 is the header.
 std::string Changed(const std::string& csv,
                     const std::function<std::string(std::size_t, const std::string&)>& change) {
   std::string text;
@@ -181,7 +181,7 @@ TEST_F(ForeignFiles, AStateThatLacksAUnitIsRefusedByWhoPlansFromIt) {
       Focalfleet({"estimate", "--units", units_, "--targets", targets_, "--from", state_});
   EXPECT_EQ(estimate.exit, 1);
   EXPECT_THAT(estimate.err, HasSubstr(complaint));
-  // A draw of targets needs the disabled units alone.
+  // A draw of targets needs nothing of the state but the disabled units.
   EXPECT_EQ(Draw("3", {"--from", state_, "--out", scratch_ / "t3.csv"}).exit, 0);
 }
 

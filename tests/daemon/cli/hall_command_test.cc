@@ -41,7 +41,7 @@ test::PlantedCampaign Campaign(const test::Planted& planted, double noise_T) {
   return test::MakeCampaign({.rows = 60, .noise_T = noise_T, .seed = 5}, law, law, planted);
 }
 
-// The voltages alone.
+// Returns the campaign's CSV with the voltages alone.
 std::string VoltsText(const test::PlantedCampaign& campaign) {
   std::istringstream in(test::CampaignText(campaign, false));
   std::string out;
@@ -148,7 +148,7 @@ TEST(HallCommand, DiagnosesIntoItsReport) {
     EXPECT_TRUE(report["gain"].contains(key)) << key;
   EXPECT_EQ(report["data"]["rows"], 60);
   EXPECT_THAT(Slurp(scratch / "report/report.html"), HasSubstr("Explained: sensor_gain"));
-  // The extended model orients by the corrected gain.
+  // The extended model orients with the corrected gain.
   const std::string volts =
       scratch.Put("volts.csv", VoltsText(Campaign({"sensor_gain", 0.05, 2}, 5e-4)));
   const auto orient = Focalfleet({"hall", "orient", "--model", scratch / "report/model.toml",
@@ -161,7 +161,7 @@ TEST(HallCommand, DiagnosesIntoItsReport) {
   EXPECT_EQ(Json::parse(again.out)["verdict"], "consistent");
 }
 
-// The largest error of an angle in rows that `orient` finished.
+// Returns the largest error of an angle over the rows that `orient` finished.
 double WorstError(const std::string& estimates, const test::PlantedCampaign& campaign) {
   const auto rows = Cells(estimates);
   double worst_deg = 0;

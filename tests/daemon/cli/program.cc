@@ -36,7 +36,7 @@ std::vector<char*> Pointers(std::vector<std::string>* texts) {
   return pointers;
 }
 
-// Reads both ends until the program has closed them: neither can fill up and stop it.
+// Reads both pipes until the program has closed them, so that neither can fill and block it.
 void Drain(std::array<int, 2> fds, std::array<std::string*, 2> texts) {
   std::array<pollfd, 2> polls{pollfd{fds[0], POLLIN, 0}, pollfd{fds[1], POLLIN, 0}};
   while (polls[0].fd >= 0 || polls[1].fd >= 0) {

@@ -1,4 +1,4 @@
-// focalfleet stop through the daemon; direct_stop_test.cc has the way without one.
+// focalfleet stop through the daemon; direct_stop_test.cc tests the way without a daemon.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/cli/daemon_commands.h"
@@ -43,7 +43,7 @@ TEST_F(DaemonCommands, AStopIsDoneWhenUnitsStand) {
   EXPECT_EQ(Ask({"stop"}, {{"stop", {}}}).exit, 5) << "whether they stand is not known";
 }
 
-// Where all places are taken the daemon lets a stop in, and no question.
+// A daemon whose places are all taken accepts a stop and refuses other requests.
 TEST_F(DaemonCommands, AStopAsksAgainWhereTheDaemonHasNoPlaceForAQuestion) {
   const auto all = Ask({"stop", "--within-s", "600"},
                        {{"stop", {}}, {"status", {.full_first = 2, .result = StatusAnswer()}}});

@@ -1,4 +1,4 @@
-// The progress bar and the tables, by themselves.
+// The progress bar and the tables by themselves.
 #include <gmock/gmock.h>
 #include <unistd.h>
 

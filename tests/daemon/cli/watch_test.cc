@@ -1,5 +1,5 @@
-// watch as a process, against a publisher in this one: what DDS keeps for late joiners is what it
-// shows.
+// watch runs as a process against a publisher in this one. It shows what DDS keeps for late
+// joiners.
 #include <gmock/gmock.h>
 
 #include "daemon/control/messages.h"

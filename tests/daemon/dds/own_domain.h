@@ -1,6 +1,6 @@
-// A DDS domain that no other test of this machine uses: the first whose lock file is free. Held
-// until the process ends. 20..99 keeps Cyclone's ports (7400 + 250 * domain) below the ephemeral
-// ones.
+// Finds a DDS domain that no other test on this machine uses: the first whose lock file is free.
+// The lock is held until the process ends. Domains 20..99 keep Cyclone's ports (7400 + 250 *
+// domain) below the ephemeral ones.
 #pragma once
 
 #include <fcntl.h>

@@ -1,5 +1,5 @@
-// A daemon's voice without the daemon: publishes units 1..N and alarms 1..A once, says `ready`, and
-// stays until its stdin ends.   talker DOMAIN UNITS ALARMS
+// The talker publishes as a daemon does: units 1..N and alarms 1..A once. Then it prints `ready`
+// and stays until its stdin ends.   talker DOMAIN UNITS ALARMS
 #include <unistd.h>
 
 #include <cstdio>

@@ -63,7 +63,7 @@ TEST(FitsTable, SaysWhatIsNoTable) {
   const auto read = ReadFitsTable(path);
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().text, HasSubstr("text.fits"));
-  // No filter of an extended file name is run.
+  // Filters of an extended file name are not run.
   EXPECT_FALSE(ReadFitsTable(path + "[1][col x=1]"));
   EXPECT_FALSE(WriteFitsTable(folder / "no/such/folder.fits", Small()));
 }

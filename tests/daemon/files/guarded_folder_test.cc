@@ -29,7 +29,8 @@ using ::testing::HasSubstr;
 
 constexpr std::size_t kMax = 1 << 20;
 
-/// Beside the guarded folder lies what is somebody else's: "secret", and a folder "theirs".
+/// The guarded folder has neighbours that belong to another program: "secret", and a folder
+/// "theirs".
 class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
   GuardedFolderTest() : user_(GetParam()), files_(std::make_unique<test::ScratchFolder>()) {
@@ -65,7 +66,7 @@ class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
     return lstat(path.c_str(), &status) == 0;
   }
 
-  AsUser user_;  // from here on, the temporary folder included
+  AsUser user_;  // from here on, the scratch folder included
   std::unique_ptr<test::ScratchFolder> files_;
   std::unique_ptr<GuardedFolder> folder_;
 };
@@ -105,7 +106,7 @@ TEST_P(GuardedFolderTest, ReadsRegularFilesAndNothingElse) {
 
 TEST_P(GuardedFolderTest, AFileThatChangesWhileItIsReadIsNotTaken) {
   const char* reported = "changed while it was read: write it under another ending, then rename it";
-  // The kernel's own files say that they hold nothing.
+  // The kernel's own files report a size of 0.
   const auto kernel = GuardedFolder::Open("/proc/self");
   ASSERT_TRUE(kernel);
   EXPECT_THAT(kernel->Read("status", kMax).error().text, HasSubstr(reported));
@@ -231,7 +232,7 @@ TEST_P(GuardedFolderTest, AFolderThatMayNotBeWrittenIsReported) {
   const auto aside = folder_->Subfolder("aside").value();
   std::filesystem::permissions(
       In(""), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
-  // Root may write all the same.
+  // Root may write into a read-only folder all the same.
   EXPECT_EQ(folder_->Write("y", "2").has_value(), GetParam() == 0);
   EXPECT_EQ(folder_->Move("x", aside).has_value(), GetParam() == 0);
   if (GetParam() != 0) {

@@ -19,7 +19,7 @@ namespace {
 using test::ScratchFolder;
 using ::testing::HasSubstr;
 
-/// The simulator's end of one bus.
+/// The listener is the simulator's end of one bus.
 class Listener {
  public:
   explicit Listener(const std::string& path) {
@@ -97,8 +97,8 @@ TEST(UnixPort, CarriesFramesBothWays) {
   EXPECT_EQ(received[0].bus, BusId{3});
 }
 
-// A process that is held up for a tenth of a second whenever it has read the time, and in the midst
-// of that a frame comes.
+// The process is held up for a tenth of a second after every reading of the time. A frame comes in
+// the middle of the delay.
 std::int64_t g_held_up_ns = 0;
 std::function<void(HostInstant)> g_meanwhile;
 std::int64_t ReadHeldUp() {

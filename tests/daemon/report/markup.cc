@@ -39,7 +39,7 @@ class Reader {
     return name;
   }
 
-  // Up to but not including one of `ends`; false at '<' or an unknown entity before.
+  // Reads up to the first of `ends`; false where '<' or an unknown entity comes before.
   bool Characters(std::string_view ends, std::string* out) {
     static const std::pair<std::string_view, char> kEntities[] = {
         {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&#39;", '\''}};

@@ -1,5 +1,6 @@
-// The page in a real browser, worked by plan_page_probe.js. What it draws, plays and tells is held
-// to the plan, the kinematics and the powers of the program. Skipped where there is no Chromium.
+// The page in a real browser, operated by plan_page_probe.js. What the page draws, plays and
+// reports is compared with the plan, the kinematics and the powers of the program. The test is
+// skipped where there is no Chromium.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -39,8 +40,8 @@ void Insert(const std::string& text, const std::string& before, std::string* htm
   html->insert(at, text);
 }
 
-// From the very border of a row to the end; away from the tight pairs, whose labels may hide an
-// arm.
+// The times run from the very border of a row to the end. They avoid the tight pairs, whose labels
+// may hide an arm.
 std::vector<double> Times(const Plan& plan) {
   const UnitPlan& move = plan.moves.front();
   const double row_begins_s = move.path[0].segments()[0].start_ticks / 1e4;
@@ -53,8 +54,8 @@ struct Visit {
   std::string log;
 };
 
-// The browser's time is virtual, it passes as fast as its timers allow. A browser that is to dump
-// its document makes no frames of its own; a timer stands in.
+// The browser's time is virtual and passes as fast as its timers allow. A browser that dumps its
+// document draws no frames of its own, so a timer takes their place.
 constexpr const char* kPreparation = R"(<script>
 const probeErrors = [];
 addEventListener("error", (event) => probeErrors.push(event.message));
@@ -62,7 +63,8 @@ requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 16);
 </script>
 )";
 
-// No sandbox: it wants privileges that a container or root do not have, and the page is our own.
+// The sandbox is off: it needs privileges that a container or root lacks, and the page is the
+// project's own.
 Visit VisitPage(const SceneData& data) {
   std::string html = PlanPage(data.scene());
   Insert(kPreparation, "<title>", &html);
@@ -119,7 +121,7 @@ SceneData* PlanPageInABrowser::data_ = nullptr;
 Visit* PlanPageInABrowser::visit_ = nullptr;
 Json* PlanPageInABrowser::seen_ = nullptr;
 
-// plan.csv as docs/files.md has it: linear within a row, standing otherwise.
+// Returns the angle by plan.csv as in docs/files.md: linear within a row, constant otherwise.
 double AngleAt(const std::vector<PlanRow>& rows, UnitId unit, Axis axis, double start_deg,
                double t_s) {
   double at_deg = start_deg;

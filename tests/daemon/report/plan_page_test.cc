@@ -37,7 +37,7 @@ const std::string& Html() {
   return html;
 }
 
-// What stands between the end of `begin` and `end`; both must be there once.
+// Returns the text between the end of `begin` and `end`; both must occur once.
 std::string Between(const std::string& text, const std::string& begin, const std::string& end) {
   const std::size_t at = text.find(begin);
   EXPECT_NE(at, std::string::npos) << begin;
@@ -99,7 +99,7 @@ TEST(PlanPage, CarriesTheRowsOfThePlanToTheBit) {
   }
 }
 
-// The page knows where a row begins from the row before or from where the axis stood.
+// The page takes the start of a row from the row before, or from where the axis stood.
 TEST(PlanPage, TellsWhichRowsAreWhose) {
   const Json data = DataOf(Html());
   const auto rows =

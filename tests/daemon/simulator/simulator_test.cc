@@ -36,8 +36,6 @@ std::string Slurp(const std::string& path) {
   return text.str();
 }
 
-// ---- texts
-
 TEST(SimulatorCommandLine, ReadsInterfacesAndRanges) {
   using Names = std::vector<std::string>;
   EXPECT_EQ(*ParseInterfaces("vcan0"), Names({"vcan0"}));
@@ -115,7 +113,7 @@ TEST(SimulatorTruth, ComparesFibresWithWhatWasAskedFor) {
   const auto compare = [&](const std::string& text) {
     return CompareWithTargets(world, *ReadTargets(text, "t.csv"));
   };
-  // Fibres stand at (103, 4) and (203, 4): 30 um and 40 um off.
+  // The fibres are at (103, 4) and (203, 4), so these places are 30 um and 40 um off.
   auto errors = compare("unit_id,x_mm,y_mm\n1,103.03,4\n2,203,4.04\n3,0,0\n");
   ASSERT_TRUE(errors);
   EXPECT_EQ(errors->units, 2u);
@@ -130,8 +128,6 @@ TEST(SimulatorTruth, ComparesFibresWithWhatWasAskedFor) {
   ASSERT_FALSE(errors);
   EXPECT_EQ(errors.error().text, "t.csv:2: no unit 9 in this fleet");
 }
-
-// ---- the process
 
 class Simulation : public ::testing::Test {
  protected:
@@ -185,7 +181,7 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   ASSERT_TRUE(simulation.ready());
   BusClient speaker(scratch_ / "bus8.sock");
   BusClient listener(scratch_ / "bus8.sock");
-  // Both are known to the simulation once both have heard something.
+  // The simulation has accepted both clients once both have received something.
   listener.Send(1, StatusRequest{}, 4);
   ASSERT_TRUE(listener.ReceiveFromUnit<StatusReply>());
   speaker.Send(1, ProgressRequest{}, 5);
@@ -194,7 +190,8 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   ASSERT_TRUE(heard);
   EXPECT_EQ(*heard, request);
   EXPECT_TRUE(listener.ReceiveFromUnit<ProgressReply>());
-  // The speaker may have heard the listener's exchange before; it never hears its own request.
+  // The speaker may have received the listener's exchange before. It never receives its own
+  // request.
   for (;;) {
     heard = speaker.Receive();
     ASSERT_TRUE(heard);
@@ -207,7 +204,7 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
 TEST_F(Simulation, FlashSurvivesItsEnd) {
   const std::string flash = scratch_ / "flash.json";
   {
-    // Homing takes most of a minute at the pace of life: it is still under way at the end.
+    // Homing takes most of a minute at real speed, so it is still under way at the end.
     RunningSimulation simulation(Arguments({"--flash", flash}, "1"));
     ASSERT_TRUE(simulation.ready());
     BusClient bus(scratch_ / "bus3.sock");
@@ -368,7 +365,7 @@ TEST_F(Simulation, SaysWhatIsWrongAndEnds) {
   said = run({"--units", units(), "--unix-directory", scratch_.path()});
   EXPECT_EQ(said.exit, 1);
   EXPECT_NE(said.err.find("is in use"), std::string::npos) << said.err;
-  // And the first is still there.
+  // The first program is still there.
   BusClient bus(scratch_ / "bus8.sock");
   bus.Send(1, IdentifyRequest{});
   EXPECT_TRUE(bus.ReceiveFromUnit<IdentifyReply>());
@@ -387,7 +384,7 @@ TEST_F(Simulation, AStateFilePlacesTheUnits) {
   const auto said =
       RunToEnd({"truth", "--json", "--targets", scratch_ / "targets.csv", "--control", control()});
   EXPECT_EQ(said.exit, 0) << said.err;
-  // Half a vector of 4.2 mdeg at 16.5 mm.
+  // The bound is half a vector of 4.2 mdeg at 16.5 mm.
   const auto at = said.out.find("\"rms_um\":");
   ASSERT_NE(at, std::string::npos) << said.out;
   EXPECT_LT(std::stod(said.out.substr(at + 9)), 1.3);

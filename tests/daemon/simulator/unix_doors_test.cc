@@ -13,8 +13,8 @@ namespace {
 
 using test::ScratchFolder;
 
-// A process that is held up for a tenth of a second whenever it has read the time. In the midst of
-// the hold-up behind one of these readings something happens.
+// The process is held up for a tenth of a second after every reading of the time. `g_meanwhile` is
+// called in the middle of one of these delays.
 std::int64_t g_now_ns = 0;
 int g_readings_left = 0;
 std::function<void(HostInstant)> g_meanwhile;
@@ -67,7 +67,7 @@ TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
     ASSERT_EQ(heard.size(), 1u) << behind;
     const auto answer = DecodeUnit(heard[0].frame);
     ASSERT_TRUE(answer);
-    // A clock as nominal is off by 50 ppm at most.
+    // A nominal clock is off by at most 50 ppm.
     const double sent_ticks = static_cast<double>(sent.ns) / static_cast<double>(kTick.ns);
     EXPECT_GE(std::get<ClockReply>(answer->message).ticks, sent_ticks * (1 - 50e-6) - 1) << behind;
     EXPECT_GE(heard[0].at, sent) << behind;
