@@ -1,6 +1,7 @@
-// A focal plane in front of a simulated camera with planted troubles of real ones, and a judge that
-// compares the result with the true sources. The truth is drawn with the simulator's mechanisms and
-// imaged with its camera. The code under judgement (fleet/camera) has no part in it.
+// The camera field is a focal plane in front of a simulated camera, with planted troubles of real
+// ones. The judge compares an identification with the true sources. The truth is drawn with the
+// simulator's mechanisms and imaged with its camera. The code under judgement (fleet/camera) has no
+// part in it.
 #pragma once
 
 #include <array>

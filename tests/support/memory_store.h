@@ -1,6 +1,6 @@
-// The store in memory serves tests that need no file. It keeps, merges and refuses exactly what
-// daemon/store/store.h does: tests/daemon/store/memory_store_test.cc feeds both the same batches.
-// It also remembers the events that a test may ask for.
+// The store in memory serves tests that need no file. Rows are kept, merged and refused exactly as
+// by daemon/store/store.h: tests/daemon/store/memory_store_test.cc feeds both the same batches.
+// Events that a test may ask for are remembered, too.
 #pragma once
 
 #include <cstddef>

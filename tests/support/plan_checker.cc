@@ -20,9 +20,9 @@ using Point = std::complex<double>;
 
 double Dot(Point a, Point b) { return a.real() * b.real() + a.imag() * b.imag(); }
 
-/// Returns the distance of segments p0-p1 and q0-q1. One parameter is minimised in closed form and
-/// clamped, both ways. The minimum of a convex quadratic over the unit square lies inside it or on
-/// one of its four edges.
+/// Returns the distance of segments p0-p1 and q0-q1. The minimum of a convex quadratic over the
+/// unit square lies inside the square or on one of its four edges. On an edge, one parameter is
+/// minimised in closed form and clamped.
 double SegmentDistance(Point p0, Point p1, Point q0, Point q1) {
   const Point u = p1 - p0;
   const Point v = q1 - q0;

@@ -1,11 +1,11 @@
-// The checker is an independent witness for plans. It tests what docs/files.md states about rows
-// and about "clear". It shares no line with the planner: kinematics, distance of two segments and
-// reading of the files are its own.
+// The checker is an independent witness for plans. Its rules are what docs/files.md states about
+// rows and about "clear". No line is shared with the planner: kinematics, distance of two segments
+// and reading of the files are the checker's own.
 //
-// The checker walks along time instead of sampling it blindly. Where two arms are d apart and can
-// approach with at most v, nothing can happen for (d - need) / v, so the next look is then. Where
-// they are already as near as the rule allows, the step is the time in which they travel 1 um. A
-// violation deeper than that cannot be stepped over.
+// The checker walks along time instead of sampling it blindly. Two arms that are d apart and
+// approach with at most v cannot touch for (d - need) / v, so the next look is then. Where they are
+// already as near as the rule allows, the step is the time in which they travel 1 um. A violation
+// deeper than that cannot be stepped over.
 //
 // The walk is made for every pair of units in reach, with nominal clocks and at the corners of
 // start skew and clock error.

@@ -1,5 +1,5 @@
-// A child process of a test, with its output in a file. It is killed at the latest when the object
-// goes out of scope, so a failing test leaves none behind.
+// A child process of a test, with its output in a file. The process is killed at the latest when
+// the object goes out of scope, so a failing test leaves none behind.
 #pragma once
 
 #include <sys/types.h>

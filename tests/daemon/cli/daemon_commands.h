@@ -1,5 +1,5 @@
-// The fixture for commands that speak to the daemon. It runs the command as a process of its own
-// against scripted answers, and keeps the requests that the command sent.
+// The fixture for commands that speak to the daemon runs the command as a process of its own
+// against scripted answers. The fixture keeps the requests that the command sent.
 #pragma once
 
 #include <gtest/gtest.h>

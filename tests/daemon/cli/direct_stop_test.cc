@@ -29,7 +29,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// PlayedBus is a bus whose units answer a stop with their positions. It keeps what it received.
+// PlayedBus is a bus whose units answer a stop with their positions. All frames from the host are
+// kept.
 class PlayedBus {
  public:
   PlayedBus(const std::string& path, std::vector<NodeId> nodes) : nodes_(std::move(nodes)) {

@@ -196,7 +196,7 @@ TEST_F(EstimateCommand, TellsWhatTheCommandsOfAModelTake) {
   EXPECT_EQ(reported["model"]["name"], "night-extended");
   EXPECT_EQ(reported["model"]["compensated"], 1);
   EXPECT_EQ(reported["model"]["left_out"], Json::array({"start_skew"}));
-  // Time grows with the distance that is counted. So does energy, because the motor turns at the
+  // Time grows with the distance that is counted. Energy does, too, because the motor turns at the
   // same speed.
   EXPECT_NEAR(Of(nominal["makespan_s"]) / Of(reported["makespan_s"]), 1.01, 2e-4);
   EXPECT_NEAR(Of(nominal["modes"][0]["energy_J"]) / Of(reported["modes"][0]["energy_J"]), 1.01,

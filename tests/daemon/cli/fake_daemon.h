@@ -1,5 +1,5 @@
 // The fake daemon is the daemon's end of the control socket with scripted answers, on a thread of
-// its own. It keeps the requests that it receives.
+// its own. The requests that it receives are kept.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,4 @@
-// watch runs as a process against a publisher in this one. It shows what DDS keeps for late
+// watch runs as a process against a publisher in this one. The output is what DDS keeps for late
 // joiners.
 #include <gmock/gmock.h>
 

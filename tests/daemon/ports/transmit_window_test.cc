@@ -99,7 +99,7 @@ TEST(TransmitWindow, AFrameOfAnotherNodeDelaysOursThatWaited) {
   const DurationNs took = Microseconds(FrameBits(kFrame));
   window.Sent(kFrame, kNow);
   window.Sent(kFrame, kNow);
-  // The foreign frame won the wire after our first. It ended when our second would have ended.
+  // The foreign frame won the wire after our first, and ended when our second would have ended.
   window.Heard(kFrame, kNow + took * 2);
   EXPECT_EQ(window.Room(false, kNow + took), 1u) << "the first left before";
   EXPECT_EQ(window.Room(false, kNow + took * 3 - DurationNs{1}), 1u);

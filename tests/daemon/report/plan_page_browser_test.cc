@@ -1,5 +1,5 @@
-// The page in a real browser, operated by plan_page_probe.js. What the page draws, plays and
-// reports is compared with the plan, the kinematics and the powers of the program. The test is
+// The page in a real browser, operated by plan_page_probe.js. The page's drawing, playing and
+// reports are compared with the plan, the kinematics and the powers of the program. The test is
 // skipped where there is no Chromium.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -190,7 +190,7 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   ASSERT_TRUE(heard);
   EXPECT_EQ(*heard, request);
   EXPECT_TRUE(listener.ReceiveFromUnit<ProgressReply>());
-  // The speaker may have received the listener's exchange before. It never receives its own
+  // The speaker may have received the listener's exchange before, but it never receives its own
   // request.
   for (;;) {
     heard = speaker.Receive();
