@@ -3,7 +3,7 @@
 // and reading of the files are the checker's own.
 //
 // The checker walks along time instead of sampling it blindly. Two arms that are d apart and
-// approach with at most v cannot touch for (d - need) / v, so the next look is then. Where they are
+// approach with at most v cannot touch for (d - need) / v. The next look is then. Where they are
 // already as near as the rule allows, the step is the time in which they travel 1 um. A violation
 // deeper than that cannot be stepped over.
 //
