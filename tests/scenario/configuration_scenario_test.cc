@@ -70,7 +70,7 @@ TEST(Configuration, SilentUnitIsNamedAndTheOthersArrive) {
   EXPECT_EQ(view.phase, UnitPhase::kSilent);
   EXPECT_NE(view.outcome_reason, "");
   EXPECT_TRUE(HasAlarm(fleet, "unit 5 does not answer"));
-  ExpectOthersArrive(&fleet, 4);  // its neighbours' targets may be blocked by where it stands
+  ExpectOthersArrive(&fleet, 4);  // its position may block its neighbours' targets
 }
 
 TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
@@ -80,7 +80,7 @@ TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({0}).outcome, TargetOutcome::kFailed);
   EXPECT_EQ(fleet.coordinator().unit({0}).phase, UnitPhase::kAbsent);
-  // Nobody knows where it stands, so its six neighbours keep out of its whole reach.
+  // Its position is not known, so its six neighbours keep out of its whole reach.
   EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
 }
 
@@ -271,7 +271,8 @@ TEST(Configuration, EveryStepOfALinkIsReportedWithItsCauseAndOnlyOffLosesUnits) 
   ExpectOthersArrive(&fleet, 0);
 }
 
-// Its units hear the host's clock through a passive controller, or they would give the host up.
+// The bus' units hear the host's clock through a passive controller; otherwise they would give the
+// host up.
 TEST(Configuration, UnitsBehindAPassiveControllerKeepTheirHost) {
   InProcessFleet fleet(Small(24));
   fleet.Run(Seconds(2));
@@ -302,7 +303,7 @@ TEST(Configuration, PowerCutInMidMoveLeavesAnIntervalThatHoldsTheTruth) {
   EXPECT_EQ(view.phase, UnitPhase::kReady);
   fleet.ExpectStoreTellsTheTruth("after the power cut");
 
-  // It is refused by name until it is homed, and then it arrives.
+  // The unit is refused by name until it is homed, and then it arrives.
   fleet.ApplyRandom(22);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit(victim).outcome, TargetOutcome::kRefused);

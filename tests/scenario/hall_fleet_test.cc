@@ -19,9 +19,9 @@
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"
 #include "tests/daemon/dds/own_domain.h"
+#include "tests/support/fibre_carrier_model.h"
 #include "tests/support/process.h"
 #include "tests/support/scratch_folder.h"
-#include "tests/support/spine_model.h"
 
 namespace focalfleet {
 namespace {

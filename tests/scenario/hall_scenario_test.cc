@@ -9,7 +9,7 @@
 #include "fleet/kinematics.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
-#include "tests/support/spine_model.h"
+#include "tests/support/fibre_carrier_model.h"
 
 namespace focalfleet {
 namespace {

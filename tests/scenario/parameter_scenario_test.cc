@@ -56,7 +56,7 @@ TEST(Configuration, WritingItsPositionMakesAUnitKnown) {
   fleet.Run(Seconds(15));
   const UnitView& view = fleet.coordinator().unit(one);
   ASSERT_FALSE(IsPlace(view.knowledge));
-  // The unit takes the nearest place that shows its vector, and that is what the store is told.
+  // The unit takes the nearest position that shows its vector, and the store records that position.
   const Pose seen = fleet.TruePoses()[one.value];
   for (const Axis axis : kAxes) {
     const auto reply = Write(&fleet, {one, axis, Parameter::kPosition, seen[Index(axis)] + 7});

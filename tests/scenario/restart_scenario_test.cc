@@ -20,7 +20,8 @@ using test::RunIntoMotion;
 using test::Small;
 using test::Unserved;
 
-// One unit's homing, cut at `ms` by somebody; a place may only be claimed where it was homed.
+// Cuts the homing of a unit after `ms` by `cut`. A position may only be claimed where the unit was
+// homed.
 void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*)>& cut) {
   const std::string when = std::to_string(ms) + " ms";
   InProcessFleet fleet(Small(40));
@@ -39,7 +40,7 @@ void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*
   EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
   fleet.ExpectStoreTellsTheTruth(when);
-  // It is homed again, and then it is known.
+  // The unit is homed again, and then its position is known.
   fleet.Send({901, EnableCommand{{{4}}}});
   fleet.Run(Seconds(2));
   fleet.Send({902, HomeCommand{{{4}}, true}});
@@ -65,7 +66,7 @@ TEST(Configuration, CutHomingIsNotAPlace) {
   }
 }
 
-// With the coordinator dead the unit's own mark decides what its vectors are worth.
+// With the coordinator dead the unit's own mark decides how far its vectors are trusted.
 TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
   for (const int ms : {100, 1000, 20'000, 45'000}) {
     for (const bool stopped : {false, true}) {
@@ -114,8 +115,9 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
     if (!lost.empty()) {
       fleet.Send({903, HomeCommand{lost}});
       ASSERT_TRUE(fleet.RunUntilIdle());
-      // With the coordinator dead nobody was held back for it: a neighbour may stand where it may
-      // stand, and then no way home can be proven. That is said, and left to the operator.
+      // With the coordinator dead no unit was kept away from it: a neighbour may stand inside its
+      // interval. No way home can be proven then. The coordinator reports that and leaves the
+      // decision to the operator.
       if (fleet.CountOutcome(TargetOutcome::kArrived) != lost.size()) {
         ++unproven;
         fleet.Send({904, HomeCommand{lost, true}});

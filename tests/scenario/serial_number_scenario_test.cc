@@ -48,7 +48,7 @@ TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
               std::string::npos);
     EXPECT_EQ(fleet.world().Truth(std::size_t{5}).moves_begun, 0u);
     EXPECT_TRUE(HasAlarm(fleet, "unit 6 answers with serial number 0"));
-    // Programmed again, it is one like the others.
+    // Programmed again, the unit is like the others.
     fleet.world().faults(fleet.id(5))->foreign_serial.reset();
     fleet.Run(Seconds(5));
     EXPECT_EQ(fleet.coordinator().unit({5}).phase, UnitPhase::kReady);

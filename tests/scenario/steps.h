@@ -1,4 +1,4 @@
-// What scenarios do and look at again and again.
+// These functions are steps and checks that many scenarios share.
 #pragma once
 
 #include <cstdint>
@@ -11,18 +11,19 @@ namespace focalfleet::test {
 /// 37 units, which make a hexagon with four units a side. The rest is as by default.
 InProcessFleet::Options Small(std::uint64_t seed);
 
-/// Until somebody moves, and then a little longer: in the middle of the motion.
+/// Runs until a unit moves and then for `further`: into the middle of the motion.
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further);
 
-/// The first unit that moves at `now` and for some time to come.
+/// The first unit that moves now and for some time to come.
 PositionerIndex SomebodyMoving(InProcessFleet* fleet);
 
 bool HasAlarm(const InProcessFleet& fleet, const std::string& part);
 
-/// A line for each unit that has not arrived: how it stands, and why.
+/// A line for each unit that has not arrived, with its state and reason.
 std::string Unserved(InProcessFleet& fleet);
 
-/// All but so many have arrived, the store knows the truth, and no intent is open.
+/// Expects that all units but `others_than` have arrived, that the store is true, and that no
+/// intent is open.
 void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than);
 
 }  // namespace focalfleet::test

@@ -84,7 +84,8 @@ TEST(Configuration, AStopIsAnOutcomeOfItsOwn) {
   EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
 }
 
-// It has ended, everybody stands at a known place, and nobody moves before the next apply.
+// Expects that the configuration has ended, that all units stand at known positions, and that none
+// moves before the next apply.
 void ExpectStoppedForGood(InProcessFleet* fleet, const std::string& when) {
   ASSERT_TRUE(fleet->RunUntilIdle(Seconds(20))) << when;
   EXPECT_EQ(fleet->coordinator().configuration().state, ConfigurationState::kStopped) << when;
@@ -132,7 +133,7 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
   }
 }
 
-// Answers that come late or twice, to stops of ours of which there may be several.
+// Late or repeated answers to stops of this host, of which there may be several.
 TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
   for (std::uint64_t seed = test::TestSeed(60); seed < test::TestSeed(60) + 30; ++seed) {
     FOCALFLEET_TRACE_SEED(seed);

@@ -66,7 +66,7 @@ TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
   EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
   EXPECT_TRUE(HasAlarm(fleet, "the store refuses the intent of serial"));
   ExpectOthersArrive(&fleet, 4);
-  // It stays out until somebody says that it is mended.
+  // The unit stays out until an operator reports that it is repaired.
   fleet.refuse = nullptr;
   fleet.Run(Seconds(30));
   EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);

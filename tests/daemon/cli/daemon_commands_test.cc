@@ -272,7 +272,7 @@ TEST_F(DaemonCommands, StateWritesWhereEveryUnitStands) {
             "unit_id,theta_deg,phi_deg\n1,-1.5,179.25\n2,-1.5,179.25\n");
 }
 
-TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessToldToLeaveThemOut) {
+TEST_F(DaemonCommands, StateRefusesUnknownPlacesUnlessTheyAreLeftOut) {
   const Json rows{{"rows", {StateRow(1, "reported"), StateRow(2, "interval")}}};
   const auto refused = Ask({"state", "--out", scratch_ / "s.csv"}, {{"state", {.result = rows}}});
   EXPECT_EQ(refused.exit, 1);

@@ -12,8 +12,8 @@
 #include "fleet/hex_layout.h"
 #include "fleet/kinematics.h"
 #include "sim/hall/fibre_carrier.h"
+#include "tests/support/fibre_carrier_model.h"
 #include "tests/support/seed.h"
-#include "tests/support/spine_model.h"
 
 namespace focalfleet {
 namespace {
