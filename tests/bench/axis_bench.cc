@@ -18,10 +18,7 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::HostInstant;
-using focalfleet::Segment;
-using focalfleet::bench::Option;
-namespace sim = focalfleet::sim;
+using bench::Option;
 
 double CpuSeconds() {
   timespec now{};

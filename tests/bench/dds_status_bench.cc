@@ -14,10 +14,10 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::bench::Median;
-using focalfleet::bench::Option;
-using focalfleet::test::ClientProcess;
-using focalfleet::test::OwnDomain;
+using bench::Median;
+using bench::Option;
+using test::ClientProcess;
+using test::OwnDomain;
 
 struct Load {
   int units;

@@ -14,11 +14,11 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::test::DrawStartAndTargets;
-using ::focalfleet::test::FleetOf;
-using ::focalfleet::test::HexFleet;
-using ::focalfleet::test::PlanningFleet;
-using ::focalfleet::test::Seed;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::Seed;
 using ::testing::HasSubstr;
 
 /// An answer to the planner's question: false for so many times.

@@ -7,15 +7,15 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::test::CheckedRow;
-using ::focalfleet::test::CheckOptions;
-using ::focalfleet::test::DrawStartAndTargets;
-using ::focalfleet::test::FleetOf;
-using ::focalfleet::test::HexFleet;
-using ::focalfleet::test::PlanningFleet;
-using ::focalfleet::test::PoseDeg;
-using ::focalfleet::test::Seed;
-using ::focalfleet::test::UnitAt;
+using test::CheckedRow;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {

@@ -11,17 +11,17 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::test::CheckedRow;
-using ::focalfleet::test::CheckOptions;
-using ::focalfleet::test::DrawStartAndTargets;
-using ::focalfleet::test::ExpectSound;
-using ::focalfleet::test::FleetOf;
-using ::focalfleet::test::HexFleet;
-using ::focalfleet::test::MoveOf;
-using ::focalfleet::test::PlanningFleet;
-using ::focalfleet::test::PoseDeg;
-using ::focalfleet::test::Seed;
-using ::focalfleet::test::UnitAt;
+using test::CheckedRow;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::MoveOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 /// Two arms side by side between the bases, each below or above the other so that folding back (phi

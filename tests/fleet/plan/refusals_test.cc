@@ -9,14 +9,14 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::test::CheckOptions;
-using ::focalfleet::test::DrawStartAndTargets;
-using ::focalfleet::test::ExpectSound;
-using ::focalfleet::test::FleetOf;
-using ::focalfleet::test::PlanningFleet;
-using ::focalfleet::test::PoseDeg;
-using ::focalfleet::test::Seed;
-using ::focalfleet::test::UnitAt;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 TEST(Planner, PassesOverDisabledAndUnknownUnitsByName) {

@@ -11,10 +11,10 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::test::FleetOf;
-using ::focalfleet::test::PlanningFleet;
-using ::focalfleet::test::PoseDeg;
-using ::focalfleet::test::UnitAt;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::UnitAt;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -14,9 +14,9 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::test::HexFleet;
-using focalfleet::test::PlanningFleet;
-using focalfleet::test::TestSeed;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
 
 TEST(DirectionOf, IsCosineAndSine) {
   Rng rng(TestSeed(11));

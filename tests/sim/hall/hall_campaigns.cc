@@ -21,11 +21,11 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::test::CampaignPlan;
-using focalfleet::test::FieldLaw;
-using focalfleet::test::Planted;
-using focalfleet::test::PlantedCampaign;
-using focalfleet::test::Vec;
+using test::CampaignPlan;
+using test::FieldLaw;
+using test::Planted;
+using test::PlantedCampaign;
+using test::Vec;
 
 constexpr double kAmplitude_T = 0.08;
 constexpr const char* kCauses[] = {
