@@ -15,12 +15,10 @@
 #include "sim/world/axis/axis.h"
 #include "tests/bench/options.h"
 
+namespace focalfleet {
 namespace {
 
-using focalfleet::HostInstant;
-using focalfleet::Segment;
-using focalfleet::bench::Option;
-namespace sim = focalfleet::sim;
+using bench::Option;
 
 double CpuSeconds() {
   timespec now{};
@@ -73,9 +71,7 @@ Outcome RunAxes(const sim::Motor& motor, int count, int seconds, int hz) {
   return {seconds / cpu_s, static_cast<double>(after - before) / count};
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int count = Option(argc, argv, "--axes", 10'000);
   const int seconds = Option(argc, argv, "--seconds", 20);
   const int hz = Option(argc, argv, "--hz", 20);
@@ -121,3 +117,8 @@ int main(int argc, char** argv) {
               drive.t_s() / (CpuSeconds() - begin));
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

@@ -13,9 +13,9 @@
 #include "tests/protocol/random_messages.h"
 #include "tests/support/alloc_guard.h"
 
+namespace focalfleet {
 namespace {
 
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one bench
 using bench::Median;
 using bench::Option;
 
@@ -51,11 +51,11 @@ Load<Message> MakeLoad(Rng rng, Draw draw) {
 // Alternatives of the variants: an upload of eight segments, and the unit's answers to it.
 HostMessage OfAnUpload(Rng& rng, std::size_t i) {
   constexpr std::size_t kOrder[] = {6, 7, 7, 7, 7, 7, 7, 7, 7, 5, 4};
-  return testing::RandomHost(kOrder[i % std::size(kOrder)], rng);
+  return test::RandomHost(kOrder[i % std::size(kOrder)], rng);
 }
 UnitMessage ToAnUpload(Rng& rng, std::size_t i) {
   constexpr std::size_t kOrder[] = {3, 2, 5, 0};
-  return testing::RandomUnit(kOrder[i % std::size(kOrder)], rng);
+  return test::RandomUnit(kOrder[i % std::size(kOrder)], rng);
 }
 
 auto DecodeAs(const CanFrame& frame, const HostMessage*) { return DecodeHost(frame); }
@@ -71,7 +71,7 @@ struct Outcome {
 template <class Message>
 Outcome RunOnce(const Load<Message>& load, int frames) {
   Outcome outcome;
-  const testing::AllocGuard guard;
+  const test::AllocGuard guard;
   std::uint64_t sum = 0;
   double begin = CpuSeconds();
   for (int i = 0; i < frames; ++i) {
@@ -111,23 +111,25 @@ bool Measure(const char* what, const Load<Message>& load, int frames) {
   return good && allocations == 0;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int frames = Option(argc, argv, "--frames", 20'000'000);
   const Rng rng(1);
   std::printf("%-22s %12s %12s %12s\n", "million per CPU second", "encoded", "decoded",
               "allocations");
   bool good = Measure(
       "host, every kind",
-      MakeLoad<HostMessage>(rng, [](Rng& r, std::size_t) { return testing::RandomHost(r); }),
-      frames);
-  good = Measure(
-             "unit, every kind",
-             MakeLoad<UnitMessage>(rng, [](Rng& r, std::size_t) { return testing::RandomUnit(r); }),
-             frames) &&
-         good;
+      MakeLoad<HostMessage>(rng, [](Rng& r, std::size_t) { return test::RandomHost(r); }), frames);
+  good =
+      Measure("unit, every kind",
+              MakeLoad<UnitMessage>(rng, [](Rng& r, std::size_t) { return test::RandomUnit(r); }),
+              frames) &&
+      good;
   good = Measure("host, an upload", MakeLoad<HostMessage>(rng, OfAnUpload), frames) && good;
   good = Measure("unit, to an upload", MakeLoad<UnitMessage>(rng, ToAnUpload), frames) && good;
   return good ? 0 : 1;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

@@ -23,9 +23,9 @@
 #include "sim/world/world.h"
 #include "tests/bench/options.h"
 
+namespace focalfleet {
 namespace {
 
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one bench
 using bench::Median;
 using bench::Option;
 
@@ -206,9 +206,7 @@ bool Measure(std::uint32_t count, std::uint32_t per_bus, int runs) {
   return figures.arrived == count;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int units = Option(argc, argv, "--units", 0);
   const int runs = Option(argc, argv, "--runs", 5);
   const auto per_bus = static_cast<std::uint32_t>(Option(argc, argv, "--per-bus", 100));
@@ -222,3 +220,8 @@ int main(int argc, char** argv) {
     good = Measure(static_cast<std::uint32_t>(count), per_bus, runs) && good;
   return good ? 0 : 1;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

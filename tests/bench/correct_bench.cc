@@ -19,8 +19,10 @@
 #include "sim/world/spread.h"
 #include "tests/scenario/in_process_fleet.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
 
 struct BenchOptions {
   std::uint32_t units = 1000;
@@ -233,10 +235,10 @@ int Run(const BenchOptions& options) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet
 
 int main(int count, char** arguments) {
-  focalfleet::testing::BenchOptions options;
+  focalfleet::BenchOptions options;
   for (int i = 1; i + 1 < count; i += 2) {
     const char* value = arguments[i + 1];
     if (std::strcmp(arguments[i], "--units") == 0) {
@@ -254,5 +256,5 @@ int main(int count, char** arguments) {
       return 2;
     }
   }
-  return focalfleet::testing::Run(options);
+  return focalfleet::Run(options);
 }

@@ -12,12 +12,13 @@
 #include "tests/daemon/dds/client_process.h"
 #include "tests/daemon/dds/own_domain.h"
 
+namespace focalfleet {
 namespace {
 
-using focalfleet::bench::Median;
-using focalfleet::bench::Option;
-using focalfleet::testing::ClientProcess;
-using focalfleet::testing::OwnDomain;
+using bench::Median;
+using bench::Option;
+using test::ClientProcess;
+using test::OwnDomain;
 
 struct Load {
   int units;
@@ -47,9 +48,7 @@ Outcome Run(const char* publisher_program, const Load& load) {
   return outcome;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const Load load{Option(argc, argv, "--units", 5000), Option(argc, argv, "--cycles", 60),
                   Option(argc, argv, "--hz", 10)};
   const int pairs = Option(argc, argv, "--pairs", 5);
@@ -85,3 +84,8 @@ int main(int argc, char** argv) {
       Median(ratios));
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

@@ -10,6 +10,7 @@
 
 #include "daemon/dds/status_publisher.h"
 
+namespace focalfleet {
 namespace {
 
 double CpuSeconds() {
@@ -19,10 +20,7 @@ double CpuSeconds() {
          1e-6 * static_cast<double>(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  using namespace focalfleet;
+int Main(int argc, char** argv) {
   if (argc != 5) return 2;
   const int cycles = std::atoi(argv[3]);
   const std::chrono::nanoseconds period(1'000'000'000 / std::atoi(argv[4]));
@@ -53,3 +51,8 @@ int main(int argc, char** argv) {
               static_cast<unsigned long>((*publisher)->counters().samples));
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

@@ -11,9 +11,8 @@
 #include "sim/hall/orient.h"
 #include "tests/bench/options.h"
 
+namespace focalfleet {
 namespace {
-
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one bench
 
 double CpuSeconds() {
   timespec now{};
@@ -65,9 +64,7 @@ Rate Follow(const sim::OrientationSolver& solver, const Load& load, int estimate
   return rate;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int estimates = bench::Option(argc, argv, "--estimates", 200'000);
   const int rows = bench::Option(argc, argv, "--rows", 500);
   const sim::MagnetArray magnets(sim::OneShellArray(), 8);
@@ -102,3 +99,8 @@ int main(int argc, char** argv) {
   }
   return good ? 0 : 1;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

@@ -12,12 +12,14 @@
 #include "tests/bench/options.h"
 #include "tests/support/camera_field.h"
 
-namespace focalfleet::bench {
+namespace focalfleet {
 namespace {
 
-using testing::CameraField;
-using testing::FieldTroubles;
-using testing::Judgement;
+using bench::Median;
+using bench::Option;
+using test::CameraField;
+using test::FieldTroubles;
+using test::Judgement;
 
 double CpuMs() {
   timespec t{};
@@ -71,10 +73,10 @@ int Run(int argc, char** argv) {
   double rim_mm = 0;
   for (const Unit& unit : field.layout().units())
     rim_mm = std::max(rim_mm, std::hypot(unit.base_fp.x_mm, unit.base_fp.y_mm));
-  sim::CameraTraits traits = testing::TestCamera(rim_mm);
+  sim::CameraTraits traits = test::TestCamera(rim_mm);
   traits.air = {.sigma_mm = Option(argc, argv, "--air-um", 8) * 1e-3,
                 .length_mm = static_cast<double>(Option(argc, argv, "--length-mm", 150))};
-  const CameraModel model = testing::ModelOf(traits);
+  const CameraModel model = test::ModelOf(traits);
 
   Judgement all;
   int refused = 0;
@@ -86,7 +88,7 @@ int Run(int argc, char** argv) {
   for (int k = 0; k < exposures; ++k) {
     field.Move(troubles);
     const sim::Image image = sim::TakeImage(field.Sources(), traits, &field.rng());
-    const Exposure exposure = testing::ExposureOf(image, std::to_string(k));
+    const Exposure exposure = test::ExposureOf(image, std::to_string(k));
     const std::vector<UnitExpectation> expectations = field.Expectations();
     if (k % 10 == 0) calibration_ms.push_back(CalibrationMs());
     const double begin_ms = CpuMs();
@@ -105,7 +107,7 @@ int Run(int argc, char** argv) {
                   checked ? result.error().text.c_str() : checked.error().text.c_str());
       continue;
     }
-    const Judgement one = testing::Judge(field, image, *result);
+    const Judgement one = test::Judge(field, image, *result);
     if (one.wrong + one.pairs_unseen > 0)
       std::printf("exposure %d: %u wrong, %u swaps unseen\n", k, one.wrong, one.pairs_unseen);
     Add(one, &all);
@@ -139,6 +141,6 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace focalfleet::bench
+}  // namespace focalfleet
 
-int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::Run(argc, argv); }

@@ -8,8 +8,8 @@
 // --layout 0 hexagonal, 1 the plate of the file FOCALFLEET_DESI_UNITS names, 2 SDSS-like.
 #include <sys/resource.h>
 
-#include <array>
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <ctime>
 #include <fstream>
@@ -25,8 +25,13 @@
 #include "tests/bench/ratio_plot.h"
 #include "tests/fleet/plan/plan_rows.h"
 
-namespace focalfleet::bench {
+namespace focalfleet {
 namespace {
+
+using bench::Median;
+using bench::Option;
+using bench::PlotRatios;
+using bench::TextOption;
 
 std::vector<Unit> UnitsOf(int layout, std::uint32_t count) {
   if (layout == 0) return MakeHexLayout({.count = count});
@@ -136,11 +141,11 @@ int Run(int argc, char** argv) {
         power.flatness);
     std::string verdict = "-";
     if (check) {
-      testing::CheckOptions check_options;
+      test::CheckOptions check_options;
       check_options.clearance_mm = layout->clearance_mm();
-      const auto report = testing::CheckPlan(testing::CheckedUnits(*layout, drives, start, frozen),
-                                             testing::CheckedRows(*plan, *layout, drives),
-                                             testing::CheckedObstacles(*layout), check_options);
+      const auto report = test::CheckPlan(test::CheckedUnits(*layout, drives, start, frozen),
+                                          test::CheckedRows(*plan, *layout, drives),
+                                          test::CheckedObstacles(*layout), check_options);
       verdict = report.ok() ? "clear" : report.Text();
     }
     // A unit that provably has no way at all is no fault of the plan.
@@ -188,6 +193,6 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace focalfleet::bench
+}  // namespace focalfleet
 
-int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::Run(argc, argv); }

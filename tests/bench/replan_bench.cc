@@ -13,8 +13,11 @@
 #include "fleet/targets.h"
 #include "tests/bench/options.h"
 
-namespace focalfleet::bench {
+namespace focalfleet {
 namespace {
+
+using bench::Median;
+using bench::Option;
 
 double CpuMs() {
   timespec t{};
@@ -164,6 +167,6 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace focalfleet::bench
+}  // namespace focalfleet
 
-int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::Run(argc, argv); }

@@ -11,8 +11,11 @@
 #include "tests/bench/options.h"
 #include "tests/fleet/plan/plan_rows.h"
 
-namespace focalfleet::bench {
+namespace focalfleet {
 namespace {
+
+using bench::Median;
+using bench::Option;
 
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -49,12 +52,11 @@ bool Draw(std::uint64_t seed, Fleet* fleet) {
 }
 
 bool IsClear(const Fleet& fleet, const Plan& plan) {
-  testing::CheckOptions options;
+  test::CheckOptions options;
   options.clearance_mm = fleet.layout.clearance_mm();
-  return testing::CheckPlan(
-             testing::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
-             testing::CheckedRows(plan, fleet.layout, fleet.drives),
-             testing::CheckedObstacles(fleet.layout), options)
+  return test::CheckPlan(test::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+                         test::CheckedRows(plan, fleet.layout, fleet.drives),
+                         test::CheckedObstacles(fleet.layout), options)
       .ok();
 }
 
@@ -110,6 +112,6 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace focalfleet::bench
+}  // namespace focalfleet
 
-int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::Run(argc, argv); }

@@ -22,7 +22,6 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
-#include <filesystem>
 #include <fstream>
 #include <numbers>
 #include <string>
@@ -32,6 +31,7 @@
 #include "sim/drive/steady.h"
 #include "tests/bench/options.h"
 #include "tests/bench/spice_netlist.h"
+#include "tests/support/scratch_folder.h"
 
 extern char** environ;
 
@@ -261,17 +261,15 @@ int main(int argc, char** argv) {
                                    .rise_s = 1e-9 * Option(argc, argv, "--rise-ns", 10),
                                    .check = Option(argc, argv, "--check", 0) != 0,
                                    .ratio_min = Option(argc, argv, "--ratio-min", 50)};
-  std::string folder =
-      (std::filesystem::temp_directory_path() / "focalfleet_spice_XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) return 1;
+  focalfleet::test::ScratchFolder folder;
   const std::vector<focalfleet::bench::SpiceCase> cases = focalfleet::sim::Cases();
   int code = 0;
   for (std::size_t k = 0; k < cases.size(); ++k)
     if (chosen < 0 || static_cast<std::size_t>(chosen) == k)
-      code = std::max(code, focalfleet::sim::Run(cases[k], load, folder));
-  if (Option(argc, argv, "--keep", 0) != 0)
-    std::printf("%s\n", folder.c_str());
-  else
-    std::filesystem::remove_all(folder);
+      code = std::max(code, focalfleet::sim::Run(cases[k], load, folder.path()));
+  if (Option(argc, argv, "--keep", 0) != 0) {
+    std::printf("%s\n", folder.path().c_str());
+    folder.Keep();
+  }
   return code;
 }

@@ -23,9 +23,9 @@
 #include "protocol/wire/frame_bits.h"
 #include "tests/bench/options.h"
 
+namespace focalfleet {
 namespace {
 
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one bench
 using bench::Option;
 
 constexpr DurationNs kTurn = Microseconds(200);  // of the daemon's loop
@@ -202,9 +202,7 @@ class StopBench {
   bool saturating_ = false;
 };
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int buses = Option(argc, argv, "--buses", 50);
   const int units_per_bus = Option(argc, argv, "--units-per-bus", 100);
   const int stops = Option(argc, argv, "--stops", 200);
@@ -233,3 +231,8 @@ int main(int argc, char** argv) {
               at(0.99), at(1));
   return at(1) <= 2 && load_min > 0.99 ? 0 : 1;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

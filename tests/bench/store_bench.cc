@@ -12,6 +12,7 @@
 #include "daemon/store/store.h"
 #include "tests/bench/bare_store.h"
 #include "tests/bench/options.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {

@@ -26,11 +26,13 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/upload_on_wire.h"
 
-namespace focalfleet::bench {
+namespace focalfleet {
 namespace {
 
-using testing::InProcessFleet;
-using testing::UploadOnWire;
+using bench::Median;
+using bench::Option;
+using test::InProcessFleet;
+using test::UploadOnWire;
 
 /// The upload of each bus; empty where the units do not begin to move.
 std::vector<UploadOnWire> UploadOnce(std::uint32_t units, std::uint64_t seed) {
@@ -44,7 +46,7 @@ std::vector<UploadOnWire> UploadOnce(std::uint32_t units, std::uint64_t seed) {
       Seconds(60));
   std::vector<UploadOnWire> uploads;
   if (moves)
-    for (const auto& [bus, upload] : testing::MeasureUpload(wire)) uploads.push_back(upload);
+    for (const auto& [bus, upload] : test::MeasureUpload(wire)) uploads.push_back(upload);
   return uploads;
 }
 
@@ -163,6 +165,6 @@ int Run(int argc, char** argv) {
 }
 
 }  // namespace
-}  // namespace focalfleet::bench
+}  // namespace focalfleet
 
-int main(int argc, char** argv) { return focalfleet::bench::Run(argc, argv); }
+int main(int argc, char** argv) { return focalfleet::Run(argc, argv); }

@@ -1,6 +1,6 @@
 #include "tests/can/bus_story.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 // A segment may arrive twice (a retry); its index gives its place.
@@ -108,4 +108,4 @@ BusStory Listen(const CandumpLog& log) {
   return listener.Take();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

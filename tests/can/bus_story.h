@@ -16,7 +16,7 @@
 #include "protocol/wire/staged_move.h"
 #include "tests/can/candump_log.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct OverheardMove {
   StagedMove staged;  // as uploaded, in the order of the segments' indices
@@ -47,4 +47,4 @@ struct BusStory {
 
 BusStory Listen(const CandumpLog& log);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

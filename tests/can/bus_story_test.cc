@@ -5,8 +5,15 @@
 #include <cstdio>
 #include <string>
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::BusStory;
+using test::CandumpLog;
+using test::Listen;
+using test::OverheardMove;
+using test::OverheardUnit;
+using test::ParseCandump;
 
 std::string Line(const CanFrame& frame, const char* interface = "vcan0", int at_s = 1) {
   char head[80];
@@ -116,4 +123,4 @@ TEST(BusStory, NamesWhatNoDecoderTakes) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

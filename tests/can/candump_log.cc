@@ -5,7 +5,7 @@
 
 #include "protocol/wire/candump_line.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 template <class Number>
@@ -58,4 +58,4 @@ Result<CandumpLog> ParseCandump(const std::string& text) {
   return log;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

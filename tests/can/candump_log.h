@@ -10,7 +10,7 @@
 #include "protocol/base/result.h"
 #include "protocol/wire/can_frame.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct LoggedFrame {
   std::int64_t at_us = 0;
@@ -27,4 +27,4 @@ struct CandumpLog {
 /// Errors: kInvalid, names the line.
 Result<CandumpLog> ParseCandump(const std::string& text);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

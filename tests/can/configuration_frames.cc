@@ -6,7 +6,7 @@
 
 #include "protocol/wire/codec.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr std::uint32_t kSequenceMask = 255u << 3;
@@ -72,4 +72,4 @@ ConfigurationFrames SortOut(const CandumpLog& log) {
   return out;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

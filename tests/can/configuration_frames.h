@@ -13,7 +13,7 @@
 #include "protocol/wire/identifier.h"
 #include "tests/can/bus_story.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct MaskedFrame {
   std::uint32_t id = 0;
@@ -39,4 +39,4 @@ struct ConfigurationFrames {
 
 ConfigurationFrames SortOut(const CandumpLog& log);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

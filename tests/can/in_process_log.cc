@@ -21,7 +21,7 @@
 #include "fleet/files/targets_file.h"
 #include "fleet/plan/job.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 constexpr DurationNs kTurn = Microseconds(200);  // of the loop, as the daemon's
@@ -165,12 +165,12 @@ int Main(char** arguments) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet
 
 int main(int count, char** arguments) {
   if (count != 4) {
     std::fputs("usage: in_process_log CONFIG STATE_CSV TARGETS_CSV\n", stderr);
     return 2;
   }
-  return focalfleet::testing::Main(arguments);
+  return focalfleet::Main(arguments);
 }

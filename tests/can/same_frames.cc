@@ -16,7 +16,7 @@
 #include "protocol/wire/codec.h"
 #include "tests/can/configuration_frames.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 // The daemon's defaults, in the fleet's time, and the bounds that follow from them.
@@ -172,12 +172,12 @@ int Run(const char* reference_path, const char* path, double speed) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet
 
 int main(int count, char** arguments) {
   if (count != 4) {
     std::fputs("usage: same_frames REFERENCE_LOG LOG SPEED\n", stderr);
     return 2;
   }
-  return focalfleet::testing::Run(arguments[1], arguments[2], std::atof(arguments[3]));
+  return focalfleet::Run(arguments[1], arguments[2], std::atof(arguments[3]));
 }

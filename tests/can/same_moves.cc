@@ -17,9 +17,15 @@
 #include "protocol/wire/staged_move.h"
 #include "tests/can/bus_story.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
+using test::BusNode;
+using test::BusStory;
+using test::Listen;
+using test::OverheardMove;
+using test::OverheardUnit;
+using test::ParseCandump;
 using Pair = std::array<std::int64_t, kAxisCount>;
 
 // Codes of the store's tables (docs of daemon/store/schema.cc): how an intent ended.
@@ -260,12 +266,12 @@ int Run(const std::vector<std::string>& arguments) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet
 
 int main(int count, char** arguments) {
   if (count < 5) {
     std::fputs("usage: same_moves CANDUMP_LOG DATABASE UNITS_CSV INTERFACE...\n", stderr);
     return 2;
   }
-  return focalfleet::testing::Run({arguments + 1, arguments + count});
+  return focalfleet::Run({arguments + 1, arguments + count});
 }

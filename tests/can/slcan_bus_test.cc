@@ -130,7 +130,7 @@ TEST(SlcanBus, AtMostThreeOfOursAreBelowAndAStopWaitsForTwo) {
   const CanFrame stop = Encode(HostMessage(Stop{}), {kBroadcastNode, 0});
   const CanFrame other = Encode(HostMessage(StageSegment{Axis::kTheta, 1, {5, 6, 7}}), {{4}, 0});
   const std::array<CanFrame, 8> batch{other, other, other, other, other, other, other, other};
-  const std::uint64_t seed = testing::TestSeed(11);
+  const std::uint64_t seed = test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   constexpr std::size_t kFrames = 3000;

@@ -106,8 +106,8 @@ TEST(SocketCanPort, CarriesEveryMessageBitByBitInOrder) {
   std::vector<CanFrame> down;
   std::vector<CanFrame> up;
   for (std::uint8_t i = 0; i < 200; ++i) {
-    down.push_back(Encode(testing::RandomHost(rng), {{i}, i}));
-    up.push_back(Encode(testing::RandomUnit(rng), {{i}, i}));
+    down.push_back(Encode(test::RandomHost(rng), {{i}, i}));
+    up.push_back(Encode(test::RandomUnit(rng), {{i}, i}));
   }
   ASSERT_EQ(SendAll(*host, down), down.size());
   ASSERT_EQ(SendAll(*units, up), up.size());

@@ -48,7 +48,7 @@ double SumOf(const TurnMeans& means) {
 }
 
 TEST(MeansOverTurn, WhatTheBridgeGivesIsWhatWindingShaftAndSwitchesTake) {
-  const std::uint64_t seed = testing::TestSeed(3);
+  const std::uint64_t seed = test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 60; ++k) {
@@ -64,7 +64,7 @@ TEST(MeansOverTurn, WhatTheBridgeGivesIsWhatWindingShaftAndSwitchesTake) {
 }
 
 TEST(MeansOverTurn, DoNotDependOnWhereTheTurnIsCutOpen) {
-  const std::uint64_t seed = testing::TestSeed(4);
+  const std::uint64_t seed = test::TestSeed(4);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 30; ++k) {
@@ -183,7 +183,7 @@ TEST(MeansOverTurn, SwitchingIsOneHardEdgeForEachLegThatSwitches) {
 
 // A phasor gives the same current in an independent way, the load angle found by bisection.
 TEST(SteadyPower, OfASlowWindingIsThatOfThePhasorOfTheLoadAngle) {
-  const std::uint64_t seed = testing::TestSeed(7);
+  const std::uint64_t seed = test::TestSeed(7);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 40; ++k) {
@@ -219,7 +219,7 @@ TEST(SteadyPower, OfASlowWindingIsThatOfThePhasorOfTheLoadAngle) {
 }
 
 TEST(SteadyPower, PullsItsLoadAtEveryPointThatItDoesNotCallStalled) {
-  const std::uint64_t seed = testing::TestSeed(11);
+  const std::uint64_t seed = test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   int stalled = 0;
@@ -264,7 +264,7 @@ TEST(SteadyPower, StallsBeyondPullOutAndOnlyThere) {
 }
 
 TEST(SteadyPower, SevenSegmentsSwitchMostAndHeatLeast) {
-  const std::uint64_t seed = testing::TestSeed(12);
+  const std::uint64_t seed = test::TestSeed(12);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 40; ++k) {

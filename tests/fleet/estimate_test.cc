@@ -66,7 +66,7 @@ double PowerAt(const std::vector<PowerStep>& steps, double t_s) {
 }
 
 TEST(Estimate, CurvesAreTheSumOfTheMotorsThatRunAtEachInstant) {
-  const std::uint64_t seed = testing::TestSeed(31);
+  const std::uint64_t seed = test::TestSeed(31);
   FOCALFLEET_TRACE_SEED(seed);
   const Case c = RandomCase(seed);
   DrivePowers powers(MotorModel{});
@@ -123,7 +123,7 @@ TEST(Estimate, APlanWithoutMovesTakesNothing) {
 }
 
 TEST(EstimateWithSpread, HoldsTheNominalCurvesAndTheirRailsAddUp) {
-  const std::uint64_t seed = testing::TestSeed(8);
+  const std::uint64_t seed = test::TestSeed(8);
   FOCALFLEET_TRACE_SEED(seed);
   const Case c = RandomCase(seed);
   const EstimateFigures figures = EstimateWithSpread(c.plan, c.layout, c.drives, {});
@@ -141,7 +141,7 @@ TEST(EstimateWithSpread, HoldsTheNominalCurvesAndTheirRailsAddUp) {
 }
 
 TEST(EstimateWithSpread, LimitsHoldEveryMotorWithinTheSpread) {
-  const std::uint64_t seed = testing::TestSeed(9);
+  const std::uint64_t seed = test::TestSeed(9);
   FOCALFLEET_TRACE_SEED(seed);
   const Case c = RandomCase(seed);
   const EstimateSpread spread{.load = 0.2, .resistance = 0.1, .model_error = 0};

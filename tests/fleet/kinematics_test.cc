@@ -65,7 +65,7 @@ TEST(Kinematics, PatrolHasAHoleWhereTheArmCannotFold) {
 }
 
 TEST(Kinematics, EverySolutionOfAReachablePointIsFoundAndReachesIt) {
-  const std::uint64_t seed = testing::TestSeed(20240611);
+  const std::uint64_t seed = test::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 20'000; ++k) {

@@ -60,7 +60,7 @@ TEST(Layout, OneUnitAlonePitchesTwiceItsReach) {
 }
 
 TEST(Layout, NeighboursAreExactlyThoseWhoseReachesOverlap) {
-  const std::uint64_t seed = testing::TestSeed(20240611);
+  const std::uint64_t seed = test::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
   struct Plate {
     double height_mm;

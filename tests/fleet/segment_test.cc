@@ -27,7 +27,7 @@ TEST(Segment, DistancesOfPlainCases) {
 }
 
 TEST(Segment, NoPairOfPointsIsNearerAndOneIsAsNear) {
-  const std::uint64_t seed = testing::TestSeed(20240611);
+  const std::uint64_t seed = test::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const auto point = [&] { return PointFp{rng.Uniform(-10, 10), rng.Uniform(-10, 10)}; };
@@ -58,7 +58,7 @@ double ByCrossingAndEnds(const SegmentFp& s, const SegmentFp& t) {
 }
 
 TEST(Segment, AlmostParallelOnesAreAsFarApartAsTheirEndsSay) {
-  const std::uint64_t seed = testing::TestSeed(20240612);
+  const std::uint64_t seed = test::TestSeed(20240612);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 200'000; ++k) {

@@ -235,7 +235,7 @@ TEST(ResolveTargets, CountsWhatItDoesNotTellByItsReason) {
 }
 
 TEST(DrawConfiguration, IsClearInRangeAndTheSameForTheSameSeed) {
-  const std::uint64_t seed = testing::TestSeed(20240611);
+  const std::uint64_t seed = test::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
   const Fleet fleet = Hex(400);
   const auto poses = DrawConfiguration(fleet.layout, fleet.drives, {}, Rng(seed));
@@ -246,7 +246,7 @@ TEST(DrawConfiguration, IsClearInRangeAndTheSameForTheSameSeed) {
 }
 
 TEST(DrawConfiguration, FiveThousandUnitsFindTheirPlaces) {
-  const std::uint64_t seed = testing::TestSeed(20240611);
+  const std::uint64_t seed = test::TestSeed(20240611);
   FOCALFLEET_TRACE_SEED(seed);
   const Fleet fleet = Hex(5000);
   for (std::uint64_t k = 0; k < 5; ++k)

@@ -28,6 +28,8 @@
 namespace focalfleet {
 namespace {
 
+using test::SmallFleet;
+
 constexpr std::uint32_t kUnitCount = 3;
 
 void CheckUnits(const Command& command) {

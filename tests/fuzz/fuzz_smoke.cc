@@ -14,6 +14,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
+namespace focalfleet {
 namespace {
 
 using Bytes = std::vector<std::uint8_t>;
@@ -48,9 +49,7 @@ void Mutate(focalfleet::Rng& rng, Bytes* input) {
   }
 }
 
-}  // namespace
-
-int main(int count, char** arguments) {
+int Main(int count, char** arguments) {
   if (count < 2) return 2;
   const std::vector<Bytes> corpus = ReadCorpus(arguments[1]);
   const int runs = count > 2 ? std::atoi(arguments[2]) : 20'000;
@@ -74,3 +73,8 @@ int main(int count, char** arguments) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int count, char** arguments) { return focalfleet::Main(count, arguments); }

@@ -359,7 +359,7 @@ class Harness {
   Layout layout_;
   std::array<FakeUnit, kUnits> fake_units_;
   std::unique_ptr<Coordinator> coordinator_;
-  testing::MemoryStore store_;
+  test::MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
   struct Commit {

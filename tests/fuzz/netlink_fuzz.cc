@@ -10,9 +10,10 @@
 #include "daemon/ports/can_netlink.h"
 #include "protocol/base/check.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
-                               // function
+namespace focalfleet {
+namespace {
+
+void TryBytes(const std::uint8_t* data, std::size_t size) {
   std::vector<std::byte> bytes(size);
   if (size > 0) std::memcpy(bytes.data(), data, size);
   if (const auto link = ReadLink(bytes)) {
@@ -23,5 +24,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const auto acknowledged = ReadAcknowledgement(bytes);
   FOCALFLEET_CHECK(acknowledged || !acknowledged.error().text.empty());
+}
+
+}  // namespace
+}  // namespace focalfleet
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  focalfleet::TryBytes(data, size);
   return 0;
 }

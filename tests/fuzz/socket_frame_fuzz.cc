@@ -10,9 +10,10 @@
 #include "daemon/ports/socket_frames.h"
 #include "protocol/base/check.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one
-                               // function
+namespace focalfleet {
+namespace {
+
+void TryBytes(const std::uint8_t* data, std::size_t size) {
   if (canfd_frame fd{}; size >= sizeof fd) {
     std::memcpy(&fd, data, sizeof fd);
     if (const auto frame = FromSocketFrame(fd)) {
@@ -39,5 +40,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       FOCALFLEET_CHECK(frame->data[i] == 0);
     FOCALFLEET_CHECK(FromSocketFrame(ToSocketFrame(*frame)) == frame);
   }
+}
+
+}  // namespace
+}  // namespace focalfleet
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  focalfleet::TryBytes(data, size);
   return 0;
 }

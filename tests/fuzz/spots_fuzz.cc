@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -15,9 +14,12 @@
 #include "fleet/files/fiducials_file.h"
 #include "fleet/files/spots_file.h"
 #include "protocol/base/check.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
+
+using test::ScratchFolder;
 
 constexpr SensorLimits kSensor{11'000, 11'000};
 
@@ -58,7 +60,8 @@ void TryCsv(std::string_view text) {
 
 /// Tries bytes as FITS, or as any file of a camera, packed by gzip, too.
 void TryBytes(std::string_view bytes) {
-  static const Scratch scratch;
+  // In memory, where a file system in memory can be written.
+  static const ScratchFolder scratch(access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp");
   const auto exposure = ParseExposure(std::string(bytes), "in.fits", kSensor);
   if (!exposure) {
     FOCALFLEET_CHECK(exposure.error().text.find("in.fits") == 0);
@@ -66,7 +69,7 @@ void TryBytes(std::string_view bytes) {
   }
   FOCALFLEET_CHECK(CheckSpots(*exposure, kSensor).has_value());
   FOCALFLEET_CHECK(CheckExposureId(exposure->id).has_value());
-  FOCALFLEET_CHECK(WriteSpotsFits(scratch.File("again.fits"), *exposure).has_value());
+  FOCALFLEET_CHECK(WriteSpotsFits(scratch / "again.fits", *exposure).has_value());
 }
 
 void TryFiducials(std::string_view text) {

@@ -8,20 +8,29 @@
 #include "protocol/base/check.h"
 #include "protocol/wire/stage_group.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace focalfleet;
-  if (size < 5) return 0;
+namespace focalfleet {
+namespace {
+
+void TryBytes(const std::uint8_t* data, std::size_t size) {
+  if (size < 5) return;
   FdFrame group;
   std::memcpy(&group.id, data, 4);
   group.length = data[4];
   std::memcpy(group.data.data(), data + 5, std::min(size - 5, group.data.size()));
   const auto entries = UnpackGroup(group);
-  if (!entries) return 0;
+  if (!entries) return;
   const std::span<const CanFrame> frames(entries->frame.data(), entries->count);
   FOCALFLEET_CHECK(std::all_of(frames.begin(), frames.end(), CanBeGrouped));
   FdFrame again;
   FOCALFLEET_CHECK(PackGroup(frames, &again) == entries->count);
   FOCALFLEET_CHECK(again.id == group.id && again.length == group.length &&
                    std::equal(again.payload().begin(), again.payload().end(), group.data.begin()));
+}
+
+}  // namespace
+}  // namespace focalfleet
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  focalfleet::TryBytes(data, size);
   return 0;
 }

@@ -11,7 +11,7 @@
 namespace focalfleet::hidden {
 namespace {
 
-using focalfleet::testing::TestSeed;
+using focalfleet::test::TestSeed;
 
 Campaign SmallCampaign(const std::string& design, std::size_t units, std::size_t moves,
                        std::uint64_t seed) {

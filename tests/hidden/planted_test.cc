@@ -16,7 +16,7 @@
 namespace focalfleet::hidden {
 namespace {
 
-using focalfleet::testing::TestSeed;
+using focalfleet::test::TestSeed;
 
 std::vector<std::string> Split(const std::string& line, char at) {
   std::vector<std::string> parts(1);

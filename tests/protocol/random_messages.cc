@@ -3,7 +3,7 @@
 #include <sstream>
 #include <type_traits>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 template <class T>
@@ -231,4 +231,4 @@ UnitMessage RandomUnit(Rng& rng) {
 std::string Show(const HostMessage& message) { return ShowAny(message); }
 std::string Show(const UnitMessage& message) { return ShowAny(message); }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

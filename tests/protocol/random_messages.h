@@ -9,7 +9,7 @@
 #include "protocol/base/rng.h"
 #include "protocol/wire/messages.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 HostMessage RandomHost(Rng& rng);
 HostMessage RandomHost(std::size_t alternative, Rng& rng);
@@ -21,4 +21,4 @@ UnitMessage RandomUnit(std::size_t alternative, Rng& rng);
 std::string Show(const HostMessage& message);
 std::string Show(const UnitMessage& message);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

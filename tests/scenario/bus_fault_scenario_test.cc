@@ -10,8 +10,11 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::TestSeed;
 
 constexpr std::uint32_t kUnits = 37;
 
@@ -169,4 +172,4 @@ TEST(BusFaults, APlanOfFaultsGivesTheSameRunTwice) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

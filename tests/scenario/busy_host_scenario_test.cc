@@ -11,9 +11,11 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
+using test::InProcessFleet;
+using test::TestSeed;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -201,4 +203,4 @@ TEST(BusyHost, AnAnswerToAQuestionThatHasNotLeftAnswersNone) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

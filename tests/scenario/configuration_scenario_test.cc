@@ -3,18 +3,22 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
 #include <string>
 
-#include "protocol/wire/codec.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
-InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
+using test::ExpectOthersArrive;
+using test::HasAlarm;
+using test::InProcessFleet;
+using test::RunIntoMotion;
+using test::Small;
+using test::SomebodyMoving;
+using test::Unserved;
 
 TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
   for (const std::uint64_t seed : {1u, 2u, 3u}) {
@@ -40,44 +44,6 @@ TEST(Configuration, SecondOneStartsFromWhereTheFirstEnded) {
     EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
   }
   fleet.ExpectStoreTellsTheTruth("after three configurations");
-}
-
-TEST(Configuration, NothingStartsBeforeTheIntentIsDurable) {
-  auto options = Small(6);
-  options.commit_delay = Seconds(3);
-  InProcessFleet fleet(options);
-  fleet.ApplyRandom(6);
-  ASSERT_TRUE(fleet.RunUntil(
-      [&] {
-        for (std::size_t n = 0; n < fleet.layout().size(); ++n)
-          if (fleet.world().Truth(n).moves_begun != 0) return true;
-        return false;
-      },
-      Seconds(120)));
-  EXPECT_EQ(fleet.store().begun.size(), fleet.store().fleet.open_intents.size());
-  EXPECT_GE(fleet.store().begun.size(), 30u);
-}
-
-TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
-  InProcessFleet fleet(Small(7));
-  fleet.Run(Seconds(5));
-  fleet.ApplyRandom(7);
-  fleet.Run(Milliseconds(25));
-  fleet.store_fails = true;
-  fleet.Run(Seconds(30));
-  for (std::size_t n = 0; n < fleet.layout().size(); ++n)
-    EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u);
-  EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kUploading);
-  EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "the store, which cannot be written");
-  fleet.store_fails = false;
-  ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "");
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
-  fleet.store_fails = true;
-  const auto refused = fleet.ApplyRandom(8);
-  fleet.Run(Seconds(1));
-  ASSERT_TRUE(fleet.LastReply(refused));
-  EXPECT_TRUE(fleet.LastReply(refused)->error);
 }
 
 TEST(Configuration, WhileOneRunsAnotherIsRefused) {
@@ -884,4 +850,4 @@ TEST(Configuration, SameSeedSameFrames) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -7,9 +7,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <set>
@@ -24,10 +21,17 @@
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::Pause;
+using test::Process;
+using test::ScratchFolder;
+using test::TestSeed;
+using test::WaitUntil;
 
 constexpr int kTrials = 50;
 constexpr std::uint32_t kUnits = 60;
@@ -49,12 +53,9 @@ struct Truth {
 class Observatory {
  public:
   explicit Observatory(std::uint64_t seed)
-      : directory_(std::filesystem::temp_directory_path() /
-                   ("focalfleet_crash_" + std::to_string(getpid()))),
-        layout_(*Layout::Create(MakeHexLayout({.count = kUnits, .units_per_bus = 10}), {})),
+      : layout_(*Layout::Create(MakeHexLayout({.count = kUnits, .units_per_bus = 10}), {})),
         drives_(kUnits) {
-    std::filesystem::create_directories(directory_);
-    Write("units.csv", WriteUnits(layout_.units()));
+    folder_.Put("units.csv", WriteUnits(layout_.units()));
     const auto start = DrawConfiguration(layout_, drives_, {}, Rng::Stream(seed, "start"));
     Write("state.csv", WriteState(layout_, drives_,
                                   std::vector<std::optional<Pose>>(start->begin(), start->end())));
@@ -73,20 +74,11 @@ class Observatory {
               "silence_limit_ms = 30000\npoll_period_ms = 5000\n");
     simulator_.emplace(
         std::vector<std::string>{FOCALFLEET_SIM, "--units", Path("units.csv"), "--state",
-                                 Path("state.csv"), "--unix-directory", directory_.string(),
-                                 "--control", Path("sim.sock"), "--speed", std::to_string(kSpeed)},
+                                 Path("state.csv"), "--unix-directory", folder_.path(), "--control",
+                                 Path("sim.sock"), "--speed", std::to_string(kSpeed)},
         Path("sim.log"));
     EXPECT_TRUE(
         WaitUntil([&] { return LineClient::Connect(Path("sim.sock")).has_value(); }, kPatienceMs));
-  }
-  ~Observatory() {
-    if (::testing::Test::HasFailure()) {
-      std::fprintf(stderr, "files of the failed run are in %s\n", directory_.c_str());
-    } else {
-      daemon_.reset();
-      simulator_.reset();
-      std::filesystem::remove_all(directory_);
-    }
   }
 
   void StartDaemon() {
@@ -168,9 +160,7 @@ class Observatory {
     return csv;
   }
 
-  [[nodiscard]] std::string Path(const std::string& name) const {
-    return (directory_ / name).string();
-  }
+  [[nodiscard]] std::string Path(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] const Layout& layout() const { return layout_; }
 
  private:
@@ -179,11 +169,8 @@ class Observatory {
     if (!client) return tl::unexpected<Error>(client.error());
     return client->Call(verb, args, {.silence_max = Seconds(60), .on_progress = {}});
   }
-  void Write(const std::string& name, const std::string& text) {
-    std::ofstream(Path(name)) << text;
-  }
 
-  std::filesystem::path directory_;
+  ScratchFolder folder_;  // outlives the processes that write into it
   Layout layout_;
   std::vector<UnitDrive> drives_;
   std::optional<Process> simulator_;
@@ -304,4 +291,4 @@ TEST(Crash, KilledAnywhereTheStoreTellsTheTruthAndTheConfigurationIsCompleted) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

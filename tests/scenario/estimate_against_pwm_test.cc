@@ -70,7 +70,7 @@ TEST(EstimateAgainstPwm, MeanPowerIsWithinTwoPercentAt200RandomPoints) {
     int stalled = 0;
   };
   std::array<Errors, 3> by_mode;
-  const std::uint64_t first = testing::TestSeed(4000);
+  const std::uint64_t first = test::TestSeed(4000);
   for (std::uint64_t k = 0; k < 200; ++k) {
     FOCALFLEET_TRACE_SEED(first);
     Rng rng = Rng::Stream(first, "operating point", k);
@@ -121,7 +121,7 @@ TEST(EstimateAgainstPwm, MeanPowerIsWithinTwoPercentAt200RandomPoints) {
 }
 
 TEST(EstimateAgainstPwm, TimeOfAMoveIsExactToACarrierPeriod) {
-  const std::uint64_t first = testing::TestSeed(4100);
+  const std::uint64_t first = test::TestSeed(4100);
   for (std::uint64_t k = 0; k < 200; ++k) {
     FOCALFLEET_TRACE_SEED(first);
     Rng rng = Rng::Stream(first, "move", k);
@@ -142,10 +142,10 @@ TEST(EstimateAgainstPwm, TimeOfAMoveIsExactToACarrierPeriod) {
 // timing is the simulation's field path.
 TEST(EstimateAgainstPwm, MakespanOfAPlanIsThatOfTheUnitsFields) {
   for (std::uint64_t k = 0; k < 5; ++k) {
-    const std::uint64_t seed = testing::TestSeed(4200 + k);
+    const std::uint64_t seed = test::TestSeed(4200 + k);
     FOCALFLEET_TRACE_SEED(seed);
-    testing::PlanningFleet fleet = testing::HexFleet(127);
-    testing::DrawStartAndTargets(&fleet, seed);
+    test::PlanningFleet fleet = test::HexFleet(127);
+    test::DrawStartAndTargets(&fleet, seed);
     const auto plan = MakePlan(fleet.request(), {});
     ASSERT_TRUE(plan) << plan.error().text;
     double makespan_s = 0;

@@ -8,8 +8,6 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
-#include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -21,11 +19,18 @@
 #include "fleet/hex_layout.h"
 #include "fleet/targets.h"
 #include "tests/daemon/dds/own_domain.h"
+#include "tests/support/fibre_carrier_model.h"
 #include "tests/support/process.h"
-#include "tests/support/spine_model.h"
+#include "tests/support/scratch_folder.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::FittedFibreCarrierModel;
+using test::OwnDomain;
+using test::Process;
+using test::ScratchFolder;
+using test::WaitUntil;
 
 constexpr int kPatienceMs = 170'000;
 constexpr const char* kSpeed = "10.0";
@@ -36,31 +41,17 @@ constexpr const char* kTiming =
 
 class HallFleet : public ::testing::Test {
  protected:
-  HallFleet()
-      : directory_(std::filesystem::temp_directory_path() /
-                   ("focalfleet_hall_" + std::to_string(getpid()) +
-                    ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    std::filesystem::create_directories(directory_);
-    Write("model.toml", WriteHallModel(FittedFibreCarrierModel()));
-  }
+  HallFleet() { folder_.Put("model.toml", WriteHallModel(FittedFibreCarrierModel())); }
   void Configure(std::uint32_t units, const std::string& bus) {
     layout_.emplace(Layout::Create(MakeHexLayout({.count = units, .sensors = 8}), {}).value());
-    Write("units.csv", WriteUnits(layout_->units()));
-    Write("focalfleet.toml",
-          "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
-          "[control]\nsocket = \"daemon.sock\"\n"
-          "[dds]\ndomain = " +
-              std::to_string(OwnDomain()) + "\n[hall]\nmodel = \"model.toml\"\n[clock]\nspeed = " +
-              kSpeed + "\n" + kTiming + "[bus]\n" + bus);
-  }
-  ~HallFleet() override {
-    if (HasFailure()) {
-      std::fprintf(stderr, "files of the failed run are in %s\n", directory_.c_str());
-    } else {
-      daemon_.reset();
-      simulator_.reset();
-      std::filesystem::remove_all(directory_);
-    }
+    folder_.Put("units.csv", WriteUnits(layout_->units()));
+    folder_.Put("focalfleet.toml",
+                "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
+                "[control]\nsocket = \"daemon.sock\"\n"
+                "[dds]\ndomain = " +
+                    std::to_string(OwnDomain()) +
+                    "\n[hall]\nmodel = \"model.toml\"\n[clock]\nspeed = " + kSpeed + "\n" +
+                    kTiming + "[bus]\n" + bus);
   }
 
   void Start() {
@@ -94,14 +85,9 @@ class HallFleet : public ::testing::Test {
     }
     return csv;
   }
-  [[nodiscard]] std::string Path(const std::string& name) const {
-    return (directory_ / name).string();
-  }
-  void Write(const std::string& name, const std::string& text) {
-    std::ofstream(Path(name)) << text;
-  }
+  [[nodiscard]] std::string Path(const std::string& name) const { return folder_ / name; }
 
-  std::filesystem::path directory_;
+  ScratchFolder folder_;  // outlives the processes that write into it
   std::optional<Layout> layout_;
   std::optional<Process> simulator_;
   std::optional<Process> daemon_;
@@ -213,16 +199,16 @@ constexpr Liar kLiars[] = {{4, "sensor_stuck", 3, "stuck v3", false},
 
 TEST_F(HallFleet, WhoseSensorLiesIsNamedInTheStore) {
   constexpr std::uint32_t kUnits = 37;
-  Configure(kUnits, "port = \"unix\"\nunix_directory = \"" + directory_.string() + "\"\n");
+  Configure(kUnits, "port = \"unix\"\nunix_directory = \"" + folder_.path() + "\"\n");
   std::string faults = "fault,bus_id,unit_id,from_s,to_s,chance,value\n";
   for (const Liar& liar : kLiars)
     faults += std::string(liar.fault) + ",," + std::to_string(liar.unit) + ",,,," +
               std::to_string(liar.sensor) + "\n";
-  Write("faults.csv", faults);
+  folder_.Put("faults.csv", faults);
   simulator_.emplace(
       std::vector<std::string>{FOCALFLEET_SIM, "--units", Path("units.csv"), "--faults",
-                               Path("faults.csv"), "--unix-directory", directory_.string(),
-                               "--control", Path("sim.sock"), "--speed", kSpeed},
+                               Path("faults.csv"), "--unix-directory", folder_.path(), "--control",
+                               Path("sim.sock"), "--speed", kSpeed},
       Path("sim.log"));
   ASSERT_TRUE(
       WaitUntil([&] { return LineClient::Connect(Path("sim.sock")).has_value(); }, kPatienceMs));
@@ -263,4 +249,4 @@ TEST_F(HallFleet, WhoseSensorLiesIsNamedInTheStore) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -9,10 +9,14 @@
 #include "fleet/kinematics.h"
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
-#include "tests/support/spine_model.h"
+#include "tests/support/fibre_carrier_model.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::FittedFibreCarrierModel;
+using test::HasAlarm;
+using test::InProcessFleet;
 
 class HallScenario : public ::testing::Test {
  protected:
@@ -152,4 +156,4 @@ TEST_F(HallScenario, ASensorsReadingTakesHalfAMillisecondOfItsBus) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -13,7 +13,7 @@
 #include "protocol/base/check.h"
 #include "protocol/wire/codec.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 // Between two steps at least this much time passes, as between two turns of the daemon's loop.
@@ -314,4 +314,4 @@ void InProcessFleet::ExpectStoreTellsTheTruth(const std::string& when) const {
   }
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -21,7 +21,7 @@
 #include "sim/world/world.h"
 #include "tests/support/memory_store.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class InProcessFleet {
  public:
@@ -162,4 +162,4 @@ class InProcessFleet {
   std::uint64_t digest_ = 0xcbf29ce484222325u;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -7,8 +7,12 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/scenario/steps.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::RunIntoMotion;
+using test::Unserved;
 
 double TrueErrorUm(const InProcessFleet& fleet, const UnitView& view, std::uint32_t n) {
   const PointFp wanted = FibreAt(fleet.layout().units()[n], UnitDrive{}, *view.target);
@@ -159,7 +163,7 @@ TEST(Measured, AStopBeforeTheExposureLeavesNobodyArrived) {
 void PutBackAnOldStore(InProcessFleet* fleet) {
   fleet->ApplyRandom(11);
   ASSERT_TRUE(fleet->RunUntilIdle());
-  const testing::MemoryStore backup = fleet->store();
+  const test::MemoryStore backup = fleet->store();
   fleet->ApplyRandom(12);
   ASSERT_TRUE(fleet->RunUntilIdle());
   fleet->store() = backup;
@@ -266,4 +270,4 @@ TEST(Measured, ALookThatFailsFindsNobody) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -13,8 +13,11 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::TestSeed;
 
 constexpr std::uint64_t kRequest = 7000;
 
@@ -453,4 +456,4 @@ TEST(Retarget, WhoMissedTheStartGoesLateInTheSameRound) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -11,7 +11,7 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 constexpr double kSlackS = 1.2;  // both units still move for this long
@@ -267,4 +267,4 @@ TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -10,9 +10,11 @@
 #include "tests/scenario/in_process_fleet.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
+using test::InProcessFleet;
+using test::TestSeed;
 using ::testing::HasSubstr;
 
 const double kAllowed_s = 2 * PlanOptions{}.start_skew_s;
@@ -247,4 +249,4 @@ TEST(StartSkew, OfFiftyBusesWithAHundredUnitsEachIsWithinWhatPlansAllowFor) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

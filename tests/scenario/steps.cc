@@ -4,7 +4,9 @@
 
 #include <algorithm>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
+
+InProcessFleet::Options Small(std::uint64_t seed) { return {.count = 37, .seed = seed}; }
 
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further) {
   ASSERT_TRUE(fleet->RunUntil(
@@ -47,4 +49,4 @@ void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than) {
   EXPECT_TRUE(fleet->store().fleet.open_intents.empty());
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

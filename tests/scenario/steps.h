@@ -6,7 +6,7 @@
 
 #include "tests/scenario/in_process_fleet.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// Runs until a unit moves and then for `further`: into the middle of the motion.
 void RunIntoMotion(InProcessFleet* fleet, DurationNs further);
@@ -23,4 +23,4 @@ std::string Unserved(InProcessFleet& fleet);
 /// intent is open.
 void ExpectOthersArrive(InProcessFleet* fleet, std::uint32_t others_than);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -19,8 +19,17 @@
 #include "tests/support/plan_checker.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::CheckedRow;
+using test::CheckedUnit;
+using test::CheckPlan;
+using test::CheckReport;
+using test::ExpectOthersArrive;
+using test::HasAlarm;
+using test::InProcessFleet;
+using test::Unserved;
 
 bool RunUntilUploading(InProcessFleet* fleet) {
   return fleet->RunUntil(
@@ -439,4 +448,4 @@ TEST(Checked, IsWhatTheFramesOnTheWireSay) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

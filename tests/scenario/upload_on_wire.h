@@ -13,7 +13,7 @@
 #include "protocol/wire/stage_group.h"
 #include "sim/world/world.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// The upload of one bus, all in bits of its own clock. The needed frames are those without which a
 /// unit is not armed, counted once. They are stage_begin, stage_segment, confirm and its answer,
@@ -100,4 +100,4 @@ inline std::map<BusId, UploadOnWire> MeasureUpload(std::span<const sim::WireFram
   return out;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -7,7 +7,7 @@
 #include "tests/scenario/upload_on_wire.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 /// The frames of the first upload of a random configuration, until the units move.
@@ -107,4 +107,4 @@ TEST(Upload, SaysWhatRepeatsCost) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

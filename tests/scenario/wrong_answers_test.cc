@@ -13,8 +13,13 @@
 #include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::ExpectOthersArrive;
+using test::HasAlarm;
+using test::InProcessFleet;
+using test::Unserved;
 
 std::uint32_t Begun(InProcessFleet& fleet) {
   std::uint32_t begun = 0;
@@ -397,4 +402,4 @@ TEST(Settings, ASlowerUnitIsSlowerOnTheWire) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <new>
 
-// NOLINTBEGIN(cppcoreguidelines-no-malloc): this is what operator new is made of.
+// NOLINTBEGIN(cppcoreguidelines-no-malloc): operator new is made of malloc.
 namespace {
 
 thread_local std::uint64_t allocation_count = 0;
@@ -42,8 +42,8 @@ void operator delete[](void* memory, std::size_t, std::align_val_t) noexcept { s
 
 // NOLINTEND(cppcoreguidelines-no-malloc)
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 std::uint64_t AllocationCount() { return allocation_count; }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

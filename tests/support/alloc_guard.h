@@ -1,15 +1,16 @@
-// Forbids the heap for the length of a scope. The programs that link this replace the global
-// operator new, so every allocation of C++ code on this thread counts, whatever library makes it.
+// The guard counts uses of the heap during a scope. Programs that link this library have their
+// global operator new replaced. Every allocation of C++ code on this thread counts, whatever
+// library makes it.
 #pragma once
 
 #include <cstdint>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
-/// Allocations by operator new on this thread since it began.
+/// Allocations by operator new on this thread since the thread began.
 std::uint64_t AllocationCount();
 
-/// Counts from its construction on: `EXPECT_EQ(guard.allocations(), 0u)`.
+/// The guard counts from its construction on: `EXPECT_EQ(guard.allocations(), 0u)`.
 class AllocGuard {
  public:
   AllocGuard() : before_(AllocationCount()) {}
@@ -19,4 +20,4 @@ class AllocGuard {
   std::uint64_t before_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

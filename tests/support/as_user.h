@@ -1,5 +1,5 @@
-// A test as another user: what root may do no permission forbids, so a test of root alone proves
-// nothing of the others, and the other way round.
+// A test as another user. No permission forbids root anything, so a test of root proves nothing of
+// other users, nor the other way round.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
-/// The users that tests can be: root and nobody where root runs them, else whoever does.
+/// The users that tests can be: root and nobody where root runs them, else the user who runs them.
 inline std::vector<uid_t> UsersOfTests() {
   constexpr uid_t kNobody = 65'534;
   return geteuid() == 0 ? std::vector<uid_t>{0, kNobody} : std::vector<uid_t>{geteuid()};
@@ -20,7 +20,7 @@ inline std::string NameOfUser(const ::testing::TestParamInfo<uid_t>& info) {
   return info.param == 0 ? "AsRoot" : "AsAUser";
 }
 
-/// The whole process is that user until the end of the scope.
+/// The whole process acts as that user until the end of the scope.
 class AsUser {
  public:
   explicit AsUser(uid_t user) : before_(geteuid()) {
@@ -40,4 +40,4 @@ class AsUser {
   uid_t before_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

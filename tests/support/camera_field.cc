@@ -5,7 +5,7 @@
 
 #include "fleet/targets.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr double kAlikeMm = 0.7;  // twice the widest gate
@@ -23,7 +23,7 @@ sim::Mechanism MechanismOf(const Unit& unit) {
 }
 
 Layout MadeLayout(std::vector<Unit> units, Rng* rng) {
-  // Zero angles of their own: a command means another direction at each unit.
+  // Each unit has a zero angle of its own, so a command means another direction at each unit.
   for (Unit& unit : units) unit.axis[0].zero_deg = rng->Uniform(-180, 180);
   return *Layout::Create(std::move(units), {});
 }
@@ -66,7 +66,7 @@ std::vector<AxisAngles> CameraField::DrawAngles(bool collision_free) {
 void CameraField::Move(const FieldTroubles& troubles) {
   const std::vector<AxisAngles> next = DrawAngles(troubles.collision_free);
   for (std::uint32_t i = 0; i < units_.size(); ++i) {
-    // The loop had brought everybody to its place before.
+    // The loop had brought every unit to its place before.
     const AxisAngles before = units_[i].commanded;
     const std::complex<double> noise(troubles.corrected_sigma_mm * rng_.Normal(),
                                      troubles.corrected_sigma_mm * rng_.Normal());
@@ -93,7 +93,7 @@ void CameraField::Move(const FieldTroubles& troubles) {
       ends[k] = unit.stayed[k] ? from[k] : from[k] + share[k] * (to[k] - from[k]) + error;
     }
     unit.place_mm = PlaceOf(i, {ends[0], ends[1]});
-    // Disabled units are told nothing.
+    // Disabled units receive no command.
     if (unit.fate == PlantedFate::kDisabled) unit.commanded = unit.before;
   }
 }
@@ -250,7 +250,7 @@ class Judging {
     if (said.status == MeasurementStatus::kSwapped)
       return truth.fate == PlantedFate::kSwapped && said.other.value == truth.swapped_with;
     if (said.status == MeasurementStatus::kDidNotMove) return said.stayed == truth.stayed;
-    // Measured where its move ends: it is there, whatever brought it.
+    // The unit is where its move ends, whatever brought it there.
     return std::abs(field_.PlaceOf(i, truth.commanded) - truth.place_mm) < kAlikeMm ||
            !said.motion_is_known;
   }
@@ -296,4 +296,4 @@ Judgement Judge(const CameraField& field, const sim::Image& image, const Identif
   return Judging(field, image, result).Run();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

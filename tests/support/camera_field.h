@@ -1,6 +1,7 @@
-// A focal plane in front of a simulated camera, with the troubles of real ones planted, and a judge
-// who knows whose light is in which spot. The truth is drawn with the simulator's mechanisms and
-// taken with its camera; what is judged (fleet/camera) has no part in it.
+// The camera field is a focal plane in front of a simulated camera, with planted troubles of real
+// ones. The judge compares an identification with the true sources. The truth is drawn with the
+// simulator's mechanisms and imaged with its camera. The code under judgement (fleet/camera) has no
+// part in it.
 #pragma once
 
 #include <array>
@@ -16,16 +17,16 @@
 #include "sim/world/camera/camera.h"
 #include "sim/world/mechanism.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct FieldTroubles {
   double blind_sigma_deg = 0.22;      // of each axis: 54 um rms over the patrol area
-  double tail_share = 0.004;          // of units, with errors 3 to 30 times as large
-  double dead_share = 0.02;           // two of three with both axes, the others with one
-  double slipping_share = 0.02;       // stop anywhere on their way
-  double disabled_share = 0.01;       // shine and do not move
-  int swaps = 20;                     // pairs; every second of neighbours
-  double corrected_sigma_mm = 0.005;  // of where a unit was before: how well that is known
+  double tail_share = 0.004;          // of units; their errors are 3 to 30 times as large
+  double dead_share = 0.02;           // of units; two of three with both axes, the others with one
+  double slipping_share = 0.02;       // of units; they stop anywhere on their way
+  double disabled_share = 0.01;       // of units; they shine and do not move
+  int swaps = 20;                     // pairs; half of them are neighbours
+  double corrected_sigma_mm = 0.005;  // of the place before the move: how well that is known
   bool collision_free = true;  // false: poses at random, fibres may be anywhere near each other
 };
 
@@ -41,23 +42,23 @@ struct PlantedUnit {
   std::complex<double> place_mm;  // where the fibre truly is
 };
 
-/// The fleet between two exposures.
+/// The field is the fleet between two exposures.
 class CameraField {
  public:
   CameraField(const HexLayoutOptions& options, std::uint64_t seed);
 
-  /// Everybody goes to a new configuration; errors and troubles are drawn.
+  /// Every unit goes to a new configuration; errors and troubles are drawn.
   void Move(const FieldTroubles& troubles);
 
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Fiducial>& fiducials() const { return fiducials_; }
   [[nodiscard]] const std::vector<PlantedUnit>& units() const { return units_; }
   [[nodiscard]] std::vector<PlantedUnit>& units() { return units_; }
-  /// Fibres in the order of the layout, then fiducials.
+  /// The fibres in the order of the layout, then the fiducials.
   [[nodiscard]] std::vector<sim::LightSource> Sources() const;
-  /// What the coordinator would expect: commands and earlier measurements, nothing of the truth.
+  /// The expectations of a coordinator: commands and earlier measurements, nothing of the truth.
   [[nodiscard]] std::vector<UnitExpectation> Expectations() const;
-  /// True place of a unit with these angles.
+  /// The true place of a unit's fibre at these angles.
   [[nodiscard]] std::complex<double> PlaceOf(std::uint32_t unit, const AxisAngles& angles) const;
   Rng& rng() { return rng_; }
 
@@ -73,19 +74,21 @@ class CameraField {
   std::vector<PlantedUnit> units_;
 };
 
-/// The camera of the tests: 5 px/mm, distortion of a millimetre at the rim, turned a little.
+/// The camera of the tests has 5 px/mm and a distortion of one millimetre at the rim, and is turned
+/// a little.
 sim::CameraTraits TestCamera(double rim_mm);
-/// What the coordinator believes of it: no distortion, nothing of an exposure's own changes.
+/// The model that a coordinator has of the camera: no distortion, and no changes between exposures.
 CameraModel ModelOf(const sim::CameraTraits& traits);
-/// As the port would deliver it.
+/// The exposure as the port would deliver it.
 Exposure ExposureOf(const sim::Image& image, std::string id);
 
 struct Judgement {
   std::array<std::uint32_t, kMeasurementStatusCount> count{};
-  std::uint32_t wrong = 0;        // certain, and the spot is not lit by the unit's fibre
+  std::uint32_t wrong = 0;        // certain, but the spot is not lit by the unit's fibre
   std::uint32_t wrong_story = 0;  // certain, its spot, but moved / did not move / swapped is false
-  std::uint32_t flagged_wrong = 0;  // has a spot that is not its, and says that it is not certain
-  std::uint32_t lost = 0;           // visible, alone in its spot, and still not certain
+  std::uint32_t flagged_wrong =
+      0;                   // has a spot that is not its own, and is reported as not certain
+  std::uint32_t lost = 0;  // visible, alone in its spot, and still not certain
   std::uint32_t pairs = 0;
   std::uint32_t pairs_found = 0;      // both name each other
   std::uint32_t pairs_dark = 0;       // one or both give no light of their own: cannot be closed
@@ -98,7 +101,7 @@ struct Judgement {
   std::uint32_t placed = 0;
 };
 
-/// `light`: of the image, sources as of CameraField::Sources.
+/// Judges an identification. The sources of `image` are those of CameraField::Sources.
 Judgement Judge(const CameraField& field, const sim::Image& image, const Identification& result);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,4 +1,4 @@
-// Bytes packed as gzip packs them, by zlib's own compressor.
+// Packs bytes as gzip does, with zlib's own compressor.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline std::string Gzipped(std::string_view bytes) {
   z_stream stream{};
@@ -23,4 +23,4 @@ inline std::string Gzipped(std::string_view bytes) {
   return out.substr(0, stream.total_out);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

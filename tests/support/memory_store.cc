@@ -6,10 +6,10 @@
 
 #include "fleet/row_check.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
-/// The element of a list that is sorted by `key`, put there where there is none.
+/// Returns the element of a list that is sorted by `key`; it is inserted where it is missing.
 template <class Element, class Key>
 Element& Slot(std::vector<Element>* list, const Element& like, Key key) {
   const auto at =
@@ -85,7 +85,7 @@ void MemoryStore::Keep(const IntentEndRow& row) {
 }
 
 void MemoryStore::Keep(const BindingRow& row) {
-  // A serial number sits at one place only.
+  // A serial number is at one place only.
   for (StoredFleet::StoredUnit& unit : fleet.units)
     if (row.serial.value != 0 && unit.serial == row.serial && unit.unit != row.unit)
       unit.serial = {};
@@ -114,7 +114,7 @@ void MemoryStore::Keep(const ConfigurationRow& row) {
   configurations.push_back(row);
   const auto by_id = [](const ConfigurationRow& r) { return r.id; };
   Slot(&fleet.configurations, row, by_id) = row;
-  // Those that never ended, and the newest.
+  // The list keeps the configurations that never ended, and the newest.
   const std::uint64_t newest = fleet.configurations.back().id;
   std::erase_if(fleet.configurations,
                 [&](const ConfigurationRow& r) { return IsOver(r.state) && r.id != newest; });
@@ -130,4 +130,4 @@ void MemoryStore::Keep(const NextMoveRow& row) { fleet.next_move = row.next; }
 
 void MemoryStore::Keep(const ModelRow& row) { model_entries_.insert(row.entry); }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

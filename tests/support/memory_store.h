@@ -1,6 +1,6 @@
-// The store in memory, for tests that need no file: it keeps, merges and refuses exactly what
-// daemon/store/store.h does (tests/daemon/store/memory_store_test.cc feeds both the same batches),
-// and remembers the events that a test may ask for.
+// The store in memory serves tests that need no file. Rows are kept, merged and refused exactly as
+// by daemon/store/store.h: tests/daemon/store/memory_store_test.cc feeds both the same batches.
+// Events that a test may ask for are remembered, too.
 #pragma once
 
 #include <cstddef>
@@ -11,20 +11,20 @@
 #include "fleet/records.h"
 #include "protocol/base/result.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class MemoryStore {
  public:
-  /// As Store::Commit: all rows or none; ends of intents come last. Errors: kInvalid, and `refused`
-  /// is the row that it is about.
+  /// Keeps all rows or none, as Store::Commit does; ends of intents come last. Errors: kInvalid;
+  /// `refused` is the index of the row at fault.
   Status Commit(std::span<const Row> rows, std::size_t* refused = nullptr);
-  /// As StoreThread: rows that can never be kept are set aside, the rest is kept.
+  /// Sets aside rows that can never be kept and keeps the others, as StoreThread does.
   std::vector<RefusedRow> CommitAllBut(std::uint64_t batch, std::vector<Row> rows);
 
-  /// What Store::Load gives, in the same order.
+  /// The content that Store::Load would return, in the same order.
   StoredFleet fleet;
 
-  // Everything that was ever durable, in order.
+  // All rows that were ever durable, in order.
   std::vector<IntentRow> begun;
   std::vector<IntentEndRow> ended;
   std::vector<AlarmRow> alarms;
@@ -49,4 +49,4 @@ class MemoryStore {
   std::set<std::uint64_t> model_entries_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

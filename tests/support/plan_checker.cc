@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
@@ -20,9 +20,9 @@ using Point = std::complex<double>;
 
 double Dot(Point a, Point b) { return a.real() * b.real() + a.imag() * b.imag(); }
 
-/// Distance of segments p0-p1 and q0-q1 by minimising over one parameter in closed form and
-/// clamping, both ways: the minimum of a convex quadratic over the unit square lies inside it or on
-/// one of its four edges.
+/// Returns the distance of segments p0-p1 and q0-q1. The minimum of a convex quadratic over the
+/// unit square lies inside the square or on one of its four edges. On an edge, one parameter is
+/// minimised in closed form and clamped.
 double SegmentDistance(Point p0, Point p1, Point q0, Point q1) {
   const Point u = p1 - p0;
   const Point v = q1 - q0;
@@ -55,7 +55,8 @@ struct Knot {
   double phi_deg = 0;
 };
 
-/// One unit over time: straight between knots, still before the first and after the last.
+/// The track is one unit over time: straight between knots, at rest before the first and after the
+/// last.
 struct Track {
   std::vector<Knot> knots;
 };
@@ -70,7 +71,7 @@ class Walker {
   Walker(const CheckedUnit& unit, const Track& track, Clock clock)
       : unit_(unit), track_(track), clock_(clock) {}
 
-  /// Moves on to true time `t_s`, which never goes back.
+  /// Moves on to true time `t_s`, which never decreases.
   void To(double t_s) {
     const double own = Own(t_s);
     const auto& knots = track_.knots;
@@ -97,12 +98,12 @@ class Walker {
     elbow = Point(unit_.base_x_mm, unit_.base_y_mm) + std::polar(unit_.axis[0].arm_mm, t);
     fibre = elbow + std::polar(unit_.axis[1].arm_mm, t + p);
   }
-  /// No point of the arm is faster until NextChange. Units: mm/s.
+  /// A bound on the speed of every point of the arm until NextChange. Units: mm/s.
   [[nodiscard]] double SpeedBound() const {
     return theta_rate_ * (unit_.axis[0].arm_mm + unit_.axis[1].arm_mm) +
            phi_rate_ * unit_.axis[1].arm_mm;
   }
-  /// True time of the next knot.
+  /// The true time of the next knot.
   [[nodiscard]] double NextChange() const {
     if (next_ >= track_.knots.size()) return 1e18;
     return track_.knots[next_].t_s / clock_.rate + clock_.skew_s;
@@ -160,15 +161,15 @@ class Checker {
   const std::vector<CheckedObstacle>& obstacles_;
   CheckOptions options_;
   std::vector<Track> tracks_;
-  std::vector<std::pair<std::size_t, std::size_t>> near_;  // pairs of bases worth a look
+  std::vector<std::pair<std::size_t, std::size_t>> near_;  // pairs of bases whose arms can meet
   CheckReport report_;
 };
 
-/// Half-widths and clearance where they are not given, and the pairs near each other.
+/// Fills in half-widths and clearance that are not given, and finds the pairs near each other.
 void Checker::FillIn() {
   double reach_max = 0;
   for (std::size_t i = 0; i < units_.size(); ++i) reach_max = std::max(reach_max, Reach(i));
-  // Widths are at most a twelfth of a distance that is itself below this.
+  // Widths are at most a twelfth of a distance that is itself below this horizon.
   const double horizon = 3 * reach_max + 1;
   std::vector<std::size_t> by_x(units_.size());
   for (std::size_t i = 0; i < by_x.size(); ++i) by_x[i] = i;
@@ -373,8 +374,6 @@ void Checker::CheckObstacles() {
   }
 }
 
-// ---- files
-
 using Record = std::map<std::string, std::string>;
 
 bool ReadRecords(const std::string& path, std::vector<Record>* records, CheckReport* report) {
@@ -497,4 +496,4 @@ CheckReport CheckPlanFiles(const std::string& units_path, const std::string& sta
   return CheckPlan(std::move(units), rows, obstacles, options);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -10,7 +10,7 @@
 
 #include "protocol/base/check.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 Process::Process(const std::vector<std::string>& arguments, const std::string& log) {
   std::vector<char*> argv;
@@ -67,4 +67,4 @@ bool Process::running() { return pid_ > 0 && kill(pid_, 0) == 0; }
 
 void Pause(int milliseconds) { poll(nullptr, 0, milliseconds); }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,5 +1,5 @@
-// A child process of a test: started with its output in a file, killed at the latest when it goes
-// out of scope, so that no failing test leaves one behind.
+// A child process of a test, with its output in a file. The process is killed at the latest when
+// the object goes out of scope, so a failing test leaves none behind.
 #pragma once
 
 #include <sys/types.h>
@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class Process {
  public:
-  /// Pre: arguments[0] is a path. Output and errors are appended to `log`.
+  /// The program runs. Pre: arguments[0] is a path. Output and errors are appended to `log`.
   Process(const std::vector<std::string>& arguments, const std::string& log);
   Process(Process&& other) noexcept : pid_(other.pid_) { other.pid_ = -1; }
   Process& operator=(Process&& other) noexcept;
@@ -21,9 +21,9 @@ class Process {
   ~Process();
 
   void Signal(int number) const;
-  /// Waits for its end: exit status, or 128 + signal.
+  /// Waits for its end. Returns the exit status, or 128 + signal.
   int Wait();
-  /// As Wait; none: it has not ended within `limit_ms`.
+  /// As Wait; returns none where the process has not ended within `limit_ms`.
   std::optional<int> WaitFor(int limit_ms);
   [[nodiscard]] bool running();
 
@@ -31,10 +31,10 @@ class Process {
   pid_t pid_ = -1;
 };
 
-/// Lets real time pass for another process's sake.
+/// Lets real time pass, so that another process can proceed.
 void Pause(int milliseconds);
 
-/// Polls `done` every 10 ms; false where `limit_ms` ran out.
+/// Polls `done` every 10 ms; false where `limit_ms` passed without it.
 template <class Predicate>
 bool WaitUntil(const Predicate& done, int limit_ms) {
   for (int waited = 0; waited < limit_ms; waited += 10) {
@@ -44,4 +44,4 @@ bool WaitUntil(const Predicate& done, int limit_ms) {
   return done();
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,5 +1,5 @@
-// One seed for a random test, printed with every failure inside its scope and taken from the
-// environment when it is to be seen again: FOCALFLEET_SEED=4711 ctest -R Codec.
+// The seed of a random test. Every failure inside its scope prints the seed, and the environment
+// variable repeats it: FOCALFLEET_SEED=4711 ctest -R Codec.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -8,13 +8,13 @@
 #include <cstdlib>
 #include <string>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline std::uint64_t TestSeed(std::uint64_t otherwise) {
   const char* text = std::getenv("FOCALFLEET_SEED");
   return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test
 
 #define FOCALFLEET_TRACE_SEED(seed) SCOPED_TRACE("FOCALFLEET_SEED=" + std::to_string(seed))

@@ -17,13 +17,13 @@
 #include "protocol/base/limits.h"
 #include "tests/support/as_user.h"
 #include "tests/support/gzip.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::AsUser;
+using test::AsUser;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -36,25 +36,25 @@ Exposure Three(const std::string& id) {
 
 class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
-  CameraFolderTest() : user_(GetParam()), files_(std::make_unique<testing::TemporaryFolder>()) {
-    std::ofstream(files_->File("secret")) << "secret";
+  CameraFolderTest() : user_(GetParam()), files_(std::make_unique<test::ScratchFolder>()) {
+    std::ofstream(*files_ / "secret") << "secret";
   }
   ~CameraFolderTest() override {
-    EXPECT_EQ(ReadTextFile(files_->File("secret")).value_or("none"), "secret");
+    EXPECT_EQ(ReadTextFile(*files_ / "secret").value_or("none"), "secret");
     std::error_code ignored;
     fs::permissions(File(""), fs::perms::owner_all, ignored);
     fs::permissions(File("taken"), fs::perms::owner_all, ignored);
   }
-  void Open() { folder_ = CameraFolder::Open(files_->File("camera"), kSensor).value(); }
+  void Open() { folder_ = CameraFolder::Open(*files_ / "camera", kSensor).value(); }
   [[nodiscard]] std::string File(const std::string& name) const {
-    return files_->File("camera/" + name);
+    return *files_ / ("camera/" + name);
   }
   void Put(const std::string& name, const std::string& bytes) const {
     ASSERT_TRUE(WriteFileAtomically(File(name), bytes));
   }
   [[nodiscard]] std::string FitsOf(const Exposure& exposure) const {
-    EXPECT_TRUE(WriteSpotsFits(files_->File("made.fits"), exposure));
-    return ReadFile(files_->File("made.fits")).value();
+    EXPECT_TRUE(WriteSpotsFits(*files_ / "made.fits", exposure));
+    return ReadFile(*files_ / "made.fits").value();
   }
   [[nodiscard]] static bool Exists(const std::string& path) {
     struct stat status {};
@@ -64,7 +64,7 @@ class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
     const auto taken = folder_->Take();
     return !taken ? taken.error().text : !*taken ? "nothing" : (*taken)->id;
   }
-  /// The file stands in refused/ now, with the reason, and the next is looked at.
+  /// The file is in refused/ with its reason, and the folder takes the next file.
   void ExpectRefused(const std::string& name, const std::string& reason) const {
     EXPECT_THAT(TakenId(), HasSubstr(reason)) << name;
     EXPECT_FALSE(Exists(File(name)));
@@ -75,12 +75,12 @@ class CameraFolderTest : public ::testing::TestWithParam<uid_t> {
   }
 
   AsUser user_;
-  std::unique_ptr<testing::TemporaryFolder> files_;
+  std::unique_ptr<test::ScratchFolder> files_;
   std::unique_ptr<CameraFolder> folder_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Users, CameraFolderTest, ::testing::ValuesIn(testing::UsersOfTests()),
-                         testing::NameOfUser);
+INSTANTIATE_TEST_SUITE_P(Users, CameraFolderTest, ::testing::ValuesIn(test::UsersOfTests()),
+                         test::NameOfUser);
 
 TEST_P(CameraFolderTest, AsksByAFileThatIsThereAsAWhole) {
   Open();
@@ -96,10 +96,10 @@ TEST_P(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesWhateverHoldsThem) 
   const std::string csv = WriteSpots(Three("csv"));
   Put("a.csv", csv);
   Put("b.fits", FitsOf(Three("fits")));
-  Put("c.csv.gz", testing::Gzipped(WriteSpots(Three("csv.gz"))));
-  Put("d.fits.gz", testing::Gzipped(FitsOf(Three("fits.gz"))));
+  Put("c.csv.gz", test::Gzipped(WriteSpots(Three("csv.gz"))));
+  Put("d.fits.gz", test::Gzipped(FitsOf(Three("fits.gz"))));
   Put("e.FIT", FitsOf(Three("fit")));
-  Put("f.fts.GZ", testing::Gzipped(FitsOf(Three("fts.gz"))));
+  Put("f.fts.GZ", test::Gzipped(FitsOf(Three("fts.gz"))));
   Put("g.csv", FitsOf(Three("fits called csv")));
   for (const char* id : {"csv", "fits", "csv.gz", "fits.gz", "fit", "fts.gz", "fits called csv"}) {
     const auto taken = folder_->Take();
@@ -117,7 +117,7 @@ TEST_P(CameraFolderTest, TakesSpotListsInTheOrderOfTheirNamesWhateverHoldsThem) 
 TEST_P(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
   Open();
   const std::string csv = WriteSpots(Three("x"));
-  const std::string packed = testing::Gzipped(csv);
+  const std::string packed = test::Gzipped(csv);
   const struct {
     const char* name;
     std::string bytes;
@@ -127,7 +127,7 @@ TEST_P(CameraFolderTest, WhatIsNoExposureIsSetAsideWithItsReason) {
       {"bad.fits", "no table", "bad.fits"},
       {"empty.fits", "", "empty.fits"},
       {"cut.csv.gz", packed.substr(0, packed.size() / 2), "its gzip stream is cut short"},
-      {"plain.csv.gz.csv", testing::Gzipped(packed), "this is compressed with gzip"},
+      {"plain.csv.gz.csv", test::Gzipped(packed), "this is compressed with gzip"},
       {"x.csv.bz2", "BZh9", "spots come as .csv, .fits, .fit or .fts"},
       {"x.fits.fz", "SIMPLE  =", "spots come as .csv"},
       {"spots.txt", csv, "spots come as .csv"},
@@ -173,8 +173,6 @@ TEST_P(CameraFolderTest, WhatLayThereBeforeAnswersNothing) {
   EXPECT_TRUE(Exists(File("refused/old.fits")));
 }
 
-// ---- a camera that is broken or hostile
-
 TEST_P(CameraFolderTest, ARequestIsWrittenIntoNothingOfOthers) {
   Open();
   ASSERT_EQ(symlink("../secret", File("request.json").c_str()), 0);
@@ -208,22 +206,22 @@ TEST_P(CameraFolderTest, WhatIsNoFileIsRefusedWithoutLookingIntoIt) {
 TEST_P(CameraFolderTest, ALinkToWhereThingsAreSetAsideIsRefused) {
   for (const char* part : {"taken", "refused"}) {
     fs::create_directories(File(""));
-    fs::create_directories(files_->File("theirs"));
+    fs::create_directories(*files_ / "theirs");
     ASSERT_EQ(symlink("../theirs", File(part).c_str()), 0);
-    const auto folder = CameraFolder::Open(files_->File("camera"), kSensor);
+    const auto folder = CameraFolder::Open(*files_ / "camera", kSensor);
     ASSERT_FALSE(folder);
     EXPECT_EQ(folder.error().code, ErrorCode::kUnavailable);
     EXPECT_THAT(folder.error().text, HasSubstr(std::string(part) + ": a symbolic link"));
     fs::remove(File(part));
   }
-  // Also when it comes later: what is held open is the folder that it was.
+  // A folder that is exchanged later changes nothing: the port holds the first one open.
   Open();
   fs::rename(File("refused"), File("gone"));
   ASSERT_EQ(symlink("../theirs", File("refused").c_str()), 0);
   Put("bad.csv", "no spots\n");
   EXPECT_THAT(TakenId(), HasSubstr("bad.csv"));
   EXPECT_TRUE(Exists(File("gone/bad.csv")));
-  EXPECT_TRUE(fs::is_empty(files_->File("theirs")));
+  EXPECT_TRUE(fs::is_empty(*files_ / "theirs"));
   EXPECT_THAT(folder_->Request(1, kSince).error().text, HasSubstr("refused: a symbolic link"));
 }
 
@@ -250,13 +248,13 @@ TEST_P(CameraFolderTest, WhatCannotBeMovedIsTakenOnceAndStays) {
   Put("a.csv", WriteSpots(Three("a")));
   Put("b.csv", "no spots\n");
   fs::permissions(File(""), fs::perms::owner_read | fs::perms::owner_exec);
-  const bool root = GetParam() == 0;  // may move them all the same
+  const bool root = GetParam() == 0;  // root may move files all the same
   EXPECT_EQ(TakenId(), "a");
   EXPECT_THAT(TakenId(), HasSubstr("b.csv"));
   EXPECT_EQ(TakenId(), "nothing");
   EXPECT_EQ(Exists(File("a.csv")), !root);
   EXPECT_EQ(folder_->Request(1, kSince).has_value(), root);
-  // At the start, too, it would be refused for ever.
+  // At the next start the file would be refused again and again.
   folder_.reset();
   Open();
   EXPECT_EQ(TakenId(), "nothing");
@@ -278,7 +276,7 @@ TEST_P(CameraFolderTest, LongNamesAndStrangeOnesAreSetAsideToo) {
   EXPECT_EQ(TakenId(), "nothing");
 }
 
-// The camera's thread ends when the daemon does, whatever lies in the folder.
+// The camera's thread ends when the daemon ends, whatever the folder contains.
 TEST_P(CameraFolderTest, NothingInTheFolderHoldsTheCamerasThread) {
   Open();
   for (const char* name : {"request.json", "a.csv", "b.fits", "c.csv.gz"})

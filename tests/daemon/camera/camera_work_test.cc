@@ -1,4 +1,4 @@
-// What becomes of exposures that may not answer: nothing of them is used, and the reason is told.
+// Exposures that do not answer the request are not used, and the reason is reported.
 #include "daemon/camera/camera_work.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@
 namespace focalfleet {
 namespace {
 
-using testing::CameraField;
+using test::CameraField;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -21,7 +21,7 @@ constexpr std::int64_t kNowNs = 1'795'316'645'000'000'000;
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr double kRimMm = 260;  // beyond the outermost fibre
 
-/// Gives what it was filled with, one after the other.
+/// The port hands over the exposures that it was filled with, one after the other.
 class ScriptedPort : public CameraPort {
  public:
   explicit ScriptedPort(std::deque<Exposure>* exposures) : exposures_(exposures) {}
@@ -40,12 +40,12 @@ class ScriptedPort : public CameraPort {
 class CameraWorkTest : public ::testing::Test {
  protected:
   CameraWorkTest() : field_({.count = 300, .units_per_bus = 100, .fiducials = 40}, 7) {
-    const testing::FieldTroubles none{
+    const test::FieldTroubles none{
         .tail_share = 0, .dead_share = 0, .slipping_share = 0, .disabled_share = 0, .swaps = 0};
     field_.Move(none);
-    const sim::CameraTraits traits = testing::TestCamera(kRimMm);
+    const sim::CameraTraits traits = test::TestCamera(kRimMm);
     options_ = {.layout = &field_.layout(),
-                .site = {.model = testing::ModelOf(traits),
+                .site = {.model = test::ModelOf(traits),
                          .sensor = {traits.sensor_px.real(), traits.sensor_px.imag()},
                          .fiducials = field_.fiducials(),
                          .options = {}},
@@ -74,9 +74,9 @@ class CameraWorkTest : public ::testing::Test {
     return knowledge;
   }
   Exposure Take(const std::string& id) {
-    sim::CameraTraits traits = testing::TestCamera(kRimMm);
+    sim::CameraTraits traits = test::TestCamera(kRimMm);
     Exposure exposure =
-        testing::ExposureOf(sim::TakeImage(field_.Sources(), traits, &field_.rng()), id);
+        test::ExposureOf(sim::TakeImage(field_.Sources(), traits, &field_.rng()), id);
     exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;
     return exposure;
   }
@@ -115,7 +115,7 @@ TEST_F(CameraWorkTest, PutsEachUnitWhereItIs) {
     const Unit& unit = field_.layout().unit(measurement.unit);
     const std::complex<double> truth = field_.units()[measurement.unit.value].place_mm;
     EXPECT_LT(std::hypot(measurement.x_mm - truth.real(), measurement.y_mm - truth.imag()), 0.015);
-    // The place in vectors is where the camera saw it, to half a vector of each axis.
+    // The place in vectors is where the camera saw the fibre, to half a vector of each axis.
     const PointFp at = FibreAt(unit, UnitDrive{}, *measurement.place);
     EXPECT_LT(std::hypot(at.x_mm - measurement.x_mm, at.y_mm - measurement.y_mm), 0.004);
   }
@@ -130,7 +130,7 @@ TEST_F(CameraWorkTest, WhatMayNotAnswerIsRefusedWithItsReason) {
   future.taken_unix_ns = now_ns_ + 10 * kSecondNs;
   ExpectRefused(future, "future");
   Exposure turned = Take("turned");
-  const std::complex<double> far_corner = testing::TestCamera(kRimMm).sensor_px - 1.0;
+  const std::complex<double> far_corner = test::TestCamera(kRimMm).sensor_px - 1.0;
   for (Spot& spot : turned.spots) {
     spot.x_px = far_corner.real() - spot.x_px;
     spot.y_px = far_corner.imag() - spot.y_px;
@@ -148,9 +148,8 @@ TEST_F(CameraWorkTest, AnotherFieldIsRefused) {
   const Exposure other = [&] {
     CameraField elsewhere({.count = 300, .units_per_bus = 100, .fiducials = 40}, 8);
     elsewhere.Move({});
-    return testing::ExposureOf(
-        sim::TakeImage(elsewhere.Sources(), testing::TestCamera(kRimMm), &elsewhere.rng()),
-        "other");
+    return test::ExposureOf(
+        sim::TakeImage(elsewhere.Sources(), test::TestCamera(kRimMm), &elsewhere.rng()), "other");
   }();
   Exposure exposure = other;
   exposure.taken_unix_ns = now_ns_ + kSecondNs / 100;
@@ -177,13 +176,13 @@ TEST_F(CameraWorkTest, AGoodExposureAfterABadOneIsTaken) {
   EXPECT_THAT(log_[0], HasSubstr("early"));
 }
 
-/// Gives an exposure of long ago, again and again, and counts.
+/// The port hands over the same old exposure again and again, and counts the calls.
 class ChatteringPort : public CameraPort {
  public:
   explicit ChatteringPort(Exposure exposure) : exposure_(std::move(exposure)) {}
   Status Request(std::uint64_t, WallTime) override { return {}; }
   Result<std::optional<Exposure>> Take() override {
-    constexpr int kPatience = 100'000;  // many times what the worker's lasts
+    constexpr int kPatience = 100'000;  // calls; many times what the worker makes until it gives up
     if (++given_ > kPatience) return Fail(ErrorCode::kInvalid, "it was not given up");
     exposure_.id = "chatter " + std::to_string(given_);
     return std::optional(exposure_);

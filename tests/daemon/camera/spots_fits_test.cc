@@ -1,5 +1,5 @@
-// Spots as astronomers' writers put them into FITS: columns, keys and tables beside the wanted
-// ones.
+// Spots are read from FITS files as other programs write them, with columns, keys and tables beside
+// the wanted ones.
 #include "daemon/camera/spots_fits.h"
 
 #include <fitsio.h>
@@ -13,8 +13,8 @@
 
 #include "daemon/files/text_file.h"
 #include "protocol/base/rng.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
-#include "tests/support/temporary_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -29,7 +29,7 @@ struct Column {
   std::string form;
 };
 
-/// A file that cfitsio writes, with three spots in its table.
+/// SpotFile is a file that cfitsio writes, with three spots in its table.
 class SpotFile {
  public:
   SpotFile() {
@@ -68,7 +68,7 @@ class SpotFile {
     fits_write_col(file_, type, column, 1, 1, static_cast<LONGLONG>(values.size()), values.data(),
                    &status_);
   }
-  /// The four wanted columns from `first` on.
+  /// The four wanted columns are written from column `first` on.
   void Spots(int first) {
     Values<int>(TINT, first, {1, 2, 3});
     Values<double>(TDOUBLE, first + 1, {10.5, 20, 30});
@@ -84,8 +84,8 @@ class SpotFile {
   Result<Exposure> Read() { return ParseSpotsFits(Bytes(), "s.fits", kSensor); }
 
  private:
-  [[nodiscard]] std::string Path() const { return folder_.File("s.fits"); }
-  testing::TemporaryFolder folder_;
+  [[nodiscard]] std::string Path() const { return folder_ / "s.fits"; }
+  test::ScratchFolder folder_;
   fitsfile* file_ = nullptr;
   int status_ = 0;
 };
@@ -252,9 +252,7 @@ TEST(SpotsFits, WhatIsWrongIsNamed) {
             "s.fits: DATE-OBS 'yesterday' is no time in UTC");
 }
 
-// ---- what the file says of itself
-
-/// The card `key` of every header says `value` instead.
+/// Returns the bytes with `value` in the card `key` of every header.
 std::string Lying(std::string bytes, const std::string& key, const std::string& value) {
   const std::string card = (key + std::string(8 - key.size(), ' ') + "= ");
   for (std::size_t at = bytes.find(card); at != std::string::npos; at = bytes.find(card, at + 80))
@@ -290,8 +288,8 @@ TEST(SpotsFits, MoreRowsThanAnExposureHasSpotsAreRefused) {
   EXPECT_EQ(ErrorOf(file.Read()), "s.fits: 131073 rows are more than 131072");
 }
 
-// Found by fuzzing: without one of its mandatory cards cfitsio takes the number of columns from
-// memory that nobody has written.
+// A header without one of its mandatory cards makes cfitsio take the number of columns from
+// uninitialised memory. Fuzzing found it.
 TEST(SpotsFits, AHeaderWithoutAMandatoryCardIsRefused) {
   SpotFile file;
   file.Table(kWanted);
@@ -320,7 +318,7 @@ TEST(SpotsFits, AnyHeaderGivesSpotsOrAnError) {
   file.Table(With({{"NAME", "16A"}, {"LIST", "1PJ(3)"}, {"SUM", "1I"}}));
   file.Spots(4);
   const std::string bytes = file.Bytes();
-  const std::uint64_t seed = testing::TestSeed(17);
+  const std::uint64_t seed = test::TestSeed(17);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   constexpr const char* kValues[] = {"0",

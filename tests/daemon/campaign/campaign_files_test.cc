@@ -71,7 +71,7 @@ TEST(CampaignFiles, SortsRowsByUnitAndMove) {
   EXPECT_EQ(campaign->word_columns[0].values, (std::vector<int>{1, -1, 0, 2}));
 }
 
-// Rows come out of a database descending, by numbers as text, in any order.
+// Databases return rows in any order: descending, or by numbers as text.
 TEST(CampaignFiles, AnyOrderOfRowsIsTheSameCampaign) {
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     const auto planted =
@@ -107,7 +107,7 @@ TEST(CampaignFiles, AnyOrderOfRowsIsTheSameCampaign) {
     EXPECT_EQ(out_of_order, 12 * 39u);
     std::ranges::stable_sort(rows, {}, [](const std::string& row) {
       const std::size_t comma = row.find(',') + 1;
-      return row.substr(comma, row.find(',', comma) - comma);  // move 10 before move 2
+      return row.substr(comma, row.find(',', comma) - comma);  // as text: move 10 before move 2
     });
     EXPECT_EQ(report(joined(rows), &out_of_order), expected);
     EXPECT_EQ(out_of_order, 96u);  // 2, 20, 21 .. and 3, 4 .. behind 10 to 19
@@ -145,7 +145,7 @@ TEST(CampaignFiles, ReadsBackWhatItWrites) {
   EXPECT_EQ(WriteCampaignUnits(*second), units);
 }
 
-// As a table comes out of a database or out of pandas: an index, names, dates, notes, flags.
+// Tables from a database or from pandas also have an index, names, dates, notes and flags.
 TEST(CampaignFiles, ColumnsOfWordsArePassedOverAndThoseOfFlagsAreNumbers) {
   TableNotes notes;
   const std::string moves =
@@ -195,7 +195,7 @@ TEST(CampaignFiles, TellsAllBadRows) {
 }
 
 TEST(CampaignFiles, ColumnsOfUnitsAreThoseOfTheHeader) {
-  // Nobody else's column whose name holds "rail_id", and not what a comment says.
+  // A column is no rail if its name merely contains "rail_id", and a comment names no column.
   std::string units = std::string("# rail_id, bus_id: see the drawing\n\n") + kUnits;
   units.replace(units.find(",rail_id\n"), 9, ",guiderail_id\n");
   TableNotes notes;

@@ -30,7 +30,7 @@ LoggedMove Row(std::uint32_t unit, std::int64_t move, double from_deg, double to
 }
 
 TEST(CampaignLog, HasEveryCovariateOfTheFormatThatIsKnownAndReadsBack) {
-  // Four units, two on a bus and three on a rail.
+  // The layout has four units: two share a bus, three a rail.
   const auto layout =
       Layout::Create(MakeHexLayout({.count = 4, .units_per_bus = 2, .units_per_rail = 3}), {});
   ASSERT_TRUE(layout);
@@ -57,7 +57,7 @@ TEST(CampaignLog, HasEveryCovariateOfTheFormatThatIsKnownAndReadsBack) {
   EXPECT_EQ(campaign.Find("rail_id")[0], layout->units()[0].rail.value);
   EXPECT_EQ(campaign.Find("cycles_theta")[1], 0.75);
   EXPECT_EQ(campaign.Find("drive_amplitude")[3], 1);
-  // Of two units on the rail one moved in the first move, and both in the second.
+  // The rail feeds two of the units that move: one moved first, both in the second move.
   EXPECT_EQ(campaign.Find("movers_on_rail")[0], 1);
   EXPECT_EQ(campaign.Find("movers_on_rail")[1], 2);
   const auto mode =

@@ -51,7 +51,7 @@ sim::ModelTerm TermOf(std::string_view cause, sim::EffectAxis axis, sim::Memory 
   return term;
 }
 
-/// A model of gears as they are, arms and zeros of their own.
+/// The model has gears with errors of the size of service, and arms and zeros of its own.
 sim::CampaignModel GearsInService(const Layout& layout, Rng* rng) {
   sim::CampaignModel model;
   model.units = Described(layout);
@@ -71,7 +71,7 @@ sim::CampaignModel GearsInService(const Layout& layout, Rng* rng) {
   return model;
 }
 
-/// Moves of all units, straight on from each other; one row a unit and move.
+/// The moves of all units follow each other without a gap, one row a unit and move.
 class Moves {
  public:
   Moves(const Layout& layout, Rng* rng) : units_(Described(layout)), rng_(*rng) {
@@ -122,7 +122,7 @@ ModelFile FileOf(const sim::CampaignModel& model, const sim::Campaign& campaign)
   return file;
 }
 
-// How far the fibres are from where they should be by the model, and would be by the counts alone.
+// Distances of the fibres from their places by the model, and what they would be by counts alone.
 struct Misses {
   double worst_um = 0;
   double uncompensated_um = 0;
@@ -146,10 +146,10 @@ Misses MissesOf(const sim::CampaignModel& model, const Layout& layout, const Mov
   return misses;
 }
 
-// The oracle is the model's own prediction of the whole campaign with all moves since: the
+// The oracle is the model's own prediction of the whole campaign with all moves since. The
 // compensation has neither the campaign's moves nor a track of facts.
 TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const Layout layout = SmallLayout();
@@ -160,7 +160,7 @@ TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
   ASSERT_EQ(compensation.units(), layout.size());
   EXPECT_TRUE(compensation.left_out().empty());
   double worst_um = 0, uncompensated_um = 0;
-  for (int k = 0; k < 45; ++k) {  // more than it keeps
+  for (int k = 0; k < 45; ++k) {  // more than the compensation keeps
     std::vector<PointFp> wanted;
     for (std::uint32_t n = 0; n < layout.size(); ++n) {
       const Unit& unit = layout.units()[n];
@@ -184,10 +184,11 @@ TEST(Compensation, LeadsFibresToTheirTargetsHoweverManyMovesItWas) {
     uncompensated_um = std::max(uncompensated_um, misses.uncompensated_um);
   }
   EXPECT_LT(worst_um, 0.5);
-  EXPECT_GT(uncompensated_um, 50);  // or there was nothing to do
+  EXPECT_GT(uncompensated_um, 50);  // or there was nothing to compensate
 }
 
-// What the planner has is places: their way is the way of the count, and the count leads there.
+// The planner works on places. The way between two places is that of the count, and the count leads
+// to the target.
 TEST(Compensation, OffsetsMakeTheWayBetweenPlacesThatOfTheCount) {
   Rng rng(6);
   const Layout layout = SmallLayout();
@@ -211,10 +212,11 @@ TEST(Compensation, OffsetsMakeTheWayBetweenPlacesThatOfTheCount) {
     const auto fibre_fp = compensation.FibreAfter({n}, reported);
     ASSERT_TRUE(fibre_fp);
     const PointFp wanted = FibreAt(unit, drive, target);
-    // A vector is 4 mdeg: at most half of one of each axis is left.
+    // A vector is 4 mdeg, so at most half a vector of each axis is left.
     EXPECT_NEAR(fibre_fp->x_mm, wanted.x_mm, 1e-3);
     EXPECT_NEAR(fibre_fp->y_mm, wanted.y_mm, 1e-3);
-    EXPECT_GT(std::abs((*offset)[0]) + std::abs((*offset)[1]), 10);  // or there was nothing to do
+    EXPECT_GT(std::abs((*offset)[0]) + std::abs((*offset)[1]),
+              10);  // or there was nothing to compensate
   }
 }
 
@@ -241,7 +243,7 @@ TEST(Compensation, AnEmpiricalRippleIsCompensatedLikeThatOfAGear) {
   }
   const Misses misses = MissesOf(model, layout, moves, wanted);
   EXPECT_LT(misses.worst_um, 0.5);
-  EXPECT_GT(misses.uncompensated_um, 5);  // or there was nothing to do
+  EXPECT_GT(misses.uncompensated_um, 5);  // or there was nothing to compensate
 }
 
 TEST(Compensation, KnowsNothingOfUnitsThatWereNotMeasuredOrWereHomed) {
@@ -299,8 +301,6 @@ TEST(Compensation, DoesNotGoFarForATargetOutOfReach) {
   EXPECT_NEAR(fibre.y_mm, unit.base_fp.y_mm, 1);
 }
 
-// ---- model.toml
-
 TEST(ModelFile, RefusesWhatNoUnitOfThisFleetCanBe) {
   const Layout layout = SmallLayout();
   const std::vector<sim::CampaignUnit> units = Described(layout);
@@ -338,7 +338,7 @@ TEST(ModelFile, RefusesWhatNoUnitOfThisFleetCanBe) {
     EXPECT_THAT(error_of(other), ::testing::HasSubstr("no such axis, form, memory and columns"))
         << to;
   }
-  // Whatever a diagnosis of a small or a large fleet can put into a model is read.
+  // Every model that a diagnosis of a small or a large fleet can write is read.
   for (const std::size_t fleet : {3u, 19u, 61u}) {
     const sim::Campaign campaign = sim::PlantCampaign({.units = fleet, .moves = 30}).value();
     const sim::CampaignFacts facts = sim::MakeFacts(campaign);

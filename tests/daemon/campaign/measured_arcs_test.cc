@@ -1,5 +1,6 @@
-// A real positioner's arcs, of one length each, from the hard stop: what is wrong with it is found,
-// and what these moves cannot tell apart is told as such.
+// The moves are a real positioner's arcs of one length each, from the hard stop. The diagnosis
+// finds what is wrong with the positioner, and reports as undecided what these moves cannot
+// separate.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,7 +28,7 @@ sim::Campaign Measured(const std::string& arcs) {
 struct Arcs {
   const char* folder;
   const char* axis;
-  double left;  // of the rms that arcs which no fit has seen had before, at most
+  double left;  // at most; share of the rms before, over arcs that no fit has seen
 };
 
 class MeasuredArcs : public testing::TestWithParam<Arcs> {};
@@ -39,13 +40,13 @@ TEST_P(MeasuredArcs, TheStrongCauseIsFoundWithTheRivalThatMovesOfOneLengthLeaveI
   const sim::CauseFound& first = diagnosis.causes.front();
   EXPECT_THAT(first.candidates, IsSupersetOf({"gear_scale", "ramp_travel"}));
   EXPECT_TRUE(first.axis == GetParam().axis || first.axis == "both") << first.axis;
-  // Arcs differ among each other by what no column shows.
+  // Arcs of one length still differ among each other by something that no column shows.
   EXPECT_NE(diagnosis.verdict, sim::Verdict::kExplained);
   EXPECT_LT(diagnosis.gain.rms_after_um, GetParam().left * diagnosis.gain.rms_before_um);
   EXPECT_LT(diagnosis.gain.mad_after_um, GetParam().left * diagnosis.gain.mad_before_um);
   EXPECT_THAT(diagnosis.gain.held_out, testing::HasSubstr("whole homings"));
 
-  // Whoever the moves were chosen for, they set these two apart.
+  // The chosen moves separate these two models, whichever pair they were chosen for.
   double apart = 0;
   for (const sim::Prospect& pair : diagnosis.next.prospects) {
     const std::set<std::string> names = {pair.cause, pair.rival};

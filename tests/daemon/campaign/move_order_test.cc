@@ -25,7 +25,7 @@ TEST(MoveOrder, OfRowsThatStandInItIsKept) {
 }
 
 TEST(MoveOrder, OfARowWithoutTimeIsThatOfItsExposure) {
-  // Move 7 was made between moves 2 and 3, as unit 0 tells.
+  // Move 7 was made between moves 2 and 3, as the rows of unit 0 show.
   const MoveOrder order =
       OrderMoves({{0, 7, 25}, {1, 2, 20}, {1, 3, 30}, {1, 7, kNoTime}, {0, 8, 26}});
   EXPECT_THAT(order.rows, ElementsAre(0, 4, 1, 3, 2));

@@ -1,4 +1,4 @@
-// next_moves.csv: written, read back, made by campaign run; and refused where it is wrong.
+// next_moves.csv is written, read back and made by campaign run, and refused where it is wrong.
 #include "daemon/campaign/next_moves_file.h"
 
 #include <gmock/gmock.h>

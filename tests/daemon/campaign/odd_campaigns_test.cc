@@ -1,5 +1,5 @@
-// Files that the diagnosis writes have no number that is none, and the project's own programs read
-// the model, whatever the campaign is like.
+// The diagnosis writes no NaN and no infinity, and the project's own programs read its model,
+// whatever the campaign is like.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -27,6 +27,9 @@ namespace {
 using sim::Campaign;
 using sim::kPhi;
 using sim::kTheta;
+using sim::test::InSteps;
+using sim::test::MovedInTurns;
+using sim::test::ReadTwice;
 
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
@@ -82,7 +85,7 @@ Campaign OneUnitOfFewMoves() {
   return Keep(campaign, keep);
 }
 
-// Places that are none of these units'.
+// Returns a campaign with places that belong to none of its units.
 Campaign Anywhere(double far_mm) {
   Rng rng = Rng::Stream(5, "anywhere");
   return Measured(Plain(), [&](std::size_t, std::size_t) {
@@ -90,7 +93,8 @@ Campaign Anywhere(double far_mm) {
   });
 }
 
-// A unit turns where it should, about another place, with arms of its own.
+// Returns a campaign in which one unit turns as commanded, but about another base and with other
+// arm lengths.
 Campaign OneUnitIsAnother() {
   Campaign campaign = Plain();
   sim::CampaignUnit other = campaign.units[2];
@@ -189,7 +193,7 @@ const Odd kOdd[] = {
     {"OfColumnsThatSayNothing", OfColumnsThatSayNothing},
 };
 
-// Words that are a number which is none: nan, -nan, inf, infinity.
+// Returns the words that stand for no number: nan, -nan, inf, infinity.
 std::vector<std::string> NoNumbersIn(const std::string& text) {
   std::vector<std::string> found;
   std::string word;

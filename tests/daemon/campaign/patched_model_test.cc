@@ -1,4 +1,5 @@
-// A model through its file and back: empirical terms, and shapes of units' own.
+// A model with empirical terms and with shapes of single units is written to its file and read
+// back.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ using ::testing::HasSubstr;
 
 const ReportNames kNames{.sha256 = "12ab", .campaign = "damp"};
 
-sim::Campaign DampCampaign() { return sim::Damp(11); }
+sim::Campaign DampCampaign() { return sim::test::Damp(11); }
 
 sim::Diagnosis PatchedDiagnosis(const sim::Campaign& campaign) {
   return sim::Diagnose(campaign, {.patch = true, .with_gain = false});
@@ -48,8 +49,8 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
   ASSERT_EQ(read->model.terms.size(), diagnosis.model.terms.size());
   EXPECT_EQ(read->units_known, campaign.units.size());
   EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, campaign), 1e-6);
-  // On another night, wetter than any that was seen, too.
-  sim::Campaign wetter = sim::Damp(12);
+  // The same holds on another night, wetter than any that was seen.
+  sim::Campaign wetter = sim::test::Damp(12);
   for (double& humidity : wetter.covariates.back().values) humidity += 15;
   EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, wetter), 1e-6);
   sim::CampaignModel plain = read->model;
@@ -67,7 +68,7 @@ TEST(ModelFile, KeepsTheShapeOfEachUnit) {
   const auto read = ReadModelFile(text, "model.toml", campaign.units);
   ASSERT_TRUE(read) << read.error().text;
   EXPECT_LT(FarthestApart_mm(diagnosis.model, read->model, campaign), 1e-6);
-  // What is no shape of each unit.
+  // These texts are no shapes of single units.
   const auto error_of = [&](std::string_view what, std::string_view instead) {
     std::string other = text;
     other.replace(other.find(what), what.size(), instead);
@@ -115,7 +116,7 @@ TEST(PatchedModel, IsCalledEmpiricalInEveryReport) {
 }
 
 TEST(PatchedModel, AFileThatNoPatchWroteIsRefused) {
-  const std::vector<sim::CampaignUnit> units = sim::Planted({}).units;
+  const std::vector<sim::CampaignUnit> units = sim::test::Planted({}).units;
   const auto error_of = [&](const std::string& text) {
     const auto read = ReadModelFile(text, "m.toml", units);
     return read ? std::string() : read.error().text;

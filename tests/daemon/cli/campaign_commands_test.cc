@@ -1,16 +1,17 @@
-// campaign run, and the model that comes of it in force: what is refused before anything moves, and
-// what a model that is loaded says of itself.
+// campaign run and the model in force that comes of it. Errors are refused before anything moves,
+// and a loaded model reports what it contains.
 #include <gmock/gmock.h>
 
 #include "tests/daemon/cli/fake_daemon.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::FakeDaemon;
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -30,7 +31,7 @@ class CampaignRun : public ::testing::Test {
     return Focalfleet({"campaign", "run", list_, "--units", units_, "--out", scratch_ / night,
                        "--socket", scratch_ / "nobody"});
   }
-  const ScratchDirectory scratch_;
+  const ScratchFolder scratch_;
   const std::string units_ = scratch_ / "units.csv", list_ = scratch_ / "list.csv";
 };
 
@@ -70,7 +71,7 @@ Json InForce(std::vector<std::string> left_out) {
 }
 
 TEST(ModelCommands, LoadSaysWhatItDoesNotCompensate) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string file = scratch.Put("model.toml", "");
   const auto loaded = [&](std::vector<std::string> left_out) {
     const FakeDaemon daemon(scratch / "control.sock",
@@ -85,7 +86,7 @@ TEST(ModelCommands, LoadSaysWhatItDoesNotCompensate) {
 }
 
 TEST(ModelCommands, ShowEndsEachOfItsLines) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const FakeDaemon daemon(scratch / "control.sock",
                           {{"model", {.result = InForce({"supply_droop"})}}});
   const auto shown = Focalfleet({"model", "show", "--socket", daemon.path()});

@@ -1,17 +1,18 @@
-// can decode as a process: words, JSON lines, bad lines, pipes.
+// can decode as a process: words, JSON lines, bad lines and pipes.
 #include <gmock/gmock.h>
 
 #include <sstream>
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::FocalfleetInto;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
@@ -31,7 +32,7 @@ constexpr const char* kLog =
     "(1436509052.250002) vcan1 14A952E0#05\n";
 
 TEST(CanDecodeCommand, PutsFramesIntoWords) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto result = Focalfleet({"can", "decode", scratch.Put("bus.log", kLog)});
   EXPECT_EQ(result.exit, 0) << result.err;
   EXPECT_EQ(result.out,
@@ -46,7 +47,7 @@ TEST(CanDecodeCommand, PutsFramesIntoWords) {
 }
 
 TEST(CanDecodeCommand, GivesAnObjectALine) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto result = Focalfleet({"can", "decode", scratch.Put("bus.log", kLog), "--json"});
   EXPECT_EQ(result.exit, 0) << result.err;
   const std::vector<Json> objects = Objects(result.out);
@@ -69,9 +70,9 @@ TEST(CanDecodeCommand, GivesAnObjectALine) {
   EXPECT_EQ(objects[4]["malformed"], "length");
 }
 
-// The example of docs/protocol.md, and one with a wrong byte.
+// The input is the example of docs/protocol.md and the same with a wrong byte.
 TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string log =
       scratch.Put("bus.log",
                   "(1.000000) vcan0 1107F800##107002801020102010709380102FFFFFF\n"
@@ -90,7 +91,7 @@ TEST(CanDecodeCommand, PutsAGroupIntoTheWordsOfItsFrames) {
   EXPECT_EQ(objects[2]["malformed"], "function");
 }
 
-// As candump -e -d prints them.
+// The lines are as candump -e -d prints them.
 constexpr const char* kErrors =
     "  can0  10501800   [5]  07 00 01 00 00\n"
     "  can0  20000088   [8]  00 00 00 00 00 00 00 00   ERRORFRAME\n"
@@ -101,7 +102,7 @@ constexpr const char* kErrors =
     "\033[32m (1.000000)  can1  0007F800   [0] \033[0m\n";
 
 TEST(CanDecodeCommand, TellsErrorFramesInWordsAndFramesThatAreMissing) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string log = scratch.Put("bus.log", kErrors);
   const auto result = Focalfleet({"can", "decode", log});
   EXPECT_EQ(result.exit, 0) << result.err;
@@ -123,7 +124,7 @@ TEST(CanDecodeCommand, TellsErrorFramesInWordsAndFramesThatAreMissing) {
 }
 
 TEST(CanDecodeCommand, ACompressedLogIsReportedOnce) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string log = scratch.Put("bus.log.gz", std::string("\x1f\x8b\x08\0\n\n\n\n", 8));
   for (const bool from_stdin : {false, true}) {
     const auto result = from_stdin ? FocalfleetInto("<" + log, {"can", "decode"})
@@ -135,7 +136,7 @@ TEST(CanDecodeCommand, ACompressedLogIsReportedOnce) {
 }
 
 TEST(CanDecodeCommand, NamesBadLinesAndDecodesTheOthers) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string log = scratch.Put("bus.log", std::string(kLog) + "hello\n" + kLog + "x y z\n");
   const auto result = Focalfleet({"can", "decode", log});
   EXPECT_EQ(result.exit, 1);
@@ -149,7 +150,7 @@ TEST(CanDecodeCommand, NamesBadLinesAndDecodesTheOthers) {
 }
 
 TEST(CanDecodeCommand, ReadsStandardInput) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string log = scratch.Put("bus.log", "  vcan0  0007F800   [0] \n");
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"can", "decode"}, {"can", "decode", "-"}}) {
@@ -160,7 +161,7 @@ TEST(CanDecodeCommand, ReadsStandardInput) {
 }
 
 TEST(CanDecodeCommand, RefusesAFileThatItCannotRead) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   EXPECT_EQ(Focalfleet({"can"}).exit, 2);
   EXPECT_EQ(Focalfleet({"can", "decode", "a", "b"}).exit, 2);
   const auto missing = Focalfleet({"can", "decode", scratch / "none.log"});

@@ -1,11 +1,11 @@
-// What holds for every command: the exit codes of wrong usage, help, JSON, and completion for all
-// of the tree.
+// Rules of every command: exit codes of wrong usage, help, JSON, and completion for the whole tree.
 #include "daemon/cli/command_line.h"
 
 #include <gmock/gmock.h>
 
 #include "daemon/cli/completion.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -25,7 +25,7 @@ std::vector<std::string> Words(const std::string& path) {
   return path.empty() ? std::vector<std::string>{} : CLI::detail::split(path, ' ');
 }
 
-// What bash would offer after these words; the last one is being typed.
+// Returns what bash would offer after these words, the last of which is being typed.
 std::vector<std::string> BashOffers(std::vector<std::string> words) {
   std::vector<std::string> command = {
       "bash",
@@ -88,7 +88,7 @@ TEST(CommandLine, NoCommandAndAnUnknownCommandAreWrongUsage) {
 }
 
 TEST(CommandLine, AnAnswerThatStdoutDoesNotTakeIsNotDone) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string units = scratch / "u.csv";
   for (const std::string into : {">/dev/full", ">&-"}) {
     for (const std::vector<std::string>& words :
@@ -160,7 +160,7 @@ TEST(Completion, BashOffersEverySubcommandAndOptionOfTheTree) {
 }
 
 TEST(Completion, BashOffersFilesAndWordsWhereTheTreeTakesThem) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string file = scratch.Put("targets with blank.csv", "");
   for (const CompletionNode& node : Nodes()) {
     for (const auto& option : node.options) {

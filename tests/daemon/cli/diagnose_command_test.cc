@@ -1,4 +1,4 @@
-// diagnose and simulate campaign as processes: two models held against each other, the patch, what
+// diagnose and simulate campaign as processes: two models compared, the patch, and the effects that
 // can be planted.
 #include <gmock/gmock.h>
 
@@ -8,16 +8,17 @@
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::HasSubstr;
 
-std::string MadeCampaign(const ScratchDirectory& scratch, const std::string& name,
+std::string MadeCampaign(const ScratchFolder& scratch, const std::string& name,
                          const std::string& gear_scale, const std::string& seed) {
   const auto made =
       Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--seed", seed,
@@ -33,7 +34,7 @@ std::string FittedModel(const std::string& campaign) {
 }
 
 TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string old_model = FittedModel(MadeCampaign(scratch, "then", "4e-4", "1"));
   const std::string today = MadeCampaign(scratch, "today", "8e-4", "2");
   const std::string new_model = FittedModel(today);
@@ -55,7 +56,7 @@ TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
   EXPECT_GT(reported["terms"][0]["difference_sigmas"], 3);
   EXPECT_EQ(reported["geometry"].size(), 5u);
 
-  // The same seed gives the same interval, another one nearly.
+  // The same seed gives the same interval; another seed gives nearly the same.
   const auto again =
       Focalfleet({"diagnose", today, "--model", old_model, "--against", new_model, "--json"});
   EXPECT_EQ(result.out, again.out);
@@ -67,7 +68,7 @@ TEST(DiagnoseAgainst, TellsWhichModelIsBetterAndWhatHasChanged) {
 }
 
 TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
   const std::string model = FittedModel(campaign);
   const auto result = Focalfleet({"diagnose", campaign, "--against", model});
@@ -83,7 +84,7 @@ TEST(DiagnoseAgainst, WithoutAModelTheIdealKinematicsAreA) {
 }
 
 TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreReported) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string campaign = MadeCampaign(scratch, "night", "8e-4", "1");
   const std::string bad = scratch.Put("bad.toml", "[[effect]]\ncause = \"moods\"\n");
   const auto neither = Focalfleet({"diagnose", campaign});
@@ -101,9 +102,9 @@ TEST(DiagnoseAgainst, WrongUsageAndBadModelsAreReported) {
   EXPECT_THAT(scratch.List(), ::testing::ElementsAre("bad.toml", "night"));
 }
 
-// What the model before could be is not asked again, and is not sure for that.
+// Candidates of the earlier model are taken over untested, and do not count as sure.
 TEST(DiagnoseModel, WhatIsTakenOverKeepsItsCandidates) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string first = FittedModel(MadeCampaign(scratch, "night", "8e-4", "1"));
   std::string text = Slurp(first);
   const std::string own = "candidates = [\"gear_scale\"]";
@@ -118,7 +119,7 @@ TEST(DiagnoseModel, WhatIsTakenOverKeepsItsCandidates) {
 }
 
 TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto made = Focalfleet({"simulate", "campaign", "--units", "24", "--moves", "60",
                                 "--effect", "stage_ripple:theta=0.1", "--out", scratch / "night"});
   ASSERT_EQ(made.exit, 0) << made.err;
@@ -137,7 +138,7 @@ TEST(DiagnosePatch, TellsTheEmpiricalTermAndLeavesTheVerdict) {
   EXPECT_EQ(Json::parse(again.out)["verdict"], "B is better");
 }
 
-// The places of moves.csv, which stand in its columns 7 and 8, in mm.
+// Returns the places in moves.csv, which are in its columns 7 and 8, in mm.
 std::vector<double> PlacesIn(const std::string& file) {
   std::vector<double> places;
   std::istringstream lines(Slurp(file));
@@ -152,9 +153,9 @@ std::vector<double> PlacesIn(const std::string& file) {
   return places;
 }
 
-// The extended model predicts the campaign that it was found in.
+// The extended model predicts the campaign in which it was found.
 TEST(SimulateCampaign, AModelPredictsTheCampaign) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string night = scratch / "night", report = scratch / "report";
   const auto made =
       Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "60", "--noise-um", "2",
@@ -175,7 +176,7 @@ TEST(SimulateCampaign, AModelPredictsTheCampaign) {
     return 1e3 * std::sqrt(2 * square / static_cast<double>(then.size()));
   };
   const double left_um = predicted(report + "/model.toml", "0");
-  EXPECT_LT(left_um, 5);  // camera and rests
+  EXPECT_LT(left_um, 5);  // noise of the camera, and residuals
   EXPECT_GT(predicted(report + "/model.toml", "20"), 25);
   const auto exit_of = [&](std::vector<std::string> more) {
     std::vector<std::string> words = {"simulate", "campaign", "--out", scratch / "none"};
@@ -189,7 +190,7 @@ TEST(SimulateCampaign, AModelPredictsTheCampaign) {
   EXPECT_EQ(exit_of({"--of", night, "--model", scratch / "no.toml"}), 1);
   EXPECT_EQ(exit_of({"--of", scratch / "no", "--model", report + "/model.toml"}), 1);
   EXPECT_EQ(exit_of({"--next", scratch / "no.csv"}), 1);
-  // What was measured stays.
+  // The measured campaign stays as it is.
   const std::string measured = Slurp(night + "/moves.csv");
   EXPECT_EQ(Focalfleet({"simulate", "campaign", "--of", night, "--model", report + "/model.toml",
                         "--out", night + "/."})
@@ -199,7 +200,7 @@ TEST(SimulateCampaign, AModelPredictsTheCampaign) {
 }
 
 TEST(Diagnose, SaysHowManyRowsAreSetAside) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "12", "--moves", "40", "--outliers",
                         "0.05", "--out", scratch / "night"})
                 .exit,
@@ -212,7 +213,7 @@ TEST(Diagnose, SaysHowManyRowsAreSetAside) {
   EXPECT_THAT(result.out, HasSubstr(std::to_string(far) + " of 480 rows: far from every"));
 }
 
-// Rounds the places of moves.csv to a step, and turns its rows around.
+// Rounds the places of moves.csv to a step and reverses its rows.
 void MakeOdd(const std::string& campaign, double step_mm) {
   std::istringstream lines(Slurp(campaign + "/moves.csv"));
   std::string line, header;
@@ -230,9 +231,9 @@ void MakeOdd(const std::string& campaign, double step_mm) {
   std::ofstream(campaign + "/moves.csv") << header << "\n" << rows;
 }
 
-// Oddities of the data are said, and the model is one that every command reads.
+// Oddities of the data are reported, and every command reads the model.
 TEST(Diagnose, SaysWhatIsOddAboutTheData) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string night = MadeCampaign(scratch, "night", "8e-4", "1");
   MakeOdd(night, 0.1);
   const auto result = Focalfleet({"diagnose", night, "--out", scratch / "report"});
@@ -253,9 +254,9 @@ TEST(Diagnose, SaysWhatIsOddAboutTheData) {
   EXPECT_THAT(against.out, HasSubstr("note: 468 of 480 rows stand behind"));
 }
 
-// No fit, no figures: what is not known is null, and no line of the model.
+// Without a fit there are no figures: unknown values are null, and no line of the model is written.
 TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   ASSERT_EQ(Focalfleet({"simulate", "campaign", "--units", "5", "--moves", "3", "--out",
                         scratch / "night"})
                 .exit,
@@ -271,7 +272,7 @@ TEST(Diagnose, TellsNoFiguresOfACampaignThatIsTooShort) {
 }
 
 TEST(SimulateCampaign, EffectsAreCauseAxisShapeAndAmplitude) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto made = [&](const std::string& effect) {
     return Focalfleet({"simulate", "campaign", "--units", "3", "--moves", "8", "--effect", effect,
                        "--out", scratch / "made"});

@@ -1,4 +1,4 @@
-// stop --direct against buses that this test plays itself: the daemon has no part in it.
+// stop --direct runs against buses that this test plays itself; the daemon has no part in it.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <linux/can.h>
@@ -16,19 +16,21 @@
 #include "daemon/ports/socket_frames.h"
 #include "protocol/wire/codec.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-// A bus with units that answer a stop with where they stand. Keeps what it heard.
+// PlayedBus is a bus whose units answer a stop with their positions. All frames from the host are
+// kept.
 class PlayedBus {
  public:
   PlayedBus(const std::string& path, std::vector<NodeId> nodes) : nodes_(std::move(nodes)) {
@@ -99,7 +101,7 @@ class PlayedBus {
 class DirectStop : public ::testing::Test {
  protected:
   std::string Config(const std::string& text) { return scratch_.Put("fleet.toml", text); }
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
 };
 
 bool StopsNode(const CanFrame& frame, NodeId node) {
@@ -136,7 +138,7 @@ TEST_F(DirectStop, StopsOneUnitOnItsBusAlone) {
                         scratch_ / "units.csv"})
                 .exit,
             0);
-  // Unit 1 of this layout is on the bus, at the node, that its row says.
+  // Unit 1 of this layout is on the bus and node that its row gives.
   const std::string csv = test::Slurp(scratch_ / "units.csv");
   const auto columns = csv.substr(0, csv.find('\n'));
   ASSERT_THAT(columns, HasSubstr("rail_id,bus_id,node_id,enabled"));

@@ -1,5 +1,5 @@
-// estimate as a process: its figures are those of the plan, its curves add up, and bad input is
-// named and writes nothing.
+// estimate as a process: its figures are those of the plan, and its curves add up. Bad input is
+// named, and then nothing is written.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
@@ -10,13 +10,14 @@
 #include "fleet/files/csv.h"
 #include "fleet/files/layout_file.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -60,7 +61,7 @@ class EstimateCommand : public ::testing::Test {
     EXPECT_THAT(scratch_.List(), Not(Contains("curve.csv")));
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string targets_ = scratch_ / "targets.csv";
@@ -161,7 +162,8 @@ TEST_F(EstimateCommand, TakesVoltageAndTimerCounts) {
   EXPECT_EQ(coarse["subdivision"], 48);
 }
 
-/// A model of unit 1 alone, whose theta goes so much farther than it is told since theta 0.
+/// Returns a model of unit 1 alone. Its theta goes farther than commanded by this share, counted
+/// from theta 0.
 std::string GearsOf(double gear_scale) {
   return fmt::format(
       "name = \"night-extended\"\n"
@@ -175,7 +177,7 @@ std::string GearsOf(double gear_scale) {
       gear_scale);
 }
 
-/// All 37 units stand so.
+/// Returns a state in which all 37 units are at these angles.
 std::string StateOf(double theta_deg, double phi_deg) {
   std::string text = "unit_id,theta_deg,phi_deg\n";
   for (int unit = 1; unit <= 37; ++unit)
@@ -194,11 +196,12 @@ TEST_F(EstimateCommand, TellsWhatTheCommandsOfAModelTake) {
   EXPECT_EQ(reported["model"]["name"], "night-extended");
   EXPECT_EQ(reported["model"]["compensated"], 1);
   EXPECT_EQ(reported["model"]["left_out"], Json::array({"start_skew"}));
-  // Time goes with the way of the count; so does energy, as the motor turns at the same speed.
+  // Time grows with the distance that is counted. Energy does, too, because the motor turns at the
+  // same speed.
   EXPECT_NEAR(Of(nominal["makespan_s"]) / Of(reported["makespan_s"]), 1.01, 2e-4);
   EXPECT_NEAR(Of(nominal["modes"][0]["energy_J"]) / Of(reported["modes"][0]["energy_J"]), 1.01,
               2e-4);
-  // A unit that its campaign did not measure is told its target.
+  // A unit that the campaign did not measure receives its target unchanged.
   targets_ = scratch_.Put("t.csv", "unit_id,theta_deg,phi_deg\n2,-100,150\n");
   EXPECT_EQ(Of(EstimateJson({"--from", from, "--model", model})["makespan_s"]),
             Of(EstimateJson({"--from", from})["makespan_s"]));
@@ -221,7 +224,7 @@ TEST_F(EstimateCommand, NamesUnitsThatTheModelWouldSendBeyondTheirRange) {
   EXPECT_THAT(text, HasSubstr("unit 1: by the model its range ends before the target"));
 }
 
-// Units 1 and 5 are neighbours along x, and stretched at each other.
+// Units 1 and 5 are neighbours along x, and each is stretched towards the other.
 TEST_F(EstimateCommand, SaysWhichArmsMayTouchByAModel) {
   const std::string model = scratch_.Put("model.toml", GearsOf(0.01));
   std::string state = StateOf(90, 180);
@@ -310,8 +313,8 @@ TEST_F(EstimateCommand, NamesTheAxesThatWouldNotStartByWhatTheStoreKnows) {
                             "4"})["modes"][0]["below_critical"]
                   .empty());
   EXPECT_TRUE(EstimateJson({"--mode", "asymmetric"})["modes"][0]["below_critical"].empty());
-  // One axis is light enough to start, so the figures are told, with who stalls and how near the
-  // others are to losing step.
+  // Only one axis is light enough to start. The figures are still reported, with the axes that
+  // stall and how near the others are to losing step.
   const auto fast = Estimate({"--store", path, "--mode", "asymmetric", "--repeat", "23"});
   EXPECT_EQ(fast.exit, 0) << fast.err;
   EXPECT_THAT(fast.out, HasSubstr("no margin"));

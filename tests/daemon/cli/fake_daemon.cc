@@ -34,7 +34,7 @@ void FakeDaemon::Serve() {
     std::array<pollfd, 2> polls{pollfd{server_->fd(), POLLIN, 0}, pollfd{quit_[0], POLLIN, 0}};
     poll(polls.data(), polls.size(), -1);
     if (polls[1].revents != 0) return;
-    std::vector<IncomingLine> urgent;  // nothing is
+    std::vector<IncomingLine> urgent;  // stays empty: none of the lines is urgent
     server_->Service(&urgent);
     while (const auto line = server_->Next()) {
       if (!AnswerLine(*line)) {

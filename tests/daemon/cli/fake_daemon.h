@@ -1,5 +1,5 @@
-// The daemon's end of the control socket with scripted answers, on a thread of its own; what it was
-// asked is kept.
+// The fake daemon is the daemon's end of the control socket with scripted answers, on a thread of
+// its own. The requests that it receives are kept.
 #pragma once
 
 #include <functional>
@@ -18,21 +18,21 @@ namespace focalfleet::test {
 
 struct FakeAnswer {
   std::vector<Json> progress;
-  int full_first = 0;  // so many times there is no place, then comes the result
+  int full_first = 0;  // so many requests find no place before the result is given
   Result<Json> result = Json::object();
   bool hang_up = false;  // closes everything instead of answering
 };
 
 class FakeDaemon {
  public:
-  /// Verbs without an answer are refused.
+  /// Verbs without a scripted answer are refused.
   FakeDaemon(const std::string& path, std::map<std::string, FakeAnswer> answers);
   FakeDaemon(const FakeDaemon&) = delete;
   FakeDaemon& operator=(const FakeDaemon&) = delete;
   ~FakeDaemon();
 
   [[nodiscard]] const std::string& path() const { return path_; }
-  /// In the order in which they came.
+  /// All requests so far, in the order in which they came.
   [[nodiscard]] std::vector<ControlRequest> requests() const;
 
  private:
@@ -44,7 +44,7 @@ class FakeDaemon {
   std::optional<LineServer> server_;
   mutable std::mutex mutex_;
   std::vector<ControlRequest> requests_;
-  int quit_[2] = {-1, -1};  // a pipe; its closing ends the thread
+  int quit_[2] = {-1, -1};  // a pipe; closing it ends the thread
   std::thread thread_;
 };
 

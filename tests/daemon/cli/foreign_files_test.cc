@@ -1,5 +1,5 @@
-// Files as other people's programs write them: what is read, what is passed over and told once, and
-// that a refusal tells all that is wrong.
+// Files as other programs write them. Known columns are read, others are passed over and reported
+// once, and a refusal names all that is wrong.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -8,13 +8,14 @@
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -29,7 +30,7 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-/// Each line as `change` makes it; 0 is the header.
+/// Returns the text with each line as `change` makes it; line 0 is the header.
 std::string Changed(const std::string& csv,
                     const std::function<std::string(std::size_t, const std::string&)>& change) {
   std::string text;
@@ -64,7 +65,7 @@ class ForeignFiles : public ::testing::Test {
   }
   void Put(std::string* file, const std::string& text) { *file = scratch_.Put("changed", text); }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string targets_ = scratch_ / "targets.csv";
@@ -180,7 +181,7 @@ TEST_F(ForeignFiles, AStateThatLacksAUnitIsRefusedByWhoPlansFromIt) {
       Focalfleet({"estimate", "--units", units_, "--targets", targets_, "--from", state_});
   EXPECT_EQ(estimate.exit, 1);
   EXPECT_THAT(estimate.err, HasSubstr(complaint));
-  // A draw of targets needs the disabled units alone.
+  // A draw of targets needs nothing of the state but the disabled units.
   EXPECT_EQ(Draw("3", {"--from", state_, "--out", scratch_ / "t3.csv"}).exit, 0);
 }
 

@@ -8,26 +8,27 @@
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/sim/hall/planted_rig.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::HasSubstr;
 
 constexpr double kDeg = 3.14159265358979323846 / 180;
 
 std::string FieldText(double width_deg) {
-  const auto law = testing::OfSurface(0.08, width_deg);
+  const auto law = test::OfSurface(0.08, width_deg);
   std::string text = "theta_deg,phi_deg,b_T\n";
   char line[96];
   for (int theta = 0; theta <= 180; theta += 6)
     for (int phi = 0; phi < 360; phi += 6) {
       const double s = std::sin(theta * kDeg);
-      const testing::Vec u = {s * std::cos(phi * kDeg), s * std::sin(phi * kDeg),
-                              std::cos(theta * kDeg)};
+      const test::Vec u = {s * std::cos(phi * kDeg), s * std::sin(phi * kDeg),
+                           std::cos(theta * kDeg)};
       std::snprintf(line, sizeof line, "%d,%d,%.9g\n", theta, phi,
                     law({59 * u[0], 59 * u[1], 59 * u[2]}, u));
       text += line;
@@ -35,14 +36,14 @@ std::string FieldText(double width_deg) {
   return text;
 }
 
-testing::PlantedCampaign Campaign(const testing::Planted& planted, double noise_T) {
-  const auto law = testing::OfSurface(0.08, 21);
-  return testing::MakeCampaign({.rows = 60, .noise_T = noise_T, .seed = 5}, law, law, planted);
+test::PlantedCampaign Campaign(const test::Planted& planted, double noise_T) {
+  const auto law = test::OfSurface(0.08, 21);
+  return test::MakeCampaign({.rows = 60, .noise_T = noise_T, .seed = 5}, law, law, planted);
 }
 
-// The voltages alone.
-std::string VoltsText(const testing::PlantedCampaign& campaign) {
-  std::istringstream in(testing::CampaignText(campaign, false));
+// Returns the campaign's CSV with the voltages alone.
+std::string VoltsText(const test::PlantedCampaign& campaign) {
+  std::istringstream in(test::CampaignText(campaign, false));
   std::string out;
   for (std::string line; std::getline(in, line);) {
     std::size_t at = 0;
@@ -64,7 +65,7 @@ std::vector<std::vector<std::string>> Cells(const std::string& text) {
 }
 
 TEST(HallCommand, FitsAndOrients) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string field = scratch.Put("field.csv", FieldText(21));
   for (const std::string kind : {"spherical", "surface", "harmonic"}) {
     const auto fit = Focalfleet({"hall", "fit", "--data", field, "--kind", kind, "--out",
@@ -93,7 +94,7 @@ TEST(HallCommand, FitsAndOrients) {
 }
 
 TEST(HallCommand, SensorsByFileAndByAnglesAreTheSame) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string field = scratch.Put("field.csv", FieldText(21));
   ASSERT_EQ(
       Focalfleet({"hall", "fit", "--data", field, "--kind", "surface", "--out", scratch / "m.toml"})
@@ -103,7 +104,7 @@ TEST(HallCommand, SensorsByFileAndByAnglesAreTheSame) {
   std::string sensors = "sensor,x,y,z\n";
   char line[128];
   int number = 0;
-  for (const auto& u : testing::PlantedSensors()) {
+  for (const auto& u : test::PlantedSensors()) {
     std::snprintf(line, sizeof line, "%d,%.15g,%.15g,%.15g\n", ++number, u[0], u[1], u[2]);
     sensors += line;
   }
@@ -125,9 +126,9 @@ TEST(HallCommand, SensorsByFileAndByAnglesAreTheSame) {
 }
 
 TEST(HallCommand, DiagnosesIntoItsReport) {
-  const ScratchDirectory scratch;
-  const std::string poses = scratch.Put(
-      "poses.csv", testing::CampaignText(Campaign({"sensor_gain", 0.05, 2}, 5e-4), true));
+  const ScratchFolder scratch;
+  const std::string poses =
+      scratch.Put("poses.csv", test::CampaignText(Campaign({"sensor_gain", 0.05, 2}, 5e-4), true));
   const auto result =
       Focalfleet({"hall", "diagnose", "--data", poses, "--out", scratch / "report", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
@@ -147,7 +148,7 @@ TEST(HallCommand, DiagnosesIntoItsReport) {
     EXPECT_TRUE(report["gain"].contains(key)) << key;
   EXPECT_EQ(report["data"]["rows"], 60);
   EXPECT_THAT(Slurp(scratch / "report/report.html"), HasSubstr("Explained: sensor_gain"));
-  // The extended model orients by the corrected gain.
+  // The extended model orients with the corrected gain.
   const std::string volts =
       scratch.Put("volts.csv", VoltsText(Campaign({"sensor_gain", 0.05, 2}, 5e-4)));
   const auto orient = Focalfleet({"hall", "orient", "--model", scratch / "report/model.toml",
@@ -160,12 +161,12 @@ TEST(HallCommand, DiagnosesIntoItsReport) {
   EXPECT_EQ(Json::parse(again.out)["verdict"], "consistent");
 }
 
-// The largest error of an angle in rows that `orient` finished.
-double WorstError(const std::string& estimates, const testing::PlantedCampaign& campaign) {
+// Returns the largest error of an angle over the rows that `orient` finished.
+double WorstError(const std::string& estimates, const test::PlantedCampaign& campaign) {
   const auto rows = Cells(estimates);
   double worst_deg = 0;
   for (std::size_t k = 0; k < campaign.poses.size(); ++k) {
-    const testing::PlantedPose& pose = campaign.poses[k];
+    const test::PlantedPose& pose = campaign.poses[k];
     const double truly_deg[] = {pose.alpha_deg, pose.beta_deg, pose.gamma_deg};
     for (std::size_t angle = 0; angle < 3; ++angle)
       worst_deg = std::max(worst_deg, std::abs(std::stod(rows[k + 1][angle]) - truly_deg[angle]));
@@ -174,17 +175,17 @@ double WorstError(const std::string& estimates, const testing::PlantedCampaign& 
 }
 
 TEST(HallCommand, CalibratesSensorsThatOrientTakes) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const std::string model = scratch.Put(
       "m.toml", "[field]\nkind = \"surface\"\namplitude_T = 0.08\nwidth_deg = 21\nphase_deg = 0\n");
-  const auto law = testing::OfSurface(0.08, 21);
-  const std::vector<testing::Planted> also = {{"sensor_offset", -0.05, 1},
-                                              {"sensor_position", 1.5, 3}};
+  const auto law = test::OfSurface(0.08, 21);
+  const std::vector<test::Planted> also = {{"sensor_offset", -0.05, 1},
+                                           {"sensor_position", 1.5, 3}};
   const auto planted = [&](double noise_T, std::uint64_t seed) {
-    return testing::MakeCampaign({.rows = 120, .noise_T = noise_T, .also = also, .seed = seed}, law,
-                                 law, {"sensor_gain", 0.04, 6});
+    return test::MakeCampaign({.rows = 120, .noise_T = noise_T, .also = also, .seed = seed}, law,
+                              law, {"sensor_gain", 0.04, 6});
   };
-  const std::string poses = scratch.Put("poses.csv", testing::CampaignText(planted(1e-4, 7), true));
+  const std::string poses = scratch.Put("poses.csv", test::CampaignText(planted(1e-4, 7), true));
   const auto result = Focalfleet({"hall", "calibrate", "--model", model, "--data", poses, "--out",
                                   scratch / "sensors.csv", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
@@ -229,7 +230,7 @@ TEST(HallCommand, CalibratesSensorsThatOrientTakes) {
 }
 
 TEST(HallCommand, BadInputIsRefusedByFileRowAndColumn) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto fit_error = [&](const std::string& text) {
     const auto result = Focalfleet(
         {"hall", "fit", "--data", scratch.Put("f.csv", text), "--out", scratch / "out.toml"});
@@ -285,7 +286,7 @@ TEST(HallCommand, BadInputIsRefusedByFileRowAndColumn) {
 }
 
 TEST(HallCommand, ReproducesThePaper) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto result = Focalfleet({"hall", "reproduce", "--out", scratch / "claims", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
   const Json claims = Json::parse(Slurp(scratch / "claims/claims.json"));

@@ -1,5 +1,5 @@
-// layout, targets and plan as processes: what they write, and that bad input is named and writes
-// nothing.
+// layout, targets and plan as processes: the files that they write. Bad input is named, and then
+// nothing is written.
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +13,7 @@
 #include "fleet/files/state_file.h"
 #include "fleet/files/targets_file.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
@@ -20,7 +21,7 @@ namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -48,7 +49,7 @@ class OfflineCommands : public ::testing::Test {
     words.insert(words.end(), more.begin(), more.end());
     return Focalfleet(words);
   }
-  // Refused with exactly this complaint, and no trace of a plan.
+  // The text is refused with exactly this complaint, and no plan is left.
   void ExpectRefused(const std::string& text, const std::string& complaint) {
     const ProgramResult result = Plan(scratch_.Put("bad.csv", text), {"--json"});
     EXPECT_EQ(result.exit, 1) << text;
@@ -59,7 +60,7 @@ class OfflineCommands : public ::testing::Test {
     EXPECT_THAT(scratch_.List(), ElementsAre("bad.csv", "state.csv", "units.csv")) << text;
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string state_ = scratch_ / "state.csv";
   std::string plan_ = scratch_ / "plan.csv";
@@ -150,7 +151,7 @@ TEST_F(OfflineCommands, TargetsArePlacesOrAngles) {
   EXPECT_THAT(Slurp(scratch_ / "b.csv"), ::testing::StartsWith("unit_id,theta_deg,phi_deg\n"));
 }
 
-// Unit 1 is the centre one.
+// Unit 1 is the one at the centre.
 std::string WithUnitOneDisabled(const std::string& units_csv) {
   auto file = ReadUnits(units_csv, "units.csv");
   EXPECT_TRUE(file);

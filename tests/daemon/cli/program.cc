@@ -6,10 +6,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -38,7 +36,7 @@ std::vector<char*> Pointers(std::vector<std::string>* texts) {
   return pointers;
 }
 
-// Reads both ends until the program has closed them: neither can fill up and stop it.
+// Reads both pipes until the program has closed them, so that neither can fill and block it.
 void Drain(std::array<int, 2> fds, std::array<std::string*, 2> texts) {
   std::array<pollfd, 2> polls{pollfd{fds[0], POLLIN, 0}, pollfd{fds[1], POLLIN, 0}};
   while (polls[0].fd >= 0 || polls[1].fd >= 0) {
@@ -97,32 +95,6 @@ ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::st
   arguments.insert(arguments.begin(),
                    {"sh", "-c", "exec \"$0\" \"$@\" " + redirection, FOCALFLEET_PROGRAM});
   return RunProgram(arguments);
-}
-
-ScratchDirectory::ScratchDirectory() {
-  std::string name = (std::filesystem::temp_directory_path() / "focalfleet-cli-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no directory " + name);
-  path_ = name;
-}
-
-ScratchDirectory::~ScratchDirectory() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
-std::string ScratchDirectory::Put(const std::string& name, const std::string& text) const {
-  const std::string path = *this / name;
-  std::ofstream(path, std::ios::binary) << text;
-  return path;
-}
-
-std::vector<std::string> ScratchDirectory::List() const {
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(path_)) {
-    names.push_back(entry.path().filename().string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
 }
 
 std::string Slurp(const std::string& path) {

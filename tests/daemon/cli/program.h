@@ -1,4 +1,4 @@
-// Runs a program to its end and keeps what it said, as an operator's shell would.
+// Runs a program to its end and keeps its output, as an operator's shell would.
 #pragma once
 
 #include <string>
@@ -8,40 +8,22 @@
 namespace focalfleet::test {
 
 struct ProgramResult {
-  int exit = -1;  // negative: the signal that ended it
+  int exit = -1;  // negative: the signal that ended the program
   std::string out;
   std::string err;
 };
 
-/// stdin is empty. `environment` is added to this process' own; NO_COLOR and the socket's variable
-/// are not passed on.
+/// Runs the program with an empty stdin. `environment` is added to this process's own; NO_COLOR and
+/// the variable of the control socket are not passed on.
 ProgramResult RunProgram(const std::vector<std::string>& arguments,
                          const std::vector<std::pair<std::string, std::string>>& environment = {});
 
 /// Runs the focalfleet executable of this build.
 ProgramResult Focalfleet(std::vector<std::string> arguments);
 
-/// The same, with stdout (and with more in `redirection` other streams) where a shell would put
-/// them: `>/dev/full`, `>&-`.
+/// Runs focalfleet with stdout redirected as a shell would: `>/dev/full`, `>&-`. `redirection` may
+/// redirect other streams, too.
 ProgramResult FocalfleetInto(const std::string& redirection, std::vector<std::string> arguments);
-
-/// A directory of its own, removed with all that is in it.
-class ScratchDirectory {
- public:
-  ScratchDirectory();
-  ScratchDirectory(const ScratchDirectory&) = delete;
-  ScratchDirectory& operator=(const ScratchDirectory&) = delete;
-  ~ScratchDirectory();
-  [[nodiscard]] std::string operator/(const std::string& name) const { return path_ + "/" + name; }
-  [[nodiscard]] const std::string& path() const { return path_; }
-  /// Writes a file and returns its path.
-  [[nodiscard]] std::string Put(const std::string& name, const std::string& text) const;
-  /// Names of all that is in it, sorted.
-  [[nodiscard]] std::vector<std::string> List() const;
-
- private:
-  std::string path_;
-};
 
 std::string Slurp(const std::string& path);
 

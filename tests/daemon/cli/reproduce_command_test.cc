@@ -5,17 +5,18 @@
 
 #include "daemon/control/messages.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::HasSubstr;
 
 TEST(ReproduceCommand, WritesEveryClaimWithItsStatusAndAPage) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   const auto result =
       Focalfleet({"reproduce", "--out", scratch / "claims", "--start-sets", "C", "--json"});
   ASSERT_EQ(result.exit, 0) << result.err;
@@ -38,7 +39,7 @@ TEST(ReproduceCommand, WritesEveryClaimWithItsStatusAndAPage) {
 }
 
 TEST(ReproduceCommand, RefusesWhatItCannotDo) {
-  const ScratchDirectory scratch;
+  const ScratchFolder scratch;
   EXPECT_EQ(Focalfleet({"reproduce"}).exit, 2) << "no --out";
   EXPECT_EQ(Focalfleet({"reproduce", "--out", scratch / "x", "--set", "Q"}).exit, 2);
   EXPECT_EQ(Focalfleet({"reproduce", "--out", scratch / "x", "--resistance-factor", "0"}).exit, 2);

@@ -1,5 +1,4 @@
-// simulate drive as a process: the files, what is refused, and that a stall is said and is no
-// error.
+// simulate drive as a process: its files and its refusals. A stall is reported and is no error.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -7,13 +6,14 @@
 #include "daemon/control/messages.h"
 #include "fleet/files/csv.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -36,7 +36,7 @@ class SimulateDrive : public ::testing::Test {
     return Json::parse(Slurp(out_ + "/summary.json"), nullptr, false);
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string out_ = scratch_ / "wave";
 };
 
@@ -44,7 +44,7 @@ const std::vector<std::string> kBench = {"--v-bus",  "9",         "--counter1", 
                                          "--repeat", "8",         "--subdivision", "96",
                                          "--mode",   "asymmetric"};
 
-// The wave's figures, computed from the table by itself.
+// The wave's figures are computed from the table alone.
 TEST_F(SimulateDrive, TheTableTellsTheSameAsTheSummary) {
   const ProgramResult result = Simulate(kBench);
   ASSERT_EQ(result.exit, 0) << result.err;
@@ -105,7 +105,7 @@ TEST_F(SimulateDrive, AStallIsSaidAndIsNoError) {
   EXPECT_EQ(Summary()["in_step"], false);
   EXPECT_TRUE(Summary()["lag_deg"].is_null());
   EXPECT_TRUE(Summary()["torque_ripple"]["rms"].is_null());
-  // More than the motor has at any lag.
+  // The load is more than the motor holds at any lag.
   EXPECT_THAT(Simulate({"--repeat", "37", "--load", "60"}).out, HasSubstr("stalled: at no lag"));
   EXPECT_EQ(Summary()["in_step"], false);
 }

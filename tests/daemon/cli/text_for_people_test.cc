@@ -1,4 +1,4 @@
-// The progress bar and the tables, by themselves.
+// The progress bar and the tables by themselves.
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -8,6 +8,7 @@
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -37,7 +38,7 @@ TEST(Table, ARowStaysOneLineOfText) {
 }
 
 TEST(TextFile, AcceptsUtf8AndNamesTheFirstByteThatIsNot) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string good = "# \xc2\xb5m \xe2\x82\xac \xf0\x9f\x94\xad\n1,2\n";
   ASSERT_TRUE(ReadTextFile(scratch.Put("good", good)));
   for (const std::string bad : {"\xc0\x80", "\xed\xa0\x80", "\xf5\x80\x80\x80", "\xe2\x82", "\x80",
@@ -49,7 +50,7 @@ TEST(TextFile, AcceptsUtf8AndNamesTheFirstByteThatIsNot) {
 }
 
 TEST(TextFile, WritesThroughALinkAndKeepsItsMode) {
-  const test::ScratchDirectory scratch;
+  const test::ScratchFolder scratch;
   const std::string file = scratch.Put("real", "old");
   const std::string link = scratch / "link";
   ASSERT_EQ(symlink(file.c_str(), link.c_str()), 0);

@@ -5,19 +5,20 @@
 #include "daemon/store/store.h"
 #include "fleet/files/csv.h"
 #include "tests/daemon/cli/program.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
 using test::ProgramResult;
-using test::ScratchDirectory;
+using test::ScratchFolder;
 using test::Slurp;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-// As the sets were fitted.
+// The sets were fitted without dead time and rise time.
 const std::vector<std::string> kIdeal = {"--dead-time-ns", "0", "--rise-ns", "0", "--fall-ns", "0"};
 
 class TuneCommand : public ::testing::Test {
@@ -32,7 +33,7 @@ class TuneCommand : public ::testing::Test {
     ASSERT_EQ(Focalfleet({"layout", "hex", "--count", "3", "--out", units_}).exit, 0);
   }
 
-  ScratchDirectory scratch_;
+  ScratchFolder scratch_;
   std::string units_ = scratch_ / "units.csv";
   std::string tuned_ = scratch_ / "tuned.csv";
 };
@@ -104,7 +105,7 @@ TEST_F(TuneCommand, TheStoreTakesWhatWasTunedWithItsOrigin) {
     ASSERT_TRUE(store) << store.error().text;
     const std::vector<Row> rows = {BindingRow{UnitId{1}, {7001}}, BindingRow{UnitId{2}, {7002}}};
     ASSERT_TRUE((*store)->Commit(rows, WallTime{1}));
-    // As while a daemon has it.
+    // The store is open, as while a daemon runs.
     const ProgramResult held = Tune({"--units", units_, "--store", path});
     EXPECT_EQ(held.exit, 1);
     EXPECT_THAT(held.err, HasSubstr(path));
@@ -170,7 +171,8 @@ TEST_F(TuneCommand, AFleetGetsTheVoltageOfEachRailAndTheModeOfEachUnit) {
     const auto cell = [&](std::size_t row, const char* column) {
       return std::string(table->cell(row, *table->Find(column)));
     };
-    // One rail: one voltage. A unit: one mode. Time wants the high voltage.
+    // All units of a rail have one voltage, and both axes of a unit one mode. The shortest time
+    // needs the high voltage.
     for (std::size_t k = 0; k < table->size(); ++k) {
       EXPECT_EQ(cell(k, "v_bus_V"), cell(0, "v_bus_V"));
       EXPECT_EQ(cell(k, "mode"), cell(k - k % 2, "mode"));
@@ -178,7 +180,7 @@ TEST_F(TuneCommand, AFleetGetsTheVoltageOfEachRailAndTheModeOfEachUnit) {
     if (what == std::string("time")) {
       EXPECT_EQ(cell(0, "v_bus_V"), "3");
     }
-    // Of unit 2 both axes have the mode that costs least in sum, so each costs no less than alone.
+    // Both axes of unit 2 have the mode that costs least in sum, so neither costs less than alone.
     const ProgramResult one =
         Tune({"--load", "6", "--minimise", what, "--rails", cell(0, "v_bus_V"), "--json"});
     ASSERT_EQ(one.exit, 0) << one.err;

@@ -1,5 +1,5 @@
-// watch as a process, against a publisher in this one: what DDS keeps for late joiners is what it
-// shows.
+// watch runs as a process against a publisher in this one. The output is what DDS keeps for late
+// joiners.
 #include <gmock/gmock.h>
 
 #include "daemon/control/messages.h"
@@ -11,9 +11,9 @@ namespace focalfleet {
 namespace {
 
 using test::Focalfleet;
+using test::OwnDomain;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::OwnDomain;
 
 UnitStatusValue UnitAt(std::uint32_t id, UnitPhase phase) {
   UnitStatusValue unit;

@@ -11,11 +11,12 @@
 
 #include "daemon/control/line_server.h"
 #include "daemon/control/unix_address.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
 /// A server on a thread of its own that answers by verb, until it is destroyed.
@@ -63,7 +64,7 @@ class EchoServer {
 };
 
 TEST(LineClient, ReturnsTheResultAndShowsProgressOnTheWay) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const EchoServer server(scratch / "s");
   auto client = LineClient::Connect(scratch / "s").value();
   std::vector<int> seen;
@@ -76,7 +77,7 @@ TEST(LineClient, ReturnsTheResultAndShowsProgressOnTheWay) {
 }
 
 TEST(LineClient, CarriesALineOfManyBytesBothWays) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const EchoServer server(scratch / "s");
   auto client = LineClient::Connect(scratch / "s").value();
   const std::string big(5'000'000, 'x');
@@ -86,7 +87,7 @@ TEST(LineClient, CarriesALineOfManyBytesBothWays) {
 }
 
 TEST(LineClient, GivesTheServersErrorAndStaysConnected) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const EchoServer server(scratch / "s");
   auto client = LineClient::Connect(scratch / "s").value();
   const auto refused = client.Call("refuse", Json::object());
@@ -98,7 +99,7 @@ TEST(LineClient, GivesTheServersErrorAndStaysConnected) {
 }
 
 TEST(LineClient, GivesUpASilentServer) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const EchoServer server(scratch / "s");
   auto client = LineClient::Connect(scratch / "s").value();
   const auto nothing =
@@ -134,7 +135,7 @@ TEST(LineClient, ReportsAServerThatDiesOrSendsGarbage) {
 
 // The server stands for a stopped daemon: it listens, and accepts no connection.
 TEST(LineClient, GivesUpOnAServerThatTakesNoConnection) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();
   const int listener = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   ASSERT_EQ(::bind(listener, address.get(), address.length()), 0);

@@ -8,15 +8,17 @@
 
 #include "tests/daemon/control/line_server_turns.h"
 #include "tests/daemon/control/raw_client.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::RawClient;
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
 TEST(LineServer, HandsOutWholeLinesOnly) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("{\"a\"");
@@ -31,7 +33,7 @@ TEST(LineServer, HandsOutWholeLinesOnly) {
 }
 
 TEST(LineServer, ClientsTakeTurns) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient greedy(scratch / "s");
   const RawClient modest(scratch / "s");
@@ -48,7 +50,7 @@ TEST(LineServer, ClientsTakeTurns) {
 }
 
 TEST(LineServer, IsReadableAsLongAsALineIsLeft) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("1\n2\n");
@@ -116,7 +118,7 @@ TEST(LineServer, TakesAStopOfAClientThatReadsNoAnswers) {
 }
 
 TEST(LineServer, AFloodOfStopsIsOneStopOfEachClientATurn) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   const RawClient client(scratch / "s");
   std::vector<IncomingLine> lines;
@@ -130,7 +132,7 @@ TEST(LineServer, AFloodOfStopsIsOneStopOfEachClientATurn) {
 }
 
 TEST(LineServer, ReadsNoFurtherAheadThanItsBound) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop, .ahead_bytes = 1000}).value();
   const RawClient client(scratch / "s");
   std::string lines;
@@ -156,7 +158,7 @@ TEST(LineServer, RefusesALineThatIsTooLongAndCloses) {
 }
 
 TEST(LineServer, TakesALineOfTheGreatestLength) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.line_bytes_max = 100'000}).value();
   const RawClient client(scratch / "s");
   const std::string line = std::string(100'000, 'x') + "\n";
@@ -170,7 +172,7 @@ TEST(LineServer, TakesALineOfTheGreatestLength) {
 }
 
 TEST(LineServer, PassesBinaryGarbageOnAsItCame) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send(std::string_view("\0\xff\x80\n", 4));
@@ -180,7 +182,7 @@ TEST(LineServer, PassesBinaryGarbageOnAsItCame) {
 }
 
 TEST(LineServer, TakesNoMoreLinesOfAClientThatDoesNotRead) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000}).value();
   const RawClient client(scratch / "s");
   std::string asked;
@@ -219,7 +221,7 @@ TEST(LineServer, DropsAClientThatLeavesTooMuchUnread) {
 }
 
 TEST(LineServer, SkipsProgressForAClientThatDoesNotRead) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.progress_bytes_max = 1000}).value();
   const RawClient client(scratch / "s");
   client.Send("wait\n");

@@ -12,7 +12,7 @@
 
 #include "daemon/control/unix_address.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 /// A client that sends exactly the bytes that a test gives.
 class RawClient {
@@ -52,4 +52,4 @@ class RawClient {
   int fd_ = -1;
 };
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -1,4 +1,4 @@
-// A camera that speaks DDS, by a client in C that knows the shipped IDL alone.
+// A client in C, which knows only the shipped IDL, plays a camera that speaks DDS.
 #include "daemon/camera/camera_dds.h"
 
 #include <gmock/gmock.h>
@@ -18,9 +18,9 @@
 namespace focalfleet {
 namespace {
 
-using testing::ClientProcess;
+using test::ClientProcess;
+using test::OwnDomain;
 using ::testing::HasSubstr;
-using testing::OwnDomain;
 
 constexpr SensorLimits kSensor{1000, 1000};
 constexpr std::int64_t kSinceNs = 1'795'316'645'678'000'000;
@@ -38,7 +38,7 @@ class CameraDdsTest : public ::testing::Test {
     ASSERT_EQ(sender_->Line(), "ready");
   }
 
-  /// Asks, and takes until something comes; an empty optional: nothing ever did.
+  /// Sends a request and takes until an exposure comes. An empty optional means that none came.
   Result<std::optional<Exposure>> Ask(std::uint64_t id) {
     EXPECT_TRUE(port_->Request(id, {kSinceNs + static_cast<std::int64_t>(id)}));
     const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -99,7 +99,7 @@ TEST_F(CameraDdsTest, NothingComesWhereNobodyAnswers) {
 }
 
 TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
-  auto taken = std::make_unique<testing::TakenPorts>(OwnDomain());
+  auto taken = std::make_unique<test::TakenPorts>(OwnDomain());
   std::mutex mutex;
   std::vector<std::string> reported;
   port_ = std::make_unique<CameraDds>(
@@ -118,7 +118,7 @@ TEST_F(CameraDdsTest, WithoutAFreePortItSaysSoAndJoinsByItselfWhenThereIsOne) {
   const auto nothing = port_->Take();
   EXPECT_TRUE(nothing && !*nothing);
   taken.reset();
-  Start({"good"});  // it is ready when somebody listens
+  Start({"good"});  // a camera is ready when a reader listens
   const auto good = Ask(2);
   ASSERT_TRUE(good) << good.error().text;
   ASSERT_TRUE(*good);

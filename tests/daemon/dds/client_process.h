@@ -1,4 +1,4 @@
-// Another program, started by a test and spoken to through its stdin and stdout.
+// The client process is another program, started by a test, with pipes to its stdin and stdout.
 #pragma once
 
 #include <fcntl.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class ClientProcess {
  public:
@@ -44,7 +44,7 @@ class ClientProcess {
   void Signal(int number) const {
     if (pid_ > 0) kill(pid_, number);
   }
-  /// Waits for a line; without its end. Empty: the program ended.
+  /// Waits for a line and returns it without its end. Empty: the program ended.
   std::string Line() const {
     std::string line;
     for (char c = 0; read(from_, &c, 1) == 1 && c != '\n';) line += c;
@@ -54,7 +54,7 @@ class ClientProcess {
     if (pid_ > 0 && waitpid(pid_, &status_, WNOHANG) == pid_) pid_ = -1;
     return pid_ < 0;
   }
-  /// Closes its stdin and waits for its end. The exit code, or -1.
+  /// Closes the program's stdin and waits for its end. Returns the exit code, or -1.
   int Finish() {
     if (to_ >= 0) close(to_);
     to_ = -1;
@@ -70,4 +70,4 @@ class ClientProcess {
   int status_ = -1;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,6 +1,6 @@
-// A DDS domain that no other test of this machine uses: the first whose lock file is free. Held
-// until the process ends. 20..99 keeps Cyclone's ports (7400 + 250 * domain) below the ephemeral
-// ones.
+// Finds a DDS domain that no other test on this machine uses: the first whose lock file is free.
+// The lock is held until the process ends. Domains 20..99 keep Cyclone's ports (7400 + 250 *
+// domain) below the ephemeral ones.
 #pragma once
 
 #include <fcntl.h>
@@ -11,7 +11,7 @@
 #include <cstdlib>
 #include <string>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline std::uint32_t OwnDomain() {
   static const std::uint32_t domain = [] {
@@ -26,4 +26,4 @@ inline std::uint32_t OwnDomain() {
   return domain;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

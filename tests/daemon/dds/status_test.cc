@@ -18,9 +18,9 @@
 namespace focalfleet {
 namespace {
 
-using testing::ClientProcess;
+using test::ClientProcess;
+using test::OwnDomain;
 using ::testing::HasSubstr;
-using testing::OwnDomain;
 
 constexpr std::chrono::seconds kPatience(20);  // far above anything that is measured
 
@@ -41,14 +41,15 @@ std::unique_ptr<StatusReader> MakeReader(bool units = true) {
   return reader ? std::move(*reader) : nullptr;
 }
 
-// The client in C reads the configuration that is installed; our own ends have it built in.
+// The client in C reads the configuration that is installed; the project's own ends have it built
+// in.
 ClientProcess LateJoiner(int units, int alarms, int wait_ms) {
   return ClientProcess({"/usr/bin/env", "CYCLONEDDS_URI=" LOOPBACK_URI, LATE_JOINER,
                         std::to_string(OwnDomain()), std::to_string(units), std::to_string(alarms),
                         std::to_string(wait_ms)});
 }
 
-// Everything that a reader has seen so far, by id, with how often.
+// Seen holds all that a reader has received so far, by id, with how often.
 struct Seen {
   std::map<std::uint32_t, UnitStatusValue> units;
   std::map<std::uint32_t, BusStatusValue> buses;
@@ -59,7 +60,7 @@ struct Seen {
   std::uint32_t malformed = 0;
 };
 
-// Takes until `enough`; false where it never came.
+// Takes samples until `enough`; false where `enough` never became true.
 bool TakeUntil(StatusReader& reader, Seen* seen, const std::function<bool()>& enough) {
   const auto until = std::chrono::steady_clock::now() + kPatience;
   StatusUpdate update;
@@ -295,7 +296,7 @@ TEST(Status, AnAlarmIsReportedOnceAndOldOnesNotToLateJoiners) {
   EXPECT_EQ(late_seen.alarms.rbegin()->first, kAlarms);
 }
 
-// The issue's own measure: a client that shares no code with us.
+// The reader is a client that shares no code with the project.
 TEST(Status, LateJoinerInCSeesAllUnitsAndEachAlarmOnce) {
   auto publisher = MakePublisher();
   const auto units = Units(5000);
@@ -334,8 +335,7 @@ TEST(Status, AStoppedReaderCostsNoTimeAndCatchesUp) {
   while (publisher->unit_readers() == 0) ASSERT_FALSE(client.Ended());
   client.Signal(SIGSTOP);
   auto units = Units(5000);
-  // A write that waited for its reader would hang here for good: 10 MB are more than any
-  // buffer.
+  // A write that waited for its reader would block here for good, because 10 MB exceed any buffer.
   for (int round = 0; round < 20; ++round) {
     for (auto& unit : units) unit.at = {round};
     EXPECT_EQ(publisher->Publish(units), units.size());
@@ -359,7 +359,7 @@ TEST(Status, AKilledDaemonIsNoticed) {
   talker.Signal(SIGKILL);
   EXPECT_TRUE(TakeUntil(*reader, &seen, [&] { return !reader->writer_alive(); }));
   EXPECT_TRUE(reader->writer_seen());
-  // The next daemon is a new writer, and is heard.
+  // The next daemon is a new writer, and readers receive its samples, too.
   ClientProcess next({TALKER, std::to_string(OwnDomain()), "11", "1"});
   EXPECT_TRUE(TakeUntil(*reader, &seen, [&] { return seen.units.size() == 11; }));
   EXPECT_TRUE(reader->writer_alive());
@@ -375,8 +375,8 @@ TEST(Status, ADaemonThatEndsIsNoticed) {
   EXPECT_TRUE(TakeUntil(*reader, &seen, [&] { return !reader->writer_alive(); }));
 }
 
-// More than there were places for (docs/adr/0006). A hundred take a minute of both cores, most of
-// it for finding each other.
+// Forty are more than there were places for (docs/adr/0006). A hundred take a minute of both cores,
+// most of it for discovery.
 TEST(Status, FortyReadersOnOneHostAllSeeEverything) {
   auto publisher = MakePublisher();
   ASSERT_EQ(publisher->Publish(Units(200)), 200u);
@@ -395,7 +395,7 @@ TEST(Status, FortyReadersOnOneHostAllSeeEverything) {
 
 TEST(Status, WithoutAFreePortJoiningFailsAndGoesLaterInTheSameProcess) {
   {
-    const testing::TakenPorts taken(OwnDomain());
+    const test::TakenPorts taken(OwnDomain());
     const auto publisher = StatusPublisher::Create(Options());
     ASSERT_FALSE(publisher);
     EXPECT_EQ(publisher.error().code, ErrorCode::kUnavailable);
@@ -430,7 +430,7 @@ TEST(Status, BadConfigurationIsAnError) {
   ASSERT_FALSE(publisher);
   EXPECT_EQ(publisher.error().code, ErrorCode::kUnavailable);
   EXPECT_THAT(publisher.error().text, HasSubstr("DDS"));
-  EXPECT_TRUE(MakePublisher());  // and the domain is not spoilt by it
+  EXPECT_TRUE(MakePublisher());  // the domain still works afterwards
 }
 
 }  // namespace

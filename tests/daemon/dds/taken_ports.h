@@ -1,5 +1,5 @@
-// All UDP ports that a program may join a DDS domain by (deploy/cyclonedds.xml), taken by somebody
-// else for as long as this lives.
+// Occupies all UDP ports by which a program may join a DDS domain (deploy/cyclonedds.xml), until it
+// is destroyed.
 #pragma once
 
 #include <arpa/inet.h>
@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class TakenPorts {
  public:
@@ -21,7 +21,7 @@ class TakenPorts {
       address.sin_addr.s_addr = htonl(INADDR_ANY);
       address.sin_port = htons(static_cast<std::uint16_t>(7410 + 250 * domain + k));
       const void* raw = &address;
-      // A port that cannot be had is taken by somebody else already.
+      // A port that cannot be bound is taken already.
       static_cast<void>(::bind(fd, static_cast<const sockaddr*>(raw), sizeof address));
       sockets_.push_back(fd);
     }
@@ -37,4 +37,4 @@ class TakenPorts {
   std::vector<int> sockets_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,5 +1,5 @@
-// A daemon's voice without the daemon: publishes units 1..N and alarms 1..A once, says `ready`, and
-// stays until its stdin ends.   talker DOMAIN UNITS ALARMS
+// The talker publishes as a daemon does: units 1..N and alarms 1..A once. Then it prints `ready`
+// and stays until its stdin ends.   talker DOMAIN UNITS ALARMS
 #include <unistd.h>
 
 #include <cstdio>
@@ -8,8 +8,10 @@
 
 #include "daemon/dds/status_publisher.h"
 
-int main(int argc, char** argv) {
-  using namespace focalfleet;
+namespace focalfleet {
+namespace {
+
+int Main(int argc, char** argv) {
   if (argc != 4) return 2;
   DdsOptions options;
   options.domain = static_cast<std::uint32_t>(std::atoi(argv[1]));
@@ -36,3 +38,8 @@ int main(int argc, char** argv) {
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

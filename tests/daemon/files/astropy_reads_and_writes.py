@@ -1,4 +1,4 @@
-"""astropy writes a table, we read and write it, astropy reads it: nothing changed."""
+"""astropy writes a table, fits_copy reads and writes it, astropy reads it: nothing changed."""
 import subprocess
 import sys
 import tempfile

@@ -1,4 +1,4 @@
-// fits_copy IN OUT: reads a table and writes it again, for a reader and writer that is not ours.
+// fits_copy IN OUT reads a table and writes it again, to be compared by another FITS library.
 #include <cstdio>
 
 #include "daemon/files/fits_table.h"

@@ -8,8 +8,6 @@
 #include <fstream>
 #include <limits>
 
-#include "tests/support/temporary_folder.h"
-
 namespace focalfleet {
 namespace {
 
@@ -25,8 +23,8 @@ FitsTable Small() {
 }
 
 TEST(FitsTable, ReadsBackToTheBit) {
-  const testing::TemporaryFolder folder;
-  const std::string path = folder.File("small.fits");
+  const test::ScratchFolder folder;
+  const std::string path = folder / "small.fits";
   ASSERT_TRUE(WriteFitsTable(path, Small()));
   const auto back = ReadFitsTable(path);
   ASSERT_TRUE(back) << back.error().text;
@@ -43,8 +41,8 @@ TEST(FitsTable, ReadsBackToTheBit) {
 }
 
 TEST(FitsTable, AnotherTableTakesThePlaceOfTheFirstAtOnce) {
-  const testing::TemporaryFolder folder;
-  const std::string path = folder.File("small.fits");
+  const test::ScratchFolder folder;
+  const std::string path = folder / "small.fits";
   FitsTable table = Small();
   ASSERT_TRUE(WriteFitsTable(path, table));
   table.columns[1].values = std::vector<double>{std::nan(""), 2, 3};
@@ -58,16 +56,16 @@ TEST(FitsTable, AnotherTableTakesThePlaceOfTheFirstAtOnce) {
 }
 
 TEST(FitsTable, SaysWhatIsNoTable) {
-  const testing::TemporaryFolder folder;
-  EXPECT_EQ(ReadFitsTable(folder.File("none.fits")).error().code, ErrorCode::kUnavailable);
-  const std::string path = folder.File("text.fits");
+  const test::ScratchFolder folder;
+  EXPECT_EQ(ReadFitsTable(folder / "none.fits").error().code, ErrorCode::kUnavailable);
+  const std::string path = folder / "text.fits";
   std::ofstream(path) << "unit_id,x_mm\n1,2\n";
   const auto read = ReadFitsTable(path);
   ASSERT_FALSE(read);
   EXPECT_THAT(read.error().text, HasSubstr("text.fits"));
-  // No filter of an extended file name is run.
+  // Filters of an extended file name are not run.
   EXPECT_FALSE(ReadFitsTable(path + "[1][col x=1]"));
-  EXPECT_FALSE(WriteFitsTable(folder.File("no/such/folder.fits"), Small()));
+  EXPECT_FALSE(WriteFitsTable(folder / "no/such/folder.fits", Small()));
 }
 
 }  // namespace

@@ -18,21 +18,22 @@
 
 #include "daemon/files/text_file.h"
 #include "tests/support/as_user.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
-using testing::AsUser;
+using test::AsUser;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr std::size_t kMax = 1 << 20;
 
-/// Beside the guarded folder lies what is somebody else's: "secret", and a folder "theirs".
+/// The guarded folder has neighbours that belong to another program: "secret", and a folder
+/// "theirs".
 class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
  protected:
-  GuardedFolderTest() : user_(GetParam()), files_(std::make_unique<testing::TemporaryFolder>()) {
+  GuardedFolderTest() : user_(GetParam()), files_(std::make_unique<test::ScratchFolder>()) {
     std::ofstream(Beside("secret")) << "secret";
     std::filesystem::create_directory(Beside("theirs"));
     folder_ = std::make_unique<GuardedFolder>(GuardedFolder::Open(In("")).value());
@@ -41,7 +42,7 @@ class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
     EXPECT_EQ(Text(Beside("secret")), "secret") << "it was written through a link";
     std::filesystem::permissions(In(""), std::filesystem::perms::owner_all);
   }
-  [[nodiscard]] std::string Beside(const std::string& name) const { return files_->File(name); }
+  [[nodiscard]] std::string Beside(const std::string& name) const { return *files_ / name; }
   [[nodiscard]] std::string In(const std::string& name) const { return Beside("camera/" + name); }
   static std::string Text(const std::string& path) { return ReadTextFile(path).value_or("none"); }
   void Link(const std::string& to, const std::string& name) const {
@@ -65,13 +66,13 @@ class GuardedFolderTest : public ::testing::TestWithParam<uid_t> {
     return lstat(path.c_str(), &status) == 0;
   }
 
-  AsUser user_;  // from here on, the temporary folder included
-  std::unique_ptr<testing::TemporaryFolder> files_;
+  AsUser user_;  // from here on, the scratch folder included
+  std::unique_ptr<test::ScratchFolder> files_;
   std::unique_ptr<GuardedFolder> folder_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Users, GuardedFolderTest, ::testing::ValuesIn(testing::UsersOfTests()),
-                         testing::NameOfUser);
+INSTANTIATE_TEST_SUITE_P(Users, GuardedFolderTest, ::testing::ValuesIn(test::UsersOfTests()),
+                         test::NameOfUser);
 
 TEST_P(GuardedFolderTest, ReadsAndWritesWholeFiles) {
   ASSERT_TRUE(folder_->Write("b", "one"));
@@ -105,7 +106,7 @@ TEST_P(GuardedFolderTest, ReadsRegularFilesAndNothingElse) {
 
 TEST_P(GuardedFolderTest, AFileThatChangesWhileItIsReadIsNotTaken) {
   const char* reported = "changed while it was read: write it under another ending, then rename it";
-  // The kernel's own files say that they hold nothing.
+  // The kernel's own files report a size of 0.
   const auto kernel = GuardedFolder::Open("/proc/self");
   ASSERT_TRUE(kernel);
   EXPECT_THAT(kernel->Read("status", kMax).error().text, HasSubstr(reported));
@@ -231,7 +232,7 @@ TEST_P(GuardedFolderTest, AFolderThatMayNotBeWrittenIsReported) {
   const auto aside = folder_->Subfolder("aside").value();
   std::filesystem::permissions(
       In(""), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
-  // Root may write all the same.
+  // Root may write into a read-only folder all the same.
   EXPECT_EQ(folder_->Write("y", "2").has_value(), GetParam() == 0);
   EXPECT_EQ(folder_->Move("x", aside).has_value(), GetParam() == 0);
   if (GetParam() != 0) {

@@ -11,7 +11,7 @@
 namespace focalfleet {
 namespace {
 
-using testing::Gzipped;
+using test::Gzipped;
 using ::testing::HasSubstr;
 
 std::string ErrorOf(const std::string& bytes, std::size_t bytes_max = 1 << 20) {

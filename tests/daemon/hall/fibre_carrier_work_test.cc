@@ -1,4 +1,5 @@
-// Units that measure themselves: places from readings, sensors that lie, and who asks the camera.
+// Units that measure themselves: places from readings, sensors that fail, and requests to the
+// camera.
 #include "daemon/hall/fibre_carrier_work.h"
 
 #include <gmock/gmock.h>
@@ -11,21 +12,21 @@
 #include "fleet/hex_layout.h"
 #include "fleet/kinematics.h"
 #include "sim/hall/fibre_carrier.h"
+#include "tests/support/fibre_carrier_model.h"
 #include "tests/support/seed.h"
-#include "tests/support/spine_model.h"
 
 namespace focalfleet {
 namespace {
 
+using test::TestSeed;
 using ::testing::HasSubstr;
-using testing::TestSeed;
 
 constexpr std::uint32_t kUnits = 40;
 
 class FibreCarrierWork : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    model_ = std::make_unique<HallModelFile>(testing::FittedFibreCarrierModel());
+    model_ = std::make_unique<HallModelFile>(test::FittedFibreCarrierModel());
   }
   static void TearDownTestSuite() { model_.reset(); }
 
@@ -40,7 +41,7 @@ class FibreCarrierWork : public ::testing::Test {
     Move();
   }
 
-  // Each unit somewhere, and believed a little beside it.
+  // Each unit is somewhere, and is believed to be a little beside it.
   void Move() {
     job_ = {.id = ++jobs_, .since = {}, .expected = {}, .before = {}, .seen = {}};
     job_.tolerance_um = 20;
@@ -108,9 +109,9 @@ TEST_F(FibreCarrierWork, PutsUnitsWhereTheyAre) {
   EXPECT_LT(worst_um, 20);
 }
 
-// Whatever one sensor says: it is named, or "cannot tell" is said, and then there is no place; or
-// it did no harm. Over all units, sensors and kinds of lie, at the first reading and with a
-// history.
+// For any reading of one sensor, one of three things holds. The sensor is named; or the result is
+// "cannot tell" and there is no place; or the reading did no harm. The test covers all units,
+// sensors and kinds of fault, at the first reading and with a history.
 TEST_F(FibreCarrierWork, ASensorThatLiesIsNamedOrNoPlaceIsReported) {
   enum Lie { kStuck, kSaturated, kMissing, kSwapped, kGain, kLies };
   int named[kLies] = {}, wrongly[kLies] = {}, untold[kLies] = {}, harmless[kLies] = {};
@@ -178,7 +179,7 @@ TEST_F(FibreCarrierWork, AUnitThatStayedIsSaidNotToHaveMoved) {
   EXPECT_EQ(Measure().front().status, MeasurementStatus::kDidNotMove);
 }
 
-/// A camera that counts how often it is asked, and sees nothing.
+/// The camera counts the requests and sees nothing.
 class CountingPort : public CameraPort {
  public:
   explicit CountingPort(int* asked) : asked_(asked) {}

@@ -19,7 +19,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// An answer as the kernel lays it out, put together here by hand.
+// Answer is a message as the kernel lays it out, put together here by hand.
 class Answer {
  public:
   template <class T>
@@ -140,14 +140,14 @@ TEST(CanNetlink, TheKernelsRefusalIsReported) {
         << none;
 }
 
-// Whatever bytes come: no crash, nothing read past the end (the sanitizers see to it).
+// No bytes make the reader crash or read past the end (the sanitizers check the latter).
 TEST(CanNetlink, CutAndSpoiltAnswersAreRefusedOrRead) {
   const NetlinkMessage whole = Controller();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     const std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<long>(size));
     EXPECT_FALSE(ReadLink(cut)) << size;
   }
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   int read = 0;
@@ -176,7 +176,7 @@ TEST(CanNetlink, MessagesAreAsLongAsTheySay) {
   EXPECT_FALSE(QuestionAboutLink(""));
 }
 
-// Every Linux has this one, and it is no CAN.
+// Every Linux has the loopback interface, which is not CAN.
 TEST(CanNetlink, LoopbackIsNoCan) {
   const auto link = LookAtLink("lo");
   ASSERT_FALSE(link);

@@ -13,8 +13,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// A chip of four lines behind the calls of the kernel. What a real driver does with them is not
-/// shown by it.
+/// The chip of four lines stands in for the kernel's calls. The test does not show how a real
+/// driver treats these calls.
 class ChipBehindTheDoor : public GpioKernel {
  public:
   int Open(const char* path) override {

@@ -57,7 +57,7 @@ TEST(SimulatedPort, WhatWasHeardWhileAnotherBusWasAskedIsDueAtOnce) {
 
 std::int64_t g_now_ns = 0;
 
-// Nothing happens in a world in which all rest: it stands where it last had something to do.
+// A world in which all units rest has no event; its clock stays at the last event.
 TEST(SimulatedPort, AFrameIsNotThereBeforeItWasSent) {
   const Layout layout = TwoUnitsOnTwoBuses();
   sim::WorldConfig config;
@@ -96,7 +96,7 @@ TEST(SimulatedPort, ADeadBusIsDownAndTakesNothing) {
   EXPECT_EQ(port.Send(std::vector<CanFrame>{CanFrame{}}), 0u);
 }
 
-// The words of a SocketCAN port, because the coordinator shows them to people.
+// The words are those of a SocketCAN port, because the coordinator shows them to people.
 TEST(SimulatedPort, TellsHowItsControllerStandsByTheInterfaceOfARealOne) {
   const Layout layout = TwoUnitsOnTwoBuses();
   sim::WorldConfig config;
@@ -113,7 +113,7 @@ TEST(SimulatedPort, TellsHowItsControllerStandsByTheInterfaceOfARealOne) {
   };
   run(Milliseconds(1));
   EXPECT_EQ(port.trouble(), "");
-  // The only other node leaves: nobody acknowledges.
+  // The only other node leaves, so no node acknowledges.
   fleet->world().PowerCut(UnitId{1});
   const std::vector<CanFrame> ask{Encode(HostMessage(IdentifyRequest{}), {kBroadcastNode, 9})};
   EXPECT_EQ(port.Send(ask), 1u);

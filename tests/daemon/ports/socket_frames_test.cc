@@ -118,9 +118,7 @@ TEST(SocketFrames, ErrorFramesGoApart) {
   EXPECT_EQ(counters.rejected, 0u);
 }
 
-// ---- stamps of the kernel
-
-/// What the next readings of both clocks show.
+/// The next readings of both clocks give these values.
 std::vector<WallAhead> g_ahead;
 WallAhead ReadPlanned() {
   const WallAhead next = g_ahead.front();
@@ -135,8 +133,9 @@ WallAhead Ahead(std::int64_t low_ms, std::int64_t high_ms) {
 }
 WallAhead Ahead(std::int64_t ms) { return Ahead(ms, ms); }
 
-/// Of a frame that the kernel took in at 150 ms, read between 200 ms and 300 ms, behind a reading
-/// that had left none at 100 ms. `before`, `after`: what both clocks showed at these two.
+/// Returns the stamp of a frame that the kernel took in at 150 ms. The socket was found empty at
+/// 100 ms, and the frame was read between 200 ms and 300 ms. `before` and `after` are what both
+/// clocks showed at these two readings.
 HostInstant StampAfter(WallAhead before, WallAhead after, std::int64_t stamp_ms = 150) {
   g_ahead = {before, before, after};
   FrameStamps stamps(ReadPlanned);
@@ -156,8 +155,8 @@ TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedInMidReceive) {
   }
 }
 
-// The first batch of a burst is read behind the step, and so is the second: both clocks run alike
-// from the one to the other, and the frame came before the step.
+// A burst is read in two batches behind the step. Both clocks run alike between the batches, but
+// the frame came before the step.
 TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedAheadOfABatch) {
   g_ahead = {Ahead(0), Ahead(0), Ahead(40), Ahead(40)};
   FrameStamps stamps(ReadPlanned);
@@ -167,8 +166,8 @@ TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedAheadOfABatch) {
   EXPECT_EQ(stamps.At(kAheadNs + 150'000'000, HostClock()), At(220));
 }
 
-// A frame comes when the socket has been found empty, the wall clock steps, and only then both
-// clocks are read.
+// A frame comes after the socket was found empty. Then the wall clock steps, and only after that
+// both clocks are read.
 TEST(FrameStamps, DoNotCountWhereTheWallClockSteppedBeforeItWasRead) {
   g_ahead = {Ahead(0), Ahead(0), Ahead(40), Ahead(40)};
   FrameStamps stamps(ReadPlanned);
@@ -206,7 +205,7 @@ TEST(FrameStamps, OfWhatWasLeftBehindMayBeOlder) {
   EXPECT_EQ(stamps.At(kAheadNs + 150'000'000, HostClock()), At(150));
 }
 
-/// Two ends with which the kernel stamps what it takes in, as it does for CAN.
+/// Both ends of the pair have the kernel stamp what it takes in, as it does for CAN.
 class StampedPair {
  public:
   StampedPair() {
@@ -240,7 +239,7 @@ class StampedPair {
   std::array<int, 2> fds_{-1, -1};
 };
 
-/// Read once, and not while this process was held up.
+/// Returns one reading during which this process was not held up.
 WallAhead ReadWell() {
   static const WallAhead well = [] {
     WallAhead ahead = ReadWallAhead();
@@ -253,7 +252,7 @@ WallAhead ReadWell() {
 WallAhead ReadStepped() {
   static std::int64_t stepped_ns = 0;
   const WallAhead ahead = ReadWallAhead();
-  stepped_ns += 3'600'000'000'000;  // put on by an hour between any two readings
+  stepped_ns += 3'600'000'000'000;  // one hour between any two readings
   return {ahead.low_ns + stepped_ns, ahead.high_ns + stepped_ns};
 }
 
@@ -265,7 +264,7 @@ TEST(SocketFrames, KernelStampsLieBetweenSendingAndReadingWhateverTheWallClockDo
     aside.stamps.emplace(read);
     std::vector<ReceivedFrame> received;
     PortCounters counters;
-    // The kernel begins to stamp some time after it was asked to.
+    // The kernel begins to stamp some time after the request.
     bool stamped = false;
     for (int i = 0; i < 3 || (read == ReadWell && !stamped && i < 10'000); ++i) {
       const HostInstant before = clock.Now();

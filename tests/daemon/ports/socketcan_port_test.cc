@@ -1,4 +1,4 @@
-// What needs no CAN in the kernel; tests/can has the rest.
+// These tests need no CAN in the kernel; those in tests/can do.
 #include "daemon/ports/socketcan_port.h"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ TEST(SocketCanPort, IsDownAndNamesTheInterfaceThatIsMissing) {
   EXPECT_THAT((*port)->trouble(), HasSubstr("nocan7"));
 }
 
-// A socket pair in place of the interface, as soon as it is `there`.
+// A socket pair takes the place of the interface as soon as it is `there`.
 struct Interface {
   Interface() { EXPECT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK, 0, ends), 0); }
   Interface(const Interface&) = delete;
@@ -81,7 +81,7 @@ TEST(SocketCanPort, FindsAnInterfaceThatComesLaterAndCountsOnlyTheNextTimes) {
   EXPECT_EQ(receive_at(1400), LinkState::kUp);
   EXPECT_EQ((*port)->trouble(), "");
   EXPECT_EQ((*port)->counters().reconnects, 0u) << "the first time it came up";
-  // The other end is gone: what is sent is refused.
+  // The other end is closed, so sending is refused.
   ::shutdown(interface.ends[0], SHUT_RDWR);
   const CanFrame frame{.id = 77, .length = 0, .data = {}};
   EXPECT_EQ((*port)->Send({&frame, 1}), 0u);
@@ -110,7 +110,8 @@ std::vector<CanFrame> Frames(std::uint32_t count, std::uint32_t first_id) {
   return frames;
 }
 
-// What the kernel charges for frames that the other end has not taken is what is below.
+// The frames below the port are those that the kernel still charges, as the other end has not taken
+// them.
 TEST(SocketCanPort, HandsDownNoMoreThanTheKernelHasLet) {
   Interface interface;
   interface.there = true;
@@ -130,7 +131,7 @@ TEST(SocketCanPort, HandsDownNoMoreThanTheKernelHasLet) {
   for (int turn = 0; turn < 200 && taken < frames.size(); ++turn) {
     sent += (*port)->Send(std::span(frames).subspan(sent));
     EXPECT_LE(sent - taken, TransmitWindow::kOrdinary);
-    // A stop finds room where the others find none, but only one does.
+    // Ordinary frames find no room now; a stop does, but only one.
     if (turn == 3) {
       const auto stops = Frames(2, 0);
       EXPECT_EQ((*port)->Send(stops), 1u);
@@ -175,8 +176,6 @@ TEST(SocketCanPort, DoesNotUseOneThatComesBackWithAnotherBitRate) {
   EXPECT_EQ((*port)->state(), LinkState::kUp);
 }
 
-// ---- CAN FD
-
 class FdPort : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -201,10 +200,10 @@ class FdPort : public ::testing::Test {
     ASSERT_TRUE(port) << port.error().text;
     port_ = std::move(*port);
   }
-  /// What the other end finds: frames alone, and groups as what they are made of.
+  /// Taken holds what the other end received: the frames, those of groups included.
   struct Taken {
     std::vector<CanFrame> frames;
-    std::vector<std::size_t> sizes;  // how many each packet had; 0: it was a classic frame
+    std::vector<std::size_t> sizes;  // frames of each packet; 0: a classic frame
   };
   void TakeOne(Taken* taken) const {
     canfd_frame raw{};
@@ -265,8 +264,8 @@ TEST_F(FdPort, PutsWhatIsStagedIntoGroupsInOrderAndNothingElse) {
   for (std::uint8_t node = 20; node < 33; ++node) frames.push_back(ConfirmTo(node));
   const Taken taken = SendAll(frames);
   EXPECT_EQ(taken.frames, frames);
-  // Five segments fill a group; one that is alone goes as a classic frame, as does what no group
-  // carries.
+  // Five segments fill a group. A segment that is left alone goes as a classic frame, as does a
+  // frame that no group carries.
   EXPECT_EQ(taken.sizes, (std::vector<std::size_t>{5, 2, 0, 0, 0, 12, 0}));
 }
 
@@ -281,7 +280,7 @@ TEST_F(FdPort, WithoutCanFdEverythingGoesAlone) {
 
 TEST_F(FdPort, AGroupTakesOnePlaceBelowAndAStopStillFindsItsOwn) {
   Open();
-  // One classic frame alone shows what a frame is charged.
+  // A single classic frame shows how much the kernel charges for a frame.
   Taken taken;
   const CanFrame arm = ArmTo(1);
   ASSERT_EQ(port_->Send({&arm, 1}), 1u);
@@ -292,7 +291,7 @@ TEST_F(FdPort, AGroupTakesOnePlaceBelowAndAStopStillFindsItsOwn) {
     sent += port_->Send(std::span(frames).subspan(sent));
     if (sent < 20) TakeOne(&taken);
   }
-  // Full now: two groups at most are below.
+  // The window is full: at most two groups are below.
   while (port_->Send(std::span(frames).subspan(sent, 5)) > 0) sent += 5;
   EXPECT_LE(sent - (taken.frames.size() - 1), 10u);
   const CanFrame stop = Encode(HostMessage(Stop{}), {NodeId{3}, 1});
@@ -365,7 +364,7 @@ TEST_F(FdPort, AHostThatIsNotSetUpForGroupsRejectsThem) {
   EXPECT_EQ((*port)->counters().rejected, 1u);
 }
 
-// Error frames that the controller's driver would write.
+// The error frames are as the controller's driver would write them.
 class TroubledPort : public ::testing::Test {
  protected:
   void SetUp() override { Open(); }
@@ -389,8 +388,8 @@ class TroubledPort : public ::testing::Test {
               static_cast<ssize_t>(sizeof frame));
   }
   void ReceiveAt(std::int64_t ms) { port_->Receive(HostInstant{} + Milliseconds(ms), &in_); }
-  /// An attempt is due at `ms`; when the port had its outcome. It has a thread of its own, so how
-  /// often the port asks until then is left to chance.
+  /// An attempt is due at `ms`; returns the time at which the port had its outcome. The attempt has
+  /// a thread of its own, so the number of the port's calls until then varies.
   std::int64_t AwaitAttempt(int number, std::int64_t ms) {
     ReceiveAt(ms);
     while (attempts_ < number) std::this_thread::yield();
@@ -428,7 +427,7 @@ TEST_F(TroubledPort, NamesStateAndCause) {
 }
 
 TEST_F(TroubledPort, WarnsNoMoreWhenTheControllerIsWellAgain) {
-  for (int time = 0; time < 2; ++time) {  // the second warning is as new as the first
+  for (int time = 0; time < 2; ++time) {  // the second warning is reported like the first
     Write(ErrorFrame(CAN_ERR_CRTL, CAN_ERR_CRTL_TX_WARNING));
     ReceiveAt(10 * time + 1);
     EXPECT_EQ(port_->trouble(), "the controller warns of errors");
@@ -457,7 +456,7 @@ TEST_F(TroubledPort, IsBroughtBackFromBusOffAgainAndAgain) {
   ReceiveAt(at += 100);
   EXPECT_EQ(port_->state(), LinkState::kUp);
   EXPECT_EQ(port_->trouble(), "");
-  // Off again at once: the next attempt waits longer than the last.
+  // The controller is off again at once, so the next attempt waits longer than the last.
   Write(ErrorFrame(CAN_ERR_BUSOFF));
   ReceiveAt(at);
   ReceiveAt(at + 3999);

@@ -59,7 +59,7 @@ TEST(TransmitWindow, AnInterfaceThatHoldsNothingIsNeverFull) {
     ASSERT_EQ(window.Room(false, kNow), room);
     for (std::size_t i = 0; i < room; ++i) window.Sent(kFrame, kNow);
   }
-  // Somebody puts a queue in between.
+  // A queue is put in between.
   window.Charged(768 * 64);
   EXPECT_EQ(window.Room(true, kNow), 0u);
   window.Charged(0);
@@ -76,7 +76,7 @@ TEST(TransmitWindow, TheBitClockHoldsAFrameForItsBits) {
   EXPECT_EQ(window.Room(false, kNow + took - DurationNs{1}), 0u);
   EXPECT_EQ(window.Room(false, kNow + took), 1u);
   EXPECT_EQ(window.Room(false, kNow + took * 2), 2u);
-  // The wire was idle: it begins anew.
+  // The wire was idle, so the bit clock begins anew.
   window.Sent(kFrame, kNow + took * 10);
   window.Sent(kFrame, kNow + took * 10);
   EXPECT_EQ(window.RoomAt(), kNow + took * 11);
@@ -99,7 +99,7 @@ TEST(TransmitWindow, AFrameOfAnotherNodeDelaysOursThatWaited) {
   const DurationNs took = Microseconds(FrameBits(kFrame));
   window.Sent(kFrame, kNow);
   window.Sent(kFrame, kNow);
-  // It won the wire after our first: it ended when our second would have.
+  // The foreign frame won the wire after our first, and ended when our second would have ended.
   window.Heard(kFrame, kNow + took * 2);
   EXPECT_EQ(window.Room(false, kNow + took), 1u) << "the first left before";
   EXPECT_EQ(window.Room(false, kNow + took * 3 - DurationNs{1}), 1u);

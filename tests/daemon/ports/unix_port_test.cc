@@ -11,14 +11,15 @@
 
 #include "daemon/control/unix_address.h"
 #include "daemon/ports/socket_frames.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
-/// The simulator's end of one bus.
+/// The listener is the simulator's end of one bus.
 class Listener {
  public:
   explicit Listener(const std::string& path) {
@@ -79,7 +80,7 @@ bool Readable(int fd) {
 }
 
 TEST(UnixPort, CarriesFramesBothWays) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();
@@ -96,8 +97,8 @@ TEST(UnixPort, CarriesFramesBothWays) {
   EXPECT_EQ(received[0].bus, BusId{3});
 }
 
-// A process that is held up for a tenth of a second whenever it has read the time, and in the midst
-// of that a frame comes.
+// The process is held up for a tenth of a second after every reading of the time. A frame comes in
+// the middle of the delay.
 std::int64_t g_held_up_ns = 0;
 std::function<void(HostInstant)> g_meanwhile;
 std::int64_t ReadHeldUp() {
@@ -107,7 +108,7 @@ std::int64_t ReadHeldUp() {
 }
 
 TEST(UnixPort, AFrameThatWasReadLateIsNotStampedEarlier) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const HostClock clock(1, ReadHeldUp);
   const auto port =
@@ -126,7 +127,7 @@ TEST(UnixPort, AFrameThatWasReadLateIsNotStampedEarlier) {
 }
 
 TEST(UnixPort, IsDownUntilTheSimulatorIsThere) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const auto port = Open(scratch / "bus3.sock");
   EXPECT_EQ(port->state(), LinkState::kDown);
   EXPECT_THAT(port->trouble(), HasSubstr("cannot connect"));
@@ -142,7 +143,7 @@ TEST(UnixPort, IsDownUntilTheSimulatorIsThere) {
 }
 
 TEST(UnixPort, SurvivesThePeersDeathAndConnectsAgain) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   const int fd = port->fd();
@@ -165,7 +166,7 @@ TEST(UnixPort, SurvivesThePeersDeathAndConnectsAgain) {
 }
 
 TEST(UnixPort, NoticesAtSendingThatThePeerDied) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();
@@ -175,7 +176,7 @@ TEST(UnixPort, NoticesAtSendingThatThePeerDied) {
 }
 
 TEST(UnixPort, TakesAPartWhenThePeerDoesNotReadAndTheRestLater) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   Listener listener(scratch / "bus3.sock");
   const auto port = Open(scratch / "bus3.sock");
   listener.Accept();

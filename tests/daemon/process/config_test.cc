@@ -5,11 +5,10 @@
 
 #include <fstream>
 
-#include "tests/daemon/control/scratch.h"
-
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -220,7 +219,7 @@ TEST(Config, WaitsForOurOwnProcessesStayInRealTimeWhereTheFleetIsFaster) {
 }
 
 TEST(Config, FileThatIsNotThereOrNoFileIsNamed) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   EXPECT_THAT(LoadConfig(scratch / "none.toml").error().text, HasSubstr(scratch / "none.toml"));
   EXPECT_THAT(LoadConfig(scratch.path()).error().text, HasSubstr("directory"));
   std::ofstream(scratch / "f.toml") << kMinimal;

@@ -19,10 +19,14 @@
 #include "tests/daemon/dds/taken_ports.h"
 #include "tests/daemon/process/focalfleetd_fixture.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::Process;
+using test::ScratchFolder;
+using test::WaitUntil;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::WaitUntil;
@@ -204,10 +208,10 @@ TEST_F(FocalfleetdTest, IdleConnectionsKeepNoClientOut) {
 }
 
 TEST_F(FocalfleetdTest, RunsWithoutDdsAndPublishesEverythingWhenItIsThere) {
-  const std::uint32_t domain = testing::OwnDomain();
+  const std::uint32_t domain = test::OwnDomain();
   std::ofstream(scratch_ / "f.toml")
       << "[dds]\ndomain = " << domain << "\n[bus]\nport = \"simulated\"\n";
-  auto taken = std::make_unique<testing::TakenPorts>(domain);
+  auto taken = std::make_unique<test::TakenPorts>(domain);
   auto daemon = Start();
   ASSERT_TRUE(Ready()) << Log();
   auto status = Ask("status");
@@ -247,10 +251,10 @@ TEST_F(FocalfleetdTest, RunsWithoutDdsAndPublishesEverythingWhenItIsThere) {
 }
 
 TEST_F(FocalfleetdTest, EndsWhileItStillTriesToJoinDds) {
-  const std::uint32_t domain = testing::OwnDomain();
+  const std::uint32_t domain = test::OwnDomain();
   std::ofstream(scratch_ / "f.toml")
       << "[dds]\ndomain = " << domain << "\n[bus]\nport = \"simulated\"\n";
-  const testing::TakenPorts taken(domain);
+  const test::TakenPorts taken(domain);
   auto daemon = Start();
   ASSERT_TRUE(Answers()) << Log();
   daemon.Signal(SIGTERM);
@@ -259,7 +263,7 @@ TEST_F(FocalfleetdTest, EndsWhileItStillTriesToJoinDds) {
 
 TEST_F(FocalfleetdTest, WarnsThatTheEnvironmentDoesNotDecideWhereStatusGoes) {
   std::ofstream(scratch_ / "f.toml")
-      << "[dds]\ndomain = " << testing::OwnDomain() << "\n[bus]\nport = \"simulated\"\n";
+      << "[dds]\ndomain = " << test::OwnDomain() << "\n[bus]\nport = \"simulated\"\n";
   ::setenv("CYCLONEDDS_URI", "<Nonsense/>", 1);
   auto daemon = Start();
   ::unsetenv("CYCLONEDDS_URI");

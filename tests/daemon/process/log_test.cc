@@ -8,15 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "tests/daemon/control/scratch.h"
-
 namespace focalfleet {
 namespace {
 
+using test::ScratchFolder;
 using ::testing::HasSubstr;
 
 TEST(Log, AnEventIsOneLineWhateverItsTextHolds) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   ASSERT_TRUE(OpenLog({.file = scratch / "log"}));
   spdlog::info("{}", "stop refused: \n2024-01-01T00:00:00.000+0000 info apply commanded\x1b[2J");
   spdlog::info("next");

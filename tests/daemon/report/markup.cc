@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 namespace {
 
 bool IsNameCharacter(char c) {
@@ -39,7 +39,7 @@ class Reader {
     return name;
   }
 
-  // Up to but not including one of `ends`; false at '<' or an unknown entity before.
+  // Reads up to the first of `ends`; false where '<' or an unknown entity comes before.
   bool Characters(std::string_view ends, std::string* out) {
     static const std::pair<std::string_view, char> kEntities[] = {
         {"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&#39;", '\''}};
@@ -123,4 +123,4 @@ std::string TextOf(const std::vector<MarkupElement>& elements) {
   return text;
 }
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

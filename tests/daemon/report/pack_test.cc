@@ -13,6 +13,8 @@
 namespace focalfleet::report {
 namespace {
 
+using test::UnpackBits;
+
 std::string Encoded(const std::string& text) {
   return Base64(std::vector<std::uint8_t>(text.begin(), text.end()));
 }

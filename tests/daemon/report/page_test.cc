@@ -11,6 +11,8 @@
 namespace focalfleet::report {
 namespace {
 
+using test::ReadMarkup;
+using test::Select;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;

@@ -1,5 +1,6 @@
-// The page in a real browser, worked by plan_page_probe.js. What it draws, plays and tells is held
-// to the plan, the kinematics and the powers of the program. Skipped where there is no Chromium.
+// The page in a real browser, operated by plan_page_probe.js. The page's drawing, playing and
+// reports are compared with the plan, the kinematics and the powers of the program. The test is
+// skipped where there is no Chromium.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,13 +14,16 @@
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/kinematics.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/report/plan_page_scene.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::report {
 namespace {
 
+using focalfleet::test::ScratchFolder;
+using test::MakeSceneData;
+using test::SceneData;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
 
@@ -36,8 +40,8 @@ void Insert(const std::string& text, const std::string& before, std::string* htm
   html->insert(at, text);
 }
 
-// From the very border of a row to the end; away from the tight pairs, whose labels may hide an
-// arm.
+// The times run from the very border of a row to the end. They avoid the tight pairs, whose labels
+// may hide an arm.
 std::vector<double> Times(const Plan& plan) {
   const UnitPlan& move = plan.moves.front();
   const double row_begins_s = move.path[0].segments()[0].start_ticks / 1e4;
@@ -50,8 +54,8 @@ struct Visit {
   std::string log;
 };
 
-// The browser's time is virtual, it passes as fast as its timers allow. A browser that is to dump
-// its document makes no frames of its own; a timer stands in.
+// The browser's time is virtual and passes as fast as its timers allow. A browser that dumps its
+// document draws no frames of its own, so a timer takes their place.
 constexpr const char* kPreparation = R"(<script>
 const probeErrors = [];
 addEventListener("error", (event) => probeErrors.push(event.message));
@@ -59,16 +63,17 @@ requestAnimationFrame = (draw) => setTimeout(() => draw(performance.now()), 16);
 </script>
 )";
 
-// No sandbox: it wants privileges that a container or root do not have, and the page is our own.
+// The sandbox is off: it needs privileges that a container or root lacks, and the page is the
+// project's own.
 Visit VisitPage(const SceneData& data) {
   std::string html = PlanPage(data.scene());
   Insert(kPreparation, "<title>", &html);
   Insert("<script>const probeTimes = " + Json(Times(data.plan)).dump() + ";\n" +
              Slurp(PLAN_PAGE_PROBE) + "</script>\n",
          "</body>", &html);
-  const Scratch scratch;
+  const ScratchFolder scratch;
   std::ofstream(scratch / "plan.html", std::ios::binary) << html;
-  testing::Process browser(
+  focalfleet::test::Process browser(
       {"/usr/bin/timeout", "100", "chromium", "--headless", "--no-sandbox", "--disable-gpu",
        "--window-size=1280,900", "--user-data-dir=" + (scratch / "profile"),
        "--virtual-time-budget=60000", "--dump-dom", "file://" + (scratch / "plan.html")},
@@ -116,7 +121,7 @@ SceneData* PlanPageInABrowser::data_ = nullptr;
 Visit* PlanPageInABrowser::visit_ = nullptr;
 Json* PlanPageInABrowser::seen_ = nullptr;
 
-// plan.csv as docs/files.md has it: linear within a row, standing otherwise.
+// Returns the angle by plan.csv as in docs/files.md: linear within a row, constant otherwise.
 double AngleAt(const std::vector<PlanRow>& rows, UnitId unit, Axis axis, double start_deg,
                double t_s) {
   double at_deg = start_deg;

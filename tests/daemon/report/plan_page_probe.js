@@ -1,5 +1,5 @@
-// Works the page as a person would and writes what it sees into the document, for
-// plan_page_browser_test.cc. `probeTimes` are the times at which it asks for everything.
+// The probe operates the page as a person would and writes what it sees into the document, for
+// plan_page_browser_test.cc. `probeTimes` are the times at which it reads everything.
 "use strict";
 
 const probe = {errors: probeErrors};
@@ -17,7 +17,7 @@ function key(name, shiftKey = false) {
   document.body.dispatchEvent(new KeyboardEvent("keydown", {bubbles: true, key: name, shiftKey}));
 }
 
-// The units that show no paint in the middle of their arm.
+// Returns the units that show no paint in the middle of their arm.
 function unpainted() {
   const {plate, motion} = planPage;
   const ratio = plate.canvas.width / plate.width;
@@ -77,7 +77,7 @@ async function useKeys() {
   return {right, left, end, home: planPage.t_s};
 }
 
-// A click on the middle of an arm, away from where the plate was centred.
+// Clicks on the middle of an arm, away from the point about which the plate was centred.
 async function click(u) {
   const {plate, motion} = planPage;
   key("0");

@@ -1,6 +1,6 @@
-// A plan for the page's tests in which everything occurs that the page can show: movers, a unit
-// that is disabled, one that is not served and one in its way, one whose place nobody knows, units
-// without a target, a fixed obstacle, two rails with limits, tight pairs.
+// The scene is a plan for the page's tests in which everything occurs that the page can show. Units
+// move, have no target, are disabled, are not served, block another, or have no known place. A
+// fixed obstacle, two rails with limits and tight pairs are there, too.
 #pragma once
 
 #include <optional>
@@ -11,7 +11,7 @@
 #include "fleet/knowledge.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 
 struct SceneData {
   static constexpr std::uint32_t kUnits = 61;
@@ -21,11 +21,11 @@ struct SceneData {
   static constexpr PositionerIndex kUnknown{12};
   static constexpr PositionerIndex kWithoutTarget{30};
 
-  testing::PlanningFleet fleet;
+  test::PlanningFleet fleet;
   std::vector<std::optional<Pose>> start;
   Plan plan;
 
-  /// Lifetime: as long as this.
+  /// Lifetime: the scene refers to this object.
   [[nodiscard]] PlanScene scene() const {
     return {.title = "Plan: <61> & more",
             .layout = &fleet.layout,
@@ -50,10 +50,10 @@ inline SceneData MakeSceneData() {
     units[i].axis[1] = {8.2 - 0.002 * nth, 3 + 0.01 * nth, 900 - nth, 0, 180};
     units[i].arm_half_width_mm = 1.9 + 0.001 * nth;
   }
-  // Between three bases, out of everybody's reach but that of the tips.
+  // The obstacle lies between three bases, where only tips reach it.
   const Layout::Options options{.obstacles = {{7, {12.8, 7.39}, 0.5}}};
-  SceneData data{testing::FleetOf(units, options), {}, {}};
-  testing::DrawStartAndTargets(&data.fleet, testing::TestSeed(3));
+  SceneData data{test::FleetOf(units, options), {}, {}};
+  test::DrawStartAndTargets(&data.fleet, test::TestSeed(3));
   data.fleet.frozen[SceneData::kDisabled.value] = 1;
   data.fleet.targets[SceneData::kWithoutTarget.value].reset();
   auto plan = MakePlan(data.fleet.request(), {.fixed = true});
@@ -65,9 +65,9 @@ inline SceneData MakeSceneData() {
       {SceneData::kUnserved, UnservedWhy::kBlocked, std::optional(SceneData::kInTheWay), {}}};
   TakeOut(SceneData::kUnknown, &data.plan);
   data.start[SceneData::kUnknown.value].reset();
-  // Not ordered; the page orders them.
+  // The pairs are not ordered; the page orders them.
   data.plan.tightest = {{{0}, {1}, 0.0456, 9.5}, {{7}, {19}, 0.0012, 4.25}, {{3}, {10}, 0.5, 20}};
   return data;
 }
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

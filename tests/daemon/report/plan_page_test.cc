@@ -18,6 +18,11 @@
 namespace focalfleet::report {
 namespace {
 
+using test::MakeSceneData;
+using test::ReadMarkup;
+using test::SceneData;
+using test::Select;
+using test::Unpack;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using Json = nlohmann::json;
@@ -32,7 +37,7 @@ const std::string& Html() {
   return html;
 }
 
-// What stands between the end of `begin` and `end`; both must be there once.
+// Returns the text between the end of `begin` and `end`; both must occur once.
 std::string Between(const std::string& text, const std::string& begin, const std::string& end) {
   const std::size_t at = text.find(begin);
   EXPECT_NE(at, std::string::npos) << begin;
@@ -94,7 +99,7 @@ TEST(PlanPage, CarriesTheRowsOfThePlanToTheBit) {
   }
 }
 
-// The page knows where a row begins from the row before or from where the axis stood.
+// The page takes the start of a row from the row before, or from where the axis stood.
 TEST(PlanPage, TellsWhichRowsAreWhose) {
   const Json data = DataOf(Html());
   const auto rows =
@@ -175,7 +180,7 @@ TEST(PlanPage, ShowsTheTightestPairsFirstAndNotTooMany) {
 }
 
 TEST(PlanPage, OfFiveThousandUnitsWithFourRowsEachStaysBelowTwoMegabytes) {
-  testing::PlanningFleet fleet = testing::HexFleet(5000);
+  focalfleet::test::PlanningFleet fleet = focalfleet::test::HexFleet(5000);
   Rng rng = Rng::Stream(1, "rows");
   const auto draw = [&](std::uint32_t below) {
     return static_cast<std::int32_t>(rng.Bits() % below);

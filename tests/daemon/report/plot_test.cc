@@ -20,6 +20,10 @@
 namespace focalfleet::report {
 namespace {
 
+using test::MarkupElement;
+using test::ReadMarkup;
+using test::Select;
+using test::TextOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -102,7 +106,7 @@ TEST(LinePlot, KeepsANarrowPeakOfALongSeries) {
   const Svg svg = Lines(x, y, plot);
   EXPECT_LT(svg.text.size(), 60000u);
   const std::string path = Select(Read(svg), "path", "line").at(0).attributes.at("d");
-  // 7 of -8 to 8, in 240 pixels from the top.
+  // The value 7 on an axis of -8 to 8, in 240 pixels from the top.
   EXPECT_THAT(path, HasSubstr(",15.00L"));
 }
 
@@ -141,7 +145,8 @@ TEST(LinePlot, IsDrawnWithoutData) {
   EXPECT_THAT(Texts(Lines({0, -1}, {1, 1}, log)), HasSubstr("no data"));
 }
 
-// Equal, huge, tiny, far from zero, ends given against the data: always an axis with ticks.
+// Data that are equal, huge, tiny or far from zero, and ends given against the data, all give an
+// axis with ticks.
 TEST(LinePlot, HasTicksForAnyData) {
   const std::vector<Numbers> data = {
       {5, 5},      {0, 0},           {-3, -3},          {1e299, -1e299},

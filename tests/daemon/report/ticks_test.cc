@@ -42,10 +42,10 @@ TEST(LinearTicks, ShareAFactorWhereNumbersAreLargeOrSmall) {
   EXPECT_THAT(Labels(large), ElementsAre("-2.0", "-1.5", "-1.0", "-0.5", "0.0"));
 }
 
-// Whatever the range: 1-2-5, evenly apart, inside, as many as allowed but not needlessly few, and a
-// label read back is the value.
+// Ticks of any range are multiples of 1, 2 or 5, evenly apart and inside. There are as many as
+// allowed, but not needlessly few, and a label read back is the value.
 TEST(LinearTicks, AreRegularForRandomRanges) {
-  const std::uint64_t seed = testing::TestSeed(4711);
+  const std::uint64_t seed = test::TestSeed(4711);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 20000; ++i) {

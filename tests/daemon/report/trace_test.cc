@@ -25,7 +25,7 @@ std::string Draw(const std::vector<Pixel>& pixels, Style style = Style::kLine) {
   return trace.Finish();
 }
 
-// The points of a path of M and L.
+// Returns the points of a path of M and L.
 std::vector<Pixel> Points(std::string path) {
   std::replace_if(
       path.begin(), path.end(), [](char c) { return c == 'M' || c == 'L' || c == ','; }, ' ');
@@ -51,7 +51,7 @@ TEST(Trace, BreaksAtGapsAndKeepsALonePointVisible) {
 
 // The oracle bins the same points by column on its own.
 TEST(Trace, KeepsTheExtremesOfEveryColumnOfALongSeries) {
-  const std::uint64_t seed = testing::TestSeed(4711);
+  const std::uint64_t seed = test::TestSeed(4711);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   struct Extremes {
@@ -60,7 +60,7 @@ TEST(Trace, KeepsTheExtremesOfEveryColumnOfALongSeries) {
   std::map<int, Extremes> expected;
   std::vector<Pixel> pixels;
   for (int i = 0; i < 200000; ++i) {
-    // Inside its column also when rounded to two digits.
+    // The point stays inside its column also when rounded to two digits.
     const int column_of_p = i / 2000;
     Pixel p{column_of_p + 0.01 + i % 2000 * 0.98 / 2000, 25 + 5 * std::sin(i * 0.01)};
     if (rng.Below(5000) == 0) p.y = rng.Uniform(0, 50);  // one sample wide

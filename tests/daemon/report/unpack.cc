@@ -3,7 +3,7 @@
 #include <bit>
 #include <string_view>
 
-namespace focalfleet::report {
+namespace focalfleet::report::test {
 namespace {
 
 std::uint64_t LittleEndian(const std::vector<std::uint8_t>& bytes, std::size_t at,
@@ -63,4 +63,4 @@ std::vector<double> Unpack(const nlohmann::json& packed, std::size_t count) {
   return column;
 }
 
-}  // namespace focalfleet::report
+}  // namespace focalfleet::report::test

@@ -114,7 +114,7 @@ TEST(FaultsFile, TheExampleOfTheHouseIsGood) {
 }
 
 TEST(FaultsFile, AnyBytesGiveAPlanOrAnError) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(61);
+  const std::uint64_t seed = focalfleet::test::TestSeed(61);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const std::string good = "noise,all,,,,1e-5,\nlate,,2-4,1.5,2,0.5,0.25\nbabble,,7,3,,,\n";

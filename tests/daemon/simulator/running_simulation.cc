@@ -15,7 +15,7 @@
 
 extern char** environ;
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr int kPatienceMs = 20'000;
@@ -48,7 +48,7 @@ Child Spawn(std::vector<std::string> arguments, bool with_stderr) {
   return child;
 }
 
-// Until `enough` stands in it, the other end closes, or patience ends.
+// Reads until the text contains `enough`, the other end closes, or the limit of time is reached.
 std::string ReadUntil(int fd, const std::string& enough) {
   std::string text;
   while (enough.empty() || text.find(enough) == std::string::npos) {
@@ -118,7 +118,7 @@ std::optional<CanFrame> BusClient::Receive() {
 
 Said RunToEnd(std::vector<std::string> arguments) {
   const Child child = Spawn(std::move(arguments), /*with_stderr=*/true);
-  // What these tests make it say fits a pipe, so one after the other is enough.
+  // The output of these tests fits a pipe, so the two streams can be read one after the other.
   Said said;
   said.out = ReadUntil(child.out, "");
   said.err = ReadUntil(child.err, "");
@@ -128,4 +128,4 @@ Said RunToEnd(std::vector<std::string> arguments) {
   return said;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

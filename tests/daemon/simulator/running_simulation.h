@@ -1,5 +1,5 @@
-// focalfleet-sim as a child process, and a client on one of its buses. Both wait for what they wait
-// for, with a limit; nothing sleeps.
+// focalfleet-sim as a child process, and a client on one of its buses. Both wait for events with a
+// limit; nothing sleeps.
 #pragma once
 
 #include <sys/types.h>
@@ -10,20 +10,20 @@
 
 #include "protocol/wire/codec.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class RunningSimulation {
  public:
-  /// Starts it and waits for `ready`.
+  /// The program runs and has printed `ready`, or ready() is false.
   explicit RunningSimulation(std::vector<std::string> arguments);
   RunningSimulation(const RunningSimulation&) = delete;
   RunningSimulation& operator=(const RunningSimulation&) = delete;
   ~RunningSimulation();
 
   [[nodiscard]] bool ready() const { return ready_; }
-  /// SIGTERM, and its exit code.
+  /// Sends SIGTERM; returns the exit code.
   int Terminate();
-  /// Waits for an end that something else brought about.
+  /// Waits for an end that another cause brings about.
   int Wait();
   [[nodiscard]] pid_t pid() const { return pid_; }
 
@@ -41,9 +41,9 @@ class BusClient {
 
   [[nodiscard]] bool connected() const { return connected_; }
   void Send(std::uint8_t node, const HostMessage& message, std::uint8_t sequence = 1);
-  /// The next frame, from whomever; none after 20 s.
+  /// Returns the next frame, from any node; none after 20 s.
   std::optional<CanFrame> Receive();
-  /// The next message of a unit.
+  /// Returns the next message of a unit.
   template <class M>
   std::optional<M> ReceiveFromUnit() {
     const auto frame = Receive();
@@ -66,4 +66,4 @@ struct Said {
 /// Runs focalfleet-sim to its end.
 Said RunToEnd(std::vector<std::string> arguments);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -10,15 +10,16 @@
 #include "daemon/simulator/memory_file.h"
 #include "daemon/simulator/truth_report.h"
 #include "fleet/files/targets_file.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/simulator/running_simulation.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::simulator {
 namespace {
 
-using testing::BusClient;
-using testing::RunningSimulation;
-using testing::RunToEnd;
+using test::BusClient;
+using test::RunningSimulation;
+using test::RunToEnd;
+using test::ScratchFolder;
 
 constexpr const char* kUnits =
     "unit_id,base_x_mm,base_y_mm,arm_theta_mm,arm_phi_mm,theta_zero_deg,phi_zero_deg,theta_gear,"
@@ -34,8 +35,6 @@ std::string Slurp(const std::string& path) {
   text << std::ifstream(path).rdbuf();
   return text.str();
 }
-
-// ---- texts
 
 TEST(SimulatorCommandLine, ReadsInterfacesAndRanges) {
   using Names = std::vector<std::string>;
@@ -114,7 +113,7 @@ TEST(SimulatorTruth, ComparesFibresWithWhatWasAskedFor) {
   const auto compare = [&](const std::string& text) {
     return CompareWithTargets(world, *ReadTargets(text, "t.csv"));
   };
-  // Fibres stand at (103, 4) and (203, 4): 30 um and 40 um off.
+  // The fibres are at (103, 4) and (203, 4), so these places are 30 um and 40 um off.
   auto errors = compare("unit_id,x_mm,y_mm\n1,103.03,4\n2,203,4.04\n3,0,0\n");
   ASSERT_TRUE(errors);
   EXPECT_EQ(errors->units, 2u);
@@ -130,8 +129,6 @@ TEST(SimulatorTruth, ComparesFibresWithWhatWasAskedFor) {
   EXPECT_EQ(errors.error().text, "t.csv:2: no unit 9 in this fleet");
 }
 
-// ---- the process
-
 class Simulation : public ::testing::Test {
  protected:
   Simulation() { Put(units(), kUnits); }
@@ -144,7 +141,7 @@ class Simulation : public ::testing::Test {
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
-  Scratch scratch_;
+  ScratchFolder scratch_;
 };
 
 TEST_F(Simulation, AnswersOnEachBusAndEndsCleanly) {
@@ -184,7 +181,7 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   ASSERT_TRUE(simulation.ready());
   BusClient speaker(scratch_ / "bus8.sock");
   BusClient listener(scratch_ / "bus8.sock");
-  // Both are known to the simulation once both have heard something.
+  // The simulation has accepted both clients once both have received something.
   listener.Send(1, StatusRequest{}, 4);
   ASSERT_TRUE(listener.ReceiveFromUnit<StatusReply>());
   speaker.Send(1, ProgressRequest{}, 5);
@@ -193,7 +190,8 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
   ASSERT_TRUE(heard);
   EXPECT_EQ(*heard, request);
   EXPECT_TRUE(listener.ReceiveFromUnit<ProgressReply>());
-  // The speaker may have heard the listener's exchange before; it never hears its own request.
+  // The speaker may have received the listener's exchange before, but it never receives its own
+  // request.
   for (;;) {
     heard = speaker.Receive();
     ASSERT_TRUE(heard);
@@ -206,7 +204,7 @@ TEST_F(Simulation, OneClientHearsTheOthersFramesAndNotItsOwn) {
 TEST_F(Simulation, FlashSurvivesItsEnd) {
   const std::string flash = scratch_ / "flash.json";
   {
-    // Homing takes most of a minute at the pace of life: it is still under way at the end.
+    // Homing takes most of a minute at real speed, so it is still under way at the end.
     RunningSimulation simulation(Arguments({"--flash", flash}, "1"));
     ASSERT_TRUE(simulation.ready());
     BusClient bus(scratch_ / "bus3.sock");
@@ -367,7 +365,7 @@ TEST_F(Simulation, SaysWhatIsWrongAndEnds) {
   said = run({"--units", units(), "--unix-directory", scratch_.path()});
   EXPECT_EQ(said.exit, 1);
   EXPECT_NE(said.err.find("is in use"), std::string::npos) << said.err;
-  // And the first is still there.
+  // The first program is still there.
   BusClient bus(scratch_ / "bus8.sock");
   bus.Send(1, IdentifyRequest{});
   EXPECT_TRUE(bus.ReceiveFromUnit<IdentifyReply>());
@@ -375,8 +373,8 @@ TEST_F(Simulation, SaysWhatIsWrongAndEnds) {
 
 TEST_F(Simulation, AStateFilePlacesTheUnits) {
   Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n");
-  const auto lacks = RunToEnd({"--units", units(), "--state", scratch_ / "state.csv",
-                               "--unix-directory", scratch_.path()});
+  const auto lacks = RunToEnd(
+      {"--units", units(), "--state", scratch_ / "state.csv", "--unix-directory", scratch_.path()});
   EXPECT_EQ(lacks.exit, 1);
   EXPECT_NE(lacks.err.find("state.csv: no row for units 11, 13"), std::string::npos) << lacks.err;
   Put(scratch_ / "state.csv", "unit_id,theta_deg,phi_deg\n12,30,60\n11,0,180\n13,0,180\n");
@@ -386,7 +384,7 @@ TEST_F(Simulation, AStateFilePlacesTheUnits) {
   const auto said =
       RunToEnd({"truth", "--json", "--targets", scratch_ / "targets.csv", "--control", control()});
   EXPECT_EQ(said.exit, 0) << said.err;
-  // Half a vector of 4.2 mdeg at 16.5 mm.
+  // The bound is half a vector of 4.2 mdeg at 16.5 mm.
   const auto at = said.out.find("\"rms_um\":");
   ASSERT_NE(at, std::string::npos) << said.out;
   EXPECT_LT(std::stod(said.out.substr(at + 9)), 1.3);

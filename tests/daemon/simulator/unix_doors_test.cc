@@ -6,13 +6,15 @@
 
 #include "daemon/ports/unix_port.h"
 #include "protocol/wire/codec.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::simulator {
 namespace {
 
-// A process that is held up for a tenth of a second whenever it has read the time. In the midst of
-// the hold-up behind one of these readings something happens.
+using test::ScratchFolder;
+
+// The process is held up for a tenth of a second after every reading of the time. `g_meanwhile` is
+// called in the middle of one of these delays.
 std::int64_t g_now_ns = 0;
 int g_readings_left = 0;
 std::function<void(HostInstant)> g_meanwhile;
@@ -41,7 +43,7 @@ sim::WorldConfig OneUnit() {
 }
 
 TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
-  const Scratch scratch;
+  const ScratchFolder scratch;
   const HostClock clock(1, ReadHeldUp);
   sim::World world(OneUnit());
   const auto doors = UnixDoors::Create({scratch.path(), {BusId{3}}}).value();
@@ -65,7 +67,7 @@ TEST(UnixDoors, AFrameEntersTheWorldNoSoonerThanItWasSent) {
     ASSERT_EQ(heard.size(), 1u) << behind;
     const auto answer = DecodeUnit(heard[0].frame);
     ASSERT_TRUE(answer);
-    // A clock as nominal is off by 50 ppm at most.
+    // A nominal clock is off by at most 50 ppm.
     const double sent_ticks = static_cast<double>(sent.ns) / static_cast<double>(kTick.ns);
     EXPECT_GE(std::get<ClockReply>(answer->message).ticks, sent_ticks * (1 - 50e-6) - 1) << behind;
     EXPECT_GE(heard[0].at, sent) << behind;

@@ -13,7 +13,7 @@
 namespace focalfleet {
 namespace {
 
-using testing::OwnDomain;
+using test::OwnDomain;
 
 constexpr std::chrono::seconds kPatience(60);  // limit for a hang; nothing is timed
 

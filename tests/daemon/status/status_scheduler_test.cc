@@ -7,6 +7,8 @@
 namespace focalfleet {
 namespace {
 
+using test::SmallFleet;
+
 class StatusSchedulerTest : public ::testing::Test {
  protected:
   StatusBatch TakeAt(std::int64_t ms) {

@@ -10,7 +10,7 @@
 
 #include "protocol/base/check.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 FaultyDisk* g_disk = nullptr;
@@ -185,4 +185,4 @@ void FaultyDisk::PowerCut(const std::string& path, const std::string& to, Rng* r
   }
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -11,7 +11,7 @@
 
 #include "protocol/base/rng.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class FaultyDisk {
  public:
@@ -53,4 +53,4 @@ class FaultyDisk {
   std::map<std::string, std::vector<Write>> unsynced_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

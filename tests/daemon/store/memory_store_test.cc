@@ -16,7 +16,8 @@
 namespace focalfleet {
 namespace {
 
-using testing::MemoryStore;
+using test::Batch;
+using test::MemoryStore;
 
 constexpr WallTime kNow{Seconds(1'700'000'000).ns};
 
@@ -174,12 +175,12 @@ void ExpectSameFleet(const StoredFleet& stored, const StoredFleet& in_memory) {
   EXPECT_EQ(stored.next_exposure, in_memory.next_exposure);
 }
 
-class MemoryStoreTest : public testing::StoreTest {};
+class MemoryStoreTest : public test::StoreTest {};
 
 TEST_F(MemoryStoreTest, RefusesAndKeepsWhatTheStoreDoes) {
   auto store = OpenStore();
   MemoryStore memory;
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   RowSource source(Rng::Stream(seed, "rows"));
   int kept = 0;
   int refused = 0;
@@ -207,7 +208,7 @@ TEST_F(MemoryStoreTest, RefusesAndKeepsWhatTheStoreDoes) {
 TEST_F(MemoryStoreTest, SetsAsideWhatTheStoreRefusesAlone) {
   auto store = OpenStore();
   MemoryStore memory;
-  const std::uint64_t seed = testing::TestSeed(2);
+  const std::uint64_t seed = test::TestSeed(2);
   RowSource source(Rng::Stream(seed, "rows"));
   for (std::uint64_t n = 1; n < 500; ++n) {
     SCOPED_TRACE("seed " + std::to_string(seed) + ", batch " + std::to_string(n));

@@ -8,7 +8,7 @@
 namespace focalfleet::store_internal {
 namespace {
 
-using focalfleet::testing::StoreTest;
+using focalfleet::test::StoreTest;
 
 std::unique_ptr<Connection> Open(const std::string& path, const char* vfs = nullptr) {
   auto connection = Connection::Open(path, Connection::Mode::kWrite, vfs, 0);
@@ -29,7 +29,7 @@ TEST_F(StoreTest, MigrationsCarryAStoreOverStepByStep) {
   }
   EXPECT_EQ(connection->Integer("PRAGMA user_version"), 3);
   EXPECT_EQ(connection->Integer("SELECT turns FROM place"), 8);
-  auto all_at_once = Open(folder_.File("second.db"));
+  auto all_at_once = Open(folder_ / "second.db");
   ASSERT_TRUE(Migrate(*all_at_once, 0, steps));
   EXPECT_EQ(all_at_once->Integer("SELECT turns FROM place"), 8);
 }
@@ -72,7 +72,7 @@ TEST_F(StoreTest, AStoreOfVersionOneKeepsWhatItHasAndTakesTunings) {
     ASSERT_EQ(fleet->parameters.size(), 1u);
     EXPECT_EQ(fleet->parameters[0].value, 37);
     EXPECT_TRUE(fleet->tunings.empty());
-    testing::ExpectDone(store->Commit(std::vector<Row>{row}, {6}));
+    test::ExpectDone(store->Commit(std::vector<Row>{row}, {6}));
     EXPECT_EQ(store->Load()->tunings.size(), 1u);
   }
   EXPECT_EQ(OpenReader()->Parameters({7001}, 9)->size(), 1u);
@@ -108,11 +108,11 @@ TEST_F(StoreTest, AStoreOfVersionFourGetsRoundCovariancesOfItsMeasurements) {
 }
 
 TEST_F(StoreTest, OpeningANewStoreSurvivesEveryFailingWrite) {
-  focalfleet::testing::FaultyDisk disk;
+  focalfleet::test::FaultyDisk disk;
   std::uint64_t n = 1;
   for (;; ++n) {
     ASSERT_LT(n, 1000u);
-    const std::string path = folder_.File("n" + std::to_string(n) + ".db");
+    const std::string path = folder_ / ("n" + std::to_string(n) + ".db");
     disk.FailAt(n, SQLITE_IOERR_WRITE, false);
     const auto store = Store::Open(path, {.vfs = disk.kVfsName});
     const bool failed = disk.has_failed();

@@ -16,10 +16,10 @@
 namespace focalfleet {
 namespace {
 
-using testing::Batch;
-using testing::BatchIn;
-using testing::FaultyDisk;
-using testing::StoreTest;
+using test::Batch;
+using test::BatchIn;
+using test::FaultyDisk;
+using test::StoreTest;
 
 constexpr WallTime kNow{1'700'000'000'000'000'000};
 
@@ -38,7 +38,7 @@ class StoreFaults : public StoreTest, public ::testing::WithParamInterface<Failu
 TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
   constexpr std::uint32_t kSerials = 60;
   auto store = OpenStore(FaultyDisk::kVfsName);
-  testing::ExpectDone(store->Commit(Batch(1, kSerials), kNow));
+  test::ExpectDone(store->Commit(Batch(1, kSerials), kNow));
   std::uint32_t held = 1;
   std::uint64_t n = 1;
   for (;; ++n) {
@@ -53,7 +53,7 @@ TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
     EXPECT_EQ(BatchIn(*store->Load(), kSerials), held) << "operation " << n;
     // The disk works again, and so does the store.
     ++held;
-    testing::ExpectDone(store->Commit(Batch(held, kSerials), kNow));
+    test::ExpectDone(store->Commit(Batch(held, kSerials), kNow));
     EXPECT_EQ(BatchIn(*store->Load(), kSerials), held);
   }
   EXPECT_GT(n, 3u);
@@ -66,7 +66,7 @@ TEST_P(StoreFaults, EveryOperationOfACommitMayFail) {
 // file.
 TEST_P(StoreFaults, ACheckpointMayFail) {
   constexpr std::uint32_t kSerials = 2000;
-  const std::uint64_t seed = testing::TestSeed(2);
+  const std::uint64_t seed = test::TestSeed(2);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   auto store = OpenStore(FaultyDisk::kVfsName);
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(StoreTest, AcknowledgedBatchesSurvivePowerCuts) {
   constexpr std::uint32_t kSerials = 100;
-  const std::uint64_t seed = testing::TestSeed(3);
+  const std::uint64_t seed = test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   FaultyDisk disk;
@@ -108,7 +108,7 @@ TEST_F(StoreTest, AcknowledgedBatchesSurvivePowerCuts) {
     const bool within = rng.Below(2) == 0;
     if (within) disk.FailAt(1 + rng.Below(12), SQLITE_IOERR_WRITE, true);
     const Status status = store->Commit(Batch(k, kSerials), kNow);
-    const std::string copy = folder_.File("cut" + std::to_string(k) + ".db");
+    const std::string copy = folder_ / ("cut" + std::to_string(k) + ".db");
     disk.PowerCut(Path(), copy, &rng);
     disk.Heal();
     {
@@ -121,21 +121,20 @@ TEST_F(StoreTest, AcknowledgedBatchesSurvivePowerCuts) {
       ASSERT_TRUE(held == k || (!status && held + 1 == k)) << held << " after batch " << k;
     }
     for (const char* suffix : {"", "-wal", "-shm", ".lock"}) std::filesystem::remove(copy + suffix);
-    if (!status) testing::ExpectDone(store->Commit(Batch(k, kSerials), kNow));
+    if (!status) test::ExpectDone(store->Commit(Batch(k, kSerials), kNow));
   }
 }
 
 TEST_F(StoreTest, AWalCutOrGarbledAnywhereHoldsAWholeBatch) {
   constexpr std::uint32_t kSerials = 100;
-  const std::uint64_t seed = testing::TestSeed(4);
+  const std::uint64_t seed = test::TestSeed(4);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   auto store = OpenStore();
-  for (std::uint32_t k = 1; k <= 40; ++k)
-    testing::ExpectDone(store->Commit(Batch(k, kSerials), kNow));
+  for (std::uint32_t k = 1; k <= 40; ++k) test::ExpectDone(store->Commit(Batch(k, kSerials), kNow));
   std::ifstream in(Path() + "-wal", std::ios::binary);
   const std::string wal{std::istreambuf_iterator<char>(in), {}};
-  const std::string copy = folder_.File("copy.db");
+  const std::string copy = folder_ / "copy.db";
   std::uint32_t versions_below = 0;
   for (int i = 0; i < 60; ++i) {
     for (const char* suffix : {"", "-wal", "-shm"}) std::filesystem::remove(copy + suffix);
@@ -170,7 +169,7 @@ TEST_F(StoreTest, AWalCutOrGarbledAnywhereHoldsAWholeBatch) {
 
 TEST_F(StoreTest, AcknowledgedBatchesSurviveKill) {
   constexpr std::uint32_t kSerials = 500;
-  const std::uint64_t seed = testing::TestSeed(5);
+  const std::uint64_t seed = test::TestSeed(5);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   std::uint32_t held = 0;

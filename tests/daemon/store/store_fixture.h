@@ -16,11 +16,11 @@
 #include "daemon/store/store_reader.h"
 #include "tests/support/temporary_folder.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 class StoreTest : public ::testing::Test {
  protected:
-  [[nodiscard]] std::string Path() const { return folder_.File("fleet.db"); }
+  [[nodiscard]] std::string Path() const { return folder_ / "fleet.db"; }
 
   std::unique_ptr<Store> OpenStore(const char* vfs = nullptr) {
     auto store = Store::Open(Path(), {.vfs = vfs});
@@ -42,7 +42,7 @@ class StoreTest : public ::testing::Test {
     sqlite3_close(db);
   }
 
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
 };
 
 inline constexpr WallTime kEight{1'700'000'000'000'000'000};
@@ -139,4 +139,4 @@ inline std::uint32_t BatchIn(const StoredFleet& fleet, std::uint32_t serials) {
   return k;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -10,6 +10,9 @@
 namespace focalfleet {
 namespace {
 
+using test::Intent;
+using test::StoreTest;
+using test::Vector;
 using ::testing::HasSubstr;
 using testing::Intent;
 using testing::kEight;
@@ -47,7 +50,7 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
       ConfigurationRow{5, "night.csv", ConfigurationState::kMoving, 5000, 3, 2, 1, 22.5,
                        std::nan(""), 1.25, 9.0},
       AlarmRow{9, Severity::kError, UnitId{12}, BusId{3}, "over_temperature"}};
-  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+  test::ExpectDone(OpenStore()->Commit(rows, kEight));
 
   const auto fleet = OpenStore()->Load();
   ASSERT_TRUE(fleet) << fleet.error().text;
@@ -77,8 +80,7 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
 
 TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
   auto store = OpenStore();
-  testing::ExpectDone(
-      store->Commit(std::vector<Row>{Vector(1, Witness::kReported, -1, 193)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, -1, 193)}, kEight));
   Sql("CREATE TEMP TABLE t(ok INTEGER CHECK(ok)); INSERT INTO t SELECT vector = 95 AND turns = -1 "
       "FROM axis_state WHERE axis = 0; INSERT INTO t SELECT vector = 1 AND turns = 2 FROM "
       "axis_state "
@@ -87,9 +89,9 @@ TEST_F(StoreTest, VectorAndTurnsAreThePositionByTheSubdivision) {
 
 TEST_F(StoreTest, ASerialNumberSitsAtOnePlace) {
   auto store = OpenStore();
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{BindingRow{{1}, {11}}, BindingRow{{2}, {22}}}, kEight));
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{BindingRow{{1}, {22}}, BindingRow{{2}, {11}}}, kNine));
   const auto units = store->Load()->units;
   ASSERT_EQ(units.size(), 2u);
@@ -133,8 +135,7 @@ TEST_F(StoreTest, ARowThatCouldNotBeReadBackIsNotWritten) {
   }
   EXPECT_TRUE(store->Load()->vectors.empty());  // not even the good rows beside them
   EXPECT_EQ(store->counters().failed, std::size(wrong));
-  testing::ExpectDone(
-      store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(77, Witness::kReported, 1, 1)}, kEight));
   EXPECT_EQ(store->Load()->vectors.size(), 1u);
 }
 
@@ -146,7 +147,7 @@ struct Garbage {
 class StoreGarbage : public StoreTest, public ::testing::WithParamInterface<Garbage> {};
 
 TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
-  testing::ExpectDone(OpenStore()->Commit(
+  test::ExpectDone(OpenStore()->Commit(
       std::vector<Row>{BindingRow{{12}, {7}}, Vector(7, Witness::kReported, 10, 20),
                        Intent(12, 7, 3, {0, 0}, {1, 1}),
                        ParameterRow{{7}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
@@ -198,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_F(StoreTest, AnEmptyBatchIsNoTransaction) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit({}, kEight));
+  test::ExpectDone(store->Commit({}, kEight));
   EXPECT_EQ(store->counters().transactions, 0u);
 }
 

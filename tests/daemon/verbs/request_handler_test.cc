@@ -13,12 +13,15 @@
 #include "daemon/status/status_json.h"
 #include "protocol/base/limits.h"
 #include "tests/daemon/control/raw_client.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/verbs/small_fleet.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
 
+using test::RawClient;
+using test::ScratchFolder;
+using test::SmallFleet;
 using ::testing::HasSubstr;
 
 std::string Line(std::uint64_t id, const std::string& verb, const Json& args = Json::object()) {
@@ -59,7 +62,7 @@ class RequestHandlerTest : public ::testing::Test {
     }));
   }
 
-  const Scratch scratch_;
+  const ScratchFolder scratch_;
   SmallFleet fleet_;
   std::string log_;
   ModelRegistry models_{&fleet_.layout()};

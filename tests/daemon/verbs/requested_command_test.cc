@@ -11,6 +11,7 @@
 namespace focalfleet {
 namespace {
 
+using test::SmallFleet;
 using ::testing::HasSubstr;
 
 Result<Command> Try(const SmallFleet& fleet, const std::string& verb, const Json& args) {

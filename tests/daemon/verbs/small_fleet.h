@@ -9,7 +9,7 @@
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 class SmallFleet {
  public:
@@ -44,4 +44,4 @@ class SmallFleet {
   std::unique_ptr<Coordinator> coordinator_;
 };
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -45,7 +45,7 @@ struct Exact {
 };
 
 TEST(Assign, ProbabilitiesAreThoseOfCountingEverything) {
-  const std::uint64_t seed = testing::TestSeed(11);
+  const std::uint64_t seed = test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int round = 0; round < 300; ++round) {

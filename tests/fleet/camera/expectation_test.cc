@@ -22,7 +22,7 @@ Unit OneUnit() {
 }
 
 TEST(CovarianceAt, IsThatOfTheSimulatorsMechanism) {
-  const std::uint64_t seed = testing::TestSeed(2);
+  const std::uint64_t seed = test::TestSeed(2);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const Unit unit = OneUnit();

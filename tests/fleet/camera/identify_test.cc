@@ -13,9 +13,9 @@
 namespace focalfleet {
 namespace {
 
-using testing::CameraField;
-using testing::FieldTroubles;
-using testing::Judgement;
+using test::CameraField;
+using test::FieldTroubles;
+using test::Judgement;
 using Complex = std::complex<double>;
 
 constexpr FieldTroubles kNoTroubles{
@@ -24,7 +24,7 @@ constexpr FieldTroubles kNoTroubles{
 class Identify : public ::testing::Test {
  protected:
   Identify() {
-    traits_ = testing::TestCamera(Rim());
+    traits_ = test::TestCamera(Rim());
     traits_.missing_share = 0;
     traits_.extra_share = 0;
   }
@@ -38,7 +38,7 @@ class Identify : public ::testing::Test {
 
   void Picture(std::vector<sim::LightSource> sources) {
     image_ = sim::TakeImage(sources, traits_, &field_.rng());
-    exposure_ = testing::ExposureOf(image_, "1");
+    exposure_ = test::ExposureOf(image_, "1");
   }
 
   tl::expected<Identification, Refusal> Ask(const std::vector<UnitExpectation>& expectations) {
@@ -78,9 +78,9 @@ class Identify : public ::testing::Test {
     return 0;
   }
 
-  CameraField field_{{.count = 217, .fiducials = 24}, testing::TestSeed(1)};
+  CameraField field_{{.count = 217, .fiducials = 24}, test::TestSeed(1)};
   sim::CameraTraits traits_;
-  CameraModel model_ = testing::ModelOf(testing::TestCamera(Rim()));
+  CameraModel model_ = test::ModelOf(test::TestCamera(Rim()));
   IdentifyOptions options_;
   sim::Image image_;
   Exposure exposure_;
@@ -89,7 +89,7 @@ class Identify : public ::testing::Test {
 TEST_F(Identify, AHealthyFleetIsMeasuredWithinItsErrors) {
   field_.Move(kNoTroubles);
   const Identification seen = See();
-  const Judgement judged = testing::Judge(field_, image_, seen);
+  const Judgement judged = test::Judge(field_, image_, seen);
   EXPECT_GE(Count(seen, MeasurementStatus::kMeasured), 216u);
   EXPECT_EQ(judged.wrong + judged.wrong_story, 0u);
   EXPECT_LT(std::sqrt(judged.squared_mm2 / judged.placed / 2), 0.006);
@@ -228,7 +228,7 @@ TEST_F(Identify, APairThatExchangedItsCommandsIsNamed) {
     troubles.swaps = 6;
     field_.Move(troubles);
     const Identification seen = See();
-    const Judgement result = testing::Judge(field_, image_, seen);
+    const Judgement result = test::Judge(field_, image_, seen);
     EXPECT_EQ(result.pairs, 6u);
     EXPECT_EQ(result.pairs_unseen, 0u);
     EXPECT_GE(result.pairs_found + result.pairs_alike + result.pairs_flagged, 6u);
@@ -321,7 +321,7 @@ TEST_F(Identify, ASpotOutOfReachIsSaid) {
 }
 
 TEST_F(Identify, EverythingAtOnceIsNeverWrongUnseen) {
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   traits_.missing_share = 0.01;
   traits_.extra_share = 0.005;
@@ -329,7 +329,7 @@ TEST_F(Identify, EverythingAtOnceIsNeverWrongUnseen) {
     for (int k = 0; k < 25; ++k) {
       field_.Move({.swaps = 2, .collision_free = collision_free});
       const Identification seen = See();
-      const Judgement judged = testing::Judge(field_, image_, seen);
+      const Judgement judged = test::Judge(field_, image_, seen);
       EXPECT_EQ(judged.wrong, 0u);
       EXPECT_EQ(judged.pairs_unseen, 0u);
       EXPECT_LE(judged.lost, 6u);
@@ -353,7 +353,7 @@ TEST_F(Identify, MissingFalseAndExtraFiducialsAreBorne) {
 }
 
 TEST_F(Identify, UnitsThatStandStillHelp) {
-  field_ = CameraField({.count = 217, .fiducials = 8}, testing::TestSeed(1));
+  field_ = CameraField({.count = 217, .fiducials = 8}, test::TestSeed(1));
   traits_.air = {.sigma_mm = 0.008, .length_mm = 80};
   FieldTroubles troubles = kNoTroubles;
   troubles.disabled_share = 0.4;
@@ -364,11 +364,11 @@ TEST_F(Identify, UnitsThatStandStillHelp) {
     options_.use_still_units = true;
     const Identification seen = See();
     EXPECT_GT(seen.still_units_used, 50u);
-    const Judgement with = testing::Judge(field_, image_, seen);
+    const Judgement with = test::Judge(field_, image_, seen);
     options_.use_still_units = false;
     const auto alone = Ask(field_.Expectations());
     ASSERT_TRUE(alone);
-    const Judgement without = testing::Judge(field_, image_, *alone);
+    const Judgement without = test::Judge(field_, image_, *alone);
     with2 += with.squared_mm2 / with.placed;
     without2 += without.squared_mm2 / without.placed;
   }
@@ -456,7 +456,7 @@ TEST_F(Identify, AFleetInWhichNoUnitMovedIsNotAnotherField) {
 }
 
 TEST_F(Identify, AnyNoiseOfSpotsIsAnAnswerOrARefusal) {
-  const std::uint64_t seed = testing::TestSeed(21);
+  const std::uint64_t seed = test::TestSeed(21);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   field_.Move({});

@@ -113,7 +113,7 @@ Windy Blown(std::size_t count, double sigma_mm, double length_mm, Rng* rng) {
 }
 
 TEST(AirOf, FindsTheAirsStrengthOverExposures) {
-  const std::uint64_t seed = testing::TestSeed(4);
+  const std::uint64_t seed = test::TestSeed(4);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (const double sigma_mm : {0.0, 0.004, 0.008}) {
@@ -131,7 +131,7 @@ TEST(AirOf, FindsTheAirsStrengthOverExposures) {
 }
 
 TEST(PlateMap, RemovesMostOfTheAirAndClaimsWhatIsLeft) {
-  const std::uint64_t seed = testing::TestSeed(6);
+  const std::uint64_t seed = test::TestSeed(6);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   double with2 = 0;

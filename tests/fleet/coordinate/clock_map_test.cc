@@ -28,7 +28,7 @@ struct TrueClock {
 DurationNs Delay(Rng* rng, double most_ms) { return Seconds(rng->Uniform(0, most_ms * 1e-3)); }
 
 TEST(ClockMap, TruthIsAlwaysWithinTheBounds) {
-  Rng rng = Rng::Stream(testing::TestSeed(11), "clock map");
+  Rng rng = Rng::Stream(test::TestSeed(11), "clock map");
   for (int run = 0; run < 2000; ++run) {
     TrueClock clock{1 + rng.Uniform(-0.015, 0.015), {Seconds(1).ns}, 0};
     if (run % 3 == 0) clock.first_ticks = 0xffff'fff0;  // wraps meanwhile
@@ -94,7 +94,7 @@ TEST(ClockMap, ARestartedUnitHasAnotherClock) {
 // A counter that had hardly begun when it began anew: all that is missing is what a slow clock
 // would have lost.
 TEST(ClockMap, ARestartOfAYoungUnitIsNotTakenForASlowClock) {
-  Rng rng = Rng::Stream(testing::TestSeed(12), "young units");
+  Rng rng = Rng::Stream(test::TestSeed(12), "young units");
   for (int run = 0; run < 2000; ++run) {
     TrueClock clock{1 + rng.Uniform(-0.005, 0.005), {Seconds(1).ns}, 0};
     ClockMap map;
@@ -134,7 +134,7 @@ TEST(ClockMap, ReadingsThatContradictEachOtherSayNothingOfARate) {
 
 // However wide its readings are, by whatever pauses.
 TEST(ClockMap, AClockWithinItsLimitIsNeverCertainlyBeyondIt) {
-  Rng rng = Rng::Stream(testing::TestSeed(13), "pauses");
+  Rng rng = Rng::Stream(test::TestSeed(13), "pauses");
   for (int run = 0; run < 2000; ++run) {
     const double error = rng.Uniform(-0.005, 0.005);
     const TrueClock clock{1 + error, {0}, 0};

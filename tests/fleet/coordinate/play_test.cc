@@ -37,7 +37,7 @@ TEST(AxisPlay, IsLostByASmallWayBackAndFoundByTheSameWayAgain) {
 }
 
 TEST(AxisPlay, NeverNamesASideOnWhichANarrowerPlayIsNot) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(1);
+  const std::uint64_t seed = focalfleet::test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   int named = 0;

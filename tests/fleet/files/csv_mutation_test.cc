@@ -78,7 +78,7 @@ TEST(CsvMutation, UnitsReaderIsTotal) {
   auto units = MakeHexLayout({.count = 7});
   units[1].enabled = false;
   units[2].rail_slot = 3;
-  ExpectTotal(WriteUnits(units), testing::TestSeed(1), [](const std::string& text) {
+  ExpectTotal(WriteUnits(units), test::TestSeed(1), [](const std::string& text) {
     if (const auto file = ReadUnits(text, "file.csv")) {
       const auto again = ReadUnits(WriteUnits(file->units), "again");
       EXPECT_TRUE(again) << again.error().text << "\n" << text;
@@ -93,7 +93,7 @@ TEST(CsvMutation, TargetsReaderIsTotalAndSoIsResolving) {
   ExpectTotal(
       "# night 1\nunit_id,x_mm,y_mm,theta_deg,phi_deg,target_id\n1,3.25,-2,,,\"a, b\"\n"
       "3,,,10.5,77,c\n",
-      testing::TestSeed(2), [&](const std::string& text) {
+      test::TestSeed(2), [&](const std::string& text) {
         const auto targets = ReadTargets(text, "file.csv");
         if (!targets) return targets.error().text;
         const auto again = ReadTargets(WriteTargets(*targets), "again");
@@ -105,15 +105,14 @@ TEST(CsvMutation, TargetsReaderIsTotalAndSoIsResolving) {
 TEST(CsvMutation, StateReaderIsTotal) {
   const auto layout = Layout::Create(MakeHexLayout({.count = 7}), {});
   const std::vector<UnitDrive> drives(7);
-  ExpectTotal("unit_id,theta_deg,phi_deg\n1,-12.5,170\n7,100,90\n", testing::TestSeed(3),
+  ExpectTotal("unit_id,theta_deg,phi_deg\n1,-12.5,170\n7,100,90\n", test::TestSeed(3),
               [&](const std::string& text) {
                 return ErrorText(ReadState(text, "file.csv", *layout, drives));
               });
 }
 
 TEST(CsvMutation, ObstaclesReaderIsTotal) {
-  ExpectTotal("obstacle_id,x_mm,y_mm,radius_mm\n1,-12.5,170,3\n7,100,90,0.5\n",
-              testing::TestSeed(4),
+  ExpectTotal("obstacle_id,x_mm,y_mm,radius_mm\n1,-12.5,170,3\n7,100,90,0.5\n", test::TestSeed(4),
               [](const std::string& text) { return ErrorText(ReadObstacles(text, "file.csv")); });
 }
 
@@ -121,7 +120,7 @@ TEST(CsvMutation, PlanReaderIsTotal) {
   ExpectTotal(
       "unit_id,axis,t0_s,t1_s,from_deg,to_deg,mode,power_W\n"
       "1,theta,0,1,0,5,asymmetric,0.1\n1,theta,1.5,2,5,4,seven_segment,0.1\n",
-      testing::TestSeed(5), [](const std::string& text) {
+      test::TestSeed(5), [](const std::string& text) {
         const auto rows = ReadPlan(text, "file.csv");
         if (rows) {
           EXPECT_TRUE(ReadPlan(WritePlan(*rows), "again")) << text;
@@ -134,7 +133,7 @@ TEST(CsvMutation, SpotsReaderIsTotal) {
   ExpectTotal(
       "# exposure_id: a 1\n# taken_utc: 2026-11-22T03:04:05.678Z\n"
       "spot_id,x_px,y_px,flux,fwhm_px\n1,10.5,20,1.5,2.2\n9,1,2,3,\n",
-      testing::TestSeed(7), [](const std::string& text) {
+      test::TestSeed(7), [](const std::string& text) {
         const SensorLimits sensor{100, 100};
         const auto exposure = ReadSpots(text, "file.csv", sensor);
         if (!exposure) return exposure.error().text;
@@ -145,7 +144,7 @@ TEST(CsvMutation, SpotsReaderIsTotal) {
 }
 
 TEST(CsvMutation, FiducialsReaderIsTotal) {
-  ExpectTotal("fiducial_id,x_mm,y_mm\n1,0,0\n2,-5.25,0\n3,1e2,7\n", testing::TestSeed(8),
+  ExpectTotal("fiducial_id,x_mm,y_mm\n1,0,0\n2,-5.25,0\n3,1e2,7\n", test::TestSeed(8),
               [](const std::string& text) {
                 const auto fiducials = ReadFiducials(text, "file.csv");
                 if (!fiducials) return fiducials.error().text;

@@ -243,7 +243,7 @@ TEST(CsvRow, KeepsTheFirstError) {
 }
 
 TEST(NumberText, ReadsBackAsTheSameNumber) {
-  const std::uint64_t seed = testing::TestSeed(3);
+  const std::uint64_t seed = test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int k = 0; k < 20'000; ++k) {

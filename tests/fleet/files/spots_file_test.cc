@@ -37,7 +37,7 @@ TEST(SpotsFile, OfTooManyLinesIsNotRead) {
 }
 
 TEST(SpotsFile, ReadsBackWhatItWrites) {
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (const bool widths : {true, false}) {
@@ -95,7 +95,7 @@ TEST(Utc, ReadsTheCalendar) {
 }
 
 TEST(Utc, ReadsBackWhatItWrites) {
-  const std::uint64_t seed = testing::TestSeed(1);
+  const std::uint64_t seed = test::TestSeed(1);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   EXPECT_EQ(UtcOf(0), "1970-01-01T00:00:00.000Z");

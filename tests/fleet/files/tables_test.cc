@@ -120,7 +120,7 @@ TEST(TargetsFile, DrawnPosesComeBackAsTheSamePoses) {
 // ---- state.csv
 
 TEST(StateFile, WhatIsWrittenReadsBackEqual) {
-  const std::uint64_t seed = testing::TestSeed(12);
+  const std::uint64_t seed = test::TestSeed(12);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const Fleet fleet = Hex(500);

@@ -12,7 +12,7 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::TestSeed;
+using test::TestSeed;
 
 Unit RandomUnit(Rng* rng, double x_mm) {
   Unit unit;

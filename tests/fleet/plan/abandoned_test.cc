@@ -14,11 +14,11 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::Seed;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::Seed;
 using ::testing::HasSubstr;
 
 /// The answer to the planner's question: false for so many times.

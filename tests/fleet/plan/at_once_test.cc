@@ -8,8 +8,18 @@
 #include "fleet/plan/time_search.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::CheckReport;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::MoveOf;
+using test::PlanningFleet;
+using test::TestSeed;
+using test::Witnessed;
 
 constexpr double kVectorS = 108 * 500 / 144e6;  // of an untuned drive
 
@@ -209,4 +219,4 @@ TEST(TimeSearch, FindsAWayAmongAllOthersAsTheyGo) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -7,15 +7,15 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckedRow;
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::Seed;
-using ::focalfleet::testing::UnitAt;
+using test::CheckedRow;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {
@@ -47,13 +47,13 @@ TEST(MakeWayForHoming, SendsNeighboursOutOfTheArmsWay) {
       const Pose from{somewhere[0] + theta, somewhere[1]};
       then.start[0] = Exactly(Witness::kReported, from);
       const auto units =
-          focalfleet::testing::CheckedUnits(then.layout, then.drives, then.start, then.frozen);
+          focalfleet::test::CheckedUnits(then.layout, then.drives, then.start, then.frozen);
       const auto& homing = units[0];
       rows = {{homing.id, 1, 0, 20, homing.axis[1].start_deg, homing.axis[1].max_deg},
               {homing.id, 0, 20, 60, homing.axis[0].start_deg, homing.axis[0].min_deg}};
       CheckOptions options;
       options.clearance_mm = fleet.layout.clearance_mm();
-      const auto report = focalfleet::testing::CheckPlan(units, rows, {}, options);
+      const auto report = focalfleet::test::CheckPlan(units, rows, {}, options);
       for (const std::string& fault : report.faults)
         EXPECT_EQ(fault.find("units " + std::to_string(homing.id) + " and"), std::string::npos)
             << fault;

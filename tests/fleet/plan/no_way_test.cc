@@ -46,7 +46,7 @@ TEST_F(NoWayTest, IsProvenWhereTheElbowCannotPass) {
 }
 
 TEST_F(NoWayTest, NeverContradictsAWayThatASearchFinds) {
-  const std::uint64_t seed = testing::TestSeed(430);
+  const std::uint64_t seed = test::TestSeed(430);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng = Rng::Stream(seed, "no way");
   PathSearch search;

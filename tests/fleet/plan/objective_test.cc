@@ -9,8 +9,14 @@
 #include "fleet/plan/sectors.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::TestSeed;
 
 constexpr Objective kAll[] = {Objective::kLeastEnergy, Objective::kLeastPeak,
                               Objective::kEvenPower};
@@ -175,4 +181,4 @@ TEST(PowerOfAMove, GrowsWithNSoThatSlowerIsDearer) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -11,8 +11,20 @@
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::CheckedObstacle;
+using test::CheckedRow;
+using test::CheckedUnit;
+using test::CheckOptions;
+using test::CheckPlan;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
+using test::Witnessed;
 
 CheckedUnit Stretched(std::uint32_t id, std::complex<double> base_mm, double theta_deg) {
   CheckedUnit unit;
@@ -140,4 +152,4 @@ TEST(PlanChecker, CatchesAUnitThatStartsAtTheWrongTime) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -12,7 +12,7 @@
 #include "fleet/plan/plan.h"
 #include "tests/support/plan_checker.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline double DegreesOf(std::int32_t vectors, const Unit& unit, const UnitDrive& drive,
                         std::size_t axis) {
@@ -73,4 +73,4 @@ inline std::vector<CheckedObstacle> CheckedObstacles(const Layout& layout) {
   return obstacles;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

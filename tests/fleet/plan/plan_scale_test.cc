@@ -13,7 +13,7 @@
 #include "fleet/files/layout_file.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 /// Returns the makespan over the time of the slowest unit alone.
@@ -88,4 +88,4 @@ INSTANTIATE_TEST_SUITE_P(Seeds, DesiScale, ::testing::Range(0, 2));
 #endif
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

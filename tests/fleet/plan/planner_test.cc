@@ -13,17 +13,17 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckedRow;
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::ExpectSound;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::HexFleet;
-using ::focalfleet::testing::MoveOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::Seed;
-using ::focalfleet::testing::UnitAt;
+using test::CheckedRow;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::MoveOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 /// Two arms side by side between the bases, each below or above the other. Folding back (phi grows,
@@ -236,7 +236,7 @@ TEST(Planner, KeepsClearOfEveryPlaceThatAnUncertainUnitMayHave) {
       }
       truth.start[0] = Exactly(Witness::kReported, pose);
       // Neighbours that cannot be proven free of it must not have moved; they may stand inside.
-      const auto report = focalfleet::testing::Witnessed(truth, *plan);
+      const auto report = focalfleet::test::Witnessed(truth, *plan);
       for (const std::string& fault : report.faults) {
         if (!fault.starts_with("units ")) {
           ADD_FAILURE() << fault;
@@ -293,7 +293,7 @@ TEST(Planner, KeepsTheMarginsThatItIsAskedFor) {
   const auto tight =
       MakePlan(fleet.request(), {.fixed = false, .start_skew_s = 0, .clock_error = 0});
   ASSERT_TRUE(tight);
-  EXPECT_FALSE(focalfleet::testing::Witnessed(fleet, *tight, check).ok());
+  EXPECT_FALSE(focalfleet::test::Witnessed(fleet, *tight, check).ok());
 }
 
 /// A unit ends early at `t_s`; its followers are stopped as late as UnitPlan::followers allows.
@@ -316,7 +316,7 @@ std::vector<CheckedRow> CutShort(const PlanningFleet& fleet, const Plan& plan, s
     }
   }
   std::vector<CheckedRow> rows;
-  for (CheckedRow row : focalfleet::testing::CheckedRows(plan, fleet.layout, fleet.drives)) {
+  for (CheckedRow row : focalfleet::test::CheckedRows(plan, fleet.layout, fleet.drives)) {
     const double stop = stops[fleet.layout.Find(UnitId{row.unit})->value];
     if (row.t0_s >= stop) continue;
     if (row.t1_s > stop) {
@@ -344,8 +344,8 @@ TEST(Planner, StoppingTheFollowersOfAUnitThatEndsEarlyKeepsAllClear) {
     const double t_s = rng.Uniform(0, plan->makespan_s);
     for (const bool heed_left : {false, true}) {
       const auto rows = CutShort(fleet, *plan, unit, t_s, heed_left);
-      const auto report = focalfleet::testing::CheckPlan(
-          focalfleet::testing::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+      const auto report = focalfleet::test::CheckPlan(
+          focalfleet::test::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
           rows, {}, options);
       EXPECT_TRUE(report.ok()) << "unit index " << unit << " ends at " << t_s << " s\n"
                                << report.Text();
@@ -354,9 +354,9 @@ TEST(Planner, StoppingTheFollowersOfAUnitThatEndsEarlyKeepsAllClear) {
     for (UnitPlan& move : alone.moves) move.followers.clear();
     const auto rows = CutShort(fleet, alone, unit, t_s, false);
     touched_without +=
-        focalfleet::testing::CheckPlan(focalfleet::testing::CheckedUnits(fleet.layout, fleet.drives,
-                                                                         fleet.start, fleet.frozen),
-                                       rows, {}, options)
+        focalfleet::test::CheckPlan(
+            focalfleet::test::CheckedUnits(fleet.layout, fleet.drives, fleet.start, fleet.frozen),
+            rows, {}, options)
                 .ok()
             ? 0
             : 1;

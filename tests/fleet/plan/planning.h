@@ -15,7 +15,7 @@
 #include "tests/fleet/plan/plan_rows.h"
 #include "tests/support/seed.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 struct PlanningFleet {
   Layout layout;
@@ -136,4 +136,4 @@ inline void ExpectSound(const PlanningFleet& fleet, const Plan& plan,
   }
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -9,14 +9,14 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::CheckOptions;
-using ::focalfleet::testing::DrawStartAndTargets;
-using ::focalfleet::testing::ExpectSound;
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::Seed;
-using ::focalfleet::testing::UnitAt;
+using test::CheckOptions;
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::Seed;
+using test::UnitAt;
 using ::testing::HasSubstr;
 
 TEST(Planner, PassesOverDisabledAndUnknownUnitsByName) {

@@ -9,7 +9,7 @@
 
 #include "tests/fleet/plan/replan_question.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 TEST(Replan, IsClearOfAllOthersForEverySkewAndClock) {
@@ -156,4 +156,4 @@ TEST(Replan, KeepsLimitsOfPower) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -14,8 +14,16 @@
 #include "fleet/plan/power_statement.h"
 #include "tests/fleet/plan/planning.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::MoveOf;
+using test::PlanningFleet;
+using test::TestSeed;
 
 constexpr std::uint32_t kCounts[] = {2, 3, 4, 7};
 
@@ -364,4 +372,4 @@ TEST(Sectors, BadTargetsAreAllNamedAtOnce) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

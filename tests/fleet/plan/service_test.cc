@@ -11,10 +11,10 @@
 namespace focalfleet {
 namespace {
 
-using ::focalfleet::testing::FleetOf;
-using ::focalfleet::testing::PlanningFleet;
-using ::focalfleet::testing::PoseDeg;
-using ::focalfleet::testing::UnitAt;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::UnitAt;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 

@@ -19,7 +19,7 @@
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/stopped.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
 
 constexpr int kInstants = 100;
@@ -216,4 +216,4 @@ TEST_P(StopSafetyInStages, AnUnseenHaltTouchesNoOtherUnit) {
 INSTANTIATE_TEST_SUITE_P(Seeds, StopSafetyInStages, ::testing::Range(1, 3));
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

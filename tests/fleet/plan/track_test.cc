@@ -14,9 +14,9 @@
 namespace focalfleet {
 namespace {
 
-using focalfleet::testing::HexFleet;
-using focalfleet::testing::PlanningFleet;
-using focalfleet::testing::TestSeed;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
 
 TEST(DirectionOf, IsCosineAndSine) {
   Rng rng(TestSeed(11));

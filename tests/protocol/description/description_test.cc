@@ -66,17 +66,17 @@ TEST(MessageRows, FieldsOfARowLieWithinItAndApart) {
 }
 
 TEST(MessageRows, TheRowOfAFrameIsItsMessages) {
-  const std::uint64_t seed = testing::TestSeed(5);
+  const std::uint64_t seed = test::TestSeed(5);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 5000; ++i) {
-    const HostMessage host = testing::RandomHost(rng);
-    const UnitMessage unit = testing::RandomUnit(rng);
+    const HostMessage host = test::RandomHost(rng);
+    const UnitMessage unit = test::RandomUnit(rng);
     const CanFrame from_host = Encode(host, {{1}, 2});
     const CanFrame from_unit = Encode(unit, {{1}, 2});
-    ASSERT_NE(RowOf(from_host), nullptr) << testing::Show(host);
+    ASSERT_NE(RowOf(from_host), nullptr) << test::Show(host);
     EXPECT_FALSE(RowOf(from_host)->from_unit);
-    ASSERT_NE(RowOf(from_unit), nullptr) << testing::Show(unit);
+    ASSERT_NE(RowOf(from_unit), nullptr) << test::Show(unit);
     EXPECT_TRUE(RowOf(from_unit)->from_unit);
     for (const CanFrame& frame : {from_host, from_unit}) {
       for (const FieldRow& field : RowOf(frame)->fields) {

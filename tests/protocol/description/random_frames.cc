@@ -11,9 +11,8 @@
 #include "protocol/wire/layout.h"
 #include "tests/protocol/random_messages.h"
 
+namespace focalfleet {
 namespace {
-
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one program
 
 template <class T>
 long long Plain(const T& value) {
@@ -76,19 +75,22 @@ void Print(const CanFrame& frame) {
   }
 }
 
-}  // namespace
-
-int main(int count, char** arguments) {
+int Main(int count, char** arguments) {
   const int frames = count > 1 ? std::atoi(arguments[1]) : 2000;
   Rng rng(count > 2 ? std::strtoull(arguments[2], nullptr, 10) : 1);
   for (int i = 0; i < frames; ++i) {
     const bool from_unit = rng.Below(2) != 0;
     const Address address{{static_cast<std::uint8_t>(rng.Below(128))},
                           static_cast<std::uint8_t>(rng.Below(256))};
-    CanFrame frame = from_unit ? Encode(testing::RandomUnit(rng), address)
-                               : Encode(testing::RandomHost(rng), address);
+    CanFrame frame =
+        from_unit ? Encode(test::RandomUnit(rng), address) : Encode(test::RandomHost(rng), address);
     if (rng.Below(8) == 0) Spoil(rng, &frame);
     Print(frame);
   }
   return 0;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int count, char** arguments) { return focalfleet::Main(count, arguments); }

@@ -14,10 +14,11 @@
 namespace focalfleet {
 namespace {
 
-using testing::RandomHost;
-using testing::RandomUnit;
-using testing::Show;
-using testing::TestSeed;
+using test::AllocGuard;
+using test::RandomHost;
+using test::RandomUnit;
+using test::Show;
+using test::TestSeed;
 
 constexpr int kDraws = 20'000;
 
@@ -371,7 +372,7 @@ TEST(Codec, UsesNoHeap) {
     frames.push_back({static_cast<std::uint32_t>(rng.Bits()), 8, {}});
   }
   std::uint32_t sum = 0;
-  const testing::AllocGuard guard;
+  const test::AllocGuard guard;
   for (const HostMessage& m : host) sum += Encode(m, {{1}, 1}).id;
   for (const UnitMessage& m : unit) sum += Encode(m, {{1}, 1}).id;
   for (const CanFrame& frame : frames)
@@ -380,7 +381,7 @@ TEST(Codec, UsesNoHeap) {
 }
 
 TEST(AllocGuard, CountsWhatItShouldForbid) {
-  const testing::AllocGuard guard;
+  const test::AllocGuard guard;
   int* volatile number =
       new int(3);  // volatile: an optimiser may remove an allocation without effect
   delete number;

@@ -84,7 +84,7 @@ TEST(FrameBits, TheOraclesCrcIsThePublishedOne) {
 }
 
 TEST(FrameBits, EqualsTheLengthOfTheFrameWrittenOut) {
-  const auto seed = testing::TestSeed(11);
+  const auto seed = test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 20'000; ++i) {
@@ -99,8 +99,8 @@ TEST(FrameBits, EqualsTheLengthOfTheFrameWrittenOut) {
 TEST(FrameBits, EqualsTheLengthOfEveryMessageWrittenOut) {
   Rng rng(12);
   for (std::size_t i = 0; i < 2000; ++i) {
-    const CanFrame host = Encode(testing::RandomHost(rng), {{static_cast<std::uint8_t>(i)}, 1});
-    const CanFrame unit = Encode(testing::RandomUnit(rng), {{static_cast<std::uint8_t>(i)}, 1});
+    const CanFrame host = Encode(test::RandomHost(rng), {{static_cast<std::uint8_t>(i)}, 1});
+    const CanFrame unit = Encode(test::RandomUnit(rng), {{static_cast<std::uint8_t>(i)}, 1});
     ASSERT_EQ(FrameBits(host), OracleBits(host));
     ASSERT_EQ(FrameBits(unit), OracleBits(unit));
   }
@@ -138,7 +138,7 @@ FdFrameBits OracleBits(const FdFrame& frame) {
 }
 
 TEST(FrameBits, OfCanFdEqualTheFrameWrittenOut) {
-  const auto seed = testing::TestSeed(14);
+  const auto seed = test::TestSeed(14);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 20'000; ++i) {
@@ -156,7 +156,7 @@ TEST(FrameBits, OfCanFdEqualTheFrameWrittenOut) {
 }
 
 TEST(FrameBits, NoGroupIsLongerThanTheLongest) {
-  const auto seed = testing::TestSeed(15);
+  const auto seed = test::TestSeed(15);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 20'000; ++i) {

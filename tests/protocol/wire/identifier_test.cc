@@ -67,11 +67,11 @@ TEST(Identifier, ABroadcastStopWinsAgainstAllButStopsOfSingleUnits) {
   const std::uint32_t stop = Encode(HostMessage{Stop{}}, {kBroadcastNode, 255}).id;
   Rng rng(1);
   for (int i = 0; i < 5000; ++i) {
-    const auto host = testing::RandomHost(rng);
+    const auto host = test::RandomHost(rng);
     if (!std::holds_alternative<Stop>(host)) {
       EXPECT_LT(stop, Encode(host, {{0}, 0}).id);
     }
-    EXPECT_LT(stop, Encode(testing::RandomUnit(rng), {{0}, 0}).id);
+    EXPECT_LT(stop, Encode(test::RandomUnit(rng), {{0}, 0}).id);
   }
 }
 

@@ -15,7 +15,7 @@ namespace {
 CanFrame Groupable(Rng& rng) {
   for (;;) {
     const CanFrame frame = Encode(
-        testing::RandomHost(rng),
+        test::RandomHost(rng),
         {{static_cast<std::uint8_t>(rng.Below(128))}, static_cast<std::uint8_t>(rng.Below(256))});
     if (CanBeGrouped(frame)) return frame;
   }
@@ -38,7 +38,7 @@ TEST(StageGroup, IsTheBytesOfThePage) {
 }
 
 TEST(StageGroup, GivesBackWhatWasPutIn) {
-  const auto seed = testing::TestSeed(31);
+  const auto seed = test::TestSeed(31);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int round = 0; round < 5000; ++round) {
@@ -63,13 +63,13 @@ TEST(StageGroup, GivesBackWhatWasPutIn) {
 TEST(StageGroup, CarriesOnlyAHostsStagingToOneUnit) {
   Rng rng(32);
   for (int i = 0; i < 20'000; ++i) {
-    const HostMessage message = testing::RandomHost(rng);
+    const HostMessage message = test::RandomHost(rng);
     const NodeId node{static_cast<std::uint8_t>(rng.Below(2) == 0 ? rng.Below(128) : 255)};
     const bool staging = std::holds_alternative<StageBegin>(message) ||
                          std::holds_alternative<StageSegment>(message) ||
                          std::holds_alternative<Confirm>(message);
     ASSERT_EQ(CanBeGrouped(Encode(message, {node, 1})), staging && node != kBroadcastNode);
-    const CanFrame answer = Encode(testing::RandomUnit(rng), {{3}, 1});
+    const CanFrame answer = Encode(test::RandomUnit(rng), {{3}, 1});
     ASSERT_FALSE(CanBeGrouped(answer));
     FdFrame group;
     ASSERT_EQ(PackGroup({&answer, 1}, &group), 0u);

@@ -99,7 +99,7 @@ TEST(Digest, ChangesWithEveryField) {
 TEST(Digest, UsesNoHeap) {
   Rng rng(23);
   const StagedMove move = RandomMove(rng);
-  const testing::AllocGuard guard;
+  const test::AllocGuard guard;
   const std::uint32_t digest = Digest(move);
   EXPECT_EQ(guard.allocations(), 0u) << digest;
 }

@@ -3,11 +3,11 @@
 
 #include "sim/world/axis/motor.h"
 
-namespace focalfleet::sim::testing {
+namespace focalfleet::sim::test {
 
 inline const Motor& BenchMotor() {
   static const Motor motor({}, {});
   return motor;
 }
 
-}  // namespace focalfleet::sim::testing
+}  // namespace focalfleet::sim::test

@@ -15,7 +15,7 @@
 namespace focalfleet::sim {
 namespace {
 
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::test::TestSeed;
 
 constexpr double kTurn = 2 * std::numbers::pi;
 constexpr Bridge kIdeal9V{.v_bus_V = 9, .rise_s = 0, .fall_s = 0, .dead_time_s = 0};

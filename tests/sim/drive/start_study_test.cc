@@ -14,7 +14,7 @@
 namespace focalfleet::sim {
 namespace {
 
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::test::TestSeed;
 
 // The five sets were fitted without dead time and ramps.
 Drive::Setting Ideal(const MotorParameters& motor, double v_bus_V) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAmplitude_T = 0.08;
 
-HallCampaign Read(const testing::PlantedCampaign& planted) {
+HallCampaign Read(const test::PlantedCampaign& planted) {
   HallCampaign campaign;
   for (const auto& pose : planted.poses) {
     campaign.poses.push_back(
@@ -24,9 +24,9 @@ HallCampaign Read(const testing::PlantedCampaign& planted) {
   return campaign;
 }
 
-testing::PlantedCampaign Plant(const testing::CampaignPlan& plan, const testing::Planted& first) {
-  const auto law = testing::OfSurface(kAmplitude_T, 21);
-  return testing::MakeCampaign(plan, law, law, first);
+test::PlantedCampaign Plant(const test::CampaignPlan& plan, const test::Planted& first) {
+  const auto law = test::OfSurface(kAmplitude_T, 21);
+  return test::MakeCampaign(plan, law, law, first);
 }
 
 std::vector<SensorFit> Calibrated(const HallCampaign& campaign) {
@@ -39,7 +39,7 @@ TEST(HallCalibration, NumbersLieWithinTheirDeviations) {
   double squares = 0, count = 0;
   for (std::uint64_t seed = 0; seed < 12; ++seed) {
     const auto campaign = Plant(
-        {.rows = 120, .also = {{"sensor_offset", -0.04, 2}}, .seed = testing::TestSeed(100 + seed)},
+        {.rows = 120, .also = {{"sensor_offset", -0.04, 2}}, .seed = test::TestSeed(100 + seed)},
         {"sensor_gain", 0.05, 5});
     const auto fits = Calibrated(Read(campaign));
     for (std::size_t s = 0; s < fits.size(); ++s) {
@@ -60,7 +60,7 @@ TEST(HallCalibration, NumbersLieWithinTheirDeviations) {
 
 TEST(HallCalibration, FindsAPlaceAndLeavesTheRestAlone) {
   const auto fits = Calibrated(
-      Read(Plant({.noise_T = 1e-4, .seed = testing::TestSeed(8)}, {"sensor_position", 2, 3})));
+      Read(Plant({.noise_T = 1e-4, .seed = test::TestSeed(8)}, {"sensor_position", 2, 3})));
   for (std::size_t s = 0; s < fits.size(); ++s) {
     const double moved_deg =
         std::hypot(fits[s].shift.east_rad, fits[s].shift.north_rad) / kRadPerDeg;
@@ -73,7 +73,7 @@ TEST(HallCalibration, FindsAPlaceAndLeavesTheRestAlone) {
 
 TEST(HallCalibration, LeavesOutReadingsThatAreAccidents) {
   const auto campaign =
-      Plant({.dirty = true, .seed = testing::TestSeed(9)}, {"sensor_gain", -0.03, 0});
+      Plant({.dirty = true, .seed = test::TestSeed(9)}, {"sensor_gain", -0.03, 0});
   const auto fits = Calibrated(Read(campaign));
   std::size_t far_off = 0, missing = 0;
   for (std::size_t s = 0; s < fits.size(); ++s) {
@@ -87,7 +87,7 @@ TEST(HallCalibration, LeavesOutReadingsThatAreAccidents) {
 }
 
 TEST(HallCalibration, SaysWhoCannotBeCalibrated) {
-  HallCampaign campaign = Read(Plant({.seed = testing::TestSeed(10)}, {}));
+  HallCampaign campaign = Read(Plant({.seed = test::TestSeed(10)}, {}));
   for (std::size_t row = 0; row < campaign.rows.size(); ++row) {
     std::vector<double>& volts = campaign.rows[row].voltages_V;
     volts[0] = std::nan("");
@@ -107,7 +107,7 @@ TEST(HallCalibration, SaysWhoCannotBeCalibrated) {
 }
 
 TEST(HallCalibration, ExchangedSensorsAreFoundInEachOthersPlaces) {
-  HallCampaign campaign = Read(Plant({.noise_T = 1e-4, .seed = testing::TestSeed(12)}, {}));
+  HallCampaign campaign = Read(Plant({.noise_T = 1e-4, .seed = test::TestSeed(12)}, {}));
   for (VoltageRow& row : campaign.rows) std::swap(row.voltages_V[4], row.voltages_V[7]);
   const auto fits = Calibrated(campaign);
   const HallRig rig;
@@ -119,7 +119,7 @@ TEST(HallCalibration, ExchangedSensorsAreFoundInEachOthersPlaces) {
 }
 
 TEST(HallCalibration, PosesThatDoNotTiltTellNoPlaces) {
-  const auto fits = Calibrated(Read(Plant({.tilt_deg = 0, .seed = testing::TestSeed(11)}, {})));
+  const auto fits = Calibrated(Read(Plant({.tilt_deg = 0, .seed = test::TestSeed(11)}, {})));
   for (const SensorFit& fit : fits) EXPECT_EQ(fit.status, CalibrationStatus::kUndetermined);
 }
 

@@ -16,14 +16,14 @@ constexpr double kNoise_T = 5e-4;
 
 struct Table {
   std::vector<VoltageRow> rows;
-  std::vector<testing::PlantedPose> truth;
+  std::vector<test::PlantedPose> truth;
 };
 Table Drawn(std::size_t rows, double noise_T = kNoise_T) {
-  const std::uint64_t seed = testing::TestSeed(23);
-  const auto law = testing::OfSurface(0.08, 21);
+  const std::uint64_t seed = test::TestSeed(23);
+  const auto law = test::OfSurface(0.08, 21);
   Table table;
   table.truth =
-      testing::MakeCampaign({.rows = rows, .noise_T = noise_T, .seed = seed}, law, law, {}).poses;
+      test::MakeCampaign({.rows = rows, .noise_T = noise_T, .seed = seed}, law, law, {}).poses;
   for (const auto& pose : table.truth) table.rows.push_back({pose.volts});
   return table;
 }

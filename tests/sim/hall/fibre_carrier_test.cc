@@ -11,7 +11,7 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::TestSeed;
+using test::TestSeed;
 using Covariance = std::array<std::array<double, 3>, 3>;
 
 constexpr double kLength_mm = 33;

@@ -25,7 +25,7 @@ FieldMap MapOf(const testing::FieldLaw& law, int step_deg, double noise_T, std::
   return map;
 }
 
-double WorstElsewhere_T(const FieldFit& fit, const testing::FieldLaw& law, std::uint64_t seed) {
+double WorstElsewhere_T(const FieldFit& fit, const test::FieldLaw& law, std::uint64_t seed) {
   Rng rng(seed);
   const auto model = MakeField(fit.parameters);
   double worst_T = 0;
@@ -38,13 +38,13 @@ double WorstElsewhere_T(const FieldFit& fit, const testing::FieldLaw& law, std::
 }
 
 TEST(FieldFit, FindsThePlantedSurfaceWithinItsUncertainty) {
-  const std::uint64_t seed = testing::TestSeed(5);
+  const std::uint64_t seed = test::TestSeed(5);
   FOCALFLEET_TRACE_SEED(seed);
   double chi2 = 0;
   constexpr int kTrials = 40;
   for (int k = 0; k < kTrials; ++k) {
     const auto fit =
-        FitField(MapOf(testing::OfSurface(0.08, 21), 6, 5e-4, seed + static_cast<std::uint64_t>(k)),
+        FitField(MapOf(test::OfSurface(0.08, 21), 6, 5e-4, seed + static_cast<std::uint64_t>(k)),
                  FieldKind::kSurface);
     ASSERT_TRUE(fit);
     const auto surface = std::get<SurfaceParameters>(fit->parameters);
@@ -58,8 +58,8 @@ TEST(FieldFit, FindsThePlantedSurfaceWithinItsUncertainty) {
 }
 
 TEST(FieldFit, SphericalModelHoldsBetweenThePointsOfItsMap) {
-  const testing::DipoleRotor rotor(testing::PlantedTwoShells(), 6);
-  const auto law = testing::OfRotor(rotor);
+  const test::DipoleRotor rotor(test::PlantedTwoShells(), 6);
+  const auto law = test::OfRotor(rotor);
   const FieldMap map = MapOf(law, 6, 0, 1);
   const auto spherical = FitField(map, FieldKind::kSpherical);
   const auto surface = FitField(map, FieldKind::kSurface);
@@ -73,24 +73,23 @@ TEST(FieldFit, SphericalModelHoldsBetweenThePointsOfItsMap) {
 }
 
 TEST(FieldFit, TellsUnlikeMagnetsFromNoise) {
-  auto shells = testing::PlantedOneShell();
+  auto shells = test::PlantedOneShell();
   shells[0].strength = {1.02, 0.97, 1, 1.01, 0.99, 1, 1.03, 0.98};
-  const testing::DipoleRotor rotor(shells, 5);
-  const auto law = testing::OfRotor(rotor);
+  const test::DipoleRotor rotor(shells, 5);
+  const auto law = test::OfRotor(rotor);
   const auto fit = FitField(MapOf(law, 6, 2e-4, 7), FieldKind::kSpherical);
   ASSERT_TRUE(fit);
   EXPECT_TRUE(fit->all_orders);
   EXPECT_LT(WorstElsewhere_T(*fit, law, 8), 4e-4);
-  const auto even =
-      FitField(MapOf(testing::OfSurface(0.08, 21), 6, 2e-4, 9), FieldKind::kSpherical);
+  const auto even = FitField(MapOf(test::OfSurface(0.08, 21), 6, 2e-4, 9), FieldKind::kSpherical);
   ASSERT_TRUE(even);
   EXPECT_FALSE(even->all_orders) << "noise is no magnet";
   EXPECT_NEAR(even->noise_T, 2e-4, 2e-5);
 }
 
 TEST(FieldFit, TwoCutsAreEnoughOfAnIdealArray) {
-  const testing::DipoleRotor rotor(testing::PlantedOneShell(), 6);
-  const auto law = testing::OfRotor(rotor);
+  const test::DipoleRotor rotor(test::PlantedOneShell(), 6);
+  const auto law = test::OfRotor(rotor);
   FieldMap map;
   const auto add = [&](double theta_deg, double phi_deg) {
     const Vector3 u = DirectionAt(theta_deg * kRadPerDeg, phi_deg * kRadPerDeg);
@@ -105,8 +104,8 @@ TEST(FieldFit, TwoCutsAreEnoughOfAnIdealArray) {
 }
 
 TEST(FieldFit, FindsHowTheFieldFallsOffFromMapsAtTwoRadii) {
-  const testing::DipoleRotor rotor(testing::PlantedOneShell(), 4);
-  const auto law = testing::OfRotor(rotor);
+  const test::DipoleRotor rotor(test::PlantedOneShell(), 4);
+  const auto law = test::OfRotor(rotor);
   FieldMap map = MapOf(law, 10, 0, 1, 58);
   const FieldMap outer = MapOf(law, 10, 0, 1, 60);
   map.insert(map.end(), outer.begin(), outer.end());

@@ -45,7 +45,7 @@ double Formula(const FieldParameters& parameters, const Vector3& u) {
 }
 
 TEST(FieldModel, IsItsFormulaAndItsSlopesAreItsChanges) {
-  const std::uint64_t seed = testing::TestSeed(3);
+  const std::uint64_t seed = test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (const FieldParameters& parameters : Every()) {

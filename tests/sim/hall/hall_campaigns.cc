@@ -19,14 +19,14 @@
 #include "tests/bench/options.h"
 #include "tests/sim/hall/planted_rig.h"
 
+namespace focalfleet {
 namespace {
 
-using namespace focalfleet;  // NOLINT(google-build-using-namespace): the whole file is one program
-using focalfleet::testing::CampaignPlan;
-using focalfleet::testing::FieldLaw;
-using focalfleet::testing::Planted;
-using focalfleet::testing::PlantedCampaign;
-using focalfleet::testing::Vec;
+using test::CampaignPlan;
+using test::FieldLaw;
+using test::Planted;
+using test::PlantedCampaign;
+using test::Vec;
 
 constexpr double kAmplitude_T = 0.08;
 constexpr const char* kCauses[] = {
@@ -81,8 +81,8 @@ struct Plant {
   std::unique_ptr<sim::FieldModel> model;
 };
 
-Plant OfMagnets(const testing::DipoleRotor& rotor) {
-  const FieldLaw law = testing::OfRotor(rotor);
+Plant OfMagnets(const test::DipoleRotor& rotor) {
+  const FieldLaw law = test::OfRotor(rotor);
   sim::FieldMap map;
   for (int theta = 0; theta <= 180; theta += 5)
     for (int phi = 0; phi < 360; phi += 5) {
@@ -110,7 +110,7 @@ Planted Some(const char* cause, Rng* rng) {
 // The cause with the size at which it is worth `wanted` by itself.
 Planted Sized(const Plant& plant, const CampaignPlan& plan, Planted planted, double wanted) {
   for (int pass = 0; pass < 2; ++pass) {  // not quite linear
-    const auto made = testing::MakeCampaign(plan, plant.law, Wrong(plant.law, planted), planted);
+    const auto made = test::MakeCampaign(plan, plant.law, Wrong(plant.law, planted), planted);
     planted.size *= std::sqrt(wanted / std::max(made.lambda_free, 1e-9));
   }
   return planted;
@@ -132,7 +132,7 @@ Drawn Draw(const Plant& plant, const std::vector<const char*>& causes, double la
   }
   if (planted.empty()) planted.emplace_back();
   plan.also.assign(planted.begin() + 1, planted.end());
-  drawn.campaign = testing::MakeCampaign(plan, plant.law, law, planted.front());
+  drawn.campaign = test::MakeCampaign(plan, plant.law, law, planted.front());
   return drawn;
 }
 
@@ -312,15 +312,13 @@ class Suite {
   std::map<std::string, std::map<std::string, int>> verdicts_;
 };
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int Main(int argc, char** argv) {
   const int per = bench::Option(argc, argv, "--per", 6);
   const int nulls = bench::Option(argc, argv, "--nulls", 20);
   const int dirty = bench::Option(argc, argv, "--dirty", 10);
   const bool magnets = bench::Option(argc, argv, "--magnets", 0) != 0;
-  const testing::DipoleRotor rotor(testing::PlantedOneShell(), 4);
-  Plant plant{testing::OfSurface(kAmplitude_T, 21),
+  const test::DipoleRotor rotor(test::PlantedOneShell(), 4);
+  Plant plant{test::OfSurface(kAmplitude_T, 21),
               sim::MakeField(sim::SurfaceParameters{.amplitude_T = 0.05})};
   if (magnets) plant = OfMagnets(rotor);
   Suite suite(&plant, static_cast<std::uint64_t>(bench::Option(argc, argv, "--seed", 1)));
@@ -336,3 +334,8 @@ int main(int argc, char** argv) {
                     singles.wrong_and_sure <= 0.005 * singles.campaigns + 1;
   return good ? 0 : 1;
 }
+
+}  // namespace
+}  // namespace focalfleet
+
+int main(int argc, char** argv) { return focalfleet::Main(argc, argv); }

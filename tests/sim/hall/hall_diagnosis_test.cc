@@ -10,7 +10,7 @@
 namespace focalfleet::sim {
 namespace {
 
-HallCampaign Read(const testing::PlantedCampaign& planted, bool temperature = true) {
+HallCampaign Read(const test::PlantedCampaign& planted, bool temperature = true) {
   HallCampaign campaign;
   double sum = 0;
   for (const auto& pose : planted.poses) {
@@ -26,9 +26,9 @@ HallCampaign Read(const testing::PlantedCampaign& planted, bool temperature = tr
   return campaign;
 }
 
-testing::PlantedCampaign Plant(const testing::Planted& planted, std::size_t rows = 120) {
-  const auto law = testing::OfSurface(0.08, 21);
-  return testing::MakeCampaign({.rows = rows, .seed = testing::TestSeed(31)}, law, law, planted);
+test::PlantedCampaign Plant(const test::Planted& planted, std::size_t rows = 120) {
+  const auto law = test::OfSurface(0.08, 21);
+  return test::MakeCampaign({.rows = rows, .seed = test::TestSeed(31)}, law, law, planted);
 }
 
 HallDiagnosis Diagnosed(const HallCampaign& campaign) {
@@ -70,19 +70,19 @@ TEST(HallDiagnosis, NamesTheSensorTheCauseAndItsSize) {
 }
 
 TEST(HallDiagnosis, TellsAWiderFieldFromAnotherOne) {
-  const auto law = testing::OfSurface(0.08, 21);
-  const auto wide = testing::MakeCampaign({.seed = 3}, law, testing::OfSurface(0.09, 24), {});
+  const auto law = test::OfSurface(0.08, 21);
+  const auto wide = test::MakeCampaign({.seed = 3}, law, test::OfSurface(0.09, 24), {});
   const HallDiagnosis width = Diagnosed(Read(wide));
   ASSERT_EQ(width.causes.size(), 1u);
   EXPECT_EQ(width.causes[0].candidates, std::vector{HallCause::kFieldWidth});
   EXPECT_NEAR(width.causes[0].amplitude, 24.0 / 21 - 1, 0.01);
-  const auto sine = [](const testing::Vec& place, const testing::Vec&) {
+  const auto sine = [](const test::Vec& place, const test::Vec&) {
     const double r2 = place[0] * place[0] + place[1] * place[1] + place[2] * place[2];
     const double s2 = 1 - place[2] * place[2] / r2;
     return 0.08 * s2 * s2 * std::cos(4 * std::atan2(place[1], place[0]));
   };
   const HallDiagnosis shape =
-      Diagnosed(Read(testing::MakeCampaign({.noise_T = 1e-4, .seed = 4}, law, sine, {})));
+      Diagnosed(Read(test::MakeCampaign({.noise_T = 1e-4, .seed = 4}, law, sine, {})));
   ASSERT_FALSE(shape.causes.empty());
   EXPECT_EQ(shape.causes[0].candidates.front(), HallCause::kFieldHarmonics);
 }
@@ -98,7 +98,7 @@ TEST(HallDiagnosis, SaysWhatCannotBeTested) {
 
 // Some causes together imitate these effects nearly to within the noise; none is named as sure.
 TEST(HallDiagnosis, WhatIsNoneOfTheCausesIsUnknown) {
-  const std::pair<testing::Planted, const char*> outside[] = {
+  const std::pair<test::Planted, const char*> outside[] = {
       {{"pose_scale", -0.02}, "alpha_deg is told wrongly, by alpha: its scale"},
       {{"crosstalk", 0.05, 2}, "v3 hears v4"},
       {{"drift", 0.05, 5}, "v6 drifts from row to row"}};

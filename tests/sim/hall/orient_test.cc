@@ -47,8 +47,8 @@ TEST(Orient, RotationIsTheProductOfThreeMatrices) {
   for (int k = 0; k < 100; ++k) {
     const Orientation o{rng.Uniform(-3, 3), rng.Uniform(-3, 3), rng.Uniform(-3, 3)};
     const Vector3 p = Unit({rng.Normal(), rng.Normal(), rng.Normal()});
-    const auto expected = testing::BackTurned(
-        testing::RotationMatrix(o.alpha_rad, o.beta_rad, o.gamma_rad), {p.x, p.y, p.z});
+    const auto expected = test::BackTurned(
+        test::RotationMatrix(o.alpha_rad, o.beta_rad, o.gamma_rad), {p.x, p.y, p.z});
     const Turned turned = Rotation(o).ToRotorWithSlopes(p);
     EXPECT_NEAR(turned.local.x, expected[0], 1e-14);
     EXPECT_NEAR(turned.local.y, expected[1], 1e-14);
@@ -65,15 +65,15 @@ TEST(Orient, RotationIsTheProductOfThreeMatrices) {
 }
 
 TEST(Orient, InvertsItsOwnVoltagesToABillionthOfADegree) {
-  const std::uint64_t seed = testing::TestSeed(11);
+  const std::uint64_t seed = test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
-  const testing::DipoleRotor rotor(testing::PlantedOneShell(), 4);
+  const test::DipoleRotor rotor(test::PlantedOneShell(), 4);
   FieldMap map;
   for (int theta = 0; theta <= 180; theta += 6)
     for (int phi = 0; phi < 360; phi += 6) {
       const Vector3 u = DirectionAt(theta * kRadPerDeg, phi * kRadPerDeg);
       map.push_back({theta * kRadPerDeg, phi * kRadPerDeg,
-                     testing::OfRotor(rotor)({59 * u.x, 59 * u.y, 59 * u.z}, {u.x, u.y, u.z})});
+                     test::OfRotor(rotor)({59 * u.x, 59 * u.y, 59 * u.z}, {u.x, u.y, u.z})});
     }
   const auto fit = FitField(map, FieldKind::kSpherical);
   ASSERT_TRUE(fit);
@@ -108,7 +108,7 @@ TEST(Orient, ALastStepLeavesLessThanAnyNoise) {
 }
 
 TEST(Orient, ReachesTheCramerRaoBound) {
-  const std::uint64_t seed = testing::TestSeed(13);
+  const std::uint64_t seed = test::TestSeed(13);
   FOCALFLEET_TRACE_SEED(seed);
   constexpr double kNoise_T = 5e-4;
   const OrientationSolver solver(Rig(), Surface());
@@ -162,10 +162,10 @@ TEST(Orient, ReachesTheCramerRaoBound) {
 }
 
 TEST(Orient, OnMagnetsOursErrsLessThanATwentiethOfADegree) {
-  const std::uint64_t seed = testing::TestSeed(17);
+  const std::uint64_t seed = test::TestSeed(17);
   FOCALFLEET_TRACE_SEED(seed);
-  const testing::DipoleRotor rotor(testing::PlantedTwoShells(), 6);
-  const auto law = testing::OfRotor(rotor);
+  const test::DipoleRotor rotor(test::PlantedTwoShells(), 6);
+  const auto law = test::OfRotor(rotor);
   FieldMap map;
   for (int theta = 0; theta <= 180; theta += 5)
     for (int phi = 0; phi < 360; phi += 5) {
@@ -173,8 +173,8 @@ TEST(Orient, OnMagnetsOursErrsLessThanATwentiethOfADegree) {
       map.push_back({theta * kRadPerDeg, phi * kRadPerDeg,
                      law({59 * u.x, 59 * u.y, 59 * u.z}, {u.x, u.y, u.z})});
     }
-  testing::CampaignPlan plan{.rows = 60, .noise_T = 0, .seed = seed};
-  const auto campaign = testing::MakeCampaign(plan, law, law, {});
+  test::CampaignPlan plan{.rows = 60, .noise_T = 0, .seed = seed};
+  const auto campaign = test::MakeCampaign(plan, law, law, {});
   double worst_deg[3] = {};
   for (const FieldKind kind : kFieldKinds) {
     const auto fit = FitField(map, kind);
@@ -230,14 +230,14 @@ TEST(Orient, FindsAnyTiltOfItsRange) {
 TEST(ClosedForm, IsExactWhereItsModelIs) {
   const double widths_deg[] = {21, 24};
   for (const double width_deg : widths_deg) {
-    const auto law = testing::OfSurface(0.08, width_deg);
+    const auto law = test::OfSurface(0.08, width_deg);
     for (const double tilt_deg : {-12.0, -3.0, 7.0}) {
       for (const bool alpha : {true, false}) {
         std::vector<double> b_T;
-        const auto turn = testing::RotationMatrix(alpha ? tilt_deg * kRadPerDeg : 0,
-                                                  alpha ? 0 : tilt_deg * kRadPerDeg, 0);
-        for (const auto& sensor : testing::PlantedSensors()) {
-          const auto local = testing::BackTurned(turn, sensor);
+        const auto turn = test::RotationMatrix(alpha ? tilt_deg * kRadPerDeg : 0,
+                                               alpha ? 0 : tilt_deg * kRadPerDeg, 0);
+        for (const auto& sensor : test::PlantedSensors()) {
+          const auto local = test::BackTurned(turn, sensor);
           b_T.push_back(law({59 * local[0], 59 * local[1], 59 * local[2]}, local));
         }
         const auto any = OrientBySurfaceOfAnyWidth(b_T, {});

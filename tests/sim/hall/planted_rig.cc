@@ -6,7 +6,7 @@
 
 #include "protocol/base/rng.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 namespace {
 
 constexpr double kDeg = 3.14159265358979323846 / 180;
@@ -283,4 +283,4 @@ std::string CampaignText(const PlantedCampaign& campaign, bool temperatures) {
   return text;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

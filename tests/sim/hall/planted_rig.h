@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 using Vec = std::array<double, 3>;
 using Mat = std::array<Vec, 3>;
@@ -91,4 +91,4 @@ PlantedCampaign MakeCampaign(const CampaignPlan& plan, const FieldLaw& law, cons
 /// CSV as focalfleet hall diagnose reads it.
 std::string CampaignText(const PlantedCampaign& campaign, bool temperatures);
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -14,7 +14,7 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::BenchMotor;
+using test::BenchMotor;
 
 constexpr double kTurnElectricalDeg = 360;
 
@@ -55,7 +55,7 @@ TEST(Motor, ComesUpExactlyFromItsCriticalSpeed) {
 TEST(Motor, IsWithinADegreeOfPwmLevelAndStartsWhatItStarts) {
   double worst_deg = 0;
   for (std::uint64_t k = 0; k < 10; ++k) {
-    const std::uint64_t seed = ::focalfleet::testing::TestSeed(500 + k);
+    const std::uint64_t seed = ::focalfleet::test::TestSeed(500 + k);
     FOCALFLEET_TRACE_SEED(seed);
     Rng rng(seed);
     const Drive::Setting setting{

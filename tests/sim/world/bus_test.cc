@@ -66,7 +66,7 @@ std::uint32_t BitsByHand(const CanFrame& frame) {
 }
 
 TEST(Bus, HoldsTheWireForExactlyTheFramesBits) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(3);
+  const std::uint64_t seed = focalfleet::test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   Bus bus = BusOfEight({.bit_rate_bps = 1'000'000}, Rng(1));
@@ -147,7 +147,7 @@ TEST(Bus, ADeadBusLosesWhatWaitsAndCarriesAgainWhenRevived) {
 }
 
 TEST(Bus, PlantedChanceDropsDuplicatesAndDelaysAtItsRate) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(4);
+  const std::uint64_t seed = focalfleet::test::TestSeed(4);
   FOCALFLEET_TRACE_SEED(seed);
   Bus bus = BusOfEight({}, Rng(seed));
   bus.faults() = {.drop = 0.1, .duplicate = 0.05, .late = 0.3, .late_by = Milliseconds(5)};

@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 namespace {
 
 TEST(EventQueue, AlwaysShowsTheSoonestAndTheLowestSlotOfEqualOnes) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(6);
+  const std::uint64_t seed = focalfleet::test::TestSeed(6);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (const std::size_t slots : {1u, 2u, 7u, 100u}) {

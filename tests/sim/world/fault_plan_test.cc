@@ -8,8 +8,8 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::FleetOf;
-using testing::Rig;
+using test::FleetOf;
+using test::Rig;
 
 TEST(FaultPlan, EveryFaultEndsAsItBegan) {
   WorldConfig config = FleetOf(1, 4);
@@ -39,7 +39,7 @@ TEST(FaultPlan, EveryFaultEndsAsItBegan) {
 }
 
 TEST(FaultPlan, ChanceHitsItsShareOfTheUnitsAndTheSameOnesForOneSeed) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(71);
+  const std::uint64_t seed = focalfleet::test::TestSeed(71);
   FOCALFLEET_TRACE_SEED(seed);
   const auto silent = [](std::uint64_t of) {
     WorldConfig config = FleetOf(10, 100);

@@ -16,7 +16,7 @@
 #include "sim/world/unit/firmware.h"
 #include "tests/sim/drive/bench_motor.h"
 
-namespace focalfleet::sim::testing {
+namespace focalfleet::sim::test {
 
 inline constexpr double kBenchGear = 100;
 inline constexpr std::int32_t kBenchMin = -9600;  // one output turn is 9600 vectors

@@ -23,7 +23,7 @@ UnitDescription Describe() {
 
 // The two printed lines of the file format, coordinate by coordinate.
 TEST(Mechanism, PutsTheFibreWhereTheSharedFormulaDoes) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(5);
+  const std::uint64_t seed = focalfleet::test::TestSeed(5);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   for (int i = 0; i < 1000; ++i) {

@@ -10,7 +10,7 @@
 #include "protocol/wire/staged_move.h"
 #include "sim/world/world.h"
 
-namespace focalfleet::sim::testing {
+namespace focalfleet::sim::test {
 
 inline constexpr double kGear = 337.0 * 45 / 17;
 
@@ -110,4 +110,4 @@ class Rig {
   std::uint8_t sequence_ = 0;
 };
 
-}  // namespace focalfleet::sim::testing
+}  // namespace focalfleet::sim::test

@@ -15,10 +15,10 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::FleetOf;
-using testing::kGear;
-using testing::MakeMove;
-using testing::Rig;
+using test::FleetOf;
+using test::kGear;
+using test::MakeMove;
+using test::Rig;
 
 constexpr double kDegPerVector = 360 / (96 * kGear);
 
@@ -284,7 +284,7 @@ TEST(World, RefusesUnitsThatCannotBe) {
     const auto valid = World::Validate(config);
     return valid ? std::string() : valid.error().text;
   };
-  using testing::DescribeUnit;
+  using test::DescribeUnit;
   EXPECT_EQ(complaint([](UnitDescription*) {}), "");
   EXPECT_EQ(complaint([](UnitDescription* u) { u->id = {1}; }), "unit 1: stands here twice");
   EXPECT_EQ(complaint([](UnitDescription* u) { u->node = {1}; }),
@@ -304,7 +304,7 @@ TEST(World, RefusesUnitsThatCannotBe) {
 // Frames are lost, doubled and late, and power fails anywhere. A start may be missed, never
 // doubled.
 TEST(World, NoUnitBeginsAMoveTwiceOnBadBuses) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(11);
+  const std::uint64_t seed = focalfleet::test::TestSeed(11);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   WorldConfig config = FleetOf(2, 8);

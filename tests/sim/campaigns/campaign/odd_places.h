@@ -8,7 +8,7 @@
 #include "protocol/base/rng.h"
 #include "sim/campaigns/campaign/campaign.h"
 
-namespace focalfleet::sim {
+namespace focalfleet::sim::test {
 
 /// Every place on the grid of a step.
 inline Campaign InSteps(Campaign campaign, double step_mm) {
@@ -51,4 +51,4 @@ inline Campaign ReadTwice(Campaign campaign, std::size_t exposure, double share 
   return campaign;
 }
 
-}  // namespace focalfleet::sim
+}  // namespace focalfleet::sim::test

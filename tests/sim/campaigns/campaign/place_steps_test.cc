@@ -12,6 +12,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::InSteps;
+using test::Planted;
+
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 
 TEST(PlaceSteps, AreThoseOfWholePixels) {

@@ -13,6 +13,10 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::InSteps;
+using test::MovedInTurns;
+using test::Planted;
+using test::ReadTwice;
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 

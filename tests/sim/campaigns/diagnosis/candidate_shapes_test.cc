@@ -12,6 +12,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 constexpr double kAnyEvidence = -std::numeric_limits<double>::infinity();
 constexpr double kHeight_deg = 0.2;
 

@@ -11,6 +11,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Verdicts;
+
 CampaignModel Nominal(const Campaign& campaign) {
   CampaignModel model;
   model.units = campaign.units;

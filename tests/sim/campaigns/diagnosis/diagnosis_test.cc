@@ -16,6 +16,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::ExchangePlaces;
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
 using testing::Contains;
 using testing::UnorderedElementsAre;
 

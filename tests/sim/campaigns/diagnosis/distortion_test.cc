@@ -13,6 +13,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 std::vector<Undistorted> Judged(const Campaign& campaign, const Templates& templates) {
   const CampaignFacts facts = MakeFacts(campaign);
   Fit fit = StaticFit(facts);

@@ -13,6 +13,11 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
 using testing::ElementsAre;
 
 constexpr double kRadians = std::numbers::pi / 180;

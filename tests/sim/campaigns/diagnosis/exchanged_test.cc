@@ -11,6 +11,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::Verdicts;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;

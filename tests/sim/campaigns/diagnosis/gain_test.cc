@@ -12,6 +12,11 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::ExchangePlaces;
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+
 TEST(HeldOutGain, OutliersOfAHomingThatNoFitHasSeenDoNotMoveItsZeros) {
   // The zeros of a held-out homing are fitted to its own few moves, of which some lie anywhere
   // within 2 mm.

@@ -18,6 +18,10 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::Verdicts;
 using testing::ElementsAre;
 using testing::IsEmpty;
 

@@ -9,6 +9,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::StaticFit;
+
 TEST(Lanes, EachIsWhitenedAsIfItWereAlone) {
   const Campaign campaign = Planted({}, {.units = 7, .rest_noise_deg = 0.03});
   const CampaignFacts facts = MakeFacts(campaign);

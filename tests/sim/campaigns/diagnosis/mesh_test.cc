@@ -9,6 +9,11 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::TurnTheta;
+using test::Verdicts;
+
 // The gear's axis is a little off: 45 waves a turn, of a depth that goes round with it.
 TEST(Mesh, TeethDeeperOnOneSideAreOneCause) {
   constexpr double kTeeth = 45, kDepth_deg = 0.06, kOff = 0.7;

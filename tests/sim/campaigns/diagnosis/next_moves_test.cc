@@ -13,6 +13,8 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::StaticFit;
 using testing::Each;
 using testing::Field;
 using testing::IsEmpty;

@@ -13,6 +13,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Damp;
+using test::Planted;
+using test::Reported;
+using test::TurnTheta;
+using test::Verdicts;
+
 // A ripple of order five, 0.05 degrees, with a phase of each unit's own.
 Campaign FiveTimesATurn() {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 12});

@@ -15,7 +15,7 @@
 #include "sim/campaigns/diagnosis/fit.h"
 #include "sim/campaigns/diagnosis/planted.h"
 
-namespace focalfleet::sim {
+namespace focalfleet::sim::test {
 
 /// A campaign of exactly `options.units` units; 24 are enough for most tests and quick to diagnose.
 inline Campaign Planted(std::vector<PlantedEffect> effects,
@@ -90,4 +90,4 @@ inline std::string Reported(const Diagnosis& diagnosis) {
   return text;
 }
 
-}  // namespace focalfleet::sim
+}  // namespace focalfleet::sim::test

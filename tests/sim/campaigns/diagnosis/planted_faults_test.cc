@@ -8,6 +8,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::Verdicts;
 using testing::HasSubstr;
 
 struct Fault {

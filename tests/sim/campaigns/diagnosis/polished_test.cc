@@ -11,6 +11,8 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::StaticFit;
 using testing::Contains;
 using testing::Each;
 using testing::ElementsAre;

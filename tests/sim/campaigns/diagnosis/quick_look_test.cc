@@ -12,6 +12,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 // Theta commands of these units rounded, each to a step of its own.
 Campaign Rounded(const std::map<std::size_t, double>& step_deg, std::uint64_t seed) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});

@@ -12,6 +12,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::InSteps;
+using test::MovedInTurns;
+using test::Planted;
+using test::ReadTwice;
+using test::Reported;
+using test::Verdicts;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

@@ -14,6 +14,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 constexpr double kDegree = std::numbers::pi / 180;
 
 struct Motion {

@@ -10,6 +10,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::StaticFit;
+
 Template Of(const char* cause, const CampaignFacts& facts) {
   return ListTemplates(*FindEffect(cause), facts).front();
 }

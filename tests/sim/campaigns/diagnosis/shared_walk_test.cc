@@ -8,6 +8,11 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::TurnTheta;
+using test::Verdicts;
+
 constexpr std::size_t kMoves = 120;
 
 // Theta of all units is off by the exposure's given angle.

@@ -12,6 +12,11 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
 using testing::Contains;
 using testing::ElementsAre;
 using testing::IsEmpty;

@@ -9,6 +9,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::StaticFit;
+
 struct Moments {
   double square = 0, next = 0, count = 0;
 };

@@ -9,6 +9,9 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::Verdicts;
 using testing::ElementsAre;
 using testing::IsEmpty;
 

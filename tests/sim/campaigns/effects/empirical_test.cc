@@ -11,6 +11,8 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+
 TEST(Knots, GiveTheColumnsRanksBack) {
   const Campaign campaign = Planted({});
   const CampaignFacts facts = MakeFacts(campaign);

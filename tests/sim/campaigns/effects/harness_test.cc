@@ -52,7 +52,7 @@ double DropBySegments(const Drawn& drawn, std::size_t of) {
 }
 
 TEST(Harness, EachSegmentCarriesTheCurrentOfAllBehindIt) {
-  const std::uint64_t seed = testing::TestSeed(60);
+  const std::uint64_t seed = test::TestSeed(60);
   SCOPED_TRACE(seed);
   Rng rng = Rng::Stream(seed, "harness");
   for (int round = 0; round < 20; ++round) {

@@ -13,7 +13,7 @@ namespace focalfleet::sim {
 namespace {
 
 using Complex = std::complex<double>;
-using ::focalfleet::testing::TestSeed;
+using ::focalfleet::test::TestSeed;
 
 TEST(Spectrum, IsTheSumThatDefinesIt) {
   const std::uint64_t seed = TestSeed(1);

@@ -224,7 +224,7 @@ class RandomFaults {
 };
 
 TEST(FaultConfinement, CountersAndTimeFollowTheRulesOnAnySequenceOfFaults) {
-  const std::uint64_t first = focalfleet::testing::TestSeed(51);
+  const std::uint64_t first = focalfleet::test::TestSeed(51);
   std::uint64_t passive = 0;
   std::uint64_t off = 0;
   std::uint64_t back = 0;
@@ -246,7 +246,7 @@ TEST(FaultConfinement, CountersAndTimeFollowTheRulesOnAnySequenceOfFaults) {
 // ---- single rules
 
 TEST(FaultConfinement, AFrameIsDestroyedWithTheProbabilityOfItsBits) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(52);
+  const std::uint64_t seed = focalfleet::test::TestSeed(52);
   FOCALFLEET_TRACE_SEED(seed);
   const CanFrame frame = FrameOf(0x12345);
   const double bits = ExposedBits(frame);

@@ -125,7 +125,7 @@ CanFrame AnyFrame(Rng* rng) {
 }
 
 TEST(FrameCourse, EveryDisturbedBitCostsWhatNodesThatSignalItBitByBitTake) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(41);
+  const std::uint64_t seed = focalfleet::test::TestSeed(41);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   std::array<int, 13> flags{};

@@ -29,7 +29,7 @@ CameraTraits Quiet() {
 }
 
 TEST(Turbulence, HasItsCovarianceOverRealisations) {
-  const std::uint64_t seed = testing::TestSeed(3);
+  const std::uint64_t seed = test::TestSeed(3);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   const TurbulenceLaw law{.sigma_mm = 0.008, .length_mm = 120};
@@ -124,7 +124,7 @@ TEST(Camera, TheSameSeedTakesTheSamePicture) {
 }
 
 TEST(Camera, NoiseFallsWithTheRootOfTheFlux) {
-  const std::uint64_t seed = testing::TestSeed(5);
+  const std::uint64_t seed = test::TestSeed(5);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   CameraTraits traits = Quiet();
@@ -162,7 +162,7 @@ TEST(Camera, TwoNearLightsAreOneSpotAtTheirCentreOfLight) {
 }
 
 TEST(Camera, LosesItsShareAndAddsItsShare) {
-  const std::uint64_t seed = testing::TestSeed(9);
+  const std::uint64_t seed = test::TestSeed(9);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   CameraTraits traits = Quiet();

@@ -165,7 +165,7 @@ TEST_F(UnitMachineTest, HasRoomForTheAnswersToTheFullestGroup) {
 
 // Staging in any portions gives the same answers and the same staged move.
 TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
-  const auto seed = focalfleet::testing::TestSeed(41);
+  const auto seed = focalfleet::test::TestSeed(41);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   PaperBoard other_board;
@@ -253,7 +253,7 @@ TEST_F(UnitMachineTest, LeavesNothingUnkept) {
 
 TEST_F(UnitMachineTest, UsesNoHeap) {
   board_.writes = false;
-  const focalfleet::testing::AllocGuard guard;
+  const focalfleet::test::AllocGuard guard;
   StageArmStart();
   Pass();
   Pass();

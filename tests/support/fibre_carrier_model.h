@@ -1,12 +1,12 @@
-// The model of the simulated joints' field, fitted to a map of their magnets as an instrument maker
-// would measure it.
+// The model of the simulated joints' field, fitted to a map of their magnets as the maker of an
+// instrument would measure it.
 #pragma once
 
 #include "daemon/hall/field_model_file.h"
 #include "sim/hall/fibre_carrier.h"
 #include "sim/hall/field_fit.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline HallModelFile FittedFibreCarrierModel() {
   constexpr int kStepDeg = 4;
@@ -22,4 +22,4 @@ inline HallModelFile FittedFibreCarrierModel() {
   return model;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -1,0 +1,77 @@
+// Parameters written to units of the in-process fleet, positions among them.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
+
+namespace focalfleet {
+namespace {
+
+using test::ExpectOthersArrive;
+using test::InProcessFleet;
+using test::RunIntoMotion;
+using test::Small;
+using test::SomebodyMoving;
+
+ReplyEffect Write(InProcessFleet* fleet, const WriteParameterCommand& command) {
+  static std::uint64_t request = 5000;
+  fleet->Send({++request, command});
+  EXPECT_TRUE(fleet->RunUntil([&] { return fleet->LastReply(request).has_value(); }, Seconds(60)));
+  fleet->Run(Seconds(1));
+  return fleet->LastReply(request).value_or(ReplyEffect{});
+}
+
+TEST(Configuration, ParameterIsSetWhenTheUnitSaysSo) {
+  InProcessFleet fleet(Small(43));
+  fleet.Run(Seconds(5));
+  EXPECT_EQ(Write(&fleet, {{3}, Axis::kTheta, Parameter::kRepeat, 54}).text,
+            "unit 4: theta repeat = 54");
+  EXPECT_EQ(fleet.coordinator().drives()[3].axis[0].repeat, 54);
+  const auto refused = Write(&fleet, {{3}, Axis::kTheta, Parameter::kRepeat, 0});
+  ASSERT_TRUE(refused.error);
+  EXPECT_EQ(refused.error->code, ErrorCode::kRefused);
+  EXPECT_EQ(refused.error->text, "unit 4 refuses it (bad_value): theta repeat stays 54");
+  EXPECT_EQ(Write(&fleet, {{3}, Axis::kPhi, Parameter::kSubdivision, 192}).text,
+            "unit 4: phi subdivision = 192");
+  EXPECT_EQ(fleet.coordinator().drives()[3].axis[1].subdivision, 192);
+  EXPECT_FALSE(IsPlace(fleet.coordinator().unit({3}).knowledge)) << "rounded: not the same place";
+  fleet.world().faults(fleet.id(3))->silent = true;
+  const auto silent = Write(&fleet, {{3}, Axis::kTheta, Parameter::kRepeat, 60});
+  ASSERT_TRUE(silent.error);
+  EXPECT_EQ(silent.error->code, ErrorCode::kUnavailable);
+  EXPECT_EQ(silent.error->text, "unit 4 did not answer: it may have taken the value or not");
+}
+
+TEST(Configuration, WritingItsPositionMakesAUnitKnown) {
+  InProcessFleet fleet(Small(22));
+  fleet.ApplyRandom(22);
+  RunIntoMotion(&fleet, Seconds(2));
+  const PositionerIndex one = SomebodyMoving(&fleet);
+  fleet.world().PowerCut(fleet.id(one.value));
+  fleet.Run(Seconds(3));
+  fleet.world().PowerOn(fleet.id(one.value));
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  fleet.Run(Seconds(15));
+  const UnitView& view = fleet.coordinator().unit(one);
+  ASSERT_FALSE(IsPlace(view.knowledge));
+  // The unit takes the nearest position that shows its vector, and the store records that position.
+  const Pose seen = fleet.TruePoses()[one.value];
+  for (const Axis axis : kAxes) {
+    const auto reply = Write(&fleet, {one, axis, Parameter::kPosition, seen[Index(axis)] + 7});
+    EXPECT_FALSE(reply.error);
+    EXPECT_NE(reply.text.find("position = "), std::string::npos) << reply.text;
+  }
+  EXPECT_TRUE(IsPlace(view.knowledge));
+  fleet.ExpectStoreTellsTheTruth("after it was written");
+  fleet.Restart();
+  fleet.Run(Seconds(5));
+  EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge)) << "and after a restart";
+  fleet.ApplyRandom(22);
+  ASSERT_TRUE(fleet.RunUntilIdle());
+  ExpectOthersArrive(&fleet, 0);
+}
+
+}  // namespace
+}  // namespace focalfleet

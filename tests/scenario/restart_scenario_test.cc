@@ -1,0 +1,165 @@
+// Motions that are cut short on the in-process fleet: the coordinator is killed, the power fails,
+// or a homing is stopped. The store claims no place that is not true, and work can go on.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
+#include "tests/support/seed.h"
+
+namespace focalfleet {
+namespace {
+
+using test::ExpectOthersArrive;
+using test::HasAlarm;
+using test::InProcessFleet;
+using test::RunIntoMotion;
+using test::Small;
+using test::Unserved;
+
+// Cuts the homing of a unit after `ms` by `cut`. A position may only be claimed where the unit was
+// homed.
+void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*)>& cut) {
+  const std::string when = std::to_string(ms) + " ms";
+  InProcessFleet fleet(Small(40));
+  fleet.Run(Seconds(2));
+  fleet.Send({900, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntil(
+      [&] { return fleet.world().Truth(std::size_t{4}).state == UnitState::kHoming; }, Seconds(5)));
+  fleet.Run(Milliseconds(ms));
+  cut(&fleet);
+  ASSERT_TRUE(fleet.RunUntilIdle(Seconds(20))) << when;
+  fleet.Run(Seconds(2));
+  const UnitView& view = fleet.coordinator().unit({4});
+  EXPECT_EQ(view.knowledge[0].witness, Witness::kInterval) << when;
+  EXPECT_EQ(view.knowledge[1].witness, Witness::kInterval) << when;
+  EXPECT_TRUE(IsUnserved(view.outcome)) << when;
+  EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
+  EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
+  fleet.ExpectStoreTellsTheTruth(when);
+  // The unit is homed again, and then its position is known.
+  fleet.Send({901, EnableCommand{{{4}}}});
+  fleet.Run(Seconds(2));
+  fleet.Send({902, HomeCommand{{{4}}, true}});
+  ASSERT_TRUE(fleet.RunUntilIdle()) << when;
+  EXPECT_EQ(view.outcome, TargetOutcome::kArrived) << when << " " << view.outcome_reason;
+  EXPECT_TRUE(IsPlace(view.knowledge)) << when;
+  fleet.Run(Milliseconds(100));
+  fleet.ExpectStoreTellsTheTruth(when);
+}
+
+TEST(Configuration, CutHomingIsNotAPlace) {
+  for (const int ms : {100, 500, 1000, 5000, 20'000, 30'000, 45'000}) {
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->Send({910, StopCommand{}});
+    });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->Send({910, StopCommand{PositionerIndex{4}}});
+    });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) { fleet->StopDirectly(); });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
+      fleet->world().RaiseFault(fleet->id(4), FaultCode::kDriver);
+    });
+  }
+}
+
+// With the coordinator dead the unit's own mark decides how far its vectors are trusted.
+TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
+  for (const int ms : {100, 1000, 20'000, 45'000}) {
+    for (const bool stopped : {false, true}) {
+      const std::string when = std::to_string(ms) + (stopped ? " ms, stopped" : " ms");
+      InProcessFleet fleet(Small(40));
+      fleet.Run(Seconds(2));
+      fleet.Send({900, HomeCommand{{{4}}, true}});
+      fleet.Run(Milliseconds(ms));
+      if (stopped) fleet.StopDirectly();
+      fleet.Restart();
+      fleet.Run(Seconds(90));
+      const UnitView& view = fleet.coordinator().unit({4});
+      EXPECT_EQ(view.phase, UnitPhase::kReady) << when;
+      EXPECT_TRUE(stopped || IsPlace(view.knowledge)) << when;
+      fleet.ExpectStoreTellsTheTruth(when);
+    }
+  }
+}
+
+TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
+  int unproven = 0;
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    FOCALFLEET_TRACE_SEED(seed);
+    InProcessFleet fleet({.count = 19, .seed = seed});
+    Rng rng = Rng::Stream(seed, "kill");
+    fleet.ApplyRandom(seed);
+    fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 40'000))));
+    const bool cut = rng.Uniform() < 0.5;
+    const UnitId victim = fleet.id(static_cast<std::uint32_t>(rng.Below(19)));
+    if (cut) fleet.world().PowerCut(victim);
+    fleet.Restart();
+    if (cut) {
+      fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 5000))));
+      fleet.world().PowerOn(victim);
+    }
+    fleet.Run(Seconds(120));
+    fleet.ExpectStoreTellsTheTruth("after the kill");
+    std::vector<PositionerIndex> lost;
+    for (std::uint32_t n = 0; n < 19; ++n) {
+      const UnitView& view = fleet.coordinator().unit({n});
+      EXPECT_EQ(view.phase, UnitPhase::kReady) << n;
+      if (IsPlace(view.knowledge)) continue;
+      EXPECT_TRUE(cut && fleet.id(n) == victim) << "row " << n << " lost power? no";
+      lost.push_back({n});
+    }
+    if (!lost.empty()) {
+      fleet.Send({903, HomeCommand{lost}});
+      ASSERT_TRUE(fleet.RunUntilIdle());
+      // With the coordinator dead no unit was kept away from it: a neighbour may stand inside its
+      // interval. No way home can be proven then. The coordinator reports that and leaves the
+      // decision to the operator.
+      if (fleet.CountOutcome(TargetOutcome::kArrived) != lost.size()) {
+        ++unproven;
+        fleet.Send({904, HomeCommand{lost, true}});
+        ASSERT_TRUE(fleet.RunUntilIdle());
+      }
+      EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), lost.size()) << Unserved(fleet);
+    }
+    fleet.ApplyRandom(seed);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    ExpectOthersArrive(&fleet, 0);
+  }
+  EXPECT_LE(unproven, 10);
+}
+
+TEST(Configuration, TheOneThatTheDaemonDidNotEndHasFailed) {
+  for (const bool asked : {false, true}) {  // kill -9, SIGTERM
+    InProcessFleet fleet(Small(47));
+    fleet.ApplyRandom(47);
+    RunIntoMotion(&fleet, Seconds(2));
+    fleet.Run(Milliseconds(50));
+    ASSERT_EQ(fleet.store().configurations.back().state, ConfigurationState::kMoving);
+    if (asked) {
+      fleet.End();
+      EXPECT_EQ(fleet.store().configurations.back().state, ConfigurationState::kFailed);
+    }
+    fleet.Restart();
+    fleet.Run(Milliseconds(100));
+    const ConfigurationRow& row = fleet.store().configurations.back();
+    EXPECT_EQ(row.state, ConfigurationState::kFailed);
+    EXPECT_EQ(row.targeted, 37u);
+    EXPECT_TRUE(HasAlarm(fleet, "configuration 1 has failed: the daemon ended"));
+    EXPECT_EQ(fleet.store().alarms.size(), 1u) << "said once";
+    EXPECT_EQ(fleet.coordinator().configuration().id, 1u);
+    EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kFailed);
+    EXPECT_EQ(fleet.coordinator().configuration().source, "test");
+    fleet.Run(Seconds(90));
+    fleet.ApplyRandom(47);
+    ASSERT_TRUE(fleet.RunUntilIdle());
+    EXPECT_EQ(fleet.coordinator().configuration().id, 2u);
+    ExpectOthersArrive(&fleet, 0);
+  }
+}
+
+}  // namespace
+}  // namespace focalfleet
