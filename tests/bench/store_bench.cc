@@ -90,10 +90,7 @@ int Run(int serials, int rounds, const std::string& folder) {
 
 int main(int argc, char** argv) {
   // The folder is on the disk where the bench is started, not in a /tmp that may be memory.
-  std::string folder = (std::filesystem::current_path() / "store_bench_XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) return 1;
-  const int code = focalfleet::Run(focalfleet::bench::Option(argc, argv, "--serials", 5000),
-                                   focalfleet::bench::Option(argc, argv, "--rounds", 200), folder);
-  std::filesystem::remove_all(folder);
-  return code;
+  const focalfleet::test::ScratchFolder folder(std::filesystem::current_path().string());
+  return focalfleet::Run(focalfleet::bench::Option(argc, argv, "--serials", 5000),
+                         focalfleet::bench::Option(argc, argv, "--rounds", 200), folder.path());
 }

@@ -111,7 +111,7 @@ TEST(LineClient, GivesUpASilentServer) {
 }
 
 TEST(LineClient, NamesASocketThatNoServerAnswers) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   const auto client = LineClient::Connect(scratch / "s");
   ASSERT_FALSE(client);
   EXPECT_EQ(client.error().code, ErrorCode::kUnavailable);
@@ -119,7 +119,7 @@ TEST(LineClient, NamesASocketThatNoServerAnswers) {
 }
 
 TEST(LineClient, ReportsAServerThatDiesOrSendsGarbage) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = std::make_unique<EchoServer>(scratch / "s");
   auto mumbled = LineClient::Connect(scratch / "s").value();
   EXPECT_FALSE(mumbled.Call("mumble", Json::object()));

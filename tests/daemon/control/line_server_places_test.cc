@@ -11,7 +11,7 @@
 #include "daemon/control/line_server.h"
 #include "tests/daemon/control/line_server_turns.h"
 #include "tests/daemon/control/raw_client.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -51,7 +51,7 @@ bool Ended(const RawClient& client, std::string* said) {
 }
 
 TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 3}).value();
   Crowd crowd(scratch / "s", &server);
   for (int i = 0; i < 3; ++i) crowd.Add();
@@ -72,7 +72,7 @@ TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
 }
 
 TEST(LineServer, AClientThatNeverCompletesALineAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 2}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add("drip");
@@ -89,7 +89,7 @@ TEST(LineServer, AClientThatNeverCompletesALineAgesAsAnIdleOne) {
 }
 
 TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .clients_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
@@ -105,7 +105,7 @@ TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
 
 // Lines that such a client sends are not taken before it reads, so they keep no place.
 TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s",
                          {.output_bytes_pause = 10'000, .clients_max = 1, .reserved_max = 0})
@@ -123,7 +123,7 @@ TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
 }
 
 TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add();
@@ -138,7 +138,7 @@ TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
 }
 
 TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.clients_max = 2, .urgent = IsStop, .reserved_max = 2})
           .value();
@@ -161,7 +161,7 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
 }
 
 TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 20}).value();
   Crowd crowd(scratch / "s", &server);
   for (int i = 0; i < 20; ++i) crowd.AddBusy();
@@ -172,7 +172,7 @@ TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) 
 }
 
 TEST(LineServer, AClientInAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1, .urgent = IsStop}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.AddBusy();
@@ -186,7 +186,7 @@ TEST(LineServer, AClientInAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
 }
 
 TEST(LineServer, AFloodOfConnectionsDoesNotKeepOutPresentClients) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 64, .urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> flood;
   for (int i = 0; i < 64; ++i) flood.push_back(std::make_unique<RawClient>(scratch / "s"));
@@ -217,7 +217,7 @@ class NoDescriptors {
 };
 
 TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.Add();
@@ -232,7 +232,7 @@ TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
 }
 
 TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop, .reserved_max = 1}).value();
   Crowd crowd(scratch / "s", &server);
   crowd.AddBusy();
@@ -249,7 +249,7 @@ TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
 }
 
 TEST(LineServer, AcceptsAgainAfterAPauseWhenDescriptorsAreThere) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.accept_pause = std::chrono::milliseconds(20)}).value();
   const RawClient client(scratch / "s");

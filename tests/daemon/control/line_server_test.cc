@@ -65,7 +65,7 @@ TEST(LineServer, IsReadableAsLongAsALineIsLeft) {
 }
 
 TEST(LineServer, AnUrgentLineGoesBeforeAllOtherLines) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   std::vector<std::unique_ptr<RawClient>> askers;
   for (int i = 0; i < 40; ++i) {
@@ -81,7 +81,7 @@ TEST(LineServer, AnUrgentLineGoesBeforeAllOtherLines) {
 }
 
 TEST(LineServer, AnUrgentLineOvertakesLinesOfItsClientWhichAreMarked) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
   const RawClient client(scratch / "s");
   const RawClient other(scratch / "s");
@@ -102,7 +102,7 @@ TEST(LineServer, AnUrgentLineOvertakesLinesOfItsClientWhichAreMarked) {
 }
 
 TEST(LineServer, TakesAStopOfAClientThatReadsNoAnswers) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .urgent = IsStop}).value();
   const RawClient client(scratch / "s");
@@ -146,7 +146,7 @@ TEST(LineServer, ReadsNoFurtherAheadThanItsBound) {
 }
 
 TEST(LineServer, RefusesALineThatIsTooLongAndCloses) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.line_bytes_max = 1000}).value();
   const RawClient client(scratch / "s");
   client.Send(std::string(1001, 'x'));
@@ -210,7 +210,7 @@ TEST(LineServer, TakesNoMoreLinesOfAClientThatDoesNotRead) {
 }
 
 TEST(LineServer, DropsAClientThatLeavesTooMuchUnread) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.output_bytes_max = 1'000'000}).value();
   const RawClient client(scratch / "s");
   client.Send("a\n");
@@ -240,7 +240,7 @@ TEST(LineServer, SkipsProgressForAClientThatDoesNotRead) {
 }
 
 TEST(LineServer, TakesTheLastLinesOfAClientThatCloses) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   RawClient client(scratch / "s");
   client.Send("stop\nstop again\n");
@@ -253,7 +253,7 @@ TEST(LineServer, TakesTheLastLinesOfAClientThatCloses) {
 }
 
 TEST(LineServer, AnswersAClientThatEndedItsInputAndThenCloses) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s").value();
   const RawClient client(scratch / "s");
   client.Send("status\n");

@@ -13,7 +13,7 @@
 #include "daemon/control/unix_address.h"
 #include "tests/daemon/control/line_server_turns.h"
 #include "tests/daemon/control/raw_client.h"
-#include "tests/daemon/control/scratch.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -21,7 +21,7 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(LineServer, OnlyOwnerAndGroupMayConnect) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   const auto server = LineServer::Create(scratch / "s").value();
   struct stat info {};
   ASSERT_EQ(::stat((scratch / "s").c_str(), &info), 0);
@@ -29,7 +29,7 @@ TEST(LineServer, OnlyOwnerAndGroupMayConnect) {
 }
 
 TEST(LineServer, ReplacesASocketFileThatNoServerAnswers) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   const auto address = UnixAddress::Of(scratch / "s").value();
   const int dead = ::socket(AF_UNIX, SOCK_STREAM, 0);
   ASSERT_EQ(::bind(dead, address.get(), address.length()), 0);
@@ -42,7 +42,7 @@ TEST(LineServer, ReplacesASocketFileThatNoServerAnswers) {
 }
 
 TEST(LineServer, RefusesASocketThatALiveServerHolds) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   const auto first = LineServer::Create(scratch / "s").value();
   const auto second = LineServer::Create(scratch / "s");
   ASSERT_FALSE(second);
@@ -52,7 +52,7 @@ TEST(LineServer, RefusesASocketThatALiveServerHolds) {
 }
 
 TEST(LineServer, DoesNotTakeAFileThatIsNoSocket) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   std::ofstream(scratch / "s") << "precious";
   const auto server = LineServer::Create(scratch / "s");
   ASSERT_FALSE(server);
@@ -65,7 +65,7 @@ TEST(LineServer, NamesAPathThatIsTooLongOrNotThere) {
 }
 
 TEST(LineServer, RemovesItsSocketFileButNotItsSuccessors) {
-  const Scratch scratch;
+  const test::ScratchFolder scratch;
   { const auto server = LineServer::Create(scratch / "s").value(); }
   EXPECT_NE(::access((scratch / "s").c_str(), F_OK), 0);
   {

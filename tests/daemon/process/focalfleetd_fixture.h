@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "daemon/control/line_client.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/support/process.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 
@@ -60,7 +60,7 @@ class FocalfleetdTest : public ::testing::Test {
         kPatienceMs);
   }
 
-  const Scratch scratch_;
+  const test::ScratchFolder scratch_;
 };
 
 }  // namespace focalfleet

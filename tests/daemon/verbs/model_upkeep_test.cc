@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "daemon/store/store.h"
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/verbs/model_text.h"
 #include "tests/daemon/verbs/small_fleet.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {
@@ -26,7 +26,7 @@ class ModelUpkeepTest : public ::testing::Test {
   }
   std::unique_ptr<StoreReader> Reader() { return StoreReader::Open(scratch_ / "fleet.db").value(); }
 
-  const Scratch scratch_;
+  const test::ScratchFolder scratch_;
   SmallFleet fleet_;
   std::unique_ptr<Store> store_;
   ModelRegistry models_{&fleet_.layout()};

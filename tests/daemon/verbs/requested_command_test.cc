@@ -5,8 +5,8 @@
 
 #include <variant>
 
-#include "tests/daemon/control/scratch.h"
 #include "tests/daemon/verbs/small_fleet.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
 namespace {

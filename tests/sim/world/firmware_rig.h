@@ -140,4 +140,4 @@ M Get(const CanFrame& frame) {
                                                                 : M{};
 }
 
-}  // namespace focalfleet::sim::testing
+}  // namespace focalfleet::sim::test
