@@ -1,5 +1,5 @@
 // Vectors, angles and time of an axis. A vector turns the motor's field by 360/subdivision degrees.
-// It lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1, section "Open loop
+// A vector lasts V_counter2 = n * V_counter1 timer counts at 144 MHz (paper 1, section "Open loop
 // regulating process"). Example: V_counter1 = 500, n = 108, subdivision 96 and a gear of 337 *
 // 45/17. A turn of the axis then takes 32.11 s and one vector is 4.2 mdeg. All motions on the bus
 // are whole vectors.

@@ -25,8 +25,8 @@
 // time. Between them a diode takes the current: the low one where it flows out of the leg, the high
 // one where it flows in. Where the current comes to zero before the switch closes, the leg floats
 // without current. Edges take their rise or fall time, counted as a delay of half of it. A switch
-// may close onto the current of the opposite diode (a hard edge). It then carries current and
-// voltage together: 0.5 v_bus |i| (rise or fall). Where the current itself has moved the leg (a
+// may close onto the current of the opposite diode (a hard edge). The switch then carries current
+// and voltage together: 0.5 v_bus |i| (rise or fall). Where the current itself has moved the leg (a
 // soft edge), there is no such loss.
 //
 // Lag. The rotor's mean torque is load + viscous w at one lag below pull-out. The lag is found by
