@@ -6,9 +6,9 @@
 // A unit's way since the campaign is kept here: where the campaign left it, and each place at which
 // it came to rest. Motion during the daemon's absence (another daemon, a restart) counts as one
 // straight move. A unit that was homed counts anew, and the model's zeros are no longer its own: it
-// goes uncompensated until there is another model. Units that the campaign did not measure go uncompensated, too.
-// Effects that need conditions unknown to the daemon (temperature, supply, elevation), and those of
-// camera, rails and plate, are left out, by name.
+// goes uncompensated until there is another model. Units that the campaign did not measure go
+// uncompensated, too. Effects that need conditions unknown to the daemon (temperature, supply,
+// elevation), and those of camera, rails and plate, are left out, by name.
 #pragma once
 
 #include <array>

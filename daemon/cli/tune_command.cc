@@ -1,5 +1,5 @@
-// The command tune finds the repeat n that a motor needs, by its own load and always from rest. It
-// tunes one motor, or a fleet into the store.
+// The command tune finds the repeat n that a motor needs, by its own load and always from rest:
+// of a single motor, or of a fleet into the store.
 
 #include <fmt/format.h>
 

@@ -9,6 +9,7 @@
 #include <sys/types.h>
 
 #include <string>
+#include <utility>
 
 #include "daemon/control/unix_address.h"
 #include "protocol/base/result.h"

@@ -1,5 +1,5 @@
 // Upkeep of the model in force. The model is restored at the start and learns where each unit
-// rests. It loses each unit that is no longer what the model was measured on.
+// rests. The model loses each unit that is no longer what the model was measured on.
 #pragma once
 
 #include "daemon/status/status_snapshot.h"

@@ -3,6 +3,7 @@
 
 #include "daemon/control/messages.h"
 #include "daemon/store/store.h"
+#include "daemon/store/store_reader.h"
 #include "fleet/files/csv.h"
 #include "tests/daemon/cli/program.h"
 #include "tests/support/scratch_folder.h"
