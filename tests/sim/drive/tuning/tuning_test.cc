@@ -46,7 +46,7 @@ TEST(Tuning, RefusesCurrentsNearWhatThePhaseCanReach) {
   EXPECT_NEAR(fast.limit_A, 0.34991, 1e-5);
 }
 
-TEST(Tuning, LoadsBeyondTheMotorAreToldApart) {
+TEST(Tuning, LoadsBeyondTheMotorAreDistinguished) {
   const TuningRule rule{.cross_check = false};
   Drive::Setting setting = Ideal(1.8);
   setting.motor.load_Nm = 18e-6;

@@ -333,7 +333,7 @@ TEST(FaultConfinement, AUnitThatIsOffComesBackAfter128TimesElevenRecessiveBits) 
                                  FrameBits(FrameOf(7)) * kBit);
 }
 
-TEST(FaultConfinement, TheHostComesBackWhenItIsToldToOrByItself) {
+TEST(FaultConfinement, TheHostComesBackOnRequestOrByItself) {
   Bus bus = BusOf(1, 1, {.host_restart = DurationNs{kNever.ns}});
   bus.Offer({FrameOf(7), false, 0}, {0});
   bus.ThrowHostOff({50'000});
