@@ -12,8 +12,8 @@ constexpr std::size_t kValuesMax = 20000;  // values that a step is sought in, e
 constexpr double kSame_mm = 1e-8;          // arithmetic on equal numbers leaves less
 constexpr double kNearStep = 0.05;         // share of a step; a gap as near is a multiple
 constexpr double kShareOfChance = 2 * kNearStep;
-constexpr double kMostlyAre =
-    0.95;                         // share of the gaps; others were merged in, or measured otherwise
+// Share of the gaps; others were merged in, or measured otherwise.
+constexpr double kMostlyAre = 0.95;
 constexpr double kChance = 1e-6;  // probability that gaps of any size look like multiples
 constexpr int kMultiplesMax = 6;  // multiples of the step that the most frequent gap may be
 

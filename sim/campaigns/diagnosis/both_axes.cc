@@ -57,7 +57,7 @@ std::vector<AxisPair> PromisingPairs(const PairsByCause& pairs, const Templates&
   for (const auto& [cause, pair] : pairs)
     if (cause != own->cause && pair.log_evidence > std::max(kNear * log_evidence, 0.0))
       promising.push_back(pair);
-  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::evidence);
+  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::log_evidence);
   return promising;
 }
 

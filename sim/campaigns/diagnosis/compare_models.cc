@@ -14,8 +14,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kFar = 6;  // medians of the unit's, or of the fleet's, residuals
-constexpr double kElsewhereUm =
-    1e3;                          // a unit's median: it is at another place than the model has it
+// A unit's median: it is at another place than the model has it.
+constexpr double kElsewhereUm = 1e3;
 constexpr double kSameUm = 1e-3;  // smaller differences are the digits of a file
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 

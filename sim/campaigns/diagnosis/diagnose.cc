@@ -32,8 +32,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kMovesMin = 8;  // seen moves of a unit
-constexpr double kMissMax_mm =
-    1;  // median; a larger miss means that the geometry is another unit's
+// Median; a larger miss means that the geometry is another unit's.
+constexpr double kMissMax_mm = 1;
 constexpr double kKeptMin = 0.03;
 
 // Templates that the data can test; the reasons for the others go to `not_testable`.

@@ -27,10 +27,10 @@ struct CauseFound {
   // Rivals that leave nearly the same trace and are behind by the likelihood alone. A likelihood
   // decides nothing where the model leaves something unexplained.
   std::vector<std::string> behind;
-  std::vector<std::string>
-      cannot_be;  // names that these data exclude, whatever else may be unexplained
-  std::vector<std::string>
-      misfit_artefacts;  // causes or columns that the misfit of its shape looks like
+  // Names that these data exclude, whatever else may be unexplained.
+  std::vector<std::string> cannot_be;
+  // Causes or columns that the misfit of its shape looks like.
+  std::vector<std::string> misfit_artefacts;
   std::string axis;
   std::string scope;
   std::vector<std::uint32_t> units;
@@ -94,8 +94,8 @@ struct Prospect {
 struct NextMoves {
   std::vector<ProposedMove> moves;
   std::vector<Prospect> prospects;
-  std::vector<std::pair<std::string, std::string>>
-      inseparable;  // cause and rival that no moves separate
+  // Cause and rival that no moves separate.
+  std::vector<std::pair<std::string, std::string>> inseparable;
 };
 
 enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };

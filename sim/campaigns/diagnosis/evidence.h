@@ -1,10 +1,10 @@
 // The evidence for a template says at which level its amplitudes are shared, how much it explains,
 // and whether that could be chance.
 //
-// Evidence is a marginal likelihood ratio against no effect at all, over amplitudes of any size
-// near the effect's prior size: ln Z = 1/2 b' (G + 1/a^2)^-1 b - 1/2 ln|1 + a^2 G|. A free
-// amplitude for every unit pays for itself or loses to one amplitude for all. Units that have the
-// effect among units that have not are a mixture with unknown share. A shape of the unit's own
+// Evidence is the ratio of the marginal likelihoods with the effect and without. Amplitudes may
+// have any size near the effect's prior size: ln Z = 1/2 b' (G + 1/a^2)^-1 b - 1/2 ln|1 + a^2 G|. A
+// free amplitude for every unit pays for itself or loses to one amplitude for all. Units that have
+// the effect among units that have not are a mixture with unknown share. A shape of the unit's own
 // costs the logarithm of the number of shapes to choose from. Chance is the tail of chi-square for
 // the best of the levels, with the dispersion of the actual residuals.
 #pragma once

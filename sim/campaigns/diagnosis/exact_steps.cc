@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::size_t kEventsMax = 40;  // steps of a unit at once
-constexpr double kStepMin_deg =
-    0.3;                          // a smaller lost command cannot be distinguished from other steps
+// A smaller lost command cannot be distinguished from other steps.
+constexpr double kStepMin_deg = 0.3;
 constexpr double kRowsWorth = 3;  // far rows that a change has to put right
 constexpr double kCap_mm = 0.5;   // the most that an outlier costs
 

@@ -47,9 +47,9 @@ bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks
 /// Judges weak causes beside strong ones. A weak cause is uncertain where it may be a misfit of the
 /// strong one's shape, in units that have both. Relatives on the same axis are such causes, and
 /// causes that only units of the strong one have. They get the strong one as a candidate. A misfit
-/// artefact is a faint cause, in ln L or beside a cause of an axis, that is less than that one's
-/// shape can leave. The same holds for a cause that is hardly there beside a strong cause of any
-/// axis. Pre: strongest first. `units`: of the campaign.
+/// artefact is a faint cause, in ln L or beside a cause of an axis. Its size is less than that
+/// one's shape can leave. The same holds for a cause that is hardly there beside a strong cause of
+/// any axis. Pre: strongest first. `units`: of the campaign.
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes);
 
 /// Makes single units outliers whose behaviour is that of no cause. A cause moves them by far more

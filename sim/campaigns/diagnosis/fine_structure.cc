@@ -81,8 +81,8 @@ bool IsNamed(const CampaignModel& model, std::string_view column) {
   });
 }
 
-// The columns are angles as commanded and the distance from there, gaps of arms that come near each
-// other, and the spot's position on its pixel.
+// The columns are angles as commanded and the distance from there. Others are gaps of arms that
+// come near each other, and the spot's position on its pixel.
 std::vector<Column> ColumnsOf(const CampaignFacts& facts, const CampaignModel& model) {
   const std::vector<Channel> angles = {kAlongTheta, kAlongPhi};
   std::vector<Column> columns;

@@ -20,14 +20,14 @@ constexpr double kClusterLeast = 4;        // units and exposures
 constexpr std::size_t kClusterMost = 200;  // far visits in a window
 // Share of the visits that are as near: some units do not move, or touch little.
 constexpr double kTouchedLeast = 1.0 / 3;
-constexpr std::size_t kNextTouched =
-    12;                              // visits that decide whether arms touch at wider gaps, too
-constexpr double kBeyondMost = 0.1;  // of that share, of arms that are farther apart
+// Visits that decide whether arms touch at wider gaps, too.
+constexpr std::size_t kNextTouched = 12;
+constexpr double kBeyondMost = 0.1;         // of that share, of arms that are farther apart
 constexpr double kTouchLogLikelihood = 25;  // ln L of a row
 constexpr std::string_view kClusterColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
-constexpr double kFarMore =
-    4;  // times other units' distance: the unit is named, whatever its noise
+// Times other units' distance: the unit is named, whatever its noise.
+constexpr double kFarMore = 4;
 constexpr std::size_t kOthersMin = 8;
 
 double SpreadOf(const std::vector<double>& values) {

@@ -15,8 +15,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kSizeMinUm = 0.05;  // a smaller misfit is not worth a term, however certain
-constexpr double kSpreadMaxDeg =
-    0.3;  // of units' own amplitudes, where nothing else determines them
+// The spread of units' own amplitudes, where nothing else determines them.
+constexpr double kSpreadMaxDeg = 0.3;
 
 bool IsSame(const Template& a, const Template& b) {
   constexpr double kApart = 0.3;  // orders that are nearer are one ripple, found again

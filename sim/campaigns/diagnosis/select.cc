@@ -20,8 +20,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kKeptMin = 0.03;  // of a signature: geometry explains a smaller rest as well
-constexpr double kAlike =
-    4;  // a rival that leaves the same trace may be so many times as far behind
+// A rival that leaves the same trace may be so many times as far behind.
+constexpr double kAlike = 4;
 constexpr double kShapeDoubt = 0.002;
 constexpr double kHopeless = 0.3;  // of what the term explains
 constexpr int kSwapSweepsMax = 3;

@@ -31,8 +31,8 @@ struct SelectionRule {
   std::size_t terms_max = 8;
   double size_min_um = 0.05;  // a smaller misfit is not worth a name, however certain
   double rival_behind = 9;    // 2 d ln L
-  double rival_share =
-      0.99;  // squared cosine: a rival that takes over more is the same effect here
+  // Squared cosine above which a rival is the same effect here.
+  double rival_share = 0.99;
   std::uint64_t seed = 1;
   std::function<void(std::string_view)> progress = [](std::string_view) {};
 };

@@ -10,8 +10,8 @@
 namespace focalfleet::sim {
 
 struct ArmGaps {
-  std::vector<double>
-      gap_mm;                // Shape: (rows): between the arms' centre lines; the pitch if farther
+  // Shape: (rows): between the arms' centre lines; the pitch if farther.
+  std::vector<double> gap_mm;
   std::vector<double> side;  // Shape: (rows): +1: the gap grows with phi; -1: it shrinks
 };
 

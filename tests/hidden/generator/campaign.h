@@ -69,8 +69,8 @@ struct Exposure {
   Place gradient_C_per_mm;  // of the plate's temperature
   double humidity = 50;     // relative, per cent
   double wind_m_s = 0;
-  double pump_deg =
-      0;  // phase of a circulation pump: a covariate that no cause of the library names
+  // Phase of a circulation pump: a covariate that no cause of the library names.
+  double pump_deg = 0;
 };
 
 struct Campaign {

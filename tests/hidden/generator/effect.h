@@ -56,8 +56,8 @@ struct EffectKind {
   std::vector<Owner> owners;
   std::vector<std::string_view> columns;  // of moves.csv, needed to name it
   int phases = 1;                         // free coefficients per owner: 2 where a phase is free
-  bool is_event =
-      false;  // a realisation of chance: no other cause's signature can be compared with it
+  // A realisation of chance: no other cause's signature can be compared with it.
+  bool is_event = false;
   void (*apply)(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) = nullptr;
 };
 
@@ -70,8 +70,8 @@ struct Effect {
   std::uint64_t seed = 0;         // of events
   std::vector<double> weight;     // by unit; 0: without the effect
   std::vector<double> phase_rad;  // by unit
-  double read_through =
-      0;  // sensor_bias: the growth per K that is computed from the sensor's readings
+  // sensor_bias: the growth per K that is computed from the sensor's readings.
+  double read_through = 0;
   [[nodiscard]] double Amount(std::size_t unit) const {
     return kind->typical * size * weight[unit];
   }

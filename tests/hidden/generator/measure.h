@@ -15,8 +15,8 @@ namespace focalfleet::hidden {
 struct Measurement {
   std::vector<Place> place_mm;
   std::vector<char> seen;
-  std::vector<char>
-      counts;             // seen, and not of a stuck unit, which shows nothing of what is planted
+  // Seen, and not of a stuck unit, which shows nothing of what is planted.
+  std::vector<char> counts;
   std::vector<char> bad;  // an outlier, a stuck or swapped unit: an oracle must not fit it
   std::vector<ByAxis> reported_from_deg;
   std::vector<ByAxis> reported_cmd_deg;

@@ -22,8 +22,8 @@ Planted Plant(const Spec& spec);
 
 struct Key {
   std::string json;
-  std::string
-      contribution_csv;  // unit_id, move_id, cause, dx_um, dy_um: contribution of each effect
+  // unit_id, move_id, cause, dx_um, dy_um: contribution of each effect.
+  std::string contribution_csv;
 };
 
 Key MakeKey(const Planted& planted);
