@@ -172,11 +172,11 @@ TEST(TidyRules, UncleanTextIsCaught) {
   EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", "\ttab\n"), 1u);
   EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", "dos\r\n"), 1u);
   EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", "space \n"), 1u);
-  EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", std::string(101, 'x') + "\n"), 1u);
-  EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", std::string(100, 'x') + "\n"), 0u);
+  EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", std::string(101, 'x').append("\n")), 1u);
+  EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", std::string(100, 'x').append("\n")), 0u);
   EXPECT_EQ(Found(TextIsClean, "fleet/a.cc", "// " + std::string(96, 'x') + "\u00b0\n"), 0u)
       << "columns, not bytes";
-  EXPECT_EQ(Found(TextIsClean, "docs/a.md", std::string(300, 'x') + "\n"), 0u);
+  EXPECT_EQ(Found(TextIsClean, "docs/a.md", std::string(300, 'x').append("\n")), 0u);
 }
 
 TEST(TidyRules, LeftoversAreCaught) {

@@ -273,8 +273,8 @@ TEST(TidyRules, UnreadablePagesAreCaught) {
   const auto found = [](const std::string& text) {
     return Found(PagesAreReadable, "docs/a.md", text);
   };
-  EXPECT_EQ(found(std::string(201, 'x') + "\n"), 1u);
-  EXPECT_EQ(found(std::string(200, 'x') + "\n"), 0u);
+  EXPECT_EQ(found(std::string(201, 'x').append("\n")), 1u);
+  EXPECT_EQ(found(std::string(200, 'x').append("\n")), 0u);
   EXPECT_EQ(found("| a | Units move. Units stay. Units end. |\n"), 1u);
   EXPECT_EQ(found("| a | Units move. Units stay. |\n"), 0u);
 }
