@@ -1,9 +1,15 @@
 #include "fleet/coordinator.h"
 
 #include <algorithm>
+#include <utility>
+#include <variant>
 
-#include "fleet/coordinate/core.h"
+#include "fleet/coordinate/bus_traffic.h"
+#include "fleet/coordinate/coordination.h"
 #include "fleet/coordinate/executor.h"
+#include "fleet/coordinate/identification.h"
+#include "fleet/coordinate/refused_rows.h"
+#include "fleet/coordinate/unit_parameters.h"
 #include "fleet/coordinate/unit_session.h"
 #include "protocol/base/check.h"
 
@@ -13,68 +19,81 @@ class Coordinator::Impl {
  public:
   Impl(const Layout* layout, std::vector<UnitDrive> drives, const CoordinatorConfig& config,
        StoredFleet stored)
-      : core_(layout, std::move(drives), config, std::move(stored)),
-        sessions_(&core_),
-        executor_(&core_, &sessions_) {}
+      : config_(config),
+        units_(*layout, std::move(drives), {config.bit_rate_bps, config.data_bit_rate_bps}, stored,
+               step_),
+        timers_(layout->size()),
+        ledger_(*layout, std::move(stored), step_),
+        requests_(config_, step_, &units_, &timers_),
+        traffic_(config_, step_, &units_),
+        fleet_{*layout, config_, step_, units_, timers_, requests_, ledger_},
+        sessions_(fleet_),
+        executor_(fleet_) {
+    for (std::uint32_t n = 0; n < units_.size(); ++n) timers_.Set({n}, {INT64_MIN});
+  }
 
   void Step(const Inputs& inputs, Effects* effects) {
-    core_.BeginStep(inputs, effects);
-    executor_.EndThoseOfAnEarlierRun();
-    for (const ShellNote& note : inputs.notes) core_.Raise(note.severity, {}, {}, note.text);
-    for (const RefusedRow& refused : inputs.refused) sessions_.StoreRefused(refused);
+    BeginStep(inputs.now, inputs.committed_through, inputs.store_failing, effects);
+    EndEarlierConfigurations(fleet_);
+    for (const ShellNote& note : inputs.notes) ledger_.Raise(note.severity, {}, {}, note.text);
+    for (const RefusedRow& refused : inputs.refused) StoreRefused(fleet_, refused);
     for (const LinkEvent& link : inputs.links) sessions_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
     for (const PlanDone& plan : inputs.plans) executor_.OnPlan(plan);
     for (const ExposureDone& exposure : inputs.exposures) executor_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
-    while (const auto due = core_.NextDue()) static_cast<void>(sessions_.Service(*due));
+    while (const auto due = timers_.TakeDue(step_.now)) static_cast<void>(sessions_.Service(*due));
     executor_.Advance();
     effects->wake_at = std::min(effects->wake_at, executor_.due());
-    core_.EndStep();
+    ledger_.SendReplies();
+    requests_.Release();
+    traffic_.EndStep();
+    effects->wake_at = std::min(effects->wake_at, timers_.earliest());
+    ledger_.CloseBatch();
   }
 
   void End(HostInstant now, Effects* effects) {
-    core_.BeginStep({.now = now,
-                     .frames = {},
-                     .links = {},
-                     .commands = {},
-                     .plans = {},
-                     .committed_through = core_.committed_through,
-                     .store_failing = core_.store_failing},
-                    effects);
+    BeginStep(now, ledger_.committed_through(), ledger_.store_failing(), effects);
     executor_.GiveUp();
-    if (!effects->rows.empty()) effects->batch = core_.next_batch++;
+    ledger_.CloseBatch();
   }
 
-  Core& core() { return core_; }
-  ConfigurationExecutor& executor() { return executor_; }
+  const UnitTable& units() const { return units_; }
+  UnitTable& units() { return units_; }
+  const CoordinatorConfig& config() const { return config_; }
+  const ConfigurationExecutor& executor() const { return executor_; }
 
  private:
+  void BeginStep(HostInstant now, std::uint64_t committed_through, bool store_failing,
+                 Effects* effects) {
+    step_ = {.now = now, .out = effects};
+    units_.BeginStep();
+    ledger_.BeginStep(committed_through, store_failing);
+  }
+
   void Hear(const ReceivedFrame& received) {
-    BusRecord* bus = core_.FindBus(received.bus);
+    BusRecord* bus = units_.FindBus(received.bus);
     FOCALFLEET_CHECK(bus != nullptr);  // the shell opens the buses of the layout and no others
-    ++bus->view.frames_received;
-    core_.heard_until = std::max(core_.heard_until, received.at);
-    core_.Count(bus, {&received.frame, 1});
+    traffic_.CountHeard(received, bus);
     const auto heard = DecodeUnit(received.frame);
     if (!heard) {
       // Another host may share the bus (a direct stop does): its frames are well formed and not for
-      // us.
+      // this host.
       if (!DecodeHost(received.frame)) ++bus->view.malformed;
       return;
     }
-    const auto i = core_.layout.Find(received.bus, heard->address.node);
+    const auto i = fleet_.layout.Find(received.bus, heard->address.node);
     if (!i) {
-      ++bus->view.malformed;  // nobody of ours has this node number
+      ++bus->view.malformed;  // no unit of the layout has this node number
       return;
     }
     const std::uint8_t sequence = heard->address.sequence;
     if (const auto* confirm = std::get_if<ConfirmReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kConfirm, sequence)) executor_.OnConfirm(*i, *confirm);
+      if (requests_.Answers(*i, Function::kConfirm, sequence)) executor_.OnConfirm(*i, *confirm);
     } else if (const auto* arm = std::get_if<ArmReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kArm, sequence)) executor_.OnArm(*i, *arm);
+      if (requests_.Answers(*i, Function::kArm, sequence)) executor_.OnArm(*i, *arm);
     } else if (const auto* home = std::get_if<HomeReply>(&heard->message)) {
-      if (core_.Answers(*i, Function::kHome, sequence)) executor_.OnHomeReply(*i, *home);
+      if (requests_.Answers(*i, Function::kHome, sequence)) executor_.OnHomeReply(*i, *home);
     } else {
       sessions_.Hear(*i, *heard, received.at);
     }
@@ -84,13 +103,13 @@ class Coordinator::Impl {
     const Status status =
         std::visit([&](const auto& what) { return Do(command.request, what); }, command.what);
     if (!status) {
-      core_.out->replies.push_back({command.request, true, status.error(), {}});
+      step_.out->replies.push_back({command.request, true, status.error(), {}});
     } else if (std::holds_alternative<StopCommand>(command.what)) {
-      core_.out->replies.push_back({command.request, true, {}, "done"});
+      step_.out->replies.push_back({command.request, true, {}, "done"});
     } else if (std::holds_alternative<EnableCommand>(command.what) ||
                std::holds_alternative<AdoptCommand>(command.what)) {
-      core_.ReplyWhenDurable(command.request, "done");
-    }  // the others go on and answer when they are over
+      ledger_.ReplyWhenDurable(command.request, "done");
+    }  // other commands go on, and are answered when they are over
   }
 
   Status Do(std::uint64_t request, const ApplyCommand& c) { return executor_.Apply(request, c); }
@@ -109,28 +128,35 @@ class Coordinator::Impl {
   }
   Status Do(std::uint64_t, const EnableCommand& c) {
     for (const PositionerIndex i : c.units) {
-      if (c.enabled && !core_.layout.unit(i).enabled)
+      if (c.enabled && !fleet_.layout.unit(i).enabled)
         return Fail(ErrorCode::kRefused,
-                    core_.NameOf(i) + " is disabled in the units file: change it there");
-      if (IsUnderWay(core_.unit(i).view.phase) || IsLoaded(core_.unit(i).view.phase))
-        return Fail(ErrorCode::kRefused, core_.NameOf(i) + " takes part in a configuration now");
+                    units_.NameOf(i) + " is disabled in the units file: change it there");
+      if (IsUnderWay(units_[i].view.phase) || IsLoaded(units_[i].view.phase))
+        return Fail(ErrorCode::kRefused, units_.NameOf(i) + " takes part in a configuration now");
     }
     sessions_.Enable(c);
     return {};
   }
-  Status Do(std::uint64_t, const AdoptCommand& c) { return sessions_.Adopt(c.unit); }
+  Status Do(std::uint64_t, const AdoptCommand& c) { return Adopt(fleet_, c.unit); }
   Status Do(std::uint64_t request, const WriteParameterCommand& c) {
     if (executor_.busy()) return Fail(ErrorCode::kRefused, "a configuration is under way");
-    return sessions_.WriteParameter(request, c);
+    return WriteParameter(fleet_, request, c);
   }
 
   Status Do(std::uint64_t request, const KeepModelCommand& c) {
-    core_.Note(c.row);
-    core_.ReplyWhenDurable(request, "done");
+    ledger_.Note(c.row);
+    ledger_.ReplyWhenDurable(request, "done");
     return {};
   }
 
-  Core core_;
+  const CoordinatorConfig config_;
+  StepState step_;
+  UnitTable units_;
+  UnitTimers timers_;
+  Ledger ledger_;
+  Requests requests_;
+  BusTraffic traffic_;
+  const Coordination fleet_;  // of the members above
   UnitSessions sessions_;
   ConfigurationExecutor executor_;
 };
@@ -156,7 +182,7 @@ void Coordinator::Step(const Inputs& inputs, Effects* effects) { impl_->Step(inp
 
 void Coordinator::End(HostInstant now, Effects* effects) { impl_->End(now, effects); }
 
-const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->core().unit(i).view; }
+const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->units()[i].view; }
 
 UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const {
   const auto course = impl_->executor().CourseOf(i);
@@ -167,20 +193,20 @@ UnitKnowledge Coordinator::KnowledgeAt(PositionerIndex i, HostInstant now) const
     predicted[Index(axis)] =
         Exactly(Witness::kPredicted,
                 PositionAt(course->plan->from[Index(axis)], course->plan->path[Index(axis)],
-                           impl_->core().drives[i.value].axis[Index(axis)],
+                           impl_->units().drives[i.value].axis[Index(axis)],
                            (now - course->began).seconds()));
   return predicted;
 }
 
 const BusView& Coordinator::bus(BusId bus) const {
-  const BusRecord* record = impl_->core().FindBus(bus);
+  const BusRecord* record = impl_->units().FindBus(bus);
   FOCALFLEET_CHECK(record != nullptr);
   return record->view;
 }
 
 const ConfigurationView& Coordinator::configuration() const { return impl_->executor().view(); }
-std::span<const UnitDrive> Coordinator::drives() const { return impl_->core().drives; }
-const CoordinatorConfig& Coordinator::config() const { return impl_->core().config; }
+std::span<const UnitDrive> Coordinator::drives() const { return impl_->units().drives; }
+const CoordinatorConfig& Coordinator::config() const { return impl_->config(); }
 bool Coordinator::busy() const { return impl_->executor().busy(); }
 
 }  // namespace focalfleet

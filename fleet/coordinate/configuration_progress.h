@@ -1,0 +1,65 @@
+// The progress of the configuration under way: from a goal through its rounds to its end. Each
+// function takes it over one edge of the table in configuration_phase.h, when what the edge waits
+// for has come: answers, a plan, a durable batch, an exposure.
+//
+// Nothing starts before every unit of the plan holds its move, and before the store holds the
+// intent of each. A unit that fails before the start costs a new plan. One that fails in motion
+// stops those whose way leads through where it may stand (UnitPlan::followers). The next round
+// takes these on, unless they find a way while the others still move (late_moves.h). Every round
+// and every late move uses a new move id, so a unit that kept an old move never starts with the
+// others.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "fleet/coordinate/executor_rooms.h"
+
+namespace focalfleet {
+
+class ConfigurationProgress {
+ public:
+  /// `rooms` outlives this.
+  explicit ConfigurationProgress(ExecutorRooms* rooms)
+      : rooms_(*rooms),
+        fleet_(rooms->fleet),
+        configuration_(rooms->configuration),
+        round_(rooms->round) {}
+
+  void Begin(std::uint64_t request, const Goal& goal);
+  void OnPlan(const PlanDone& done);
+  void OnExposure(const ExposureDone& done);
+  /// Goes on as far as it can now.
+  void Advance();
+  /// Stops all units, and ends the configuration when they have answered.
+  void Stop(const std::string& reason);
+
+ private:
+  void Gather();
+  void GatherIfDue();
+  void BeginRound();
+  void TakePlan(const PlanDone& done);
+  void AdvanceUpload();
+  void Disarm();
+  void AdvanceCommit();
+  void Start();
+  void StartHoming();
+  void CountPrediction();
+  [[nodiscard]] bool RoundIsOver() const;
+  void EndRound();
+  void EndHomingWave();
+  void JudgeTargets();
+  void MeasureOrEnd();
+  void TakeMeasurement(ConfigurationMeasurement::Progress progress);
+  void End();
+  void SayWhatIsWaitedFor();
+
+  ExecutorRooms& rooms_;
+  const Coordination& fleet_;     // of rooms_
+  Configuration& configuration_;  // of rooms_
+  Round& round_;                  // of rooms_
+  HostInstant gather_until_ = kNever;
+  bool sets_out_ = false;  // the next round is the first since the last exposure
+};
+
+}  // namespace focalfleet

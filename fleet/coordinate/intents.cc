@@ -1,0 +1,54 @@
+#include "fleet/coordinate/intents.h"
+
+#include <optional>
+
+#include "fleet/coordinate/unit_knowledge.h"
+
+namespace focalfleet {
+
+IntentRow IntentOf(const Coordination& fleet, const Round& round, std::uint64_t configuration,
+                   PositionerIndex i) {
+  const UnitPlan& plan = *round.PlanOf(i);
+  IntentRow row{.configuration = configuration,
+                .serial = fleet.units[i].view.serial,
+                .unit = fleet.layout.unit(i).id,
+                .move = round.MoveOf(i),
+                .from = plan.from,
+                .to = plan.to,
+                .hull = {}};
+  for (const Axis axis : kAxes) {
+    const Span span = SpanOf(plan.from[Index(axis)], plan.path[Index(axis)]);
+    row.hull[Index(axis)] = {Witness::kInterval, span.low, span.high};
+  }
+  return row;
+}
+
+void Intend(const Coordination& fleet, const IntentRow& intent, const Pose& offset,
+            PositionerIndex i, Round* round) {
+  UnitView& view = fleet.units[i].view;
+  (*round)[i].before = {view.knowledge, view.offset};
+  view.offset = offset;
+  fleet.ledger.intents[intent.serial] = intent;
+  fleet.ledger.Note(intent);
+  // The store must not claim the old place any more: the unit may be anywhere on its way.
+  Know(fleet, i, intent.hull, Origin::kMove);
+}
+
+void TakeBackIntent(const Coordination& fleet, PositionerIndex i, Round* round) {
+  std::optional<RoundUnit::Before>& before = (*round)[i].before;
+  if (!before) return;
+  // A unit that was lost meanwhile keeps its intent: its return decides.
+  UnitView& view = fleet.units[i].view;
+  if (view.phase == UnitPhase::kArmed || view.phase == UnitPhase::kReady) {
+    fleet.ledger.EndIntent(view.serial, IntentEnd::kNeverBegan);
+    view.offset = before->offset;
+    Know(fleet, i, before->knowledge, Origin::kMove);
+  }
+  before.reset();
+}
+
+void TakeBackIntents(const Coordination& fleet, Round* round) {
+  for (std::uint32_t n = 0; n < fleet.units.size(); ++n) TakeBackIntent(fleet, {n}, round);
+}
+
+}  // namespace focalfleet

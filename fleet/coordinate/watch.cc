@@ -1,0 +1,95 @@
+#include "fleet/coordinate/watch.h"
+
+#include <algorithm>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "fleet/coordinate/stall_detection.h"
+#include "fleet/estimate.h"
+
+namespace focalfleet {
+namespace {
+
+/// Sets the time within which others pass where the unit may stand.
+void SetWatch(const Coordination& fleet, const Round& round, PositionerIndex i) {
+  MotionState& motion = fleet.units[i].motion;
+  motion.watch_from = kNever;
+  motion.watch_until = HostInstant{INT64_MIN};
+  for (const UnitPlan::Follower& follower : round.PlanOf(i)->followers) {
+    motion.watch_from = std::min(motion.watch_from, round.AtPlanTime(follower.since_s));
+    motion.watch_until = std::max(motion.watch_until, round.AtPlanTime(follower.left_s));
+  }
+}
+
+}  // namespace
+
+void WatchFromStart(const Coordination& fleet, const Round& round, PositionerIndex i) {
+  constexpr DurationNs kBegun = Milliseconds(50);  // every unit has begun, whatever the skew
+  SetWatch(fleet, round, i);
+  UnitRecord& unit = fleet.units[i];
+  // Spread over a period, so that a bus never hears all its units at once.
+  const auto spread = [&](DurationNs period) {
+    return DurationNs{period.ns * (i.value % 97) / 97};
+  };
+  const HostInstant began = round.BeganOf(i);
+  const DurationNs poll = fleet.config.poll_period;
+  const DurationNs watch = StallDetectionOf(fleet.config).poll;
+  unit.motion.begun_by = began + poll;
+  unit.next_poll = began + poll + spread(poll);
+  if (unit.motion.watch_from < unit.motion.watch_until)
+    unit.next_poll = std::min(
+        unit.next_poll, std::max(began + kBegun, unit.motion.watch_from) + spread(watch - kBegun));
+}
+
+void WatchSoon(const Coordination& fleet, const Round& round, PositionerIndex i) {
+  SetWatch(fleet, round, i);
+  UnitRecord& unit = fleet.units[i];
+  unit.next_poll = std::min(unit.next_poll, std::max(fleet.now(), unit.motion.watch_from));
+  if (!unit.request.question) fleet.timers.Set(i, unit.next_poll);
+}
+
+bool MayHaveArrived(const Coordination& fleet, const Round& round, const Round::Course& course) {
+  const PlanOptions allowed;
+  const double end_s = EndOf(*course.plan, fleet.drive(course.plan->unit));
+  return fleet.now() >=
+         course.began + Seconds(end_s * (1 - allowed.clock_error) - 2 * round.skew_s);
+}
+
+Ended SeenUntil(const Coordination& fleet, PositionerIndex i, HostInstant until) {
+  return {fleet.units[i].motion.seen_moving, until};
+}
+
+void StopFollowers(const Coordination& fleet, const Round& round, PositionerIndex first,
+                   const Ended& ended, const std::string& reason) {
+  std::vector<std::pair<PositionerIndex, Ended>> open{{first, ended}};
+  while (!open.empty()) {
+    const auto [i, when] = open.back();
+    open.pop_back();
+    const UnitPlan* const plan = round.PlanOf(i);
+    if (plan == nullptr) continue;
+    for (const UnitPlan::Follower& follower : plan->followers) {
+      if (round.AtPlanTime(follower.left_s) < when.from ||
+          round.AtPlanTime(follower.since_s) > when.until)
+        continue;
+      const UnitRecord& unit = fleet.units[follower.unit];
+      const bool asked =
+          unit.request.question && std::holds_alternative<Stop>(unit.request.question->message);
+      if (round.part(follower.unit) != Part::kMoving || unit.view.phase != UnitPhase::kMoving ||
+          asked)
+        continue;
+      StopOne(fleet, follower.unit, reason);
+      // The follower ends when the stop gets through. Should that take longer, it is judged anew
+      // then.
+      open.push_back({follower.unit, {fleet.now(), fleet.now() + fleet.requests.Patience()}});
+    }
+  }
+}
+
+void StopOne(const Coordination& fleet, PositionerIndex i, const std::string& reason) {
+  fleet.requests.Forget(i);
+  fleet.requests.Ask(i, Stop{});
+  fleet.ledger.Raise(Severity::kInfo, i, {}, fleet.units.NameOf(i) + " is stopped: " + reason);
+}
+
+}  // namespace focalfleet
