@@ -209,7 +209,7 @@ int Run(const BenchOptions& options) {
   std::vector<std::vector<double>> history(options.units);
   std::size_t alarms = fleet.store().alarms.size();
   HostInstant since = fleet.now();
-  fleet.camera_fault = [&](ExposureDone*) {
+  fleet.camera.fault = [&](ExposureDone*) {
     for (; alarms < fleet.store().alarms.size(); ++alarms)
       if (!fleet.store().alarms[alarms].unit)
         std::printf("  %s\n", fleet.store().alarms[alarms].text.c_str());

@@ -19,6 +19,14 @@
 namespace focalfleet {
 namespace {
 
+using test::BusNode;
+using test::CandumpLog;
+using test::ConfigurationFrames;
+using test::LoggedFrame;
+using test::MaskedFrame;
+using test::ParseCandump;
+using test::SortOut;
+
 // The daemon's defaults, in the fleet's time, and the bounds that follow from them.
 constexpr double kClockPeriod_s = 0.5;
 constexpr double kPollPeriodMin_s = 1;

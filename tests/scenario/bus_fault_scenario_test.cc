@@ -8,11 +8,14 @@
 #include <string>
 
 #include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
+using test::ExpectStoreTellsTheTruth;
 using test::InProcessFleet;
 using test::TestSeed;
 
@@ -34,7 +37,7 @@ std::uint64_t ErrorFrames(InProcessFleet* fleet) {
 // Expects that no knowledge is wrong, and that each unit outside `sick` has arrived.
 void ExpectOnlyTheSickBusSuffers(InProcessFleet* fleet, BusId sick) {
   fleet->Run(Milliseconds(100));  // the last batch becomes durable
-  fleet->ExpectStoreTellsTheTruth("at the end");
+  ExpectStoreTellsTheTruth(*fleet, "at the end");
   for (std::uint32_t n = 0; n < kUnits; ++n) {
     const UnitView& view = fleet->coordinator().unit({n});
     if (fleet->layout().units()[n].bus == sick) {
@@ -57,7 +60,7 @@ void ExpectAllArriveNow(InProcessFleet* fleet, std::uint64_t seed) {
     EXPECT_EQ(view.outcome, TargetOutcome::kArrived)
         << "unit " << fleet->id(n).value << " " << Name(view.phase) << " " << view.outcome_reason;
   }
-  fleet->ExpectStoreTellsTheTruth("after all");
+  ExpectStoreTellsTheTruth(*fleet, "after all");
 }
 
 TEST(BusFaults, NoiseCostsTimeAndNoUnit) {
@@ -67,10 +70,10 @@ TEST(BusFaults, NoiseCostsTimeAndNoUnit) {
     for (const BusId bus : fleet.layout().buses()) fleet.world().faults(bus)->bit_error_rate = rate;
     fleet.ApplyRandom(31);
     ASSERT_TRUE(fleet.RunUntilIdle());
-    EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), kUnits);
+    EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), kUnits);
     EXPECT_EQ(fleet.coordinator().configuration().round, 1u);
     fleet.Run(Milliseconds(100));
-    fleet.ExpectStoreTellsTheTruth("at the end");
+    ExpectStoreTellsTheTruth(fleet, "at the end");
     std::uint64_t frames = 0;
     for (const BusId bus : fleet.layout().buses())
       frames += fleet.world().counters(bus).host_frames + fleet.world().counters(bus).unit_frames;
@@ -93,7 +96,7 @@ TEST(BusFaults, ABabblingUnitTakesOnlyItsBus) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_GT(fleet.world().counters(sick).babbled, 10'000u);
   ExpectOnlyTheSickBusSuffers(&fleet, sick);
-  EXPECT_GT(fleet.CountOutcome(TargetOutcome::kFailed), 5u) << "nothing below passed";
+  EXPECT_GT(CountOutcome(fleet, TargetOutcome::kFailed), 5u) << "nothing below passed";
   fleet.world().Babble(babbler, std::nullopt);
   ExpectAllArriveNow(&fleet, 33);
 }
@@ -160,7 +163,7 @@ TEST(BusFaults, APlanOfFaultsGivesTheSameRunTwice) {
     fleet.ApplyRandom(seed);
     EXPECT_TRUE(fleet.RunUntilIdle());
     fleet.Run(Milliseconds(100));
-    fleet.ExpectStoreTellsTheTruth("at the end");
+    ExpectStoreTellsTheTruth(fleet, "at the end");
     EXPECT_GT(fleet.world().counters({0}).error_frames(), 0u);
     EXPECT_EQ(fleet.world().counters({1}).went_off, 1u);
     EXPECT_GT(fleet.world().counters({2}).received_twice, 0u);

@@ -14,6 +14,7 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::FittedFibreCarrierModel;
 using test::HasAlarm;
 using test::InProcessFleet;
@@ -30,7 +31,7 @@ class HallScenario : public ::testing::Test {
     auto worker = FibreCarrierWorker::Create(fleet_->layout(), *model_, {});
     ASSERT_TRUE(worker) << worker.error().text;
     worker_ = std::move(*worker);
-    fleet_->measurer = [this](const ExposureJob& job) {
+    fleet_->camera.measurer = [this](const ExposureJob& job) {
       const std::vector<UnitDrive> drives(job.expected.size());
       return MeasureUnits({job, drives}, worker_.get(), nullptr, std::atomic<bool>(false));
     };
@@ -124,7 +125,7 @@ TEST_F(HallScenario, WhoDoesNotTellItsSensorsIsNotLost) {
 TEST_F(HallScenario, WhoIsReadAnewInBetweenIsMeasuredNevertheless) {
   Make({.count = 40, .seed = 8, .config = {.reads_sensors = true}, .sensors = 8});
   fleet_->ApplyRandomMeasured(1, {.corrections = 0, .tolerance_um = 20});
-  ASSERT_TRUE(fleet_->RunUntil([&] { return fleet_->CountOutcome(TargetOutcome::kArrived) == 40; },
+  ASSERT_TRUE(fleet_->RunUntil([&] { return CountOutcome(*fleet_, TargetOutcome::kArrived) == 40; },
                                Seconds(300)));
   fleet_->Freeze(Seconds(120), InProcessFleet::Heard::kWaits);
   ASSERT_TRUE(fleet_->RunUntilIdle()) << "also where nobody is measured";

@@ -1,29 +1,17 @@
 #include "tests/scenario/in_process_fleet.h"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
-#include <cmath>
 
-#include "fleet/camera/findings.h"
 #include "fleet/hex_layout.h"
 #include "fleet/kinematics.h"
-#include "fleet/plan/job.h"
 #include "fleet/targets.h"
 #include "protocol/base/check.h"
-#include "protocol/wire/codec.h"
 
 namespace focalfleet::test {
 namespace {
 
 // Between two steps at least this much time passes, as between two turns of the daemon's loop.
 constexpr DurationNs kTurn = Microseconds(200);
-
-// At rest the rotor lags the field by the angle whose sine is load over stall torque, 15 degrees of
-// 360 at 1.8 V. The lag is 4 of 96 vectors. The remaining 2 are for rounding and for the motor's
-// own spread. The interval, not this margin, contains the effect of a cut motion. No run of these
-// scenarios exceeds 5.
-constexpr double kLagVectorsMax = 6;
 
 sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDrive& drive) {
   sim::UnitDescription described{.id = unit.id,
@@ -47,7 +35,11 @@ sim::UnitDescription Describe(const Unit& unit, const Pose& pose, const UnitDriv
 
 }  // namespace
 
-InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
+InProcessFleet::InProcessFleet(const Options& options)
+    : storage(options.commit_delay),
+      planner(options.plan_delay),
+      camera({options.exposure_delay, options.centroid_sigma_um}),
+      options_(options) {
   std::vector<focalfleet::Unit> units = MakeHexLayout(
       {.count = options.count, .units_per_bus = options.units_per_bus, .sensors = options.sensors});
   for (focalfleet::Unit& unit : units) unit.id.value += options.first_id - 1;
@@ -75,82 +67,58 @@ InProcessFleet::InProcessFleet(const Options& options) : options_(options) {
 }
 
 void InProcessFleet::Restart() {
-  commits_.clear();  // rows that were not durable are lost
-  refused_.clear();
-  planning_.clear();
-  exposing_.clear();
-  commands_.clear();
-  committed_through_ = 0;
+  storage.Restart();
+  planner.Restart();
+  camera.Restart();
+  inputs_.commands.clear();
   coordinator_ =
-      std::make_unique<Coordinator>(layout_.get(), drives_, options_.config, store_.fleet);
+      std::make_unique<Coordinator>(layout_.get(), drives_, options_.config, store().fleet);
   wake_at_ = now_;
 }
 
 void InProcessFleet::End() {
   Effects last;
   coordinator_->End(now_, &last);
-  for (const Commit& commit : commits_) store_.CommitAllBut(commit.batch, commit.rows);
-  store_.CommitAllBut(last.batch, last.rows);
+  storage.CommitAll(last);
 }
 
 void InProcessFleet::StepOnce() {
-  world_->AdvanceTo(now_, &heard_, wire);
+  world_->AdvanceTo(now_, &inputs_.frames, wire);
   if (now_ >= sync_at_) {
     world_->PulseSync();
     sync_at_ = kNever;
   }
   for (std::size_t i = 0; i < controllers_.size(); ++i)
     if (controllers_[i].Look(*world_))
-      links_.push_back({layout_->buses()[i], controllers_[i].state(), controllers_[i].trouble()});
-  std::vector<PlanDone> plans;
-  while (!planning_.empty() && planning_.front().at <= now_) {
-    plans.push_back(RunPlanJob(planning_.front().job, *layout_, coordinator_->drives()));
-    planning_.pop_front();
-    if (plans.back().plan) last_plan_ = *plans.back().plan;
-  }
-  std::vector<ExposureDone> exposures;
-  while (!exposing_.empty() && exposing_.front().at <= now_) {
-    exposures.push_back(Expose(exposing_.front().job));
-    if (camera_fault) camera_fault(&exposures.back());
-    exposing_.pop_front();
-  }
-  while (!store_fails && !commits_.empty() && commits_.front().at <= now_) {
-    Commit& next = commits_.front();
-    for (std::size_t k = next.rows.size(); refuse && k-- > 0;) {
-      if (!refuse(next.rows[k])) continue;
-      refused_.push_back({next.batch, next.batch, next.rows[k], "the test refuses it"});
-      next.rows.erase(next.rows.begin() + static_cast<std::ptrdiff_t>(k));
-    }
-    for (RefusedRow& row : store_.CommitAllBut(next.batch, next.rows))
-      refused_.push_back(std::move(row));
-    committed_through_ = commits_.front().batch;
-    commits_.pop_front();
-  }
+      inputs_.links.push_back(
+          {layout_->buses()[i], controllers_[i].state(), controllers_[i].trouble()});
+  const auto plans = planner.TakeDue(now_, *layout_, coordinator_->drives());
+  const auto exposures = camera.TakeDue(now_, *layout_, drives_, *world_);
+  storage.CommitDue(now_);
   if (options_.stamped_when_heard)
-    for (ReceivedFrame& frame : heard_) frame.at = std::max(frame.at, now_);
+    for (ReceivedFrame& frame : inputs_.frames) frame.at = std::max(frame.at, now_);
+  const std::vector<RefusedRow> refused = storage.TakeRefused();
   effects_.Clear();
   coordinator_->Step({.now = now_,
-                      .frames = heard_,
-                      .links = links_,
-                      .commands = commands_,
+                      .frames = inputs_.frames,
+                      .links = inputs_.links,
+                      .commands = inputs_.commands,
                       .plans = plans,
                       .exposures = exposures,
-                      .committed_through = committed_through_,
-                      .store_failing = store_fails,
-                      .refused = refused_},
+                      .committed_through = storage.committed_through(),
+                      .store_failing = storage.fails,
+                      .refused = refused},
                      &effects_);
-  refused_.clear();
-  heard_.clear();
-  commands_.clear();
-  links_.clear();
+  inputs_.frames.clear();
+  inputs_.commands.clear();
+  inputs_.links.clear();
   Perform(effects_);
 }
 
 void InProcessFleet::Perform(const Effects& effects) {
   if (held_up) Freeze(held_up(), Heard::kWaits);
   if (sent != nullptr) sent->insert(sent->end(), effects.frames.begin(), effects.frames.end());
-  if (!effects.rows.empty())
-    commits_.push_back({now_ + options_.commit_delay, effects.batch, effects.rows});
+  storage.Put(now_, effects);
   if (effects.sync_at) sync_at_ = *effects.sync_at;
   for (const OutFrame& out : effects.frames) {
     world_->Inject(out.bus, out.frame, now_);
@@ -159,43 +127,10 @@ void InProcessFleet::Perform(const Effects& effects) {
       digest_ = (digest_ ^ word) * 0x100000001b3u;
     for (const std::uint8_t byte : out.frame.payload()) digest_ = (digest_ ^ byte) * 0x100000001b3u;
   }
-  if (effects.plan_job) planning_.push_back({now_ + options_.plan_delay, *effects.plan_job});
-  if (effects.exposure) exposing_.push_back({now_ + options_.exposure_delay, *effects.exposure});
+  if (effects.plan_job) planner.Put(now_, *effects.plan_job);
+  if (effects.exposure) camera.Put(now_, *effects.exposure);
   replies_.insert(replies_.end(), effects.replies.begin(), effects.replies.end());
   wake_at_ = effects.wake_at;
-}
-
-// A camera that sees every fibre and knows its unit: detection and identification have tests of
-// their own.
-ExposureDone InProcessFleet::Expose(const ExposureJob& job) {
-  if (measurer) return measurer(job);
-  const std::vector<UnitExpectation> expected = Expect(*layout_, {.now = job.expected,
-                                                                  .before = job.before,
-                                                                  .seen = job.seen,
-                                                                  .reported = job.reported,
-                                                                  .drives = drives_});
-  ExposureFindings exposure{
-      .id = job.id, .measurements = {}, .after_request_s = options_.exposure_delay.seconds()};
-  for (std::uint32_t n = 0; n < layout_->size(); ++n) {
-    const sim::UnitTruth truth = world_->Truth(n);
-    const double noise_mm = 1e-3 * options_.centroid_sigma_um;
-    Measurement measurement{.unit = {n},
-                            .status = MeasurementStatus::kMeasured,
-                            .other = {},
-                            .x_mm = truth.x_mm + noise_mm * camera_noise_.Normal(),
-                            .y_mm = truth.y_mm + noise_mm * camera_noise_.Normal(),
-                            .covariance = RoundCovariance(options_.centroid_sigma_um),
-                            .place = {}};
-    const PointFp seen{measurement.x_mm, measurement.y_mm};
-    if (IsPlace(job.expected[n]))
-      measurement.place =
-          PlaceSeen(layout_->units()[n], drives_[n], seen, PlaceOf(job.expected[n]));
-    else
-      measurement.place = PoseOfLost(layout_->units()[n], drives_[n], seen, expected[n],
-                                     options_.centroid_sigma_um * 1e-3);
-    exposure.measurements.push_back(measurement);
-  }
-  return {job.id, std::move(exposure)};
 }
 
 bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limit) {
@@ -204,11 +139,8 @@ bool InProcessFleet::RunUntil(const std::function<bool()>& done, DurationNs limi
     StepOnce();
     if (done()) return true;
     HostInstant next = std::min(wake_at_, world_->NextEvent());
-    if (!commits_.empty() && !store_fails) next = std::min(next, commits_.front().at);
-    if (!exposing_.empty()) next = std::min(next, exposing_.front().at);
-    if (!planning_.empty()) next = std::min(next, planning_.front().at);
-    next = std::min(next, sync_at_);
-    if (!commands_.empty() || !links_.empty()) next = now_;
+    next = std::min({next, storage.due(), camera.due(), planner.due(), sync_at_});
+    if (!inputs_.commands.empty() || !inputs_.links.empty()) next = now_;
     next = std::max(next, now_ + kTurn);
     if (next > end) {
       now_ = end;
@@ -224,23 +156,16 @@ void InProcessFleet::Run(DurationNs duration) {
 }
 
 bool InProcessFleet::RunUntilIdle(DurationNs limit) {
-  return RunUntil([&] { return commands_.empty() && !coordinator_->busy(); }, limit);
+  return RunUntil([&] { return inputs_.commands.empty() && !coordinator_->busy(); }, limit);
 }
 
 void InProcessFleet::Freeze(DurationNs duration, Heard heard) {
   now_ = now_ + duration;
-  world_->AdvanceTo(now_, &heard_, wire);
-  if (heard == Heard::kLost) heard_.clear();
+  world_->AdvanceTo(now_, &inputs_.frames, wire);
+  if (heard == Heard::kLost) inputs_.frames.clear();
 }
 
-void InProcessFleet::StopDirectly() {
-  constexpr std::uint8_t kOtherHostsSequence = 255;
-  for (const BusId bus : layout_->buses())
-    world_->Inject(bus, Encode(HostMessage(Stop{}), {kBroadcastNode, kOtherHostsSequence}), now_,
-                   1);
-}
-
-void InProcessFleet::Send(Command command) { commands_.push_back(std::move(command)); }
+void InProcessFleet::Send(Command command) { inputs_.commands.push_back(std::move(command)); }
 
 std::uint64_t InProcessFleet::Apply(std::vector<std::optional<Pose>> targets) {
   const std::uint64_t request = next_request_++;
@@ -277,41 +202,6 @@ std::optional<ReplyEffect> InProcessFleet::LastReply(std::uint64_t request) cons
   for (auto it = replies_.rbegin(); it != replies_.rend(); ++it)
     if (it->request == request) return *it;
   return std::nullopt;
-}
-
-std::uint32_t InProcessFleet::CountOutcome(TargetOutcome outcome) const {
-  std::uint32_t count = 0;
-  for (std::uint32_t n = 0; n < layout_->size(); ++n)
-    if (coordinator_->unit({n}).outcome == outcome) ++count;
-  return count;
-}
-
-std::vector<Pose> InProcessFleet::TruePoses() const {
-  std::vector<Pose> poses;
-  for (std::size_t n = 0; n < layout_->size(); ++n) {
-    const sim::UnitTruth truth = world_->Truth(n);
-    poses.push_back({static_cast<std::int32_t>(std::lround(truth.vectors[0])),
-                     static_cast<std::int32_t>(std::lround(truth.vectors[1]))});
-  }
-  return poses;
-}
-
-void InProcessFleet::ExpectStoreTellsTheTruth(const std::string& when) const {
-  for (std::size_t n = 0; n < layout_->size(); ++n) {
-    const UnitView& view = coordinator_->unit({static_cast<std::uint32_t>(n)});
-    const VectorRow* row = store_.Vector(view.serial);
-    const sim::UnitTruth truth = world_->Truth(n);
-    EXPECT_EQ(truth.begun_twice, 0u) << when << ": unit " << truth.id.value;
-    ASSERT_NE(row, nullptr) << when << ": unit " << truth.id.value;
-    for (const Axis axis : kAxes) {
-      const AxisKnowledge& known = row->knowledge[Index(axis)];
-      if (known.witness == Witness::kUnknown) continue;
-      EXPECT_GE(truth.vectors[Index(axis)], known.low - kLagVectorsMax)
-          << when << ": unit " << truth.id.value << " " << Name(axis) << " " << Name(known.witness);
-      EXPECT_LE(truth.vectors[Index(axis)], known.high + kLagVectorsMax)
-          << when << ": unit " << truth.id.value << " " << Name(axis) << " " << Name(known.witness);
-    }
-  }
 }
 
 }  // namespace focalfleet::test

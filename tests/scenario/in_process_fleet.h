@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -17,9 +16,8 @@
 #include "daemon/ports/simulated_port.h"
 #include "fleet/coordinator.h"
 #include "fleet/layout.h"
-#include "protocol/base/rng.h"
 #include "sim/world/world.h"
-#include "tests/support/memory_store.h"
+#include "tests/scenario/delayed_parts.h"
 
 namespace focalfleet::test {
 
@@ -60,16 +58,14 @@ class InProcessFleet {
   /// exceed the socket's buffer and are lost.
   enum class Heard : std::uint8_t { kWaits, kLost };
   void Freeze(DurationNs duration, Heard heard);
-  /// Sends a stop of all on every bus from another program, as `stop --direct` does.
-  void StopDirectly();
 
   /// Reports a state of a bus' link as its port would, in addition to the states of its controller.
   /// Frames pass all the same: the call tests only the coordinator's reaction. KillBus tests the
   /// loss of frames.
-  void ReportLink(LinkEvent event) { links_.push_back(std::move(event)); }
+  void ReportLink(LinkEvent event) { inputs_.links.push_back(std::move(event)); }
 
   /// Adds a frame that no unit sent; the coordinator hears it with the next step.
-  void Hear(const ReceivedFrame& frame) { heard_.push_back(frame); }
+  void Hear(const ReceivedFrame& frame) { inputs_.frames.push_back(frame); }
 
   void Send(Command command);
   /// Applies a random configuration that is clear of all units that stand; returns its request
@@ -89,47 +85,33 @@ class InProcessFleet {
   void End();
 
   [[nodiscard]] std::optional<ReplyEffect> LastReply(std::uint64_t request) const;
-  /// Fails the running test where a unit's true angle is not within what the store holds.
-  void ExpectStoreTellsTheTruth(const std::string& when) const;
-  [[nodiscard]] std::uint32_t CountOutcome(TargetOutcome outcome) const;
-  [[nodiscard]] std::vector<Pose> TruePoses() const;  // nearest vectors
   [[nodiscard]] UnitId id(std::uint32_t n) const { return layout_->units()[n].id; }
 
   [[nodiscard]] HostInstant now() const { return now_; }
   [[nodiscard]] Coordinator& coordinator() { return *coordinator_; }
   [[nodiscard]] sim::World& world() { return *world_; }
   [[nodiscard]] const Layout& layout() const { return *layout_; }
-  [[nodiscard]] MemoryStore& store() { return store_; }
-  [[nodiscard]] const MemoryStore& store() const { return store_; }
-  /// The plan that the coordinator was given last.
-  [[nodiscard]] const Plan& last_plan() const { return last_plan_; }
+  [[nodiscard]] MemoryStore& store() { return storage.memory(); }
+  [[nodiscard]] const MemoryStore& store() const { return storage.memory(); }
   [[nodiscard]] std::uint64_t digest() const { return digest_; }
 
-  bool store_fails = false;
-  /// Rows that the store refuses beside those that it always does.
-  std::function<bool(const Row&)> refuse;
+  DelayedStore storage;
+  DelayedPlanner planner;
+  DelayedCamera camera;
   /// If set, the delay of the host between a step and sending its results.
   std::function<DurationNs()> held_up;
-  /// Changes the camera's findings of an exposure before the coordinator receives them.
-  std::function<void(ExposureDone*)> camera_fault;
-  /// Answers exposure jobs in place of that camera.
-  std::function<ExposureDone(const ExposureJob&)> measurer;
   std::vector<sim::WireFrame>* wire = nullptr;  // receives every frame of every bus, if set
   std::vector<OutFrame>* sent = nullptr;        // receives all frames of the coordinator, if set
 
  private:
   void StepOnce();
   void Perform(const Effects& effects);
-  [[nodiscard]] ExposureDone Expose(const ExposureJob& job);
 
-  struct Commit {
-    HostInstant at;
-    std::uint64_t batch;
-    std::vector<Row> rows;
-  };
-  struct Planning {
-    HostInstant at;
-    PlanJob job;
+  /// Inputs of the next step.
+  struct Pending {
+    std::vector<Command> commands;
+    std::vector<LinkEvent> links;
+    std::vector<ReceivedFrame> frames;
   };
 
   Options options_;
@@ -138,26 +120,12 @@ class InProcessFleet {
   std::unique_ptr<sim::World> world_;
   std::vector<SimulatedLink> controllers_;  // Shape: as the layout's buses
   std::unique_ptr<Coordinator> coordinator_;
-  MemoryStore store_;
   HostInstant now_{Seconds(1).ns};
   HostInstant wake_at_{0};
   HostInstant sync_at_ = kNever;
-  std::deque<Commit> commits_;
-  std::deque<Planning> planning_;
-  struct Exposing {
-    HostInstant at;
-    ExposureJob job;
-  };
-  std::deque<Exposing> exposing_;
-  Rng camera_noise_{1};
-  std::uint64_t committed_through_ = 0;
-  std::vector<RefusedRow> refused_;
-  std::vector<Command> commands_;
-  std::vector<LinkEvent> links_;
+  Pending inputs_;
   std::vector<ReplyEffect> replies_;
-  std::vector<ReceivedFrame> heard_;
   Effects effects_;
-  Plan last_plan_;
   std::uint64_t next_request_ = 1;
   std::uint64_t digest_ = 0xcbf29ce484222325u;
 };

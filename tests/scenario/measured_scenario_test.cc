@@ -10,6 +10,7 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Unserved;
@@ -54,9 +55,9 @@ void ExpectAccounted(InProcessFleet& fleet) {
   const ConfigurationView& view = fleet.coordinator().configuration();
   EXPECT_EQ(view.arrived + view.refused + view.failed + view.stopped + view.unmeasured,
             view.targeted);
-  EXPECT_EQ(view.arrived, fleet.CountOutcome(TargetOutcome::kArrived));
-  EXPECT_EQ(view.stopped, fleet.CountOutcome(TargetOutcome::kStopped));
-  EXPECT_EQ(view.unmeasured, fleet.CountOutcome(TargetOutcome::kUnmeasured));
+  EXPECT_EQ(view.arrived, CountOutcome(fleet, TargetOutcome::kArrived));
+  EXPECT_EQ(view.stopped, CountOutcome(fleet, TargetOutcome::kStopped));
+  EXPECT_EQ(view.unmeasured, CountOutcome(fleet, TargetOutcome::kUnmeasured));
   const ConfigurationRow& stored = fleet.store().configurations.back();
   EXPECT_EQ(stored.arrived, view.arrived);
   EXPECT_EQ(stored.stopped, view.stopped);
@@ -69,7 +70,7 @@ void ExpectAccounted(InProcessFleet& fleet) {
 
 TEST(Measured, NobodyHasArrivedWhereTheCameraIsDark) {
   InProcessFleet fleet(WithCamera(5));
-  fleet.camera_fault = [](ExposureDone* done) {
+  fleet.camera.fault = [](ExposureDone* done) {
     done->exposure = Fail(ErrorCode::kUnavailable, "nothing came from the camera");
   };
   fleet.ApplyRandomMeasured(1, {.corrections = 2, .tolerance_um = 10});
@@ -83,7 +84,7 @@ TEST(Measured, NobodyHasArrivedWhereTheCameraIsDark) {
 
 TEST(Measured, NobodyIsServedInAnObservedMoveThatNobodySaw) {
   InProcessFleet fleet(WithCamera(5));
-  fleet.camera_fault = [](ExposureDone* done) {
+  fleet.camera.fault = [](ExposureDone* done) {
     done->exposure = Fail(ErrorCode::kUnavailable, "nothing came from the camera");
   };
   fleet.ApplyRandomMeasured(1, {.observe = true});
@@ -97,7 +98,7 @@ TEST(Measured, CorrectionsThatNobodySawAreUnmeasured) {
   options.spread = sim::Spread::kReal;
   InProcessFleet fleet(options);
   int exposures = 0;
-  fleet.camera_fault = [&](ExposureDone* done) {
+  fleet.camera.fault = [&](ExposureDone* done) {
     if (++exposures > 1) done->exposure = Fail(ErrorCode::kUnavailable, "the light went off");
   };
   // The tolerance is so wide that some units are within it before any correction. They were seen
@@ -125,7 +126,7 @@ TEST(Measured, UnitsThatTheCameraDoesNotFindHaveNotArrived) {
       MeasurementStatus::kAmbiguous,     MeasurementStatus::kMissing,
       MeasurementStatus::kOutsidePatrol};
   InProcessFleet fleet(WithCamera(7));
-  fleet.camera_fault = [&](ExposureDone* done) {
+  fleet.camera.fault = [&](ExposureDone* done) {
     for (std::size_t k = 0; k < std::size(kUnsure); ++k) {
       done->exposure->measurements[2 * k].status = kUnsure[k];
       done->exposure->measurements[2 * k].place.reset();
@@ -214,7 +215,7 @@ TEST(Measured, AMeasurementFindsUnitsOfUnknownPlace) {
   ExpectPlacesAreTrue(fleet, 10);  // five times the camera's noise
   fleet.ApplyRandom(13);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u);
   fleet.Run(Seconds(1));
   ExpectPlacesAreTrue(fleet, kAfterAMoveUm);
 }
@@ -224,7 +225,7 @@ TEST(Measured, AMeasuredConfigurationLooksForLostUnitsFirst) {
   PutBackAnOldStore(&fleet);
   fleet.ApplyRandomMeasured(14, {.corrections = 1, .tolerance_um = 200});
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u) << Unserved(fleet);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u) << Unserved(fleet);
 }
 
 TEST(Measured, UnitsThatLostPowerInMidMoveAreFoundAndMoveAgain) {
@@ -249,7 +250,7 @@ TEST(Measured, UnitsThatLostPowerInMidMoveAreFoundAndMoveAgain) {
   ExpectPlacesAreTrue(fleet, 10);
   fleet.ApplyRandom(16);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u) << Unserved(fleet);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u) << Unserved(fleet);
   fleet.Run(Seconds(1));
   ExpectPlacesAreTrue(fleet, kAfterAMoveUm);
 }
@@ -257,7 +258,7 @@ TEST(Measured, UnitsThatLostPowerInMidMoveAreFoundAndMoveAgain) {
 TEST(Measured, ALookThatFailsFindsNobody) {
   InProcessFleet fleet(WithCamera(12));
   fleet.Run(Seconds(3));
-  fleet.camera_fault = [](ExposureDone* done) {
+  fleet.camera.fault = [](ExposureDone* done) {
     done->exposure = Fail(ErrorCode::kUnavailable, "nothing came from the camera");
   };
   fleet.Send({900, MeasureCommand{}});

@@ -10,10 +10,12 @@ namespace focalfleet {
 namespace {
 
 using test::ExpectOthersArrive;
+using test::ExpectStoreTellsTheTruth;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Small;
 using test::SomebodyMoving;
+using test::TruePoses;
 
 ReplyEffect Write(InProcessFleet* fleet, const WriteParameterCommand& command) {
   static std::uint64_t request = 5000;
@@ -57,14 +59,14 @@ TEST(Configuration, WritingItsPositionMakesAUnitKnown) {
   const UnitView& view = fleet.coordinator().unit(one);
   ASSERT_FALSE(IsPlace(view.knowledge));
   // The unit takes the nearest position that shows its vector, and the store records that position.
-  const Pose seen = fleet.TruePoses()[one.value];
+  const Pose seen = TruePoses(fleet)[one.value];
   for (const Axis axis : kAxes) {
     const auto reply = Write(&fleet, {one, axis, Parameter::kPosition, seen[Index(axis)] + 7});
     EXPECT_FALSE(reply.error);
     EXPECT_NE(reply.text.find("position = "), std::string::npos) << reply.text;
   }
   EXPECT_TRUE(IsPlace(view.knowledge));
-  fleet.ExpectStoreTellsTheTruth("after it was written");
+  ExpectStoreTellsTheTruth(fleet, "after it was written");
   fleet.Restart();
   fleet.Run(Seconds(5));
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit(one).knowledge)) << "and after a restart";

@@ -13,11 +13,14 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::ExpectOthersArrive;
+using test::ExpectStoreTellsTheTruth;
 using test::HasAlarm;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Small;
+using test::StopDirectly;
 using test::Unserved;
 
 // Cuts the homing of a unit after `ms` by `cut`. A position may only be claimed where the unit was
@@ -39,7 +42,7 @@ void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*
   EXPECT_TRUE(IsUnserved(view.outcome)) << when;
   EXPECT_FALSE(IsPlace(fleet.store().Vector(view.serial)->knowledge)) << when;
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
-  fleet.ExpectStoreTellsTheTruth(when);
+  ExpectStoreTellsTheTruth(fleet, when);
   // The unit is homed again, and then its position is known.
   fleet.Send({901, EnableCommand{{{4}}}});
   fleet.Run(Seconds(2));
@@ -48,7 +51,7 @@ void ExpectCutHomingIsNotAPlace(int ms, const std::function<void(InProcessFleet*
   EXPECT_EQ(view.outcome, TargetOutcome::kArrived) << when << " " << view.outcome_reason;
   EXPECT_TRUE(IsPlace(view.knowledge)) << when;
   fleet.Run(Milliseconds(100));
-  fleet.ExpectStoreTellsTheTruth(when);
+  ExpectStoreTellsTheTruth(fleet, when);
 }
 
 TEST(Configuration, CutHomingIsNotAPlace) {
@@ -59,7 +62,7 @@ TEST(Configuration, CutHomingIsNotAPlace) {
     ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
       fleet->Send({910, StopCommand{PositionerIndex{4}}});
     });
-    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) { fleet->StopDirectly(); });
+    ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) { StopDirectly(fleet); });
     ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
       fleet->world().RaiseFault(fleet->id(4), FaultCode::kDriver);
     });
@@ -75,13 +78,13 @@ TEST(Configuration, KilledWhileHomingTheStoreTellsTheTruth) {
       fleet.Run(Seconds(2));
       fleet.Send({900, HomeCommand{{{4}}, true}});
       fleet.Run(Milliseconds(ms));
-      if (stopped) fleet.StopDirectly();
+      if (stopped) StopDirectly(&fleet);
       fleet.Restart();
       fleet.Run(Seconds(90));
       const UnitView& view = fleet.coordinator().unit({4});
       EXPECT_EQ(view.phase, UnitPhase::kReady) << when;
       EXPECT_TRUE(stopped || IsPlace(view.knowledge)) << when;
-      fleet.ExpectStoreTellsTheTruth(when);
+      ExpectStoreTellsTheTruth(fleet, when);
     }
   }
 }
@@ -103,7 +106,7 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
       fleet.world().PowerOn(victim);
     }
     fleet.Run(Seconds(120));
-    fleet.ExpectStoreTellsTheTruth("after the kill");
+    ExpectStoreTellsTheTruth(fleet, "after the kill");
     std::vector<PositionerIndex> lost;
     for (std::uint32_t n = 0; n < 19; ++n) {
       const UnitView& view = fleet.coordinator().unit({n});
@@ -118,12 +121,12 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
       // With the coordinator dead no unit was kept away from it: a neighbour may stand inside its
       // interval. No way home can be proven then. The coordinator reports that and leaves the
       // decision to the operator.
-      if (fleet.CountOutcome(TargetOutcome::kArrived) != lost.size()) {
+      if (CountOutcome(fleet, TargetOutcome::kArrived) != lost.size()) {
         ++unproven;
         fleet.Send({904, HomeCommand{lost, true}});
         ASSERT_TRUE(fleet.RunUntilIdle());
       }
-      EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), lost.size()) << Unserved(fleet);
+      EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), lost.size()) << Unserved(fleet);
     }
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());

@@ -11,13 +11,17 @@
 #include "fleet/targets.h"
 #include "protocol/base/rng.h"
 #include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
+using test::ExpectStoreTellsTheTruth;
 using test::InProcessFleet;
 using test::TestSeed;
+using test::TruePoses;
 
 constexpr std::uint64_t kRequest = 7000;
 
@@ -86,7 +90,7 @@ class Retargeting {
  private:
   double Nearest() {
     const auto& layout = fleet.layout();
-    const std::vector<Pose> poses = fleet.TruePoses();
+    const std::vector<Pose> poses = TruePoses(fleet);
     const auto arm = [&](std::uint32_t n) {
       return ArmAt(layout.unit({n}), fleet.coordinator().drives()[n], poses[n]);
     };
@@ -142,12 +146,12 @@ TEST(Retarget, MovingUnitGoesToItsNewTargetAndAllOthersGoOn) {
       EXPECT_EQ(run.fleet.world().Truth(n).moves_begun, 1u) << n;
       EXPECT_EQ(run.fleet.coordinator().unit({n}).outcome, TargetOutcome::kArrived) << n;
     }
-    run.fleet.ExpectStoreTellsTheTruth("at the end");
+    ExpectStoreTellsTheTruth(run.fleet, "at the end");
     EXPECT_TRUE(run.fleet.store().fleet.open_intents.empty());
     const ConfigurationView& configuration = run.fleet.coordinator().configuration();
     EXPECT_EQ(configuration.targeted, 37u);
-    EXPECT_EQ(configuration.arrived, run.fleet.CountOutcome(TargetOutcome::kArrived));
-    EXPECT_EQ(configuration.refused, run.fleet.CountOutcome(TargetOutcome::kRefused));
+    EXPECT_EQ(configuration.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
+    EXPECT_EQ(configuration.refused, CountOutcome(run.fleet, TargetOutcome::kRefused));
   }
   std::printf("%d new targets: %d arrived, %d refused; %d configurations in one round\n", draws,
               arrived, refused, one_round);
@@ -225,7 +229,7 @@ TEST(Retarget, UnitAtRestGoes) {
     EXPECT_EQ(view.outcome, TargetOutcome::kArrived) << view.outcome_reason;
     EXPECT_EQ(PlaceOf(view.knowledge), target);
     EXPECT_EQ(run.fleet.coordinator().configuration().targeted, 37u);
-    EXPECT_EQ(run.fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+    EXPECT_EQ(CountOutcome(run.fleet, TargetOutcome::kArrived), 37u);
   }
 }
 
@@ -297,10 +301,10 @@ void Disturb(std::uint64_t seed, DurationNs after,
     const sim::UnitTruth truth = run.fleet.world().Truth(n);
     EXPECT_TRUE(!truth.powered || truth.state != UnitState::kMoving) << n;
   }
-  run.fleet.ExpectStoreTellsTheTruth("at the end");
+  ExpectStoreTellsTheTruth(run.fleet, "at the end");
   EXPECT_TRUE(run.fleet.LastReply(kRequest));
   if (!others_arrive) return;
-  EXPECT_GE(run.fleet.CountOutcome(TargetOutcome::kArrived), 37u - 5u);
+  EXPECT_GE(CountOutcome(run.fleet, TargetOutcome::kArrived), 37u - 5u);
 }
 
 TEST(Retarget, StopOfAllAtAnyStageEndsIt) {
@@ -337,8 +341,8 @@ TEST(Retarget, AStoppedUnitThatGetsAnotherTargetIsCountedOnce) {
   run.Send(unit, run.DrawTarget(unit, 1));
   ASSERT_TRUE(run.fleet.RunUntilIdle());
   const ConfigurationView& view = run.fleet.coordinator().configuration();
-  EXPECT_EQ(view.stopped, run.fleet.CountOutcome(TargetOutcome::kStopped));
-  EXPECT_EQ(view.arrived, run.fleet.CountOutcome(TargetOutcome::kArrived));
+  EXPECT_EQ(view.stopped, CountOutcome(run.fleet, TargetOutcome::kStopped));
+  EXPECT_EQ(view.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
   EXPECT_EQ(view.arrived + view.refused + view.failed + view.stopped + view.unmeasured,
             view.targeted);
 }
@@ -380,9 +384,9 @@ TEST(Retarget, LostFramesAndASlowStoreDelayIt) {
   Disturb(
       TestSeed(565), Milliseconds(50),
       [](Retargeting* run, PositionerIndex) {
-        run->fleet.store_fails = true;
+        run->fleet.storage.fails = true;
         run->fleet.Run(Seconds(4));
-        run->fleet.store_fails = false;
+        run->fleet.storage.fails = false;
       },
       true);
 }
@@ -412,12 +416,12 @@ TEST(Retarget, KilledAtAnyStageTheStoreTellsTheTruth) {
     run.fleet.Run(Milliseconds(ms));
     run.fleet.Restart();
     run.fleet.Run(Seconds(90));
-    run.fleet.ExpectStoreTellsTheTruth("after the restart");
+    ExpectStoreTellsTheTruth(run.fleet, "after the restart");
     EXPECT_TRUE(run.fleet.store().fleet.open_intents.empty());
     run.fleet.ApplyRandom(seed + 1);
     ASSERT_TRUE(run.fleet.RunUntilIdle());
     run.fleet.Run(Milliseconds(100));
-    run.fleet.ExpectStoreTellsTheTruth("after the next configuration");
+    ExpectStoreTellsTheTruth(run.fleet, "after the next configuration");
   }
 }
 
@@ -449,7 +453,7 @@ TEST(Retarget, WhoMissedTheStartGoesLateInTheSameRound) {
     late += run.fleet.coordinator().configuration().round == 1 ? 1 : 0;
     EXPECT_EQ(run.fleet.coordinator().unit({5}).outcome, TargetOutcome::kArrived)
         << run.fleet.coordinator().unit({5}).outcome_reason;
-    run.fleet.ExpectStoreTellsTheTruth("at the end");
+    ExpectStoreTellsTheTruth(run.fleet, "at the end");
   }
   std::printf("%d of %d went in the same round\n", late, draws);
   EXPECT_GE(late, draws / 2);

@@ -10,6 +10,7 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::HasAlarm;
 using test::InProcessFleet;
 using test::Small;
@@ -31,7 +32,7 @@ TEST(Configuration, ForeignHardwareIsNotMovedUntilAdopted) {
   EXPECT_EQ(fleet.coordinator().unit({2}).phase, UnitPhase::kReady);
   fleet.ApplyRandom(27);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u);
 }
 
 TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
@@ -42,7 +43,7 @@ TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
     fleet.Restart();
     fleet.ApplyRandom(44);
     ASSERT_TRUE(fleet.RunUntilIdle()) << "a batch that the store refuses holds up all others";
-    EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 37u - 7u);
+    EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 37u - 7u);
     EXPECT_EQ(fleet.coordinator().unit({5}).outcome, TargetOutcome::kFailed);
     EXPECT_NE(fleet.coordinator().unit({5}).outcome_reason.find("serial number 0"),
               std::string::npos);

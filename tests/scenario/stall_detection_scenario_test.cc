@@ -9,10 +9,14 @@
 #include "fleet/coordinate/stall_detection.h"
 #include "protocol/base/rng.h"
 #include "tests/scenario/in_process_fleet.h"
+#include "tests/scenario/steps.h"
 #include "tests/support/seed.h"
 
 namespace focalfleet {
 namespace {
+
+using test::InProcessFleet;
+using test::TestSeed;
 
 constexpr double kSlackS = 1.2;  // both units still move for this long
 
@@ -32,12 +36,12 @@ class Noticed : public ::testing::Test {
         Seconds(60)));
     started_ = fleet_->coordinator().configuration().started;
     pairs_.clear();
-    for (const UnitPlan& move : fleet_->last_plan().moves)
+    for (const UnitPlan& move : fleet_->planner.last_plan().moves)
       for (const UnitPlan::Follower& follower : move.followers)
         pairs_.push_back({move.unit, follower});
   }
   [[nodiscard]] double EndOf(PositionerIndex i) const {
-    for (const UnitPlan& move : fleet_->last_plan().moves)
+    for (const UnitPlan& move : fleet_->planner.last_plan().moves)
       if (move.unit == i) return focalfleet::EndOf(move, UnitDrive{});
     return 0;
   }
@@ -261,9 +265,9 @@ TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
   fleet.Run(Milliseconds(240));
   each_bus({});
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 61u);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 61u);
   EXPECT_EQ(fleet.coordinator().configuration().round, 1u);
-  fleet.ExpectStoreTellsTheTruth("after a late start");
+  ExpectStoreTellsTheTruth(fleet, "after a late start");
 }
 
 }  // namespace

@@ -13,12 +13,15 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::ExpectOthersArrive;
+using test::ExpectStoreTellsTheTruth;
 using test::HasAlarm;
 using test::InProcessFleet;
 using test::RunIntoMotion;
 using test::Small;
 using test::SomebodyMoving;
+using test::StopDirectly;
 using test::Unserved;
 
 TEST(Configuration, StopOfAllLeavesEveryUnitAtAKnownPlace) {
@@ -33,7 +36,7 @@ TEST(Configuration, StopOfAllLeavesEveryUnitAtAKnownPlace) {
     EXPECT_NE(fleet.world().Truth(n).state, UnitState::kMoving) << n;
   }
   fleet.Run(Milliseconds(100));
-  fleet.ExpectStoreTellsTheTruth("after the stop");
+  ExpectStoreTellsTheTruth(fleet, "after the stop");
   fleet.ApplyRandom(23);
   ASSERT_TRUE(fleet.RunUntilIdle());
   ExpectOthersArrive(&fleet, 0);
@@ -50,7 +53,7 @@ TEST(Configuration, StopInEveryStateEndsTheConfiguration) {
     fleet.Run(Seconds(2));
     for (std::uint32_t n = 0; n < 37; ++n)
       EXPECT_EQ(fleet.world().Truth(n).state, UnitState::kRest) << ms << " ms, row " << n;
-    fleet.ExpectStoreTellsTheTruth(std::to_string(ms) + " ms");
+    ExpectStoreTellsTheTruth(fleet, std::to_string(ms) + " ms");
   }
 }
 
@@ -78,7 +81,7 @@ TEST(Configuration, AStopIsAnOutcomeOfItsOwn) {
   EXPECT_EQ(view.failed, 0u) << "nobody failed";
   EXPECT_GT(view.stopped, 20u);
   EXPECT_EQ(view.stopped + view.arrived + view.refused, view.targeted);
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kStopped), view.stopped);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kStopped), view.stopped);
   EXPECT_EQ(fleet.store().configurations.back().stopped, view.stopped);
   ASSERT_TRUE(fleet.LastReply(request));
   EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
@@ -89,7 +92,7 @@ TEST(Configuration, AStopIsAnOutcomeOfItsOwn) {
 void ExpectStoppedForGood(InProcessFleet* fleet, const std::string& when) {
   ASSERT_TRUE(fleet->RunUntilIdle(Seconds(20))) << when;
   EXPECT_EQ(fleet->coordinator().configuration().state, ConfigurationState::kStopped) << when;
-  EXPECT_EQ(fleet->CountOutcome(TargetOutcome::kPending), 0u) << when;
+  EXPECT_EQ(CountOutcome(*fleet, TargetOutcome::kPending), 0u) << when;
   std::vector<std::uint32_t> begun;
   for (std::uint32_t n = 0; n < fleet->layout().size(); ++n)
     begun.push_back(fleet->world().Truth(n).moves_begun);
@@ -100,11 +103,11 @@ void ExpectStoppedForGood(InProcessFleet* fleet, const std::string& when) {
     EXPECT_EQ(fleet->world().Truth(n).moves_begun, begun[n]) << when << ", row " << n;
     EXPECT_TRUE(IsPlace(fleet->coordinator().unit({n}).knowledge)) << when << ", row " << n;
   }
-  fleet->ExpectStoreTellsTheTruth(when);
+  ExpectStoreTellsTheTruth(*fleet, when);
   const auto again = fleet->ApplyRandom(24);
   ASSERT_TRUE(fleet->RunUntilIdle()) << when;
   EXPECT_FALSE(fleet->LastReply(again)->error) << when;
-  EXPECT_EQ(fleet->CountOutcome(TargetOutcome::kArrived), 37u) << when << "\n" << Unserved(*fleet);
+  EXPECT_EQ(CountOutcome(*fleet, TargetOutcome::kArrived), 37u) << when << "\n" << Unserved(*fleet);
 }
 
 TEST(Configuration, StopOfSomebodyElseEndsItInEveryState) {
@@ -113,7 +116,7 @@ TEST(Configuration, StopOfSomebodyElseEndsItInEveryState) {
     fleet.Run(Seconds(1));
     const auto request = fleet.ApplyRandom(24);
     fleet.Run(Milliseconds(ms));
-    fleet.StopDirectly();
+    StopDirectly(&fleet);
     ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
     EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
   }
@@ -126,7 +129,7 @@ TEST(Configuration, StopOfSomebodyElseHoldsWhileTheCoordinatorStoodStill) {
       fleet.ApplyRandom(24);
       RunIntoMotion(&fleet, Seconds(3));
       fleet.Freeze(Milliseconds(100), InProcessFleet::Heard::kWaits);
-      fleet.StopDirectly();
+      StopDirectly(&fleet);
       fleet.Freeze(Milliseconds(ms), heard);
       ExpectStoppedForGood(&fleet, std::to_string(ms) + " ms");
     }
@@ -144,7 +147,7 @@ TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
-    fleet.ExpectStoreTellsTheTruth("with late answers");
+    ExpectStoreTellsTheTruth(fleet, "with late answers");
   }
 }
 

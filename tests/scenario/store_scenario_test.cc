@@ -10,6 +10,7 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::ExpectOthersArrive;
 using test::HasAlarm;
 using test::InProcessFleet;
@@ -36,17 +37,17 @@ TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
   fleet.Run(Seconds(5));
   fleet.ApplyRandom(7);
   fleet.Run(Milliseconds(25));
-  fleet.store_fails = true;
+  fleet.storage.fails = true;
   fleet.Run(Seconds(30));
   for (std::size_t n = 0; n < fleet.layout().size(); ++n)
     EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u);
   EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kUploading);
   EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "the store, which cannot be written");
-  fleet.store_fails = false;
+  fleet.storage.fails = false;
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().configuration().waiting_for, "");
-  EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kArrived), 37u);
-  fleet.store_fails = true;
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u);
+  fleet.storage.fails = true;
   const auto refused = fleet.ApplyRandom(8);
   fleet.Run(Seconds(1));
   ASSERT_TRUE(fleet.LastReply(refused));
@@ -56,7 +57,7 @@ TEST(Configuration, FailingStoreStartsNothingAndRefusesTheNext) {
 TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
   InProcessFleet fleet(Small(45));
   fleet.Run(Seconds(3));
-  fleet.refuse = [](const Row& row) {
+  fleet.storage.refuse = [](const Row& row) {
     const auto* intent = std::get_if<IntentRow>(&row);
     return intent != nullptr && intent->unit == UnitId{8};
   };
@@ -67,7 +68,7 @@ TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
   EXPECT_TRUE(HasAlarm(fleet, "the store refuses the intent of serial"));
   ExpectOthersArrive(&fleet, 4);
   // The unit stays out until an operator reports that it is repaired.
-  fleet.refuse = nullptr;
+  fleet.storage.refuse = nullptr;
   fleet.Run(Seconds(30));
   EXPECT_EQ(fleet.coordinator().unit({7}).phase, UnitPhase::kFault);
   fleet.Send({900, EnableCommand{{{7}}, true, {}}});
@@ -78,7 +79,7 @@ TEST(Configuration, ARowThatTheStoreRefusesTakesItsUnitAloneOut) {
 TEST(Configuration, ACommandWhoseRowIsRefusedIsNotDone) {
   InProcessFleet fleet(Small(46));
   fleet.Run(Seconds(3));
-  fleet.refuse = [](const Row& row) { return std::holds_alternative<ModelRow>(row); };
+  fleet.storage.refuse = [](const Row& row) { return std::holds_alternative<ModelRow>(row); };
   fleet.Send({900, KeepModelCommand{{.entry = 1}}});
   fleet.Send({901, EnableCommand{{{5}}, false, "fibre broken"}});
   fleet.Run(Seconds(1));
@@ -90,7 +91,7 @@ TEST(Configuration, ACommandWhoseRowIsRefusedIsNotDone) {
 TEST(Configuration, AnAlarmThatTheStoreRefusesBegetsNoOther) {
   InProcessFleet fleet(Small(49));
   std::size_t refused = 0;
-  fleet.refuse = [&refused](const Row& row) {
+  fleet.storage.refuse = [&refused](const Row& row) {
     const bool is_alarm = std::holds_alternative<AlarmRow>(row);
     refused += is_alarm ? 1u : 0u;
     return is_alarm;
@@ -120,7 +121,7 @@ TEST(Configuration, WhatTheStoreDoesNotTakeIsNotDone) {
   fleet.Run(Seconds(5));
   fleet.Send({900, EnableCommand{{{5}}, false, "fibre broken"}});
   fleet.Run(Milliseconds(1));
-  fleet.store_fails = true;  // before this one is durable
+  fleet.storage.fails = true;  // before this one is durable
   fleet.Run(Seconds(1));
   fleet.Send({901, EnableCommand{{{6}}, false, "too"}});
   fleet.Send({902, WriteParameterCommand{{7}, Axis::kTheta, Parameter::kRepeat, 54}});

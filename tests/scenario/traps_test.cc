@@ -26,9 +26,13 @@ using test::CheckedRow;
 using test::CheckedUnit;
 using test::CheckPlan;
 using test::CheckReport;
+using test::CountOutcome;
 using test::ExpectOthersArrive;
+using test::ExpectStoreTellsTheTruth;
 using test::HasAlarm;
 using test::InProcessFleet;
+using test::StopDirectly;
+using test::TruePoses;
 using test::Unserved;
 
 bool RunUntilUploading(InProcessFleet* fleet) {
@@ -57,7 +61,7 @@ TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
         EXPECT_EQ(fleet.coordinator().unit({n}).outcome, TargetOutcome::kFailed) << n;
         EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u) << n;
       }
-    EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 25u) << Unserved(fleet);
+    EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 25u) << Unserved(fleet);
     fleet.world().ReviveBus(dead);
     if (reported) fleet.ReportLink({dead, LinkState::kUp, ""});
     fleet.Run(Seconds(10));
@@ -98,7 +102,7 @@ TEST(HostGone, WhatMovesFinishesAndNothingElseBegins) {
     }
     fleet.Restart();
     fleet.Run(Seconds(10));
-    fleet.ExpectStoreTellsTheTruth(when);
+    ExpectStoreTellsTheTruth(fleet, when);
     for (std::uint32_t n = 0; n < 37; ++n)
       EXPECT_EQ(fleet.coordinator().unit({n}).phase, UnitPhase::kReady) << when << ", row " << n;
     fleet.ApplyRandom(83);
@@ -125,7 +129,7 @@ void MoveByAnotherHost(InProcessFleet* fleet, std::uint32_t row, std::int32_t de
 
 /// A move away from the end of the unit's range, so that the unit accepts it.
 std::int32_t RoomyDelta(InProcessFleet* fleet, std::uint32_t row, std::int32_t size) {
-  return fleet->TruePoses()[row][0] > 0 ? -size : size;
+  return TruePoses(*fleet)[row][0] > 0 ? -size : size;
 }
 
 TEST(HostGone, UnitThatWasMovedMeanwhileIsNotBelievedToStandWhereItStood) {
@@ -144,7 +148,7 @@ TEST(HostGone, UnitThatWasMovedMeanwhileIsNotBelievedToStandWhereItStood) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({7}).outcome, TargetOutcome::kRefused);
   EXPECT_EQ(fleet.world().Truth(std::size_t{7}).moves_begun, 2u);
-  fleet.ExpectStoreTellsTheTruth("after it was moved by somebody else");
+  ExpectStoreTellsTheTruth(fleet, "after it was moved by somebody else");
 }
 
 // The unit was armed by a run that was killed, and has not been heard since. The unit must not go
@@ -164,7 +168,7 @@ TEST(HostGone, WhatAnEarlierRunArmedNeverStarts) {
     fleet.ApplyRandom(98);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_EQ(fleet.world().Truth(std::size_t{12}).moves_begun, 0u) << ms;
-    EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 30u) << Unserved(fleet);
+    EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 30u) << Unserved(fleet);
   }
 }
 
@@ -181,7 +185,7 @@ TEST(Rest, UnitThatLosesPowerBetweenConfigurationsIsNoticed) {
   fleet.Run(Seconds(5));
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kReady);
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit({3}).knowledge));
-  fleet.ExpectStoreTellsTheTruth("after its return");
+  ExpectStoreTellsTheTruth(fleet, "after its return");
 }
 
 // ---- stops
@@ -196,7 +200,7 @@ TEST(Stop, LeavesTheEvidenceOfAFault) {
         [&] { return fleet.world().Truth(std::size_t{3}).state == UnitState::kFault; },
         Seconds(60)));
     if (direct)
-      fleet.StopDirectly();
+      StopDirectly(&fleet);
     else
       fleet.Send({900, StopCommand{}});
     ASSERT_TRUE(fleet.RunUntilIdle(Seconds(30)));
@@ -288,7 +292,7 @@ TEST(Refused, CommandsLeaveAConfigurationAsItIs) {
     EXPECT_TRUE(!disturbed || request > 1100) << "or this tries nothing";
     ExpectOthersArrive(&fleet, 0);
     digests[disturbed ? 1 : 0] = fleet.digest();
-    ends[disturbed ? 1 : 0] = fleet.TruePoses();
+    ends[disturbed ? 1 : 0] = TruePoses(fleet);
   }
   EXPECT_EQ(digests[0], digests[1]) << "every frame and its instant";
   EXPECT_EQ(ends[0], ends[1]);
@@ -303,7 +307,7 @@ TEST(Limits, TargetOutOfAnAxisRangeIsRefusedByName) {
       const AxisGeometry& geometry = unit.axis[Index(axis)];
       const AxisDrive& drive = fleet.coordinator().drives()[2].axis[Index(axis)];
       std::vector<std::optional<Pose>> targets(7);
-      targets[2] = fleet.TruePoses()[2];
+      targets[2] = TruePoses(fleet)[2];
       (*targets[2])[Index(axis)] =
           NearestVectors(side < 0 ? geometry.min_deg : geometry.max_deg, geometry, drive) +
           side * 200;

@@ -10,6 +10,11 @@
 namespace focalfleet {
 namespace {
 
+using test::InProcessFleet;
+using test::MeasureUpload;
+using test::TestSeed;
+using test::UploadOnWire;
+
 /// The frames of the first upload of a random configuration, until the units move.
 std::vector<sim::WireFrame> UploadOf(InProcessFleet* fleet, std::uint64_t seed) {
   fleet->Run(Milliseconds(2500));  // all units have been read

@@ -16,7 +16,9 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
 using test::ExpectOthersArrive;
+using test::ExpectStoreTellsTheTruth;
 using test::HasAlarm;
 using test::InProcessFleet;
 using test::Unserved;
@@ -39,7 +41,7 @@ void ExpectNothingStarted(InProcessFleet& fleet, const std::string& part, const 
         << when << ", row " << n << ": " << view.outcome_reason;
   }
   fleet.Run(Milliseconds(100));
-  fleet.ExpectStoreTellsTheTruth(when);
+  ExpectStoreTellsTheTruth(fleet, when);
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty()) << when;
 }
 
@@ -78,7 +80,7 @@ TEST(WrongAnswer, NobodyAnswersAndNothingStarts) {
     fleet.ApplyRandom(61);
     ASSERT_TRUE(fleet.RunUntilIdle(Seconds(60))) << when;
     EXPECT_EQ(Begun(fleet), 0u) << when;
-    EXPECT_EQ(fleet.CountOutcome(TargetOutcome::kFailed), 7u) << when << "\n" << Unserved(fleet);
+    EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kFailed), 7u) << when << "\n" << Unserved(fleet);
     for (std::uint32_t n = 0; n < 7; ++n)
       EXPECT_NE(fleet.coordinator().unit({n}).outcome_reason, "") << when;
   }
@@ -110,7 +112,7 @@ TEST(WrongAnswer, RefusedHomingIsNamed) {
   fleet.Run(Seconds(2));
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit({2}).knowledge)) << "it has not moved";
   EXPECT_TRUE(fleet.store().fleet.open_intents.empty());
-  fleet.ExpectStoreTellsTheTruth("after the refusal");
+  ExpectStoreTellsTheTruth(fleet, "after the refusal");
 }
 
 // ---- one unit among many
@@ -274,7 +276,7 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
             "it speaks protocol version 0, not 1 or 2");
   EXPECT_EQ(fleet.coordinator().unit({11}).knowledge[0].witness, Witness::kUnknown);
   EXPECT_EQ(fleet.world().Truth(std::size_t{11}).moves_begun, 1u);
-  EXPECT_GE(fleet.CountOutcome(TargetOutcome::kArrived), 30u) << Unserved(fleet);
+  EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 30u) << Unserved(fleet);
   const Unit& unit = fleet.layout().units()[11];
   int asked = 0;
   for (const OutFrame& out : sent) {

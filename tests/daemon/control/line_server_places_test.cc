@@ -19,9 +19,9 @@ namespace {
 using ::testing::HasSubstr;
 
 /// Clients that connected one after the other, each taken by the server.
-class Crowd {
+class Clients {
  public:
-  Crowd(const std::string& path, LineServer* server) : path_(path), server_(server) {}
+  Clients(const std::string& path, LineServer* server) : path_(path), server_(server) {}
   /// A client whose line is read, and not handed out.
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(path_));
@@ -53,51 +53,51 @@ bool Ended(const RawClient& client, std::string* said) {
 TEST(LineServer, AnIdleClientMakesRoomForANewcomerAndIsReportedWhy) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 3}).value();
-  Crowd crowd(scratch / "s", &server);
-  for (int i = 0; i < 3; ++i) crowd.Add();
-  crowd[0].Send("status\n");  // so that the second one is idle longest
+  Clients clients(scratch / "s", &server);
+  for (int i = 0; i < 3; ++i) clients.Add();
+  clients[0].Send("status\n");  // so that the second one is idle longest
   server.Answer(Drain(&server).at(0).client, "fine");
-  crowd.Add("hello\n");
+  clients.Add("hello\n");
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].text, "hello");
   EXPECT_FALSE(lines[0].reserved);
   EXPECT_EQ(server.clients(), 3u);
   std::string said;
-  EXPECT_TRUE(Ended(crowd[1], &said));
+  EXPECT_TRUE(Ended(clients[1], &said));
   EXPECT_THAT(said, HasSubstr("this one was idle longest"));
-  EXPECT_FALSE(Ended(crowd[0], &said));
+  EXPECT_FALSE(Ended(clients[0], &said));
   EXPECT_EQ(said, "fine\n");
-  EXPECT_FALSE(Ended(crowd[2], &said));
+  EXPECT_FALSE(Ended(clients[2], &said));
 }
 
 TEST(LineServer, AClientThatNeverCompletesALineAgesAsAnIdleOne) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 2}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.Add("drip");
-  crowd.Add();
+  Clients clients(scratch / "s", &server);
+  clients.Add("drip");
+  clients.Add();
   for (int i = 0; i < 10; ++i) {
-    crowd[0].Send("x");
+    clients[0].Send("x");
     OnlyUrgent(&server);
   }
-  crowd.Add("hello\n");
+  clients.Add("hello\n");
   EXPECT_EQ(Drain(&server).size(), 1u);
   std::string said;
-  EXPECT_TRUE(Ended(crowd[0], &said));
-  EXPECT_FALSE(Ended(crowd[1], &said));
+  EXPECT_TRUE(Ended(clients[0], &said));
+  EXPECT_FALSE(Ended(clients[1], &said));
 }
 
 TEST(LineServer, AClientThatDoesNotReadItsAnswersAgesAsAnIdleOne) {
   const test::ScratchFolder scratch;
   auto server =
       LineServer::Create(scratch / "s", {.output_bytes_pause = 10'000, .clients_max = 1}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.Add("state\nstate\n");
+  Clients clients(scratch / "s", &server);
+  clients.Add("state\nstate\n");
   const auto asked = server.Next();
   ASSERT_TRUE(asked);
   server.Answer(asked->client, std::string(2'000'000, 'y'));
-  crowd.Add("hello\n");
+  clients.Add("hello\n");
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].text, "hello");
@@ -110,13 +110,13 @@ TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
       LineServer::Create(scratch / "s",
                          {.output_bytes_pause = 10'000, .clients_max = 1, .reserved_max = 0})
           .value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.Add("state\n");
+  Clients clients(scratch / "s", &server);
+  clients.Add("state\n");
   const auto asked = server.Next();
   ASSERT_TRUE(asked);
   server.Answer(asked->client, std::string(2'000'000, 'y'));
-  crowd[0].Send("state\n");
-  crowd.Add("hello\n");
+  clients[0].Send("state\n");
+  clients.Add("hello\n");
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].text, "hello");
@@ -125,10 +125,10 @@ TEST(LineServer, AClientThatSendsOnAndDoesNotReadAgesAsAnIdleOne) {
 TEST(LineServer, SomethingAskedButNotReadYetIsNotIdle) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.Add();
+  Clients clients(scratch / "s", &server);
+  clients.Add();
   const RawClient newcomer(scratch / "s");
-  crowd[0].Send("status\n");  // both come before the server's next turn
+  clients[0].Send("status\n");  // both come before the server's next turn
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_EQ(lines[0].text, "status");
@@ -142,9 +142,9 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
   auto server =
       LineServer::Create(scratch / "s", {.clients_max = 2, .urgent = IsStop, .reserved_max = 2})
           .value();
-  Crowd crowd(scratch / "s", &server);
-  for (int i = 0; i < 2; ++i) crowd.AddBusy();
-  crowd.Add();
+  Clients clients(scratch / "s", &server);
+  for (int i = 0; i < 2; ++i) clients.AddBusy();
+  clients.Add();
   EXPECT_EQ(server.clients(), 3u);
   const RawClient stopper(scratch / "s");
   const RawClient asker(scratch / "s");  // in the place of the idle one
@@ -157,16 +157,16 @@ TEST(LineServer, WhereAllAreBusyReservedPlacesAreLeft) {
   EXPECT_TRUE(lines[0].reserved);
   EXPECT_TRUE(lines[1].reserved) << "the answer can say that only stop is taken";
   std::string said;
-  EXPECT_FALSE(Ended(crowd[0], &said)) << "a client with an open request keeps its place";
+  EXPECT_FALSE(Ended(clients[0], &said)) << "a client with an open request keeps its place";
 }
 
 TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 20}).value();
-  Crowd crowd(scratch / "s", &server);
-  for (int i = 0; i < 20; ++i) crowd.AddBusy();
+  Clients clients(scratch / "s", &server);
+  for (int i = 0; i < 20; ++i) clients.AddBusy();
   std::string said;
-  EXPECT_TRUE(Ended(crowd.Add("hello\n"), &said));
+  EXPECT_TRUE(Ended(clients.Add("hello\n"), &said));
   EXPECT_THAT(said, HasSubstr("too many clients"));
   EXPECT_EQ(server.clients(), 20u);
 }
@@ -174,11 +174,11 @@ TEST(LineServer, WithoutAnythingUrgentNoPlaceIsReservedAndOneTooManyIsReported) 
 TEST(LineServer, AClientInAReservedPlaceGetsAnotherOneAsSoonAsThereIsOne) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.clients_max = 1, .urgent = IsStop}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.AddBusy();
-  crowd.Add();
-  crowd[0].Close();
-  crowd[1].Send("status\n");
+  Clients clients(scratch / "s", &server);
+  clients.AddBusy();
+  clients.Add();
+  clients[0].Close();
+  clients[1].Send("status\n");
   OnlyUrgent(&server);
   const auto lines = Drain(&server);
   ASSERT_EQ(lines.size(), 1u);
@@ -219,8 +219,8 @@ class NoDescriptors {
 TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.Add();
+  Clients clients(scratch / "s", &server);
+  clients.Add();
   const RawClient newcomer(scratch / "s");
   newcomer.Send("status\n");
   const NoDescriptors none;
@@ -228,14 +228,14 @@ TEST(LineServer, WithoutDescriptorsAnIdleClientMakesRoom) {
   ASSERT_EQ(lines.size(), 1u);
   EXPECT_FALSE(lines[0].reserved);
   std::string said;
-  EXPECT_TRUE(Ended(crowd[0], &said));
+  EXPECT_TRUE(Ended(clients[0], &said));
 }
 
 TEST(LineServer, WithoutDescriptorsAStopComesThroughAndNothingSpins) {
   const test::ScratchFolder scratch;
   auto server = LineServer::Create(scratch / "s", {.urgent = IsStop, .reserved_max = 1}).value();
-  Crowd crowd(scratch / "s", &server);
-  crowd.AddBusy();
+  Clients clients(scratch / "s", &server);
+  clients.AddBusy();
   const RawClient first(scratch / "s");
   const RawClient second(scratch / "s");
   first.Send("stop\n");

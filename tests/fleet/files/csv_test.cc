@@ -216,7 +216,7 @@ TEST(CsvRow, ReadsFlagsAsNumbersAndAsOthersWriteThem) {
                                "' is neither 0 nor 1 (nor false nor true)");
 }
 
-TEST(CsvRow, WholeNumbersEndWhereTheyAreNotToldApart) {
+TEST(CsvRow, WholeNumbersEndWhereNeighboursAreTheSameDouble) {
   for (const char* cell : {"9223372036854775808", "1e300", "9007199254740994"}) {
     const CsvTable table = Parsed("a\n" + std::string(cell) + "\n");
     CsvRow row(table, 0);
@@ -226,7 +226,7 @@ TEST(CsvRow, WholeNumbersEndWhereTheyAreNotToldApart) {
   }
 }
 
-TEST(Cell, NumbersFlagsAndWordsAreToldApart) {
+TEST(Cell, NumbersFlagsAndWordsAreDistinct) {
   for (const char* cell : {"", "nan", "NaN"}) EXPECT_EQ(KindOf(cell), CellKind::kMissing) << cell;
   for (const char* cell : {"1", "-2.5e3", "+7"}) EXPECT_EQ(KindOf(cell), CellKind::kNumber) << cell;
   for (const char* cell : {"True", "F"}) EXPECT_EQ(KindOf(cell), CellKind::kFlag) << cell;

@@ -16,6 +16,13 @@
 namespace focalfleet {
 namespace {
 
+using test::DrawStartAndTargets;
+using test::ExpectSound;
+using test::FleetOf;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
+
 /// Returns the makespan over the time of the slowest unit alone.
 double ExpectAllServed(PlanningFleet* fleet, std::uint64_t seed) {
   FOCALFLEET_TRACE_SEED(seed);

@@ -12,6 +12,11 @@
 namespace focalfleet {
 namespace {
 
+using test::DrawStartAndTargets;
+using test::HexFleet;
+using test::PlanningFleet;
+using test::TestSeed;
+
 TEST(Replan, IsClearOfAllOthersForEverySkewAndClock) {
   int asked = 0;
   int served = 0;

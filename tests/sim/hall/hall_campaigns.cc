@@ -1,5 +1,5 @@
 // Campaigns with planted causes or none, drawn by an independent plant. They are diagnosed from the
-// content of their file, with the figures of merit of every diagnosis (docs/hall.md). Lambda is
+// content of their file, with the quality figures of every diagnosis (docs/hall.md). Lambda is
 // drawn from 15 to 4000. Lambda is the chi^2 of the planted cause after the unknown amplitude and
 // phase of the field are projected out. The program ends with 1 where a figure is missed by more
 // than its few campaigns allow. The figures: nulls named 1 % (dirty 2 %), exact at lambda >= 100 97

@@ -15,6 +15,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 // A ripple of some units that no gear has.
 Campaign Rippled(double order, double size_deg, std::uint64_t seed,
                  const std::vector<std::size_t>& units = {4, 13}) {

@@ -8,6 +8,10 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::Verdicts;
+
 // The same number of units moves at once in all moves.
 Campaign PlayOfBothAxes(double play_deg, std::uint64_t seed) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = play_deg, .axis = "theta"},

@@ -13,6 +13,12 @@
 namespace focalfleet::sim {
 namespace {
 
+using test::Planted;
+using test::Reported;
+using test::StaticFit;
+using test::TurnTheta;
+using test::Verdicts;
+
 // The only unknown structure, or none.
 UnknownFound OnlyUnknown(const Diagnosis& diagnosis) {
   EXPECT_EQ(diagnosis.unknown.size(), 1u) << Reported(diagnosis);
