@@ -8,6 +8,8 @@
 #include <fstream>
 #include <limits>
 
+#include "tests/support/scratch_folder.h"
+
 namespace focalfleet {
 namespace {
 

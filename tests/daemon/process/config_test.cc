@@ -5,6 +5,8 @@
 
 #include <fstream>
 
+#include "tests/support/scratch_folder.h"
+
 namespace focalfleet {
 namespace {
 

@@ -21,7 +21,7 @@ struct SceneData {
   static constexpr PositionerIndex kUnknown{12};
   static constexpr PositionerIndex kWithoutTarget{30};
 
-  test::PlanningFleet fleet;
+  focalfleet::test::PlanningFleet fleet;
   std::vector<std::optional<Pose>> start;
   Plan plan;
 
@@ -52,8 +52,8 @@ inline SceneData MakeSceneData() {
   }
   // The obstacle lies between three bases, where only tips reach it.
   const Layout::Options options{.obstacles = {{7, {12.8, 7.39}, 0.5}}};
-  SceneData data{test::FleetOf(units, options), {}, {}};
-  test::DrawStartAndTargets(&data.fleet, test::TestSeed(3));
+  SceneData data{focalfleet::test::FleetOf(units, options), {}, {}};
+  focalfleet::test::DrawStartAndTargets(&data.fleet, focalfleet::test::TestSeed(3));
   data.fleet.frozen[SceneData::kDisabled.value] = 1;
   data.fleet.targets[SceneData::kWithoutTarget.value].reset();
   auto plan = MakePlan(data.fleet.request(), {.fixed = true});
