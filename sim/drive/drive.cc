@@ -24,30 +24,30 @@ double Project(Complex vector, std::size_t leg) {
 }
 
 // A switching edge of one carrier period.
-struct Order {
+struct SwitchingEdge {
   double at_s;
   std::size_t leg;
   bool high;
 };
 
 // The edges of one carrier period in order of time.
-struct Orders {
-  Orders(const Pattern& pattern, const Modulation& modulation) {
+struct CarrierEdges {
+  CarrierEdges(const Pattern& pattern, const Modulation& modulation) {
     for (std::size_t k = 0; k < kLegCount; ++k) {
       if (pattern[k].none()) {
-        of[count++] = {0, k, false};
+        in_order[count++] = {0, k, false};
         continue;
       }
-      if (pattern[k].on > 0) of[count++] = {0, k, false};
-      of[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
+      if (pattern[k].on > 0) in_order[count++] = {0, k, false};
+      in_order[count++] = {pattern[k].on / modulation.clock_Hz, k, true};
       if (pattern[k].off < modulation.counter1)
-        of[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
+        in_order[count++] = {pattern[k].off / modulation.clock_Hz, k, false};
     }
-    std::sort(of.begin(), of.begin() + static_cast<std::ptrdiff_t>(count),
-              [](const Order& a, const Order& b) { return a.at_s < b.at_s; });
+    std::sort(in_order.begin(), in_order.begin() + static_cast<std::ptrdiff_t>(count),
+              [](const SwitchingEdge& a, const SwitchingEdge& b) { return a.at_s < b.at_s; });
   }
 
-  std::array<Order, 3 * kLegCount> of;
+  std::array<SwitchingEdge, 3 * kLegCount> in_order{};
   std::size_t count = 0;
 };
 
@@ -326,17 +326,16 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
   const double period_s = modulation.carrier_s();
   direction_ = std::polar(1.0, shaft_.angle_rad());
 
-  const Orders orders(pattern, modulation);
+  const CarrierEdges edges(pattern, modulation);
   double now_s = 0;
   std::size_t next = 0;
   while (true) {
-    while (next < orders.count && orders.of[next].at_s <= now_s) {
+    while (next < edges.count && edges.in_order[next].at_s <= now_s) {
       // The switch opens in the middle of its gate's ramp; the current of that instant chooses the
       // diode.
-      const Order& order = orders.of[next];
-      const double half_s = (order.high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
-      Command(&legs_[order.leg], order.high, now_s,
-              Project(CourseOf(speed_).At(half_s), order.leg));
+      const SwitchingEdge& edge = edges.in_order[next];
+      const double half_s = (edge.high ? setting_.bridge.rise_s : setting_.bridge.fall_s) / 2;
+      Command(&legs_[edge.leg], edge.high, now_s, Project(CourseOf(speed_).At(half_s), edge.leg));
       ++next;
     }
     CloseSwitches(now_s);
@@ -351,7 +350,7 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
     if (now_s >= period_s) break;
 
     double until_s = std::min(period_s, now_s + kStepMax_s);
-    if (next < orders.count) until_s = std::min(until_s, orders.of[next].at_s);
+    if (next < edges.count) until_s = std::min(until_s, edges.in_order[next].at_s);
     bool diode = false;
     for (const Leg& leg : legs_) {
       until_s = std::min({until_s, leg.closes_at_s, leg.ramp_ends_at_s});

@@ -7,9 +7,8 @@
 // units at rest cost nothing but the frames that they are sent.
 //
 //   world.Inject(bus, frame, now);   the host's controller takes a frame
-//   world.AdvanceTo(t, &received);   the frames that the host receives up to and including t, in
-//   order world.NextEvent()                the instant at which the world next does something by
-//   itself
+//   world.AdvanceTo(t, &received);   the frames that the host receives until t, t included
+//   world.NextEvent()                the instant at which the world next does something by itself
 //
 // Each bus has one controller on the host's side, with a mailbox for every waiting frame. The
 // lowest identifier among the frames that wait anywhere on a bus goes first, and of equal ones the

@@ -24,6 +24,7 @@
 #include <cstdint>
 
 #include "protocol/base/instants.h"
+#include "protocol/base/limits.h"
 #include "protocol/wire/can_frame.h"
 #include "protocol/wire/codec.h"
 #include "protocol/wire/stage_group.h"
