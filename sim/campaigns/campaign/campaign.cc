@@ -63,8 +63,8 @@ std::span<const double> Campaign::Find(std::string_view covariate) const {
 }
 
 Exposures FindExposures(const Campaign& campaign) {
-  // A unit's rows stand in the order in which they were made; the exposures' own order is that of
-  // the first unit that has them, and later units add what it lacks.
+  // Rows of a unit are in the order in which they were made. Exposures have the order of the first
+  // unit that has them, and later units add the exposures that it lacks.
   Exposures exposures;
   std::map<std::int64_t, std::uint32_t> index;
   exposures.of_row.reserve(campaign.rows());

@@ -8,15 +8,16 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kValuesMax = 20000;  // that a step is sought in, evenly from all
-constexpr double kSame_mm = 1e-8;          // what arithmetic leaves of equal numbers is less
-constexpr double kNearStep = 0.05;         // of a step: as near is a multiple
+constexpr std::size_t kValuesMax = 20000;  // values that a step is sought in, evenly from all
+constexpr double kSame_mm = 1e-8;          // arithmetic on equal numbers leaves less
+constexpr double kNearStep = 0.05;         // share of a step; a gap as near is a multiple
 constexpr double kShareOfChance = 2 * kNearStep;
-constexpr double kMostlyAre = 0.95;  // of the gaps: others were merged in, or measured otherwise
-constexpr double kChance = 1e-6;     // that gaps of any size look like multiples
-constexpr int kMultiplesMax = 6;     // of the step, that the most frequent gap may be
+// Share of the gaps; others were merged in, or measured otherwise.
+constexpr double kMostlyAre = 0.95;
+constexpr double kChance = 1e-6;  // probability that gaps of any size look like multiples
+constexpr int kMultiplesMax = 6;  // multiples of the step that the most frequent gap may be
 
-// Ascending, each once.
+// The distinct values, ascending.
 std::vector<double> Distinct(std::span<const double> values) {
   std::vector<double> sorted;
   const std::size_t stride = std::max<std::size_t>(1, values.size() / kValuesMax);
@@ -59,14 +60,14 @@ double MostFrequent(std::span<const double> ascending) {
   return best;
 }
 
-// Are the gaps multiples of the step, more of them than chance makes so?
+// Whether more gaps are multiples of the step than chance makes so.
 bool AreMultiples(std::span<const double> gaps, double step) {
   if (!(step > 10 * kSame_mm)) return false;
   std::size_t near = 0;
   for (const double gap : gaps)
     if (std::abs(std::remainder(gap, step)) <= kNearStep * step) ++near;
   const auto n = static_cast<double>(gaps.size());
-  // The gap that has made the step proves nothing.
+  // The gap that has made the step proves nothing, hence n - 1.
   return static_cast<double>(near) >= kMostlyAre * n &&
          (n - 1) * std::log(kShareOfChance) + std::log(n * kMultiplesMax) < std::log(kChance);
 }
@@ -85,7 +86,7 @@ double FindStep(std::span<const double> values) {
     if (AreMultiples(gaps, frequent / of)) step = frequent / of;
   const double common = CommonMeasure(gaps);
   if (common > step && AreMultiples(gaps, common)) step = common;
-  // Too few of them to tell a wider step have at least their digits.
+  // Values that are too few to show a wider step still show their digits.
   return std::max(step, LastDigitOf(distinct));
 }
 

@@ -1,6 +1,7 @@
-// How fine a campaign's places are. A camera that tells whole pixels, or a table with few digits,
-// gives places in steps: the error of a coordinate is then spread evenly over one step, and no
-// estimate from places that repeat can be below that. Whoever divides by a noise needs a floor.
+// The step of a campaign's places limits every estimate of their noise. A camera that reports whole
+// pixels, or a table with few digits, gives places in steps. The error of a coordinate is then
+// spread evenly over one step. An estimate from repeated places cannot be below that, and a
+// division by the noise needs a floor.
 #pragma once
 
 #include <span>
@@ -9,17 +10,17 @@
 
 namespace focalfleet::sim {
 
-/// A coordinate in double precision, in mm on a plate of 1 m, is rounded by less than 1e-7 um; no
-/// camera and no model of a positioner is as good as this. Half of it changes nothing; double of it
-/// would be seen in a campaign that is simulated without noise.
+/// A coordinate in double precision, in mm on a plate of 1 m, is rounded by less than 1e-7 um. No
+/// camera and no model of a positioner is as good as this floor. Half of it changes nothing. Twice
+/// of it would be seen in a campaign that is simulated without noise.
 inline constexpr double kNoiseLeast_um = 0.02;
 
-/// The widest step that nearly all of the values are whole multiples of, apart from a common
-/// offset; 0: none that is more than chance. Values that are not finite say nothing.
+/// The widest step of which nearly all values are whole multiples, apart from a common offset. 0
+/// where chance explains every step. Values that are not finite are ignored.
 double FindStep(std::span<const double> values);
 
-/// The place of the last digit that any of the values has, 1 at most; 0: they have more digits than
-/// 1e-6 shows, or there are none.
+/// The place of the last digit that any of the values has, 1 at most. 0 where the values have more
+/// digits than 1e-6 shows, or where there are none.
 double LastDigitOf(std::span<const double> values);
 
 struct PlaceSteps {
@@ -29,11 +30,12 @@ struct PlaceSteps {
 };
 PlaceSteps FindPlaceSteps(const Campaign& campaign);
 
-/// Standard deviation of what a step rounds off: uniform over the step.
+/// Standard deviation of the rounding to a step: the error is uniform over the step.
 double SpreadOfStep(double step);
 
-/// Below this no standard deviation of a coordinate is believed: that of the wider step, that of
-/// the digits of sigma_um where it is told, and kNoiseLeast_um.
+/// The least standard deviation of a coordinate that is believed. This floor is the largest of that
+/// of the wider step, that of the digits of sigma_um where the table has this column, and
+/// kNoiseLeast_um.
 double LeastNoise_um(const Campaign& campaign, const PlaceSteps& steps);
 
 }  // namespace focalfleet::sim

@@ -13,13 +13,13 @@ namespace {
 // A row with a place whose unit had a place before.
 struct Revisit {
   std::size_t row = 0;
-  double moved_mm = 0;     // since then, by the table; 0: it was told to stay
-  double off_mm[2] = {0};  // by how much the place differs
+  double moved_mm = 0;     // since then, by the table; 0: commanded to stay
+  double off_mm[2] = {0};  // difference between the two places
   [[nodiscard]] bool repeats() const { return off_mm[0] == 0 && off_mm[1] == 0; }
 };
 
-// In the order of the rows. Angles are compared with those of the last place that was seen: moves
-// between, of which nothing was seen, count.
+// Revisits in the order of the rows. Angles are compared with those of the last place that was
+// seen, so that moves between, without a place, count.
 std::vector<Revisit> RevisitsOf(const Campaign& campaign) {
   std::vector<Revisit> revisits;
   const std::span<const double> rehomed = campaign.Find("rehomed");
@@ -51,23 +51,23 @@ std::vector<Revisit> RevisitsOf(const Campaign& campaign) {
   return revisits;
 }
 
-// How likely a coordinate is rounded to the same step twice, where two measurements of it differ by
-// a normal variable of this spread: the mean of 1 - |difference| / step, as far as that is
-// positive.
+// Probability that a coordinate is rounded to the same step twice, where two measurements of it
+// differ by a normal variable of this spread. The result is the mean of 1 - |difference| / step, as
+// far as that is positive.
 double SameStep(double step_mm, double spread_mm) {
   const double ratio = step_mm / spread_mm;
   return std::erf(ratio / std::numbers::sqrt2) -
          std::sqrt(2 / std::numbers::pi) / ratio * (1 - std::exp(-ratio * ratio / 2));
 }
 
-// The share of places at rest that repeat by chance, at most.
+// The largest share of places at rest that repeat by chance.
 double ShareByChance(const std::vector<Revisit>& revisits, double step_mm) {
-  // Spread of a coordinate that no camera of a fibre positioner is below; believed where the places
-  // are too coarse to tell. Double of it misses places that are carried on in steps of 10 um, half
-  // of it sees some in those of a very good camera.
+  // Spread of a coordinate below that of any camera of a fibre positioner. The figure is assumed
+  // where the places are too coarse to show their own. Twice of it misses places that are carried
+  // on in steps of 10 um. Half of it finds some in those of a very good camera.
   constexpr double kGoodCamera_mm = 1e-3;
   constexpr double kNormal = 0.6745;        // median of a normal variable's size
-  constexpr double kDiffersBy_steps = 1.5;  // steps, by which places differ that do
+  constexpr double kDiffersBy_steps = 1.5;  // steps between places that do differ
   if (!(step_mm > 0)) return 0;
   std::vector<double> off_mm;
   for (const Revisit& revisit : revisits)
@@ -83,7 +83,7 @@ double ShareByChance(const std::vector<Revisit>& revisits, double step_mm) {
   return same * same;
 }
 
-// Are there more repeats at rest than chance makes?
+// Whether more places at rest repeat than chance explains.
 bool AreCarriedOn(const std::vector<Revisit>& revisits, double share) {
   constexpr double kSure = 5;  // standard deviations
   double rest = 0, repeats = 0;
@@ -102,18 +102,21 @@ struct ExposureCount {
   std::size_t far_moved = 0, far_repeat = 0;  // of those that were moved far
 };
 
-// Exposures of which half of those that were moved far repeat, or all do, however little they were
-// moved, and not by chance. Shape: (exposures).
+// An exposure is a copy where half of the units that were moved far repeat their place, and chance
+// does not explain it. The same holds where all units repeat, however little they were moved.
+// Shape: (exposures).
 std::vector<char> FindCopies(const Exposures& exposures, const std::vector<Revisit>& revisits,
                              double step_mm, double share) {
-  // An exposure in a million is called a copy by chance; a campaign has 10 to 1000. Half and double
-  // of it move the least number of units that can show a copy by less than one.
+  // Probability that chance alone makes an exposure a copy: one in a million, and a campaign has 10
+  // to 1000. Half and twice of it change the least number of units that can show a copy by less
+  // than one.
   constexpr double kChance = 1e-6;
-  // Shorter moves may be kept back by play and stiction, some 10 um at the fibre, and rounded away.
-  // Half of either bound is still above those; double of it only leaves fewer rows that can tell.
+  // Shorter moves may be held back by play and stiction, some 10 um at the fibre, and rounded away.
+  // Half of this bound is still above those. Twice of it only leaves fewer rows as evidence.
   constexpr double kMoved_mm = 0.1;
   constexpr double kSteps = 3;
-  // Two units may both be stuck; with double of it a copy is not seen where fewer than six moved.
+  // Two units may both be stuck. With twice of it a copy is not seen where fewer than six units
+  // moved.
   constexpr std::size_t kRowsMin = 3;
   const double far_mm = std::max(kMoved_mm, kSteps * step_mm);
   std::vector<ExposureCount> counts(exposures.size());

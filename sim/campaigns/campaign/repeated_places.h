@@ -1,7 +1,7 @@
-// Places that are no measurements: the row repeats the place that the unit had before, to the last
-// digit. A pipeline that fills in what it did not measure does that where a unit was not moved, and
-// a camera that is read twice does it to a whole exposure. Counted as evidence they would say that
-// the noise is nothing.
+// Some places are no measurements: their row repeats the place that the unit had before, to the
+// last digit. A pipeline that fills in missing measurements does that where a unit was not moved. A
+// camera that is read twice does it to a whole exposure. Counted as measurements such rows would
+// make the noise look like nothing.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ struct RepeatedPlaces {
   [[nodiscard]] bool empty() const { return carried_on.empty() && copied.empty(); }
 };
 
-/// Places of units at rest repeat by chance, too, where they come in steps: none of them is carried
-/// on unless more do than that explains. An exposure is a copy where half of the units that were
-/// moved by more than 0.1 mm, three at least, repeat their place, or all do, however little they
-/// were moved.
+/// Finds the places that repeat. Places of units at rest also repeat by chance where they come in
+/// steps. None of them counts as carried on unless more do than chance explains. An exposure is a
+/// copy where half of the units that were moved by more than 0.1 mm, three at least, repeat their
+/// place. The same holds where all units do, however little they were moved.
 RepeatedPlaces FindRepeatedPlaces(const Campaign& campaign);
 
-/// The same, and these places are missing from then on.
+/// Finds the places that repeat and sets them to missing.
 RepeatedPlaces ForgetRepeatedPlaces(Campaign* campaign);
 
 }  // namespace focalfleet::sim

@@ -13,7 +13,7 @@ constexpr double kTurn_deg = 360;
 constexpr double kNominalDrive = 1, kNominalDelay_s = 3;
 constexpr double kBetweenExposures_s = 45;
 
-// What the unit's last rows told; NaN: nothing.
+// The unit's last value in the column; NaN where it has none.
 double LastOf(std::span<const double> rows) {
   for (std::size_t i = rows.size(); i-- > 0;)
     if (std::isfinite(rows[i])) return rows[i];
@@ -25,7 +25,7 @@ bool HasColumn(const Campaign& campaign, std::string_view name) {
          campaign.covariates.end();
 }
 
-// The campaign with the columns that tell a proposed move's conditions.
+// The campaign with the columns that hold a proposed move's conditions.
 Campaign WithLevers(const Campaign& made) {
   Campaign reported = made;
   for (const auto& [name, value] : {std::pair("drive_amplitude", kNominalDrive),
@@ -38,14 +38,14 @@ Campaign WithLevers(const Campaign& made) {
 
 double RailOf(const CampaignUnit& unit) { return std::isfinite(unit.rail) ? unit.rail : -1; }
 
-// Of each rail, how many make the move.
+// The number of units of each rail that make the move.
 std::map<double, double> MoversOf(const std::vector<CampaignUnit>& units, const PlateMove& move) {
   std::map<double, double> movers;
   for (std::size_t u = 0; u < units.size(); ++u) movers[RailOf(units[u])] += move.to_deg[u] ? 1 : 0;
   return movers;
 }
 
-// One unit on its way through the proposed moves.
+// A unit on its way through the proposed moves.
 struct Walker {
   double at_deg[2];
   double cycles[2];
@@ -94,7 +94,7 @@ std::vector<PlateMove> SpreadOver(const std::vector<CampaignUnit>& units,
   for (const CampaignUnit& unit : units) place.push_back(seen[RailOf(unit)]++);
   std::vector<PlateMove> spread;
   for (std::size_t m = 0; m < moves.size(); ++m) {
-    // Out and back are the same units' moves, the next two are others'.
+    // The way out and the way back are moves of the same units; the next two are those of others.
     const std::size_t turn = m / 2 % moves[m].every;
     PlateMove& move = spread.emplace_back();
     move.conditions = moves[m].conditions;

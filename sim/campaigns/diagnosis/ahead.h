@@ -1,6 +1,6 @@
-// A campaign as it would be if more moves were made: the rows that were measured, then those of the
-// moves to come, with the conditions that each asks for and all else as it was at last. What the
-// model's effects do in such rows is what an experiment is chosen by (next_moves.h).
+// A campaign as it would be after more moves: the rows that were measured, then those of the moves
+// to come. Each new row has the conditions that its move asks for, and all else as it was last.
+// Experiments are chosen by what the model's effects do in such rows (next_moves.h).
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 
 namespace focalfleet::sim {
 
-/// Under which a move is asked for.
+/// The conditions that a move asks for.
 struct MoveConditions {
   double drive_amplitude = 1;
   double delay_s = 3;
@@ -25,26 +25,27 @@ struct MoveConditions {
 /// A move of the whole plate, by its units' own angles.
 struct PlateMove {
   MoveConditions conditions;
-  // Theta and phi. Shape: (units); none: it stays where it is.
+  // Theta and phi. Shape: (units). nullopt: the unit stays where it is.
   std::vector<std::optional<std::array<double, 2>>> to_deg;
 };
 
-/// The same as a stance: all units stand alike, as translated copies of each other, so that nobody
-/// comes near anybody on the way.
+/// A move as a stance: all units have the same pose, as translated copies of each other. No unit
+/// comes near another on the way.
 struct ProposedMove {
   double theta_fp_deg = 0;  // where the elbow points, in the plate's frame
   double phi_fp_deg = 90;   // 0 stretches the arm out, 180 folds it back
-  std::size_t every = 1;    // of the units on a rail, who moves; the others stay where they are
+  std::size_t every = 1;    // one in `every` units of a rail moves; the others stay where they are
   MoveConditions conditions;
-  std::string separates = {};  // which causes
+  std::string separates = {};  // the causes that the move separates
 };
 
 /// Each unit's angles nearest to the stances, 3 degrees clear of its ends.
 std::vector<PlateMove> SpreadOver(const std::vector<CampaignUnit>& units,
                                   const std::vector<ProposedMove>& moves);
 
-/// For units that have rows. Drive, delay and homings are told from then on, if they were not; what
-/// was not told is taken as nominal. Places of the new rows are 0.
+/// The campaign with new rows for those units that have rows. Drive, delay and homings become
+/// columns where they were none; an unknown value is taken as nominal. Places of the new rows are
+/// 0.
 /// Shape: first_row[u + 1] - moves.size() .. first_row[u + 1] are unit u's new rows.
 Campaign Ahead(const Campaign& made, const std::vector<PlateMove>& moves);
 

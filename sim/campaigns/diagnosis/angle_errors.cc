@@ -18,7 +18,7 @@ std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::s
     if (!(std::abs(det) > kApart * std::hypot(ax, ay) * std::hypot(bx, by))) continue;
     const double x = 1e-3 * fit.x_um[row], y = 1e-3 * fit.y_um[row];
     const double error = axis == kTheta ? (by * x - bx * y) / det : (ax * y - ay * x) / det;
-    // Near the folded pose an angle of theta moves next to nothing.
+    // Near the folded pose an angle of theta moves the fibre next to nothing.
     const double lever = std::abs(det) / (axis == kTheta ? std::hypot(bx, by) : std::hypot(ax, ay));
     rows.push_back({i, error / kRadians, lever});
   }

@@ -1,4 +1,4 @@
-// What each seen place says of an axis' angle, where the arms' pose tells the two axes apart.
+// The error of an axis' angle at each seen place, where the arms' pose separates the two axes.
 #pragma once
 
 #include <cstddef>
@@ -12,15 +12,16 @@ namespace focalfleet::sim {
 struct AngleRow {
   std::size_t move = 0;  // of the track
   double error_deg = 0;  // measured less predicted
-  double lever_mm = 0;   // by which a place tells the angle
+  double lever_mm = 0;   // motion of the place per radian of the angle
 
-  /// Of noise_mm in the place.
+  /// Standard deviation of the error where that of the place is noise_mm.
   [[nodiscard]] double sigma_deg(double noise_mm) const {
     return noise_mm / lever_mm * 180 / std::numbers::pi;
   }
 };
 
-/// Rows that are set aside tell nothing. Pre: the track is of the fit's campaign and model.
+/// The errors of all rows that are not set aside. Pre: the track is of the fit's campaign and
+/// model.
 std::vector<AngleRow> AngleErrors(const Fit& fit, const UnitTrack& track, std::size_t axis);
 
 }  // namespace focalfleet::sim

@@ -10,7 +10,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// Indices of terms, from the last to the first, which is how they can be erased.
+// Indices of terms, from the last to the first, so that they can be erased in this order.
 using LastFirst = std::vector<std::size_t>;
 
 LastFirst SeriesOf(const CampaignModel& model, EffectAxis axis) {
@@ -34,7 +34,8 @@ void FitAnew(Fit* fit) {
   SettleFit(fit, kRounds);
 }
 
-// A bend of what the cause does with its own column is its shape, not another structure.
+// Whether the structure follows the cause's own column: a bend there is the cause's shape, not
+// another structure.
 bool IsOwnShape(const Effect& effect, const UnknownFound& reported) {
   constexpr std::string_view kOfDirection[] = {"thermal_backlash", "supply_drift"};
   return std::ranges::count(kOfDirection, effect.cause) != 0 &&
@@ -50,13 +51,13 @@ auto AtAngleOf(EffectAxis axis) {
   };
 }
 
-// Ripples of the gears, which come round too fast to be the shape of a curve.
+// Whether the cause is a ripple of the gears, which is too fast to be the shape of a curve.
 bool IsRipple(std::string_view cause) { return cause == "stage_ripple" || cause == "tooth_mesh"; }
 
 bool IsBump(const ModelTerm& term) { return term.form.effect->cause == "tooth_damage"; }
 
-// Without what is not of the structure: beside a curve for it, a ripple that is there explains as
-// much as it does alone, whatever its many amplitudes cost.
+// The series without the terms that are not part of the structure. A separate ripple explains as
+// much beside a curve for the structure as it does alone, whatever its many amplitudes cost.
 LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm& curve) {
   constexpr double kOfItsOwn = 0.5, kOfChance = 2;
   Fit without = fit;
@@ -66,7 +67,7 @@ LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm
   curved.model.terms.push_back(curve);
   FitAnew(&curved);
   struct Explains {
-    double by = 0, chance = 0;  // 2 d ln L at no price; what its parameters give
+    double by = 0, chance = 0;  // 2 d ln L at no price; the part that its parameters give by chance
   };
   const auto explains = [&](std::size_t term, const Fit& beside) {
     Fit with = beside;
@@ -86,14 +87,15 @@ LastFirst WithoutItsOwn(const Fit& fit, const LastFirst& series, const ModelTerm
   return left;
 }
 
-// How sure a name must be beaten, and by what.
+// The margin by which a name must be beaten, and the empirical term that does so.
 struct Beaten {
   double family_wise;
   std::uint64_t seed;
   Fit* fit;
   Selection* selection;
 
-  /// True: they were, and are out. `counts`: whether a structure could be what they are.
+  /// Removes the terms where an empirical term beats them, and returns whether it did. `counts`:
+  /// whether a structure could be what they are.
   template <class Counts>
   bool DropIf(const LastFirst& terms, double better_by, const Counts& counts) const {
     Fit without = *fit;
@@ -106,7 +108,7 @@ struct Beaten {
     FitAnew(&curved);
     FitAnew(&named);
     if (BetterBy(curved, named) <= better_by) return false;
-    // One of several that is as good alone is the structure: the others are beside it.
+    // A term that is as good alone is the structure itself: the others are beside it.
     constexpr double kUndecided = 6;
     const auto is_the_structure = [&](std::size_t term) {
       Fit one = without;
@@ -115,7 +117,7 @@ struct Beaten {
       return BetterBy(curved, one) <= kUndecided;
     };
     if (terms.size() > 1 && std::ranges::any_of(terms, is_the_structure)) return false;
-    // What has nothing to do with the structure explains beside it what it explains alone.
+    // A term that has nothing to do with the structure explains beside it what it explains alone.
     constexpr double kOfItsOwn = 0.5;
     Fit both = named;
     both.model.terms.push_back(left->term);
@@ -136,8 +138,8 @@ struct Beaten {
 }  // namespace
 
 void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* selection) {
-  // Names of 400 hidden campaigns that were right were beaten by 10 at most, by the shape of their
-  // own column; wrong ones by 35 and more, but for two.
+  // The margin is from 400 hidden campaigns. Right names were beaten by 10 at most, by the shape of
+  // their own column. Wrong ones were beaten by 35 and more, but for two.
   constexpr double kClearly = 20;
   const Beaten beaten{family_wise, seed, fit, selection};
   for (const EffectAxis axis : {EffectAxis::kTheta, EffectAxis::kPhi}) {

@@ -1,7 +1,7 @@
-// Names that an empirical term beats. Several parts at one angle: bumps and waves enough add up to
-// any ripple, so that their names are worth no more than the ripple's order. What drifts over a
-// night: hours, warmth, wear and volts go together, so that a name of one of them passes for what
-// follows another column.
+// Some names are beaten by an empirical term. Enough bumps and waves at one angle add up to any
+// ripple. Their names are then worth no more than the ripple's order. Hours, warmth, wear and volts
+// drift together over a night, so that the name of one of them may stand for what follows another
+// column.
 #pragma once
 
 #include <cstdint>
@@ -10,10 +10,11 @@
 
 namespace focalfleet::sim {
 
-/// Takes out the terms that depend on where an axis stands, where one empirical ripple or curve of
-/// that axis' angle predicts better than two or more of them do together, and each term that drifts
-/// with the night, where an empirical curve over whatever column predicts clearly better; both at
-/// their price. What they named is left for the screen to find.
+/// Drops names that an empirical term beats, both at their price. The first kind are terms that
+/// depend on where an axis stands. Two or more of them are dropped where one ripple or curve of
+/// that axis' angle predicts better than they do together. The second kind are terms that drift
+/// with the night: each is dropped where a curve over any column predicts clearly better. The
+/// screen then finds what they had explained.
 void DropBeaten(double family_wise, std::uint64_t seed, Fit* fit, Selection* selection);
 
 }  // namespace focalfleet::sim

@@ -13,7 +13,7 @@ namespace {
 // The best of a cause's templates on each axis.
 struct AxisPair {
   std::size_t theta = kNoTerm, phi = kNoTerm;
-  double log_evidence = 0;  // of both; what they share counts twice
+  double log_evidence = 0;  // sum of both; what they share counts twice
 };
 
 void TakeBetter(std::size_t k, const std::vector<Evidence>& evidence_of, std::size_t* best) {
@@ -22,7 +22,7 @@ void TakeBetter(std::size_t k, const std::vector<Evidence>& evidence_of, std::si
 
 using PairsByCause = std::map<std::string_view, AxisPair>;
 
-// Of the causes that have one on each axis.
+// The pairs of all causes that have a template on each axis.
 PairsByCause AllPairs(const ScorePass& pass, const Templates& templates,
                       const std::vector<Evidence>& evidence_of, double kept_min) {
   PairsByCause by_cause;
@@ -40,12 +40,12 @@ PairsByCause AllPairs(const ScorePass& pass, const Templates& templates,
   return by_cause;
 }
 
-// Of other causes those that are worth a trial, the best first. Beside what the other axis does,
-// which is noise to either, a pair's evidence may be next to nothing: the own cause's pair says how
-// much it can be, or where it has none, the term itself.
+// The pairs of other causes that are worth a trial, the best first. The other axis' part of the
+// effect is noise to either template, so that a pair's evidence may be next to nothing. The own
+// cause's pair, or without one the term itself, gives the scale.
 std::vector<AxisPair> PromisingPairs(const PairsByCause& pairs, const Templates& templates,
                                      const std::vector<Evidence>& evidence_of, const Effect* own) {
-  constexpr double kNear = 0.5;  // of the own one's evidence
+  constexpr double kNear = 0.5;  // of the own cause's evidence
   double log_evidence = 0;
   if (const auto of_own = pairs.find(own->cause); of_own != pairs.end())
     log_evidence = of_own->second.log_evidence;
@@ -57,11 +57,11 @@ std::vector<AxisPair> PromisingPairs(const PairsByCause& pairs, const Templates&
   for (const auto& [cause, pair] : pairs)
     if (cause != own->cause && pair.log_evidence > std::max(kNear * log_evidence, 0.0))
       promising.push_back(pair);
-  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::evidence);
+  std::ranges::stable_sort(promising, std::ranges::greater{}, &AxisPair::log_evidence);
   return promising;
 }
 
-// In place of the shapes that `without` has not.
+// The fit with the pair in place of the shapes that `without` lacks.
 PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, const ModelTerm& phi) {
   constexpr int kRounds = 3;
   PairTrial trial{.cause = theta.form.effect->cause, .fit = without};
@@ -70,8 +70,8 @@ PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, cons
   StepFit(&trial.fit);
   SettleFit(&trial.fit, kRounds);
   trial.behind = BetterBy(fit, trial.fit);
-  // What it explains more at no price, and what chance gives to the parameters that it has more.
-  constexpr double kSigmas = 3, kNoiseOfNoise = 1.2;  // of many, as of each: tails are heavy
+  // The trial explains more, before its price, than chance gives to its additional parameters.
+  constexpr double kSigmas = 3, kNoiseOfNoise = 1.2;  // in all, and each: tails are heavy
   constexpr double kFew = 2;
   const double more = std::max(CountParameters(trial.fit) - CountParameters(fit), 0.0);
   const double explains = PriceOf(trial.fit) - PriceOf(fit) - trial.behind;
@@ -80,7 +80,7 @@ PairTrial Tried(const Fit& fit, const Fit& without, const ModelTerm& theta, cons
   return trial;
 }
 
-// As the term has it: an amplitude of each unit, where the units' may differ.
+// The evidence with an amplitude of each unit, where the term's units may differ.
 Evidence OfEachUnit(Evidence evidence, const ModelTerm& as) {
   evidence.sharing = Sharing::kUnit;
   evidence.scattered = false, evidence.spread = 0;
@@ -105,7 +105,7 @@ std::vector<PairTrial> TryAgainst(const Fit& fit, const Fit& without, const Mode
       trials.back().log_p = std::max(theta.log_p, phi.log_p);
     };
     take(theta, phi);
-    // Either axis alone may show too little of its units to be of each.
+    // Either axis alone may show too little of its units to get amplitudes of each.
     if (term.sharing == Sharing::kUnit &&
         (theta.sharing != Sharing::kUnit || phi.sharing != Sharing::kUnit))
       take(OfEachUnit(theta, term), OfEachUnit(phi, term));
@@ -121,7 +121,7 @@ std::vector<PairTrial> TryPairs(const Fit& fit, std::size_t term, const ScorePas
                                 double kept_min) {
   const ModelTerm& own = fit.model.terms[term];
   if (own.form.axis != EffectAxis::kBoth) return {};
-  // Two shapes of one cause may stand for what another does plainly.
+  // Two shapes of one cause may stand for one shape of another.
   Fit without = fit;
   const bool was_alone =
       std::erase_if(without.model.terms, [&](const ModelTerm& other) {

@@ -20,7 +20,7 @@ bool DifferInShapeAlone(const Template& a, const Template& b) {
 
 bool IsOfAll(const Template& form) { return form.shape_of_unit.empty(); }
 
-// To the nearest of other shapes of its kind; 0: it has none, or none between them.
+// The distance to the nearest other shape of its kind. 0 where there is none, or none between them.
 double GapTo(const Template& form, const Templates& kind) {
   double gap = kInfinity;
   for (const Template& other : kind)
@@ -37,7 +37,7 @@ Template Moved(const Template& form, double by) {
   return moved;
 }
 
-// What the unit's residuals gain by it; 0: nothing that can be.
+// Chi-square that the unit's residuals gain by the template; 0 where no possible amplitude gains.
 double ChiSquare(const Score& score, const Template& form, std::size_t unit) {
   const std::size_t c = form.columns;
   const auto size = static_cast<Eigen::Index>(c);
@@ -91,7 +91,7 @@ std::vector<CandidateShape> CandidateShapesOf(const ScorePass& pass,
                                               const std::vector<Evidence>& evidence_of,
                                               const Templates& templates, std::size_t best,
                                               double kept_min) {
-  constexpr double kNear = 15, kNearShare = 0.15;  // of the best one's chi-square
+  constexpr double kNear = 15, kNearShare = 0.15;  // of the best template's chi-square
   constexpr std::size_t kMost = 6;
   if (best == kNoTerm) return {};
   const double far = std::max(kNear, kNearShare * evidence_of[best].chi_square);
@@ -140,7 +140,8 @@ std::vector<CandidateShape> OwnShapes(const ScorePass& pass, const Templates& te
     if (kind.size() < 2) continue;
     std::map<std::uint32_t, double> shapes;
     Score own = *scores.front();  // each unit's by its own shape
-    // About a wrong shape the right one's trace is spread: the least is the noise's.
+    // The trace of the right shape is spread about a wrong one: the least spread is that of the
+    // noise.
     for (const Score* one : scores)
       if (one->spread_sum * own.spread_count < own.spread_sum * one->spread_count)
         own.spread_sum = one->spread_sum, own.spread_count = one->spread_count;

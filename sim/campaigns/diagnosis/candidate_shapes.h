@@ -1,7 +1,7 @@
-// Shapes that suit the data. What comes near the best is taken to its own best shape between the
-// listed ones before anyone decides; and where a shape is each unit's own, as a damaged tooth sits
-// elsewhere in each gear, each unit gets the one that its residuals like best and pays for the
-// choice (evidence.h).
+// Candidate shapes suit the data. A template that comes near the best is refined to its own best
+// shape between the listed ones before any decision. Some shapes are each unit's own, as a damaged
+// tooth is elsewhere in each gear. There each unit gets the shape that its residuals favour, and
+// pays for the choice (evidence.h).
 #pragma once
 
 #include <span>
@@ -25,17 +25,17 @@ std::vector<CandidateShape> CandidateShapesOf(const ScorePass& pass,
                                               const Templates& templates, std::size_t best,
                                               double kept_min);
 
-/// The effects that have own shapes, with the best of the listed ones for each unit, one for each
-/// axis, memory and form, where the evidence for them, each unit's choice paid for, is more than
-/// `evidence_min`.
+/// The effects that have own shapes, one for each axis, memory and form, with the best of the
+/// listed shapes for each unit. Those are returned whose evidence, with each unit's choice paid
+/// for, is more than `evidence_min`.
 std::vector<CandidateShape> OwnShapes(const ScorePass& pass, const Templates& templates,
                                       const CampaignFacts& facts, const FleetGroups& groups,
                                       double evidence_min);
 
-/// Those that differ from `form` in their shapes alone.
+/// The templates of the library that differ from `form` in their shapes alone.
 Templates KindOf(const Template& form, const Templates& library);
 
-/// Takes each candidate shape to the shape between the listed ones that the data like best.
+/// Refines each candidate shape to the shape between the listed ones that the data favour.
 void RefineCandidateShapes(const Fit& fit, const FleetGroups& groups,
                            std::vector<CandidateShape>* candidate_shapes);
 

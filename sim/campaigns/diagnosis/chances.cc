@@ -21,7 +21,8 @@ double LowerGamma(double a, double x) {
   return sum * std::exp(-x + a * std::log(x) - std::lgamma(a));
 }
 
-// Continued fraction of the upper one, by Lentz. Source: Abramowitz and Stegun 6.5.31.
+// Continued fraction of the upper incomplete gamma function, by Lentz. Source: Abramowitz and
+// Stegun 6.5.31.
 double LogUpperGamma(double a, double x) {
   constexpr double kTiny = 1e-300;
   double b = x + 1 - a, c = 1 / kTiny, d = 1 / b, h = d;
@@ -66,7 +67,7 @@ double BinomialTail(std::size_t hits, std::size_t tries, double share) {
 }
 
 double LogLeastOf(double log_p, double tests) {
-  // 1 - (1 - p)^n; for small n p the first term is all.
+  // The result is 1 - (1 - p)^n; for small n p the first term is all.
   const double p = std::exp(log_p);
   if (p * tests < 1e-6) return log_p + std::log(tests);
   if (p >= 1) return 0;

@@ -1,5 +1,5 @@
-// How likely a statistic is by chance, down to where ordinary numbers underflow: natural
-// logarithms of tail probabilities throughout. And how a family of correlated tests counts.
+// Tail probabilities of statistics, as natural logarithms, down to where ordinary numbers
+// underflow. The chance of a family of correlated tests follows from its effective number of tests.
 #pragma once
 
 #include <cstddef>

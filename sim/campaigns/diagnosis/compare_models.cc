@@ -13,9 +13,10 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kFar = 6;            // medians of the unit's, or of the fleet's, residuals
-constexpr double kElsewhereUm = 1e3;  // a unit's median: no model of its own says that
-constexpr double kSameUm = 1e-3;      // less are the digits of a file
+constexpr double kFar = 6;  // medians of the unit's, or of the fleet's, residuals
+// A unit's median: it is at another place than the model has it.
+constexpr double kElsewhereUm = 1e3;
+constexpr double kSameUm = 1e-3;  // smaller differences are the digits of a file
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // Lengths of one model's residuals; NaN where nothing was measured or the row is set aside.
@@ -38,8 +39,8 @@ double MedianOf(std::span<const double> lengths) {
   return known.empty() ? 0 : Median(std::move(known));
 }
 
-// By one model: units that stand elsewhere, and rows far from where the rest of their unit is. A
-// unit that is off in all of its rows has no outliers.
+// Units that are elsewhere by one model's residuals, and rows far from where the rest of their unit
+// is. A unit that is off in all of its rows has no outliers.
 struct FarOff {
   std::vector<char> unit;  // Shape: (units)
   std::vector<char> row;   // Shape: (rows)
@@ -96,7 +97,7 @@ bool IsSameKind(const Template& a, const Template& b) {
          (FindEmpirical(a.effect->cause) == nullptr || a.form == b.form);
 }
 
-// Do amplitudes of both mean the same?
+// Whether the amplitudes of both templates mean the same.
 bool IsSameShape(const Template& a, const Template& b) {
   return a.form == b.form && a.memory == b.memory && a.columns == b.columns &&
          (a.effect->continuous_shape || (a.shape == b.shape && a.shape_of_unit == b.shape_of_unit));
@@ -105,7 +106,7 @@ bool IsSameShape(const Template& a, const Template& b) {
 // The normal deviate that is as unlikely as the chi-square.
 double DeviateOf(double chi_square, double dof) {
   const double wanted = LogChiSquareTail(chi_square, dof);
-  double low = 0, high = std::sqrt(chi_square);  // which it is with one degree of freedom
+  double low = 0, high = std::sqrt(chi_square);  // the deviate with one degree of freedom
   constexpr int kHalvings = 60;
   for (int k = 0; k < kHalvings && dof > 1; ++k) {
     const double middle = 0.5 * (low + high);
@@ -147,7 +148,7 @@ TermSide SideOf(const ModelTerm& term) {
   return {.shape = term.form.label, .units = UnitsOf(term), .amplitude = Summarise(term)};
 }
 
-// B's counterpart of A's term that no other has taken; one of the same shape first.
+// B's counterpart of A's term, not yet taken by another term; one of the same shape first.
 std::size_t CounterpartOf(const ModelTerm& term, const std::vector<ModelTerm>& others,
                           const std::vector<char>& taken) {
   std::size_t at = others.size();

@@ -31,11 +31,12 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kMovesMin = 8;  // of a unit, seen
-constexpr double kMissMax_mm = 1;     // median: more, and the geometry is another unit's
+constexpr std::size_t kMovesMin = 8;  // seen moves of a unit
+// Median; a larger miss means that the geometry is another unit's.
+constexpr double kMissMax_mm = 1;
 constexpr double kKeptMin = 0.03;
 
-// Templates that the data can test; why the others cannot.
+// Templates that the data can test; the reasons for the others go to `not_testable`.
 Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
                       std::vector<NotTestable>* not_testable) {
   Templates templates;
@@ -62,7 +63,7 @@ Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options
   return templates;
 }
 
-// Causes of which no template has a signature of its own in these moves.
+// Finds causes of which no template has a signature of its own in these moves.
 void FindNotExcited(const Templates& templates, const Selection& selection,
                     std::vector<NotTestable>* out) {
   std::map<std::string_view, double> best;
@@ -76,7 +77,8 @@ void FindNotExcited(const Templates& templates, const Selection& selection,
                                                    : "the moves never excite it"});
 }
 
-// What the screen sees joins what is told: a column once, but for each term that patches it.
+// Adds what the screen found to what is reported: each column once, but for each term that patches
+// it.
 void AddUnknown(std::vector<UnknownFound> seen, std::vector<UnknownFound>* reported) {
   for (UnknownFound& one : seen) {
     const auto of_column = [&](const UnknownFound& other) {
@@ -90,7 +92,7 @@ void AddUnknown(std::vector<UnknownFound> seen, std::vector<UnknownFound>* repor
   }
 }
 
-// What is left that no cause explains; with `patch`, terms for it.
+// Finds what is left that no cause explains; with `patch`, adds terms for it.
 void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) {
   const double noise_um = RmsOf(*fit);
   const auto matters = [&](const UnknownFound& left) {
@@ -114,7 +116,7 @@ void LookAtRest(const DiagnoseOptions& options, Fit* fit, Diagnosis* diagnosis) 
   if (fine && matters(*fine)) diagnosis->unknown.push_back(std::move(*fine));
 }
 
-// Temperatures as neighbours have them, where sensors are suspect; else nullptr.
+// Temperatures by the neighbours' sensors, where sensors are suspect; else nullptr.
 std::unique_ptr<TrueTemperatures> TestSensors(const CampaignFacts& facts,
                                               const DiagnoseOptions& options,
                                               std::vector<NotTestable>* not_testable) {
@@ -151,8 +153,8 @@ double MedianMiss(const Fit& fit) {
   return misses.empty() ? 0 : Median(std::move(misses));
 }
 
-// What the model that is there already explains is no misfit of it: its effects are taken off the
-// measured places, and its geometry stands for the table's.
+// The part that the given model already explains is no misfit. Its effects are subtracted from the
+// measured places, and its geometry replaces the table's.
 void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel,
               Campaign* campaign) {
   campaign->units = model.units;
@@ -165,7 +167,7 @@ void TakeAway(const CampaignModel& model, const CampaignFacts& facts, const Para
   }
 }
 
-// Where far rows cluster: arms have touched, or nobody knows.
+// Clusters of far rows are contacts of arms where these are nearest, and else unknown.
 void ReportClusters(const Fit& fit, std::vector<std::size_t> far, const DiagnoseOptions& options,
                     Diagnosis* diagnosis) {
   const auto is_contact = [](const CauseFound& cause) { return cause.cause == kContact; };
@@ -217,7 +219,7 @@ HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
   return MeasureGain(fit, &misnamed);
 }
 
-// What the model gains on held-out moves, and the moves to make next.
+// Measures the gain on held-out moves, and proposes the moves to make next.
 void LookAhead(const Fit& fit, const std::optional<Campaign>& as_named,
                const DiagnoseOptions& options, Diagnosis* diagnosis) {
   if (options.with_gain) {
@@ -241,15 +243,15 @@ void RemarkOnRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
   diagnosis->steps = FindPlaceSteps(*facts.campaign);
 }
 
-// The steps of the places limit what is told where they make more of the noise than all else does.
+// The steps of the places limit the diagnosis where they make more of the noise than all else does.
 void RemarkOnNoise(const Fit& fit, Diagnosis* diagnosis) {
   const double of_steps_um = 1e3 * SpreadOfStep(diagnosis->steps.wider_mm());
   diagnosis->steps_limit = std::numbers::sqrt2 * of_steps_um > fit.noise.place_um;
   if (diagnosis->steps_limit) Remark({RemarkOnSteps(diagnosis->steps)}, diagnosis);
 }
 
-// A fit to rows that say nothing of a unit, or that are not its own, is no model of it: whoever
-// reads the model has the table's.
+// A unit's fit is no model of it where its rows show nothing of the unit, or belong to another. The
+// model then has the table's geometry for it.
 void LeaveOutImpossible(const Campaign& given, Diagnosis* diagnosis) {
   CampaignModel& model = diagnosis->model;
   for (std::size_t unit = 0; unit < model.units.size(); ++unit) {
@@ -330,7 +332,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   };
   const std::unique_ptr<TrueTemperatures> truth =
       TestSensors(facts, options, &diagnosis.not_testable);
-  // Without the wrong sensors a column may be gone that they alone made.
+  // A column may be gone that only the wrong sensors made.
   if (truth != nullptr)
     std::erase_if(templates, [&](const Template& form) { return !IsOffered(form, truth->facts); });
   Selection selection = FindModel(templates, options, rule, truth.get(), &fit, &diagnosis);

@@ -1,6 +1,6 @@
-// The verdict on a campaign: what the simulation gets wrong, by name. docs/diagnosis.md has the
-// fields as programs read them. Everything is a function of the campaign, the options and nothing
-// else: the same data give the same verdict, at any number of threads.
+// The verdict on a campaign names what the simulation gets wrong. docs/diagnosis.md has the fields
+// as programs read them. Everything is a function of the campaign and the options alone: the same
+// data give the same verdict, at any number of threads.
 #pragma once
 
 #include <cstdint>
@@ -24,11 +24,13 @@ namespace focalfleet::sim {
 struct CauseFound {
   std::string cause;
   std::vector<std::string> candidates;  // the cause itself first
-  // Who leaves nearly the same trace, and is behind by the likelihood alone: where the model leaves
-  // something unexplained, that decides nothing.
+  // Rivals that leave nearly the same trace and are behind by the likelihood alone. A likelihood
+  // decides nothing where the model leaves something unexplained.
   std::vector<std::string> behind;
-  std::vector<std::string> cannot_be;         // names that these data exclude, whatever is not told
-  std::vector<std::string> misfit_artefacts;  // what its shape leaves looks like these, by name
+  // Names that these data exclude, whatever else may be unexplained.
+  std::vector<std::string> cannot_be;
+  // Causes or columns that the misfit of its shape looks like.
+  std::vector<std::string> misfit_artefacts;
   std::string axis;
   std::string scope;
   std::vector<std::uint32_t> units;
@@ -38,15 +40,15 @@ struct CauseFound {
   double ci95[2] = {0, 0};
   double size_um = 0;  // rms at the fibre
   double delta_log_likelihood = 0;
-  // The same shared out, by unit id, by the squares of what it does to each fibre; empty: it is
-  // not.
+  // delta_log_likelihood of each unit, by unit id, in proportion to the squares of what the cause
+  // does to each fibre. Empty where it is not shared out.
   std::map<std::uint32_t, double> evidence_of_unit;
   double predicted_gain_um = 0;
   std::string shape;      // of the template, in words
   std::string paragraph;  // for the operator
 };
 
-/// By its name, which is its only candidate so far.
+/// A cause by its name, which is its only candidate so far.
 inline CauseFound CauseNamed(std::string_view name) {
   return {.cause = std::string(name), .candidates = {std::string(name)}};
 }
@@ -72,7 +74,7 @@ struct OutliersFound {
   std::map<std::string, std::size_t> why;  // rows by reason
 };
 
-/// NaN: not known, as where nothing could be held out.
+/// Figures on held-out moves. NaN where one is not known, as where nothing could be held out.
 struct HeldOutGain {
   static constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   double rms_before_um = kNotKnown, rms_after_um = kNotKnown;
@@ -82,18 +84,18 @@ struct HeldOutGain {
   std::string held_out;
 };
 
-/// How far the proposed moves set a cause and its rival apart: chi-square (next_moves.h).
+/// The separation of a cause and its rival by the proposed moves, as a chi-square (next_moves.h).
 struct Prospect {
   std::string cause, rival;
   double d = 0;
 };
 
-/// The moves to make next, and what is to be had from them.
+/// The moves to make next, and the separations that they achieve.
 struct NextMoves {
   std::vector<ProposedMove> moves;
   std::vector<Prospect> prospects;
-  std::vector<std::pair<std::string, std::string>>
-      inseparable;  // cause and rival that moves do not tell
+  // Cause and rival that no moves separate.
+  std::vector<std::pair<std::string, std::string>> inseparable;
 };
 
 enum class Verdict { kConsistent, kExplained, kAmbiguous, kUnknown, kInsufficient };
@@ -101,7 +103,7 @@ std::string_view Name(Verdict verdict);
 
 struct Diagnosis {
   Verdict verdict = Verdict::kInsufficient;
-  std::string insufficient;  // what is missing
+  std::string insufficient;  // the reason, where the verdict is kInsufficient
   std::vector<CauseFound> causes;
   std::vector<UnknownFound> unknown;
   std::vector<NotTestable> not_testable;
@@ -109,11 +111,11 @@ struct Diagnosis {
   HeldOutGain gain;
   std::size_t rows = 0, units = 0, moves = 0;
   PlaceSteps steps;
-  bool steps_limit = false;          // they are wider than the noise
+  bool steps_limit = false;          // the steps are wider than the noise
   std::vector<std::string> remarks;  // on what is odd in the data (remarks.h)
-  CampaignModel model;               // the extended one
-  // Ids of units of which the fit has made no such unit as the table describes: the model has the
-  // table's geometry, and no effects of theirs.
+  CampaignModel model;               // the extended model
+  // Ids of units whose fit could not be a unit as the table describes it. The model has the table's
+  // geometry for them, and no effects.
   std::vector<std::uint32_t> without_geometry;
   NextMoves next;
   // Residuals in um, for pictures. Shape: (rows); NaN where nothing was measured.
@@ -123,12 +125,12 @@ struct Diagnosis {
 struct DiagnoseOptions {
   std::uint64_t seed = 1;
   double family_wise = 0.01;
-  std::span<const Effect> library =
-      EffectLibrary();                    // outlives the diagnosis, whose terms point to it
-  std::vector<std::string> leave_out;     // causes that the library shall not have
-  std::uint64_t shuffle_library = 0;      // not 0: another order of its templates
-  const CampaignModel* before = nullptr;  // an extended model to start from; none: nominal
-  bool patch = false;                     // empirical terms for what is unknown
+  // Templates of the model point into the library, which has to outlive the diagnosis.
+  std::span<const Effect> library = EffectLibrary();
+  std::vector<std::string> leave_out;     // causes to leave out of the library
+  std::uint64_t shuffle_library = 0;      // not 0: seed of another order of its templates
+  const CampaignModel* before = nullptr;  // an extended model to start from; else the nominal one
+  bool patch = false;                     // add empirical terms for what is unknown
   bool with_gain = true;
   bool with_next_moves = true;
   ParallelFor parallel = OneAfterTheOther();
@@ -136,7 +138,7 @@ struct DiagnoseOptions {
                                                                           std::string_view) {};
 };
 
-/// Pre: Validate(campaign).
+/// The verdict on a campaign. Pre: Validate(campaign).
 Diagnosis Diagnose(const Campaign& campaign, const DiagnoseOptions& options);
 
 }  // namespace focalfleet::sim

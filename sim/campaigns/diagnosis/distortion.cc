@@ -9,7 +9,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kStrong = 100;     // chi-square: a tenth of it could pass the gate
-constexpr double kWeakShare = 0.5;  // of the strong one's chi-square
+constexpr double kWeakShare = 0.5;  // of the strong term's chi-square
 constexpr double kSpread = 0.3;     // of the cause: a prior that keeps the fit determined
 
 PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
@@ -21,8 +21,8 @@ PoseErrors DoneBy(const ModelTerm& term, const Fit& fit, std::size_t unit) {
   return errors;
 }
 
-// What makes a distortion of the error `e` of a channel with this rms: the unit's own amplitude,
-// two bends, another dependence on the drive.
+// A distortion's error as a multiple of the error `e` of a channel with this rms. The columns are
+// the unit's own amplitude, two bends, and another dependence on the drive.
 double Factor(std::size_t column, double e, double rms, double drive) {
   const double size = std::abs(e) / rms;
   if (column == 0) return 1;
@@ -37,7 +37,7 @@ double RmsOf(const std::vector<double>& error) {
   return std::sqrt(square / static_cast<double>(std::max<std::size_t>(error.size(), 1)));
 }
 
-// The term's own errors, times what a distortion makes of them.
+// The term's own errors, distorted.
 ErrorTable DistortionsOf(const ModelTerm& term, const Fit& fit) {
   const Campaign& campaign = *fit.facts->campaign;
   const FilledColumn* drive = fit.facts->Find("drive_amplitude");

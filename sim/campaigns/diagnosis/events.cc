@@ -13,13 +13,13 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kEventsMax = 40;  // of a unit at once
+constexpr std::size_t kEventsMax = 40;  // events of a unit at once
 constexpr int kTurnsMax = 20;
-constexpr double kEventLogLikelihood = 25;  // at least, of an event that was taken
+constexpr double kEventLogLikelihood = 25;  // the least of an event that was taken
 
-// ---- slips near the noise: whole turns of the rotor, against the motion
+// ---- Slips near the noise: whole turns of the rotor, against the motion.
 
-// Rows about a jump that belong to its history, the nearest first.
+// Rows near a jump that belong to its history, the nearest first.
 std::vector<AngleRow> RowsFrom(const std::vector<AngleRow>& rows, const UnitTrack& track,
                                std::size_t at, int step) {
   constexpr std::size_t kRows = 8;
@@ -40,7 +40,7 @@ double MedianError(const std::vector<AngleRow>& rows) {
   return Median(std::move(errors));
 }
 
-// Where the nearest rows stand.
+// The level of the nearest rows.
 double LevelFrom(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t at,
                  int step) {
   constexpr std::size_t kNearest = 3;
@@ -49,9 +49,9 @@ double LevelFrom(const std::vector<AngleRow>& rows, const UnitTrack& track, std:
   return MedianError(near);
 }
 
-// What a step of `size_deg` before row k explains of the rows on its poorer side, in squares of
-// their noise. A row pays for at most kMost: a place that comes back at once was an outlier, and
-// pays nothing, on whichever side it lies.
+// The gain of a step of `size_deg` before row k, on the side of it that gains less, in squares of
+// the rows' noise. A row counts for at most kMost. A place that comes back at once was an outlier,
+// and a step gains nothing by it on either side.
 double GainOfStep(const std::vector<AngleRow>& rows, const UnitTrack& track, std::size_t k,
                   double size_deg, double noise_mm) {
   constexpr double kMost = 25;
@@ -71,13 +71,13 @@ double GainOfStep(const std::vector<AngleRow>& rows, const UnitTrack& track, std
 }
 
 struct Jump {
-  std::size_t move = 0;  // that it happened in
+  std::size_t move = 0;  // the move that it happened in
   double size_deg = 0, turns = 0;
   bool whole = false;       // a whole number of turns, against the motion
-  bool is_lasting = false;  // the next rows stand at the new level
+  bool is_lasting = false;  // the next rows stay at the new level
 };
 
-// The move between two rows that went the other way, the longest; 0: none.
+// The longest move between two rows that went the other way; 0: none.
 std::size_t MoveAgainst(const UnitTrack& track, std::size_t axis, std::size_t from, std::size_t to,
                         double turns) {
   std::size_t best = 0;
@@ -99,7 +99,8 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
     if (EndOfHistory(track, from) <= to || std::abs(size) < 0.6 * turn) continue;
     Jump jump;
     jump.size_deg = size;
-    // Of the two rows, or of what stands on either side where these two are noisy.
+    // The step between the two rows, or between the levels on either side where these two rows are
+    // noisy.
     for (const double tried :
          {size, LevelFrom(rows, track, k, 1) - LevelFrom(rows, track, k - 1, -1)}) {
       jump.turns = std::round(tried / turn);
@@ -114,8 +115,8 @@ std::vector<Jump> JumpsOf(const std::vector<AngleRow>& rows, const UnitTrack& tr
   return jumps;
 }
 
-// Of a place across the arm, as the differences of most of the unit's rows have it; negative: too
-// few rows.
+// The noise of a place across the arm, from the differences of most of the unit's rows. Negative
+// where there are too few rows.
 double UsualNoise_mm(const Fit& fit, std::size_t unit, std::size_t axis) {
   constexpr std::size_t kJumpsMin = 8;
   const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
@@ -128,9 +129,9 @@ double UsualNoise_mm(const Fit& fit, std::size_t unit, std::size_t axis) {
   return std::max(Median(std::move(jumps)) / 0.6745, 1e-3 * fit.noise.least_um);
 }
 
-// `noise_mm`: of a place, without slips.
+// Slips of the axis. `noise_mm`: of a place, without slips.
 std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis, double noise_mm) {
-  constexpr double kNoiseMax = 1.0 / 8;  // of a turn: else turns cannot be counted
+  constexpr double kNoiseMax = 1.0 / 8;  // of a turn: otherwise turns cannot be counted
   std::vector<EventTerm> events;
   if (noise_mm < 0) return events;
   const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
@@ -139,8 +140,8 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   std::erase_if(rows,
                 [&](const AngleRow& row) { return row.sigma_deg(noise_mm) > kNoiseMax * turn; });
   std::vector<Jump> jumped = JumpsOf(rows, track, axis, turn, noise_mm);
-  // Many jumps that are whole turns against the motion: slips, however close they follow. There and
-  // back again counts once: so does an outlier.
+  // Many jumps by whole turns against the motion are slips, however close they follow. A jump there
+  // and back again counts once, as an outlier does.
   double whole = 0, all = 0;
   for (std::size_t k = 0; k < jumped.size(); ++k) {
     const auto undoes = [&](std::size_t other) {
@@ -168,7 +169,7 @@ StepKind KindOf(const Fit& fit, const EventTerm& event) {
 }
 
 double FleetNoise_mm(const Fit& fit, std::size_t axis) {
-  constexpr std::size_t kUnits = 64;  // are enough for a median
+  constexpr std::size_t kUnits = 64;  // enough for a median
   const std::size_t units = fit.model.units.size();
   std::vector<double> usual;
   for (std::size_t unit = 0; unit < units; unit += std::max<std::size_t>(1, units / kUnits))
@@ -224,8 +225,8 @@ bool AnyHasMet(const Fit& fit) {
                              [&](const EventTerm& event) { return IsOfContact(fit, event); });
 }
 
-// How near arms come where they have met; below any gap: none have, or nobody can say. Arms that
-// meet on their way may be meant to end far apart.
+// The gap at which arms come to rest that have met. Below any gap where none have met, or where the
+// data do not show it. Arms that meet on their way may have targets far apart.
 double TouchingGap_mm(const Fit& fit) {
   const FilledColumn* gap = fit.facts->Find(kArmGap);
   std::vector<double> gaps_mm;
@@ -248,7 +249,7 @@ CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view parag
   cause.scope = "unit";
   cause.amplitude_unit = kEvents;
   std::set<std::uint32_t> units;
-  std::set<std::size_t> axes, moves;  // a lost one has an event of each axis
+  std::set<std::size_t> axes, moves;  // a lost move has an event of each axis
   double square = 0;
   for (const EventTerm& event : events) {
     moves.insert(event.row);
@@ -277,7 +278,7 @@ bool IsOfContact(const Fit& fit, const EventTerm& event) {
   if (kind == StepKind::kCommand) return false;
   const CampaignUnit& own = fit.model.units[event.unit];
   const std::vector<std::uint32_t>& exposure = fit.facts->exposures.of_row;
-  // Two that lost whole turns both slipped.
+  // Two units that lost whole turns both slipped.
   const auto has_met = [&](StepKind one, StepKind other) {
     return other != StepKind::kCommand &&
            (one == StepKind::kBlocked || other == StepKind::kBlocked);
@@ -309,8 +310,8 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
                  "they have touched. Home both, and look at the plan of that move.",
                  {}};
   const bool any_has_met = AnyHasMet(fit);
-  // Where some have met, a unit that stopped short alone has pushed its neighbour too little to be
-  // seen; and some that are stopped end whole turns short.
+  // A unit that stopped short alone, where others have met, has pushed its neighbour too little to
+  // be seen. Some units that are stopped end whole turns short.
   const double touching_mm = TouchingGap_mm(fit);
   const auto has_met = [&](const EventTerm& event, StepKind kind) {
     if (kind == StepKind::kBlocked) return any_has_met;

@@ -1,7 +1,8 @@
-// Steps: an axis that from one move on stands by a fixed angle elsewhere, until it is homed. What
-// physics has a size for comes first: whole motor turns lost against the motion (step_loss), a
-// whole command lost or done twice (lost_command). What stops short by any angle has touched a
-// neighbour where one did so in the same move (collision_contact); else nobody knows.
+// A step is an axis that from one move on is off by a fixed angle, until it is homed. Steps of a
+// size that physics gives come first. They are whole motor turns lost against the motion
+// (step_loss), or a whole command lost or done twice (lost_command). A move that stops short by any
+// angle has touched a neighbour where that one was stopped in the same move (collision_contact).
+// The cause of other steps is unknown.
 #pragma once
 
 #include <string_view>
@@ -18,16 +19,16 @@ inline constexpr std::string_view kStepLoss = "step_loss", kLostCommand = "lost_
 /// The amplitude's unit of a cause that is made of steps.
 inline constexpr std::string_view kEvents = "events";
 
-/// Adds the steps that stand out from the residuals to the model. Returns how many.
+/// Adds the steps that are clear in the residuals to the model. Returns their number.
 std::size_t AddEvents(Fit* fit);
 
-/// Whether a neighbour was stopped in the same move, one of the two not after whole turns.
+/// Whether a neighbour was stopped in the same move, and one of the two not after whole turns.
 bool IsOfContact(const Fit& fit, const EventTerm& event);
 
-/// The model's steps by their causes.
+/// The causes that explain the model's steps.
 std::vector<CauseFound> EventCauses(const Fit& fit);
 
-/// The steps that nobody has a cause for.
+/// The model's steps that no cause explains.
 std::vector<UnknownFound> UnexplainedSteps(const Fit& fit);
 
 }  // namespace focalfleet::sim

@@ -16,16 +16,17 @@ namespace {
 
 using Eigen::Index;
 constexpr int kMost = static_cast<int>(kColumnsMax);
-// Of one group: no memory of the heap, as there may be thousands of groups for each template.
+// A vector of one group, without heap memory, as there may be thousands of groups for each
+// template.
 using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
 
 constexpr double kSizes[] = {0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30};  // of the prior size
 constexpr double kShares[] = {1, 0.5, 0.2, 0.05, 0.01, 0.002};     // of units that have it
-constexpr double kOddsMax = 1e90;  // beyond, one of two summands is lost in the other's rounding
+constexpr double kOddsMax = 1e90;  // beyond it one of two summands is lost in the other's rounding
 constexpr double kFlat = 1e-9;  // of the largest curvature: a direction that the data do not show
 
-// One group's score along its principal directions.
+// A group's score along its principal directions.
 struct Direction2 {
   double b2 = 0;  // squared
   double g = 0;
@@ -37,7 +38,7 @@ struct GroupScore {
   }
   [[nodiscard]] bool empty() const { return count_ == 0; }
   void Add(const Direction2& direction) { along_[count_++] = direction; }
-  /// For what was chosen to fit: so much less evidence.
+  /// Lowers the evidence by the price of a choice.
   void Charge(double price) {
     if (empty()) return;
     price_ += price;
@@ -76,7 +77,7 @@ GroupScore Decompose(const Vector& b, const Square& g, double dispersion) {
   return out;
 }
 
-// An amplitude that cannot be says nothing for the effect.
+// An amplitude that is impossible is no evidence for the effect.
 GroupScore DecomposePossible(const Template& form, const Vector& b, const Square& g,
                              double dispersion) {
   if (IsImpossible(form, b, g)) return Decompose(Vector::Zero(b.size()), g, dispersion);
@@ -114,7 +115,7 @@ struct Level {
   Sharing sharing = Sharing::kUnit;
   std::vector<GroupScore> groups;
   std::vector<std::uint32_t> group_of_unit;
-  // Groups that have it together or not at all, as a rail's units; empty: each by itself.
+  // Groups that have the effect together or not at all, as a rail's units. Empty: each by itself.
   std::vector<std::uint32_t> together;
   [[nodiscard]] std::size_t as_one(std::size_t group) const {
     return together.empty() ? group : together[group];
@@ -127,7 +128,7 @@ std::vector<std::uint32_t> Each(std::size_t units) {
   return each;
 }
 
-// Each unit by itself.
+// The level at which each unit has its own amplitude.
 Level UnitLevel(const Score& score, const Template& form, double dispersion) {
   const std::size_t c = form.columns, units = score.b.size() / c;
   Level level{Sharing::kUnit, {}, Each(units)};
@@ -155,7 +156,7 @@ double LevelLogP(const Level& level) {
   double sum = 0, dof = 0;
   double tests = 0;
   std::array<double, kColumnsMax + 1> most{};  // chi-square of the best group, by its freedom
-  // One unit's noise is known from its own rows only.
+  // The noise of a single unit is known from its own rows only.
   constexpr double kOwnNoise = 1.15;
   const double inflation =
       level.sharing == Sharing::kUnit && level.groups.size() > 1 ? kOwnNoise : 1;
@@ -172,7 +173,7 @@ double LevelLogP(const Level& level) {
     if (most[freedom] > 0)
       best =
           std::min(best, LogChiSquareTail(most[freedom] / inflation, static_cast<double>(freedom)));
-  // A sum over many units also counts what is wrong with the noise of all of them.
+  // A sum over many units also counts the error of all units' noise.
   constexpr double kNoiseOfNoise = 0.2, kMany = 20;
   const double all =
       LogChiSquareTail(sum / (1 + kNoiseOfNoise * std::min(1.0, (dof - 1) / kMany)), dof);
@@ -184,7 +185,7 @@ struct MixtureFit {
   double size = 0, share = 1;
 };
 
-// ln of the product of 1 - share + share exp(e) over the groups: each has it or has it not.
+// ln of the product of 1 - share + share exp(e) over the groups: each has the effect or not.
 // `odds`: exp(e), as far as that is a number.
 double LogMixture(const std::vector<double>& evidence, const std::vector<double>& odds,
                   double share) {
@@ -192,17 +193,17 @@ double LogMixture(const std::vector<double>& evidence, const std::vector<double>
   double sum = 0, product = 1;
   for (std::size_t k = 0; k < evidence.size(); ++k) {
     if (odds[k] > kOddsMax) {
-      sum += std::log(share) + evidence[k];  // the other summand is nothing beside it
+      sum += std::log(share) + evidence[k];  // the other summand is negligible
       continue;
     }
     product *= 1 - share + share * odds[k];
-    // One logarithm for many factors.
+    // A single logarithm serves many factors.
     if (product > kLarge || product < 1 / kLarge) sum += std::log(product), product = 1;
   }
   return sum + std::log(product);
 }
 
-// Evidence summed over the groups that have it together; NaN where none of them is told anything.
+// Evidence summed over the groups that have the effect together; NaN where no group has data.
 // Shape: (groups), by `Level::as_one`.
 void SumTogether(const Level& level, double size, std::vector<double>* evidence) {
   evidence->assign(level.groups.size(), std::numeric_limits<double>::quiet_NaN());
@@ -213,7 +214,7 @@ void SumTogether(const Level& level, double size, std::vector<double>* evidence)
   }
 }
 
-// Average over sizes and shares; the best of them tells who has it.
+// Average over sizes and shares; the best of them decides which groups have the effect.
 MixtureFit Mix(const Level& level, double prior_size) {
   MixtureFit best;
   double most = -std::numeric_limits<double>::infinity();
@@ -236,7 +237,7 @@ MixtureFit Mix(const Level& level, double prior_size) {
   return best;
 }
 
-// Units' own amplitudes about a mean: evidence, and the spread that fits best. One column only.
+// Units' own amplitudes about a mean: evidence, and the spread that fits best. Pre: one column.
 // `price`: of each unit.
 struct ScatterFit {
   double log_evidence = -std::numeric_limits<double>::infinity();
@@ -299,7 +300,7 @@ void TakeMixture(const Level& level, const MixtureFit& fit, Evidence* out) {
 }
 
 double UnitDispersion(const Score& score) {
-  // One unit's own estimate is noisy: some prior weight at 1.
+  // The estimate of a single unit is noisy: it gets some prior weight at 1.
   constexpr double kPrior = 4;
   return (score.spread_sum + kPrior) / (score.spread_count + kPrior);
 }
@@ -321,14 +322,14 @@ double FleetDispersion(const Score& score, std::size_t columns) {
   if (!(g.trace() > 0)) return 1;
   const Eigen::CompleteOrthogonalDecomposition<Square> solver(g);
   const Vector own = solver.solve(b);
-  // A generalised inverse: columns may be alike in what all units have of them.
+  // A generalised inverse: columns may be alike in all units.
   NeighbourSum<Eigen::Dynamic> sum(solver.pseudoInverse());
   double fourth = 0;
   for (std::size_t e = 0; e < exposures; ++e) {
     sum.Add(at_b(e) - at_g(e) * own);
     fourth += at_g(e).trace() * at_g(e).trace();
   }
-  // Few exposures carry the score: their own dispersion says little.
+  // Few exposures carry the score, so that their own dispersion is uncertain.
   const double effective = g.trace() * g.trace() / std::max(fourth, 1e-300);
   constexpr double kPrior = 6;
   const double raw = sum.sum() / static_cast<double>(c) * effective / std::max(effective - 1, 1.0);
@@ -349,8 +350,8 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
     levels.back().together = Together(form.effect->owner, groups, units);
   }
   if (units > 1 && form.shape_of_unit.empty()) {
-    // Noise that units share makes chance of what they share; the levels themselves are compared
-    // with one dispersion.
+    // Noise that units share may look like an effect that they share. The levels themselves are
+    // compared with one dispersion.
     const double fleet = std::max(best.dispersion, FleetDispersion(score, c));
     const Level cautious{Sharing::kFleet,
                          {DecomposePossible(form, score.fleet_b, score.fleet_g, fleet)},
@@ -379,7 +380,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
   // Units' own shapes have been paid for by each unit.
   const double price = form.shape_of_unit.empty() ? std::log(form.choices) : 0;
   best.log_p = std::min(0.0, best.log_p + price);
-  // Chance explains it: no need to know who has it.
+  // Chance explains less evidence: which units have the effect is not computed.
   constexpr double kWorthALook = -3;
   if (best.log_p > kWorthALook) {
     best.log_evidence = 0;
@@ -393,7 +394,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
   if (units > 2 && c == 1 && !of_the_whole) {
     const ScatterFit scatter = Scatter(score, prior, best.dispersion,
                                        form.shape_of_unit.empty() ? 0 : std::log(form.choices));
-    // Only as a refinement of what is shared by all: a scatter that pays for itself.
+    // A scatter that pays for itself is taken only as a refinement of an effect that all share.
     if (scatter.log_evidence > best.log_evidence + 3) {
       best.sharing = Sharing::kUnit;
       best.log_evidence = scatter.log_evidence;
@@ -403,7 +404,7 @@ Evidence Assess(const Score& score, const Template& form, const FleetGroups& gro
       for (std::size_t unit = 0; unit < units; ++unit) {
         const GroupScore& own = levels.front().groups[unit];
         best.chi_square += own.chi_square;
-        // Who found no shape among those that each unit may have does not have it.
+        // A unit without a shape, where each may have its own, does not have the effect.
         best.has[unit] = form.shape_of_unit.empty() || !own.empty() ? 1 : 0;
       }
     }

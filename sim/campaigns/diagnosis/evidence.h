@@ -1,12 +1,12 @@
-// How a template stands against the data: at which level its amplitudes are shared, how much it
-// explains, and whether that could be chance.
+// The evidence for a template says at which level its amplitudes are shared, how much it explains,
+// and whether that could be chance.
 //
-// Evidence is the marginal likelihood over amplitudes of any size near the effect's prior size,
-// ln Z = 1/2 b' (G + 1/a^2)^-1 b - 1/2 ln|1 + a^2 G|, against no effect at all: a free amplitude
-// for every unit pays for itself or loses to one amplitude for all. Units that have it among units
-// that have not are a mixture with unknown share. A shape of the unit's own costs the logarithm of
-// the number of shapes that there were to choose from. Chance is the tail of chi-square, with the
-// dispersion that the residuals really have, for the best of the levels looked at.
+// Evidence is the ratio of the marginal likelihoods with the effect and without. Amplitudes may
+// have any size near the effect's prior size: ln Z = 1/2 b' (G + 1/a^2)^-1 b - 1/2 ln|1 + a^2 G|. A
+// free amplitude for every unit pays for itself or loses to one amplitude for all. Units that have
+// the effect among units that have not are a mixture with unknown share. A shape of the unit's own
+// costs the logarithm of the number of shapes to choose from. Chance is the tail of chi-square for
+// the best of the levels, with the dispersion of the actual residuals.
 #pragma once
 
 #include <cstddef>
@@ -20,15 +20,15 @@ namespace focalfleet::sim {
 struct Evidence {
   Sharing sharing = Sharing::kFleet;
   std::vector<char> has;    // Shape: (units)
-  double log_evidence = 0;  // natural logarithm of the marginal likelihood ratio
+  double log_evidence = 0;  // of the marginal likelihood ratio, natural
   double chi_square = 0;    // explained at that level, by the units that have it
-  double log_p = 0;         // of the level that is least likely by chance, for all levels looked at
+  double log_p = 0;         // the least of all levels, corrected for their number
   double dispersion = 1;    // of the noise along this template
   double spread = 0;        // of the units' amplitudes, where they are their own
   bool scattered = false;   // units' own amplitudes about a mean of the fleet
 };
 
-/// Pre: score belongs to form.
+/// The evidence for the template at its best level. Pre: score belongs to form.
 Evidence Assess(const Score& score, const Template& form, const FleetGroups& groups);
 
 /// Dispersion of the fleet's score about its fit, from exposure to exposure.
@@ -38,7 +38,8 @@ double FleetDispersion(const Score& score, std::size_t columns);
 double ShareOfTarget(const Score& score, const Template& form, const Evidence& as,
                      const FleetGroups& groups, double target_square);
 
-/// How many independent tests the templates are worth, from exposures' signs flipped at random.
+/// The number of independent tests that the templates are worth, from exposures' signs flipped at
+/// random.
 double EffectiveTests(const std::vector<Score>& scores, const Templates& templates,
                       std::uint64_t seed);
 

@@ -14,12 +14,13 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr std::size_t kEventsMax = 40;  // of a unit at once
-constexpr double kStepMin_deg = 0.3;    // a lost command below it cannot be told from other steps
-constexpr double kRowsWorth = 3;        // far ones, that a change puts right at least
-constexpr double kCap_mm = 0.5;         // what an outlier costs at most
+constexpr std::size_t kEventsMax = 40;  // steps of a unit at once
+// A smaller lost command cannot be distinguished from other steps.
+constexpr double kStepMin_deg = 0.3;
+constexpr double kRowsWorth = 3;  // far rows that a change has to put right
+constexpr double kCap_mm = 0.5;   // the most that an outlier costs
 
-// One unit's rows, and what has been added to each angle so far.
+// The rows of a unit, and the angles that changes have added so far.
 struct UnitRows {
   CampaignUnit geometry;
   UnitTrack track;
@@ -42,17 +43,17 @@ double TotalCost(const UnitRows& rows) {
   return sum;
 }
 
-// What may have happened in a move: what it added to the angles.
+// A change that may have happened in a move: the angles that it added.
 struct Change {
   std::size_t move = 0;
   double by_deg[2] = {0, 0};
   double gained = 0;
 };
-// kInOrder: whole moves, each by what comes next rather than by all that is to come.
+// kInOrder finds whole moves, each by the rows that follow next rather than by all later rows.
 enum class ChangeKind { kWholeMove, kInOrder, kSlip, kBlocked };
 
-// How far both axes stand from where they were told to, by the place alone. NaN: it is out of
-// reach.
+// The difference of both axes from their commands, by the place alone. NaN where the place is out
+// of reach.
 struct AnglesOff {
   double deg[2];
 };
@@ -61,7 +62,7 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
   const double a = unit.arm_mm[kTheta], b = unit.arm_mm[kPhi];
   const double x = rows.x_mm[i] - unit.base_x_mm, y = rows.y_mm[i] - unit.base_y_mm;
   const double cosine = (x * x + y * y - a * a - b * b) / (2 * a * b);
-  constexpr double kFlat = 0.9;  // nearly stretched or folded: the place does not tell the axes
+  constexpr double kFlat = 0.9;  // cosine: nearly stretched or folded arms do not separate the axes
   AnglesOff best{{std::nan(""), std::nan("")}};
   if (!(std::abs(cosine) < kFlat)) return best;
   double least = std::numeric_limits<double>::infinity();
@@ -78,8 +79,8 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
   return best;
 }
 
-// What the rows from the move on stand off by, one and all: something kept the axes from their way.
-// An axis that was on its way stands short of it; one that was not may have been pushed.
+// The angle by which the rows from this move on are off: an obstacle kept the axes from their way.
+// An axis that was moving stops short. An axis that was not may have been pushed.
 std::vector<Change> StoppedShort(const UnitRows& rows, std::size_t move) {
   constexpr std::size_t kRowsMin = 4, kRowsMax = 60;
   constexpr double kLeast_deg = 0.1;
@@ -104,8 +105,8 @@ std::vector<Change> StoppedShort(const UnitRows& rows, std::size_t move) {
   return {change};
 }
 
-// A command that was lost, or made twice, of both axes or of one; or whole turns of a rotor,
-// against its motion.
+// The changes that may have happened in a move. They are a command that was lost or made twice, of
+// both axes or of one, or whole turns of a rotor against its motion.
 std::vector<Change> ChangesIn(const UnitRows& rows, std::size_t move, ChangeKind kind) {
   constexpr int kTurnsAtOnce = 4;
   if (kind == ChangeKind::kBlocked) return StoppedShort(rows, move);
@@ -131,7 +132,7 @@ std::vector<Change> ChangesIn(const UnitRows& rows, std::size_t move, ChangeKind
   return changes;
 }
 
-// What every row costs now, and all from a row on.
+// The present cost of each row, and the sum from each row on.
 struct Costs {
   std::vector<double> of_row, from;
 };
@@ -145,7 +146,7 @@ Costs CostsOf(const UnitRows& rows) {
   return costs;
 }
 
-// The one that gains most, if it gains `gain_min`.
+// The change that gains most, if it gains `gain_min`.
 Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
   constexpr double kRounding = 1e-9;  // of sums of squares, mm^2
   const Costs costs = CostsOf(rows);
@@ -155,7 +156,8 @@ Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
     for (Change& change : ChangesIn(rows, move, kind)) {
       const double enough = std::max(best.gained, gain_min) - kRounding;
       double gained = 0;
-      // No more can be gained than what the rows to come cost: most moves are out after a few.
+      // A change cannot gain more than the later rows cost: most moves are excluded after a few
+      // rows.
       for (std::size_t i = move; i < end && gained + costs.from[i] - costs.from[end] >= enough; ++i)
         gained +=
             costs.of_row[i] - RowCost(rows, i, rows.added_deg[kTheta][i] + change.by_deg[kTheta],
@@ -168,7 +170,7 @@ Change BestChange(const UnitRows& rows, ChangeKind kind, double gain_min) {
   return best;
 }
 
-// Once a change is known, so is the geometry: by the rows before and behind it.
+// A known change makes the geometry known: it is fitted by the rows before and after.
 void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
   constexpr int kRounds = 20;
   std::vector<PlainRow> plain;
@@ -180,7 +182,7 @@ void FitGeometry(const CampaignUnit& table, UnitRows* rows) {
   rows->geometry = FitPlain(plain, table, rows->geometry, kRounds);
 }
 
-// From its move on, until the unit is homed.
+// Applies the change from its move on, until the unit is homed.
 void Take(const Change& change, UnitRows* rows) {
   const std::size_t end = EndOfHistory(rows->track, change.move);
   for (std::size_t i = change.move; i < end; ++i)
@@ -220,29 +222,29 @@ Change LongestRun(const UnitRows& rows, std::size_t since, std::size_t at, doubl
   return best;
 }
 
-// Whole moves in the order of time: after many that were lost no single one explains what comes
-// later, but each explains what comes next.
+// Whole moves in the order of time. After many lost moves no single one explains all later rows,
+// but each explains the next ones.
 std::vector<Change> FindInOrder(std::size_t at_most, double far_mm, const CampaignUnit& table,
                                 UnitRows* rows) {
   constexpr double kNothing[2] = {0, 0};
   const double gain_min = kRowsWorth * far_mm * far_mm;
   std::vector<Change> found;
-  std::size_t since = 0;  // after the last row that stood where it should
+  std::size_t since = 0;  // after the last row that was where it should be
   for (std::size_t i = 0; i < rows->track.moves && found.size() < at_most; ++i) {
     if (!std::isfinite(rows->x_mm[i])) continue;
     if (IsFar(*rows, i, kNothing, far_mm)) {
       const Change best = LongestRun(*rows, since, i, far_mm);
-      if (best.gained < gain_min) continue;  // somewhere else for this once
+      if (best.gained < gain_min) continue;  // an outlier: off in this row only
       Take(best, rows);
       found.push_back(best);
     }
     since = i + 1;
   }
-  if (!found.empty()) FitGeometry(table, rows);  // not before: most rows may be to come
+  if (!found.empty()) FitGeometry(table, rows);  // not earlier: most rows may still follow
   return found;
 }
 
-// Changes that explain the rows, from one geometry to begin at.
+// Changes that explain the rows, starting from one geometry.
 std::vector<Change> FindChanges(ChangeKind kind, std::size_t at_most, double far_mm,
                                 const CampaignUnit& table, UnitRows* rows) {
   const double gain_min = kRowsWorth * far_mm * far_mm;
@@ -268,12 +270,12 @@ UnitRows RowsOf(const Fit& fit, std::size_t unit, const CampaignUnit& geometry) 
   return rows;
 }
 
-// One way to explain a unit's rows that lie far off.
+// An explanation of a unit's rows that are far off.
 struct Explained {
   std::vector<Change> changes;
-  CampaignUnit geometry;  // that they belong to
-  double cost = 0;        // that is left
-  std::size_t far = 0;    // rows that are
+  CampaignUnit geometry;  // the geometry of these rows
+  double cost = 0;        // the cost that is left
+  std::size_t far = 0;    // rows that are still far
 };
 
 Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std::size_t unit,
@@ -295,11 +297,11 @@ Explained ExplainedBy(ChangeKind kind, std::size_t at_most, const Fit& fit, std:
 }  // namespace
 
 std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit* geometry) {
-  constexpr double kLeftMax = 0.2;           // what changes do not explain is something else
-  constexpr double kLeftOfAny = 0.05;        // by changes of any size: a drift is not made of steps
-  constexpr std::size_t kUnitsForNoise = 4;  // of one unit alone noise may be the drift itself
-  constexpr std::size_t kRowsForASlip = 4;   // that were far, at least: slips fit anything
-  // A row is worth a look that noise does not put there. What is sought here makes a unit noisy.
+  constexpr double kLeftMax = 0.2;     // more unexplained cost is another effect
+  constexpr double kLeftOfAny = 0.05;  // for changes of any size: a drift is not made of steps
+  constexpr std::size_t kUnitsForNoise = 4;  // the noise of a single unit may be the drift itself
+  constexpr std::size_t kRowsForASlip = 4;   // far rows, at least: slips fit anything
+  // A row is tested where noise does not explain it. The steps that are sought make a unit noisy.
   const double factor = std::min(fit.noise.unit_factor[unit], 1.5);
   const double far_mm = std::clamp(10e-3 * fit.noise.place_um * factor, 0.04, 0.4);
   const CampaignUnit& fitted = fit.model.units[unit];
@@ -309,8 +311,8 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
     if (fit.aside[rows.track.first_row + i] == 0 && RowCost(rows, i, 0, 0) > far_mm * far_mm) ++far;
   if (far == 0) return {};
   const double before = TotalCost(rows);
-  // Far rows may still be noise's, of rests that all units have; beside changes that explain far
-  // more than noise does, what all rows cost tells.
+  // Far rows may still be noise of rests that all units have. The total cost of all rows decides,
+  // where the changes explain far more than noise does.
   const auto seen = static_cast<double>(
       std::ranges::count_if(rows.x_mm, [](double x) { return std::isfinite(x); }));
   const double of_noise = 2 * seen * std::pow(1e-3 * fit.noise.typical_um * factor, 2);
@@ -327,7 +329,7 @@ std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit
   ChangeKind best_kind = ChangeKind::kWholeMove;
   for (const ChangeKind kind :
        {ChangeKind::kWholeMove, ChangeKind::kInOrder, ChangeKind::kSlip, ChangeKind::kBlocked}) {
-    // What has a size by itself goes before what has any, unless it leaves far more.
+    // A change whose size physics gives precedes one of any size, unless it leaves far more.
     const double far_better = kind == ChangeKind::kBlocked ? 0.5 : 1;
     const bool is_whole = kind == ChangeKind::kWholeMove || kind == ChangeKind::kInOrder;
     const std::size_t at_most = is_whole ? kEventsMax : std::min(far / kRowsForASlip, kEventsMax);

@@ -1,6 +1,6 @@
-// Steps of single units so large that only the exact place tells: whole commands that were lost or
-// made twice, of both axes or of one; whole turns of the rotor; and, where neither explains the
-// rows, whatever the axes were kept from by something in their way.
+// Some steps of single units are so large that only the exact place shows them. They are whole
+// commands lost or made twice, of both axes or of one, or whole turns of the rotor. Where neither
+// explains the rows, an obstacle has kept the axes from their way by any angle.
 #pragma once
 
 #include <vector>
@@ -9,8 +9,8 @@
 
 namespace focalfleet::sim {
 
-/// The unit's steps, all of one kind; none: its rows lie near, or no kind explains them. Its
-/// geometry is set to the one that they belong to, as a fit that did not know of them may have been
+/// The unit's steps, all of one kind. Empty where its rows are near, or where no kind explains
+/// them. Sets the geometry to that of the rows, because a fit without the steps may have been
 /// dragged along.
 std::vector<EventTerm> ExactSteps(const Fit& fit, std::size_t unit, CampaignUnit* geometry);
 

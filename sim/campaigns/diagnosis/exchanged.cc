@@ -16,11 +16,11 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kBad_mm = 0.3;       // miss
-constexpr double kSwapBetter = 0.2;   // of the miss that is left once names are exchanged
-constexpr double kSwapNear_mm = 3;    // and no more than this: the table's zeros may be wrong
-constexpr std::size_t kRowsMin = 3;   // that both have
-constexpr double kChange = 2.5;       // votes that names are exchanged, or back
+constexpr double kBad_mm = 0.3;       // distance from the expected place
+constexpr double kSwapBetter = 0.2;   // of the distance that is left once names are exchanged
+constexpr double kSwapNear_mm = 3;    // absolute limit: the table's zeros may be wrong
+constexpr std::size_t kRowsMin = 3;   // rows that both units have
+constexpr double kChange = 2.5;       // votes that a change of the exchange costs
 constexpr std::size_t kBadMost = 64;  // units: more are no exchange, but another table
 
 // Rows of an exposure that both units have.
@@ -42,7 +42,7 @@ std::vector<RowPair> RowsOfBoth(const CampaignFacts& facts, std::size_t a, std::
   return rows;
 }
 
-// Of a measured place from a unit of the table at these angles; NaN: not seen.
+// Distance of a measured place from that of a unit of the table at these angles; NaN: not seen.
 double MissAt(const Campaign& campaign, std::size_t row, std::size_t unit, double theta_deg,
               double phi_deg) {
   const PlacePoint at = PlaceOf(campaign.units[unit], theta_deg, phi_deg);
@@ -80,8 +80,8 @@ std::size_t SinceWhen(const Campaign& campaign, const std::vector<RowPair>& rows
   return since;
 }
 
-// What the other's commands are off by, for each pair of rows: the units stood elsewhere when they
-// began to make each other's moves, and stand elsewhere where both are homed.
+// The error of the other's commands, for each pair of rows. The units were at different angles when
+// they began to make each other's moves, and are at different ones where both are homed.
 std::array<std::vector<double>, 2> Offsets(const CampaignFacts& facts,
                                            const std::vector<RowPair>& rows, std::size_t since) {
   const Campaign& campaign = *facts.campaign;
@@ -124,7 +124,8 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
   return CommandSwap{a, b, rows[since].exposure, rms_mm};
 }
 
-// Where fibres should be by the table, and how far from there they were seen. Shape: (rows)
+// The expected places of fibres by the table, and the distance from there to the measured ones.
+// Shape: (rows).
 struct Expected {
   std::vector<PlacePoint> at;
   std::vector<double> own_mm;  // NaN: not seen
@@ -148,7 +149,7 @@ double MissOf(const Campaign& campaign, const Expected& expected, std::size_t ro
                     campaign.y_mm[row] - expected.at[other].y_mm);
 }
 
-// Each stands where the other should, and far from its own place.
+// Whether each fibre is where the other should be, and far from its own place.
 bool AreCrossed(const Campaign& campaign, const Expected& expected, std::size_t a, std::size_t b) {
   const auto crossed = [&](std::size_t row, std::size_t other) {
     const double own_mm = expected.own_mm[row];
@@ -174,7 +175,7 @@ std::vector<Crossing> FindCrossings(const CampaignFacts& facts, const Expected& 
   const Campaign& campaign = *facts.campaign;
   struct Off {
     std::size_t unit = 0, row = 0;
-    double x_mm = 0;  // where it should be
+    double x_mm = 0;  // expected place
   };
   std::vector<std::vector<Off>> off_in(facts.exposures.size());
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
@@ -195,8 +196,8 @@ std::vector<Crossing> FindCrossings(const CampaignFacts& facts, const Expected& 
   return crossings;
 }
 
-// Where names are exchanged and where not: the changes that most rows agree with, for their price.
-// A row that says neither, an outlier's say, goes with those around it.
+// The rows in which names are exchanged: the changes that most rows agree with, for their price. A
+// row that decides neither way, as an outlier does, goes with those around it.
 std::vector<char> ExchangedIn(const Campaign& campaign, const Expected& expected,
                               const std::vector<RowPair>& rows) {
   std::array<double, 2> best = {0, 0};  // by whether names are exchanged
@@ -223,7 +224,7 @@ std::vector<char> ExchangedIn(const Campaign& campaign, const Expected& expected
   return exchanged;
 }
 
-// None: in no three exposures on end.
+// The exchange in stretches of three exposures or more; nullopt where there is none.
 std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected& expected,
                                      std::size_t a, std::size_t b) {
   const Campaign& campaign = *facts.campaign;
@@ -236,7 +237,7 @@ std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected&
     for (end = begin; end < rows.size() && exchanged[end] == exchanged[begin]; ++end)
       if (AreCrossed(campaign, expected, rows[end].a, rows[end].b)) ++crossed;
     if (exchanged[begin] == 0 || crossed < kRowsMin) continue;
-    // To the unit's end where it is to the end of what both have.
+    // An exchange to the end of the rows that both units have is one to the end of each unit.
     FibreSwap::Stretch stretch = FibreSwap::Whole(campaign, a, b).stretches.front();
     if (begin > 0) stretch.begin_a = rows[begin].a, stretch.begin_b = rows[begin].b;
     if (end < rows.size()) stretch.end_a = rows[end].a, stretch.end_b = rows[end].b;
@@ -348,7 +349,7 @@ std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts) {
 std::vector<std::size_t> RowsUnderAnothersName(const CampaignFacts& facts) {
   const Campaign& campaign = *facts.campaign;
   const Expected expected = ExpectedOf(campaign);
-  // Where the table is wrong about a unit, who knows whose place it is at.
+  // A wrong table of a unit makes it unknown whose place it is at.
   const auto is_known = [&](std::size_t unit) {
     std::vector<double> misses;
     for (std::size_t row = campaign.first_row[unit]; row < campaign.first_row[unit + 1]; ++row)

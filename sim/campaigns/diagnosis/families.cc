@@ -15,28 +15,28 @@
 namespace focalfleet::sim {
 namespace {
 
-// What depends on the direction and length of moves.
+// Causes that depend on the direction and length of moves.
 constexpr std::string_view kMoves[] = {
     "backlash",   "load_angle_lag", "relaxation",       "supply_droop",        "friction_windup",
     "stiction",   "mode_threshold", "ramp_travel",      "scale_asymmetry",     "start_skew",
     "gear_scale", "fibre_torque",   "thermal_backlash", "command_quantisation"};
-// What depends on where the axis stands.
+// Causes that depend on where the axis stands.
 constexpr std::string_view kAngles[] = {"gear_scale",     "eccentricity",   "pinion_runout",
                                         "stage_ripple",   "tooth_mesh",     "tooth_damage",
                                         "axis_tilt",      "hard_stop",      "fibre_torque",
                                         "axis_crosstalk", "gravity_torque", "command_quantisation"};
-// What drifts as the night cools and the units run.
+// Causes that drift as the night cools and the units run.
 constexpr std::string_view kNight[] = {"wear",          "thermal_backlash",   "self_heating",
                                        "supply_drift",  "thermal_arm_growth", "plate_expansion",
                                        "plate_gradient"};
-// What moves the whole image.
+// Causes that move the whole image.
 constexpr std::string_view kImage[] = {"camera_similarity", "air_turbulence", "camera_distortion",
                                        "plate_expansion",   "plate_gradient", "gravity_sag",
                                        "axis_tilt"};
-// What turns with the rotor.
+// Causes that turn with the rotor.
 constexpr std::string_view kRotor[] = {"cogging", "phase_imbalance", "neighbour_coupling"};
 
-// Found by their exact places, not by signatures.
+// Causes that are found by exact places, not by signatures.
 constexpr std::string_view kElsewhere[] = {"zero_offset",   "base_offset",  "arm_length",
                                            "identity_swap", "lost_command", "step_loss",
                                            "sensor_bias"};
@@ -45,7 +45,7 @@ bool Has(std::span<const std::string_view> family, std::string_view cause) {
   return std::find(family.begin(), family.end(), cause) != family.end();
 }
 
-// By its exact places: what it explains is no shape of anything.
+// Whether the cause is found by exact places: what it explains is no shape of another.
 bool IsFoundElsewhere(const CauseFound& cause) {
   return Has(kElsewhere, cause.cause) || cause.amplitude_unit == kEvents;
 }
@@ -55,8 +55,8 @@ bool IsCandidate(const CauseFound& cause, std::string_view name) {
          cause.candidates.end();
 }
 
-// Some units have it, and nearly all of these have the other, too: hardly by accident, unless
-// nearly all units have the other.
+// Whether only some units have the cause, and nearly all of these have the other, too. This is
+// hardly an accident, unless nearly all units have the other.
 bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause, std::size_t units) {
   constexpr double kNearlyAll = 0.8, kByAccident = 0.3;
   if (cause.all_units || other.all_units) return false;
@@ -69,7 +69,7 @@ bool IsAmongUnitsOf(const CauseFound& other, const CauseFound& cause, std::size_
          BinomialTail(both, cause.units.size(), std::min(share, 1.0)) < kByAccident;
 }
 
-// What the units of `other` contribute to the cause's evidence.
+// The contribution of the units of `other` to the cause's evidence.
 double EvidenceAmong(const CauseFound& cause, const CauseFound& other) {
   if (cause.evidence_of_unit.empty() || other.evidence_of_unit.empty())
     return cause.delta_log_likelihood;
@@ -79,26 +79,26 @@ double EvidenceAmong(const CauseFound& cause, const CauseFound& other) {
   return sum;
 }
 
-// Of the other's evidence where both are, unit by unit. Infinite where the other is not: a shape
-// leaves nothing in units that do not have it.
+// The cause's share of the other's evidence in the units of both, unit by unit. Infinite where the
+// other is absent: a shape leaves nothing in units that do not have it.
 double ShareBeside(const CauseFound& other, const CauseFound& cause) {
-  constexpr double kTogether = 0.5;  // of the weaker one's evidence, at least
+  constexpr double kTogether = 0.5;  // least share of the weaker one's evidence
   const double weak = EvidenceAmong(cause, other), strong = EvidenceAmong(other, cause);
   if (weak < kTogether * cause.delta_log_likelihood || !(strong > 0))
     return std::numeric_limits<double>::infinity();
   return weak / strong;
 }
 
-// Air moves neighbours alike, in the rows of an exposure and for no reason that moves have: what
-// whole rails or the plate seem to do a little of beside it, is its.
+// Whether a small effect of whole rails or of the plate is part of moving air. Air moves neighbours
+// alike, in the rows of an exposure, and independently of the moves.
 bool IsOfTheAir(const CauseFound& air, const CauseFound& cause) {
   constexpr double kFaintBeside = 50, kOfAir = 0.4;  // ln L; size
   return air.cause == "air_turbulence" && cause.scope != "unit" && cause.axis != "none" &&
          cause.delta_log_likelihood < kFaintBeside && cause.size_um < kOfAir * air.size_um;
 }
 
-// An image that moves by far more leaves as much where it is not quite a similarity, and units' own
-// amplitudes take it.
+// Whether the cause may be what an image that moves by far more leaves. An image is not quite a
+// similarity, and units' own amplitudes take up the difference.
 bool MayBeOfTheCamera(const CauseFound& camera, const CauseFound& cause) {
   constexpr double kOfSize = 0.05, kOfEvidence = 0.1;
   return camera.cause == "camera_similarity" && cause.axis != "none" && cause.scope == "unit" &&
@@ -106,8 +106,8 @@ bool MayBeOfTheCamera(const CauseFound& camera, const CauseFound& cause) {
          cause.delta_log_likelihood < kOfEvidence * camera.delta_log_likelihood;
 }
 
-// A tooth breaks in a unit, and shows there. The same one in many units, hardly seen in any, is no
-// tooth.
+// Whether a tooth damage is faint in many units. A broken tooth belongs to one unit and is clear
+// there; a damage that many units have and none shows is no tooth.
 bool IsFaintInMany(const CauseFound& cause) {
   constexpr std::size_t kMany = 5;
   constexpr double kMean = 4, kMost = 10;  // ln L of a unit
@@ -187,15 +187,15 @@ bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks
 }
 
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes) {
-  // Of the stronger one's evidence.
+  // Shares of the stronger cause's evidence.
   constexpr double kShape = 0.03, kCandidate = 0.1, kSameName = 0.3, kSameUnits = 0.3;
-  // The same in the weak one's units, which are where it happens to be largest.
+  // The same shares in the weak cause's units, which are where it happens to be largest.
   constexpr double kShapeThere = 0.2, kCandidateThere = 0.3;
-  // What chance does not explain may still be what another's shape leaves. Of ln L, and of the
-  // stronger one's evidence.
+  // A cause that chance does not explain may still be a misfit artefact of another. In ln L, and as
+  // a share of the stronger cause's evidence.
   constexpr double kFaint = 30, kBesideFaint = 0.3;
-  // So little beside a strong cause of whatever axis was not there in six of eight cases of two
-  // hidden suites: what one axis does reaches the other through geometry and noise of both.
+  // In two hidden suites so little beside a strong cause of any axis was not real in six of eight
+  // cases. The effect of one axis reaches the other through geometry and noise of both.
   constexpr double kVeryFaint = 22, kBesideVeryFaint = 0.2;
   std::vector<CauseFound> kept;
   for (CauseFound& cause : *causes) {
@@ -207,7 +207,8 @@ void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes) {
       const double there = ShareBeside(other, cause);
       const bool smaller = CanLeave(other, cause);
       const bool shape = smaller && share < kShape && there < kShapeThere;
-      // Of whatever kind: so little of what axes do may be the strong one's shape.
+      // Relatives are not required here: any small effect of an axis may come from the strong
+      // cause's shape.
       const bool related =
           (shape && other.axis != "none" && cause.axis != "none") ||
           (share < kCandidate && there < kCandidateThere && AreRelated(other.cause, cause.cause) &&
@@ -225,8 +226,7 @@ void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes) {
       of_its_shape = faint || very_faint || of_air || (related && shape);
       break;
     }
-    // What could as well be the relative by another name, and is weak beside it, is its misfit
-    // artefact.
+    // A cause that could as well be its relative, and is weak beside it, is its misfit artefact.
     if (relative == nullptr)
       for (CauseFound& other : kept)
         if (cause.delta_log_likelihood < kSameName * other.delta_log_likelihood &&
@@ -281,13 +281,14 @@ void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unkn
 }
 
 void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers) {
-  constexpr std::size_t kUnitsMax = 4, kOneIn = 5;  // else there are no others to stray from
-  constexpr double kFar = 20, kLeft = 0.3;          // of noise; of the cause's size
+  constexpr std::size_t kUnitsMax = 4,
+                        kOneIn = 5;         // otherwise too few others are left to compare with
+  constexpr double kFar = 20, kLeft = 0.3;  // of noise; of the cause's size
   const Campaign& campaign = *fit.facts->campaign;
   std::map<std::uint32_t, std::size_t> index_of;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
     index_of[campaign.units[unit].id] = unit;
-  // Of the unit's rows, in the middle.
+  // Median of the unit's rows.
   const auto left_um = [&](std::uint32_t id) {
     std::vector<double> left;
     const std::size_t unit = index_of.at(id);
@@ -342,10 +343,10 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
                  const RotorCauses& reported, std::vector<CauseFound>* causes) {
   // In 1200 hidden campaigns the sure names below 15 were right; later one at 14.95 was not.
   constexpr double kFar_deg = 12;
-  constexpr double kSecond = 0.3;  // of the stronger one's evidence
+  constexpr double kSecond = 0.3;  // of the stronger cause's evidence
   constexpr std::string_view kPair[] = {"cogging", "phase_imbalance"};
   if (model.units.empty()) return;
-  // Whether exact waves have told the cause of its axes.
+  // Whether exact waves have decided the cause of its axes.
   const auto is_reported_by = [&](const CauseFound& cause, std::string_view name) {
     return (cause.axis == "phi" || reported[kTheta] == name) &&
            (cause.axis == "theta" || reported[kPhi] == name);
@@ -379,10 +380,11 @@ void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& lef
 }
 
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes) {
-  // Over a night the supply sinks, for one, and the air cools, for the other; at one drive level a
-  // lag of the load is play, and what phases do is what the rotor's poles do; at one delay so is
-  // what has not yet relaxed, and so are starts and sags by places that nobody tells. A plate that
-  // grows is a camera that scales, and one that bends shifts the image.
+  // Pairs of causes that only the missing column separates. Over a night the supply sinks and the
+  // air cools. At one drive level a lag of the load is play, and phases act like the rotor's poles.
+  // At one delay play looks like a creep that is not over, and so do start delays and sags by
+  // unrecorded places. A plate that grows looks like a camera that scales, and one that bends
+  // shifts the image.
   constexpr std::string_view kAlikeWithoutColumn[][2] = {{"thermal_backlash", "supply_drift"},
                                                          {"backlash", "load_angle_lag"},
                                                          {"backlash", "relaxation"},
@@ -401,14 +403,15 @@ void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<Cau
 }
 
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown) {
-  // Slow waves of an angle, as what follows it may have.
+  // Slow waves of an angle, as a structure that follows it may have.
   constexpr std::string_view kOfFollowed[] = {"eccentricity", "axis_tilt", "axis_crosstalk"};
   for (UnknownFound& left : *unknown) {
     const std::string axis = left.channel.starts_with("theta") ? "theta"
                              : left.channel.starts_with("phi") ? "phi"
                                                                : "";
     if (axis.empty()) continue;
-    // What follows an axis' angle, whichever axis it turns, may look like that angle's own cause.
+    // A structure that follows an axis' angle may look like that angle's own cause, whichever axis
+    // it turns.
     const std::string followed = left.covariate == kCommand[kTheta] ? "theta"
                                  : left.covariate == kCommand[kPhi] ? "phi"
                                                                     : "";

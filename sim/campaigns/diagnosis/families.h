@@ -1,5 +1,5 @@
-// Causes whose signatures are near each other, so that the true shape of one, where the library has
-// it only roughly, leaves a misfit artefact that looks like another.
+// Families are causes whose signatures are near each other. Where the library has the true shape of
+// one only roughly, it leaves a misfit artefact that looks like another.
 #pragma once
 
 #include <string_view>
@@ -10,28 +10,32 @@
 
 namespace focalfleet::sim {
 
-/// Have the two causes a family in common?
+/// Whether the two causes have a family in common.
 bool AreRelated(std::string_view a, std::string_view b);
 
-/// Does it depend on where an axis stands?
+/// Whether the cause depends on where an axis stands.
 bool IsOfAngle(std::string_view cause);
 
-/// Does it drift as a night goes on?
+/// Whether the cause drifts over a night.
 bool IsOfNight(std::string_view cause);
 
-/// Can what is of one axis touch what is of the other? By name: "both" and "none" touch all.
+/// Whether effects of the two axes can touch each other. The axes are names, and "both" and "none"
+/// touch all.
 bool AxesMeet(std::string_view a, std::string_view b);
 
-/// No shape leaves more than half of what it is, in the units where it leaves it.
+/// Whether `misfit_artefact` may be left by the shape of `of`. No shape leaves more than half of
+/// its effect, in the units where it leaves it.
 bool CanLeave(const CauseFound& of, const CauseFound& misfit_artefact);
 
-/// Tells what the shape of `of` leaves and what that looks like, by name: a cause or a column.
+/// Adds to `of` the misfit of its shape, with its size and the name that it looks like: a cause or
+/// a column.
 void ReportAsMisfitArtefact(double size_um, std::string_view looks_like, CauseFound* of);
 
-/// Whose shape leaves so little structure: a cause of all units on the same axis, ten times its
-/// size, or of the image the air, four times, where it is also far below the noise; pooled over
-/// many rows the least is significant. `noise_um`: rms of the residuals. nullptr: nobody's, it is
-/// worth telling.
+/// The cause whose shape leaves such a small structure; nullptr where the structure is worth
+/// reporting. The cause is one of all units on the same axis, of ten times the structure's size.
+/// For a structure of the image it may be moving air of four times its size. The structure also has
+/// to be far below the noise: pooled over many rows the smallest one is significant. `noise_um`:
+/// rms of the residuals.
 CauseFound* CauseThatLeaves(const UnknownFound& left, double noise_um,
                             std::vector<CauseFound>* causes);
 
@@ -40,44 +44,45 @@ CauseFound* CauseThatLeaves(const UnknownFound& left, double noise_um,
 bool IsReportedAsMisfitArtefact(const UnknownFound& left, std::string_view looks_like,
                                 double noise_um, std::vector<CauseFound>* causes);
 
-/// A weak cause beside a strong one is no cause of its own for sure where it may be what the strong
-/// one's shape leaves, in units that have both: a relative on the same axis, what only units of the
-/// strong one have. It gets the strong one as a candidate. What is faint, in ln L or beside a cause
-/// of an axis, and less than that one's shape can leave is told so, and what is hardly there beside
-/// a strong cause of any axis. Pre: strongest first. `units`: of the campaign.
+/// Judges weak causes beside strong ones. A weak cause is uncertain where it may be a misfit of the
+/// strong one's shape, in units that have both. Relatives on the same axis are such causes, and
+/// causes that only units of the strong one have. They get the strong one as a candidate. A misfit
+/// artefact is a faint cause, in ln L or beside a cause of an axis. Its size is less than that
+/// one's shape can leave. The same holds for a cause that is hardly there beside a strong cause of
+/// any axis. Pre: strongest first. `units`: of the campaign.
 void JudgeMisfitArtefacts(std::size_t units, std::vector<CauseFound>* causes);
 
-/// Single units that a cause moves by far more than noise, and whose rows it leaves nearly as far
-/// off, do what no cause does: they are outliers.
+/// Makes single units outliers whose behaviour is that of no cause. A cause moves them by far more
+/// than noise, and leaves their rows nearly as far off.
 void JudgeStrays(const Fit& fit, std::vector<CauseFound>* causes, OutliersFound* outliers);
 
-/// A unit that would need three causes of its own or more behaves like none of them: it is named as
-/// a unit, among the outliers, and what it does is unknown.
+/// Makes a unit an outlier that would need three causes of its own or more. Its behaviour is that
+/// of none of them, and becomes unknown.
 void JudgeUnits(std::size_t units, std::vector<CauseFound>* causes, OutliersFound* outliers,
                 std::vector<UnknownFound>* unknown);
 
-/// What half of the library could be is no name: a weak misfit artefact of a strong cause goes,
-/// anything else is unknown. So is a broken tooth that many units have and none shows. Pre:
-/// strongest first.
+/// Removes names that half of the library could have. A weak misfit artefact of a strong cause
+/// goes; any other becomes unknown. A broken tooth that many units have and none shows becomes
+/// unknown, too. Pre: strongest first.
 void JudgeNames(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// On an axis with something unknown, or of the angle that this follows, a cause that explains less
-/// than what is left is a name for a part of it: it goes into the unknown.
+/// Moves a cause into the unknown where it only names a part of an unknown structure. The cause
+/// explains less than the structure, which is of the same axis or follows the cause's angle.
 void JudgeBesideUnknown(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// Three causes or more that depend on where one axis stands are a series of shapes rather than
-/// causes: each gets the others as candidates, and the axis is told as not understood.
+/// Judges three causes or more that depend on where one axis stands. They are a series of shapes
+/// rather than causes: each gets the others as candidates, and the axis is reported as not
+/// understood.
 void JudgeSeries(std::vector<CauseFound>* causes, std::vector<UnknownFound>* unknown);
 
-/// Where the rotor is turned far out of its field, what phases do bends as what the rotor's poles
-/// do: each is the other's candidate, unless it is left out of the library. By the model's gears.
-/// Where exact waves have told whose they are, it is that one's. Beside the stronger of the two the
-/// other, where it could be it, is what its shape leaves.
+/// Judges causes of rotors that are turned far out of their field. There the effects of phases bend
+/// like those of the rotor's poles. Each is then the other's candidate, unless it is left out of
+/// the library. The model's gears decide which. The cause that exact waves have decided is final.
+/// The weaker of the two causes, where it could be the stronger, is a misfit artefact of it.
 void JudgeRotors(const CampaignModel& model, const std::vector<std::string>& left_out,
                  const RotorCauses& reported, std::vector<CauseFound>* causes);
 
-/// Where the column is missing that would tell two causes apart, who could not be tested is a
-/// candidate, too.
+/// Adds untested causes as candidates where the column is missing that would separate two causes.
 void JudgeUntested(const std::vector<NotTestable>& not_testable, std::vector<CauseFound>* causes);
 
 }  // namespace focalfleet::sim

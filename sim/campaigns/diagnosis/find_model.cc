@@ -13,10 +13,11 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kUndecided = 6;  // 2 d ln L between two ways to read the temperatures
+constexpr double kUndecided = 6;  // 2 d ln L between two interpretations of the temperatures
 
-// What units do all alike moves the image, and its motion passes for what they do: found first, it
-// may need fewer causes beside it. True: the fit is that one now.
+// Tries the fit with the image's motion found first, and returns whether the fit is that one now.
+// Common motions of all units move the image, and its motion looks like causes of theirs. With the
+// image found first fewer causes may be needed.
 bool TryImageFirst(const Templates& templates, const DiagnoseOptions& options,
                    const SelectionRule& rule, Fit* fit, ImageFound* image, Selection* selection) {
   Fit anew = *fit;
@@ -49,7 +50,7 @@ Selection FindTerms(const Templates& templates, const DiagnoseOptions& options,
     report_homings();
     return selection;
   }
-  // What the image's motion hid, or what stood in for it.
+  // The shares of templates that the image's motion hid, or that replaced it.
   std::vector<double> kept = std::move(selection.kept_share);
   const bool has_terms = !fit->model.terms.empty();
   selection = Select(templates, rule, fit);

@@ -1,5 +1,6 @@
-// The search for the extended model of a campaign: effects, steps, zeros of homings and motion of
-// the image, whichever comes first explains best; and by which sensors, where some are suspect.
+// The search for the extended model of a campaign tries effects, steps, zeros of homings and motion
+// of the image. The search begins with whichever explains best. Where sensors are suspect it also
+// tries which of them to believe.
 #pragma once
 
 #include <string_view>
@@ -11,16 +12,17 @@
 
 namespace focalfleet::sim {
 
-/// Whether the library shall not have the cause.
+/// Whether the options leave the cause out of the library.
 bool IsLeftOut(const DiagnoseOptions& options, std::string_view cause);
 
-/// Of the residuals of rows that count, in 2-D, um.
+/// Rms of the 2-D residuals of used rows, um.
 double RmsOf(const Fit& fit);
 
-/// The fit becomes the model's; what is no term of it (homings, image, sensors) is told as causes.
-/// With `truth`: by the temperatures as they were told and, where sensors are suspect, by those
-/// around them: whoever explains the moves better. Where neither does, a whole rail's sensors are
-/// told as what they may be; a single unit may well be warmer. nullptr: no sensor is suspect.
+/// Makes the fit that of the extended model, and adds causes for the parts that are no terms
+/// (homings, image, sensors). With `truth` both temperatures are tried, as reported and, for
+/// suspect sensors, as around them, and the ones that explain the moves better are kept. Where
+/// neither does, the sensors of a whole rail are reported as a possibility. A single unit may well
+/// be warmer. nullptr: no sensor is suspect.
 Selection FindModel(const Templates& templates, const DiagnoseOptions& options,
                     const SelectionRule& rule, const TrueTemperatures* truth, Fit* fit,
                     Diagnosis* diagnosis);

@@ -18,10 +18,10 @@ namespace {
 
 constexpr std::size_t kNext = 8;   // partners of a row, by rank
 constexpr std::size_t kApart = 4;  // exposures; nearer ones may share the air
-constexpr double kClip = 3;        // an outlier is one row
+constexpr double kClip = 3;        // limits an outlier's weight to that of one row
 constexpr double kPairsMin = 100;
-constexpr double kShareOfRate = 0.3;  // the family-wise one
-// How near is nearly, as a share of the column's range.
+constexpr double kShareOfRate = 0.3;  // of the family-wise rate
+// Distances that count as near, as a share of the column's range.
 constexpr std::array kNear = {1.0 / 20000, 1.0 / 5000, 1.0 / 1250, 1.0 / 300, 1.0 / 80};
 
 // Orders of a ripple beyond the screen's, in halves of one: bins are of two turns.
@@ -34,14 +34,14 @@ constexpr std::string_view kChannelName[] = {"theta angle", "phi angle", "x", "y
 
 struct Row {
   double along[kChannels];  // whitened residual along a direction: variance about one
-  double um[kChannels];     // of one such
+  double um[kChannels];     // um of one unit of `along`
 };
 
 // Values by which rows nearly repeat each other. Shapes: (rows).
 struct Column {
   std::string name;
   std::vector<double> values;
-  std::vector<double> sign;  // of the residuals, 0: the row has none of it; empty: all +1
+  std::vector<double> sign;  // of the residuals; 0: the row has no part in it; empty: all +1
   std::vector<Channel> channels;
 };
 
@@ -73,15 +73,16 @@ std::vector<Row> RowsOf(const Fit& fit) {
   return rows;
 }
 
-// What is left along a column that a named cause reads by name, as a pixel's, is left by its shape.
+// Whether a named cause reads the column, as a pixel's: structure along it is left by that cause's
+// shape.
 bool IsNamed(const CampaignModel& model, std::string_view column) {
   return std::ranges::any_of(model.terms, [&](const ModelTerm& term) {
     return std::ranges::find(term.form.effect->needs, column) != term.form.effect->needs.end();
   });
 }
 
-// Angles where they were told to go and how far from there; arms that come near each other; where
-// on a pixel a spot lies.
+// The columns are angles as commanded and the distance from there. Others are gaps of arms that
+// come near each other, and the spot's position on its pixel.
 std::vector<Column> ColumnsOf(const CampaignFacts& facts, const CampaignModel& model) {
   const std::vector<Channel> angles = {kAlongTheta, kAlongPhi};
   std::vector<Column> columns;
@@ -117,7 +118,8 @@ struct Alike {
   [[nodiscard]] double share() const { return products / std::max(both, 1e-12); }
 };
 
-// In the order of the values; of equal ones at random, for neighbours of the table are of one unit.
+// The rows in the order of their values; equal ones at random, because neighbours in the table are
+// of one unit.
 std::vector<std::size_t> OrderOf(const Column& column, const Fit& fit) {
   std::vector<std::size_t> order;
   for (std::size_t row = 0; row < fit.weight.size(); ++row)
@@ -132,7 +134,7 @@ std::vector<std::size_t> OrderOf(const Column& column, const Fit& fit) {
   return order;
 }
 
-// Root mean square of what noise does along a direction, in um.
+// Root mean square of the noise along a direction, in um.
 double SpreadOf(const std::vector<Row>& rows, Channel c) {
   double sum = 0, count = 0;
   for (const Row& row : rows)
@@ -160,10 +162,10 @@ class Clearest {
   std::optional<UnknownFound> found_;
 };
 
-// Of a normal deviate, one-sided.
+// ln of a normal deviate's one-sided tail probability.
 double LogTail(double z) { return z > 0 ? LogChiSquareTail(z * z, 1) - std::numbers::ln2 : 0; }
 
-// Of ln L, where a share of the rows' variance is.
+// Explained ln L of a share of the rows' variance.
 double Explained(double share, std::size_t rows) {
   return -static_cast<double>(rows) / 2 * std::log1p(-std::min(share, 0.99));
 }
@@ -201,7 +203,7 @@ void LookAtRepeats(const Fit& fit, const std::vector<Row>& rows, const Column& c
   }
 }
 
-// Has the axis just come to rest, so that its error is a new one?
+// Whether the axis has just come to rest, so that its error is a new one.
 bool Arrives(const CampaignFacts& facts, std::size_t axis, std::size_t row) {
   return facts.restarts[row] != 0 || facts.step_deg[axis][row] != 0;
 }
@@ -229,7 +231,8 @@ void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axi
   std::size_t most = kBinOfOrder * kOrderMin;
   for (std::size_t k = most; k < most + kOrders; ++k)
     if (std::norm(waves[k]) > std::norm(waves[most])) most = k;
-  // What an exposure has in common adds up at any phase: by the spread of the exposures' sums.
+  // The common part of an exposure adds up at any phase: the spread of the exposures' sums is the
+  // scale.
   const double order = static_cast<double>(most) / kBinOfOrder;
   std::vector<std::complex<double>> of_exposure(facts.exposures.size());
   std::complex<double> sum = 0;

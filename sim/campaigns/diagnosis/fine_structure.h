@@ -1,14 +1,16 @@
-// What varies faster than any curve of the screen can follow, without a shape for it: roundings,
-// teeth of an unknown order, what small steps do, fractions of a pixel.
+// Fine structure varies faster than any curve of the screen can follow. Two methods find it without
+// a shape for it: roundings, teeth of an unknown order, effects of small steps, fractions of a
+// pixel.
 //
-// Near repeats: noise errs differently each time, an effect errs alike. Residuals of pairs of rows
-// with nearly one value of a column are multiplied; chance has the products' mean at zero, whatever
-// the noise of each. Pairs are of different exposures, for what an exposure has in common is no
-// repeat. Source: the ratio of J. von Neumann, Ann. Math. Statist. 12 (1941) 367, with pairs chosen
-// by distance.
+// Near repeats: noise differs each time, an effect repeats. Residuals of pairs of rows with nearly
+// one value of a column are multiplied. The products' mean is zero by chance, whatever the noise of
+// each. Pairs are of different exposures, because the common part of an exposure is no repeat.
+// Source: the ratio of J. von Neumann, Ann. Math. Statist. 12 (1941) 367, with pairs chosen by
+// distance.
 //
 // Fine ripple: the periodogram of an axis' residuals over its angle where it has just moved, of all
-// units at one phase. Source: A. Schuster, Terr. Magn. 3 (1898) 13; by the fast Fourier transform.
+// units at one phase. The fast Fourier transform makes it.
+// Source: A. Schuster, Terr. Magn. 3 (1898) 13.
 #pragma once
 
 #include <optional>
@@ -18,8 +20,9 @@
 
 namespace focalfleet::sim {
 
-/// The clearest. None: chance explains it, at a share of the family-wise rate, or it is less than
-/// `share_min` of the variance along an angle or direction.
+/// The clearest structure. The result is nullopt where chance explains it, at a share of the
+/// family-wise rate. A structure is also ignored below `share_min` of the variance along an angle
+/// or direction.
 std::optional<UnknownFound> FindFineStructure(const Fit& fit, double family_wise,
                                               double share_min = 0.08);
 

@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kMicrons = 1e3;  // a millimetre
+constexpr double kMicrons = 1e3;  // in a millimetre
 
 std::vector<PlainRow> PlainRows(const Fit& fit, std::size_t unit) {
   const Campaign& campaign = *fit.facts->campaign;

@@ -1,9 +1,7 @@
-// The fit of a model to a campaign: residuals, their noise, robust weights, and Gauss-Newton steps
-// of everything at once. Static geometry and the amplitudes that are a unit's own are eliminated
-// unit by unit (Schur complement), so that a step costs O(rows) and one small dense system of the
-// amplitudes that units share.
-//
-// Noise is whiten.h's.
+// The fit of a model to a campaign has residuals, their noise (whiten.h), robust weights, and
+// Gauss-Newton steps of everything at once. Static geometry and the amplitudes that are a unit's
+// own are eliminated unit by unit (Schur complement). A step therefore costs O(rows) and one small
+// dense system of the amplitudes that units share.
 #pragma once
 
 #include <Eigen/Dense>
@@ -35,32 +33,33 @@ struct Fit {
   }
 };
 
-/// Starts from the table's geometry: finds each unit's static geometry robustly, also where zeros
+/// A fit at the table's geometry, with each unit's static geometry found robustly, also where zeros
 /// are far off. Errors in the data stay residuals.
 Fit StartFit(const CampaignFacts& facts, CampaignModel model, std::vector<char> aside,
              ParallelFor parallel);
 
 void UpdateResiduals(Fit* fit);
-void UpdateNoise(Fit* fit);    // by the present residuals
-void UpdateWeights(Fit* fit);  // by residuals and noise
+void UpdateNoise(Fit* fit);    // from the present residuals
+void UpdateWeights(Fit* fit);  // from residuals and noise
 
-/// One Gauss-Newton step of geometry and all amplitudes, then residuals anew.
+/// Makes a Gauss-Newton step of geometry and all amplitudes, then updates the residuals.
 void StepFit(Fit* fit);
 
-/// Steps, noise and weights in turn until the amplitudes rest.
+/// Repeats steps, noise and weights in turn, `rounds` at most, until the amplitudes rest.
 void SettleFit(Fit* fit, int rounds);
 
 /// Lets the zeros differ from homing to homing, and fits them.
 void FreeHomings(Fit* fit);
 
-/// 2 ln L of the fit less a price for its parameters (BIC); comparable between fits of one
+/// 2 ln L of the fit less a price for its parameters (-BIC); comparable between fits of one
 /// campaign.
 double NegativeBic(const Fit& fit);
-/// The parameters that have been fitted beside the static geometry, and BIC's price for them.
+/// The number of parameters that have been fitted beside the static geometry, and BIC's price for
+/// them.
 double CountParameters(const Fit& fit);
 double PriceOf(const Fit& fit);
 
-/// Static geometry's covariance in mm and degrees, with the unit's own terms beside it.
+/// The static geometry's covariance in mm and degrees, with the unit's own terms fitted beside it.
 StaticMatrix StaticCovariance(const Fit& fit, std::size_t unit);
 
 }  // namespace focalfleet::sim

@@ -1,5 +1,5 @@
-// Which units hang together: on one supply rail, on one CAN bus. What a rail or a bus owns comes to
-// its units together or to none of them.
+// Groups are the units on one supply rail, or on one CAN bus. All units of a rail or a bus have its
+// effect, or none of them does.
 #pragma once
 
 #include <cstddef>
@@ -19,12 +19,13 @@ struct FleetGroups {
 };
 FleetGroups GroupsOf(const CampaignFacts& facts);
 
-/// Shape: (units): who has an effect of this owner together, whatever each has of it. Empty: each
-/// by itself. Where no rail or bus is known, the fleet is one.
+/// Groups of units that have an effect of this owner together, whatever its amplitude in each.
+/// Empty: each unit by itself. Where no rail or bus is known, the fleet is one group.
+/// Shape: (units).
 std::vector<std::uint32_t> Together(Owner owner, const FleetGroups& groups, std::size_t units);
 
-/// Can units with this flag have what such an owner has? A rail's units, and a bus', have it
-/// together: most of those of each that has any. Shape of has: (units).
+/// Whether the units with this flag can have an effect of such an owner. Most units of each rail,
+/// or bus, that has any such unit must have it. Shape of has: (units).
 bool AreTogether(Owner owner, const std::vector<char>& has, const FleetGroups& groups);
 
 }  // namespace focalfleet::sim

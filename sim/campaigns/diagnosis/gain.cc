@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kFolds = 5;
 constexpr double kOutlier = 6;  // whitened length by the final model
 
-// Which fold each row is in.
+// The fold of each row.
 std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   const Campaign& campaign = *fit.facts->campaign;
   const CampaignFacts& facts = *fit.facts;
@@ -31,7 +31,8 @@ std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
     }
     return fold;
   }
-  // Blocks of neighbouring exposures, dealt out in turn: no fold is one end of a drift alone.
+  // Blocks of neighbouring exposures are dealt out in turn, so that no fold is one end of a drift
+  // alone.
   *how = "5 folds of blocks of exposures; each fold predicted from the other four";
   const std::size_t exposures = facts.exposures.size();
   const std::size_t block = std::max<std::size_t>(1, exposures / (4 * kFolds));
@@ -40,8 +41,8 @@ std::vector<std::size_t> FoldsOf(const Fit& fit, std::string* how) {
   return fold;
 }
 
-// The zeros of a homing of which no fit has seen anything are its own: from those of its exposures
-// that are judged, everything else fixed. The prior keeps what few poses do not show.
+// Fits the zeros of a homing that no fit has seen, from those of its exposures that are judged,
+// with everything else fixed. The prior keeps what few poses do not show.
 void FitHeldOutHomings(const std::vector<char>& hold, const std::vector<char>& judged, Fit* fit) {
   if (fit->model.homing_zero_deg[kTheta].empty()) return;
   constexpr int kRounds = 3;
@@ -106,14 +107,16 @@ Fit FitWithout(const Fit& final_fit, const std::vector<char>& hold, const std::v
   return fit;
 }
 
-// Is the row's place another one once names are right? No, where none is known under the old name.
+// Whether the row's place is another one once names are right. False where no place is known under
+// the old name.
 bool IsUnderAnother(const Fit& as_named, const Fit& fit, std::size_t row) {
   const Campaign& a = *as_named.facts->campaign;
   const Campaign& b = *fit.facts->campaign;
   return std::isfinite(a.x_mm[row]) && (a.x_mm[row] != b.x_mm[row] || a.y_mm[row] != b.y_mm[row]);
 }
 
-// Of an angle at one exposure; what adds up from move to move, as after ten of them at most.
+// Spread of an angle at one exposure. A part that adds up from move to move counts as after ten
+// moves at most.
 double AngleSpread(const Noise& noise, std::size_t axis) {
   const double c2 = noise.carry[axis] * noise.carry[axis];
   const double summed = 1 / std::max(1 - c2, 0.1);

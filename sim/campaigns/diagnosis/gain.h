@@ -1,7 +1,7 @@
-// What the extended model is worth on moves that no fit has seen: the campaign's exposures are
-// split into folds; for each fold the static geometry alone, and the geometry with the model's
-// terms, are fitted to the others and judged on it. Where units are homed several times a fold is
-// whole homings.
+// The gain of the extended model is measured on moves that no fit has seen. The campaign's
+// exposures are split into folds. For each fold the static geometry alone, and the geometry with
+// the model's terms, are fitted to the others and judged on it. Where units are homed several
+// times, a fold is whole homings.
 #pragma once
 
 #include "sim/campaigns/diagnosis/diagnosis.h"
@@ -9,9 +9,10 @@
 
 namespace focalfleet::sim {
 
-/// Pre: fit has the final model. Rows that are outliers of the final model are not judged.
-/// `as_named`: where names of fibres were exchanged, the static fit under the names that the table
-/// has; their rows are as far off before as they are under these. nullptr: none were.
+/// The gain of the fit's model. Rows that are outliers of the final model are not judged.
+/// Pre: fit has the final model. `as_named`: where names of fibres were exchanged, the static fit
+/// under the names of the table. Rows are as far off before, by these, as under the corrected
+/// names. nullptr: no name was.
 HeldOutGain MeasureGain(const Fit& fit, const Fit* as_named = nullptr);
 
 /// Root mean square of the noise that the fit found, two-dimensional, um.

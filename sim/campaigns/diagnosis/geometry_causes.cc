@@ -56,7 +56,8 @@ std::vector<UnitOffset> Offsets(const Fit& fit) {
   return offsets;
 }
 
-// What all bases share is the image's, where the image moves: its mean place is in nobody's table.
+// A common offset of all bases belongs to the image, where the image moves: no table has its mean
+// place.
 void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
   constexpr std::size_t kUnitsMin = 6;
   if (fit.model.exposures.empty() || offsets->size() < kUnitsMin) return;
@@ -80,7 +81,7 @@ void TakeOffTheImage(const Fit& fit, std::vector<UnitOffset>* offsets) {
   for (UnitOffset& one : *offsets) one.offset.head<2>() -= columns(one) * common;
 }
 
-// What is left unexplained when only the parameters outside `rest` may differ.
+// Chi-square that is left when only the parameters outside `rest` may differ.
 double Left(const UnitOffset& unit, const std::vector<Index>& rest) {
   const auto n = static_cast<Index>(rest.size());
   if (n == 0) return 0;
@@ -110,7 +111,7 @@ double SizeAtFibre(const UnitOffset& unit, const Group& group, const CampaignUni
 struct GroupTest {
   double log_p = 0;
   double gained = 0;
-  std::vector<std::size_t> which;  // of the offsets: those that have it
+  std::vector<std::size_t> which;  // indices of the offsets that have it
 };
 
 GroupTest TestGroup(const std::vector<UnitOffset>& offsets, const std::vector<Index>& rest,
@@ -132,7 +133,7 @@ GroupTest TestGroup(const std::vector<UnitOffset>& offsets, const std::vector<In
     if (LogLeastOf(log_p, n * 5) < std::log(family_wise))
       test.which.push_back(k), test.gained += gained;
   }
-  // The fleet as a whole: noise of the noise estimate grows with the number of units.
+  // For the fleet as a whole the error of the noise estimate grows with the number of units.
   constexpr double kNoiseOfNoise = 1.1;
   const double all = LogChiSquareTail(sum / kNoiseOfNoise, dof * n);
   test.log_p = std::min(all, LogLeastOf(best, n)) + std::log(10.0);

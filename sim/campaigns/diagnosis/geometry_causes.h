@@ -1,6 +1,7 @@
-// Where the fitted static geometry differs from the table by more than chance: zero_offset,
-// base_offset, arm_length, per axis. Parameters that a unit's moves hardly tell apart are not
-// blamed one by one: a group joins only if what the groups before it leave unexplained needs it.
+// Geometry causes are differences of the fitted static geometry from the table by more than chance:
+// zero_offset, base_offset, arm_length, per axis. Parameters that a unit's moves hardly separate
+// are not blamed one by one. A group joins only if what the groups before it leave unexplained
+// needs it.
 #pragma once
 
 #include <vector>

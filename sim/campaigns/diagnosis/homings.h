@@ -1,5 +1,5 @@
-// Zeros that differ from homing to homing: how much, and the cause that they are. fit.h frees them,
-// multi_start.h says whether they are worth it.
+// Zeros that differ from homing to homing: their scatter, and the cause that they are. fit.h frees
+// them, multi_start.h decides whether they are worth it.
 #pragma once
 
 #include <cmath>
@@ -9,7 +9,7 @@
 
 namespace focalfleet::sim {
 
-/// Rms over the moves, and what it does at the fibre.
+/// Rms over the moves, and its effect at the fibre.
 struct HomingScatter {
   double rms_deg[2] = {0, 0};
   double um[2] = {0, 0};

@@ -38,7 +38,7 @@ std::vector<Image> Normals(const Fit& fit) {
     for (std::size_t k = 0; k < white.moves.size(); ++k) {
       const std::size_t i = white.moves[k];
       Image& image = images[fit.facts->exposures.of_row[white.track.first_row + i]];
-      // Per um of shift, and per um at the plate's edge of turn, scale and shears.
+      // Displacement per um of shift, and per um at the plate's edge of turn, scale and shears.
       const double x = white.track.fibre_x_mm[i] / fit.facts->radius_mm;
       const double y = white.track.fibre_y_mm[i] / fit.facts->radius_mm;
       const double* w = white.filter[k].w;
@@ -57,7 +57,7 @@ std::vector<Image> Normals(const Fit& fit) {
   return images;
 }
 
-// Do neighbours' whitened residuals agree, exposure by exposure? In standard deviations.
+// Agreement of neighbours' whitened residuals, exposure by exposure, in standard deviations.
 double NeighboursAgree(const Fit& fit, double* size_um) {
   const Campaign& campaign = *fit.facts->campaign;
   const std::size_t units = campaign.units.size();
@@ -125,12 +125,12 @@ double Carryover(const std::vector<Vector4>& shifts) {
 
 // Shift, turn and scale of each image, um at the plate's edge, and what they explain.
 struct Motion {
-  std::vector<Vector4> found;     // Shape: (exposures); 0 where none was seen
+  std::vector<Vector4> found;     // Shape: (exposures); 0 where no fibre was seen
   std::vector<std::size_t> seen;  // exposures
   double chi_square = 0, dof = 0;
   double left = 0, left_dof = 0;                              // of the residuals beside it
   Vector4 square = Vector4::Zero(), noise = Vector4::Zero();  // summed over exposures
-  /// Share of what was found of each that is no noise: shifts may be large and turns nothing.
+  /// Share of each component that is no noise: shifts may be large and turns nothing.
   [[nodiscard]] Vector4 Kept() const {
     return (1 - noise.array() / square.array().max(1e-12)).max(0.0).min(1.0);
   }
@@ -162,13 +162,13 @@ Motion FindMotion(const Fit& fit) {
   return motion;
 }
 
-// A variance, summed over the images, without the noise's; its own variance, and what that is
-// where there is nothing but noise.
+// A variance, summed over the images, less that of the noise. Its own variance, and the same where
+// there is nothing but noise.
 struct Power {
   double power = 0, variance = 0, variance_of_noise = 0;
 };
 
-// How images are deformed, anew at each exposure. Air has no preferred direction: a field whose
+// The deformation of images, anew at each exposure. Air has no preferred direction. A field whose
 // components vary alike in both directions shears as much as it turns and scales.
 struct Deformation {
   Power rigid;  // turn and scale
@@ -205,7 +205,7 @@ Deformation FindDeformation(const Fit& fit) {
     freedom += 2 * image.rows - 6;
   }
   if (shears.empty()) return {};
-  // The fit took the images' motion for noise; what is left beside it is the noise.
+  // The fit took the images' motion for noise; the noise is what is left beside the motion.
   const double dispersion = left / freedom;
   const auto power = [&](Eigen::Index k) {
     // The square of a normal variable of variance v has the variance 2 v^2, its fourth power the
@@ -217,19 +217,20 @@ Deformation FindDeformation(const Fit& fit) {
   return {power(2), power(4), Carryover(shears) < kRemembers};
 }
 
-// Scale that goes on from exposure to exposure, and next to nothing else: plate or camera, who
-// knows.
+// Whether the image has a scale that goes on from exposure to exposure, and next to nothing else.
+// The data do not show whether plate or camera makes it.
 bool OnlyGrows(const Motion& motion) {
   constexpr double kMore = 2;
   const Vector4 power = (motion.square - motion.noise).cwiseMax(0.0);
-  // In um at the edge, of which the fibres have half the square.
+  // Powers are in um at the edge; the fibres have half the square of it.
   if (0.5 * power[3] < kMore * (power[0] + power[1] + 0.5 * power[2])) return false;
   std::vector<Vector4> scales;
   for (const Vector4& shift : motion.OfSeen()) scales.push_back({shift[3], 0, 0, 0});
   return Carryover(scales) >= kRemembers;
 }
 
-// Along one line, without turn or scale: what gravity may do. Which line it is nobody knows.
+// Whether the image moves along one line, without turn or scale, as gravity may move it. The
+// direction of the line is unknown.
 bool MovesAlongALine(const Motion& motion) {
   constexpr double kSure = 4;     // standard deviations of noise alone
   constexpr double kLeaks = 0.2;  // of the motion: where units move alike geometry bends the line
@@ -249,7 +250,8 @@ bool MovesAlongALine(const Motion& motion) {
 
 bool IsImageStep(const ModelTerm& term) { return term.form.effect->cause == kCameraSimilarity; }
 
-// Steps of the whole image were a first guess at its motion.
+// Drops steps of the whole image, which were a first guess at its motion. Returns whether there
+// were any.
 bool DropImageSteps(Fit* fit) {
   if (std::erase_if(fit->model.terms, IsImageStep) == 0) return false;
   UpdateResiduals(fit);
@@ -257,8 +259,8 @@ bool DropImageSteps(Fit* fit) {
   return true;
 }
 
-// Takes the motion into the model, round by round: rest errors and geometry have swallowed a part
-// of what moves slowly. The whole motion; `size_um`: its root mean square without noise.
+// Takes the motion into the model, round by round: rest errors and geometry have absorbed a part of
+// slow motion. Returns the whole motion. `size_um`: its root mean square without noise.
 Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
   constexpr int kRounds = 5;
   const std::size_t exposures = motion.found.size();
@@ -291,15 +293,17 @@ Motion TakeMotion(Motion motion, Fit* fit, double* size_um) {
 }
 
 bool MovesForSure(const Motion& motion, double family_wise) {
-  // By what is left beside the motion, for the fit's noise has the motion in it. Of 130 hidden
-  // campaigns without any motion the largest ratio to it was 3.1 standard deviations above 1.
+  // The gate uses the residuals beside the motion, because the fit's noise has the motion in it. In
+  // 130 hidden campaigns without any motion the largest ratio to it was 3.1 standard deviations
+  // above 1.
   constexpr double kNoiseOfNoise = 1.03, kShare = 0.01;
   if (motion.dof <= 0 || !(motion.left > 0)) return false;
   const double noise = kNoiseOfNoise * motion.left / motion.left_dof;
   return LogChiSquareTail(motion.chi_square / noise, motion.dof) < std::log(kShare * family_wise);
 }
 
-// One step of the image explains what follows a column slowly: without it the column shows.
+// Whether a single step of the image explains a slow dependence on a column: without the step the
+// column shows.
 bool HidesAColumn(const Fit& fit, double family_wise) {
   Fit bare = fit;
   DropImageSteps(&bare);
@@ -318,7 +322,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   double turbulence_um = 0;
   const double before = NeighboursAgree(*fit, &turbulence_um);
   const bool moves = MovesForSure(motion, family_wise);
-  // Several steps are no touch of the camera, but a staircase for something else.
+  // Several steps are no touch of the camera, but stand in for another effect.
   const auto steps = std::count_if(fit->model.terms.begin(), fit->model.terms.end(), IsImageStep);
   const bool one_step_alone = !moves && before < kNeighboursAgree && steps < 2;
   if (one_step_alone && (steps == 0 || !HidesAColumn(*fit, family_wise))) return image;
@@ -331,7 +335,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   const double signal = 0.5 * (motion.Kept()[0] + motion.Kept()[1]);
   const std::vector<Vector4> shifts = motion.OfSeen();
   image.followed = FollowedColumn(*fit->facts, motion.seen, shifts, signal, size_um);
-  // With the whole motion taken no column shows: it was one step after all.
+  // With the whole motion taken no column shows: a single step was right.
   if (one_step_alone && !image.followed) {
     *fit = with_step;
     return {};
@@ -341,7 +345,8 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   if (goes_on) image.drift_um = size_um;
   CauseFound cause =
       ImageCause(motion.chi_square, std::max(size_um, turbulence_um), motion.seen.size());
-  // Air forgets from exposure to exposure; what does so may be air, however few the neighbours.
+  // Air is new at each exposure. A motion that is new as well may be air, however few the
+  // neighbours.
   if (!goes_on && !deformed.IsCamera()) cause.candidates.emplace_back("air_turbulence");
   if (OnlyGrows(motion)) cause.candidates.emplace_back("plate_expansion");
   if (!MovesAlongALine(motion)) cause.cannot_be.emplace_back("gravity_sag");
@@ -357,7 +362,7 @@ ImageFound AddImageTerms(Fit* fit, double family_wise) {
   }
   const bool swings = image.followed && image.followed->channel != kImageShift;
   if (swings && deformed.IsCamera()) image.followed.reset();
-  // What follows a column is not the image's own unrest.
+  // A motion that follows a column is not unrest of the image itself.
   if ((!image.followed || swings) && cause.size_um >= kSizeMin_um) image.cause = std::move(cause);
   return image;
 }

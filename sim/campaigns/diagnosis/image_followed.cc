@@ -12,7 +12,7 @@ namespace {
 // vary.
 std::vector<double> OfExposures(const CampaignFacts& facts, const FilledColumn& column,
                                 const std::vector<std::size_t>& seen) {
-  constexpr double kOwnShareMax = 0.1;  // of the variance: what units have of their own
+  constexpr double kOwnShareMax = 0.1;  // of the variance: the part of single units
   const std::size_t exposures = facts.exposures.size();
   std::vector<double> mean(exposures, 0), count(exposures, 0);
   double square = 0;
@@ -66,7 +66,7 @@ double EvidenceOf(double share, double coefficients, std::size_t n) {
          2 * coefficients * std::log(static_cast<double>(n));
 }
 
-// The largest share of the shifts' variance that one sine over time takes.
+// The largest share of the shifts' variance that a single sine over time takes.
 double ShareOfSine(const std::vector<ImageMotion>& shifts, const std::vector<double>& time) {
   constexpr double kHalvesMin = 0.5, kHalvesMax = 24, kStep = 0.25;  // half periods
   const auto n = static_cast<Eigen::Index>(shifts.size());
@@ -90,7 +90,7 @@ double ShareOfSine(const std::vector<ImageMotion>& shifts, const std::vector<dou
   return most;
 }
 
-// The largest share that one step takes.
+// The largest share that a single step takes.
 double ShareOfStep(const std::vector<ImageMotion>& shifts) {
   std::vector<double> behind(shifts.size(), 1);
   double most = 0;

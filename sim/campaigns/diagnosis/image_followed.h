@@ -1,5 +1,5 @@
-// Does the image move with something that the table knows? Of a column that its shifts follow the
-// image is no cause: what moves with the wind is the wind's.
+// The image may move with a column of the table. The image is then no cause: a motion that follows
+// the wind belongs to the wind.
 #pragma once
 
 #include <Eigen/Dense>
@@ -19,9 +19,9 @@ inline constexpr std::string_view kImageShift = "the image's shift";
 /// Shift (2), turn and scale of an image, um at the plate's edge.
 using ImageMotion = Eigen::Matrix<double, 4, 1>;
 
-/// The column that the image's shifts follow best, if it is no chance and more than time does; or
-/// one slow wave of time. `shifts`: of the exposures `seen`. `signal`: share of their variance that
-/// is no noise. `size_um`: rms of the motion.
+/// The column that the image's shifts follow best, where it is no chance and more than time
+/// explains; or one slow wave of time. `shifts`: of the exposures `seen`. `signal`: share of their
+/// variance that is no noise. `size_um`: rms of the motion.
 std::optional<UnknownFound> FollowedColumn(const CampaignFacts& facts,
                                            const std::vector<std::size_t>& seen,
                                            const std::vector<ImageMotion>& shifts, double signal,

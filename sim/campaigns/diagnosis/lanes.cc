@@ -10,10 +10,10 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kMicrons = 1e3;  // a millimetre
+constexpr double kMicrons = 1e3;  // in a millimetre
 
-// Two lanes in one register: what every machine has. A compiler left to itself gathers lanes across
-// rows instead.
+// Two lanes in one register, which every machine has. A compiler left to itself gathers lanes
+// across rows instead.
 struct PairOf {
   using Numbers [[gnu::vector_size(16), gnu::may_alias]] = double;
 };
@@ -32,7 +32,7 @@ bool IsAllZero(const std::vector<double>& values) {
   return bits << 1 == 0;  // but for the sign
 }
 
-// Of one axis' angle alone, as most effects are.
+// Puts errors of a single axis' angle, as most effects make, into a lane.
 void PutTurn(const WhiteUnit& white, const std::vector<double>& angle_deg, std::size_t axis,
              std::size_t lane, Lanes* rows) {
   const std::size_t* moves = white.moves.data();
@@ -60,7 +60,7 @@ void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size
 }
 
 void WhitenLanes(const WhiteUnit& white, Lanes* rows) {
-  Pair theta[kPairs] = {}, phi[kPairs] = {};  // what the rows so far told of the rest errors
+  Pair theta[kPairs] = {}, phi[kPairs] = {};  // rest errors, estimated from the rows so far
   const RowFilter* f = white.filter.data();
   const double* t = white.turn_um.data();
   for (std::size_t k = 0; k < white.filter.size(); ++k, ++f, t += 4) {

@@ -1,7 +1,7 @@
-// Columns side by side: what is done alike to many signatures of one unit is done to eight at a
-// time, a row's eight numbers together in memory. Every column's sums run over its rows in their
-// order and no column touches another, so that a column's result does not depend on who stands
-// beside it, nor on how wide the machine's registers are.
+// Lanes are columns side by side. Operations that are the same for many signatures of one unit run
+// on eight at a time, with a row's eight numbers together in memory. Every column's sums run over
+// its rows in their order, and no column touches another. The result of a column therefore depends
+// neither on its neighbours nor on the width of the machine's registers.
 #pragma once
 
 #include <Eigen/Dense>
@@ -17,7 +17,7 @@ struct alignas(64) Lanes {
   double at[kLanes] = {};
 };
 
-// Rows of places are interleaved like everywhere: x of a move, then its y. Shapes: rows (2 moves).
+// Rows of places are interleaved as everywhere: x of a move, then its y. Shapes: rows (2 moves).
 
 /// Puts the displacement that pose errors make, in um, into one lane.
 void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size_t lane,
@@ -47,8 +47,8 @@ Lanes MultiplyByData(const Lanes* rows, const Eigen::VectorXd& y, Lanes* product
 
 void AddLanes(const Lanes& from, Lanes* to);
 
-/// Variance of the sum of each lane's scores about its own fit, where neighbours may be alike
-/// (neighbour_sum.h): of b - g own. Shapes: b, g (moves).
+/// Variance of the sum of each lane's scores b - g own about its own fit, where neighbours may be
+/// alike (neighbour_sum.h). Shapes: b, g (moves).
 Lanes SumAlikeNeighbours(const Lanes* b, const Lanes* g, const Lanes& own, std::size_t moves);
 
 }  // namespace focalfleet::sim

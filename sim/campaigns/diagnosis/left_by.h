@@ -1,5 +1,6 @@
-// How a campaign left its units: where their counts stood after the last move, and what had added
-// up on each axis by then. From there on a model predicts without the campaign's moves.
+// The state in which a campaign left its units. The state is their counts after the last move, and
+// the errors that had added up on each axis by then. A model predicts from there without the
+// campaign's moves.
 #pragma once
 
 #include <array>
@@ -11,14 +12,14 @@
 namespace focalfleet::sim {
 
 struct UnitLeft {
-  bool moved = false;  // it has rows; else nothing of the rest is known
+  bool moved = false;  // it has rows; else the rest is not known
   std::array<double, 2> pose_deg{};
-  /// Of what adds up until the unit is homed: open-loop effects, slips, the zero of its last
-  /// homing.
+  /// The sum of errors that stay until the unit is homed: open-loop effects, slips, the zero of its
+  /// last homing.
   std::array<double, 2> added_deg{};
 };
 
-/// Shape: (units). Effects that read covariates are not in it.
+/// The state of each unit, without effects that read covariates. Shape: (units).
 std::vector<UnitLeft> LeftByCampaign(const CampaignModel& model, const Campaign& campaign);
 
 }  // namespace focalfleet::sim

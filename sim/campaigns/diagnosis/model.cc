@@ -24,14 +24,14 @@ void AddEvents(const CampaignModel& model, std::size_t unit, const UnitTrack& tr
   }
 }
 
-// Why nobody can say what the term does in these moves; empty: it can be said.
+// The reason why these moves cannot test the term; empty where they can.
 std::string WhyNotTestable(const Template& form, const CampaignFacts& facts) {
   const bool empirical = FindEmpirical(form.effect->cause) != nullptr;
   std::string_view missing = MissingCovariate(*form.effect, facts);
   if (empirical && !facts.Has(form.covariate)) missing = form.covariate;
   if (!missing.empty()) return "column " + std::string(missing) + " is missing";
   if (empirical) return {};
-  // What a form needs beyond its effect's columns is known to its list.
+  // The effect's own list checks what a form needs beyond its effect's columns.
   return IsOffered(form, facts) ? "" : "these units or moves have no such part";
 }
 

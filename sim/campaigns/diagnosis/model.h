@@ -1,6 +1,6 @@
-// The extended model of a campaign: fitted static geometry of each unit, and the effects that were
-// accepted, each with its amplitudes. It predicts where every fibre stands after every move: the
-// simulation with its effects.
+// The extended model of a campaign has the fitted static geometry of each unit and the accepted
+// effects with their amplitudes. The model is the simulation with its effects, and predicts the
+// place of every fibre after every move.
 #pragma once
 
 #include <cstddef>
@@ -15,13 +15,13 @@
 
 namespace focalfleet::sim {
 
-/// Runs work(0) .. work(chunks - 1), in any order and on any threads; each chunk by itself is
-/// deterministic and results are merged in the order of the chunks.
+/// Runs work(0) .. work(chunks - 1), in any order and on any threads. Each chunk by itself is
+/// deterministic, and results are merged in the order of the chunks.
 using ParallelFor =
     std::function<void(std::size_t chunks, const std::function<void(std::size_t)>& work)>;
 ParallelFor OneAfterTheOther();
 
-/// At which level the amplitudes are the same.
+/// The level at which the amplitudes are the same.
 enum class Sharing { kUnit, kRail, kBus, kFleet };
 std::string_view Name(Sharing sharing);
 
@@ -37,7 +37,7 @@ struct ModelTerm {
   double spread = 0;  // standard deviation of the units' amplitudes, a prior; 0: none
 
   [[nodiscard]] std::size_t groups() const { return amplitude.size() / form.columns; }
-  /// {} where the unit does not have it.
+  /// The unit's amplitudes, empty where it does not have the effect.
   [[nodiscard]] std::span<const double> AmplitudeOf(std::size_t unit) const;
 };
 
@@ -45,7 +45,7 @@ struct ModelTerm {
 /// sign, else their root mean square.
 struct AmplitudeSummary {
   double value = 0;
-  double sigma = 0;  // 0: nothing is known of it
+  double sigma = 0;  // 0: not known
 };
 AmplitudeSummary Summarise(const ModelTerm& term);
 
@@ -72,37 +72,37 @@ struct CampaignModel {
   std::vector<ModelTerm> terms;
   std::vector<ExposureTerm> exposures;  // empty, or Shape: (exposures)
   std::vector<EventTerm> events;
-  // Zeros that differ from homing to homing: per row, what is added to the angle. Empty: none.
+  // Zeros that differ from homing to homing: the angle that is added, per row. Empty: none.
   std::vector<double> homing_zero_deg[2];
   double homing_spread_deg[2] = {0, 0};  // their standard deviation, a prior
 };
 
-/// Moves that an event happened in: one that was lost has an event of each axis.
+/// The number of moves with events: a lost move has an event of each axis.
 std::size_t MovesWithEvents(const CampaignModel& model);
 
-/// One axis from a homing to the next.
+/// An axis from one homing to the next.
 struct Homing {
   std::size_t axis = kTheta;
   std::size_t begin = 0, end = 0;  // moves of the track
 };
-/// Those whose zero the model leaves free: theta's, then phi's; none where zeros are the same after
-/// each homing.
+/// Homings whose zero the model leaves free: theta's, then phi's. Empty where zeros are the same
+/// after each homing.
 std::vector<Homing> FreeHomingsOf(const CampaignModel& model, const UnitTrack& track);
-/// One degree on the axis while the homing lasts. `errors` is reset.
+/// Sets `errors` to one degree on the axis while the homing lasts.
 void ApplyHoming(const UnitTrack& track, const Homing& homing, PoseErrors* errors);
 
-/// The pose errors of one unit by all terms, events and homings of the model.
+/// Adds the pose errors of one unit by all terms, events and homings of the model.
 void AddPoseErrors(const CampaignModel& model, std::size_t unit, const UnitTrack& track,
                    PoseErrors* errors);
 
-/// What these data cannot say anything of.
+/// A cause that these data cannot test.
 struct NotTestable {
   std::string cause;
   std::string why;
 };
 
-/// Takes out the terms that this campaign cannot be predicted with: it lacks a column, or its units
-/// and moves have no such part. Returns which, and why.
+/// Takes out the terms that cannot predict this campaign: it lacks a column, or its units and moves
+/// have no such part. Returns them with the reasons.
 std::vector<NotTestable> LeaveOutUntestable(const CampaignFacts& facts, CampaignModel* model);
 
 struct Places {
@@ -110,11 +110,11 @@ struct Places {
   std::vector<double> y_mm;
 };
 
-/// A unit's moves at the poses that its steps have put it in: a lost command may be half a turn,
-/// and what a place says of the geometry is another thing there.
+/// A unit's moves at the poses after its steps. A lost command may be half a turn, and a place
+/// depends differently on the geometry there.
 UnitTrack TrackOf(const CampaignModel& model, const CampaignFacts& facts, std::size_t unit);
 
-/// Where the model says that every fibre stands after every move.
+/// The place of every fibre after every move, by the model.
 Places Predict(const CampaignModel& model, const CampaignFacts& facts, const ParallelFor& parallel);
 
 /// Chunks of units that depend on their number alone.

@@ -15,17 +15,18 @@ double NegativeBicWith(Fit fit, const Noise& noise) {
   return NegativeBic(fit);
 }
 
-// With and without steps in single units' angles; the better fit for its price.
+// Selects with and without steps in single units' angles, and takes the better fit for its price.
 Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule, Fit* fit) {
   Fit stepped = *fit;
   const bool has_events = AddEvents(&stepped) > 0;
   Selection selection = Select(templates, rule, fit);
   if (!has_events) return selection;
-  // What a cause does to a few moves looks like steps until the cause is known.
+  // The effect of a cause on a few moves looks like steps until the cause is known.
   Fit explained = *fit;
   if (AddEvents(&explained) == 0) return selection;
   Selection again = Select(templates, rule, &stepped);
-  // A step is a large claim about one move: it has to be worth more than its price. So is a cause.
+  // A step is a large claim about one move: it has to be worth more than its price. The same holds
+  // for a cause.
   constexpr double kClearly = 20, kEach = 10, kCause = 20;
   const auto terms = [](const Fit& one) { return static_cast<double>(one.model.terms.size()); };
   const double price = kClearly + kEach * static_cast<double>(MovesWithEvents(stepped.model)) -
@@ -36,15 +37,15 @@ Selection SelectWithEvents(const Templates& templates, const SelectionRule& rule
   return again;
 }
 
-// Zeros that differ from homing to homing, where they are worth their number. The terms are then
-// and steps are chosen anew: what was one homing's zero may have passed for something else.
+// Tries zeros that differ from homing to homing, where they are worth their number. Terms and steps
+// are then chosen anew, because one homing's zero may have looked like either.
 void TryHomings(const Templates& templates, const SelectionRule& rule, Selection* selection,
                 Fit* fit) {
   constexpr double kBetterBy = 20;
   Fit freed = *fit;
   FreeHomings(&freed);
   if (NegativeBic(freed) < NegativeBic(*fit) + kBetterBy) return;
-  // Many homings of a few moves each follow what noise does to these.
+  // Many homings of a few moves each follow the noise of these.
   constexpr double kOfNoise = 0.25;
   if (ScatterOfHomings(freed).both_um() < kOfNoise * std::numbers::sqrt2 * freed.noise.typical_um)
     return;

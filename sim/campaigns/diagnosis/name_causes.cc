@@ -65,10 +65,10 @@ CauseFound CauseOf(const Fit& fit, const ModelTerm& term, const Accepted& accept
   return cause;
 }
 
-// One entry a cause: both axes, or several shapes, of one name belong together.
+// Merges causes of one name, of both axes or of several shapes, into one entry.
 void MergeCauses(std::vector<CauseFound>* causes) {
-  // Strongest first: what cannot be told of the strongest part cannot be told of the whole, and
-  // rivals of a weak part only do not explain it.
+  // The strongest part comes first. A rival that the data do not separate from it is a rival of the
+  // whole. A rival of a weak part alone does not explain the whole.
   std::stable_sort(causes->begin(), causes->end(), [](const CauseFound& a, const CauseFound& b) {
     return a.delta_log_likelihood > b.delta_log_likelihood;
   });
@@ -106,8 +106,9 @@ void MergeCauses(std::vector<CauseFound>* causes) {
   *causes = std::move(merged);
 }
 
-// The causes of the model's terms. What a distortion of a stronger one explains as well is told as
-// what that one's shape leaves; what it explains in part has it as a candidate.
+// The causes of the model's terms. A term that a distortion of a stronger one explains as well is
+// reported as a misfit of that one's shape. A term that it explains in part has the stronger one as
+// a candidate.
 std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& accepted) {
   const std::vector<Undistorted> beside = BesideDistortions(fit, accepted);
   const double rms_um = RmsOf(fit);
@@ -118,7 +119,8 @@ std::vector<CauseFound> TermCauses(const Fit& fit, const std::vector<Accepted>& 
   for (std::size_t t = 0; t < all.size(); ++t)
     is_misfit_artefact.push_back(beside[t].is_misfit_artefact() &&
                                  CanLeave(all[beside[t].of], all[t]));
-  // Whose misfit artefact a misfit artefact is: of is stronger each time, so that this ends.
+  // The term that a misfit artefact belongs to may be one itself: `of` is stronger each time, so
+  // that the loop ends.
   const auto named = [&](std::size_t of) {
     while (is_misfit_artefact[of] != 0) of = beside[of].of;
     return of;
@@ -160,7 +162,7 @@ void NameCauses(const Fit& fit, const Selection& selection, const DiagnoseOption
   }
   JudgeStrays(fit, &causes, &diagnosis->outliers);
   MergeCauses(&causes);
-  // Where the image's motion follows a column, steps of it are what is left of that.
+  // Steps of the image are a misfit of its motion where that follows a column.
   if (std::any_of(diagnosis->unknown.begin(), diagnosis->unknown.end(),
                   [](const UnknownFound& reported) { return reported.channel == kImageShift; }))
     std::erase_if(causes,

@@ -1,6 +1,6 @@
-// The variance of a sum of vectors of which neighbours are alike, as noise with a memory makes them
-// (Newey and West, Econometrica 55, 703, 1987): products of neighbours count too, with weights that
-// fall to nothing. Vectors come one by one, in the order of their times.
+// The variance of a sum of vectors of which neighbours are alike, as noise with memory makes them.
+// Products of neighbours count too, with weights that fall to zero. Vectors come one by one, in the
+// order of their times. Source: Newey and West, Econometrica 55, 703, 1987.
 #pragma once
 
 #include <Eigen/Dense>
@@ -14,12 +14,12 @@ namespace focalfleet::sim {
 
 inline constexpr std::size_t kNeighbourLags = 4;
 
-/// With which share the product of vectors so many places apart counts.
+/// The weight of a product of vectors so many places apart.
 constexpr double NeighbourShare(std::size_t lag) {
   return 1 - static_cast<double>(lag) / (kNeighbourLags + 1);
 }
 
-/// kSize: of the vectors; Eigen::Dynamic: up to kColumnsMax.
+/// The running sum. kSize: of the vectors; Eigen::Dynamic: up to kColumnsMax.
 template <int kSize>
 class NeighbourSum {
  public:
@@ -27,7 +27,7 @@ class NeighbourSum {
   using Small = Eigen::Matrix<double, kSize, 1, 0, kMost, 1>;
   using Square = Eigen::Matrix<double, kSize, kSize, 0, kMost, kMost>;
 
-  /// `inverse`: of the matrix in units of which the variance is told.
+  /// `inverse`: of the matrix that is the unit of the variance.
   explicit NeighbourSum(const Square& inverse) : inverse_(inverse) {
     past_.fill(Small::Zero(inverse.rows()));
   }

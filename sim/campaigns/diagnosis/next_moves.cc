@@ -19,34 +19,34 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kPairsMax = 12;
-constexpr std::size_t kUnitsOfCause = 8;   // that a cause is looked at in
+constexpr std::size_t kUnitsOfCause = 8;   // units that a cause is examined in
 constexpr std::size_t kUnitsOfGroup = 40;  // where units act on each other
-constexpr std::size_t kRowsMax = 4000;     // of moves that were made
-constexpr std::size_t kFormsOfRival = 6;   // its shapes that are nearest
-constexpr double kSure = 38;               // D at which nothing is left to do
+constexpr std::size_t kRowsMax = 4000;     // moves already made
+constexpr std::size_t kFormsOfRival = 6;   // the rival's nearest shapes
+constexpr double kSure = 38;               // D at which a pair is separated
 constexpr double kWorthALook = 0.002;      // probability of confusion, summed over the pairs
-constexpr double kTurn_s = 33;             // of an axis
+constexpr double kTurn_s = 33;             // time of a move of one axis
 constexpr double kExposure_s = 10, kHoming_s = 60;
 constexpr double kLever_s = 20, kTelescope_s = 40;  // to change the drive; the elevation
-constexpr double kDelayMin_s = 3;                   // a shorter one saves nothing
+constexpr double kDelayMin_s = 3;                   // a shorter delay saves nothing
 
-// Where all blocks of moves begin and end.
+// The stance in which all blocks of moves begin and end.
 const ProposedMove& Home() {
   static const ProposedMove home{.theta_fp_deg = 0, .phi_fp_deg = 90};
   return home;
 }
 
-// ---- who is to be told from whom
+// ---- Pairs of causes to separate.
 
-// A cause of the model and one who could be it.
+// A cause of the model and a rival that could be it.
 struct Pair {
   std::size_t term = 0;
   std::string cause, rival;
   Templates forms;   // of the rival
-  double scale = 1;  // of D in all units to D in those looked at
+  double scale = 1;  // ratio of D in all units to D in the examined ones
 };
 
-// The term of this name that does most.
+// The term of this name with the largest effect.
 std::optional<std::size_t> TermOf(const Fit& fit, const CauseFound& cause) {
   std::optional<std::size_t> strongest;
   double most_um = 0;
@@ -65,7 +65,8 @@ bool ActsOnOthers(const Effect& effect) {
          effect.cause == "neighbour_coupling" || effect.cause == "collision_contact";
 }
 
-// Units that show the term most, or where units act on each other those around the one that does.
+// Units that show the term most. Where units act on each other, those around the one that shows it
+// most.
 std::vector<std::size_t> UnitsOf(const Fit& fit, const ModelTerm& term, bool in_groups,
                                  const TermTrace& trace) {
   const std::vector<CampaignUnit>& units = fit.model.units;
@@ -92,11 +93,11 @@ std::vector<std::size_t> UnitsOf(const Fit& fit, const ModelTerm& term, bool in_
   return order;
 }
 
-// ---- a fit of some units, with moves to come
+// ---- A fit of some units, with moves to come.
 
 struct Ground {
   Campaign made;
-  std::vector<ModelTerm> terms;  // of the model: those that these units and columns can have
+  std::vector<ModelTerm> terms;  // terms of the model that these units and columns can have
   std::vector<double> weight;    // Shape: (rows of made)
 };
 
@@ -133,14 +134,14 @@ void TakeTerms(const Fit& fit, Ground* ground, std::vector<Pair>* pairs, NextMov
   std::erase_if(*pairs, [](const Pair& pair) { return pair.term == kNoTerm; });
 }
 
-// Owns what a fit refers to.
+// Owns the data that a fit refers to.
 struct FitAhead {
   Campaign campaign;
   CampaignFacts facts;
   Fit fit;
 };
 
-// Residuals are nobody's business here: what counts is what the terms do.
+// Residuals play no part here: only the effects of the terms count.
 std::unique_ptr<FitAhead> LookAhead(const Fit& fit, const Ground& ground,
                                     const std::vector<ProposedMove>& moves) {
   auto ahead = std::make_unique<FitAhead>();
@@ -167,7 +168,7 @@ std::unique_ptr<FitAhead> LookAhead(const Fit& fit, const Ground& ground,
   return ahead;
 }
 
-// Of each form, what it leaves of the term's own signal, as a chi-square.
+// For each form, what it leaves of the term's own signal, as a chi-square.
 std::vector<double> LeftBy(const Fit& ahead, const FleetGroups& groups, std::size_t term,
                            const Templates& forms) {
   const ScorePass pass = ScoreTemplates(ahead, forms, term);
@@ -179,7 +180,7 @@ std::vector<double> LeftBy(const Fit& ahead, const FleetGroups& groups, std::siz
   return left;
 }
 
-// Its shapes that leave least of the term, with the moves that were made.
+// The rival's shapes that leave least of the term, with the moves that were made.
 Templates NearestForms(const Fit& ahead, const FleetGroups& groups, std::size_t term,
                        std::string_view rival) {
   const Effect* effect = FindEffect(rival);
@@ -208,7 +209,7 @@ std::vector<double> Apart(const Fit& ahead, const FleetGroups& groups,
   return d;
 }
 
-// ---- what can be done
+// ---- Moves that are possible.
 
 // Moves that end in the stance that they begin in: blocks can follow each other in any order.
 struct Block {
@@ -245,7 +246,7 @@ ProposedMove Off(ProposedMove lever, double theta_deg, double phi_deg) {
 
 ProposedMove After(double delay_s) { return {.conditions = {.delay_s = delay_s}}; }
 
-// What these units can be asked for.
+// Moves with each condition that these units allow.
 std::vector<ProposedMove> LeversOf(const CampaignFacts& facts) {
   std::vector<ProposedMove> levers = {{}, {.conditions = {.home_first = true}}};
   for (const double drive : {0.6, 1.5})
@@ -280,14 +281,14 @@ std::vector<Block> ListBlocks(const CampaignFacts& facts) {
       stairs.push_back(Off({}, 0, 0));
       Add(std::move(stairs), &blocks);
     }
-    // Over the range.
+    // An arc over the range.
     std::vector<ProposedMove> arc;
     const double reach = theta > 0 ? 150 : 80;
     for (int k = -5; k <= 5; ++k)
       arc.push_back(Off({}, k * reach / 5 * theta, k * reach / 5 * phi));
     arc.push_back(Off({}, 0, 0));
     Add(std::move(arc), &blocks);
-    // At rest, looked at again and again.
+    // Exposures at rest, repeated.
     for (const double step : {2.5, 40.0})
       Add({Off(After(0.3), step * theta, step * phi), Off(After(30), step * theta, step * phi),
            Off(After(100), step * theta, step * phi), Off(After(0.3), 0, 0)},
@@ -296,7 +297,7 @@ std::vector<Block> ListBlocks(const CampaignFacts& facts) {
   return blocks;
 }
 
-// ---- the choice
+// ---- The choice.
 
 double ConfusionOf(const std::vector<double>& d) {
   double sum = 0;
@@ -345,7 +346,8 @@ class Chooser {
     return moves;
   }
 
-  // What these moves add. Those that were made have had their say, and it was for nobody.
+  // D that these moves add. The moves already made do not count here: they have not separated the
+  // pair.
   [[nodiscard]] std::vector<double> With(const std::vector<ProposedMove>& moves) const {
     std::vector<double> d = Apart(LookAhead(fit_, ground_, moves)->fit, groups_, pairs_);
     for (std::size_t p = 0; p < d.size(); ++p) d[p] = std::max(d[p] - made_[p], 0.0);
@@ -356,7 +358,7 @@ class Chooser {
     return std::ranges::all_of(d_, [](double d) { return d >= kSure; });
   }
 
-  // What the blocks are worth after these moves: probability of confusion a second.
+  // The blocks' worth after these moves: reduced probability of confusion per second.
   void LookAt(const std::vector<std::size_t>& which, const std::vector<ProposedMove>& moves) {
     const double confusion = ConfusionOf(d_);
     fit_.parallel(which.size(), [&](std::size_t k) {
@@ -368,7 +370,7 @@ class Chooser {
     });
   }
 
-  // Who was worth most before is looked at again, until the best is one that was.
+  // The block that was worth most before is examined again, until the best is one just examined.
   std::size_t BestBlock(const std::vector<ProposedMove>& moves) {
     constexpr std::size_t kAtATime = 4, kRoundsMax = 6;
     std::set<std::size_t> fresh;
@@ -400,11 +402,11 @@ class Chooser {
 
   const Fit& fit_;
   const Ground& ground_;
-  const FleetGroups groups_;  // of all units, whoever is looked at
+  const FleetGroups groups_;  // of all units, not only the examined ones
   const std::vector<Pair>& pairs_;
   std::vector<Block> blocks_;
   std::vector<double> worth_;
-  std::vector<double> d_, made_;  // what the moves so far add; in those that were made
+  std::vector<double> d_, made_;  // from the moves so far; from those already made
 };
 
 }  // namespace
@@ -440,7 +442,7 @@ NextMoves ProposeMoves(const Fit& fit, const std::vector<CauseFound>& causes) {
     for (const std::size_t u : units) chosen += square[u];
     if (chosen > 0) pairs[p].scale = std::accumulate(square.begin(), square.end(), 0.0) / chosen;
   }
-  // Nobody who has the term was seen: no moves of theirs tell anything.
+  // No unit with the term was seen: no moves of such units can separate anything.
   if (units.empty()) {
     for (const Pair& pair : pairs) none.inseparable.push_back({pair.cause, pair.rival});
     pairs.clear();

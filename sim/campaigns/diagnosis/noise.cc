@@ -1,5 +1,6 @@
-// Noise and weights of a fit (fit.h, whiten.h): variances by maximum likelihood with the density of
-// Student's t, in which outliers cost a logarithm; then factors of units and of exposures.
+// Noise and weights of a fit (fit.h, whiten.h). Variances come first, by maximum likelihood with
+// the density of Student's t, in which outliers cost a logarithm. Factors of units and of exposures
+// follow.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,7 +14,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
-constexpr std::size_t kRowsMax = 4000;                   // of those that the variances come from
+constexpr std::size_t kRowsMax = 4000;                   // rows that the variances come from
 constexpr std::size_t kRowsMin = 200;                    // fewer: one variance only
 
 struct NoiseMove {
@@ -27,7 +28,7 @@ struct NoiseUnit {
   double factor = 1;
   std::vector<NoiseMove> moves;
   std::vector<double> turn_um;  // of the seen moves. Shape: (seen, 4)
-  // What the unit's own unknowns (geometry, own amplitudes) do. Shape: (2 seen, unknowns)
+  // Effects of the unit's own unknowns (geometry, own amplitudes). Shape: (2 seen, unknowns).
   Eigen::MatrixXd own;
 };
 
@@ -47,7 +48,7 @@ Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUn
     own.conservativeResize(Eigen::NoChange, own.cols() + 1);
     Displacement(white, errors, own.col(own.cols() - 1).data());
   }
-  // To a common size: what matters is the plane that they span.
+  // Columns are scaled to a common size: only the plane that they span matters.
   for (Eigen::Index c = 0; c < own.cols(); ++c)
     if (const double length = own.col(c).norm(); length > 0) own.col(c) /= length;
   return own;
@@ -85,8 +86,9 @@ std::vector<NoiseUnit> Sample(const Fit& fit) {
   return sample;
 }
 
-// Of one unit: the density of each place given those before it, and what the unit's own unknowns
-// have absorbed (restricted likelihood; the unknowns to second order about the residuals).
+// The cost of a unit is the density of each place given those before it, and the part that the
+// unit's own unknowns have absorbed. The likelihood is restricted, with the unknowns to second
+// order about the residuals.
 // Source: Patterson and Thompson, Biometrika 58 (1971) 545.
 double CostOf(const NoiseUnit& unit, const Noise& noise) {
   constexpr double kLoose = 1e-12;  // of an unknown that the rows do not show
@@ -154,7 +156,7 @@ class NoiseSearch {
       }
     }
   }
-  // Steps that factors do not find.
+  // Tries steps that changes by a factor do not reach.
   void Leaps() {
     for (int axis = 0; axis < 2; ++axis) {
       const double lever = std::max(Lever_um(sample_, axis), 1e-6);
@@ -187,8 +189,8 @@ class NoiseSearch {
   double cost_;
 };
 
-// From nothing: errors that are held and errors that are not look alike from far off, so that the
-// search begins at either.
+// A search without a previous result. Errors that are held and errors that are not look alike from
+// far off, so that the search begins at either.
 Noise SearchAnew(const std::vector<NoiseUnit>& sample, bool with_axes, double typical_um,
                  Noise noise) {
   noise.place_um = typical_um;
@@ -228,7 +230,8 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
   if (squares.empty()) return;
   const bool with_axes = squares.size() >= kRowsMin;
   const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), noise->least_um);
-  // Near where it was: a short search. Anew where it was never made, or is far away.
+  // A previous result that is near makes the search short. Without one, or with one far away, the
+  // search is anew.
   const bool near =
       noise->fitted && typical < 2 * noise->typical_um && typical > 0.5 * noise->typical_um;
   if (near) {
@@ -267,9 +270,9 @@ struct UnitLengths {
   std::vector<std::size_t> exposure;
 };
 
-// Factors are about 1; what they have in common is the fleet's noise. A unit or an exposure without
-// any residual has a factor, too: the least that numbers bear. Half or double of it decides
-// nothing, as a place's noise does not fall below the least one with it (rest_filter.h).
+// Factors are about 1; their common part is the fleet's noise. A unit or an exposure without any
+// residual has a factor, too: the least that numbers allow. Half or twice of it decides nothing, as
+// a place's noise has a floor of its own (rest_filter.h).
 void Normalise(Noise* noise) {
   constexpr double kFactorLeast = 0.01;
   for (std::vector<double>* factors : {&noise->unit_factor, &noise->exposure_factor})
@@ -315,7 +318,7 @@ void FitFactors(Fit* fit) {
     const double n = own[unit] < 0 ? 0 : static_cast<double>(lengths[unit].square.size());
     fit->noise.unit_factor[unit] *= Shrunk(std::max(own[unit], 0.0), n, usual);
   }
-  // Exposures: what is left once the units have theirs.
+  // Exposures get what is left after the units' factors.
   constexpr std::size_t kUnitsMin = 6;
   if (units < kUnitsMin) return Normalise(&fit->noise);
   std::vector<std::vector<double>> of(fit->facts->exposures.size());

@@ -18,21 +18,23 @@ constexpr double kStuckSpread_mm = 0.03;
 constexpr double kClusterShare = 0.3;      // of the family-wise rate
 constexpr double kClusterLeast = 4;        // units and exposures
 constexpr std::size_t kClusterMost = 200;  // far visits in a window
-// Of those that are as near: some do not move, or touch little.
+// Share of the visits that are as near: some units do not move, or touch little.
 constexpr double kTouchedLeast = 1.0 / 3;
-constexpr std::size_t kNextTouched = 12;    // visits by which to tell whether wider gaps touch, too
-constexpr double kBeyondMost = 0.1;         // of that share, of those that are farther apart
+// Visits that decide whether arms touch at wider gaps, too.
+constexpr std::size_t kNextTouched = 12;
+constexpr double kBeyondMost = 0.1;         // of that share, of arms that are farther apart
 constexpr double kTouchLogLikelihood = 25;  // ln L of a row
 constexpr std::string_view kClusterColumns[] = {kCommand[kTheta], kCommand[kPhi], kArmGap};
 constexpr double kMostRows = 0.3;  // of a unit's rows: the unit itself is named
-constexpr double kFarMore = 4;     // off than other units: so is it, whatever noise it passes for
+// Times other units' distance: the unit is named, whatever its noise.
+constexpr double kFarMore = 4;
 constexpr std::size_t kOthersMin = 8;
 
 double SpreadOf(const std::vector<double>& values) {
   return values.empty() ? 0 : Quantile(values, 0.95) - Quantile(values, 0.05);
 }
 
-// Commanded to move, and does not.
+// Whether the unit was commanded to move, and does not.
 bool IsStuck(const Campaign& campaign, std::size_t unit) {
   std::vector<double> x, y;
   double low[2] = {1e300, 1e300}, high[2] = {-1e300, -1e300};
@@ -49,7 +51,7 @@ bool IsStuck(const Campaign& campaign, std::size_t unit) {
          SpreadOf(x) < kStuckSpread_mm && SpreadOf(y) < kStuckSpread_mm;
 }
 
-// Did the fibre stay where the move began?
+// Whether the fibre stayed where the move began.
 bool Stayed(const Fit& fit, std::size_t unit, std::size_t row) {
   const Campaign& campaign = *fit.facts->campaign;
   const double from_x_um = 1e3 * campaign.x_mm[row], from_y_um = 1e3 * campaign.y_mm[row];
@@ -59,8 +61,8 @@ bool Stayed(const Fit& fit, std::size_t unit, std::size_t row) {
   return std::hypot(from_x_um - 1e3 * start.x_mm, from_y_um - 1e3 * start.y_mm) < 0.2 * miss;
 }
 
-// An axis' stay at one value of a column: a row that is far because of where it stands is far for
-// as long as it stands there.
+// A visit is an axis' stay at one value of a column. A row that is far because of its pose is far
+// as long as the axis stays there.
 struct Visit {
   double value = 0;
   std::size_t row = 0;  // its first, or its first far one
@@ -72,7 +74,7 @@ struct Visit {
 std::vector<Visit> VisitsOf(const Fit& fit, const FilledColumn& column,
                             const std::vector<char>& is_far) {
   const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
-  // No arm is near: no gap.
+  // Without a near arm the column has no gap.
   const FilledColumn* side =
       &column == fit.facts->Find(kArmGap) ? fit.facts->Find(kArmGapSide) : nullptr;
   std::vector<Visit> visits;
@@ -99,15 +101,15 @@ struct Window {
   std::vector<const Visit*> visits;
 };
 
-// Of all windows from one far visit to another the one that chance fills least. `visits` in the
-// order of their values.
+// The window from one far visit to another that chance fills least, of all such windows. `visits`
+// in the order of their values.
 Window DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   std::vector<std::size_t> far, rows_before = {0};
   for (std::size_t k = 0; k < visits.size(); ++k) {
     if (visits[k].far) far.push_back(k);
     rows_before.push_back(rows_before.back() + visits[k].rows);
   }
-  // Whole ties: in what order equal ones stand means nothing.
+  // Ties are taken whole: the order of equal values means nothing.
   const auto begin_of = [&](std::size_t k) {
     const auto first = std::ranges::lower_bound(visits, visits[k].value, {}, &Visit::value);
     return static_cast<std::size_t>(first - visits.begin());
@@ -120,7 +122,7 @@ Window DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   Window densest;
   std::size_t begin = 0, end = 0;
   for (std::size_t i = 0; i < far.size(); ++i) {
-    // Many of one unit, or of one exposure, count once: they may have something else in common.
+    // Visits of one unit, or of one exposure, count once: they may have another common reason.
     std::set<std::size_t> units, together;
     for (std::size_t j = i; j < std::min(far.size(), i + kClusterMost); ++j) {
       units.insert(visits[far[j]].unit);
@@ -141,7 +143,7 @@ Window DensestOf(const std::vector<Visit>& visits, const Exposures& exposures) {
   return densest;
 }
 
-// Units that are far more off than others are, as a rule and by no cause.
+// Units that are far more off than others are, in most rows and without a cause.
 std::vector<std::uint32_t> FarMoreThanOthers(const Fit& fit) {
   const std::vector<std::size_t>& first_row = fit.facts->campaign->first_row;
   std::vector<std::pair<double, std::uint32_t>> usual_um;
@@ -167,7 +169,8 @@ double MissSquare_um2(const Fit& fit, std::size_t row) {
   return fit.x_um[row] * fit.x_um[row] + fit.y_um[row] * fit.y_um[row];
 }
 
-// The widest gap at which arms touch: on from the window while many of the next ones are far.
+// The widest gap at which arms touch: from the window on, as long as many of the next visits are
+// far.
 double WidestTouch_mm(const std::vector<Visit>& visits, const Window& window, double pitch_mm) {
   auto end = std::ranges::upper_bound(visits, window.visits.back()->value, {}, &Visit::value);
   const auto many_of_next = [&] {
@@ -179,8 +182,8 @@ double WidestTouch_mm(const std::vector<Visit>& visits, const Window& window, do
   return std::min(std::prev(end)->value, kThickestArm * pitch_mm);
 }
 
-// Far rows whose arms are near enough to touch. {}: many there are not far, or many beyond are: it
-// is not the arms that make them so. `far`: rows.
+// Far rows whose arms are near enough to touch. Empty where many visits there are not far, or many
+// beyond are: the arms are not the reason then. `far`: rows.
 std::vector<std::size_t> TouchedRows(const Fit& fit, const std::vector<Visit>& visits,
                                      const Window& window, const std::vector<std::size_t>& far) {
   const double touching_mm = WidestTouch_mm(visits, window, fit.facts->pitch_mm);

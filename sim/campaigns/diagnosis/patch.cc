@@ -14,8 +14,9 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kSizeMinUm = 0.05;    // less is no misfit worth a term, however certain
-constexpr double kSpreadMaxDeg = 0.3;  // of units' own amplitudes, where nothing else holds them
+constexpr double kSizeMinUm = 0.05;  // a smaller misfit is not worth a term, however certain
+// The spread of units' own amplitudes, where nothing else determines them.
+constexpr double kSpreadMaxDeg = 0.3;
 
 bool IsSame(const Template& a, const Template& b) {
   constexpr double kApart = 0.3;  // orders that are nearer are one ripple, found again
@@ -24,7 +25,7 @@ bool IsSame(const Template& a, const Template& b) {
          (a.effect == &EmpiricalCurve() || std::abs(a.shape - b.shape) < kApart);
 }
 
-// The look, with amplitudes for all of its curve.
+// The term that shows the structure, with amplitudes for all of its curve.
 ModelTerm PatchOf(const ModelTerm& look, const CampaignFacts& facts) {
   ModelTerm term = look;
   if (look.form.effect == &EmpiricalCurve()) {
@@ -36,7 +37,7 @@ ModelTerm PatchOf(const ModelTerm& look, const CampaignFacts& facts) {
   }
   term.amplitude.assign(look.groups() * term.form.columns, 0);
   term.sigma.assign(term.amplitude.size(), 0);
-  // One unit's rows may not tell all cosines apart.
+  // The rows of a single unit may not separate all cosines.
   if (term.sharing == Sharing::kUnit && !(term.spread > 0)) term.spread = kSpreadMaxDeg;
   return term;
 }
@@ -46,7 +47,7 @@ void Refit(Fit* fit) {
   SettleFit(fit, 2);
 }
 
-// The image's shifts as curves over the column that they follow; what else moves stays in the
+// Adds the image's shifts as curves over the column that they follow. Other motion stays in the
 // image's own terms.
 bool PatchImage(const PatchRule& rule, UnknownFound* reported, Fit* fit) {
   const FilledColumn* column = fit->facts->Find(reported->covariate);
@@ -62,7 +63,7 @@ bool PatchImage(const PatchRule& rule, UnknownFound* reported, Fit* fit) {
   UpdateResiduals(fit);
   Refit(fit);
   AddImageTerms(fit, rule.family_wise);
-  // Steps of the image may have gone, the curves are the last.
+  // Steps of the image may have been dropped; the curves are the last terms.
   const std::size_t terms = fit->model.terms.size();
   reported->patched = {std::string(EmpiricalCurve().cause),
                        std::hypot(SizeOf(*fit, fit->model.terms[terms - 2]),

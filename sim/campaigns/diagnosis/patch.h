@@ -1,7 +1,8 @@
-// What no cause explains can still be corrected: an empirical term for the clearest structure that
-// the screen sees, then for the next, until chance explains what is left. A curve of all cosines
-// over the column, or the ripple of the order; the whole model is fitted anew with each. It names
-// nothing: the verdict stays "unknown", and held-out moves say what the patch is worth.
+// A patch corrects what no cause explains. An empirical term is added for the clearest structure
+// that the screen finds, then for the next, until chance explains what is left. A term is a curve
+// of all cosines over the column, or the ripple of the order. The whole model is fitted anew with
+// each. A patch names nothing: the verdict stays "unknown", and held-out moves measure what the
+// patch is worth.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +22,9 @@ struct PatchRule {
   std::function<bool(const UnknownFound&)> matters = [](const UnknownFound&) { return true; };
 };
 
-/// Adds terms to the fit's model, for what matters. Where the image's shifts follow a column
-/// (`told`, marked as patched then), curves in x and y take their place. Returns what the screen
-/// saw, each entry marked where a term was added for it.
+/// Adds terms to the fit's model for the structures that matter. Where the image's shifts follow a
+/// column, curves in x and y take their place, and the entry of `reported` is marked as patched.
+/// Returns the structures that the screen found, each marked where a term was added for it.
 std::vector<UnknownFound> PatchStructures(const PatchRule& rule,
                                           std::vector<UnknownFound>* reported, Fit* fit);
 

@@ -24,7 +24,7 @@ double MedianMiss(const std::vector<PlainRow>& rows, const CampaignUnit& unit) {
 
 }  // namespace
 
-// Levenberg-Marquardt with L1-like weights about the median miss.
+// Levenberg-Marquardt with L1-like weights about the median distance.
 CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& table,
                       CampaignUnit unit, int rounds) {
   const StaticVector prior = StaticPriorWeights();

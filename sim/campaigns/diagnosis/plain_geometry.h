@@ -1,4 +1,5 @@
-// A unit's geometry by its places alone: no effects, no noise, a minority of rows anywhere.
+// Plain geometry is a unit's geometry by its places alone, without effects or noise; a minority of
+// rows may be anywhere.
 #pragma once
 
 #include <vector>
@@ -7,13 +8,13 @@
 
 namespace focalfleet::sim {
 
-/// Where a fibre was seen at the angles that its axes should stand at.
+/// The place of a fibre that was seen, and the angles that its axes should have.
 struct PlainRow {
   double theta_deg, phi_deg, x_mm, y_mm;
 };
 
-/// The geometry that most of the rows agree on, from `start`; what they do not show stays where the
-/// table has it. `rounds`: at most.
+/// The geometry that most of the rows agree on, from `start`; what they do not show stays as in the
+/// table. `rounds`: at most.
 CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& table,
                       CampaignUnit start, int rounds);
 

@@ -179,7 +179,8 @@ Result<ModelTerm> TermOf(const PlantedEffect& planted, const CampaignFacts& fact
   const std::size_t c = term.form.columns;
   const bool of_all = effect->owner == Owner::kPlate || effect->owner == Owner::kCamera;
   double phase = 0;
-  // A step of rounding is the controller's; where shapes go on between, they are units' own.
+  // A step of rounding belongs to the controller. Shapes with values between the listed ones are
+  // units' own.
   const bool own = effect->own_shape && effect->continuous_shape && planted.form < 0;
   std::map<std::uint32_t, double> shapes;
   std::erase_if(templates, [&](const Template& one) { return one.form != term.form.form; });
@@ -247,7 +248,7 @@ void Measure(const PlantedOptions& options, const CampaignFacts& facts, const Pl
 
 bool IsByPixel(const PlantedEffect& planted) { return planted.cause == "centroid_bias"; }
 
-// What a camera makes of the places that it sees.
+// Changes of the places that depend on the camera's pixels.
 Status PlantByPixel(const PlantedOptions& options, Campaign* campaign) {
   constexpr double kPixel_mm = 0.06, kMiddle = 1000;
   for (const auto& [name, place_mm] :

@@ -1,8 +1,10 @@
-// A made-up campaign with chosen effects in it, for tests, load and demonstration: units on a
-// hexagonal lattice, a diagnostic campaign (long and short moves both ways, single axes and both,
-// few and many movers, several drive levels, delays and temperatures), places measured with noise.
-// The physics are those of the library; a test of the diagnosis that must not share them plants its
-// own (tests/hidden).
+// A planted campaign has chosen effects in it, for tests, load and demonstration. Units are on a
+// hexagonal lattice. Moves are a diagnostic campaign: long and short ones both ways, of single axes
+// and both. They have few and many movers, several drive levels, delays and temperatures. Places
+// are measured with noise.
+//
+// The physics are those of the library. A test of the diagnosis that must not share them plants its
+// own campaigns (tests/hidden).
 #pragma once
 
 #include <cstdint>
@@ -21,8 +23,8 @@ struct PlantedEffect {
   std::string axis;         // empty: the first that the effect has
   double unit_share = 1;    // of the units that have it
   double unit_scatter = 0;  // relative, of the units' own amplitudes
-  // Index among the effect's templates on that axis. -1: the first, or where shapes are units' own
-  // (as damaged teeth are), one of the first's kind for each.
+  // Index among the effect's templates on that axis. With -1 it is the first. Where shapes are
+  // units' own, as damaged teeth are, each unit then has one of the first's kind.
   int form = -1;
 };
 
@@ -31,8 +33,8 @@ struct PlantedOptions {
   std::size_t moves = 60;
   std::uint64_t seed = 1;
   double noise_um = 3;           // one coordinate of a measured place
-  double rest_noise_deg = 0.01;  // of each axis, anew at each of its moves, held until the next
-  double zero_offset_deg = 0;    // of the true geometry against the table, and so below
+  double rest_noise_deg = 0.01;  // of each axis, new at each of its moves, held until the next
+  double zero_offset_deg = 0;    // of the true geometry against the table, as are the next two
   double base_offset_mm = 0;
   double arm_offset_mm = 0;
   double outlier_share = 0;  // rows that lie anywhere within 2 mm
@@ -43,8 +45,9 @@ struct PlantedOptions {
   std::vector<PlateMove> next;  // made after the others, by the same units
 };
 
-/// Of the causes that no effect is, those of planted_faults.h, too; camera pixels are told where
-/// centroid_bias is planted. Errors: kInvalid: an effect, axis or shape that there is not.
+/// A campaign with the effects, and with the causes of planted_faults.h, which are no effects. The
+/// campaign has camera pixels where centroid_bias is planted.
+/// Errors: kInvalid: an effect, axis or shape that does not exist.
 Result<Campaign> PlantCampaign(const PlantedOptions& options);
 
 }  // namespace focalfleet::sim

@@ -27,7 +27,7 @@ bool IsOf(std::span<const std::string_view> causes, std::string_view cause) {
   return std::ranges::find(causes, cause) != causes.end();
 }
 
-// The fibre as it is where the axis stands `off_deg` beside its command.
+// Moves the fibre to where it is when the axis is `off_deg` from its command.
 void Turn(std::size_t unit, std::size_t row, std::size_t axis, double off_deg, Campaign* campaign) {
   const CampaignUnit& u = campaign->units[unit];
   Plane pivot(u.base_x_mm, u.base_y_mm);
@@ -47,7 +47,8 @@ std::vector<std::size_t> Drawn(std::size_t count, double share, Rng* rng) {
   return drawn;
 }
 
-// What a fault takes off an axis' angle at some of a unit's moves is missing until it is homed.
+// The part of an axis' angle that a fault takes off at some of a unit's moves is missing until the
+// unit is homed.
 struct Loss {
   std::span<const std::size_t> axes;
   std::size_t moves = 1;
@@ -104,7 +105,7 @@ Status ExchangeNames(const PlantedEffect& planted, const CampaignFacts& facts, R
   };
   for (std::size_t k = 0; k < pairs; ++k) {
     const std::size_t a = take(), b = take();
-    // It exchanges either way.
+    // Undoing an exchange exchanges the places either way.
     UndoFibreSwap(facts.exposures, FibreSwap::Whole(*campaign, a, b), campaign);
   }
   return {};
@@ -133,7 +134,7 @@ void DistortTemperatures(const PlantedEffect& planted, const CampaignFacts& fact
           column.values[row] += planted.amplitude * (column.values[row] - mean_C);
 }
 
-// Air between fibres and camera: waves of all directions, anew at each exposure.
+// Air between fibres and camera: waves of all directions, new at each exposure.
 void MoveAir(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
              Campaign* campaign) {
   constexpr int kWaves = 8;

@@ -13,7 +13,7 @@ bool IsNamed(const ModelTerm& term, std::string_view cause, std::string_view axi
   return term.form.effect->cause == cause && AxesMeet(Name(term.form.axis), axis);
 }
 
-// Somebody else's cause by the same name is none.
+// A separate cause of the same name is no misfit artefact.
 bool IsMisfitArtefact(const ModelTerm& term, const CauseFound& of,
                       std::span<const CauseFound> named) {
   return std::ranges::any_of(
@@ -24,7 +24,7 @@ bool IsMisfitArtefact(const ModelTerm& term, const CauseFound& of,
          });
 }
 
-// The part of a name of several that does most; kNoTerm: none is left.
+// The largest part of a cause that has several terms; kNoTerm: none is left.
 std::size_t StrongestOf(const Fit& fit, const CauseFound& cause) {
   std::size_t strongest = kNoTerm;
   double most_um = 0;

@@ -1,5 +1,5 @@
-// What the shape of a strong cause leaves is in the model, under other names. There it polishes the
-// strong one: a rival that is as near the truth has all of it against itself.
+// Misfit artefacts of a strong cause are in the model, under other names. There they polish the
+// strong one: a rival that is as near the truth has all of them against itself.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace focalfleet::sim {
 
-/// Asks who else a cause could be without its misfit artefacts in the model; they become
+/// Finds the rivals of each cause without its misfit artefacts in the model, and adds them as
 /// candidates.
 void ReassessWithoutMisfitArtefacts(const Templates& templates, const SelectionRule& rule,
                                     const Fit& fit, std::vector<CauseFound>* causes);

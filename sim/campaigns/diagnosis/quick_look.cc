@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// One unit's angle, its median taken off and outliers drawn in.
+// The angle of one unit, with its median removed and outliers limited.
 struct Series {
   UnitTrack track;
   std::vector<AngleRow> rows;
@@ -42,7 +42,7 @@ Series SeriesOf(const Fit& fit, std::size_t unit, std::size_t axis) {
   return series;
 }
 
-// Sums of the template's signature s against the errors r, its mean taken off.
+// Sums of the template's signature s against the errors r, without its mean.
 struct Products {
   double rs = 0, ss = 0;
 };
@@ -67,7 +67,7 @@ bool CanBeOf(const Template& form, const Products& sum) {
   return sum.ss > 0 && CanBe(form, sum.rs / sum.ss, 0);
 }
 
-// Of one axis: the best unit's gain in 2 ln L by each template, and sums over the fleet.
+// Results for an axis: the best unit's gain in 2 ln L by each template, and sums over the fleet.
 struct Glances {
   std::vector<double> most;
   std::vector<Products> fleet;
@@ -103,15 +103,15 @@ Glances GlanceAt(const Fit& fit, const Templates& forms, std::size_t axis) {
   return all;
 }
 
-// ---- periods along the commanded angle
+// ---- Periods along the commanded angle.
 
 constexpr std::size_t kBins = 131072;  // of the angle's circle, which is longer than any axis goes
 constexpr double kCircle_deg = 720;
 constexpr double kPeriodMin_deg = 0.02, kPeriodMax_deg = 2.5;
-constexpr double kPeriods = kCircle_deg / kPeriodMin_deg;  // that can be told apart, about
+constexpr double kPeriods = kCircle_deg / kPeriodMin_deg;  // that can be separated, about
 
-// The power of what all units do alike, by whole periods in the circle: of noise, chi-square with
-// two degrees of freedom, halved.
+// The power of the units' common error, by whole periods in the circle. For noise it is chi-square
+// with two degrees of freedom, halved.
 std::vector<double> PowerOf(const Fit& fit, std::size_t axis) {
   std::vector<double> sums(kBins, 0);
   double square = 0;
@@ -135,7 +135,7 @@ std::vector<double> PowerOf(const Fit& fit, std::size_t axis) {
   return power;
 }
 
-// Shapes of the periods that stand out, and near them.
+// Adds shapes of the periods that stand out, and near them.
 void AddPeriods(const Fit& fit, const Effect& effect, EffectAxis of_axis, Templates* forms) {
   constexpr std::size_t kPeaksMax = 3;
   constexpr int kEitherSide = 5;  // tenths of a period in the circle

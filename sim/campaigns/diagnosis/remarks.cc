@@ -7,8 +7,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// Two vectors of an axis, and 3 um at 16.5 mm: a table that rounds its angles to hundredths is
-// within it. Half of it would call such rounding a break; double of it is what a camera sees.
+// Two field vectors of an axis, which are 3 um at 16.5 mm: a table that rounds its angles to
+// hundredths is within it. Half of it would call such rounding a break. Twice of it is what a
+// camera sees.
 constexpr double kJoins_deg = 0.01;
 constexpr double kTurn_deg = 360;
 

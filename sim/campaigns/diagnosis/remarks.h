@@ -1,5 +1,5 @@
-// Remarks on what is odd about a campaign's data: none is an error, and none shall be passed over
-// in silence.
+// Remarks report what is odd about a campaign's data. None of it is an error, and none is passed
+// over in silence.
 #pragma once
 
 #include <string>
@@ -11,14 +11,15 @@
 
 namespace focalfleet::sim {
 
-/// Times against numbers of moves; rows that do not begin where the row before ended.
+/// Remarks on times that contradict the numbers of moves, and on rows that do not begin where the
+/// row before ended.
 std::vector<std::string> RemarksOnOrder(const CampaignFacts& facts);
 
 std::vector<std::string> RemarksOnRepeats(const RepeatedPlaces& repeated, std::size_t rows);
 
 std::string RemarkOnSteps(const PlaceSteps& steps);
 
-/// Shortest decimal of four digits.
+/// The shortest decimal of four digits.
 std::string FourDigits(double value);
 
 /// "7, 9, 12 and 3 more".

@@ -8,11 +8,11 @@
 
 namespace focalfleet::sim {
 
-/// For each move of the track: Move. For each row that is used, then: See, SquareLength, Take,
-/// Whiten.
+/// Call Move for each move of the track. For each row that is used, then call See, SquareLength,
+/// Take, Whiten.
 class RestFilter {
  public:
-  /// `factor`: of all the unit's noise.
+  /// `factor` multiplies all of the unit's noise.
   RestFilter(const Noise& noise, double factor)
       : carry_{noise.carry[0], noise.carry[1]}, least2_(noise.least_um * noise.least_um) {
     const double f2 = factor * factor;
@@ -40,7 +40,8 @@ class RestFilter {
     }
   }
 
-  /// The row's covariance before its place is known. t: d place / d theta, d phi; um per degree.
+  /// Predicts the row's covariance before its place is known. t: d place / d theta, d phi; um per
+  /// degree.
   void See(const double* t, double exposure_factor) {
     e_[0] *= keep_[0], e_[1] *= keep_[1];
     const double a = p_[0] + angle2_[0], c = p_[2] + angle2_[1], b = p_[1];
@@ -52,7 +53,7 @@ class RestFilter {
     t_ = t;
   }
 
-  /// Of the residual, in sigmas, squared.
+  /// The squared length of the residual, in sigmas.
   [[nodiscard]] double SquareLength(double x_um, double y_um) const {
     const double x = x_um - t_[0] * e_[0] - t_[2] * e_[1];
     const double y = y_um - t_[1] * e_[0] - t_[3] * e_[1];
@@ -60,7 +61,7 @@ class RestFilter {
   }
   [[nodiscard]] double determinant() const { return det_; }
 
-  /// The row counts with this weight.
+  /// Updates the filter with the row at this weight.
   RowFilter Take(double weight) {
     RowFilter out{};
     out.keep[0] = keep_[0], out.keep[1] = keep_[1];
@@ -82,7 +83,7 @@ class RestFilter {
     return out;
   }
 
-  /// The row's two whitened numbers; the rest errors are known better behind it.
+  /// Writes the row's two whitened numbers, and improves the estimate of the rest errors.
   void Whiten(const RowFilter& row, const double* t, double x_um, double y_um, double* out) {
     const double x = x_um - t[0] * e_[0] - t[2] * e_[1];
     const double y = y_um - t[1] * e_[0] - t[3] * e_[1];

@@ -18,12 +18,12 @@ namespace {
 constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::string_view kCogging = "cogging", kImbalance = "phase_imbalance";
 
-// One way to turn a rotor: the error in electrical radians by the wave's phase in radians, and its
-// strength where the drive is 1.
+// A way to turn a rotor: the error in electrical radians by the wave's phase in radians, and its
+// strength at drive 1.
 struct Way {
   std::string_view cause;
   double harmonic;  // of the motor's turn
-  double falls;     // with this power of the drive
+  double falls;     // power of the drive by which the strength falls
   double (*error)(double harmonic, double wave_rad, double strength);
 };
 
@@ -52,11 +52,11 @@ constexpr Way kWays[] = {
     {kImbalance, 1, 1, OfField},  {kImbalance, 2, 0, OfField},  {kImbalance, 6, 1, OfDeadTime},
     {kImbalance, 1, 1, Straight}, {kImbalance, 2, 0, Straight}, {kImbalance, 6, 1, Straight}};
 
-// The angle errors of one unit's axis, and what they depend on.
+// The angle errors of a unit's axis, and the conditions that they depend on.
 struct RotorRow {
   double error_deg;  // of the axis
   double sigma_deg;
-  double motor_deg;  // commanded; without whole turns
+  double motor_deg;  // commanded, without whole turns
   double drive;      // of the move that brought the axis here
 };
 struct Rotor {
@@ -68,7 +68,7 @@ Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
   constexpr double kDriveLeast = 0.05;
   const UnitTrack track = TrackOf(fit.model, *fit.facts, unit);
   const std::span<const double> drive = track.Column("drive_amplitude");
-  // What a rotor came to rest with stays until the axis moves again.
+  // The error of a rotor at rest stays until the axis moves again.
   constexpr std::size_t kNever = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> moved(track.moves, kNever);
   std::size_t last = kNever;
@@ -90,7 +90,7 @@ Rotor RotorOf(const Fit& fit, std::size_t unit, std::size_t axis) {
   return rotor;
 }
 
-// -2 ln L of the rows by outlier-proof density, with a zero of their own.
+// -2 ln L of the rows by a robust density, with a zero of their own.
 double CostOf(const Rotor& rotor, const Way& way, double strength, double phase_rad,
               std::vector<double>* left) {
   left->clear();
@@ -141,7 +141,7 @@ bool IsOfRotor(const ModelTerm& term, std::size_t axis) {
          AxisIndex(term.form) == axis;
 }
 
-// The term of the axis that does most; kNoTerm: it has none.
+// The term of the axis with the largest effect; kNoTerm: it has none.
 std::size_t StrongestOf(const Fit& fit, std::size_t axis, std::vector<double>* square_um2) {
   std::size_t strongest = kNoTerm;
   double most_um = 0;
@@ -154,13 +154,13 @@ std::size_t StrongestOf(const Fit& fit, std::size_t axis, std::vector<double>* s
   return strongest;
 }
 
-// Whether it turns rotors by so much, electrically.
+// Whether the term turns rotors by so much, electrically.
 bool IsFar(const Fit& fit, std::size_t term, double far_deg) {
   const ModelTerm& of = fit.model.terms[term];
   return std::abs(Summarise(of).value) * MedianGear(fit.model, AxisIndex(of.form)) >= far_deg;
 }
 
-// The way of a cause that suits best, all units by the same, and its cost.
+// The best way of a cause, the same for all units, and its cost.
 struct BestWay {
   const Way* way = nullptr;
   double cost = std::numeric_limits<double>::infinity();
@@ -200,13 +200,13 @@ std::vector<Rotor> TakeRotors(const Fit& fit, std::size_t axis,
   return rotors;
 }
 
-// Whether one way is better for sure: beyond chance, and by a quarter of what it leaves itself
-// above noise, for that is no scatter but a misfit. A detent of order 1 and a circle beside the
-// origin are one curve.
+// Whether one way is clearly better: beyond chance, and by a quarter of what it leaves itself above
+// noise. The excess is no scatter but a misfit. A detent of order 1 and a circle beside the origin
+// are one curve.
 bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotors) {
   constexpr double kOfNormal = 1.15;    // mean of 2 MinusLogDensity of a normal number's square
   constexpr double kClearly = 15;       // -2 ln L
-  constexpr double kDispersionMax = 2;  // what is far from either says nothing of the two
+  constexpr double kDispersionMax = 2;  // rows far from either way do not separate the two
   constexpr double kOfMisfit = 0.25;
   if (a.way->harmonic == 1 && b.way->harmonic == 1) return false;
   double rows = 0;
@@ -218,8 +218,8 @@ bool IsClear(const BestWay& a, const BestWay& b, const std::vector<Rotor>& rotor
          std::abs(a.cost - b.cost) >= std::max(kClearly * dispersion, kOfMisfit * misfit);
 }
 
-// Beside the term at `at` the axis' other waves of either cause go: they are what its shape left.
-// Returns where the term is then.
+// Removes the axis' other waves of either cause beside the term at `at`: they are misfits of its
+// shape. Returns the term's index afterwards.
 std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
   const std::size_t axis = AxisIndex(fit->model.terms[at].form);
   for (std::size_t t = fit->model.terms.size(); t-- > 0;) {
@@ -231,8 +231,8 @@ std::size_t LeaveAlone(std::size_t at, Fit* fit, Selection* selection) {
   return at;
 }
 
-// The same units with the bent wave of another cause, which has its own rivals. False: it has none
-// in these data.
+// Exchanges the term for the bent wave of another cause in the same units, with rivals of its own.
+// False where these data have no such wave.
 bool Exchange(const Templates& templates, const SelectionRule& rule, const Way& way, std::size_t at,
               Fit* fit, Selection* selection) {
   constexpr int kRounds = 2;
@@ -266,8 +266,8 @@ double MedianGear(const CampaignModel& model, std::size_t axis) {
 }
 
 double DetentError(double harmonic, double wave_deg, double detent) {
-  // The lag that is nearest to none: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to
-  // its first zero.
+  // The lag nearest to zero: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to its first
+  // zero.
   const double wave = wave_deg * kRadians;
   const auto excess = [&](double lag) {
     return std::sin(lag) - detent * std::sin(wave - harmonic * lag);
@@ -286,7 +286,7 @@ double DetentError(double harmonic, double wave_deg, double detent) {
 
 RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
                          const std::vector<std::string>& left_out, Fit* fit, Selection* selection) {
-  constexpr double kFar_deg = 8;  // electrical: less is a sine by either
+  constexpr double kFar_deg = 8;  // electrical: a smaller turn is a sine by either cause
   RotorCauses reported;
   if (!fit->facts->Has("drive_amplitude")) return reported;
   for (const std::string_view name : {kCogging, kImbalance})

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr double kLeverageMax = 0.5;  // of a signature in one row: an outlier looks the same
 constexpr double kKeptMin = 0.01;     // of a unit's signature beside its geometry
 
-// What a chunk of units adds to a template's sums over the fleet.
+// The part that a chunk of units adds to a template's sums over the fleet.
 struct FleetPart {
   double raw = 0, kept = 0, spread_sum = 0, spread_count = 0;
   std::vector<double> exposure_g;  // of several columns. Shape: (exposures, c, c)
@@ -35,7 +35,7 @@ struct LookPart {
 
 using ChunkPart = std::vector<LookPart>;  // Shape: (looks)
 
-// All that the units of a pass have in common.
+// The data that the units of a pass share.
 struct PassPlan {
   const Fit& fit;
   const Templates& templates;
@@ -44,7 +44,7 @@ struct PassPlan {
   SharedColumns shared;
 };
 
-// Room for one block of one unit.
+// Buffers for one block of one unit.
 struct Scratch {
   std::vector<Lanes> raw, m;          // Shape: (2 moves): before and after the projection
   std::vector<Lanes> gg, by;          // Shape: (moves): products of m with itself and with the data
@@ -64,7 +64,7 @@ void MultiplyColumns(const std::vector<Lanes>& m, const Placed& placed, std::siz
         *product++ = x[0].at[p] * x[0].at[q] + x[1].at[p] * x[1].at[q];
 }
 
-// As SumAlikeNeighbours, in units of g. `by`: the columns' products with the data.
+// The same as SumAlikeNeighbours, in units of g. `by`: the columns' products with the data.
 template <int kSize>
 double SpreadOf(const std::vector<double>& products, const std::vector<Lanes>& by,
                 const Placed& placed, const MatrixXd& g, const VectorXd& b) {
@@ -86,8 +86,8 @@ double SpreadOf(const std::vector<double>& products, const std::vector<Lanes>& b
   return sum.sum();
 }
 
-// Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise that
-// remembers makes more of it.
+// Dispersion of the moves' scores about the unit's own fit, 1 for noise as modelled. Noise with
+// memory makes more of it.
 void AddSpread(double sum, Index values, Index spent, std::size_t columns, FleetPart* part) {
   const auto n = static_cast<double>(values);
   const double free = n - static_cast<double>(spent) - static_cast<double>(columns);
@@ -111,7 +111,7 @@ void AddAtExposures(const std::vector<Lanes>& of_move, const std::vector<std::si
   for (std::size_t k = 0; k < exposure.size(); ++k) AddLanes(of_move[k], sums + exposure[k]);
 }
 
-// Scores one unit in the lanes of one block after the other.
+// Scores a unit in the lanes of one block after the other.
 class BlockScorer {
  public:
   BlockScorer(const PassPlan& plan, std::size_t unit, UnitScorer* scorer, Scratch* scratch)
@@ -142,7 +142,7 @@ class BlockScorer {
   }
 
  private:
-  // Off with what the plane absorbs; lanes whose rest says nothing are emptied.
+  // Removes what the plane absorbs. Lanes are emptied whose rest is only rounding.
   void Project(const UnitScorer::Plane& plane) {
     const MatrixXd& columns = plane.basis.columns();
     scratch_.parts.resize(static_cast<std::size_t>(columns.cols()));
@@ -165,8 +165,8 @@ class BlockScorer {
     MultiplyLanes(plane.shared, scratch_.m.data(), shared_cross_.data());
   }
 
-  // What bends the plate or its image shifts each unit far more than it bends what the unit sees;
-  // the shift is its base's. The first two columns of the basis are those of the base.
+  // A bend of the plate or its image shifts each unit far more than it bends what the unit sees.
+  // The shift belongs to the unit's base. The first two columns of the basis are those of the base.
   void LeaveOutShifts() {
     constexpr double kRounding = 1e-9;  // of a signature that is all shift
     raw_ = whole_;
@@ -276,7 +276,7 @@ class BlockScorer {
   UnitScorer& scorer_;
   Scratch& scratch_;
   std::size_t moves_ = 0;
-  // Of the block and plane at hand.
+  // The present block and plane.
   std::size_t block_ = 0;
   Lanes whole_, raw_, kept_;  // squared lengths
   Index spent_ = 0;
@@ -356,7 +356,7 @@ void Merge(const LookPart& from, LookPart* to) {
   to->values += from.values;
 }
 
-// One template's lanes, as numbers one after the other.
+// The lanes of one template, as numbers one after the other.
 std::vector<double> OutOfLanes(const Lanes* rows, std::size_t count, const Placed& placed,
                                std::size_t columns) {
   std::vector<double> values;
@@ -405,7 +405,7 @@ void TakeFleet(const PassPlan& plan, const LookPart& all, ScorePass* pass) {
     score.fleet_b -= gone.transpose() * all.shared_b;
     score.fleet_target_b -= gone.transpose() * all.shared_target_b;
     score.fleet_g -= cross.transpose() * gone;
-    // What the model has already says nothing new: what is left of it is rounding.
+    // A template that the model has already gives only rounding.
     if (score.fleet_g.trace() > kKeptMin * own) return;
     score.fleet_b.setZero();
     score.fleet_target_b.setZero();
@@ -450,7 +450,7 @@ std::vector<ScorePass> ScoreWithouts(const Fit& fit, const Templates& templates,
                       ListShared(fit.model.terms, withouts)};
   std::vector<ScorePass> passes(withouts.size(), EmptyPass(templates, units));
   ChunkPart all = EmptyPart(plan);
-  // A few chunks at a time: what each adds is as large as a pass.
+  // Chunks run a few at a time, because the part of each is as large as a pass.
   constexpr std::size_t kAtOnce = 8;
   const std::vector<UnitChunk> chunks = ChunksOf(units);
   for (std::size_t begin = 0; begin < chunks.size(); begin += kAtOnce) {

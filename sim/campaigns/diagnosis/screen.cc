@@ -9,14 +9,15 @@
 namespace focalfleet::sim {
 namespace {
 
-// Of the family-wise rate: the screen's; and where what is left is little, of the residuals: what
-// names leave by their shapes is never quite nothing.
+// Thresholds: the screen's share of the family-wise rate. A smaller share applies where the
+// structure is a small part of the residuals, because named causes always leave a little by their
+// shapes.
 constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
-// Of a look beside the model: a name is often nearly what is there, and the screen looks for what
-// little it leaves.
+// Share of a look that has to be left beside the model. A cause is often nearly the true one, and
+// the screen looks for the little that it leaves.
 constexpr double kKeptMin = 0.012;
 
-// Of the rotor behind the gear, where all units have the same.
+// Adds the orders of the rotor behind the gear, where all units have the same gear.
 void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<double>* orders) {
   const std::vector<CampaignUnit>& units = facts.campaign->units;
   const double gear = units.front().gear[axis];
@@ -25,7 +26,7 @@ void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<do
   for (const double harmonic : {1.0, 2.0, 6.0}) orders->push_back(harmonic * gear);
 }
 
-// The ripple's order between the listed ones that explains most, and how it stands then.
+// The ripple's order between the listed ones that explains most, with its evidence.
 Template WithFineOrder(const Fit& fit, const FleetGroups& groups, const Template& ripple,
                        Evidence* evidence) {
   constexpr int kEitherSide = 4;

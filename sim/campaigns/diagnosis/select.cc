@@ -19,14 +19,15 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kKeptMin = 0.03;  // of a signature: less is what geometry explains as well
-constexpr double kAlike = 4;       // times as far behind may be who leaves the same trace
+constexpr double kKeptMin = 0.03;  // of a signature: geometry explains a smaller rest as well
+// A rival that leaves the same trace may be so many times as far behind.
+constexpr double kAlike = 4;
 constexpr double kShapeDoubt = 0.002;
 constexpr double kHopeless = 0.3;  // of what the term explains
 constexpr int kSwapSweepsMax = 3;
-constexpr double kBetterBy = 0.5;  // logarithm of evidence
+constexpr double kBetterBy = 0.5;  // log evidence
 
-// `library`: of which the templates are some or all.
+// `library`: the templates are some or all of it.
 std::vector<Evidence> AssessAll(const ScorePass& pass, const Templates& templates,
                                 const Templates& library, const FleetGroups& groups,
                                 const ParallelFor& parallel) {
@@ -38,7 +39,7 @@ std::vector<Evidence> AssessAll(const ScorePass& pass, const Templates& template
     for (std::size_t k = block * kBlock; k < end; ++k)
       evidence_of[k] = Assess(pass.scores[k], templates[k], groups);
   });
-  // Who comes in many shapes fits by chance more often: each shape has its share of the cause.
+  // A cause with many shapes fits by chance more often: each shape has its share of the cause.
   std::map<std::pair<std::string_view, EffectAxis>, double> shapes;
   for (const Template& form : library) shapes[{form.effect->cause, form.axis}] += 1;
   for (std::size_t k = 0; k < templates.size(); ++k)
@@ -98,11 +99,11 @@ struct Look {
   std::vector<Evidence> evidence_of;
 };
 
-// Looks at one state of the fit, with all of its terms (kNoTerm) and without each: whoever asks for
-// one soon asks for the others, and the signatures are the same in all.
+// Looks at one state of the fit, with all of its terms (kNoTerm) and without each. All are made at
+// the first request, because the signatures are the same in all.
 class LookBook {
  public:
-  /// `one_by_one`: the others are not asked for.
+  /// `one_by_one`: only requested looks are made.
   LookBook(const FleetGroups& groups, bool one_by_one) : groups_(groups), one_by_one_(one_by_one) {}
 
   const Look& At(const Fit& fit, const Templates& templates, std::size_t without) {
@@ -112,7 +113,7 @@ class LookBook {
       look.evidence_of = AssessAll(look.pass, templates, templates, groups_, fit.parallel);
     return look;
   }
-  /// The fit has changed, or the templates.
+  /// Call after a change of the fit or the templates.
   void Forget() { looks_.clear(); }
 
  private:
@@ -132,7 +133,7 @@ class LookBook {
   std::map<std::size_t, Look> looks_;
 };
 
-// The best of the templates from `begin` on and of what was best before.
+// The best of the templates from `begin` on and the best of those before.
 Best BestAmong(const Fit& fit, const Templates& templates, const FleetGroups& groups,
                std::size_t begin, const Best& before, double tests, double family_wise) {
   const Templates refined(templates.begin() + static_cast<std::ptrdiff_t>(begin), templates.end());
@@ -166,7 +167,7 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
     const double behind = 2 * (best.log_evidence - look.evidence_of[k].log_evidence);
     const double share =
         ShareOfTarget(look.pass.scores[k], templates[k], best, groups, look.pass.target_square);
-    const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude cannot be
+    const bool hopeless = behind > kHopeless * best.chi_square;  // its amplitude is impossible
     // Signatures are as good as their shapes: of a large cause a small share decides nothing.
     const double near = std::max(rule.rival_behind, kShapeDoubt * best.chi_square);
     const bool alike = share >= rule.rival_share && !hopeless &&
@@ -181,7 +182,7 @@ std::vector<Rival> RivalsOf(const Look& look, const Templates& templates, const 
   return rivals;
 }
 
-// A cause of both axes gives way to one that has its own amplitude on each, if that is better.
+// Exchanges a cause of both axes for one with its own amplitude on each, if that is better.
 bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGroups& groups,
                      const SelectionRule& rule, double tests, std::size_t at, Fit* fit) {
   if (fit->model.terms.size() >= rule.terms_max) return false;
@@ -196,7 +197,7 @@ bool ExchangeForPair(const Look& look, const Templates& templates, const FleetGr
   return true;
 }
 
-// Who does as well as a term of both axes with a cause on each.
+// Adds pairs that do as well as a term of both axes, with a cause on each, as rivals.
 void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetGroups& groups,
                       const SelectionRule& rule, const Fit& fit, std::size_t at,
                       std::vector<Rival>* rivals) {
@@ -208,8 +209,7 @@ void AddPairsAsRivals(const Look& look, const Templates& templates, const FleetG
       rivals->push_back({trial.cause, trial.behind, 0, false});
 }
 
-// One look at each term: exchanged, dropped, or kept; where it is kept, its rivals. True if
-// anything changed.
+// Looks at each term once: exchanges it, drops it, or keeps its rivals. True if anything changed.
 bool SwapSweep(const Templates& templates, const FleetGroups& groups, const SelectionRule& rule,
                double tests, LookBook* looks, Fit* fit, std::vector<Accepted>* accepted) {
   accepted->clear();
@@ -255,7 +255,7 @@ void TakeRivals(const Templates& templates, const FleetGroups& groups, const Sel
   }
 }
 
-// Terms that the others have made needless go, the weakest first.
+// Drops terms that the others have made needless, the weakest first.
 void DropTheNeedless(const Templates& templates, const FleetGroups& groups,
                      const SelectionRule& rule, double tests, LookBook* looks, Fit* fit,
                      std::vector<Accepted>* accepted) {
@@ -295,7 +295,7 @@ ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGr
     if (evidence.has[unit] == 0) term.group_of_unit[unit] = kNoGroup;
   term.amplitude.assign(count * form.columns, 0);
   term.sigma.assign(count * form.columns, 0);
-  // The mixture's size is a grid point: as a prior let it be loose.
+  // The mixture's size is a grid point, so that the prior is made loose.
   if (evidence.sharing == Sharing::kUnit && !evidence.scattered && units > 1)
     term.spread = 3 * evidence.spread;
   return term;
@@ -339,7 +339,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
   const std::size_t listed = templates->size();
   std::vector<CandidateShape> candidate_shapes =
       CandidateShapesOf(look.pass, look.evidence_of, *templates, best.at, kKeptMin);
-  // Their evidence grows where each unit's shape is refined, too.
+  // Evidence may grow where each unit's shape is refined, too.
   constexpr double kOfBest = 0.3;
   const double least = best.at == kNoTerm ? 0 : kOfBest * best.evidence.log_evidence;
   for (CandidateShape& own : OwnShapes(look.pass, *templates, *fit->facts, groups, least))
@@ -363,7 +363,7 @@ bool AddTerm(const FleetGroups& groups, const SelectionRule& rule, Templates* te
 }
 
 Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* fit) {
-  Templates templates = library;  // and refined ones, and what the model has already
+  Templates templates = library;  // and refined ones, and those of the model
   for (const ModelTerm& term : fit->model.terms)
     if (IndexOf(templates, term.form) == kNoTerm) templates.push_back(term.form);
   const FleetGroups groups = GroupsOf(*fit->facts);
@@ -391,7 +391,7 @@ Selection SelectByAll(const Templates& library, const SelectionRule& rule, Fit* 
   return selection;
 }
 
-// ---- large fleets: the model is sought on some units, and holds for all
+// ---- Large fleets: the model is found on some units, and then used for all.
 
 // The fit with all units but `keep` random ones aside.
 Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
@@ -410,8 +410,7 @@ Fit SomeUnits(const Fit& fit, std::size_t keep, std::uint64_t seed) {
   return some;
 }
 
-// A term of units' own amplitudes belongs to all units if most of those that were looked at have
-// it.
+// Gives a term of units' own amplitudes to all units if most of the examined ones have it.
 void SpreadToAll(const Fit& some, ModelTerm* term) {
   if (term->sharing != Sharing::kUnit) return;
   const Campaign& campaign = *some.facts->campaign;
@@ -430,7 +429,7 @@ void SpreadToAll(const Fit& some, ModelTerm* term) {
   }
 }
 
-// Units that were not looked at get shapes of their own, too.
+// Gives shapes of their own to units that were not examined.
 void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t t, Fit* fit) {
   const auto at = fit->model.terms.begin() + static_cast<std::ptrdiff_t>(t);
   ModelTerm term = std::move(*at);
@@ -443,7 +442,7 @@ void GiveShapes(const Templates& library, const FleetGroups& groups, std::size_t
   std::vector<CandidateShape> found =
       OwnShapes(ScoreTemplates(*fit, kind), kind, *fit->facts, groups, kAny);
   RefineCandidateShapes(*fit, groups, &found);
-  // What units have that were looked at stays.
+  // Shapes of the examined units stay.
   for (CandidateShape& one : found) term.form.shape_of_unit.merge(one.form.shape_of_unit);
   for (std::size_t unit = 0; unit < term.group_of_unit.size(); ++unit)
     if (!ShapeOf(term.form, fit->model.units[unit].id)) term.group_of_unit[unit] = kNoGroup;
@@ -483,7 +482,7 @@ Selection Select(const Templates& library, const SelectionRule& rule, Fit* fit) 
     if (!fit->model.terms[t].form.shape_of_unit.empty()) GiveShapes(library, groups, t, fit);
   StepFit(fit);
   Refit(fit);
-  // What only units have that were not looked at.
+  // Effects that only units have that were not examined.
   rule.progress("all units");
   Templates templates = library;
   LookBook of_library(groups, true);

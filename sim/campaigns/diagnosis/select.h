@@ -1,7 +1,7 @@
-// Which effects are in the data. Forward: the template with the most evidence among those that
-// chance does not explain at the family-wise rate joins the model; then everything is fitted anew,
-// terms are exchanged for better ones and dropped where the others have taken their place. At the
-// end each term's rivals are those that would do as well in its place.
+// Selection finds the effects that are in the data. The template with the most evidence among those
+// that chance does not explain at the family-wise rate joins the model. Everything is then fitted
+// anew, and terms are exchanged for better ones, or dropped where others have taken their place. At
+// the end each term's rivals are those that would do as well in its place.
 #pragma once
 
 #include <cstdint>
@@ -16,23 +16,23 @@ namespace focalfleet::sim {
 
 struct Rival {
   std::string_view cause;
-  double behind = 0;  // twice the difference of the logarithms of evidence
-  double share = 0;   // of the term's own signal that the rival can take over
-  bool behind_by_likelihood =
-      false;  // leaves the same trace, and only its small misfit artefact decides
+  double behind = 0;                  // twice the difference of the log evidence
+  double share = 0;                   // of the term's own signal that the rival can take over
+  bool behind_by_likelihood = false;  // leaves the same trace, and only its small misfit decides
 };
 
 struct Accepted {
   Evidence evidence;          // with the rest of the model in place
-  std::vector<Rival> rivals;  // cannot be told apart by these data
+  std::vector<Rival> rivals;  // not separable by these data
 };
 
 struct SelectionRule {
   double family_wise = 0.01;
   std::size_t terms_max = 8;
-  double size_min_um = 0.05;  // less is no misfit worth a name, however certain
+  double size_min_um = 0.05;  // a smaller misfit is not worth a name, however certain
   double rival_behind = 9;    // 2 d ln L
-  double rival_share = 0.99;  // squared cosine: what takes over more is the same thing here
+  // Squared cosine above which a rival is the same effect here.
+  double rival_share = 0.99;
   std::uint64_t seed = 1;
   std::function<void(std::string_view)> progress = [](std::string_view) {};
 };
@@ -40,22 +40,23 @@ struct SelectionRule {
 struct Selection {
   std::vector<Accepted> accepted;  // Shape: (terms of the model)
   double tests = 1;                // independent tests that the library is worth
-  // Of a signature beside the geometry. Shape: (templates), then those found at a glance.
+  // Share of each signature that is left beside the geometry. Shape: (templates), then those of the
+  // quick look.
   std::vector<double> kept_share;
 };
 
 /// Adds terms to the fit's model.
 Selection Select(const Templates& templates, const SelectionRule& rule, Fit* fit);
 
-/// Who else could be the term, as the fit stands.
+/// The causes that could be the term, as the fit is now.
 std::vector<Rival> FindRivals(const Templates& templates, const SelectionRule& rule, const Fit& fit,
                               std::size_t term);
 
-/// The term that a evidence calls for, with amplitudes 0.
+/// The term that the evidence calls for, with amplitudes 0.
 ModelTerm MakeTerm(const Template& form, const Evidence& evidence, const FleetGroups& groups);
 
-/// The best of the templates that chance does not explain. kNoTerm: none. `kept_min`: share of a
-/// signature that must be left of it beside geometry and model.
+/// The best of the templates that chance does not explain; `at` is kNoTerm where there is none.
+/// `kept_min`: share of a signature that must be left of it beside geometry and model.
 struct Best {
   std::size_t at = kNoTerm;
   Evidence evidence;

@@ -9,7 +9,8 @@ namespace {
 
 constexpr double kRemembers = 0.3;  // of a rest error
 
-// Of an axis whose noise remembers: that hides what this axis does, and nothing else.
+// Whether the structure is of an axis whose noise remembers: only effects of that axis are hidden
+// by its noise.
 bool IsOfSuchAxis(const UnknownFound& reported, const Noise& noise) {
   return (reported.channel.starts_with("theta") && noise.carry[kTheta] >= kRemembers) ||
          (reported.channel.starts_with("phi") && noise.carry[kPhi] >= kRemembers);
@@ -36,7 +37,7 @@ std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, s
     forgetful.model.terms.push_back(left->term);
     StepFit(&forgetful);
     SettleFit(&forgetful, kRounds);
-    // Each by its own noise: that is what differs.
+    // Each fit is judged by its own noise, which is the difference between them.
     if (NegativeBic(forgetful) > NegativeBic(fit) + kClearly) return clearest;
   }
   return std::nullopt;

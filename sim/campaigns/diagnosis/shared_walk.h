@@ -1,7 +1,8 @@
-// Rest errors that the next moves take along are a random walk of each unit, and a walk goes
-// anywhere: noise that remembers leaves nothing to see of what all units do together, a zero that
-// steps or drifts. But walks of their own would not agree. So where the noise remembers, noise that
-// forgets and empirical curves of all units together are held against it.
+// A shared walk is a common drift or step of all units that passes for noise with memory. Rest
+// errors that the next moves take along are a random walk of each unit, and a walk can reach
+// anything. Noise that remembers therefore hides what all units do together: a zero that steps or
+// drifts. Independent walks would not agree, though. Where the noise remembers, the fit is compared
+// with noise that forgets and empirical curves of all units together.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace focalfleet::sim {
 
-/// None: the units walk each by itself.
+/// The structure of the common walk; nullopt where the units walk independently.
 std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, std::uint64_t seed);
 
 }  // namespace focalfleet::sim

@@ -21,7 +21,7 @@ inline StaticVector ToVector(const CampaignUnit& unit) {
   return v;
 }
 
-/// Arms stay longer than nothing.
+/// Adds the step to the unit; arms stay longer than zero.
 inline void AddStatic(const StaticVector& step, CampaignUnit* unit) {
   constexpr double kArmMin_mm = 1e-3;
   const StaticVector v = ToVector(*unit) + step;
@@ -31,17 +31,17 @@ inline void AddStatic(const StaticVector& step, CampaignUnit* unit) {
   unit->zero_deg[kTheta] = v[4], unit->zero_deg[kPhi] = v[5];
 }
 
-/// Whether the fitted unit can be the one that the table describes: a fit moves a base by its play
-/// on the plate and an arm by its making, not to another unit.
+/// Whether the fitted unit can be the one that the table describes. A fit moves a base by its play
+/// on the plate and an arm by its tolerance, not to another unit.
 struct GeometryCheck {
   bool base = false, arms = false;
   [[nodiscard]] bool passes() const { return base && arms; }
 };
 inline GeometryCheck CheckGeometry(const CampaignUnit& described, const CampaignUnit& fitted) {
-  // A neighbour's base is a pitch away, 10.4 mm on the plates here: double of the bound would take
-  // it for the unit's own, half of it still leaves room for any play. Arms in service scatter by
-  // 0.057 mm, 2 % of 3 mm (sim/world/spread.cc): half of the bound is 12 times that, double of it
-  // takes an arm of no length.
+  // A neighbour's base is a pitch away, 10.4 mm on the plates here. Twice of the bound would take
+  // it for the unit's own; half of it still leaves room for any play. Arms in service scatter by
+  // 0.057 mm, 2 % of 3 mm (sim/world/spread.cc). Half of that bound is 12 times the scatter; twice
+  // of it accepts an arm of no length.
   constexpr double kBase_mm = 10;
   constexpr double kArmShare = 0.5;
   GeometryCheck check;
@@ -55,7 +55,8 @@ inline GeometryCheck CheckGeometry(const CampaignUnit& described, const Campaign
   return check;
 }
 
-/// Wide: what the moves do not show stays where units.csv has it. Per mm^2 and degree^2.
+/// Weights of a wide prior: what the moves do not show stays as in units.csv. Per mm^2 and
+/// degree^2.
 inline StaticVector StaticPriorWeights() {
   constexpr double kBase_mm = 2, kArm_mm = 0.5, kZero_deg = 180;
   StaticVector spread;

@@ -11,12 +11,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// One unit's equations: its own unknowns (geometry, own amplitudes, homings), and the shared ones
-// that reach it.
+// The equations of one unit: its own unknowns (geometry, own amplitudes, homings), and the shared
+// ones that reach it.
 struct UnitEquations {
   MatrixXd own;                  // columns
-  VectorXd prior, value;         // weight of the prior of each unknown, and how far off it stands
-  std::vector<Index> shared_at;  // which shared unknowns
+  VectorXd prior, value;         // weight of the prior of each unknown, and its distance from it
+  std::vector<Index> shared_at;  // indices of the shared unknowns
   MatrixXd shared;               // columns
   VectorXd y;
 };
@@ -26,7 +26,8 @@ void AppendColumn(const VectorXd& column, MatrixXd* columns) {
   columns->col(columns->cols() - 1) = column;
 }
 
-// An unknown of the unit's own: its column, the weight of its prior, how far off it stands.
+// Appends an unknown of the unit's own: its column, the weight of its prior, and its distance from
+// it.
 void AppendOwn(const VectorXd& column, double prior, double value, UnitEquations* eq) {
   AppendColumn(column, &eq->own);
   eq->prior.conservativeResize(eq->own.cols());
@@ -94,7 +95,7 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   UnitSolution solution;
   MatrixXd normal = eq.own.transpose() * eq.own;
   normal.diagonal() += eq.prior;
-  // What neither data nor prior hold must not move.
+  // An unknown without data or prior must not move.
   normal.diagonal().array() += 1e-12;
   solution.right = eq.own.transpose() * eq.y - eq.prior.cwiseProduct(eq.value);
   solution.own.compute(normal);
@@ -115,8 +116,8 @@ UnitSolution Eliminate(const UnitEquations& eq, SharedSystem* shared) {
   return solution;
 }
 
-// A unit's own data may well pull its amplitude beyond what can be; the other unknowns then make up
-// for the rest in the next round.
+// A unit's own data may pull its amplitude beyond the possible range, where it is held. The other
+// unknowns make up for the difference in the next round.
 void Advance(double step, const Effect& effect, double* amplitude) {
   const auto [low, high] = RangeOfAmplitude(effect);
   *amplitude = std::clamp(*amplitude + step, low, high);
@@ -236,7 +237,7 @@ double CountParameters(const Fit& fit) {
   parameters += kOfImage * static_cast<double>(fit.model.exposures.size());
   const std::size_t freed = fit.model.homing_zero_deg[kTheta].empty() ? 0 : fit.model.units.size();
   for (std::size_t unit = 0; unit < freed; ++unit) {
-    // One zero of each axis is the geometry's.
+    // The first zero of each axis belongs to the geometry.
     const UnitTrack track = MakeTrack(*fit.facts, unit, fit.model.units[unit]);
     const auto homings = static_cast<double>(FreeHomingsOf(fit.model, track).size());
     parameters += std::max(homings - 2, 0.0);

@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kAllButAlone = 0.9;  // of the squares of what the term does
+constexpr double kAllButAlone = 0.9;  // of the squares of the term's effect
 
 double ShareOf(const TermTrace& trace, const std::vector<std::size_t>& units) {
   double theirs = 0;
@@ -33,7 +33,8 @@ bool LivesInFewUnits(const TermTrace& trace) {
   return ShareOf(trace, units) > kAllButAlone;
 }
 
-// All shapes of a cause on its axis: what one of them leaves another would take.
+// The fit without all shapes of a cause on its axis: another shape would take what the removed one
+// explained.
 Fit WithoutCauseOf(const Fit& fit, const ModelTerm& term) {
   constexpr int kRounds = 2;
   Fit without = fit;
@@ -46,8 +47,8 @@ Fit WithoutCauseOf(const Fit& fit, const ModelTerm& term) {
   return without;
 }
 
-// Units that have few steps, all of them small: those that stand off least first. A unit that has
-// met its neighbour is half of a contact, and is not asked alone.
+// Units that have few steps, all of them small, those with the smallest steps first. A unit that
+// has met its neighbour is half of a contact, and is not tried alone.
 std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
   constexpr std::size_t kUnitsMost = 8, kFew = 4;
   constexpr double kSmall_deg = 3;
@@ -76,7 +77,7 @@ std::vector<std::size_t> UnitsWithSmallSteps(const Fit& fit) {
 }  // namespace
 
 void CompareWithSteps(const Fit& fit, Selection* selection) {
-  constexpr double kClearly = 20;  // what a step is to be better by: else none is named
+  constexpr double kClearly = 20;  // a step has to be better by it, as otherwise none is named
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
     const TermTrace trace = TraceOf(fit, fit.model.terms[t]);
     if (!LivesInFewUnits(trace)) continue;
@@ -99,7 +100,7 @@ void CompareWithSteps(const Fit& fit, Selection* selection) {
 }
 
 void DropNeedlessSteps(Fit* fit) {
-  constexpr double kClearly = 20;  // as when steps are taken
+  constexpr double kClearly = 20;  // the same bound as when steps are taken
   constexpr int kRounds = 2;
   if (fit->model.terms.empty()) return;
   for (const std::size_t unit : UnitsWithSmallSteps(*fit)) {

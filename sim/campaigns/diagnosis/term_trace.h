@@ -1,4 +1,4 @@
-// What a term of the model does to the fibres of its units.
+// The trace of a term is its effect on the fibres of its units.
 #pragma once
 
 #include <vector>

@@ -12,8 +12,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// What adds up is for the most part a zero, one for all moves, which geometry has anyway: counted
-// with it, little of the signature would seem to be its own.
+// Removes the mean of errors that add up. They are mostly a zero, one for all moves, which geometry
+// has anyway. With it little of the signature would seem to be its own.
 void TakeOffZeros(PoseErrors* errors) {
   for (std::vector<double>& angle : errors->angle_deg) {
     const double sum = std::accumulate(angle.begin(), angle.end(), 0.0);

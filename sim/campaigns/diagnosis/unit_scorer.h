@@ -1,6 +1,6 @@
-// One unit in a pass over all templates: its whitened rows, what its own unknowns span, and the
-// residuals as each look sees them. A look leaves one term of the model out, or none. Templates'
-// columns stand in lanes, eight side by side.
+// A unit in a pass over all templates has its whitened rows, the span of its own unknowns, and the
+// residuals in each look. A look leaves one term of the model out, or none. Templates' columns are
+// in lanes, eight side by side.
 #pragma once
 
 #include <Eigen/Dense>
@@ -41,7 +41,7 @@ class Basis {
   Eigen::MatrixXd columns_;
 };
 
-/// Where the templates' columns stand: whole templates, those of one column first.
+/// The lanes of the templates' columns: whole templates, those of one column first.
 struct Placed {
   std::size_t form = 0;
   std::size_t lane = 0;
@@ -53,7 +53,7 @@ struct Block {
 
 std::vector<Block> PlaceInLanes(const Templates& templates);
 
-/// Which of the terms' shared columns stand beside the templates in a look without one term.
+/// The terms' shared columns that are fitted beside the templates in a look without one term.
 struct SharedColumns {
   std::vector<Eigen::Index> begin_of_term;  // kNone: its amplitudes are units' own
   Eigen::Index count = 0;
@@ -64,11 +64,11 @@ struct SharedColumns {
 SharedColumns ListShared(const std::vector<ModelTerm>& terms,
                          std::span<const std::size_t> withouts);
 
-/// One unit as each of the looks sees it. What differs between looks is which term is left out; the
-/// rows and their whitening are the same.
+/// A unit in each of the looks. Looks differ in which term is left out; the rows and their
+/// whitening are the same.
 class UnitScorer {
  public:
-  /// What the unit's own unknowns span, and the shared columns beside it.
+  /// The span of the unit's own unknowns, and the shared columns beside it.
   struct Plane {
     Basis basis;
     Eigen::MatrixXd shared;
@@ -87,7 +87,7 @@ class UnitScorer {
   [[nodiscard]] const std::vector<UnitLook>& looks() const { return looks_; }
   [[nodiscard]] bool usable() const;
 
-  /// The templates' whitened columns.
+  /// Makes the templates' whitened columns.
   void MakeSignatures(const Templates& templates, const Block& block, std::vector<Lanes>* rows);
 
  private:

@@ -11,17 +11,17 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kMicrons = 1e3;  // a millimetre
+constexpr double kMicrons = 1e3;  // in a millimetre
 constexpr double kHuber = 3;      // whitened length from which a row counts less
-constexpr double kFar = 5;        // and from which it counts for ever less
+constexpr double kFar = 5;        // length from which the weight falls on and on
 
-// Huber's, and from kFar on less and less: a row far away says nothing of the rest.
+// Huber's weight, and beyond kFar less and less: a row far away has no bearing on the rest.
 double WeightOf(double square) {
   if (square <= kHuber * kHuber) return 1;
   return square <= kFar * kFar ? kHuber / std::sqrt(square) : kHuber * kFar / square;
 }
 
-// The used rows and what an axis' turn does at each.
+// The used rows and the effect of an axis' turn at each.
 WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
   WhiteUnit white;
   white.track = TrackOf(fit.model, *fit.facts, unit);
@@ -41,7 +41,8 @@ WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
   return white;
 }
 
-// The gains of all rows, and the whitened residuals. Weights: the fit's, or made here.
+// Computes the gains of all rows, and the whitened residuals. Weights are the fit's, or are made
+// here.
 void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, WhiteUnit* white) {
   const UnitTrack& track = white->track;
   RestFilter filter(fit.noise, fit.noise.unit_factor[unit]);
@@ -74,7 +75,7 @@ void RunFilter(const Fit& fit, std::size_t unit, std::vector<double>* made, Whit
 
 void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>& turn_um,
                  double* xy_um) {
-  double theta = 0, phi = 0;  // what the rows so far told of the rest errors
+  double theta = 0, phi = 0;  // rest errors, estimated from the rows so far
   for (std::size_t k = 0; k < filter.size(); ++k) {
     const RowFilter& f = filter[k];
     const double* t = &turn_um[4 * k];

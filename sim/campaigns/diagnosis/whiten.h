@@ -1,14 +1,15 @@
-// One unit's residuals as numbers of variance one that know nothing of each other. An axis that has
+// Whitening turns a unit's residuals into independent numbers of variance one. An axis that has
 // come to rest a little off stays there until it moves again, so that errors of neighbouring
-// exposures are alike: what the places before have told of the two rest errors is taken off each
-// place (a Kalman filter along the unit's moves), and what is left is divided by its spread.
+// exposures are alike. The estimate of the two rest errors from the places before is subtracted
+// from each place (a Kalman filter along the unit's moves). The difference is divided by its
+// spread.
 //
 // Noise of one measured place:
 //   cov = place^2 I + sum over axes of t t' (angle^2 + var(rest)),  t = dplace / dangle,
 //   rest <- carry rest + N(0, rest^2) whenever the axis moves, N(0, rest^2) after a homing,
-// times factors of the unit and of the exposure. Place times these has a floor, by what places are
-// rounded to (place_steps.h). Rows count less (Huber) where the whitened length is beyond what
-// noise does; the filter believes them less, too.
+// times factors of the unit and of the exposure. Place times these has a floor, by the rounding of
+// the places (place_steps.h). Rows count less (Huber) where the whitened length is beyond noise;
+// the filter gives them less weight, too.
 // Source: Durbin and Koopman, Time Series Analysis by State Space Methods, chapter 4.
 #pragma once
 
@@ -24,11 +25,11 @@ namespace focalfleet::sim {
 
 struct Noise {
   double place_um = 1;
-  double least_um = kNoiseLeast_um;     // that a place's own noise can be, of any unit and exposure
-  double angle_deg[2] = {0, 0};         // anew at each exposure
-  double rest_deg[2] = {0, 0};          // anew at each move of the axis, held until the next
+  double least_um = kNoiseLeast_um;     // least own noise of a place, of any unit and exposure
+  double angle_deg[2] = {0, 0};         // new at each exposure
+  double rest_deg[2] = {0, 0};          // new at each move of the axis, held until the next
   double carry[2] = {0, 0};             // share of it that the next move takes along, 0..1
-  bool may_carry = true;                // whether that is sought
+  bool may_carry = true;                // whether the carried share is fitted
   std::vector<double> unit_factor;      // Shape: (units)
   std::vector<double> exposure_factor;  // Shape: (exposures), or empty: all 1; of place_um
   bool fitted = false;                  // where a new search begins near
@@ -37,7 +38,7 @@ struct Noise {
 
 struct Fit;
 
-/// How one used row is whitened: y = w (r - t'e), e <- keep .* e before and + gain (r - t'e) after.
+/// The whitening of a used row: y = w (r - t'e), e <- keep .* e before and + gain (r - t'e) after.
 struct RowFilter {
   double w[3];     // symmetric root of the inverse covariance: xx, xy, yy; per um
   double gain[4];  // of theta by x, y, of phi by x, y; degrees per um
@@ -61,17 +62,17 @@ void ApplyFilter(const std::vector<RowFilter>& filter, const std::vector<double>
                  double* xy_um);
 
 /// Degrees of freedom of Student's t in two dimensions, by which a likelihood judges a whitened
-/// place: an outlier costs the logarithm of its distance, so that its noise does not decide.
+/// place. An outlier costs the logarithm of its distance, so that its noise does not decide.
 inline constexpr double kPlaceFreedom = 5;
-/// Less what all places have in common.
+/// Minus the log density of a squared whitened length, without the constant part.
 inline double MinusLogDensity(double square) {
   return (kPlaceFreedom + 2) / 2 * std::log1p(square / kPlaceFreedom);
 }
 
-/// Rows with the weights that the fit has.
+/// The unit's rows with the weights that the fit has.
 WhiteUnit Whiten(const Fit& fit, std::size_t unit);
-/// The same with all weights 1, and only y: what the rows' weights are made from.
-/// `weights` gets the Huber weight of each used row; the filter uses them as it goes.
+/// The same with all weights 1, and only y, from which the rows' weights are made. `weights` gets
+/// the Huber weight of each used row, which the filter uses as it goes.
 WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weights);
 
 /// The displacements that static geometry makes, in um per mm and degree, and that pose errors

@@ -15,17 +15,17 @@ namespace {
 
 constexpr std::string_view kTemperature = "temp_C";
 constexpr std::size_t kUnitsMin = 8;
-constexpr double kReadingsMin = 8;  // of a unit
-constexpr double kRange_K = 0.5;    // less tells no gain
-constexpr double kGainMin = 0.05;   // off, to be suspect
+constexpr double kReadingsMin = 8;  // readings of a unit
+constexpr double kRange_K = 0.5;    // a smaller range shows no gain
+constexpr double kGainMin = 0.05;   // deviation of a suspect's gain
 constexpr double kSpreads = 6;      // of the units' gains
-constexpr double kOfGroup = 0.8;    // of a rail's units, for it to be the rail's
+constexpr double kOfGroup = 0.8;    // of a rail's units, for the fault to be the rail's
 
 bool ReadsTemperature(const ModelTerm& term) {
   return std::ranges::find(term.form.effect->needs, kTemperature) != term.form.effect->needs.end();
 }
 
-// A plane over the plate, least squares. Where units stand in a line, or are few: their mean.
+// A plane over the plate, by least squares. For units in a line, or few units, it is their mean.
 class Plane {
  public:
   void Add(double x, double y, double value) {
@@ -52,7 +52,7 @@ class Plane {
   std::size_t count_ = 0;
 };
 
-// The plane's temperature at every row, of the units that are not suspect. NaN: nobody is left.
+// The plane's temperature at every row, of the units that are not suspect. NaN: no unit is left.
 std::vector<double> PlaneTemperatures(const CampaignFacts& facts,
                                       const std::vector<char>& suspect) {
   const Campaign& campaign = *facts.campaign;
@@ -78,7 +78,8 @@ std::vector<double> PlaneTemperatures(const CampaignFacts& facts,
   return at;
 }
 
-// What each unit tells a kelvin of the plane. NaN: it tells too little, or too little changes.
+// The reading of each unit per kelvin of the plane. NaN: it has too few readings, or too little
+// changes.
 std::vector<double> Gains(const Campaign& campaign, const std::vector<double>& plane) {
   const std::span<const double> reported = campaign.Find(kTemperature);
   std::vector<double> gains;
@@ -111,7 +112,7 @@ Usual UsualOf(const std::vector<double>& gains, const std::vector<char>& suspect
   return usual;
 }
 
-// Who tells another gain than `usual`.
+// Units with another gain than `usual`.
 std::vector<char> Beside(const Usual& usual, const std::vector<double>& gains) {
   std::vector<char> beside;
   for (const double gain : gains)
@@ -119,7 +120,7 @@ std::vector<char> Beside(const Usual& usual, const std::vector<double>& gains) {
   return beside;
 }
 
-// The exposures' medians, which a few wrong ones do not move.
+// The exposures' medians, which a few wrong sensors do not move.
 std::vector<double> MedianTemperatures(const CampaignFacts& facts) {
   const std::span<const double> reported = facts.campaign->Find(kTemperature);
   std::vector<std::vector<double>> of(facts.exposures.size());
@@ -134,8 +135,8 @@ std::vector<double> MedianTemperatures(const CampaignFacts& facts) {
   return at;
 }
 
-// Whom to suspect to begin with. A rail's sensors may be wrong together: one rail is believed, or
-// else the median.
+// The suspects to begin with. A rail's sensors may be wrong together: the search begins with each
+// single rail as right, or else with the median.
 std::vector<std::vector<char>> Beginnings(const FleetGroups& groups, const CampaignFacts& facts) {
   constexpr std::uint32_t kRailsMost = 12;
   const std::size_t units = facts.campaign->units.size();
@@ -150,7 +151,7 @@ std::vector<std::vector<char>> Beginnings(const FleetGroups& groups, const Campa
   return begin;
 }
 
-// The suspects, and what the plane of the others and all gains are then.
+// The suspects, with the plane of the others and all gains.
 struct Settled {
   std::vector<char> suspect;
   std::vector<double> plane, gains;
@@ -158,11 +159,12 @@ struct Settled {
   [[nodiscard]] std::ptrdiff_t reporting() const {
     return std::ranges::count_if(gains, [](double gain) { return std::isfinite(gain); });
   }
-  // The many are believed.
+  // A majority is believed.
   [[nodiscard]] bool can_be() const { return reporting() > 0 && 2 * suspects() <= reporting(); }
 };
 
-// Wrong ones bend the plane: by who is left, until it rests.
+// Wrong sensors bend the plane: it is made anew by the remaining units, until the suspects stay the
+// same.
 Settled Settle(const CampaignFacts& facts, std::vector<char> suspect) {
   constexpr int kRounds = 8;
   Settled now{.suspect = std::move(suspect), .plane = {}, .gains = {}};
@@ -175,7 +177,7 @@ Settled Settle(const CampaignFacts& facts, std::vector<char> suspect) {
   }
 }
 
-// Whose the suspects are.
+// The owner of the suspects.
 Owner OwnerOf(const FleetGroups& groups, const std::vector<char>& suspect) {
   const auto whole = [&](const std::vector<std::uint32_t>& group, std::size_t count) {
     std::vector<double> all(count, 0), have(count, 0);
@@ -210,7 +212,7 @@ bool ReadsTemperature(const CampaignModel& model) {
 std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts) {
   const Campaign& campaign = *facts.campaign;
   const FleetGroups groups = GroupsOf(facts);
-  // Of those who can be right, who agree best with each other.
+  // The possible solution whose believed units agree best with each other.
   Settled best;
   double least = std::numeric_limits<double>::infinity();
   for (std::vector<char>& begin : Beginnings(groups, facts)) {
@@ -228,7 +230,7 @@ std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts)
   truth->owner = OwnerOf(groups, best.suspect);
   const Usual theirs = UsualOf(best.gains, best.suspect, 1);
   truth->gain = theirs.middle;
-  // Of one suspect nothing scatters: as right ones do.
+  // A single suspect has no scatter: that of the right ones is used.
   truth->gain_sigma = std::max(theirs.spread, UsualOf(best.gains, best.suspect, 0).spread);
   truth->campaign = campaign;
   for (Covariate& column : truth->campaign.covariates)

@@ -1,8 +1,8 @@
-// Boards that tell another temperature than they have. A unit's readings are held against the plane
-// through those of all others at each exposure. A unit whose readings run with another gain is
-// suspect, but no column decides whether it is warmer or its sensor is wrong. The arms and gears
-// decide, which go with the true temperature: the campaign is explained by the temperatures as told
-// and by those of the plane, and whoever explains it better is believed (diagnose.cc).
+// Some boards report another temperature than they have. A unit's readings are compared with the
+// plane through those of all others at each exposure. A unit whose readings run with another gain
+// is suspect. No column decides whether the unit is warmer or its sensor is wrong. The arms and
+// gears decide, because they follow the true temperature. The campaign is explained by the reported
+// temperatures and by those of the plane, and the better explanation is believed (diagnose.cc).
 #pragma once
 
 #include <memory>
@@ -18,27 +18,28 @@ namespace focalfleet::sim {
 /// The campaign with the plane's temperature where a sensor is suspect.
 struct TrueTemperatures {
   Campaign campaign;
-  CampaignFacts facts;  // of `campaign`; where that is, they stay
+  CampaignFacts facts;  // of `campaign`, whose address they keep
   std::vector<std::size_t> units;
   Owner owner = Owner::kUnit;  // kRail, kBus: its units, and hardly any other
-  double gain = 1;             // median of the suspects': what they tell a kelvin
+  double gain = 1;             // median of the suspects' readings per kelvin
   double gain_sigma = 0;       // of one of them
-  bool are_half = false;       // of those who tell temperatures: as well the other half
+  bool are_half = false;       // of the units with readings: the other half may be wrong as well
 };
 
 inline constexpr std::string_view kSensorBias = "sensor_bias";
 
-/// Why nothing can be said of sensors; empty: they are tested.
+/// The reason why sensors cannot be tested; empty where they are.
 std::string WhyNoSensorIsTested(const CampaignFacts& facts);
 
-/// nullptr: nobody is suspect. Pre: they are tested.
+/// The suspects' temperatures; nullptr where no sensor is suspect. Pre: sensors are tested.
 std::unique_ptr<TrueTemperatures> FindSuspectSensors(const CampaignFacts& facts);
 
 /// Whether the model has a cause that goes with the temperature.
 bool ReadsTemperature(const CampaignModel& model);
 
-/// The cause, without its evidence. `fit` is of the plane's temperatures; `as_told`: facts of the
-/// campaign as it was. Not `decided`: what goes with the temperature is a candidate, too.
+/// The cause, without its evidence. `fit` is of the plane's temperatures, `as_reported` has the
+/// facts of the unchanged campaign. Where not `decided`, causes that go with the temperature are
+/// candidates, too.
 CauseFound SensorCause(const Fit& fit, const TrueTemperatures& truth,
                        const CampaignFacts& as_reported, bool decided);
 

@@ -14,7 +14,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const std::size_t other = axis == kTheta ? kPhi : kTheta;
   const std::span<const double> step = track.step_deg[other];
-  // Form 0: in proportion to the other axis' move; form 1: by its direction alone.
+  // Form 0 is in proportion to the other axis' move, form 1 goes by its direction alone.
   constexpr double kUsualStep_deg = 30;
   AddRemembered(
       track, other, form.memory,

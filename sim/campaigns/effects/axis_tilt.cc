@@ -1,4 +1,4 @@
-// Axis tilt: an axis is not parallel to the optical one.
+// Axis tilt: an axis is not parallel to the optical axis.
 #include <cmath>
 #include <numbers>
 
@@ -17,13 +17,14 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   constexpr double kRadians = std::numbers::pi / 180;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    if (form.form == 1) {  // as the shaft's angle sees it
+    if (form.form == 1) {  // in terms of the shaft's angle
       const double twice = 2 * track.cmd_deg[axis][i] * kRadians;
       errors->angle_deg[axis][i] +=
           (amplitude[0] * std::sin(twice) + amplitude[1] * std::cos(twice)) / kRadians;
       continue;
     }
-    // The circle's ellipse, in the frame that carries the axis: the plate, or the theta arm.
+    // The tilted circle is an ellipse in the frame that carries the axis: the plate, or the theta
+    // arm.
     double x = track.elbow_x_mm[i] + track.reach_x_mm[i];
     double y = track.elbow_y_mm[i] + track.reach_y_mm[i];
     double turned = 0;

@@ -16,8 +16,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const std::span<const double> step = track.step_deg[axis];
   const double half_deg = form.shape / 2;
-  // Play: the arm lags the motor by at most half the gap on either side. An unknown side before
-  // the first move counts as the middle.
+  // Play: the arm lags the motor by at most half the gap on either side. An unknown side before the
+  // first move counts as the middle.
   double side = 0;
   AddRemembered(
       track, axis, form.memory,

@@ -1,5 +1,5 @@
-// Camera similarity: the image shifts once, as when the camera was touched. Motion of the image
-// from exposure to exposure is the image terms' (sim/campaigns/diagnosis/image.h).
+// Camera similarity: the image shifts once, as when the camera was touched. The image terms
+// (sim/campaigns/diagnosis/image.h) describe motion of the image from exposure to exposure.
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {

@@ -5,9 +5,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// Forms 1 and 2: a ripple that falls with the drive or with its square. Form 3: a rotor that the
-// detent turns so far that it meets another detent there; where sin(lag) = t/U sin(n (angle - lag))
-// the k-th harmonic of the lag falls with U^k.
+// Forms 1 and 2 are a ripple that falls with the drive or with its square. In form 3 the detent
+// turns the rotor so far that the detent there is another one. With sin(lag) = t/U sin(n (angle -
+// lag)) the k-th harmonic of the lag falls with U^k.
 constexpr int kBent = 3;
 
 void List(const CampaignFacts&, Templates* out) {

@@ -1,4 +1,4 @@
-// Collision contact: two arms lean on each other.
+// Collision contact: two arms press against each other.
 #include <algorithm>
 #include <numbers>
 

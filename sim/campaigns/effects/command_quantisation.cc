@@ -9,7 +9,7 @@ namespace {
 
 enum class Step { kDegrees, kMotorTurns, kBits };
 enum class Rounding { kNearest, kCutMove, kDown };
-/// A template's form is its index: model files have it.
+/// A template's form is its index in the table, and model files store it.
 struct Form {
   Step step;
   Rounding rounding;
@@ -44,7 +44,7 @@ void List(const CampaignFacts&, Templates* out) {
              out);
 }
 
-// Any whole number of hundredths, and bits beyond the usual.
+// Templates for any whole number of hundredths, and for bits beyond the usual.
 void Glance(Templates* out) {
   constexpr int kHundredthsMax = 200;
   std::vector<double> hundredths, bits;
@@ -59,7 +59,7 @@ void Glance(Templates* out) {
   }
 }
 
-// A step of any size.
+// The template of a step of any size.
 void OfPeriod(double period_deg, Templates* out) {
   for (std::size_t k = 0; k < kForms.size(); ++k)
     if (kForms[k].step == Step::kDegrees && kForms[k].rounding != Rounding::kCutMove)

@@ -1,12 +1,12 @@
 // An effect is one physical way in which a unit, a rail, a bus, the plate or the camera departs
-// from ideal kinematics. It is a small stateful operator: it runs along a unit's moves and adds
-// what it does to the pose (angles, arms) or to the place of the fibre. One file an effect; the
-// registry (registry.h) lists them all.
+// from ideal kinematics. Its code is a small stateful operator that runs along a unit's moves. The
+// operator adds its error to the pose (angles, arms) or to the place of the fibre. Each effect has
+// its own file, and the registry (registry.h) lists them all.
 //
-// An effect offers templates: the same physics with its shape parameters at grid values (a gap, a
-// time constant, a threshold), on one axis, with one kind of memory. In its amplitudes a template
-// is linear, so that (sim(+e) - sim(-e)) / 2e is its signature at any e. A template has one
-// amplitude, or a few where the phase or the direction is free (sine and cosine).
+// An effect offers templates: the same physics on one axis, with one kind of memory. The shape
+// parameters of a template (a gap, a time constant, a threshold) are at grid values. A template is
+// linear in its amplitudes, so that (sim(+e) - sim(-e)) / 2e is its signature at any e. A template
+// has one amplitude, or a few where the phase or the direction is free (sine and cosine).
 //
 // Angles are in degrees, places in mm; amplitudes are in `amplitude_unit`.
 #pragma once
@@ -25,27 +25,27 @@
 
 namespace focalfleet::sim {
 
-/// What an effect does to every move of one unit.
+/// The errors that an effect makes in every move of one unit.
 struct PoseErrors {
   std::vector<double> angle_deg[2];
   std::vector<double> arm_mm[2];
   std::vector<double> x_mm;
   std::vector<double> y_mm;
   void Reset(std::size_t moves);
-  /// All of them, always in the same order.
+  /// All channels, always in the same order.
   std::array<std::vector<double>*, 6> channels();
   [[nodiscard]] std::array<const std::vector<double>*, 6> channels() const;
 };
 
 enum class EffectAxis { kTheta, kPhi, kBoth, kNone };
-/// Who has it, if the data do not say otherwise.
+/// The part that has the effect, unless the data show otherwise.
 enum class Owner { kUnit, kRail, kBus, kPlate, kCamera };
 
-/// What happens to an error between the moves that make it.
+/// The fate of an error between the moves that make it.
 enum class Memory {
-  kHold,   // it stays until the axis moves again
-  kNow,    // it is there after the move that made it, and gone after the next exposure
-  kChain,  // it adds up, open loop, until the unit is homed
+  kHold,   // stays until the axis moves again
+  kNow,    // is there after the move that made it, and gone after the next exposure
+  kChain,  // adds up, open loop, until the unit is homed
 };
 
 inline constexpr std::size_t kColumnsMax = 6;
@@ -58,9 +58,10 @@ struct RankKnot {
   double rank = 0;
 };
 
-/// What the columns of a template do at every row of one campaign, where no formula says it.
+/// The errors that a template's columns make at every row of one campaign, where no formula gives
+/// them.
 struct ErrorTable {
-  std::vector<PoseErrors> columns;  // of all rows each
+  std::vector<PoseErrors> columns;  // each of all rows
 };
 
 struct Template {
@@ -70,16 +71,16 @@ struct Template {
   Memory memory = Memory::kHold;
   int form = 0;      // of the effect's own forms
   double shape = 0;  // of the effect's own shape parameter
-  // Where each unit has a shape of its own: by unit_id. Others do not have the effect.
+  // Shape by unit_id, where each unit has its own. Other units do not have the effect.
   std::map<std::uint32_t, double> shape_of_unit;
-  double choices = 1;    // shapes that it, or each unit's, was chosen from
-  bool between = false;  // of listed shapes: refined
+  double choices = 1;    // number of shapes that it, or each unit's, was chosen from
+  bool between = false;  // refined between the listed shapes
   std::string label;     // the shape in words
-  // Of an empirical term (empirical.h): the column it looks at, and a curve's knots, ascending;
-  // none: it goes by the campaign's own ranks.
+  // The column that an empirical term (empirical.h) depends on, and the knots of its curve,
+  // ascending. Without knots the term uses the campaign's own ranks.
   std::string covariate;
   std::vector<RankKnot> knots;
-  const ErrorTable* table = nullptr;  // of ApplyTable
+  const ErrorTable* table = nullptr;  // for ApplyTable
 };
 
 using Templates = std::vector<Template>;
@@ -87,37 +88,37 @@ using Templates = std::vector<Template>;
 struct Effect {
   std::string_view cause;  // id of docs/diagnosis.md
   std::string_view amplitude_unit;
-  double prior_size;  // of an amplitude, as large as it is usual
+  double prior_size;  // the usual size of an amplitude
   Owner owner;
   std::vector<std::string_view> needs;  // covariates
   std::string_view paragraph;           // for the operator
   void (*list)(const CampaignFacts&, Templates*);
   void (*apply)(const UnitTrack&, const Template&, std::span<const double> amplitude, PoseErrors*);
-  // Shapes beside the listed ones, too many to score each (quick_look.h), of one column, on each
-  // axis that `list` has; none: there are no more.
+  // Adds shapes beside the listed ones, of one column, on each axis that `list` has. They are too
+  // many to score each (quick_look.h). nullptr: the effect has no more.
   void (*glance)(Templates*) = nullptr;
-  // The same for shapes of this period along the commanded angle; none: it has no period.
+  // Adds shapes of this period along the commanded angle. nullptr: the effect has no period.
   void (*of_period)(double period_deg, Templates*) = nullptr;
   // Shapes between the listed ones exist, too: the best of the list is a place to begin at.
   bool continuous_shape = false;
-  bool one_is_enough = false;  // of the covariates, each of which is one axis' own
-  // Each unit may have its own, as it has its own teeth. Pre: a unit is the owner.
+  bool one_is_enough = false;  // one of `needs` is enough, as each belongs to one axis
+  // Each unit may have a shape of its own, as it has its own teeth. Pre: a unit is the owner.
   bool own_shape = false;
-  // Amplitudes that physics allows; 0 and 0: a hundred times the usual size either way.
+  // Amplitudes that physics allows. 0 and 0: up to a hundred times the usual size either way.
   double amplitude_low = 0;
   double amplitude_high = 0;
-  double amplitude_least = 0;  // less of it, either way, is another thing
-  // A play of two degrees loses two degrees: shape and amplitude agree within a factor of five.
-  // Shape 0 stands for any that is below all moves.
+  double amplitude_least = 0;  // a smaller amplitude, either way, is another effect
+  // The shape is an amplitude too: a play of two degrees loses two degrees, and both agree within a
+  // factor of five. Shape 0 stands for any that is below all moves.
   bool amplitude_is_shape = false;
-  // Whether moves can tell that it is this shape; none: any can.
+  // Whether the moves can distinguish this shape. nullptr: any moves can.
   bool (*shows)(const Template&, const CampaignFacts&) = nullptr;
 };
 
-/// Whether the effect's own shape can be told from these moves.
+/// Whether these moves can distinguish the effect's own shape.
 bool Shows(const CampaignFacts& facts, const Template& form);
 
-/// What an amplitude of it can be: by physics, or a hundred times what it usually is.
+/// The range of a template's amplitude: by physics, or a hundred times its usual size.
 struct AmplitudeRange {
   double low = 0;
   double high = 0;
@@ -126,11 +127,12 @@ AmplitudeRange RangeOfAmplitude(const Effect& effect);
 /// Whether the template can have an amplitude within some sigmas of this one. Pre: one column.
 bool CanBe(const Template& form, double amplitude, double sigmas);
 
-/// What one column does at the given amplitude, the others at 0. `errors` is reset.
+/// Sets `errors` to those of one column at the given amplitude, with the other amplitudes at 0.
 void ApplyColumn(const UnitTrack& track, const Template& form, std::size_t column, double amplitude,
                  PoseErrors* errors);
 
-/// An effect's `apply`: the columns of form.table. Pre: the track is of the table's campaign.
+/// The `apply` of an effect whose columns are form.table. Pre: the track is of the table's
+/// campaign.
 void ApplyTable(const UnitTrack& track, const Template& form, std::span<const double> amplitude,
                 PoseErrors* errors);
 
@@ -139,12 +141,12 @@ std::string_view Name(Owner owner);
 std::string_view Name(Memory memory);
 /// Index of the axis whose angle the template changes. Pre: kTheta or kPhi.
 std::size_t AxisIndex(const Template& form);
-/// The axes that it changes. Pre: not kNone.
+/// The axes that the template changes. Pre: not kNone.
 std::span<const std::size_t> AxesOf(const Template& form);
 
-// ---- for the files of effects
+// ---- For the files of effects.
 
-/// `prototype` once for each axis, memory and shape.
+/// A grid makes one copy of `prototype` for each axis, memory and shape.
 struct Grid {
   std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi};
   std::vector<Memory> memories = {Memory::kHold};
@@ -154,15 +156,15 @@ struct Grid {
   std::size_t columns = 1;
 };
 void ListGrid(const Grid& grid, Templates* out);
-/// The same template at another shape; its label says so. Pre: the label ends in the shape.
+/// The same template at another shape, with the shape in its label. Pre: the label ends in the
+/// shape.
 Template WithShape(const Template& form, double shape);
-/// The same with a shape of each unit. Pre: the label ends in the shape.
+/// The same template with a shape for each unit. Pre: the label ends in the shape.
 Template WithShapes(const Template& form, std::map<std::uint32_t, double> shape_of_unit);
-/// The shape that this unit has; none: it has not got the effect.
+/// The shape that this unit has; nullopt where the unit does not have the effect.
 std::optional<double> ShapeOf(const Template& form, std::uint32_t unit_id);
 
-/// Adds to angle_deg[axis] what `made(i)` makes at each move of the axis, remembered as `memory`
-/// says.
+/// Adds `made(i)` of each move of the axis to angle_deg[axis], remembered as `memory` says.
 template <class Made>
 void AddRemembered(const UnitTrack& track, std::size_t moving_axis, Memory memory, Made&& made,
                    std::vector<double>* angle_deg) {

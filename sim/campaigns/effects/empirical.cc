@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::size_t kKnotsMax = 65;
-constexpr double kPlaceMm = 0.1;  // of an amplitude of 1
+constexpr double kPlaceMm = 0.1;  // at an amplitude of 1
 constexpr std::string_view kChannelNames[] = {"theta angle",
                                               "phi angle",
                                               "x",
@@ -52,8 +52,8 @@ std::vector<double> CurveOf(const UnitTrack& track, const Template& form,
   return curve;
 }
 
-// Times the direction of the axis' motion; nothing before its first move. `held`: what it was when
-// the axis moved.
+// Multiplies the curve by the direction of the axis' motion, and by 0 before its first move. With
+// `held` the value at the axis' last move is used.
 void TurnWithMotion(const UnitTrack& track, std::size_t axis, bool held,
                     std::vector<double>* curve) {
   double direction = 0, made = 0;
@@ -174,7 +174,7 @@ double RankAt(std::span<const RankKnot> knots, double value) {
 Template WholeCurve(const Template& look, const CampaignFacts& facts) {
   Template curve = look;
   curve.knots = KnotsOf(*facts.Find(look.covariate));
-  // As many cosines as the column's values can tell apart, but for the constant.
+  // The column's values can distinguish so many cosines, without the constant.
   curve.columns = std::clamp<std::size_t>(curve.knots.size() - 1, 1, kEmpiricalCosines);
   curve.shape = 1;
   curve.label = "smooth curve over the ranks of " + look.covariate;

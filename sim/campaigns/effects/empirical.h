@@ -1,11 +1,12 @@
-// Empirical terms: shapes that make no claim about physics. A smooth curve over the ranks of a
-// column, as five cosines, or a ripple of any order, on an angle or a direction of the plate. The
-// screen looks with them at what no effect of the library explains (diagnosis/screen.h), and the
-// patch puts them into a model (diagnosis/patch.h). They are no causes and not in the library.
+// Empirical terms are shapes that make no claim about physics. The first kind is a smooth curve
+// over the ranks of a column, as five cosines. The second is a ripple of any order. Either acts on
+// an angle or a direction of the plate. The screen (diagnosis/screen.h) uses them to find what no
+// effect of the library explains, and the patch (diagnosis/patch.h) adds them to a model. They are
+// no causes and not in the library.
 //
-// A rank is of its campaign: a hundredth of another night's rows are at another humidity. A curve
-// that is to hold beside its campaign has knots, the column's values at the ranks, and is read
-// through them; beyond the range it was seen in, the end value holds.
+// A rank belongs to its campaign: a hundredth of another night's rows are at another humidity. A
+// curve for use with other campaigns has knots, the column's values at the ranks, and is read
+// through them. Beyond the range of the knots the end value holds.
 #pragma once
 
 #include <cstddef>
@@ -20,9 +21,10 @@ namespace focalfleet::sim {
 
 inline constexpr std::size_t kEmpiricalCosines = 5;
 
-/// What a curve adds to: an angle, a direction of the plate, an angle with the sign of the motion
-/// that led there; the same as it was when the axis moved, until it moves again; an angle by the
-/// sine or cosine of itself. The `form` of its template. In x and y an amplitude of 1 is 0.1 mm.
+/// The channel that a curve adds to, which is the `form` of its template. Plain channels are an
+/// angle or a direction of the plate. Odd channels are an angle with the sign of the motion that
+/// led there. Held channels keep that value until the axis moves again. The others are an angle by
+/// the sine or cosine of itself. In x and y an amplitude of 1 is 0.1 mm.
 enum EmpiricalChannel {
   kThetaAngle,
   kPhiAngle,
@@ -39,24 +41,26 @@ enum EmpiricalChannel {
   kEmpiricalChannels
 };
 
-/// Cosines shape, shape + 1 .. shape + columns - 1 over the ranks of `covariate`.
+/// The effect whose columns are the cosines shape, shape + 1 .. shape + columns - 1 over the ranks
+/// of `covariate`.
 const Effect& EmpiricalCurve();
-/// Sine and cosine of order `shape` of the axis' angle.
+/// The effect whose columns are the sine and cosine of order `shape` of the axis' angle.
 const Effect& EmpiricalRipple();
-/// nullptr: no empirical term is called that.
+/// The empirical term of that name, or nullptr.
 const Effect* FindEmpirical(std::string_view cause);
 
-/// Where the template acts: "theta angle", "x" ... Pre: it is an empirical one.
+/// The channel that the template adds to, by name: "theta angle", "x" ... Pre: an empirical
+/// template.
 std::string_view ChannelOf(const Template& form);
-/// The curve's channel of that name; none: there is none.
+/// The curve's channel of that name, or nullopt.
 std::optional<EmpiricalChannel> ChannelNamed(std::string_view name);
 
 /// The column's values at its ranks: every value, or 65 evenly over the ranks.
 std::vector<RankKnot> KnotsOf(const FilledColumn& column);
-/// Straight between the knots; the end's beyond them. Pre: not empty, values ascend.
+/// Linear between the knots; the end's rank beyond them. Pre: not empty, values ascend.
 double RankAt(std::span<const RankKnot> knots, double value);
 
-/// The curve of all cosines in the look's channel over the look's column, with its knots.
+/// The curve of all cosines over the look's column in the look's channel, with its knots.
 /// Pre: facts have the column.
 Template WholeCurve(const Template& look, const CampaignFacts& facts);
 

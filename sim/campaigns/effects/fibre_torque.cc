@@ -7,13 +7,13 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kLinear = 0.3, kFriction = 0.2;  // beside the cube
+constexpr double kLinear = 0.3, kFriction = 0.2;  // shares beside the cubic term
 
 void List(const CampaignFacts&, Templates* out) {
   ListGrid({}, out);
   ListGrid({.form = 1}, out);
   ListGrid({.form = 2}, out);
-  // A stiffening spring, and the bundle's own friction over a travel.
+  // A stiffening spring, and the fibre bundle's own friction over a travel.
   ListGrid({.shapes = {6, 18, 50}, .shape_name = "with a loop over a travel of, deg,", .form = 3},
            out);
 }
@@ -31,8 +31,8 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
     if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
     loop = direction - (direction - loop) * std::exp(-std::abs(track.step_deg[axis][i]) /
                                                      std::max(form.shape, 1e-3));
-    // Stiffening towards both ends; by the square; the hysteresis of its way back; a stiffening
-    // spring with some friction of its own.
+    // Form 0 is a spring that stiffens towards both ends, form 1 stiffens by the square, form 2 is
+    // the hysteresis of the way back. Form 3 is a stiffening spring with some friction.
     double pull = turned * turned * turned;
     if (form.form == 1) pull = turned * std::abs(turned);
     if (form.form == 2) pull = std::abs(turned) * direction;

@@ -1,4 +1,4 @@
-// Gear scale: the axis turns a little more or less than it is told, in proportion.
+// Gear scale: the axis turns a little more or less than commanded, in proportion.
 #include "sim/campaigns/effects/registry.h"
 
 namespace focalfleet::sim {

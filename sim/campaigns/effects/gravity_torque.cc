@@ -7,12 +7,13 @@
 namespace focalfleet::sim {
 namespace {
 
-// Where the arm's masses are is not in units.csv: form 0 has them in the fibre, form 1 mostly in
-// phi's motor at the elbow, whose lever turns with theta alone.
+// Positions of the arm's masses are not in units.csv. Form 0 has them in the fibre. Form 1 has them
+// mostly in phi's motor at the elbow, whose lever turns with theta alone.
 constexpr double kElbowShare = 0.75;
 
 void List(const CampaignFacts&, Templates* out) {
-  // From a spring, which yields with the torque, to play, which knows its sign alone.
+  // Shapes range from a spring, which yields in proportion to the torque, to play, which depends on
+  // its sign alone.
   for (const int form : {0, 1})
     ListGrid({.shapes = {0.3, 2, 5, 30},
               .shape_name = form == 0 ? "saturates from a torque of 1 over"

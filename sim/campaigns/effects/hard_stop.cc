@@ -1,4 +1,4 @@
-// Hard stop: the axis runs into its end before the table says so.
+// Hard stop: the axis runs into its end before the limit of units.csv.
 #include <algorithm>
 #include <vector>
 

@@ -39,7 +39,8 @@ HarnessLoads FindHarnessLoads(const Exposures& exposures, const std::vector<doub
       motors += own;
       seen += own > 0 ? 1 : 0;
     }
-    double nearer = 0, nearer_shares = 0;  // to the supply: motors, and times their own share
+    // Units nearer to the supply: their motors, and motors times their own share.
+    double nearer = 0, nearer_shares = 0;
     for (std::size_t k = begin; k < end; ++k) {
       const std::size_t row = order[k];
       const double all = seen > 0 ? std::max(1.0, movers[row] / seen) : 1;

@@ -1,6 +1,7 @@
-// The load of a supply rail's harness. Units hang on it one behind the other; each motor in motion
-// draws its current through every segment between the supply and its unit, so that a unit sees the
-// drop of the segments that it shares with each of them (Kirchhoff's laws), and that of the feed.
+// The load of a supply rail's harness. Units are connected to it one behind the other. Each motor
+// in motion draws its current through every segment between the supply and its unit. A unit sees
+// the drop of the segments that it shares with each of them, and that of the feed (Kirchhoff's
+// laws).
 #pragma once
 
 #include <vector>
@@ -9,12 +10,13 @@
 
 namespace focalfleet::sim {
 
-/// Both in motors, an axis in motion each. Where the table counts more movers on the rail than the
-/// campaign has rows of, the rest are taken to be spread like those.
+/// Loads of each row, in motors: an axis in motion counts as one. Where the table counts more
+/// movers on the rail than the campaign has rows of, the rest are assumed to be distributed like
+/// those.
 struct HarnessLoads {
   std::vector<double> motors;  // Shape: (rows): in motion on the unit's rail
-  // Shape: (rows): the same, each times the share of the harness that its unit has in common with
-  // the row's unit. Empty where slots are not known.
+  // Shape: (rows): the same, each motor times the share of the harness that its unit has in common
+  // with the row's unit. Empty where slots are not known.
   std::vector<double> shared_motors;
 };
 

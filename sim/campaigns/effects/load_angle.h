@@ -1,5 +1,6 @@
-// The angle by which a rotor stays behind the field that holds it: an arcsine of the load's torque
-// over the torque at pull-out, which goes with the drive and with the supply.
+// The load angle is the angle by which a rotor stays behind the field that holds it. Its sine is
+// the ratio of the load's torque to the torque at pull-out. The latter is in proportion to the
+// drive and to the supply voltage.
 #pragma once
 
 #include <algorithm>
@@ -7,8 +8,8 @@
 
 namespace focalfleet::sim {
 
-/// What a missing share of the voltage adds to it, in radians. `load`: of the pull-out at nominal
-/// drive; `level`: of the nominal drive.
+/// The angle that a missing share of the voltage adds, in radians. `load` is in units of the
+/// pull-out at nominal drive, `level` in units of the nominal drive.
 inline double AddedLoadAngle(double load, double level, double missing) {
   constexpr double kPullOut = 0.985;  // beyond it the rotor slips, which is another cause
   const auto angle = [&](double drive) {

@@ -8,8 +8,8 @@ namespace focalfleet::sim {
 namespace {
 
 void List(const CampaignFacts& facts, Templates* out) {
-  // Forms 0 and 1: a light load; 2 and 3: a heavy one, by the arcsine. 1 and 3: with the supply.
-  // The amplitude is the lag at nominal drive.
+  // Forms 0 and 1 are a light load, 2 and 3 a heavy one, by the arcsine. Forms 1 and 3 depend on
+  // the supply. The amplitude is the lag at nominal drive.
   const std::vector<double> loads = {0.5, 0.8, 0.95};
   constexpr std::string_view kName = "load, of the pull-out at nominal drive,";
   ListGrid({}, out);

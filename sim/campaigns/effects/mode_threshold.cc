@@ -13,7 +13,7 @@ void List(const CampaignFacts&, Templates* out) {
             .shapes = lengths_deg,
             .shape_name = "below, deg,"},
            out);
-  // What a move falls short of in the other mode adds up.
+  // Memory kChain: the travel that a move lacks in the other mode adds up.
   ListGrid({.memories = {Memory::kHold, Memory::kNow, Memory::kChain},
             .shapes = lengths_deg,
             .shape_name = "along the motion; below, deg,",
@@ -21,7 +21,8 @@ void List(const CampaignFacts&, Templates* out) {
            out);
 }
 
-// What adds up in nearly all moves is another cause's: most have to be longer.
+// An error that adds up in nearly all moves belongs to another cause: most moves have to be longer
+// than the threshold.
 bool Shows(const Template& form, const CampaignFacts& facts) {
   constexpr double kLonger = 0.7;  // of the axis' moves
   if (form.memory != Memory::kChain) return true;

@@ -8,9 +8,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// By form. 0: gains; 1: volts, an offset or dead time. Bent, where the field is turned so far that
-// its angle is no sine: 2: gains, an ellipse; 3: an offset, whose k-th harmonic falls with U^k;
-// 4: dead time, which has corners.
+// The fall with the drive, by form. Form 0 is gains; form 1 is volts, an offset or dead time. In
+// the others the field is turned so far that its angle is no sine. Form 2 is gains, an ellipse.
+// Form 3 is an offset, whose k-th harmonic falls with U^k. Form 4 is dead time, which has corners.
 constexpr FallsWithDrive kFalls[] = {{0, 0}, {1, 0}, {0, 0}, {1, 1}, {1, 0}};
 constexpr bool IsBent(int form) { return form >= 2; }
 
@@ -22,8 +22,8 @@ void List(const CampaignFacts& facts, Templates* out) {
               .columns = IsBent(form) ? 6u : 2u},
              out);
   };
-  // Unequal gains grow with the drive, so that the angle does not know it; an offset (order 1) and
-  // the bridge's dead time (order 6) are volts of their own.
+  // Unequal gains grow with the drive, so that the angle does not depend on it. An offset (order 1)
+  // and the bridge's dead time (order 6) are fixed voltages.
   list(0, {2}, "unequal gains; motor harmonic");
   list(2, {2}, "bent, unequal gains; motor harmonic");
   if (!facts.Has("drive_amplitude")) {

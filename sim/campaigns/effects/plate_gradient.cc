@@ -59,7 +59,8 @@ Effect MakePlateGradient() {
               "the temperature out, or correct by fiducials.",
           .list = List,
           .apply = Apply,
-          // Far more than any metal's: sensors at the units see a part of the plate's gradient.
+          // The range is far beyond any metal's: sensors at the units see only a part of the
+          // plate's gradient.
           .amplitude_low = -0.01,
           .amplitude_high = 0.01};
 }

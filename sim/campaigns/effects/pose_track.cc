@@ -9,8 +9,8 @@
 namespace focalfleet::sim {
 
 bool IsOfPosesAlone(const Effect& effect) {
-  // By name, because it is a fact about the code of an effect: these read no column, not even a
-  // computed one.
+  // The list is by name, because it is a fact about the code of an effect: these read no column,
+  // not even a computed one.
   static constexpr std::string_view kCauses[] = {
       "axis_crosstalk", "axis_tilt",       "backlash",        "eccentricity", "empirical_ripple",
       "fibre_torque",   "friction_windup", "gear_scale",      "hard_stop",    "mode_threshold",

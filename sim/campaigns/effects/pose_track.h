@@ -1,5 +1,6 @@
-// A track of poses alone: for effects that need no covariate, where there is no campaign. What a
-// unit did since then, and what it is about to do, as the daemon's compensation asks for it.
+// A track of poses alone runs effects that need no covariate where there is no campaign. The track
+// has the moves that a unit made since `begin_deg`, and the one it is about to make. The daemon's
+// compensation uses it.
 #pragma once
 
 #include <array>
@@ -9,24 +10,23 @@
 
 namespace focalfleet::sim {
 
-/// An effect that looks at the unit's own poses and at nothing else, and moves nothing but the
-/// unit.
+/// Whether the effect depends on the unit's own poses alone, and moves nothing but the unit.
 bool IsOfPosesAlone(const Effect& effect);
 
 class PoseTrack {
  public:
   using AxisPair = std::array<double, 2>;  // degrees, theta and phi
 
-  /// Begins anew: nothing is known of what the unit did before it stood at `begin_deg`. `unit` is
-  /// read as long as the track lives.
+  /// A track that begins anew: the unit's moves before it reached `begin_deg` are unknown. `unit`
+  /// is read as long as the track lives.
   PoseTrack(const CampaignUnit& unit, const AxisPair& begin_deg);
-  /// One more move, straight from where the last one ended, or from elsewhere.
+  /// Adds one more move, straight from where the last one ended, or from elsewhere.
   void Go(const AxisPair& cmd_deg);
   void Go(const AxisPair& from_deg, const AxisPair& cmd_deg);
-  /// As if only so many had been made. Pre: no fewer were.
+  /// Drops all moves but the first `moves`. Pre: no fewer were made.
   void Cut(std::size_t moves);
 
-  /// Valid until it changes. facts is null.
+  /// The track as effects read it, valid until it changes. facts is null.
   [[nodiscard]] const UnitTrack& track();
   [[nodiscard]] std::size_t moves() const { return cmd_[kTheta].size(); }
 

@@ -50,17 +50,17 @@ Effect MakeWear();
 /// All effects, by cause.
 const std::vector<Effect>& EffectLibrary();
 
-/// nullptr: there is none of that name.
+/// The effect of that name, or nullptr.
 const Effect* FindEffect(std::string_view cause);
 
-/// The effect's templates in this campaign, with `effect` set. Empty: a covariate is missing, or
-/// nothing of the kind can be built from these data.
+/// The effect's templates in this campaign, with `effect` set. Empty where a covariate is missing,
+/// or where no template can be built from these data.
 Templates ListTemplates(const Effect& effect, const CampaignFacts& facts);
-/// Does the effect offer the template's axis, form, memory and columns in this campaign, at
-/// whatever shape?
+/// Whether the effect offers the template's axis, form, memory and columns in this campaign, at any
+/// shape.
 bool IsOffered(const Template& form, const CampaignFacts& facts);
 
-/// The first covariate that the effect needs and the campaign lacks; empty: none.
+/// The first covariate that the effect needs and the campaign lacks; empty where none is missing.
 std::string_view MissingCovariate(const Effect& effect, const CampaignFacts& facts);
 
 }  // namespace focalfleet::sim

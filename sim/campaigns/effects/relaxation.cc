@@ -25,7 +25,8 @@ std::vector<double> RestTimes(const UnitTrack& track, std::size_t axis) {
 }
 
 void List(const CampaignFacts&, Templates* out) {
-  // Form 0: seen once, and then held; 1: by the exposure's delay; 2: since the axis came to rest.
+  // Form 0 is seen once, and then held. Form 1 goes by the exposure's delay, form 2 by the time
+  // since the axis came to rest.
   const std::vector<double> times_s = {0.3, 1, 3, 10, 30, 100};
   ListGrid({.shapes = times_s, .shape_name = "time constant, s,"}, out);
   ListGrid(
@@ -34,7 +35,7 @@ void List(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = times_s, .shape_name = "as time passes; time constant, s,", .form = 2}, out);
 }
 
-// A creep that is over before the exposures is play to whoever looks at them.
+// A creep that is over before the exposures looks like play.
 bool Shows(const Template& form, const CampaignFacts& facts) {
   constexpr double kLeftMin = 0.15;  // of the creep, root mean square
   const std::vector<double>& delay_s = facts.Find("delay_s")->values;

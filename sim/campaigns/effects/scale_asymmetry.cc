@@ -1,4 +1,4 @@
-// Scale asymmetry: one turning direction gains on the other.
+// Scale asymmetry: one turning direction travels farther than the other.
 #include <cmath>
 
 #include "sim/campaigns/effects/registry.h"

@@ -11,7 +11,7 @@ constexpr double kWinding_s = 15;  // the winding's own time constant
 
 void List(const CampaignFacts&, Templates* out) {
   ListGrid({.shapes = {60, 180, 600, 1800}, .shape_name = "time constant, s,"}, out);
-  // The housing, and the winding that heats it.
+  // Two masses: the housing, and the winding that heats it.
   ListGrid({.shapes = {60, 180, 600, 1800},
             .shape_name = "housing and winding; time constant, s,",
             .form = 3,
@@ -21,7 +21,7 @@ void List(const CampaignFacts&, Templates* out) {
             .shape_name = "against the direction; time constant, s,",
             .form = 1},
            out);
-  // The warm unit's arms grow.
+  // Growth of the warm unit's arms.
   ListGrid({.axes = {EffectAxis::kBoth},
             .shapes = {60, 180, 600, 1800},
             .shape_name = "arms; time constant, s,",

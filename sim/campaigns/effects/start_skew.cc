@@ -6,11 +6,11 @@
 namespace focalfleet::sim {
 namespace {
 
-// Of the templates.
+// Forms of the templates.
 enum Form {
   kStraight,       // the missing way grows with the slot, from a share of the slots on
   kStraightEarly,  // the same, in exposures that do not wait for the end of a move
-  kBraking,        // whoever is cut while it brakes misses little: its speed falls to nothing
+  kBraking,        // a unit that is cut off while braking misses little: its speed falls to nothing
 };
 
 void List(const CampaignFacts& facts, Templates* out) {
@@ -27,7 +27,7 @@ void List(const CampaignFacts& facts, Templates* out) {
             .shape_name = "cut while braking, over this share of the slots:",
             .form = kBraking},
            out);
-  // Whoever waits longer than that sees the end of every move.
+  // An exposure with a longer delay sees the end of every move.
   if (facts.Has("delay_s") && facts.Find("delay_s")->varies())
     ListGrid({.axes = axes,
               .memories = {Memory::kNow},
@@ -37,14 +37,16 @@ void List(const CampaignFacts& facts, Templates* out) {
              out);
 }
 
-// Slots are shares from 0 to 1. From below 0 on, a skew is a play for all, and two of them cancel.
+// Slots are shares from 0 to 1. A skew that begins below 0 is a play for all units, and two of them
+// cancel.
 bool Shows(const Template& form, const CampaignFacts&) {
   if (form.form == kBraking) return form.shape > 0 && form.shape <= 1;
   return form.shape >= 0 && form.shape < 1;
 }
 
-// What is missing of a move that is cut `late` before its end, of what the last in the order
-// misses: the square of the time while it brakes, then straight on.
+// The missing way of a move that is cut `late` before its end, as a share of what the last unit in
+// the order misses. The share goes with the square of the time while the unit brakes, then in a
+// straight line.
 double MissingOfBraking(double late, double braking) {
   const double missing = late < braking ? late * late / (2 * braking) : late - braking / 2;
   return missing / (1 - braking / 2);

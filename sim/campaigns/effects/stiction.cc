@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kStays = 0.15;  // of the wind-up at which the arm breaks loose
+constexpr double kStays = 0.15;  // share of the wind-up at which the arm breaks loose
 
 void List(const CampaignFacts&, Templates* out) {
   constexpr double kThresholds_deg[] = {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2};
@@ -15,12 +15,12 @@ void List(const CampaignFacts&, Templates* out) {
             .shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
             .shape_name = "below, deg,"},
            out);
-  // The arm stays until the command is a threshold away from it, then it jumps there.
+  // The arm stays until the command is a threshold away from it, then it jumps to the command.
   ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
             .shape_name = "jumps from, deg,",
             .form = 1},
            out);
-  // The same, and it stops before it is there: some wind-up stays.
+  // The arm jumps in the same way and stops short of the command: some wind-up stays.
   ListGrid({.shapes = {std::begin(kThresholds_deg), std::end(kThresholds_deg)},
             .shape_name = "jumps, but not home, from, deg,",
             .form = 2},

@@ -11,7 +11,8 @@ void List(const CampaignFacts& facts, Templates* out) {
   const FilledColumn* volts = facts.Find("v_bus_V");
   const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
   ListGrid({.axes = axes, .shapes = {volts->high, volts->mean}, .shape_name = "below, V,"}, out);
-  // A rotor under load: bent, and by the drive. What it lags at the usual voltage is known.
+  // A rotor under load: the lag is an arcsine, and depends on the drive. The lag at the usual
+  // voltage is subtracted.
   ListGrid({.axes = axes,
             .shapes = {0.2, 0.4, 0.6, 0.75, 0.85, 0.92},
             .shape_name = "load, of the pull-out,",
@@ -28,7 +29,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const auto missing_V = [&](std::size_t i) {
     if (form.form == 0) return form.shape - volts[i];
     const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
-    // As many volts of a light load at nominal drive.
+    // The amplitude is in volts of a light load at nominal drive.
     const double per_volt = form.shape / usual_V;
     return AddedLoadAngle(form.shape, level, 1 - volts[i] / usual_V) / per_volt;
   };

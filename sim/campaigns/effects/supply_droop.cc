@@ -1,4 +1,4 @@
-// Supply droop: the rail sags with those that move at once.
+// Supply droop: the rail's voltage sags with the number of units that move at once.
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -12,8 +12,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// From here on a form says how much of the droop is the feed's, and how deep it is: shares of the
-// voltage that are missing at the harness' end with all in motion.
+// Forms from here on give the feed's share of the droop, and its depth. The depth is the share of
+// the voltage that is missing at the harness' end with all units in motion.
 constexpr int kLoaded = 4;
 struct Named {
   double value;
@@ -21,23 +21,24 @@ struct Named {
 };
 constexpr Named kFeeds[] = {{0, "harness"}, {0.5, "harness and feed"}, {1, "feed"}};
 constexpr Named kDepths[] = {{0.05, ""}, {0.3, ", deep"}, {0.55, ", deeper"}};
-// From here on by the feed's share alone, for an axis whose lag does not know its drive.
+// Forms from here on have the feed's share alone, for an axis whose lag does not depend on its
+// drive.
 constexpr int kUndriven = kLoaded + static_cast<int>(std::size(kFeeds) * std::size(kDepths));
-// And from here on by the feed's share under load again, so deep that a part of those in motion is
-// enough for the pull-out; more of them add nothing.
+// Forms from here on have the feed's share under load again. They are so deep that a part of the
+// motors in motion is enough for the pull-out, and more of them add nothing.
 constexpr int kToPullOut = kUndriven + static_cast<int>(std::size(kFeeds));
 constexpr double kDepthToPullOut = 2.5;
 
 void List(const CampaignFacts& facts, Templates* out) {
-  // Form 0: the whole rail alike; else by the place along the harness, which has the movers evenly
-  // along it in form 3.
+  // Form 0 is the whole rail alike. The others go by the place along the harness, which has the
+  // movers evenly along it in form 3.
   const std::vector<EffectAxis> axes = {EffectAxis::kTheta, EffectAxis::kPhi, EffectAxis::kBoth};
   ListGrid({.axes = axes}, out);
   ListGrid({.axes = axes, .memories = {Memory::kNow}}, out);
   if (!facts.Has("rail_slot")) return;
   for (const int form : {1, 2, 3}) ListGrid({.axes = axes, .form = form}, out);
-  // The current of each motor through the harness, and a rotor under load: its angle is an arcsine
-  // of what the drive has left, and a deep droop bends.
+  // The current of each motor flows through the harness, and the rotor is under load. Its angle is
+  // an arcsine of the drive that is left, which bends at a deep droop.
   if (!facts.Has("drive_amplitude") || !facts.Has(kSharedMotors)) return;
   int form = kLoaded;
   const auto list_loaded = [&](const Named& feed, const char* depth) {
@@ -73,7 +74,8 @@ std::vector<double> ByPlace(const UnitTrack& track, int form) {
   return droop;
 }
 
-// The same, by the motors whose current goes through the unit's part of the harness.
+// Share of the largest droop, by the motors whose current goes through the unit's part of the
+// harness.
 std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
   const std::span<const double> motors = track.Column(kRailMotors);
   const std::span<const double> shared = track.Column(kSharedMotors);
@@ -85,10 +87,10 @@ std::vector<double> ByCurrent(const UnitTrack& track, double feed_share) {
   return droop;
 }
 
-// How a form has the droop.
+// The model of the droop that a form stands for.
 struct Way {
   bool loaded = false, driven = true;
-  double feed_share = 0;  // below 0: by the place
+  double feed_share = 0;  // below 0: by the place along the harness
   double depth = 0;
 };
 Way WayOf(int form) {
@@ -116,7 +118,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
         track, axis, form.memory,
         [&](std::size_t i) {
           const double level = drive.empty() ? 1 : std::max(drive[i], 0.05);
-          // The load angle grows with what the drive lacks.
+          // The load angle grows with the missing part of the drive.
           const double lag =
               way.loaded ? AddedLoadAngle(form.shape, level, way.depth * droop[i]) / way.depth
                          : droop[i] / level;

@@ -7,8 +7,9 @@
 namespace focalfleet::sim {
 namespace {
 
-// Form 0: in proportion. Forms 1 and 2: as grease stiffens (Andrade's law, viscosity in proportion
-// to exp(B / T)), with the slope of form 0 where it counts from.
+// Form 0 is in proportion to temperature. Forms 1 and 2 follow Andrade's law of stiffening grease,
+// viscosity in proportion to exp(B / T). Their slope at the reference temperature is that of form
+// 0.
 constexpr double kAndrade_K[] = {0, 1750, 2750};
 constexpr double kZero_K = 273.15;
 

@@ -14,7 +14,8 @@ std::vector<double> Late(std::span<const double> temperature_C, std::span<const 
       late[i] = late[i - 1];
       continue;
     }
-    // C' = (T - C) / tau with T a ramp: T less what the ramp runs ahead, and what fades.
+    // C' = (T - C) / tau with T a ramp has the solution T less the constant lag behind the ramp,
+    // and a term that fades.
     const double kept = std::exp(-elapsed);
     const double ahead = (temperature_C[i] - temperature_C[i - 1]) / elapsed;
     late[i] = temperature_C[i] - ahead + (late[i - 1] - temperature_C[i - 1] + ahead) * kept;

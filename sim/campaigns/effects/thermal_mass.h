@@ -1,4 +1,4 @@
-// What follows its surroundings late: a thermal mass behind a measured temperature.
+// A thermal mass follows the measured temperature of its surroundings late.
 #pragma once
 
 #include <span>
@@ -7,7 +7,7 @@
 namespace focalfleet::sim {
 
 /// The temperature of a body with the time constant `tau_s` in surroundings of `temperature_C`,
-/// from rest at the first value; surroundings change linearly between the times `time_s`.
+/// from rest at the first value. The surroundings change linearly between the times `time_s`.
 std::vector<double> Late(std::span<const double> temperature_C, std::span<const double> time_s,
                          double tau_s);
 

@@ -9,8 +9,8 @@
 namespace focalfleet::sim {
 namespace {
 
-// Forms 0 and 2: the pinion's tooth, which comes round with the pinion; 1 and 3: the output gear's.
-// 2 and 3: two teeth wide, or as long in mesh.
+// Forms 0 and 2 are a tooth of the pinion, which passes once a turn of the pinion. Forms 1 and 3
+// are a tooth of the output gear. Forms 2 and 3 are two teeth wide, or as long in mesh.
 constexpr bool IsOfPinion(int form) { return form % 2 == 0; }
 constexpr bool IsWide(int form) { return form >= 2; }
 
@@ -27,7 +27,7 @@ void List(const CampaignFacts& facts, Templates* out) {
   }
 }
 
-// A bump of which the axis never comes to the top is the end of a range rather than a tooth.
+// A bump whose top the axis never reaches is the end of a range rather than a tooth.
 bool Shows(const Template& form, const CampaignFacts& facts) {
   if (IsOfPinion(form.form)) return true;
   const FilledColumn& angle = facts.columns.at(std::string(kCommand[AxisIndex(form)]));
@@ -39,7 +39,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const std::size_t axis = AxisIndex(form);
   const double order = IsOfPinion(form.form) ? PinionRatio(*track.unit, axis) : 1.0;
   const double width_deg = IsWide(form.form) ? 20 : 12;  // of the damaged gear, standard deviation
-  constexpr double kFar = 9;  // widths: what is left there is lost in rounding
+  constexpr double kFar = 9;  // widths: beyond it the bump is lost in rounding
   const std::optional<double> place_deg = ShapeOf(form, track.unit->id);
   if (!place_deg) return;
   for (std::size_t i = 0; i < track.moves; ++i) {

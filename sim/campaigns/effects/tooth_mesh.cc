@@ -1,4 +1,4 @@
-// Tooth mesh: the pitch of the teeth.
+// Tooth mesh: a ripple at the pitch of the teeth.
 #include <vector>
 
 #include "sim/campaigns/effects/harmonic.h"
@@ -10,7 +10,8 @@ namespace {
 void List(const CampaignFacts& facts, Templates* out) {
   std::vector<double> meshes = {kRingTeeth};
   if (HasPinion(facts)) meshes.insert(meshes.begin(), kOutputTeeth);
-  // Form 0: all teeth alike; form 1: deeper on one side of the gear, as its axis is a little off.
+  // Form 0 has all teeth alike. In form 1 the ripple is deeper on one side of the gear, as its axis
+  // is a little off.
   ListGrid({.shapes = meshes, .shape_name = "teeth", .columns = 2}, out);
   ListGrid({.shapes = meshes, .shape_name = "deeper on one side; teeth", .form = 1, .columns = 6},
            out);
@@ -23,7 +24,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const double order = form.shape * once;
   AddHarmonic(track, axis, order, amplitude.first(2), errors);
   if (form.form == 0) return;
-  // A wave whose depth changes once a turn: two more beside it.
+  // A wave whose depth changes once a turn is the sum of the wave and two beside it.
   AddHarmonic(track, axis, order - once, amplitude.subspan(2, 2), errors);
   AddHarmonic(track, axis, order + once, amplitude.subspan(4, 2), errors);
 }

@@ -25,7 +25,7 @@ double MedianOf(std::vector<double> values) {
   return *middle;
 }
 
-// Against at most kSamples of the values, which is fine enough for a smooth curve.
+// Ranks are against at most kSamples of the values, which is fine enough for a smooth curve.
 void Rank(FilledColumn* column) {
   constexpr std::size_t kSamples = 2048;
   const std::size_t stride = std::max<std::size_t>(1, column->values.size() / kSamples);
@@ -43,7 +43,7 @@ void Rank(FilledColumn* column) {
   }
 }
 
-// What the exposure has, where all units that know it agree; NaN elsewhere. Shape: (exposures).
+// The exposure's value, where all units that have one agree; NaN elsewhere. Shape: (exposures).
 std::vector<double> CommonValues(std::span<const double> raw, const Exposures& exposures) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<double> low(exposures.size(), kNone), high(exposures.size(), kNone);
@@ -58,7 +58,7 @@ std::vector<double> CommonValues(std::span<const double> raw, const Exposures& e
   return low;
 }
 
-// Along one unit's rows: a straight line from the value before to the value behind.
+// Fills the gaps along one unit's rows by a straight line from the value before to the value after.
 void Interpolate(std::span<double> values) {
   std::size_t before = values.size();
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -125,7 +125,7 @@ void FindPlate(const Campaign& campaign, CampaignFacts* facts) {
 double StepOf(double from_deg, double cmd_deg) {
   const double step_deg = cmd_deg - from_deg;
   const double turns = std::round(step_deg / kTurn_deg);
-  // Real moves may be a whole turn long; what is beyond one is a slip of the table.
+  // Real moves may be a whole turn long. Longer ones are a slip of the table.
   return std::abs(step_deg) > 1.5 * kTurn_deg ? step_deg - turns * kTurn_deg : step_deg;
 }
 
@@ -152,7 +152,7 @@ void FindHistory(const Campaign& campaign, CampaignFacts* facts) {
   }
 }
 
-// Normal equations of a plane over the plate, one an exposure.
+// Normal equations of a plane over the plate, one for each exposure.
 struct PlaneSums {
   double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, t = 0, xt = 0, yt = 0;
   double least = std::numeric_limits<double>::infinity();
@@ -210,7 +210,8 @@ std::vector<std::vector<std::size_t>> NeighboursOf(const Campaign& campaign, dou
   return neighbours;
 }
 
-// Sum of sin(psi_u - psi_v) (pitch / distance)^3 over the neighbours, psi the motor's angle.
+// The pull is the sum of sin(psi_u - psi_v) (pitch / distance)^3 over the neighbours, with psi the
+// motor's angle.
 void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
   if (campaign.units.size() < 2) return;
   const auto neighbours = NeighboursOf(campaign, 1.3 * facts->pitch_mm);
@@ -263,7 +264,7 @@ void FindRailLoads(const Campaign& campaign, CampaignFacts* facts) {
         Fill(loads.shared_motors, campaign, facts->exposures);
 }
 
-// Columns that the units' table has and the moves' table lacks.
+// Adds columns that the units' table has and the moves' table lacks.
 void AddUnitColumns(const Campaign& campaign, CampaignFacts* facts) {
   struct UnitColumn {
     const char* name;

@@ -1,6 +1,6 @@
-// What an effect may look at: the moves of one unit in their order with the conditions of each
-// (UnitTrack), and what is the same for the whole campaign (CampaignFacts). Both are made once from
-// a campaign; a track reads the facts' columns, no copies.
+// Effects read two things. A UnitTrack is the moves of one unit in their order, with the conditions
+// of each. CampaignFacts are the same for the whole campaign. Both are made once from a campaign. A
+// track reads the facts' columns without copies.
 #pragma once
 
 #include <array>
@@ -16,8 +16,9 @@
 
 namespace focalfleet::sim {
 
-/// One covariate without gaps. A missing value is what the exposure's other units say where they
-/// agree, else between the unit's own values before and behind; where it has none, the median.
+/// A covariate without gaps. A missing value is that of the exposure's other units where they
+/// agree. Else it lies between the unit's own values before and after, and without those it is the
+/// median.
 struct FilledColumn {
   std::vector<double> values;  // Shape: (rows)
   std::vector<float> rank;     // Shape: (rows): share of the rows below, 0..1
@@ -29,7 +30,7 @@ struct FilledColumn {
   [[nodiscard]] bool varies() const { return high > low; }
 };
 
-/// Columns that are computed, with names that no table has.
+/// Names of computed columns, which no table has.
 inline constexpr std::string_view kCommand[] = {"theta_cmd_deg", "phi_cmd_deg"};
 inline constexpr std::string_view kFrom[] = {"theta_from_deg", "phi_from_deg"};
 inline constexpr std::string_view kStep[] = {"theta step", "phi step"};
@@ -40,7 +41,7 @@ inline constexpr std::string_view kRailMotors = "motors in motion on the rail"; 
 inline constexpr std::string_view kSharedMotors = "motors behind shared harness";
 inline constexpr std::string_view kNeighbourTheta = "neighbours' theta motors";
 inline constexpr std::string_view kNeighbourPhi = "neighbours' phi motors";
-// Only where arms come near each other (arm_gap.h).
+// The column exists only where arms come near each other (arm_gap.h).
 inline constexpr std::string_view kArmGap = "gap to the next arm";
 inline constexpr std::string_view kArmGapSide = "side of the next arm";
 inline constexpr double kThickestArm = 0.3;  // of the pitch
@@ -64,14 +65,14 @@ CampaignFacts MakeFacts(const Campaign& campaign);
 
 struct UnitTrack {
   const CampaignFacts* facts = nullptr;
-  const CampaignUnit* unit = nullptr;  // with the geometry that is believed now
+  const CampaignUnit* unit = nullptr;  // with the geometry in use
   std::size_t first_row = 0;
   std::size_t moves = 0;
   std::span<const double> cmd_deg[2];
   std::span<const double> from_deg[2];
   std::span<const double> step_deg[2];
   std::span<const char> restarts;
-  // At the commanded pose, or where TurnPoses says that the axes stand, relative to the base: the
+  // Positions relative to the base at the commanded pose, or at the pose that TurnPoses sets: the
   // elbow, and the fibre relative to the elbow.
   std::vector<double> elbow_x_mm, elbow_y_mm, reach_x_mm, reach_y_mm;
   std::vector<double> fibre_x_mm, fibre_y_mm;  // on the plate
@@ -80,13 +81,13 @@ struct UnitTrack {
   [[nodiscard]] std::span<const double> Column(std::string_view name) const;
 };
 
-/// One past the last move of the history (from homing to homing) that `move` belongs to.
+/// The index after the last move of the history (from homing to homing) that `move` belongs to.
 std::size_t EndOfHistory(const UnitTrack& track, std::size_t move);
 
 /// `geometry` is the unit with the geometry to use; its arrays are read as long as the track lives.
 UnitTrack MakeTrack(const CampaignFacts& facts, std::size_t unit, const CampaignUnit& geometry);
 
-/// The poses of axes that stand off from what they were commanded by these. Shapes: (moves).
+/// Sets the poses of axes that are off their commanded angles by these. Shapes: (moves).
 void TurnPoses(const std::span<const double> (&off_deg)[2], UnitTrack* track);
 
 }  // namespace focalfleet::sim

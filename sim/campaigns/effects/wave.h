@@ -1,6 +1,7 @@
-// Sine and cosine of whole arrays of angles, counted in turns: without a branch or a call, so that
-// a loop over moves costs a few operations a move. Taylor's series over a quarter of a turn either
-// way, to the 21st power; the next would be 1e-18. Within 4e-16 of the true value.
+// Sine and cosine of whole arrays of angles, counted in turns. They have no branch and no call, so
+// that a loop over moves costs a few operations a move. They are Taylor's series over a quarter of
+// a turn either way, to the 21st power; the next term would be 1e-18. The result is within 4e-16 of
+// the true value.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,7 @@ inline double WithoutTurns(double deg) { return deg - 360 * NearestWhole(deg / 3
 
 inline constexpr std::size_t kSinePowers = 11;
 
-/// Of sin(2 pi t) by odd powers of t.
+/// Coefficients of sin(2 pi t) by odd powers of t.
 inline constexpr std::array<double, kSinePowers> kSineSeries = [] {
   std::array<double, kSinePowers> series{};
   long double factor = 2 * std::numbers::pi_v<long double>;
@@ -37,7 +38,7 @@ inline constexpr std::array<double, kSinePowers> kSineSeries = [] {
 
 inline double SineOfTurns(double turns) {
   const double rest = turns - NearestWhole(turns);
-  // Beyond a quarter of a turn it falls as it rose.
+  // Beyond a quarter of a turn the sine falls as it rose.
   const double size = std::abs(rest);
   const double t = std::copysign(std::min(size, 0.5 - size), rest);
   const double square = t * t;

@@ -9,11 +9,11 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kTurns = 100;  // of a campaign; a life test makes thousands
+constexpr double kTurns = 100;  // a campaign's usual turns; a life test makes thousands
 
 constexpr std::string_view kColumns[] = {"cycles_theta", "cycles_phi"};  // of theta, of phi
 
-// The power of ten that the campaign's turns come next to: amplitudes are errors of its size.
+// The power of ten next to the campaign's turns: amplitudes are errors of its size.
 double SpanOf(const CampaignFacts& facts) {
   double most = kTurns;
   const Campaign& campaign = *facts.campaign;
@@ -46,7 +46,7 @@ void Apply(const UnitTrack& track, const Template& form, std::span<const double>
   const double span = form.shape > 0 ? form.shape : kTurns;
   double direction = 0;
   for (std::size_t i = 0; i < track.moves; ++i) {
-    // Since the campaign began: what was worn before it is backlash or scale already.
+    // Turns count since the campaign began: earlier wear is backlash or scale already.
     const double worn = (cycles[i] - cycles[0]) / span;
     if (track.restarts[i]) direction = 0;
     if (track.step_deg[axis][i] != 0) direction = Direction(track.step_deg[axis][i]);
