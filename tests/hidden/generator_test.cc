@@ -1,5 +1,5 @@
-// The generator's physics and what it knows of them: nothing comes of nothing, and what is planted
-// is as visible, and as like its rivals, as it says.
+// Tests of the generator's physics and its keys. No effect gives no change. A planted effect is as
+// visible, and as like its rivals, as its key says.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -64,7 +64,7 @@ TEST(HiddenPlant, EveryEffectVanishesWithItsSize) {
   const Scene scene = MakeScene(campaign);
   Rng rng(TestSeed(2));
   for (const EffectKind& kind : Catalogue()) {
-    if (kind.cause == "identity_swap") continue;  // is, or is not
+    if (kind.cause == "identity_swap") continue;  // all or nothing: it has no size
     Effect effect = DrawEffect(kind, campaign, &rng);
     effect.read_through = 23e-6;
     effect.owner = kind.owners.back();
@@ -80,13 +80,13 @@ TEST(HiddenPlant, EveryEffectVanishesWithItsSize) {
     if (kind.is_event && kind.stage == Stage::kTravel) continue;  // happens, or does not
     const double full = largest(1);
     EXPECT_GT(full, 0.01) << kind.cause;
-    // A tenth of a step of the command is none at all, and play takes over within a move.
+    // A tenth of a step of the command has no effect, and play takes over within a move.
     if (kind.cause == "command_quantisation") continue;
     EXPECT_LT(largest(1e-3), 0.05 * full) << kind.cause;
   }
 }
 
-// Play as Prandtl drew it: the arm stays within the gap, follows a flank, and crosses the gap when
+// Play by Prandtl's rule: the arm stays within the gap, follows a flank, and crosses the gap when
 // the motor turns back.
 TEST(HiddenPlant, BacklashIsAPlayOperator) {
   const Campaign campaign = SmallCampaign("diagnostic", 4, 120, TestSeed(3));
@@ -134,8 +134,8 @@ TEST(HiddenPlant, SlipsComeInWholeRevolutionsOfTheMotor) {
   EXPECT_GT(slipped, 0u);
 }
 
-// Lambda by the book: a dense covariance, its Cholesky factor, and normal equations for the static
-// geometry; no filter, no Gram-Schmidt.
+// Lambda by the textbook: a dense covariance, its Cholesky factor, and normal equations for the
+// static geometry; no filter, no Gram-Schmidt.
 double DenseLambda(const Campaign& campaign, const NoiseModel& noise, std::size_t unit,
                    const std::vector<Place>& um) {
   const std::size_t moves = campaign.move_count();
@@ -175,7 +175,7 @@ double DenseLambda(const Campaign& campaign, const NoiseModel& noise, std::size_
     }
     return y;
   };
-  // chi2 of the effect as data, before and after the best static geometry
+  // The chi-square of the effect as data, before and after the best static geometry.
   std::vector<std::vector<double>> a(6, std::vector<double>(7, 0));
   const auto y = whiten(um);
   std::vector<std::vector<double>> s;
@@ -237,8 +237,8 @@ TEST(HiddenEvidence, AnEffectIsMadeAsVisibleAsItIsWanted) {
     const double lambda =
         Assess(scene, noise, seen, Contribution(scene, Believed(campaign), effect)).lambda;
     const bool at_the_end = std::abs(effect.size) >= 0.999 * kind.size_max;
-    // Steps of a command's last bit are round numbers, and arms break loose rung by rung of a
-    // ladder: not every size exists.
+    // Not every size exists: steps of a command's last bit are round numbers, and arms break loose
+    // at the rungs of a ladder.
     const bool jumps = kind.cause == "command_quantisation" || kind.cause == "stiction";
     const double tolerance = jumps ? 0.7 : 0.1;
     if (at_the_end) {
@@ -246,14 +246,14 @@ TEST(HiddenEvidence, AnEffectIsMadeAsVisibleAsItIsWanted) {
     } else {
       EXPECT_NEAR(lambda / 300, 1, tolerance) << kind.cause;
     }
-    // 16 units are few for what volts alone make of the load angle.
+    // With 16 units the effect of the voltage alone on the load angle is small.
     const double visible = kind.cause == "supply_drift" ? 2 : 10;
     EXPECT_GT(lambda, visible) << kind.cause << ": hardly visible even at its largest";
   }
 }
 
-// With one speed, one voltage and long moves, lag and backlash are the same thing; a drive that
-// varies tells them apart.
+// Lag and backlash are the same with one speed, one voltage and long moves; a drive that varies
+// separates them.
 TEST(HiddenRivals, EquivalenceDependsOnWhatTheMovesExcite) {
   const auto cosine = [](const std::string& design) {
     const Campaign campaign = SmallCampaign(design, 8, 120, TestSeed(8));
@@ -268,7 +268,7 @@ TEST(HiddenRivals, EquivalenceDependsOnWhatTheMovesExcite) {
   EXPECT_LT(cosine("diagnostic"), 0.99);
 }
 
-// A detent of order one bends the rotor's angle just as an offset of one phase does, at any size; a
+// A detent of order one bends the rotor's angle just as an offset of one phase does, at any size. A
 // detent of order two falls with the drive, and the ellipse of unequal gains does not.
 TEST(HiddenRivals, ADetentOfOrderOneIsAnOffset) {
   const auto cosine = [](double order, double size) {

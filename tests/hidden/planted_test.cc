@@ -1,5 +1,5 @@
-// What a suite draws, what it writes, and what its keys say: as the README promises, and as every
-// campaign's files are.
+// The draws, files and keys of a suite are as the README promises, and the files as those of every
+// campaign.
 #include "tests/hidden/generator/planted.h"
 
 #include <gtest/gtest.h>
@@ -143,7 +143,7 @@ void CheckFiles(const Planted& planted) {
   }
   for (const std::string& column : planted.spec.dropped)
     EXPECT_EQ(std::count(moves.names.begin(), moves.names.end(), column), 0) << column;
-  // Nothing of what was planted may stand in the files.
+  // The files must not name anything that was planted.
   for (const std::string& cause : planted.spec.causes)
     EXPECT_EQ((text.moves + text.units).find(cause), std::string::npos) << cause;
   if (!planted.spec.dirty && planted.spec.design.design != "survey") {
@@ -179,8 +179,8 @@ TEST(HiddenKey, TellsTheTruthAboutACampaign) {
   const auto& effect = json["effects"][0];
   EXPECT_EQ(effect["cause"], "backlash");
   EXPECT_NEAR(effect["lambda_per_freedom"].get<double>() / 2000, 1, 0.05);
-  // The oracle is left with the noise: two coordinates of the camera and one of each axis, the
-  // latter through arms that reach farther for theta.
+  // The oracle's residual is the noise: two coordinates of the camera and one of each axis. The
+  // latter acts through arms that reach farther for theta.
   const double floor_um = json["oracle"]["rms_after_um"];
   EXPECT_GT(floor_um, planted.spec.centroid_um * std::sqrt(2.0));
   EXPECT_LT(floor_um, 1.1 * std::hypot(planted.spec.centroid_um * std::sqrt(2.0),

@@ -1,4 +1,4 @@
-// The judge is judged: contrived verdicts must give figures that can be counted by hand.
+// Contrived verdicts test the score: they must give figures that can be counted by hand.
 #include "tests/hidden/score/score.h"
 
 #include <gtest/gtest.h>
@@ -64,7 +64,7 @@ void ExpectShare(const Score& score, const std::string& id, int hits, int trials
 }
 
 TEST(HiddenIntervals, AreTheTextbooks) {
-  // Nothing in n: the exact bound is 1 - 0.025^(1/n).
+  // With no hit in n the exact bound is 1 - 0.025^(1/n).
   EXPECT_NEAR(ClopperPearson(0, 300).high, 1 - std::pow(0.025, 1.0 / 300), 1e-9);
   EXPECT_EQ(ClopperPearson(0, 300).low, 0);
   EXPECT_NEAR(ClopperPearson(300, 300).low, std::pow(0.025, 1.0 / 300), 1e-9);

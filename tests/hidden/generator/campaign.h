@@ -1,9 +1,9 @@
-// A campaign as the generator knows it: the plate, what was commanded under which conditions, and
-// nothing yet of what came of it. Rows stand move by move, every unit in each (a unit that was not
-// moved is commanded to where it stands), so row = move * units + unit.
+// A campaign of the generator has the plate and the commands with their conditions, and no results
+// yet. Rows are move by move with every unit in each, so that row = move * units + unit. A unit
+// that is not moved is commanded to its present pose.
 //
-// The generator has physics of its own and shares no line with the simulation: it exists to test
-// the diagnosis, which must not be tested against its own assumptions.
+// The generator has physics of its own and shares no line with the simulation. Its purpose is to
+// test the diagnosis, which must not be tested against its own assumptions.
 #pragma once
 
 #include <array>
@@ -30,12 +30,13 @@ struct Geometry {
   ByAxis zero_deg{};
 };
 
-/// Where the fibre is with the axes at these angles: the kinematics that all of the project shares.
+/// The place of the fibre with the axes at these angles: the kinematics that all of the project
+/// shares.
 Place FibreAt(const Geometry& geometry, const ByAxis& angle_deg);
 
 struct Unit {
   int id = 0;
-  Geometry believed;  // what units.csv says
+  Geometry believed;  // as in units.csv
   ByAxis gear{};      // motor revolutions per output revolution
   ByAxis min_deg{};
   ByAxis max_deg{};
@@ -49,7 +50,7 @@ struct Row {
   ByAxis from_deg{};
   ByAxis cmd_deg{};
   bool rehomed = false;
-  bool exposed = true;  // false: a unidirectional approach that nobody photographed
+  bool exposed = true;  // false: a unidirectional approach without a picture
   double delay_s = 0;   // since this unit last stood still
   double temp_C = 0;    // true
   double v_bus_V = 0;
@@ -59,7 +60,7 @@ struct Row {
   [[nodiscard]] bool Moved(std::size_t axis) const { return cmd_deg[axis] != from_deg[axis]; }
 };
 
-/// What all units share in one move.
+/// Conditions that all units share in one move.
 struct Exposure {
   double t_s = 0;
   double elevation_deg = 90;
@@ -68,8 +69,8 @@ struct Exposure {
   Place gradient_C_per_mm;  // of the plate's temperature
   double humidity = 50;     // relative, per cent
   double wind_m_s = 0;
-  double pump_deg =
-      0;  // phase of a circulation pump: a covariate that no cause of the library names
+  // Phase of a circulation pump: a covariate that no cause of the library names.
+  double pump_deg = 0;
 };
 
 struct Campaign {

@@ -7,7 +7,7 @@ namespace focalfleet::hidden {
 
 namespace {
 
-// One move as it is planned for the whole plate; each unit draws its own angles from it.
+// A move as it is planned for the whole plate; each unit draws its own angles from it.
 struct Step {
   enum class Kind : std::uint8_t {
     kTarget,
@@ -61,7 +61,7 @@ void Levers(std::size_t n, Rng* rng, std::vector<Step>* steps) {
     for (const double delay : kDelays_s)
       steps->push_back({.kind = Step::Kind::kStay, .delay_s = delay});
   }
-  for (std::size_t i = 0; i < n / 3 + 1; ++i) {  // away and back: what repeats
+  for (std::size_t i = 0; i < n / 3 + 1; ++i) {  // away and back, to see what repeats
     steps->push_back({});
     steps->push_back({.kind = Step::Kind::kReturn});
   }
@@ -183,7 +183,7 @@ void FillExposures(const std::vector<Step>& steps, const std::string& design, Rn
   }
 }
 
-// Where one unit goes in one step. `before`: its last two poses.
+// The angles of a unit in a step. `before`: its last two poses.
 ByAxis Goal(const Step& step, const Unit& unit, const std::array<ByAxis, 2>& before, Rng* rng) {
   ByAxis goal = before[1];
   const auto inside = [&](std::size_t axis, double angle_deg) {

@@ -1,5 +1,6 @@
-// What is commanded in a campaign and under which conditions: an ordinary survey, a campaign made
-// to tell causes apart, or arcs from the hard stop as one measures a single unit on a bench.
+// A design is what is commanded in a campaign, and under which conditions. Designs are an ordinary
+// survey, a campaign made to separate causes, or arcs from the hard stop as for a single unit on a
+// bench.
 #pragma once
 
 #include <string>
@@ -17,7 +18,8 @@ struct DesignOptions {
   std::size_t moves = 120;
 };
 
-/// The same seed gives the same campaign. Shape: units * moves rows, move by move.
+/// The campaign of the seed: the same seed gives the same one. Shape: units * moves rows, move by
+/// move.
 Campaign MakeCampaign(const DesignOptions& options, std::uint64_t seed);
 
 }  // namespace focalfleet::hidden

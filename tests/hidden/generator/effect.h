@@ -1,15 +1,16 @@
-// An effect: a cause, what owns it, how large it is for whom, and the physics that carries it from
-// the drive to the camera. A unit's campaign is a Track of what its axes do in every move; each
-// effect takes hold of the track at its own stage, so that effects act on each other as they do in
-// a real unit (a slipped revolution shifts the phase of a ripple, backlash follows the lagging
-// rotor).
+// An effect has a cause, an owner, a size for each unit, and the physics that carries it from the
+// drive to the camera. A unit's campaign is a Track of its axes' angles in every move. Each effect
+// changes the track at its own stage, so that effects act on each other as in a real unit. A
+// slipped revolution shifts the phase of a ripple, and backlash follows the lagging rotor.
 //
-//   travel      what the firmware and the gears make of a command; errors stay until the next
-//   homing rest        where the rotor comes to rest in its electrical field history     what lies
-//   between rotor and arm and remembers: play, bristles, stiction gear        transmission error of
-//   the gears, as a function of the angle that the arm has exposure    what depends on time,
-//   gravity, heat and neighbours when the picture is taken plate       the fibre's place: plate,
-//   telescope camera      what the camera makes of the place
+//   travel      the firmware and the gears turn a command into motion; errors stay until the next
+//               homing
+//   rest        the rotor comes to rest in its electrical field
+//   history     parts between rotor and arm with memory: play, bristles, stiction
+//   gear        transmission error of the gears, as a function of the arm's angle
+//   exposure    dependence on time, gravity, heat and neighbours when the picture is taken
+//   plate       the fibre's place: plate, telescope
+//   camera      the measured place
 #pragma once
 
 #include <array>
@@ -28,9 +29,9 @@ enum class AxisUse : std::uint8_t { kEither, kThetaOnly, kNone };
 
 std::string_view NameOf(Owner owner);
 
-/// One unit's campaign, move by move. Shapes: (moves).
+/// The campaign of one unit, move by move. Shapes: (moves).
 struct Track {
-  std::array<std::vector<double>, kAxes> angle_deg;  // what the axis does, stage by stage
+  std::array<std::vector<double>, kAxes> angle_deg;  // of the axis, stage by stage
   std::array<std::vector<double>, kAxes> growth;     // of the arm, relative
   std::array<std::vector<double>, kAxes> tilt_rad;   // of the axis out of the plate's normal: x, y
   std::vector<Place> place_mm;                       // from the stage of the plate on
@@ -38,7 +39,7 @@ struct Track {
 
 struct Effect;
 
-/// What an effect may look at: the commands and conditions, never the other units' true state.
+/// The data that an effect may read: commands and conditions, never the other units' true state.
 struct Scene {
   const Campaign* campaign = nullptr;
   std::vector<std::vector<std::size_t>> neighbours;
@@ -48,14 +49,15 @@ struct EffectKind {
   std::string_view cause;
   Stage stage = Stage::kExposure;
   AxisUse axis = AxisUse::kNone;
-  double typical = 1;  // what size 1 is, in `amplitude_unit`
+  double typical = 1;  // amplitude of size 1, in `amplitude_unit`
   std::string_view amplitude_unit;
-  double size_max = 30;  // multiples of the typical that physics still allows
+  double size_max = 30;  // multiples of the typical amplitude that physics still allows
   bool either_sign = false;
   std::vector<Owner> owners;
-  std::vector<std::string_view> columns;  // of moves.csv, without which nobody can name it
+  std::vector<std::string_view> columns;  // of moves.csv, needed to name it
   int phases = 1;                         // free coefficients per owner: 2 where a phase is free
-  bool is_event = false;  // a realisation of chance: no other cause's signature can be held to it
+  // A realisation of chance: no other cause's signature can be compared with it.
+  bool is_event = false;
   void (*apply)(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) = nullptr;
 };
 
@@ -64,11 +66,12 @@ struct Effect {
   std::size_t axis = kTheta;
   Owner owner = Owner::kUnit;
   double size = 0;                // multiples of the typical, signed
-  std::array<double, 4> shape{};  // uniform in 0..1: what the cause leaves open
+  std::array<double, 4> shape{};  // uniform in 0..1: parameters that the cause leaves open
   std::uint64_t seed = 0;         // of events
-  std::vector<double> weight;     // by unit; 0: not concerned
+  std::vector<double> weight;     // by unit; 0: without the effect
   std::vector<double> phase_rad;  // by unit
-  double read_through = 0;  // sensor_bias: the growth per K that the sensor's readings stand for
+  // sensor_bias: the growth per K that is computed from the sensor's readings.
+  double read_through = 0;
   [[nodiscard]] double Amount(std::size_t unit) const {
     return kind->typical * size * weight[unit];
   }
@@ -82,7 +85,7 @@ inline bool IsForeign(const EffectKind& kind) { return kind.cause.substr(0, 6) =
 /// Columns in which an analyst would see a foreign effect.
 std::vector<std::string_view> ForeignCovariates(std::string_view cause);
 
-/// The catalogue's parts, one per family of physics.
+/// The catalogue's parts, each a family of physics.
 std::vector<EffectKind> TravelEffects();
 std::vector<EffectKind> RotorEffects();
 std::vector<EffectKind> HistoryEffects();
@@ -93,8 +96,8 @@ std::vector<EffectKind> PlateEffects();
 std::vector<EffectKind> CameraEffects();
 std::vector<EffectKind> ForeignEffects();
 
-/// The last direction in which a unit's axis was driven, move by move: +1, -1; after homing the
-/// direction into the stop.
+/// The last direction in which a unit's axis was driven, move by move: +1, -1. After homing it is
+/// the direction into the stop.
 std::vector<double> Directions(const Campaign& campaign, std::size_t unit, std::size_t axis);
 
 }  // namespace focalfleet::hidden

@@ -1,5 +1,5 @@
-// What moves an arm that the drive has let go: springs that creep, gravity, a crossing cable, wear,
-// a start that came late, a neighbour that is touched, an axis that leans.
+// Effects that move an arm beside its drive are springs that creep, gravity, a crossing cable and
+// wear. Others are a late start, a touched neighbour, and an axis that leans.
 #include <algorithm>
 #include <cmath>
 
@@ -43,8 +43,8 @@ void GravityTorque(const Scene& scene, const Effect& effect, std::size_t unit, T
   }
 }
 
-// The fibre bundle of phi runs through theta's axis: it twists theta as phi turns, or drags it in
-// the direction in which phi last went.
+// The fibre bundle of phi runs through theta's axis. The bundle twists theta as phi turns, or drags
+// it in the direction in which phi last went.
 void AxisCrosstalk(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const bool drags = effect.shape[0] > 0.6;
@@ -60,7 +60,7 @@ void AxisCrosstalk(const Scene& scene, const Effect& effect, std::size_t unit, T
   }
 }
 
-// Archard's law with running-in: wear grows a little slower than the way that was made.
+// Archard's law with running-in: wear grows a little slower than the travel.
 void Wear(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double per_turn_deg = effect.Amount(unit);
@@ -76,8 +76,8 @@ void Wear(const Scene& scene, const Effect& effect, std::size_t unit, Track* tra
   }
 }
 
-// Units are started one after another as their frames come through; a late one is still braking
-// when the picture is taken.
+// Units are started one after another as their frames arrive. A late unit is still braking when the
+// picture is taken.
 void StartSkew(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double per_slot_s = std::abs(effect.Amount(unit));
@@ -108,7 +108,7 @@ void AxisTilt(const Scene& scene, const Effect& effect, std::size_t unit, Track*
   }
 }
 
-// ---- contact of two arms
+// ---- Contact of two arms.
 
 struct Segment {
   Place from;
@@ -138,7 +138,7 @@ double Distance(const Segment& a, const Segment& b) {
                    DistanceToPoint(b, a.to)});
 }
 
-// Two arms that would overlap push each other aside, each by the half, as far as they are stiff.
+// Two arms that would overlap push each other aside, each by half, as far as they are stiff.
 void CollisionContact(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double stiffness = std::min(1.0, std::abs(effect.Amount(unit)));
@@ -150,7 +150,7 @@ void CollisionContact(const Scene& scene, const Effect& effect, std::size_t unit
       const Segment other = ArmOf(campaign.units[o], campaign.At(m, o).cmd_deg);
       const double gap_mm = Distance(ArmOf(self, angle), other);
       if (gap_mm >= thick_mm) continue;
-      // Which way phi yields: where the gap grows.
+      // Phi yields to the side on which the gap grows.
       constexpr double kProbe_deg = 2;
       const double more = Distance(ArmOf(self, {angle[kTheta], angle[kPhi] + kProbe_deg}), other);
       const double less = Distance(ArmOf(self, {angle[kTheta], angle[kPhi] - kProbe_deg}), other);

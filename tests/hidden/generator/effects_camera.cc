@@ -1,4 +1,4 @@
-// Plate, telescope, air and camera: what moves a fibre's picture and not its arm.
+// Effects of plate, telescope, air and camera: they move a fibre's picture and not its arm.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -19,7 +19,7 @@ void GravitySag(const Scene& scene, const Effect& effect, std::size_t, Track* tr
   }
 }
 
-// From picture to picture the camera stands elsewhere: scale, turn and shift, wandering.
+// The camera is elsewhere from picture to picture: scale, turn and shift, wandering.
 void CameraSimilarity(const Scene& scene, const Effect& effect, std::size_t, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double amount_mm = effect.kind->typical * effect.size;
@@ -78,8 +78,9 @@ void CentroidBias(const Scene& scene, const Effect& effect, std::size_t, Track* 
   }
 }
 
-// Air between plate and camera: a Gaussian random field over the plate, new in every picture, as a
-// sum of plane waves with random directions and Gaussian wave numbers (Bochner's theorem).
+// Air between plate and camera is a Gaussian random field over the plate, new in every picture. The
+// field is a sum of plane waves with random directions and Gaussian wave numbers (Bochner's
+// theorem).
 void AirTurbulence(const Scene& scene, const Effect& effect, std::size_t, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double rms_mm = effect.kind->typical * effect.size;
@@ -99,8 +100,8 @@ void AirTurbulence(const Scene& scene, const Effect& effect, std::size_t, Track*
   }
 }
 
-// Two fibres are plugged the wrong way round. Who has changed with whom is in the weights; the
-// exchange itself needs both tracks and is made by the plant.
+// Two fibres are plugged the wrong way round. The weights mark the pair. The exchange itself needs
+// both tracks and is made by the plant.
 void IdentitySwap(const Scene&, const Effect&, std::size_t, Track*) {}
 
 }  // namespace

@@ -29,7 +29,7 @@ void PumpSawtooth(const Scene& scene, const Effect& effect, std::size_t unit, Tr
       track, unit);
 }
 
-// Something far away pulls all fibres around in a few hours.
+// A distant source pulls all fibres around in a few hours.
 void SlowTide(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double amount_mm = effect.Amount(unit);
@@ -40,7 +40,7 @@ void SlowTide(const Scene& scene, const Effect& effect, std::size_t unit, Track*
   }
 }
 
-// A gear that stands in no drawing: five bumps a turn, rounded off.
+// A gear that is in no drawing: five bumps a turn, rounded off.
 void OrderFive(const Scene&, const Effect& effect, std::size_t unit, Track* track) {
   const double amount_deg = effect.Amount(unit);
   const double order = effect.shape[0] < 0.5 ? 5.0 : 3.7;
@@ -60,7 +60,7 @@ void Humidity(const Scene& scene, const Effect& effect, std::size_t unit, Track*
       track, unit);
 }
 
-// Wind shakes the telescope aside, with the square of its speed.
+// Wind pushes the telescope aside, with the square of its speed.
 void Wind(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double amount_mm = effect.Amount(unit);
   const Place towards = std::polar(1.0, 2 * kPi * effect.shape[0]);
@@ -70,7 +70,7 @@ void Wind(const Scene& scene, const Effect& effect, std::size_t unit, Track* tra
   }
 }
 
-// The arm remembers where it stood before.
+// The arm's error depends on its pose before.
 void Memory(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   AddAngle(
@@ -82,7 +82,7 @@ void Memory(const Scene& scene, const Effect& effect, std::size_t unit, Track* t
       track, unit);
 }
 
-// Something bends where it is neither warm nor cold.
+// A part bends in proportion to the square of the temperature's difference from the mean.
 void QuadraticHeat(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   AddAngle(
@@ -94,7 +94,7 @@ void QuadraticHeat(const Scene& scene, const Effect& effect, std::size_t unit, T
       track, unit);
 }
 
-// The shutter opens from the left and from the right by turns.
+// The shutter opens from the left and from the right in turns.
 void Shutter(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double amount_mm = effect.Amount(unit);
   for (std::size_t m = 0; m < scene.campaign->move_count(); ++m)

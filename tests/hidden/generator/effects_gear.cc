@@ -1,4 +1,4 @@
-// Transmission error of gears that do not run true: a function of the angle that the arm has.
+// Transmission error of gears that do not run true, as a function of the arm's angle.
 #include <algorithm>
 #include <cmath>
 
@@ -20,8 +20,8 @@ void AddError(const Effect& effect, const Error& error_deg, Track* track) {
   for (double& angle : track->angle_deg[effect.axis]) angle += error_deg(angle * kDegree);
 }
 
-// A gear turns about a point beside its centre: seen from there its rim runs by the sine rule, so
-// the angle is an arcsine of a sine, not a sine. `ratio`: turns of this gear per turn of the
+// A gear turns about a point beside its centre. Seen from there its rim runs by the sine rule, so
+// that the angle is an arcsine of a sine, not a sine. `ratio`: turns of this gear per turn of the
 // output.
 double OffCentre(double offset_share, double ratio, double output_rad, double phase_rad) {
   const double reach = std::clamp(offset_share, -0.95, 0.95);
@@ -49,15 +49,16 @@ void StageRipple(const Scene& scene, const Effect& effect, std::size_t unit, Tra
   const double ratio = base * std::pow(kStage, stages);
   AddError(
       effect,
-      // Sizes at the arm are alike from stage to stage, so its own runout grows with the ratio.
+      // Sizes at the arm are alike from stage to stage, so that a stage's own runout grows with the
+      // ratio.
       [&](double at) {
         return OffCentre(std::min(0.9, share * ratio), ratio, at, effect.phase_rad[unit]);
       },
       track);
 }
 
-// Pitch errors tooth by tooth: a rounded triangle at the mesh order, its depth changing once a turn
-// as an eccentric carrier presses the teeth together.
+// Pitch errors are tooth by tooth: a rounded triangle at the mesh order. Its depth changes once a
+// turn as an eccentric carrier presses the teeth together.
 void ToothMesh(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double depth_deg = effect.Amount(unit);
   const double order = HasSpur(scene, unit, effect.axis) ? 45 : 46;
@@ -72,7 +73,7 @@ void ToothMesh(const Scene& scene, const Effect& effect, std::size_t unit, Track
       track);
 }
 
-// One bad tooth of the pinion lifts the mesh whenever it comes by.
+// A bad tooth of the pinion lifts the mesh whenever it passes.
 void ToothDamage(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double height_deg = effect.Amount(unit);
   const double ratio = HasSpur(scene, unit, effect.axis) ? kSpur : 1;
@@ -86,7 +87,7 @@ void ToothDamage(const Scene& scene, const Effect& effect, std::size_t unit, Tra
       track);
 }
 
-// The arm leans on its stop's cushion before the end of its range.
+// The arm presses on its stop's cushion before the end of its range.
 void HardStop(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double softness = effect.Amount(unit);
   const Unit& self = scene.campaign->units[unit];

@@ -1,5 +1,5 @@
-// What lies between rotor and arm and remembers where it came from. Each is integrated along the
-// whole way of every move, unidirectional approaches included, in steps far below its own scale.
+// Parts between rotor and arm that depend on the way there. Each is integrated along the whole way
+// of every move, unidirectional approaches included, in steps far below its own scale.
 #include <algorithm>
 #include <cmath>
 
@@ -9,8 +9,8 @@ namespace focalfleet::hidden {
 
 namespace {
 
-// Runs `follow(step_deg, rotor_deg, speed)` along the way and `rest()` when it ends; `home(angle)`
-// at a stop. What `follow` returns last is where the axis is.
+// Runs `follow(step_deg, rotor_deg, speed)` along the way and `rest()` at its end; `home(angle)` at
+// a stop. The axis is at the last result of `follow`.
 template <class Mechanism>
 void FollowWay(const Scene& scene, const Effect& effect, std::size_t unit, Mechanism mechanism,
                Track* track) {
@@ -114,8 +114,8 @@ void Stiction(const Scene& scene, const Effect& effect, std::size_t unit, Track*
             track);
 }
 
-// The fibre bundle as a spring that hardens towards the ends of the range and winds with
-// hysteresis (Bouc-Wen).
+// The fibre bundle is a spring that hardens towards the ends of the range and winds with hysteresis
+// (Bouc-Wen).
 struct FibreSpring {
   double step_deg;
   double amount_deg;

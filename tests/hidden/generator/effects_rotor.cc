@@ -1,5 +1,5 @@
-// Where a rotor comes to rest in the field of its drive. Its angle is that of the output times the
-// gear; what moves it by tens of electrical degrees is a few hundredths of a degree at the arm.
+// Effects on the rest of a rotor in the field of its drive. Its angle is that of the output times
+// the gear. A shift by tens of electrical degrees is a few hundredths of a degree at the arm.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -10,7 +10,7 @@ namespace focalfleet::hidden {
 
 namespace {
 
-// Calls `lag_deg(move, drive, rotor_rad)` when the axis moved; the rotor stays there until it moves
+// Calls `lag_deg(move, drive, rotor_rad)` when the axis moved. The rotor stays there until it moves
 // again, because its magnets hold it.
 template <class Lag>
 void AddAtRest(const Scene& scene, const Effect& effect, std::size_t unit, const Lag& lag_rad,
@@ -49,7 +49,8 @@ void LoadAngleLag(const Scene& scene, const Effect& effect, std::size_t unit, Tr
       track);
 }
 
-// The firmware knows the lag at the voltage of the day; what the slow fall of the supply adds.
+// The firmware corrects for the lag at the voltage of the day; the effect is the part that the slow
+// fall of the supply adds.
 void SupplyDrift(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const auto direction = Directions(campaign, unit, effect.axis);
@@ -64,8 +65,9 @@ void SupplyDrift(const Scene& scene, const Effect& effect, std::size_t unit, Tra
       track);
 }
 
-// Kirchhoff along one harness: each segment carries the current of all movers behind it, on top of
-// what the feed itself drops. Returns the share of the voltage that is missing at `unit`.
+// Kirchhoff's laws along one harness: each segment carries the current of all movers behind it, in
+// addition to the drop of the feed itself. Returns the share of the voltage that is missing at
+// `unit`.
 double MissingShare(const Campaign& campaign, std::size_t move, std::size_t unit,
                     double drop_per_mover, double feed) {
   const Unit& self = campaign.units[unit];
@@ -102,7 +104,7 @@ void SupplyDroop(const Scene& scene, const Effect& effect, std::size_t unit, Tra
   }
 }
 
-// The rotor settles where field torque and detent torque cancel; Newton's method.
+// The rotor settles where field torque and detent torque cancel, by Newton's method.
 void Cogging(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double detent = effect.Amount(unit);
   const double order = effect.shape[0] < 0.2 ? 1 : effect.shape[0] < 0.6 ? 2 : 6;
@@ -122,8 +124,8 @@ void Cogging(const Scene& scene, const Effect& effect, std::size_t unit, Track* 
       track);
 }
 
-// Phases of unequal gain, offset currents, and the dead time of a bridge: the field points slightly
-// elsewhere than it is told to.
+// Phases of unequal gain, offset currents, or the dead time of a bridge turn the field slightly
+// from its commanded direction.
 void PhaseImbalance(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double amount = effect.Amount(unit);
   const double kind = effect.shape[0];  // gain, offset, dead time
@@ -165,8 +167,8 @@ void ModeThreshold(const Scene& scene, const Effect& effect, std::size_t unit, T
       track);
 }
 
-// Rotors of neighbours as magnets of finite length: what one turns the other by. At rest both stand
-// where their commands left them.
+// Rotors of neighbours are magnets of finite length and turn each other. At rest both are where
+// their commands left them.
 void NeighbourCoupling(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double strength = effect.Amount(unit);

@@ -1,5 +1,5 @@
-// Heat. Nothing follows a sensor at once: arms, plate and motors have thermal masses, integrated in
-// time between the exposures.
+// Effects of heat. Nothing follows a sensor at once: arms, plate and motors have thermal masses,
+// integrated in time between the exposures.
 #include <algorithm>
 #include <cmath>
 
@@ -9,8 +9,8 @@ namespace focalfleet::hidden {
 
 namespace {
 
-// A thermal mass behind the temperature of its surroundings, exactly integrated for surroundings
-// that change linearly between two exposures.
+// A thermal mass follows the temperature of its surroundings. The integral is exact for
+// surroundings that change linearly between two exposures.
 class ThermalMass {
  public:
   ThermalMass(double start_C, double tau_s) : at_C_(start_C), before_C_(start_C), tau_s_(tau_s) {}
@@ -34,8 +34,8 @@ double Since(const Campaign& campaign, std::size_t move) {
   return move == 0 ? 0 : campaign.exposures[move].t_s - campaign.exposures[move - 1].t_s;
 }
 
-// The grease stiffens in the cold by an Andrade law; what the shaft winds up by grows with it. The
-// firmware knows the wind-up at the mean temperature.
+// Grease stiffens in the cold by an Andrade law, and the shaft's wind-up grows with it. The
+// firmware corrects for the wind-up at the mean temperature.
 void ThermalBacklash(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const auto direction = Directions(campaign, unit, effect.axis);
@@ -102,8 +102,8 @@ void PlateExpansion(const Scene& scene, const Effect& effect, std::size_t unit, 
   }
 }
 
-// A plate that is warmer on one side, free of stress: the displacement whose strain is the same in
-// all directions and proportional to g.x is conj(g) z^2 / 2 in complex notation.
+// A plate is warmer on one side, and free of stress. The strain is the same in all directions and
+// proportional to g.x. The displacement is then conj(g) z^2 / 2 in complex notation.
 void PlateGradient(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double per_kelvin = effect.Amount(unit);
@@ -115,8 +115,8 @@ void PlateGradient(const Scene& scene, const Effect& effect, std::size_t unit, T
   static_cast<void>(unit);
 }
 
-// A board reports another temperature than it has. No arm moves for it; what is left over when the
-// arms' true growth is read through the reported temperature is what an analyst sees of it.
+// A board reports another temperature than it has, and no arm moves for it. An analyst sees what is
+// left when the arms' true growth is computed from the reported temperature.
 void SensorBias(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const Campaign& campaign = *scene.campaign;
   const double gain = effect.Amount(unit);

@@ -1,5 +1,5 @@
-// What the firmware, the bus and the gear ratio make of a command. The firmware counts steps from
-// where it believes to stand, so that what is lost stays lost until the next homing.
+// Effects of the firmware, the bus and the gear ratio on a command. The firmware counts steps from
+// its believed position, so that a lost step stays lost until the next homing.
 #include <algorithm>
 #include <cmath>
 
@@ -25,7 +25,7 @@ void AddTravel(const Scene& scene, const Effect& effect, std::size_t unit, const
 
 double TravelOf(const Row& row, std::size_t axis) { return row.cmd_deg[axis] - row.from_deg[axis]; }
 
-// The gear has another number of teeth, or a hair more per revolution, than the model's.
+// The gear has another number of teeth, or a little more travel per revolution, than the model's.
 void GearScale(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double ratio = 1 / (1 - effect.Amount(unit));
   AddTravel(
@@ -33,7 +33,7 @@ void GearScale(const Scene& scene, const Effect& effect, std::size_t unit, Track
       [&](const Row& row, std::size_t) { return (ratio - 1) * TravelOf(row, effect.axis); }, track);
 }
 
-// Microsteps that one direction of rotation makes too long and the other too short.
+// Microsteps are too long in one direction of rotation and too short in the other.
 void Asymmetry(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double share = effect.Amount(unit);
   AddTravel(
@@ -59,7 +59,7 @@ void RampTravel(const Scene& scene, const Effect& effect, std::size_t unit, Trac
 void Quantisation(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double wanted_deg = std::abs(effect.Amount(unit));
   if (wanted_deg <= 0) return;
-  // Real ones are round numbers of something: hundredths of a degree, or powers of two of a turn.
+  // Real steps are round numbers: hundredths of a degree, or powers of two of a turn.
   const double hundredths = std::max(1.0, std::round(wanted_deg / 0.01)) * 0.01;
   const double binary = 360 / std::exp2(std::round(std::log2(360 / wanted_deg)));
   const double step_deg = effect.shape[0] < 0.5 ? hundredths : binary;
@@ -71,7 +71,7 @@ void Quantisation(const Scene& scene, const Effect& effect, std::size_t unit, Tr
   }
 }
 
-// Whole revolutions of the rotor are lost where the drive's torque hardly exceeds the load: the
+// Whole revolutions of the rotor are lost where the drive's torque hardly exceeds the load. The
 // odds rise as the voltage falls and the grease stiffens.
 void StepLoss(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double rate = std::abs(effect.Amount(unit));
@@ -93,7 +93,7 @@ void StepLoss(const Scene& scene, const Effect& effect, std::size_t unit, Track*
       track);
 }
 
-// A frame is lost and the unit stays, or is repeated and the unit goes twice as far.
+// A frame is lost and the unit stays, or a frame is repeated and the unit goes twice as far.
 void LostCommand(const Scene& scene, const Effect& effect, std::size_t unit, Track* track) {
   const double rate = std::abs(effect.Amount(unit));
   const double doubled = 0.3 * effect.shape[0];

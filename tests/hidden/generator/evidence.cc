@@ -85,7 +85,7 @@ UnitSpace::UnitSpace(const Campaign& campaign, const NoiseModel& noise, std::siz
 Column UnitSpace::Whiten(std::span<const Place> um) const {
   Column out;
   out.reserve(2 * steps_.size());
-  Place state;  // what is believed of the scatter: theta, phi
+  Place state;  // estimate of the scatter: theta, phi
   for (std::size_t m = 0; m < steps_.size(); ++m) {
     const Step& step = steps_[m];
     if (step.renewed[kTheta]) state.real(0);

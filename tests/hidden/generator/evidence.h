@@ -1,10 +1,10 @@
-// How visible something is in a campaign: the chi-square that it explains once the noise is made
-// white and every unit's static geometry is taken out.
+// The visibility of an effect in a campaign is the chi-square that it explains. The noise is made
+// white and every unit's static geometry is taken out before.
 //
-// A measured place is the true one plus the camera's scatter, new in every picture, plus the
-// scatter of the axes' rest, which stays until the axis moves again. That is a state with two
-// coordinates seen through the arm's Jacobian, so a Kalman filter whitens exactly in O(moves); a
-// covariance matrix over all moves would cost their cube.
+// A measured place is the true one plus two errors. The camera's scatter is new in every picture,
+// and the scatter of the axes' rest stays until the axis moves again. The latter is a state with
+// two coordinates seen through the arm's Jacobian. A Kalman filter therefore whitens exactly in
+// O(moves); a covariance matrix over all moves would cost their cube.
 #pragma once
 
 #include <array>
@@ -23,19 +23,19 @@ struct NoiseModel {
 using Matrix2 = std::array<double, 4>;  // row by row
 using Column = std::vector<double>;
 
-/// What a move of base, arms and zeros does to a unit's places, one column each: base x and y, arms
-/// (um per um), zeros (um per mdeg). Shape: (6, moves).
+/// The effect of a change of the geometry on a unit's places, one column each. Columns are base x
+/// and y, arms (um per um), zeros (um per mdeg). Shape: (6, moves).
 std::array<std::vector<Place>, 6> StaticColumns(const Campaign& campaign, std::size_t unit);
 
-/// One unit's data space. Rows that are not `used` do not exist in it.
+/// The data space of a unit. Rows that are not `used` do not exist in it.
 class UnitSpace {
  public:
   UnitSpace(const Campaign& campaign, const NoiseModel& noise, std::size_t unit,
             std::span<const char> used);
 
-  /// Noise made white. Shape: (moves) in um, to (2 * used moves).
+  /// The column with the noise made white. Shape: (moves) in um, to (2 * used moves).
   [[nodiscard]] Column Whiten(std::span<const Place> um) const;
-  /// Whitened, and without what the static geometry can take up.
+  /// The whitened column without the part that the static geometry can take up.
   [[nodiscard]] Column Project(std::span<const Place> um) const;
   /// The static columns, whitened: which = 0..5.
   [[nodiscard]] Column Static(std::size_t which) const;

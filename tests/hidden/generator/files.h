@@ -1,5 +1,5 @@
-// A campaign's folder as every campaign looks: moves.csv and units.csv, and no trace of what was
-// planted.
+// The files of a planted campaign are those of every campaign, moves.csv and units.csv, without a
+// trace of what was planted.
 #pragma once
 
 #include <string>
@@ -20,6 +20,7 @@ CampaignText Write(const Spec& spec, const Campaign& campaign, const Measurement
 /// The optional columns that this campaign has.
 std::vector<std::string> OptionalColumns(const Spec& spec);
 
+/// Writes the text to the file.
 /// Errors: kUnavailable with the path.
 Status Save(const std::string& path, const std::string& text);
 

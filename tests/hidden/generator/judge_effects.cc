@@ -42,7 +42,7 @@ Visibility Assess(const Scene& scene, const NoiseModel& noise, const std::vector
   const Campaign& campaign = *scene.campaign;
   Visibility out;
   out.lambda_by_unit.assign(campaign.unit_count(), 0);
-  NoiseModel even = noise;  // for rms in um: every row counts alike
+  NoiseModel even = noise;  // for rms in um: every row has the same weight
   even.centroid_um.assign(campaign.unit_count(), 1);
   even.actuation_deg = {};
   double raw = 0;
@@ -84,7 +84,7 @@ double LambdaScale(const Effect& effect) {
 
 void Tune(const Scene& scene, const Truth& truth, const NoiseModel& noise,
           const std::vector<char>& seen, double lambda_wanted, Effect* effect) {
-  if (effect->kind->cause == "identity_swap") return;  // is, or is not
+  if (effect->kind->cause == "identity_swap") return;  // all or nothing: it has no size
   const double sign = effect->size < 0 ? -1 : 1;
   double size = 1;
   double best_size = size;

@@ -1,6 +1,6 @@
-// What is true of a planted campaign: how large each effect is and how visible, what else could
-// have made the same picture, what noise is left for a perfect model, and what such a model gains
-// on moves that it has not seen.
+// The truth about a planted campaign is the size and visibility of each effect, and the other
+// causes that could have made the same picture. The noise that is left for a perfect model is part
+// of it. A perfect model's gain on moves that it has not seen is another.
 #pragma once
 
 #include <string>
@@ -13,21 +13,22 @@ namespace focalfleet::hidden {
 struct Visibility {
   double lambda = 0;
   double survival = 0;     // share of the whitened effect that the static geometry leaves
-  double rms_um = 0;       // over the seen rows of the units concerned
+  double rms_um = 0;       // over the seen rows of the units with the effect
   double rms_left_um = 0;  // the same after a least-squares fit of the static geometry
-  std::vector<double> lambda_by_unit;  // zero where not concerned
+  std::vector<double> lambda_by_unit;  // zero for units without the effect
 };
 
-/// What an effect adds to the places that there would be without it. Shape: by unit concerned
-/// (weight not 0) the moves, in um; empty for the others.
+/// The part of the places that an effect adds. Shape: by unit with the effect (weight not 0) the
+/// moves, in um; empty for the others.
 std::vector<std::vector<Place>> Contribution(const Scene& scene, const Truth& truth,
                                              const Effect& effect);
 
 Visibility Assess(const Scene& scene, const NoiseModel& noise, const std::vector<char>& seen,
                   const std::vector<std::vector<Place>>& contribution_um);
 
-/// Chi-square that the effect must explain to be as easy to find as `lambda` is for one with a
-/// single free coefficient: several units, each by itself, or many phases.
+/// The factor on chi-square that makes the effect as easy to find as one with a single free
+/// coefficient at `lambda`. The factor is above 1 for several units, each by itself, or many
+/// phases.
 double LambdaScale(const Effect& effect);
 
 /// Scales the effect until it explains `lambda_wanted` (or as much as physics allows).
@@ -39,8 +40,8 @@ struct Rival {
   double cosine = 0;
 };
 
-/// Other causes, at any axis, by how much of this effect their own signature can take over, with
-/// the static geometry free. Cosines below 0.5 are left out. Sorted, nearest first.
+/// Other causes, on any axis, with the share of this effect that their own signature can take over,
+/// with the static geometry free. Cosines below 0.5 are left out. Sorted, nearest first.
 std::vector<Rival> FindRivals(const Scene& scene, const NoiseModel& noise,
                               const std::vector<char>& seen, const Effect& effect);
 
@@ -52,7 +53,8 @@ struct OracleGain {
   std::size_t rows = 0;
 };
 
-/// Five folds of moves in short blocks. Rows that are bad or were not seen take no part.
+/// The oracle's gain in five folds of moves in short blocks. Rows that are bad or were not seen are
+/// left out.
 OracleGain AskOracle(const Campaign& campaign, const Measurement& measured,
                      const std::vector<std::vector<Place>>& contribution_um);
 

@@ -44,7 +44,7 @@ std::vector<Place> Lattice(std::size_t count, double pitch_mm) {
   return places;
 }
 
-// Sorts by `key`, cuts into groups of equal size and hands out (group, slot).
+// Sorts by `key`, cuts into groups of equal size and calls `give` with (group, slot) of each unit.
 template <class Key, class Give>
 void Group(const std::vector<Unit>& units, std::size_t groups, const Key& key, const Give& give) {
   std::vector<std::size_t> order(units.size());
@@ -61,7 +61,7 @@ void Group(const std::vector<Unit>& units, std::size_t groups, const Key& key, c
 Place FibreAt(const Geometry& geometry, const ByAxis& angle_deg) {
   const double first = (angle_deg[kTheta] + geometry.zero_deg[kTheta]) * kDegree;
   const double second = first + (angle_deg[kPhi] + geometry.zero_deg[kPhi]) * kDegree;
-  // A fit that goes astray may try an arm of negative length, which std::polar does not take.
+  // A diverging fit may try an arm of negative length, which std::polar does not take.
   return geometry.base_mm + geometry.arm_mm[kTheta] * std::polar(1.0, first) +
          geometry.arm_mm[kPhi] * std::polar(1.0, second);
 }

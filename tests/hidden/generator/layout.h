@@ -1,6 +1,6 @@
-// A plate of units out of a count and a type of positioner, on a hexagonal lattice filled from the
-// centre. Supply rails are sectors of the plate and buses are stripes across it, so that what
-// belongs to a rail never looks as if it belonged to a bus.
+// A plate of units is made from a count and a type of positioner, on a hexagonal lattice filled
+// from the centre. Supply rails are sectors of the plate and buses are stripes across it. An effect
+// of a rail therefore never looks like one of a bus.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
-// hidden_generate: plants one campaign of a suite. What it writes where is decided by its caller:
-// a campaign's folder for the diagnosis, and, in another call when the verdict is in, the key.
+// hidden_generate plants one campaign of a suite. Its caller decides what it writes: a campaign's
+// folder for the diagnosis, or the key, in another call after the verdict.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

@@ -19,7 +19,7 @@ double HeavyTailed(double freedom, Rng* rng) {
   return normal / std::sqrt(sum / n) * std::sqrt((n - 2.0) / n);  // variance 1
 }
 
-// A random field over the plate that changes from picture to picture and remembers the last.
+// A random field over the plate that changes from picture to picture with memory of the last.
 class Air {
  public:
   Air(const Campaign& campaign, Rng* rng) : rng_(rng) {
@@ -141,7 +141,7 @@ class Recorder {
     for (std::size_t m = 0; m < campaign_.move_count(); ++m)
       out_->bad[m * campaign_.unit_count() + unit] = 1;
   }
-  // A few commands of one unit are logged a whole turn off; the unit went where it should.
+  // A few commands of one unit are logged a whole turn off; the unit went to the right place.
   void Wrap(std::size_t unit, Rng* rng) {
     const std::size_t units = campaign_.unit_count();
     const std::size_t from = 1 + rng->Below(campaign_.move_count() - 1);

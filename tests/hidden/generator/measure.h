@@ -1,5 +1,5 @@
-// What the camera and the log make of a campaign: noise, outliers, holes, swaps, wraps. The clean
-// class has Gaussian noise of one size and nothing else.
+// The measurement of a campaign has the errors of camera and log: noise, outliers, missing rows,
+// swaps, wraps. The clean class has Gaussian noise of one size and nothing else.
 #pragma once
 
 #include <string>
@@ -11,13 +11,13 @@
 
 namespace focalfleet::hidden {
 
-/// By row of the campaign, where not said otherwise.
+/// The measured campaign, by row unless stated otherwise.
 struct Measurement {
   std::vector<Place> place_mm;
   std::vector<char> seen;
-  std::vector<char>
-      counts;             // seen, and not of a stuck unit, which shows nothing of what is planted
-  std::vector<char> bad;  // an outlier, a stuck or swapped unit: nothing that an oracle should fit
+  // Seen, and not of a stuck unit, which shows nothing of what is planted.
+  std::vector<char> counts;
+  std::vector<char> bad;  // an outlier, a stuck or swapped unit: an oracle must not fit it
   std::vector<ByAxis> reported_from_deg;
   std::vector<ByAxis> reported_cmd_deg;
   std::vector<double> reported_temp_C;

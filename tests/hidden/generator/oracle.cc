@@ -1,5 +1,5 @@
-// The oracle knows what was planted, and nothing of the noise: it takes the true contribution away,
-// fits the static geometry to four fifths of the moves, and is judged on the rest.
+// The oracle has the planted effects, but not the noise. The oracle takes the true contribution
+// away, fits the static geometry to four fifths of the moves, and is judged on the rest.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +12,7 @@ namespace {
 using Normal6 = std::array<double, 36>;
 using Vector6 = std::array<double, 6>;
 
-// Gauss with pivots; a direction that the moves do not show keeps what is believed.
+// Gauss' method with pivots; a direction that the moves do not show keeps the believed value.
 Vector6 Solve(Normal6 a, Vector6 b) {
   for (std::size_t i = 0; i < 6; ++i) a[7 * i] += 1e-9 * (1 + a[7 * i]);
   for (std::size_t k = 0; k < 6; ++k) {

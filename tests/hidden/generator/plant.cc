@@ -30,8 +30,8 @@ void AddScatter(const Campaign& campaign, const Truth& truth, std::size_t unit, 
   }
 }
 
-// A leaning axis: the arm's end as it is seen along the plate's normal. Turning by `lean` about an
-// axis in the plate takes (1 - cos) of what is perpendicular to that axis away.
+// The arm of a leaning axis, as seen along the plate's normal. A turn by `lean` about an axis in
+// the plate takes (1 - cos) of the part perpendicular to that axis away.
 Place Foreshortened(const Place& arm, const Place& lean) {
   const double angle = std::abs(lean);
   if (angle <= 0) return arm;

@@ -1,5 +1,5 @@
-// Runs a campaign through a set of effects: where every fibre truly is in every picture. Without
-// effects that is where the shared kinematics put it, to the last bit.
+// The plant runs a campaign through a set of effects and gives every fibre's true place in every
+// picture. Without effects these are the places of the shared kinematics, to the last bit.
 #pragma once
 
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace focalfleet::hidden {
 
-/// What no cause stands for: the true geometry, and the scatter of each axis's rest.
+/// The true state beside the causes: geometry, and the scatter of each axis's rest.
 struct Truth {
   std::vector<Geometry> geometry;  // by unit
   ByAxis actuation_sigma_deg{};    // 0: none; new whenever the axis moves, kept while it rests
@@ -21,12 +21,13 @@ Truth Believed(const Campaign& campaign);
 
 Scene MakeScene(const Campaign& campaign);
 
-/// Shape: (moves), for each of `units`. Cost: O(moves * effects) a unit, some 0.1 to 100 us a move.
+/// The true places. Shape: (moves), for each of `units`. Cost: O(moves * effects) a unit, some 0.1
+/// to 100 us a move.
 std::vector<std::vector<Place>> RunPlant(const Scene& scene, const Truth& truth,
                                          std::span<const Effect> effects,
                                          std::span<const std::size_t> units);
 
-/// 0..n-1.
+/// The indices 0..n-1.
 std::vector<std::size_t> AllUnits(const Campaign& campaign);
 
 }  // namespace focalfleet::hidden

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The noise that visibility is counted against: of the spec, not of its accidents.
+// The noise that visibility is computed with: that of the spec, not of its random realisation.
 NoiseModel ExpectedNoise(const Spec& spec, const Campaign& campaign, const Truth& truth) {
   NoiseModel noise;
   noise.centroid_um.assign(campaign.unit_count(), spec.centroid_um);
@@ -39,7 +39,7 @@ Json UnitsOf(const Campaign& campaign, const Effect& effect) {
   return units;
 }
 
-// Where a common effect of the plate may as well be told as one of all its units.
+// The scopes that are right as well: a common effect of the plate is also one of all its units.
 Json AlsoScope(const Effect& effect) {
   Json also = Json::array();
   const bool mechanical = effect.kind->owners[0] == Owner::kUnit;
@@ -90,7 +90,7 @@ Json EffectJson(const Planted& planted, const Scene& scene, const Effect& effect
     if (rival.cosine > 0.995) equivalent.push_back(rival.cause);
     if (rival.cosine <= 0.995 && distance < 21.6) inseparable.push_back(rival.cause);
   }
-  out["equivalent"] = equivalent;    // no data of these moves could tell them apart
+  out["equivalent"] = equivalent;    // no data of these moves could separate them
   out["inseparable"] = inseparable;  // data of this noise cannot, with 1 % confusion
   out["rivals"] = rivals;
   if (IsForeign(*effect.kind)) out["covariates"] = ForeignCovariates(effect.kind->cause);
@@ -167,7 +167,7 @@ Planted Plant(const Spec& spec) {
   }
   for (std::size_t i = 0; i < spec.causes.size(); ++i) {
     Effect& effect = planted.effects[i];
-    // A sensor's error is seen through the growth that it is read for: that one first.
+    // A sensor's bias is seen through the arms' growth, and is tuned after the growth.
     if (effect.kind->cause == "sensor_bias") continue;
     Tune(scene, planted.truth, noise, seen, spec.lambda_wanted[i] * LambdaScale(effect), &effect);
   }

@@ -1,6 +1,6 @@
-// From a spec to a finished campaign and to its key. Both are functions of the spec alone: the key
-// can be written long after the campaign was handed out, by whoever knows the seed, and is then the
-// key of exactly that campaign.
+// A spec gives a finished campaign and its key. Both are functions of the spec alone. The key can
+// be written from the seed long after the campaign was handed out, and is then the key of exactly
+// that campaign.
 #pragma once
 
 #include <string>
@@ -22,7 +22,8 @@ Planted Plant(const Spec& spec);
 
 struct Key {
   std::string json;
-  std::string contribution_csv;  // unit_id, move_id, cause, dx_um, dy_um: what each effect does
+  // unit_id, move_id, cause, dx_um, dy_um: contribution of each effect.
+  std::string contribution_csv;
 };
 
 Key MakeKey(const Planted& planted);

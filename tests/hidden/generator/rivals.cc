@@ -1,7 +1,7 @@
-// Which other cause could have made this picture: its own signature, run through the same plant on
-// the same commands, is fitted to the effect's, with the static geometry free. A rival has the same
-// freedom as the effect has: one coefficient where the effect is common, one per unit (and phase)
-// where each unit has its own.
+// A rival is another cause that could have made the same picture. Its own signature, run through
+// the same plant on the same commands, is fitted to the effect's, with the static geometry free. A
+// rival has the same freedom as the effect. Common effects have one coefficient, and others have
+// one per unit (and phase).
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -29,7 +29,7 @@ Data DataOf(const Scene& scene, const NoiseModel& noise, const std::vector<char>
   for (std::size_t u = 0; u < effect.weight.size(); ++u)
     if (effect.weight[u] != 0) concerned.push_back(u);
   const std::size_t count = std::min(kUnitsLooked, concerned.size());
-  for (std::size_t i = 0; i < count; ++i)  // evenly over the list, that is over the plate
+  for (std::size_t i = 0; i < count; ++i)  // evenly over the list, and so over the plate
     data.units.push_back(concerned[i * concerned.size() / count]);
   const Truth believed = Believed(campaign);
   const auto with = RunPlant(scene, believed, {&effect, 1}, data.units);
@@ -98,8 +98,9 @@ Effect Probe(const EffectKind& kind, const Effect& of, std::size_t axis, double 
   return probe;
 }
 
-// What turns with the rotor bends where it is large, and two phases no longer span it: the rival is
-// tried as large as the effect, at phases all around, each unit's best for itself.
+// A large effect that turns with the rotor bends, so that two phases no longer span it. The rival
+// is therefore tried as large as the effect, at phases all around, with the best phase of each
+// unit.
 double ExplainedAtItsSize(const Scene& scene, const Data& data, const EffectKind& kind,
                           const Effect& of, std::size_t axis, double shape) {
   constexpr int kPhases = 48;  // 1 - cosine of half a step: 0.002

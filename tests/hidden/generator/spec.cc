@@ -27,7 +27,7 @@ std::vector<std::string> Causes(bool foreign) {
 
 struct Slot {
   std::string kind;
-  std::uint64_t which = 0;  // the how manieth of its kind in the suite
+  std::uint64_t which = 0;  // its number within its kind in the suite
 };
 
 Slot SlotOf(std::uint64_t suite_seed, std::uint64_t index) {
@@ -42,7 +42,7 @@ Slot SlotOf(std::uint64_t suite_seed, std::uint64_t index) {
   return block[index % 20];
 }
 
-// By turns through a shuffled list, shuffled anew in every round.
+// The next cause of a shuffled list, which is shuffled anew in every round.
 std::string ByTurns(std::uint64_t suite_seed, bool foreign, std::uint64_t which) {
   auto causes = Causes(foreign);
   Rng rng = Rng::Stream(suite_seed, foreign ? "foreign" : "causes", which / causes.size());
@@ -50,7 +50,7 @@ std::string ByTurns(std::uint64_t suite_seed, bool foreign, std::uint64_t which)
   return causes[which % causes.size()];
 }
 
-// What cannot show in a design is not drawn for it.
+// Whether the cause can show in the design. Others are not drawn for it.
 bool Shows(const std::string& cause, const std::string& design) {
   static const std::vector<std::string> levers = {
       "load_angle_lag", "relaxation",      "supply_droop", "gravity_torque",
@@ -82,7 +82,7 @@ void DrawDesign(const std::string& wished, Rng* rng, Spec* spec) {
   if (!wished.empty()) design = wished;
   const bool shows = std::all_of(spec->causes.begin(), spec->causes.end(),
                                  [&](const std::string& cause) { return Shows(cause, design); });
-  // Now and then all the same: that these moves cannot show it is for the diagnosis to say.
+  // Sometimes the design stays: the diagnosis has to report that these moves cannot show the cause.
   if (!shows && wished.empty() && rng->Uniform() < 0.85) design = "diagnostic";
   spec->design.design = design;
   const bool diagnostic = design == "diagnostic";
@@ -141,7 +141,7 @@ void DropColumns(Rng* rng, Spec* spec) {
     bool needed = false;
     for (const std::string& cause : spec->causes)
       for (const std::string_view need : FindKind(cause)->columns) needed |= need == column;
-    // Now and then exactly the column that matters goes: the diagnosis must say so.
+    // Sometimes exactly the needed column is dropped: the diagnosis has to report it.
     if (needed && rng->Uniform() < 0.7) continue;
     if (std::find(spec->dropped.begin(), spec->dropped.end(), column) == spec->dropped.end())
       spec->dropped.push_back(column);
@@ -265,7 +265,7 @@ Effect DrawEffect(const EffectKind& kind, const Campaign& campaign, Rng* rng) {
   const double common = rng->Uniform(0, 2 * kPi);
   for (std::size_t u = 0; u < campaign.unit_count(); ++u)
     effect.phase_rad.push_back(effect.owner == Owner::kUnit ? rng->Uniform(0, 2 * kPi) : common);
-  if (kind.cause == "identity_swap") {  // one with another; equal weights mark the pair
+  if (kind.cause == "identity_swap") {  // a pair; equal weights mark it
     std::fill(effect.weight.begin(), effect.weight.end(), 0.0);
     const std::size_t one = rng->Below(campaign.unit_count());
     const std::size_t other =

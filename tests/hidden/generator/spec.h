@@ -1,7 +1,9 @@
-// What one campaign of the suite is made of, drawn from (suite seed, index): the design, the plate,
-// the effects and how visible they shall be, the noise, and what else goes wrong. The kinds come in
-// shuffled blocks of twenty (4 without an effect, 9 with one, 4 with two to four, 3 with one that
-// no library holds), and single causes by turns, so that a suite of any length covers all of them.
+// The spec of one campaign of the suite is drawn from (suite seed, index). The spec has the design,
+// the plate, the effects and their visibility, the noise, and other errors.
+//
+// Kinds come in shuffled blocks of twenty. Each block has 4 without an effect, 9 with one, 4 with
+// two to four, and 3 with one that no library holds. Single causes come in turns, so that a suite
+// of any length covers all of them.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +16,7 @@
 
 namespace focalfleet::hidden {
 
-/// What is wrong beside the effects. All zero in the clean class.
+/// Errors beside the effects. All zero in the clean class.
 struct Nuisances {
   double outlier_share = 0;   // of rows: spots taken for another's, hot pixels
   double missing_share = 0;   // of places
@@ -53,7 +55,7 @@ struct Spec {
   std::vector<std::string> dropped;  // columns
 };
 
-/// What a caller may fix; empty and zero: drawn.
+/// Choices that a caller may fix; empty and zero: drawn.
 struct Wishes {
   std::string kind;
   std::string cause;
@@ -64,10 +66,11 @@ struct Wishes {
   std::size_t moves = 0;
 };
 
+/// The spec of the campaign.
 /// Errors: a wish that names what does not exist.
 Result<Spec> DrawSpec(std::uint64_t suite_seed, std::uint64_t index, const Wishes& wishes);
 
-/// An effect of this cause: axis, owner, who is concerned, phases and shape; size 1.
+/// An effect of this cause: axis, owner, units with it, phases and shape; size 1.
 Effect DrawEffect(const EffectKind& kind, const Campaign& campaign, Rng* rng);
 
 }  // namespace focalfleet::hidden

@@ -1,4 +1,4 @@
-// Intervals for a share of which `hits` in `trials` were seen.
+// Confidence intervals for a share of which `hits` in `trials` were seen.
 #pragma once
 
 namespace focalfleet::hidden {

@@ -1,4 +1,4 @@
-// hidden_score: the verdicts on a suite against its keys.
+// hidden_score scores the verdicts on a suite by its keys.
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>

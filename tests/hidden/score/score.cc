@@ -20,7 +20,7 @@ constexpr std::array<Bin, 6> kBins = {{{"15", 15, 30},
                                        {"250", 250, 1000},
                                        {"1000", 1000, 1e30}}};
 
-// Shares and means are counted where they occur and made into figures at the end.
+// Shares and means are counted where they occur, and become figures at the end.
 class Tally {
  public:
   void Share(const std::string& id, bool hit) {
@@ -82,12 +82,12 @@ class Tally {
   std::map<std::string, int> ratio_trials_;
 };
 
-// Named causes that say something about what was planted: neither geometry nor a true nuisance.
+// Named causes that are claims about what was planted: neither geometry nor a true nuisance.
 std::vector<NamedCause> Claims(const Case& c) {
   std::vector<NamedCause> claims;
   for (const NamedCause& named : c.named)
     if (!IsStatic(named.cause) && c.also_true.count(named.cause) == 0) claims.push_back(named);
-  // A nuisance may be what was planted, too.
+  // A nuisance may also be what was planted.
   for (const NamedCause& named : c.named)
     for (const TrueEffect& effect : c.effects)
       if (named.cause == effect.cause && c.also_true.count(named.cause) != 0)
@@ -128,7 +128,7 @@ void CountNull(const Case& c, Tally* tally) {
 
 void CountGain(const Case& c, const std::string& id, Tally* tally) {
   const double oracle = 1 - std::pow(c.oracle_after_um / c.oracle_before_um, 2);
-  if (!(oracle > 0.02) || c.before_um <= 0) return;  // below, both are chance
+  if (!(oracle > 0.02) || c.before_um <= 0) return;  // below it both are chance
   const double gained = 1 - std::pow(c.after_um / c.before_um, 2);
   tally->Ratio(id, gained, oracle);
   tally->Value(id + "_median", gained / oracle);

@@ -1,5 +1,5 @@
-// The figures by which the diagnosis is judged, over all campaigns of a suite. Each has a name by
-// which a caller may require it, the count it stands on, an interval, and its target.
+// Figures judge the diagnosis over all campaigns of a suite. Each has a name by which a caller may
+// require it, its count, an interval, and its target.
 #pragma once
 
 #include <map>
@@ -23,18 +23,18 @@ struct Figure {
   [[nodiscard]] Interval wilson() const { return Wilson(hits, trials); }
 };
 
-/// true cause -> what was said first -> how often; single effects of the library with lambda >= 50.
+/// true cause -> first named cause -> count; single effects of the library with lambda >= 50.
 using Confusion = std::map<std::string, std::map<std::string, int>>;
 
 struct Score {
   std::vector<Figure> figures;
   Confusion confusion;
-  std::vector<std::string> worst;  // campaigns that were named wrongly and surely, and how
+  std::vector<std::string> worst;  // campaigns with wrong and unambiguous names
 };
 
 Score ScoreCases(const std::vector<Case>& cases);
 
-/// Of one class, as causes.md of the project groups what ordinary campaigns cannot tell apart.
+/// Whether the two causes are of one class: ordinary campaigns cannot separate them.
 bool SameClass(const std::string& a, const std::string& b);
 
 struct Requirement {
@@ -43,11 +43,12 @@ struct Requirement {
   double bound = 0;
 };
 
-/// "exact_100>=0.97" or "null_clean<=0.01". Errors: anything else.
+/// Parses "exact_100>=0.97" or "null_clean<=0.01".
+/// Errors: anything else.
 Result<Requirement> ParseRequirement(const std::string& text);
 
-/// Whether a figure meets a bound; `by_interval`: only when even the near end of its exact interval
-/// misses the bound it is not met. A figure without trials is not met.
+/// Whether a figure meets a bound. With `by_interval` it misses the bound only when the near end of
+/// its exact interval does. A figure without trials does not meet it.
 bool Meets(const Figure& figure, const Requirement& requirement, bool by_interval);
 
 std::string TablesOf(const Score& score);

@@ -9,7 +9,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// What a report leaves out or has in another type is not there; no report may end the scoring.
+// A field that a report leaves out, or has in another type, counts as missing; no report may end
+// the scoring.
 double Number(const Json& from, const char* name) {
   const auto at = from.is_object() ? from.find(name) : from.end();
   return at != from.end() && at->is_number() ? at->get<double>() : 0;
@@ -104,7 +105,7 @@ Result<Case> ReadCase(const std::string& name, const std::string& key, const std
   out.also_true = Words(json, "also_true");
   const Json geometry = Part(json, "static");
   out.static_planted = geometry.find("planted") != geometry.end() && geometry["planted"] == true;
-  const Json lambdas = Part(geometry, "lambda");  // items() of what does not last would dangle
+  const Json lambdas = Part(geometry, "lambda");  // items() of a temporary would dangle
   for (const auto& [cause, lambda] : lambdas.items())
     if (lambda.is_number()) out.static_lambda.emplace_back(cause, lambda.get<double>());
   const Json oracle = Part(json, "oracle");

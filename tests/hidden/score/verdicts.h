@@ -1,5 +1,5 @@
-// One campaign's truth and the verdict on it, read from a key and a report. A report that is not
-// there, or is none, is a verdict that says nothing: it counts as such everywhere.
+// A case is one campaign's truth and the verdict on it, read from a key and a report. A report that
+// is missing, or is none, is an empty verdict: it counts as such everywhere.
 #pragma once
 
 #include <set>
@@ -14,7 +14,7 @@ struct TrueEffect {
   std::string cause;
   bool foreign = false;
   std::string axis;
-  std::set<std::string> scopes;  // that are right
+  std::set<std::string> scopes;  // all that are right
   std::set<int> units;           // empty: all
   double lambda = 0;             // chi-square per freedom, see the key
   double survival = 1;
@@ -24,7 +24,7 @@ struct TrueEffect {
   std::set<std::string> inseparable;
   std::vector<std::string> missing_columns;
   std::vector<std::string> covariates;
-  /// These data can name it: nothing is missing, nothing looks the same.
+  /// Whether these data can name it: nothing is missing, and no other cause looks the same.
   [[nodiscard]] bool Identifiable() const {
     return equivalent.empty() && inseparable.empty() && missing_columns.empty() && survival >= 0.05;
   }
@@ -64,7 +64,8 @@ struct Case {
 
 bool IsStatic(const std::string& cause);
 
-/// Errors: a key that is none. `report` may be any text.
+/// The case of a key and a report. `report` may be any text.
+/// Errors: a key that is none.
 Result<Case> ReadCase(const std::string& name, const std::string& key, const std::string& report);
 
 }  // namespace focalfleet::hidden
