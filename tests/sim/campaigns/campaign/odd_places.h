@@ -1,4 +1,4 @@
-// Campaigns whose places are not what a camera of many digits measures: in steps, or repeated.
+// Odd places are in steps, or repeated, other than those of a camera with many digits.
 #pragma once
 
 #include <cmath>
@@ -17,8 +17,8 @@ inline Campaign InSteps(Campaign campaign, double step_mm) {
   return campaign;
 }
 
-/// In each exposure a share of the units is moved, at random; the others stay, and their row
-/// repeats the place before where `carried_on`, else it is missing.
+/// A campaign in which a random share of the units is moved in each exposure. The others stay, and
+/// their row repeats the place before where `carried_on`, else it is missing.
 inline Campaign MovedInTurns(Campaign campaign, double share_moved, bool carried_on,
                              std::uint64_t seed = 1) {
   Rng rng = Rng::Stream(seed, "turns");
@@ -38,7 +38,7 @@ inline Campaign MovedInTurns(Campaign campaign, double share_moved, bool carried
   return campaign;
 }
 
-/// The exposure's places are those of the exposure before, of this share of the units.
+/// A campaign in which this share of the units has the places of the exposure before.
 inline Campaign ReadTwice(Campaign campaign, std::size_t exposure, double share = 1,
                           std::uint64_t seed = 1) {
   Rng rng = Rng::Stream(seed, "stale");

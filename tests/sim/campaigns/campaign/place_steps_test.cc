@@ -44,7 +44,7 @@ TEST(PlaceSteps, AreNotHiddenByAFewOtherPlaces) {
 
 TEST(PlaceSteps, OfAFewPlacesAreTheirDigits) {
   EXPECT_NEAR(FindStep(std::vector<double>{1.2, kMissing, 3.4, 5.7}), 0.1, 1e-12);
-  EXPECT_EQ(FindStep(std::vector<double>{7, 7, kMissing}), 0);  // one place tells nothing
+  EXPECT_EQ(FindStep(std::vector<double>{7, 7, kMissing}), 0);  // a single place shows no step
   EXPECT_EQ(FindStep({}), 0);
 }
 

@@ -20,7 +20,7 @@ Campaign Plain(std::uint64_t seed = 7) {
   return Planted({}, {.units = 24, .moves = 40, .seed = seed});
 }
 
-// Rows that were told to stay, and have the place before.
+// Rows that were commanded to stay, and have the place before.
 std::vector<std::size_t> RowsThatRepeat(const Campaign& campaign) {
   std::vector<std::size_t> rows;
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit)
@@ -66,7 +66,7 @@ TEST(RepeatedPlaces, OfUnitsThatWereNotMovedAreCarriedOn) {
   }
 }
 
-// In steps, too, while these are not so wide that nobody could tell.
+// Rounded places are carried on too, as long as the steps are not too wide to show it.
 TEST(RepeatedPlaces, ThatAreRoundedAreCarriedOn) {
   for (const double step_mm : {1e-4, 1e-3, 1e-2}) {
     const Campaign campaign = InSteps(MovedInTurns(Plain(), 0.5, true), step_mm);
@@ -88,13 +88,14 @@ TEST(RepeatedPlaces, OfUnitsAtRestThatWereMeasuredAreNone) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Campaign campaign = AtRest(3e-3, seed);
     EXPECT_TRUE(FindRepeatedPlaces(campaign).empty());
-    // Some meet by chance on a grid that is about as fine as the noise; nearly all on a coarse one.
+    // On a grid about as fine as the noise some places meet by chance; on a coarse one nearly all
+    // do.
     for (const double step_mm : {1e-4, 1e-3, 3e-3, 1e-2, 0.2})
       EXPECT_TRUE(FindRepeatedPlaces(InSteps(campaign, step_mm)).empty()) << step_mm;
   }
 }
 
-// The units may have been told to make long moves, short ones, or none.
+// The units may have been commanded to make long moves, short ones, or none.
 TEST(RepeatedPlaces, OfAWholeExposureAreACopy) {
   const Campaign fine = Plain();
   for (std::size_t exposure = 1; exposure < 40; ++exposure) {
@@ -109,7 +110,7 @@ TEST(RepeatedPlaces, OfAWholeExposureAreACopy) {
   }
 }
 
-// Moves of some micrometres, which play may keep back in one unit or another, and never in all.
+// Moves of some micrometres, which play may hold back in one unit or another, and never in all.
 TEST(RepeatedPlaces, OfAWholeExposureOfShortMovesAreACopy) {
   Campaign campaign = Plain();
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
@@ -132,7 +133,7 @@ TEST(RepeatedPlaces, OfMostUnitsThatWereMovedFarAreACopy) {
   EXPECT_THAT(FindRepeatedPlaces(ReadTwice(fine, exposure, 0.2)).copied, IsEmpty());
 }
 
-// A command that was lost, or a unit that is stuck: the diagnosis has names for these.
+// A command that was lost, or a unit that is stuck, has names in the diagnosis.
 TEST(RepeatedPlaces, OfAUnitThatWasToMoveAreNone) {
   Campaign campaign = Plain();
   for (std::size_t row = campaign.first_row[3] + 1; row < campaign.first_row[4]; ++row) {

@@ -1,4 +1,4 @@
-// Names against an empirical term that does better.
+// Names are compared with an empirical term that does better.
 #include "sim/campaigns/diagnosis/beaten.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// Of some units; no gear has it.
+// A ripple of some units that no gear has.
 Campaign Rippled(double order, double size_deg, std::uint64_t seed,
                  const std::vector<std::size_t>& units = {4, 13}) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = seed});
@@ -36,7 +36,7 @@ TEST(Beaten, ARippleThatNoGearHasIsNoSeriesOfTeeth) {
   for (const double order : {5.0, 3.7}) {
     const Diagnosis diagnosis = Verdicts(Rippled(order, 0.1, 3));
     EXPECT_EQ(diagnosis.verdict, Verdict::kUnknown) << order << Reported(diagnosis);
-    for (const CauseFound& cause : diagnosis.causes)  // half a wave is a zero that is off
+    for (const CauseFound& cause : diagnosis.causes)  // half a wave looks like a wrong zero
       EXPECT_EQ(cause.cause, "zero_offset") << order << Reported(diagnosis);
     ASSERT_EQ(diagnosis.unknown.size(), 1u);
     EXPECT_EQ(diagnosis.unknown[0].channel, "theta angle");
@@ -50,7 +50,7 @@ void ExpectNamed(const std::vector<std::string>& names, const Diagnosis& diagnos
   EXPECT_TRUE(diagnosis.unknown.empty()) << Reported(diagnosis);
 }
 
-// One unit's few moves see a few crests of it, which are as many bumps.
+// A single unit's few moves pass a few crests of the ripple, which look like as many bumps.
 TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
   for (const std::uint64_t seed : {3u, 4u}) {
     SCOPED_TRACE(seed);
@@ -61,8 +61,8 @@ TEST(Beaten, ARippleOfOneUnitIsNoTooth) {
   }
 }
 
-// The teeth's own wave, and what one side of the gear has more of it, in each unit its own: a
-// ripple of their order is cheaper than both, and no better than the wave.
+// The teeth's wave is deeper on one side of the gear, differently in each unit. A ripple of the
+// teeth's order is cheaper than both parts, and no better than the wave.
 TEST(Beaten, ARippleOfTheTeethsOwnOrderIsTheTeeth) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   std::vector<double> phase_of_row;
@@ -110,7 +110,7 @@ TEST(Beaten, TwoPartsThatAreThereKeepTheirNames) {
           {.units = 24, .moves = 120, .seed = 4})));
 }
 
-// A curve does for the scale of all units; the ripple, whose many amplitudes cost what they
+// A curve replaces the scale of all units. The ripple, whose many amplitudes cost what they
 // explain, is no part of it.
 TEST(Beaten, ARippleBesideAScaleOfAllUnitsIsNoSeries) {
   ExpectNamed(
@@ -137,7 +137,7 @@ TEST(Beaten, ANameBesideAStrongerStructureKeepsIts) {
       << Reported(diagnosis);
 }
 
-// Play that opens all at once as it grows cold, which no form of the library does.
+// Play that opens suddenly as it grows cold, which no form of the library does.
 TEST(Beaten, ABendOfItsOwnColumnIsTheCausesShape) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 3});
   const std::vector<double>& temperature =

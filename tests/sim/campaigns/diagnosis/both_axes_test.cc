@@ -1,4 +1,4 @@
-// Causes that have one amplitude for both axes, against those that have one on each.
+// Causes with one amplitude for both axes are compared with those that have one on each.
 #include "sim/campaigns/diagnosis/both_axes.h"
 
 #include <gmock/gmock.h>
@@ -8,7 +8,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// As many move at once in all moves.
+// The same number of units moves at once in all moves.
 Campaign PlayOfBothAxes(double play_deg, std::uint64_t seed) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = play_deg, .axis = "theta"},
                                {.cause = "backlash", .amplitude = play_deg, .axis = "phi"}},
@@ -35,8 +35,8 @@ TEST(BothAxes, PlayOfBothIsNoDroop) {
     }
 }
 
-// Of a large play each axis by itself explains next to nothing: the other's is noise to it. In
-// moves of one drive, with nobody's place on the rail, a droop is the same step of both axes.
+// Large play on one axis explains next to nothing, because the other axis' play is noise to it. In
+// moves of one drive, with no known places on the rail, a droop is the same step of both axes.
 TEST(BothAxes, ALargePlayOfBothIsNoDroopEither) {
   Campaign campaign = PlayOfBothAxes(0.4, 3);
   std::erase_if(campaign.covariates,

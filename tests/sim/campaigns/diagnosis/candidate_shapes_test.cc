@@ -19,7 +19,7 @@ double PlaceOf_deg(std::uint32_t unit) { return std::fmod(222.5 * (unit + 1), 36
 
 double Apart_deg(double a, double b) { return std::abs(std::remainder(a - b, 360)); }
 
-// A tooth elsewhere in each unit's pinion, broader than the library's.
+// A damaged tooth elsewhere in each unit's pinion, broader than the library's.
 void DamageTeeth(const std::function<bool(std::uint32_t unit)>& has, Campaign* campaign,
                  double width_deg = 15) {
   std::vector<std::size_t> unit_of(campaign->rows());
@@ -49,7 +49,7 @@ TEST(OwnShapes, TeethElsewhereInEachUnitAreOneCause) {
   ASSERT_EQ(diagnosis.model.terms.size(), 1u);
   const auto& shapes = diagnosis.model.terms[0].form.shape_of_unit;
   ASSERT_EQ(shapes.size(), campaign.units.size());
-  // A few units hardly came by their tooth.
+  // A few units hardly passed their tooth.
   EXPECT_GE(std::ranges::count_if(
                 shapes,
                 [](const auto& own) { return Apart_deg(own.second, PlaceOf_deg(own.first)) < 8; }),
@@ -81,7 +81,7 @@ TEST(OwnShapes, FewUnitsAmongManyHaveTheirs) {
   EXPECT_EQ(diagnosis.causes[0].units, damaged);
 }
 
-// The model is sought once more where the image moves.
+// The model is selected once more where the image moves.
 TEST(OwnShapes, StayWhereTheImageMoves) {
   Campaign campaign =
       Planted({{.cause = "air_turbulence", .amplitude = 4}}, {.units = 24, .moves = 80, .seed = 8});

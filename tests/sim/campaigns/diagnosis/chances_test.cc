@@ -1,4 +1,4 @@
-// Tails of the distributions that names are judged by, against sums by hand.
+// Tails of the distributions that names are judged by are compared with sums by hand.
 #include "sim/campaigns/diagnosis/chances.h"
 
 #include <gtest/gtest.h>

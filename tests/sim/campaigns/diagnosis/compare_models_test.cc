@@ -17,7 +17,7 @@ CampaignModel Nominal(const Campaign& campaign) {
   return model;
 }
 
-// Gears that turn by a share more than was thought.
+// Gears that turn by a share more than in the table.
 Campaign Geared(double share, std::uint64_t seed) {
   return Planted({{.cause = "gear_scale", .amplitude = share}},
                  {.units = 24, .moves = 80, .seed = seed});
@@ -90,7 +90,8 @@ TEST(CompareModels, AFleetThatHasDriftedIsFound) {
   EXPECT_EQ(gear.a->units, 24u);
 }
 
-// Models that are as far from the truth on either side: which of them wins is chance.
+// Both models are equally far from the truth on either side, so that chance decides which is
+// better.
 TEST(CompareModels, NoiseSeldomPrefersAModel) {
   int preferred = 0;
   constexpr std::uint64_t kCampaigns = 60;
@@ -101,7 +102,8 @@ TEST(CompareModels, NoiseSeldomPrefersAModel) {
     for (CampaignUnit& unit : b.units) unit.base_x_mm -= 0.003;
     if (Compared(a, b, campaign).preference != Preference::kNone) ++preferred;
   }
-  // Of 60 at 5 %; the rest errors of axes last longer than an exposure and add a few.
+  // The expected number of 60 at 5 % is 3; the axes' rest errors last longer than an exposure and
+  // add a few.
   EXPECT_LE(preferred, 10);
 }
 
@@ -109,7 +111,7 @@ TEST(CompareModels, WhatBothMissByFarIsLeftOutAndCounted) {
   const Campaign campaign =
       Planted({}, {.units = 24, .moves = 80, .seed = 6, .outlier_share = 0.01, .lost_share = 0.02});
   const CampaignModel ideal = Nominal(campaign);
-  CampaignModel off = ideal;  // in one exposure, far off by this model alone: its rows stay
+  CampaignModel off = ideal;  // far off in one exposure, by this model alone: its rows stay
   off.exposures.assign(80, {});
   off.exposures[7].shift_x_um = 200;
   const ModelComparison result = Compared(ideal, off, campaign);
@@ -119,7 +121,7 @@ TEST(CompareModels, WhatBothMissByFarIsLeftOutAndCounted) {
   EXPECT_GT(result.left_out.at("not seen"), 20u);
   EXPECT_GT(result.left_out.at("far off by both models"), 10u);
   EXPECT_LT(result.left_out.at("far off by both models"), 30u);
-  EXPECT_LT(result.a.rms_um, 8);  // the outliers' is above 100
+  EXPECT_LT(result.a.rms_um, 8);  // that of the outliers is above 100
   EXPECT_GT(result.b.rms_um, 15);
   EXPECT_EQ(result.preference, Preference::kNone) << "by a single exposure";
 }

@@ -43,8 +43,9 @@ TEST_P(EveryEffect, IsNamedAndMeasured) {
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_THAT(diagnosis.causes[0].candidates, Contains(plant.cause)) << Reported(diagnosis);
   EXPECT_TRUE(diagnosis.unknown.empty()) << Reported(diagnosis);
-  if (diagnosis.causes[0].cause != plant.cause) return;  // an honest tie
-  // A quarter, and a little: another shape of the same cause counts its amplitude another way.
+  if (diagnosis.causes[0].cause != plant.cause) return;  // a true tie
+  // The tolerance is wide because another shape of the same cause has another scale of its
+  // amplitude.
   EXPECT_NEAR(std::abs(diagnosis.causes[0].amplitude), plant.amplitude, 0.3 * plant.amplitude);
 }
 
@@ -166,7 +167,7 @@ TEST(Diagnosis, IsTheSameBitForBitOnTwoThreads) {
   EXPECT_EQ(one.x_after_um, two.x_after_um);
 }
 
-// The plate turned under the sky, with all that is told of it: base, zero of theta, places.
+// The plate turned under the sky, with base, zero of theta and places.
 Campaign Turned(Campaign campaign, double turn_deg) {
   const std::complex<double> turn = std::polar(1.0, turn_deg * std::numbers::pi / 180);
   for (CampaignUnit& unit : campaign.units) {
@@ -199,7 +200,7 @@ TEST_P(OnATurnedPlate, TheCausesAreTheSame) {
               0.02 * std::abs(straight.causes[0].amplitude));
 }
 
-// Without those of gravity and of pixels, which do not turn with it.
+// Effects of gravity and of pixels are left out: they do not turn with the plate.
 INSTANTIATE_TEST_SUITE_P(
     Planted, OnATurnedPlate,
     testing::Values(Plant{"gear_scale", "theta", 3e-4}, Plant{"backlash", "theta", 0.05},
@@ -209,7 +210,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Plant{"self_heating", "theta", 0.1}),
     [](const auto& plant) { return std::string(plant.param.cause); });
 
-// Large as it is, it is an amplitude that can be.
+// The amplitude is large, but possible.
 TEST(Diagnosis, WhatOneUnitDoesAlmostAloneIsNamed) {
   const Diagnosis diagnosis = Verdicts(
       Planted({{.cause = "gravity_torque", .amplitude = 2.5, .axis = "phi", .unit_share = 0.04}}));
@@ -301,7 +302,7 @@ TEST(Diagnosis, TheScatterOfHomingsIsWhatTheirZerosDoAtTheFibre) {
     Fit fit = StaticFit(facts);
     FreeHomings(&fit);
     const HomingScatter scatter = ScatterOfHomings(fit);
-    // Of what is planted each unit's own zero takes a part; noise alone makes below 2 um.
+    // Each unit's own zero takes a part of what is planted; noise alone makes below 2 um.
     const double planted_um = 1e3 * 16.5 * sigma_deg * std::numbers::pi / 180;
     EXPECT_LT(scatter.both_um(), planted_um + 2.5);
     EXPECT_GT(scatter.both_um(), 0.5 * planted_um);

@@ -34,7 +34,7 @@ double Turn(const Campaign& campaign, std::size_t row) {
 }
 
 TEST(Distortion, WhatABentCauseLeavesGoesBesideItsBend) {
-  // Once a turn, bent: the third order is in it at a ninth of its size.
+  // A wave once a turn is bent: the third order is in it at a ninth of its size.
   Campaign campaign = Planted({}, {.units = 24, .moves = 100, .seed = 21});
   TurnTheta(
       [&](std::size_t row) {
@@ -62,7 +62,7 @@ TEST(Distortion, AWeakCauseBesideAStrongOneIsKept) {
   EXPECT_FALSE(judged[1].is_doubtful()) << judged[1].kept;
 }
 
-// The stop's angle in one unit is twice what the torque turns them all by.
+// The stop's angle in one unit is twice the angle by which the torque turns them all.
 TEST(Distortion, WhatIsLargerThanTheStrongOneIsNotWhatItsShapeLeaves) {
   for (const auto& [form, size] : {std::pair(11, 0.05), {13, 0.02}}) {
     const Diagnosis diagnosis =

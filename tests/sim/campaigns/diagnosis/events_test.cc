@@ -1,4 +1,4 @@
-// Steps in single units' angles: slips by whole turns of the rotor, moves that were not made.
+// Steps in single units' angles are slips by whole turns of the rotor, or moves that were not made.
 #include "sim/campaigns/diagnosis/events.h"
 
 #include <gmock/gmock.h>
@@ -17,7 +17,7 @@ using testing::ElementsAre;
 
 constexpr double kRadians = std::numbers::pi / 180;
 
-// Moves the fibre as if theta stood `by_deg` off from the unit's row `from` on.
+// Moves the fibre as if theta were off by `by_deg` from the unit's row `from` on.
 void TurnTheta(std::size_t unit, std::size_t from, std::size_t count, double by_deg,
                Campaign* campaign) {
   const CampaignUnit& u = campaign->units[unit];
@@ -57,7 +57,8 @@ TEST(Events, ASlipOfTwoTurnsIsFoundInItsUnit) {
 }
 
 TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
-  // Stretched, the arm's places do not tell theta from phi; small moves of theta all around.
+  // Places of a stretched arm do not separate theta from phi, and theta makes small moves all
+  // around.
   Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 4});
   constexpr std::size_t kUnit = 5, kFrom = 30, kSlipAt = 36, kBackAt = 81;
   const CampaignUnit& u = campaign.units[kUnit];
@@ -85,7 +86,8 @@ TEST(Events, ASlipInAStretchedArmThatALaterOneUndoesIsNoLostCommand) {
 }
 
 TEST(Events, NoiseOfAFoldedArmIsNoSlip) {
-  // Folded, theta moves the fibre next to nothing: noise of places is whole turns of its angle.
+  // With a folded arm theta moves the fibre next to nothing: noise of places is whole turns of its
+  // angle.
   Campaign campaign = Planted({}, {.units = 100, .moves = 240, .seed = 4});
   Rng rng = Rng::Stream(4, "folded");
   for (std::size_t unit = 0; unit < campaign.units.size(); ++unit) {
@@ -122,12 +124,13 @@ TEST(Events, ALastMoveThatDidNotHappenIsALostCommand) {
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "lost_command");
   EXPECT_EQ(diagnosis.causes[0].units, stayed);
-  EXPECT_EQ(diagnosis.causes[0].amplitude, 2);  // moves, of whichever axes
+  EXPECT_EQ(diagnosis.causes[0].amplitude, 2);  // moves, of any axes
   EXPECT_EQ(diagnosis.outliers.rows, 0u);
 }
 
-// Most of the rows come after the last of three, which no single one explains; the geometry that
-// most rows agree on is not the unit's, and its arms then stand far from where they were told to.
+// Most rows come after the last of three lost commands, and no single one explains them. The
+// geometry that most rows agree on is not the unit's, and its arms are then far from their
+// commands.
 TEST(Events, CommandsLostOneSoonAfterTheOtherAreAllFound) {
   constexpr std::size_t kUnit = 7, kLost = 3;
   for (const std::uint64_t seed : {4u, 5u, 6u, 8u}) {
@@ -162,7 +165,7 @@ TEST(Events, CommandsLostOneSoonAfterTheOtherAreAllFound) {
 }
 
 TEST(Events, AUnitThatDriftsStandsNowhereElse) {
-  // Steps of any size follow a slow drift as far as the eye sees.
+  // Steps of any size can follow a slow drift everywhere.
   Campaign campaign = Planted({}, {.units = 24, .moves = 120, .seed = 2});
   constexpr std::size_t kUnit = 5;
   const std::size_t moves = campaign.first_row[kUnit + 1] - campaign.first_row[kUnit];
@@ -173,8 +176,8 @@ TEST(Events, AUnitThatDriftsStandsNowhereElse) {
 }
 
 TEST(Events, ACommandLostNearTheBeginningIsFoundWhateverTheTableSays) {
-  // A few places before it, and a table that is off by more than noise: neither the fitted geometry
-  // nor the table's is that of the rows before and behind.
+  // Few places come before the step, and the table is off by more than noise. Neither the fitted
+  // geometry nor the table's is that of the rows before and after.
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 5});
   constexpr std::size_t kUnit = 7;
   const std::size_t first = campaign.first_row[kUnit];
@@ -232,7 +235,8 @@ TEST(Events, AUnitThatSlipsAgainAndAgainIsNoNoisyUnit) {
   const Diagnosis diagnosis = Verdicts(campaign);
   ASSERT_EQ(diagnosis.causes.size(), 1u) << Reported(diagnosis);
   EXPECT_EQ(diagnosis.causes[0].cause, "step_loss");
-  EXPECT_NEAR(diagnosis.causes[0].amplitude, kSlips, 2);  // where poses do not tell, none is seen
+  EXPECT_NEAR(diagnosis.causes[0].amplitude, kSlips,
+              2);  // no slip is seen where poses do not show it
 }
 
 TEST(Events, TwoRowsOffByTwoTurnsAreOutliers) {
@@ -251,7 +255,7 @@ TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
   constexpr std::size_t kUnit = 7;
   std::size_t move = 40;
   const auto row_of = [&](std::size_t i) { return campaign.first_row[kUnit] + i; };
-  // One that turns theta alone, so that turning the places back is exact.
+  // A move that turns theta alone, so that turning the places back is exact.
   while (campaign.cmd_deg[kPhi][row_of(move)] != campaign.from_deg[kPhi][row_of(move)] ||
          std::abs(campaign.cmd_deg[kTheta][row_of(move)] -
                   campaign.from_deg[kTheta][row_of(move)]) < 2)
@@ -265,7 +269,7 @@ TEST(Events, AMoveThatWasNotMadeIsALostCommand) {
   EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[kUnit].id));
 }
 
-// Moves the fibre as if both axes stood off from the unit's row `from` on.
+// Moves the fibre as if both axes were off from the unit's row `from` on.
 void StandElsewhere(std::size_t unit, std::size_t from, double theta_deg, double phi_deg,
                     Campaign* campaign) {
   CampaignUnit off = campaign->units[unit];
@@ -321,7 +325,7 @@ TEST(Events, NeighboursThatStopShortInOneMoveHaveTouched) {
   const Diagnosis diagnosis = Diagnose(campaign, {});
   ASSERT_FALSE(diagnosis.causes.empty());
   EXPECT_EQ(diagnosis.causes[0].cause, "collision_contact");
-  // Where they stand is known to some thousandths of a degree: what is left is a zero's.
+  // Their angles are known to some thousandths of a degree: the rest is a zero's.
   for (std::size_t k = 1; k < diagnosis.causes.size(); ++k)
     EXPECT_EQ(diagnosis.causes[k].cause, "zero_offset") << Reported(diagnosis);
   EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[0].id, campaign.units[1].id));
@@ -352,7 +356,7 @@ TEST(Events, AUnitThatANeighbourStopsAfterWholeTurnsHasTouchedIt) {
   EXPECT_THAT(diagnosis.causes[0].units, ElementsAre(campaign.units[0].id, campaign.units[1].id));
 }
 
-// Arms that met on their way may end far apart: their gap there says nothing about others.
+// Arms that met on their way may end far apart: their gap there is no evidence about others.
 TEST(Events, SlipsOfOthersBesideAContactAreSlips) {
   const Campaign plain = Planted({}, {.units = 24, .moves = 200, .seed = 6});
   const CampaignFacts facts = MakeFacts(plain);

@@ -16,8 +16,8 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-// The table has one unit's moves under the other's name from this move on: what was measured is
-// what the other's moves did. Pre: both have as many rows; none is homed after it.
+// The table has one unit's moves under the other's name from this move on: the measured places are
+// those of the other's moves. Pre: both have as many rows; none is homed after it.
 void ExchangeMoves(std::size_t a, std::size_t b, std::size_t since, Campaign* campaign) {
   const std::size_t end = campaign->first_row[a + 1] - campaign->first_row[a];
   for (const std::size_t axis : {kTheta, kPhi}) {
@@ -53,7 +53,7 @@ TEST(Exchanged, UnitsThatMakeEachOthersMovesAreFound) {
   }
 }
 
-/// The places of two units under each other's name in these moves.
+/// Exchanges the places of two units in these moves.
 void ExchangePlacesOf(std::size_t a, std::size_t b, std::size_t begin, std::size_t end,
                       Campaign* campaign) {
   for (std::size_t move = begin; move < end; ++move)
@@ -101,7 +101,7 @@ TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
   Campaign campaign = right;
   ExchangePlacesOf(3, 9, 10, 20, &campaign);
   ExchangePlacesOf(3, 9, 25, 60, &campaign);
-  // Off anywhere, and not seen: these say nothing about names.
+  // Rows that are off, or were not seen, are no evidence about names.
   campaign.x_mm[campaign.first_row[3] + 14] += 1.5;
   campaign.x_mm[campaign.first_row[9] + 59] = std::numeric_limits<double>::quiet_NaN();
   const CampaignFacts facts = MakeFacts(campaign);
@@ -119,7 +119,7 @@ TEST(Exchanged, NamesMayBeWrongTwiceAndPlacesUnseen) {
   EXPECT_EQ(diagnosis.causes[0].shape, "units 4 and 10 in moves 11 to 20 and since move 26");
 }
 
-// Exposures have numbers in the order in which they are met, unit by unit.
+// Exposures are numbered in the order in which they appear, unit by unit.
 TEST(Exchanged, OfAFirstUnitThatLacksMovesFollowsNothing) {
   Campaign right = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::vector<bool> keep(right.rows(), true);
@@ -145,8 +145,8 @@ TEST(Exchanged, NamesAreFoundWhereTheTableIsOffForAllUnits) {
   EXPECT_EQ(swaps[0].b, 9u);
 }
 
-// Neighbours that are given each other's spot now and then: no cause of an axis, whatever they are
-// near to.
+// Neighbours that sometimes get each other's spot are no cause of an axis, whatever they are near
+// to.
 TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 5});
   std::size_t exchanged = 0;
@@ -161,7 +161,7 @@ TEST(Exchanged, RowsUnderAnothersNameNowAndThenAreOutliers) {
   EXPECT_EQ(diagnosis.outliers.why.at("at another unit's place"), exchanged);
 }
 
-// Zeros anywhere put fibres near others' places by chance, now and then.
+// Random zeros put fibres near others' places by chance, now and then.
 TEST(Exchanged, WhereTheTableIsWrongNobodyIsAtAnothersPlace) {
   std::size_t exchanged = 0;
   for (const std::uint64_t seed : {3u, 4u, 5u, 6u}) {

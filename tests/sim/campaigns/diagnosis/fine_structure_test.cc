@@ -1,4 +1,4 @@
-// What varies too fast for a smooth curve, and outliers that cluster at one place.
+// Structure that varies too fast for a smooth curve, and outliers that cluster at one place.
 #include "sim/campaigns/diagnosis/fine_structure.h"
 
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-// The only thing that is unknown, or nothing.
+// The only unknown structure, or none.
 UnknownFound OnlyUnknown(const Diagnosis& diagnosis) {
   EXPECT_EQ(diagnosis.unknown.size(), 1u) << Reported(diagnosis);
   return diagnosis.unknown.empty() ? UnknownFound{} : diagnosis.unknown.front();
@@ -73,7 +73,7 @@ TEST(FineStructure, ChanceShowsItNoMoreOftenThanItSays) {
   for (std::uint64_t seed = 1; seed <= kCampaigns; ++seed) {
     const Campaign campaign = Planted({}, {.units = 24, .moves = 40, .seed = seed});
     const CampaignFacts facts = MakeFacts(campaign);
-    // However small a share of the noise it is.
+    // Even the smallest share of the noise is accepted here.
     if (FindFineStructure(StaticFit(facts), kRate, 0)) ++shown;
   }
   EXPECT_LE(shown, kShareOfRate * kRate * kCampaigns);
@@ -98,13 +98,13 @@ TEST(Cluster, ChanceShowsItNoMoreOftenThanItSays) {
   }
 }
 
-// Rows up to 2 mm off: anywhere, or only where theta stands between 40 and 48 degrees.
-Campaign WithFarRows(bool crowded) {
+// Rows up to 2 mm off: anywhere, or only where theta is between 40 and 48 degrees.
+Campaign WithFarRows(bool clustered) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   Rng rng = Rng::Stream(8, "far rows");
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     const double theta_deg = campaign.cmd_deg[kTheta][row];
-    if (crowded ? theta_deg < 40 || theta_deg > 48 : rng.Uniform() > 0.02) continue;
+    if (clustered ? theta_deg < 40 || theta_deg > 48 : rng.Uniform() > 0.02) continue;
     campaign.x_mm[row] += rng.Uniform(-1.4, 1.4);
     campaign.y_mm[row] += rng.Uniform(-1.4, 1.4);
   }
@@ -119,7 +119,8 @@ TEST(Cluster, OutliersAtOneAngleAreUnknown) {
   EXPECT_EQ(unknown.channel, "rows far from every prediction");
 }
 
-// As many of the rows up to 2 mm off whose arm comes as near to a neighbour's; and some anywhere.
+// A share of the rows is up to 2 mm off where the arm comes as near to a neighbour's; some others
+// are off anywhere.
 Campaign Touched(double gap_mm, double share) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8, .outlier_share = 0.003});
   const CampaignFacts facts = MakeFacts(campaign);
@@ -142,8 +143,8 @@ TEST(Cluster, OutliersWhereArmsAreNearestHaveTouched) {
   EXPECT_GE(diagnosis.causes[0].amplitude, 10);
 }
 
-// Arms that lean on each other as long as they stand so near are far for many rows; and no window
-// is as wide as all of them.
+// Arms that press on each other as long as they are so near are far for many rows. No window is as
+// wide as all of these.
 TEST(Cluster, ContactsThatLastAndAreManyLeaveNothingUnknown) {
   Campaign campaign = Planted({}, {.units = 90, .moves = 200, .seed = 8, .outlier_share = 0.003});
   const CampaignFacts facts = MakeFacts(campaign);
@@ -153,7 +154,7 @@ TEST(Cluster, ContactsThatLastAndAreManyLeaveNothingUnknown) {
   double dx_mm = 0, dy_mm = 0;
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
     if (gap.values[row] > 2.8) continue;
-    // The same as long as it stands.
+    // The error stays as long as the arm does.
     if (row == 0 || gap.values[row] != gap.values[row - 1])
       dx_mm = rng.Uniform(-1.4, 1.4), dy_mm = rng.Uniform(-1.4, 1.4), ++visits;
     campaign.x_mm[row] += dx_mm, campaign.y_mm[row] += dy_mm, ++rows;
@@ -177,7 +178,7 @@ TEST(Cluster, ContactsAreUnknownToALibraryWithoutThem) {
   EXPECT_EQ(OnlyUnknown(Verdicts(Touched(1.5, 0.9), options)).covariate, kArmGap);
 }
 
-// A walk of its own is noise to a unit, and not to those who look after it.
+// A random walk of its own is noise to the unit's fit, but the unit has to be named.
 TEST(Cluster, AUnitThatIsFarMoreOffThanOthersIsNamed) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 60, .seed = 8});
   Rng rng = Rng::Stream(8, "walks");

@@ -1,4 +1,4 @@
-// Motion of the whole image: its own unrest, the air's, or something that the table knows.
+// The whole image moves by its own unrest, by the air, or with a column of the table.
 #include "sim/campaigns/diagnosis/image.h"
 
 #include <gmock/gmock.h>
@@ -25,7 +25,7 @@ struct Shift {
   double x_um, y_um;
 };
 
-// A campaign whose image is shifted at each exposure; `shift` knows the exposure's index.
+// A campaign whose image is shifted at each exposure; `shift` takes the exposure's index.
 Campaign Shifted(const std::function<Shift(std::size_t)>& shift) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = 8});
   const Exposures exposures = FindExposures(campaign);
@@ -48,7 +48,7 @@ TEST(Image, AWanderingImageIsTheCameras) {
   EXPECT_THAT(diagnosis.unknown, IsEmpty()) << Reported(diagnosis);
 }
 
-// Units go anywhere, and then all step alike, most steps short, now one axis and now the other.
+// Units go anywhere, and then all make the same step, most steps short, on one axis or the other.
 Campaign SteppingAlike(std::uint64_t seed) {
   constexpr double kSteps_deg[] = {0.2, 0.5, 1, 2, 5, 20};
   PlantedOptions options{.units = 16, .moves = 40, .seed = seed};
@@ -67,7 +67,7 @@ Campaign SteppingAlike(std::uint64_t seed) {
   return Planted({}, options);
 }
 
-// What units do all alike shifts the image, and its wander passes for a cause of theirs.
+// Common motion of all units shifts the image, and its wander may look like a cause of theirs.
 TEST(Image, AWanderIsNoCauseOfUnitsThatStepAlike) {
   for (const std::uint64_t seed : {3u, 4u}) {
     Campaign campaign = SteppingAlike(seed);
@@ -157,7 +157,7 @@ TEST(Image, OnlyOneThatMovesAlongALineMayBeGravitys) {
   }
 }
 
-// Shifted, and deformed, anew at each exposure: um at the plate's edge.
+// An image that is shifted and deformed anew at each exposure: um at the plate's edge.
 Campaign Deformed(std::size_t units, double turn_and_scale_um, double shear_um) {
   Campaign campaign = Planted({}, {.units = units, .moves = 80, .seed = 8});
   const Exposures exposures = FindExposures(campaign);
@@ -194,7 +194,7 @@ TEST(Image, OneThatShearsAsMuchIsAir) {
   }
 }
 
-// Three half turns in the course of the campaign. Shape: (exposures)
+// Three half turns in the course of the campaign. Shape: (exposures).
 std::vector<double> SlowPhase(const Campaign& campaign) {
   const Exposures exposures = FindExposures(campaign);
   const std::span<const double> time_s = campaign.Find("t_s");
@@ -217,7 +217,7 @@ TEST(Image, OneThatSwingsSlowlyIsTheCamerasAndUnknown) {
   EXPECT_EQ(diagnosis.unknown[0].covariate, "t_s");
 }
 
-// Moves that nobody photographs say nothing of the image.
+// Moves without a picture are no evidence about the image.
 TEST(Image, OneThatSwingsIsSeenToThoughEverySecondMoveIsNot) {
   const std::vector<double> phase = SlowPhase(Shifted([](std::size_t) { return Shift{0, 0}; }));
   Campaign campaign = Shifted([&](std::size_t e) {

@@ -1,4 +1,4 @@
-// Columns side by side give what each gives alone.
+// Columns side by side give the same result as each alone.
 #include "sim/campaigns/diagnosis/lanes.h"
 
 #include "sim/campaigns/diagnosis/fit.h"
@@ -14,7 +14,7 @@ TEST(Lanes, EachIsWhitenedAsIfItWereAlone) {
   const CampaignFacts facts = MakeFacts(campaign);
   const Fit fit = StaticFit(facts);
   const WhiteUnit white = Whiten(fit, 2);
-  // Of one angle, of arms, of the place.
+  // Effects of an angle, of arms, of the place.
   for (const char* cause : {"backlash", "thermal_arm_growth", "axis_tilt"}) {
     const Template form = ListTemplates(*FindEffect(cause), facts).front();
     PoseErrors errors;

@@ -1,4 +1,4 @@
-// Moves that are proposed to tell causes apart, held against what they do.
+// Moves that are proposed to separate causes are compared with their effect.
 #include "sim/campaigns/diagnosis/next_moves.h"
 
 #include <gmock/gmock.h>
@@ -18,8 +18,8 @@ using testing::Field;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-// Theta in steps of one length from the stop, again and again, by all units at once: what arcs over
-// the range show, and nothing else.
+// Theta moves in steps of one length from the stop, repeatedly, by all units at once. Such arcs
+// show what arcs over the range show, and nothing else.
 Campaign Arcs(double step_deg, std::vector<PlantedEffect> effects, std::uint64_t seed) {
   PlantedOptions options{.units = 6, .moves = 1, .seed = seed, .noise_um = 2};
   const Campaign first = Planted({}, options);
@@ -107,7 +107,7 @@ TEST(NextMoves, MadeAndMeasuredTheyDecide) {
   }
 }
 
-// Play and the lag of a loaded rotor are one at one drive.
+// Play and the lag of a loaded rotor are the same at one drive.
 TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
   Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
                               {.units = 6, .moves = 60, .seed = 5});
@@ -122,7 +122,7 @@ TEST(NextMoves, AskForTheDriveWhereOnlyItDecides) {
   EXPECT_GT(next.prospects[0].d, 30);
 }
 
-// Two units have no gradient between them: a term of the plate's cannot be asked in their rows.
+// Two units have no gradient between them: their rows cannot test a term of the plate.
 TEST(NextMoves, TermsWhoseColumnsFewUnitsLackStayOut) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1, .axis = "theta"}},
                                     {.units = 20, .moves = 60, .seed = 5});

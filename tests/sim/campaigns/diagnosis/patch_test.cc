@@ -46,7 +46,8 @@ TEST(Patch, AnAngleThatFollowsTheHumidityIsCorrectedAndNotNamed) {
   EXPECT_EQ(patched.unknown[0].covariate, "humidity_pct");
   ASSERT_TRUE(patched.unknown[0].patched);
   EXPECT_EQ(patched.unknown[0].patched->term, "empirical_curve");
-  // Of 0.12 degrees times a square of 0 to 1, about its mean, at some 11 mm from the base.
+  // The planted curve is 0.12 degrees times a square of 0 to 1, about its mean, at some 11 mm from
+  // the base.
   EXPECT_NEAR(patched.unknown[0].patched->size_um, 7, 2.5);
   EXPECT_EQ(patched.causes.size(), plain.causes.size()) << Reported(patched);
   ASSERT_EQ(EmpiricalTerms(patched).size(), 1u);

@@ -1,4 +1,4 @@
-// Planted campaigns and told verdicts for the tests of the diagnosis.
+// Planted campaigns and their verdicts, for the tests of the diagnosis.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -27,8 +27,8 @@ inline Campaign Planted(std::vector<PlantedEffect> effects,
   return *campaign;
 }
 
-/// What no effect of the library does: every fibre turned about its base, as if the theta angle of
-/// that row were off.
+/// Turns every fibre about its base, as if the theta angle of that row were off. No effect of the
+/// library does this.
 inline void TurnTheta(const std::function<double(std::size_t row)>& off_deg, Campaign* campaign) {
   for (std::size_t unit = 0; unit < campaign->units.size(); ++unit)
     for (std::size_t row = campaign->first_row[unit]; row < campaign->first_row[unit + 1]; ++row) {
@@ -41,7 +41,7 @@ inline void TurnTheta(const std::function<double(std::size_t row)>& off_deg, Cam
     }
 }
 
-/// The fibres of two units under each other's name. Pre: as many moves of both.
+/// Exchanges the fibres of two units. Pre: as many moves of both.
 inline void ExchangePlaces(std::size_t a, std::size_t b, Campaign* campaign) {
   for (std::vector<double>* place : {&campaign->x_mm, &campaign->y_mm}) {
     const auto at = [&](std::size_t k) {
@@ -51,7 +51,7 @@ inline void ExchangePlaces(std::size_t a, std::size_t b, Campaign* campaign) {
   }
 }
 
-/// A theta angle that follows the air's humidity, bent, up to 0.12 degrees.
+/// A campaign whose theta angle follows the air's humidity, bent, up to 0.12 degrees.
 inline Campaign Damp(std::uint64_t seed) {
   Campaign campaign = Planted({}, {.units = 24, .moves = 80, .seed = seed});
   const Exposures exposures = FindExposures(campaign);
@@ -67,7 +67,7 @@ inline Campaign Damp(std::uint64_t seed) {
   return campaign;
 }
 
-/// Geometry alone, as a diagnosis starts. The facts outlive the fit.
+/// The fit of geometry alone, as a diagnosis starts. The facts outlive the fit.
 inline Fit StaticFit(const CampaignFacts& facts) {
   CampaignModel model;
   model.units = facts.campaign->units;

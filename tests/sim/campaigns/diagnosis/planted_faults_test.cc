@@ -1,4 +1,4 @@
-// What no effect of the library makes, planted, is found again.
+// Planted causes that no effect of the library makes are found again.
 #include "sim/campaigns/diagnosis/planted_faults.h"
 
 #include <gmock/gmock.h>
@@ -52,7 +52,7 @@ TEST(PlantedFaults, ALostMoveIsMissingUntilTheUnitIsHomed) {
         std::hypot(lost.x_mm[row] - whole.x_mm[row], lost.y_mm[row] - whole.y_mm[row]);
     if (away < 1e-9) continue;
     if (off++ == 0) first = row;
-    // What the move would have added is missing.
+    // The part that the move would have added is missing.
     const PlacePoint at =
         PlaceOf(whole.units[0], whole.cmd_deg[kTheta][row] - facts.step_deg[kTheta][first],
                 whole.cmd_deg[kPhi][row] - facts.step_deg[kPhi][first]);

@@ -1,4 +1,4 @@
-// A wrong name that other terms have polished, against who it is.
+// A wrong name that other terms have polished is compared with the right one.
 #include "sim/campaigns/diagnosis/polished.h"
 
 #include <gmock/gmock.h>
@@ -45,16 +45,17 @@ TEST(Polished, WithoutItsMisfitArtefactsWhoIsNearComesForward) {
     for (Template& form : ListTemplates(*FindEffect(cause), facts))
       library.push_back(std::move(form));
   EXPECT_THAT(FindRivals(library, {}, fit, 0),
-              Each(Field(&Rival::cause, Ne("gear_scale"))));  // with what polishes the name
+              Each(Field(&Rival::cause, Ne("gear_scale"))));  // with the terms that polish the name
   std::vector<CauseFound> causes = {CauseNamed("eccentricity")};
   causes[0].axis = "theta";
   ReassessWithoutMisfitArtefacts(library, {}, fit, &causes);
-  EXPECT_THAT(causes[0].candidates, ElementsAre("eccentricity"));  // nobody said it has any
+  EXPECT_THAT(causes[0].candidates,
+              ElementsAre("eccentricity"));  // without reported misfit artefacts
   causes[0].misfit_artefacts = {"fibre_torque"};
   ReassessWithoutMisfitArtefacts(library, {}, fit, &causes);
   EXPECT_THAT(causes[0].candidates, Contains("gear_scale"));
   EXPECT_THAT(causes[0].candidates, Not(Contains("gravity_sag")));
-  // Of another axis.
+  // A misfit artefact of another axis.
   causes[0] = CauseNamed("eccentricity");
   causes[0].axis = "phi", causes[0].misfit_artefacts = {"fibre_torque"};
   ReassessWithoutMisfitArtefacts(library, {}, fit, &causes);

@@ -1,4 +1,4 @@
-// Oddities of the data are told, and are no evidence.
+// Oddities of the data are reported, and are no evidence.
 #include "sim/campaigns/diagnosis/remarks.h"
 
 #include <gmock/gmock.h>
@@ -20,7 +20,7 @@ using ::testing::Not;
 
 constexpr double kPlane = 1.41421356;  // rms of a place to that of a coordinate
 
-// The rms that is left is that of rounding, and the noise that is believed is no less.
+// The remaining rms is that of rounding, and the noise that is believed is no less.
 TEST(WholePixels, AreTheNoiseOfACampaignWithoutMisfit) {
   for (const double step_mm : {0.2, 0.05}) {
     const Campaign campaign = InSteps(Planted({}, {.units = 24, .moves = 40, .seed = 5}), step_mm);
@@ -54,7 +54,7 @@ TEST(WholePixels, LeaveAStrongCauseItsName) {
   EXPECT_EQ(diagnosis.causes.front().cause, "eccentricity") << Reported(diagnosis);
 }
 
-// As if the places that were carried on had never been written.
+// The result is as if the places that were carried on had never been written.
 TEST(CarriedOn, IsNoEvidence) {
   const Campaign plain = Planted({}, {.units = 24, .moves = 40, .seed = 7});
   const Diagnosis carried = Diagnose(MovedInTurns(plain, 0.5, true), {});
@@ -107,7 +107,7 @@ TEST(Remarks, TellTimesThatContradictTheNumbersOfMoves) {
 TEST(Remarks, TellRowsThatDoNotJoin) {
   const Campaign whole = Planted({}, {.units = 24, .moves = 40});
   std::vector<bool> keep(whole.rows(), true);
-  // A move away, of which the row behind it shows nothing.
+  // A move away, which the next row does not show.
   for (const std::size_t unit : {std::size_t{0}, std::size_t{5}}) {
     std::size_t row = whole.first_row[unit] + 1;
     while (whole.cmd_deg[kTheta][row] == whole.from_deg[kTheta][row]) ++row;
@@ -116,9 +116,10 @@ TEST(Remarks, TellRowsThatDoNotJoin) {
   Campaign campaign = Keep(whole, keep);
   const auto two_break = HasSubstr("2 of 958 rows do not begin where");
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));
-  // A command that is written a whole turn off is one slip of the table's; a hundredth is rounding.
+  // A command that is written a whole turn off is one slip of the table; half a hundredth is
+  // rounding.
   for (double& from_deg : campaign.from_deg[kTheta]) from_deg += 360;
-  for (double& from_deg : campaign.from_deg[kPhi]) from_deg += 0.009;
+  for (double& from_deg : campaign.from_deg[kPhi]) from_deg += 0.005;
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));
   // A closed loop begins where the camera sees the fibre, and homing anywhere.
   for (const char* name : {"from_measured", "rehomed"}) {

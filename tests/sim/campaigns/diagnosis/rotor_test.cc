@@ -17,19 +17,19 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180;
 
 struct Motion {
-  double rotor;      // angle that it should have, radians
+  double rotor;      // commanded angle, radians
   double direction;  // 1 or -1
-  double drive;      // of the nominal one
+  double drive;      // of the nominal drive
   double supply;     // of the usual voltage
   std::uint32_t unit;
 };
 
-// What turns the rotor away from where its field should hold it, in radians.
+// The angle by which a cause turns the rotor away from its field, in radians.
 using Turned = std::function<double(const Motion&)>;
 
 double Phase(std::uint32_t unit) { return 2.4 * unit; }
 
-// sin(lag) = torque / drive, where the torque is that of the place to which the lag leads.
+// The solution of sin(lag) = torque / drive, with the torque at the place to which the lag leads.
 double DetentLag(double detent, double order, const Motion& motion) {
   double lag = 0;
   for (int i = 0; i < 200; ++i) {
@@ -40,7 +40,7 @@ double DetentLag(double detent, double order, const Motion& motion) {
   return lag;
 }
 
-// Of a field whose phases are unequal: an ellipse.
+// The turn of a field whose phases are unequal: an ellipse.
 double EllipseTurn(double unequal, const Motion& motion) {
   const double rotor = motion.rotor, back = Phase(motion.unit) - rotor;
   const double x = std::cos(rotor) + unequal * std::cos(back);
@@ -48,7 +48,7 @@ double EllipseTurn(double unequal, const Motion& motion) {
   return std::remainder(std::atan2(y, x) - rotor, 2 * std::numbers::pi);
 }
 
-// A load that the tuning knows, at a voltage that it does not.
+// The lag of a load that the tuning includes, at a voltage that it does not.
 double SinkingLag(double load, const Motion& motion) {
   const auto lag = [&](double supply) {
     return std::asin(std::min(load / (motion.drive * supply), 0.98));
@@ -66,7 +66,7 @@ Campaign RotorsTurned(const Turned& turned, std::uint64_t seed) {
   std::vector<double>& volts = column("v_bus_V");
   const double usual_V =
       std::accumulate(volts.begin(), volts.end(), 0.0) / static_cast<double>(volts.size());
-  constexpr double kDeeper = 3;  // than where it does little
+  constexpr double kDeeper = 3;  // than at small angles
   for (double& one : volts) one = usual_V + kDeeper * (one - usual_V);
   for (std::size_t u = 0; u < campaign.units.size(); ++u) {
     const CampaignUnit& unit = campaign.units[u];
@@ -102,8 +102,8 @@ void ExpectNamed(const char* cause, const Turned& turned, std::uint64_t seed) {
   EXPECT_TRUE(diagnosis.causes[0].all_units);
 }
 
-// Where the rotor rests, its field holds against the detent, and nothing between there and the
-// field does.
+// At the rotor's rest the field balances the detent, and no such balance lies between there and the
+// field.
 TEST(Rotor, ADetentHoldsItWhereTheFieldDoes) {
   for (const double harmonic : {1.0, 2.0, 4.0, 6.0})
     for (const double detent : {0.05, 0.3, 0.6})
@@ -137,8 +137,8 @@ struct Settled {
   std::vector<std::string> rivals;
 };
 
-// A model that has phase_imbalance bent by order 2, and what that leaves of order 4.
-// `noise_share`: of the noise that there is, what the fit believes. `also`: in the library, too.
+// Settles a model that has phase_imbalance bent by order 2, and a rest of order 4. `noise_share`:
+// the noise of the fit, as a share of the true one. `also`: a second effect of the library.
 Settled Settle(const Turned& turned, double noise_share, const Effect* also = nullptr) {
   const Campaign campaign = RotorsTurned(turned, 3);
   const CampaignFacts facts = MakeFacts(campaign);
@@ -177,7 +177,7 @@ TEST(Rotor, WhatIsFarFromEitherWaveIsNeithers) {
   EXPECT_EQ(Settle(turned, 0.3).reported[kTheta], "");
 }
 
-// What is exchanged stands alone, and has whom it cannot be told from beside it.
+// The exchanged term is alone, and has the rivals that the data do not separate from it.
 TEST(Rotor, AnExchangedNameHasRivalsOfItsOwn) {
   Effect twin = *FindEffect("cogging");
   twin.cause = "cogging_again";

@@ -1,4 +1,4 @@
-// Scores of templates: sums over units, and what is left of them beside the model's shared terms.
+// Scores of templates are sums over units, without the part that the model's shared terms explain.
 #include "sim/campaigns/diagnosis/score.h"
 
 #include <numeric>
@@ -35,7 +35,7 @@ TEST(Score, WhatTheModelHasAlreadySaysNothingNew) {
   EXPECT_EQ(pass.scores[0].fleet_b[0], 0);
 }
 
-// An amplitude below 0 is no stiction of that unit; what it says of the fleet's stays in the sum.
+// An amplitude below 0 is no stiction of that unit; its part of the fleet's sum stays.
 TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
   const Campaign campaign =
       Planted({{.cause = "gear_scale", .amplitude = 0.01, .axis = "theta", .unit_share = 0.2}});
@@ -55,7 +55,7 @@ TEST(Score, AUnitWithAnImpossibleAmplitudeCountsForTheFleet) {
   EXPECT_GT(impossible, 10u);
 }
 
-// Signatures made once for several looks say what they say made for each look alone.
+// Signatures made once for several looks give the same as those made for each look alone.
 TEST(Score, LooksTogetherAreWhatTheyAreAlone) {
   const Campaign campaign = Planted({{.cause = "backlash", .amplitude = 0.1}});
   const CampaignFacts facts = MakeFacts(campaign);

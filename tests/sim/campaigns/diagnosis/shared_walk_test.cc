@@ -1,4 +1,4 @@
-// What all units do together while their noise remembers, against walks of each by itself.
+// Common motion of all units while their noise remembers is compared with independent walks.
 #include "sim/campaigns/diagnosis/shared_walk.h"
 
 #include <gmock/gmock.h>
@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kMoves = 120;
 
-// Theta of all units stands off by what is given for the exposure.
+// Theta of all units is off by the exposure's given angle.
 Campaign Together(const std::function<double(double share_of_night)>& off_deg, std::uint64_t seed) {
   Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = seed});
   const Exposures exposures = FindExposures(campaign);

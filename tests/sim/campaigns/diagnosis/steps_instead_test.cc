@@ -1,4 +1,4 @@
-// A slip and a cause of single units that do the same to the rows.
+// A slip and a cause of single units that have the same effect on the rows.
 #include "sim/campaigns/diagnosis/steps_instead.h"
 
 #include <gmock/gmock.h>
@@ -18,8 +18,8 @@ using testing::IsEmpty;
 
 constexpr std::size_t kMoves = 60, kUnit = 5, kHomedAt = 40;
 
-// One unit makes long moves, is homed, and makes short ones to the end, but for `long_again`;
-// where its moves are short its theta stands `off_turns` of the rotor's turns off.
+// A unit makes long moves, is homed, and makes short ones to the end, but for `long_again`. Where
+// its moves are short, its theta is off by `off_turns` of the rotor's turns.
 Campaign LongThenShort(double off_turns, std::size_t long_again = kMoves) {
   Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const CampaignUnit& u = campaign.units[kUnit];
@@ -71,7 +71,7 @@ std::vector<std::string_view> StepsInsteadOf(const char* cause, std::size_t of_u
 TEST(StepsInstead, OfATurnSinceTheFirstShortMove) {
   const Campaign campaign = LongThenShort(-1);
   EXPECT_THAT(StepsInsteadOf("mode_threshold", kUnit, campaign), ElementsAre("step_loss"));
-  // What another unit does they do not explain.
+  // The steps do not explain another unit's error.
   EXPECT_THAT(StepsInsteadOf("mode_threshold", kUnit + 1, campaign), IsEmpty());
 }
 
@@ -91,8 +91,8 @@ TEST(StepsInstead, ASlipAtTheFirstShortMoveHasItAmongItsCandidates) {
   EXPECT_THAT(diagnosis.causes[0].candidates, Contains("step_loss")) << Reported(diagnosis);
 }
 
-// The unit's step of 0.3 degrees was taken before the causes were known; whether it is there is
-// planted. `also`: a neighbour that stands off by a degree since the same move.
+// A unit's step of 0.3 degrees was taken before the causes were known. The planted step may be
+// there or not. `also`: neighbours that are off by a degree since the same move.
 std::size_t StepsLeft(double planted_deg, const std::vector<std::size_t>& also = {}) {
   Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const std::size_t move = 20;
@@ -125,7 +125,8 @@ TEST(StepsInstead, WhatTheModelDoesAsWellWithoutIsNone) {
   EXPECT_EQ(StepsLeft(0.3), 1u);
 }
 
-// Of a contact the weaker half is not asked alone: without it the other would have met nobody.
+// The weaker half of a contact is not tried alone: without it the other would have met no
+// neighbour.
 TEST(StepsInstead, HalfOfAContactStays) {
   const Campaign campaign = Planted({}, {.units = 24, .moves = kMoves, .seed = 4});
   const auto apart_mm = [&](std::size_t unit) {

@@ -1,4 +1,4 @@
-// Rest errors that an axis keeps until it moves: whitened, they leave no trace.
+// Rest errors that an axis keeps until it moves leave no trace once they are whitened.
 #include "sim/campaigns/diagnosis/whiten.h"
 
 #include <cmath>
@@ -30,8 +30,8 @@ Moments MomentsOf(const Fit& fit, bool whitened) {
 }
 
 TEST(Whiten, HeldRestErrorsBecomeIndependentNumbersOfUnitVariance) {
-  // Rest errors well above the camera's noise; many moves of one axis, in which the other keeps its
-  // own.
+  // Rest errors are well above the camera's noise, and many moves are of one axis, in which the
+  // other keeps its own.
   const Campaign campaign =
       Planted({}, {.units = 40, .moves = 120, .seed = 11, .noise_um = 1, .rest_noise_deg = 0.03});
   const CampaignFacts facts = MakeFacts(campaign);
@@ -43,8 +43,8 @@ TEST(Whiten, HeldRestErrorsBecomeIndependentNumbersOfUnitVariance) {
 }
 
 TEST(NegativeBic, IsNotDecidedByOutliers) {
-  // Noise that is two per cent smaller explains the others about as well; what is anywhere costs
-  // next to nothing more.
+  // Noise that is two per cent smaller explains the other rows about as well; outliers cost next to
+  // nothing more.
   const Campaign campaign =
       Planted({}, {.units = 24, .moves = 80, .seed = 6, .outlier_share = 0.02});
   const CampaignFacts facts = MakeFacts(campaign);

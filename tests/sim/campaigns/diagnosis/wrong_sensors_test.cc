@@ -1,4 +1,4 @@
-// Boards that tell another temperature than they have, and boards that have another.
+// Boards that report another temperature than they have, and boards that have another.
 #include "sim/campaigns/diagnosis/wrong_sensors.h"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ std::vector<double>& Temperatures(Campaign* campaign) {
 }
 
 // The units' temperatures run with this gain about 12 degrees.
-void TellWithGain(const std::vector<std::size_t>& units, double gain, Campaign* campaign) {
+void ReportWithGain(const std::vector<std::size_t>& units, double gain, Campaign* campaign) {
   for (const std::size_t unit : units)
     for (std::size_t row = campaign->first_row[unit]; row < campaign->first_row[unit + 1]; ++row) {
       double& reported = Temperatures(campaign)[row];
@@ -27,7 +27,7 @@ void TellWithGain(const std::vector<std::size_t>& units, double gain, Campaign* 
     }
 }
 
-// Arms that grow with the temperature as it is told.
+// Arms that grow with the reported temperature.
 void GrowArms(Campaign* campaign) {
   const CampaignFacts facts = MakeFacts(*campaign);
   CampaignModel plain;
@@ -70,7 +70,7 @@ const CauseFound* Find(const Diagnosis& diagnosis, std::string_view name) {
 TEST(WrongSensors, ARailThatTellsAnotherGainThanItsArmsIsNamed) {
   Board board = Plain();
   GrowArms(&board.campaign);
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   const Diagnosis diagnosis = Verdicts(board.campaign);
   const CauseFound* sensors = Find(diagnosis, "sensor_bias");
   ASSERT_NE(sensors, nullptr) << Reported(diagnosis);
@@ -87,7 +87,7 @@ TEST(WrongSensors, ARailThatTellsAnotherGainThanItsArmsIsNamed) {
 TEST(WrongSensors, OneUnitsSensorIsTheUnits) {
   Board board = Plain();
   GrowArms(&board.campaign);
-  TellWithGain({17}, 2, &board.campaign);
+  ReportWithGain({17}, 2, &board.campaign);
   const Diagnosis diagnosis = Verdicts(board.campaign);
   const CauseFound* sensors = Find(diagnosis, "sensor_bias");
   ASSERT_NE(sensors, nullptr) << Reported(diagnosis);
@@ -98,7 +98,7 @@ TEST(WrongSensors, OneUnitsSensorIsTheUnits) {
 
 TEST(WrongSensors, ARailThatIsColderHasNoWrongSensors) {
   Board board = Plain();
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   GrowArms(&board.campaign);
   const Diagnosis diagnosis = Verdicts(board.campaign);
   EXPECT_EQ(Find(diagnosis, "sensor_bias"), nullptr) << Reported(diagnosis);
@@ -107,7 +107,7 @@ TEST(WrongSensors, ARailThatIsColderHasNoWrongSensors) {
 
 TEST(WrongSensors, WhereNothingGoesWithTheTemperatureTheyCannotBeReported) {
   Board board = Plain();
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   const Diagnosis diagnosis = Verdicts(board.campaign);
   EXPECT_EQ(diagnosis.verdict, Verdict::kConsistent) << Reported(diagnosis);
   const auto untested = std::ranges::find(diagnosis.not_testable, kSensorBias, &NotTestable::cause);
@@ -126,7 +126,7 @@ TEST(WrongSensors, WhoTellsNoTemperatureIsNotSuspect) {
 
 TEST(WrongSensors, AMissingReadingIsNoReading) {
   Board board = Plain();
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   std::vector<double>& reported = Temperatures(&board.campaign);
   for (std::size_t row = 0; row < reported.size(); row += 3) reported[row] = std::nan("");
   const auto truth = FindSuspectSensors(MakeFacts(board.campaign));
@@ -135,14 +135,14 @@ TEST(WrongSensors, AMissingReadingIsNoReading) {
   EXPECT_NEAR(truth->gain, 0.6, 0.01);
 }
 
-// All others tell one temperature, so that the only gradient is the wrong rail's.
+// All others report one temperature, so that the only gradient is the wrong rail's.
 TEST(WrongSensors, AColumnThatTheWrongOnesMadeGoesWithThem) {
   Board board = Plain();
   std::vector<double>& reported = Temperatures(&board.campaign);
   const std::size_t moves = board.campaign.first_row[1];
   for (std::size_t row = 0; row < reported.size(); ++row) reported[row] = reported[row % moves];
   GrowArms(&board.campaign);
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   ASSERT_TRUE(MakeFacts(board.campaign).Has(kGradientX));
   const Diagnosis diagnosis = Verdicts(board.campaign);
   EXPECT_NE(Find(diagnosis, "sensor_bias"), nullptr) << Reported(diagnosis);
@@ -156,7 +156,7 @@ TEST(WrongSensors, OfTwoHalvesNobodyKnowsWhichIsRight) {
     if (unit % 2 == 1) board.units.push_back(unit);
   }
   GrowArms(&board.campaign);
-  TellWithGain(board.units, 0.6, &board.campaign);
+  ReportWithGain(board.units, 0.6, &board.campaign);
   const Diagnosis diagnosis = Verdicts(board.campaign);
   const CauseFound* sensors = Find(diagnosis, "sensor_bias");
   ASSERT_NE(sensors, nullptr) << Reported(diagnosis);

@@ -1,4 +1,4 @@
-// Gaps between arms against points sampled along them.
+// Gaps between arms are compared with points sampled along them.
 #include "sim/campaigns/effects/arm_gap.h"
 
 #include <gtest/gtest.h>

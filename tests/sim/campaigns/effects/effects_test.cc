@@ -136,8 +136,8 @@ TEST(Effects, AStartSkewBeginsAtAShareOfTheSlots) {
   }
 }
 
-// What is missing of a move that is cut while it brakes: the square of the time, as the speed falls
-// evenly, and straight on before the braking begins.
+// The missing way of a move that is cut while it brakes goes with the square of the time, as the
+// speed falls evenly. Before the braking begins it is a straight line.
 TEST(Effects, AMoveThatIsCutWhileItBrakesMissesLittle) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
@@ -156,7 +156,7 @@ TEST(Effects, AMoveThatIsCutWhileItBrakesMissesLittle) {
       for (std::size_t i = 0; i < track.moves; ++i) {
         const double step = track.step_deg[kTheta][i];
         const double late = (track.Column("bus_slot")[i] + 1) / slots;
-        // Distance by speed, which rises from 0 at the end to 1 at `braking` before it.
+        // The integral of the speed, which rises from 0 at the end to 1 at `braking` before it.
         double missing = 0, last = 0;
         constexpr int kSteps = 2000;
         for (int k = 0; k < kSteps; ++k) {
@@ -232,7 +232,7 @@ TEST(Effects, ALagIsTheArcsineOfTheLoadUpToThePullOut) {
   }
 }
 
-// Where no axis moves nothing turns the rotor, whatever the drive level is by then.
+// While no axis moves nothing turns the rotor, whatever the drive level is by then.
 TEST(Effects, ARotorStaysWhereItCameToRest) {
   Campaign campaign = Made();
   const auto drive = std::ranges::find(campaign.covariates, "drive_amplitude", &Covariate::name);
@@ -269,9 +269,9 @@ TEST(Effects, ARelaxationThatIsOverBeforeTheExposuresDoesNotShow) {
   EXPECT_FALSE(shown(1, 0.5, 0.2));
 }
 
-// A rotor that holds a load x of its pull-out rests asin(x) behind the field; with a share of the
-// voltage gone, asin(x / (1 - share)). Forms: three shares of the feed, each at three depths; the
-// same shares at any drive come after them.
+// A rotor that holds a load x of its pull-out rests asin(x) behind the field. With a share of the
+// voltage gone it rests asin(x / (1 - share)) behind. Forms: three shares of the feed, each at
+// three depths; the same shares at any drive come after them.
 TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
@@ -299,10 +299,10 @@ TEST(Effects, ADroopUnderLoadIsTheDifferenceOfArcsines) {
     }
   }
   EXPECT_EQ(loaded, 27u);
-  EXPECT_GT(bent, 100u);  // or one depth would do
+  EXPECT_GT(bent, 100u);  // otherwise one depth would do
 }
 
-// The load alone, where the lag does not know the drive.
+// Only the load counts where the lag does not depend on the drive.
 TEST(Effects, ADroopAtAnyDriveIsTheShareOfTheLoad) {
   const Campaign campaign = Made();
   const CampaignFacts facts = MakeFacts(campaign);
@@ -324,7 +324,7 @@ TEST(Effects, ADroopAtAnyDriveIsTheShareOfTheLoad) {
   EXPECT_EQ(undriven, 3u);
 }
 
-// Where a part of those in motion takes the drive away, the rotor hangs at the pull-out, and more
+// Where a part of the moving units takes the drive away, the rotor stays at the pull-out, and more
 // of them do no more.
 TEST(Effects, ADroopToThePullOutGoesNoFurther) {
   const Campaign campaign = Made();

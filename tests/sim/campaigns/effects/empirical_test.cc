@@ -50,7 +50,7 @@ TEST(Knots, TheEndHoldsBeyondTheRange) {
   EXPECT_EQ(RankAt(knots, 1e9), 0.9);
 }
 
-// The same air is the same place, whatever the other moves of the night were.
+// The same air gives the same place, whatever the other moves of the night were.
 TEST(EmpiricalCurve, MeansTheSameValueInAnotherCampaign) {
   const Campaign one = Planted({});
   Campaign colder = one;

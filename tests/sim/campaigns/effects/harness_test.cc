@@ -1,4 +1,4 @@
-// The load of a harness against Kirchhoff's laws, segment by segment.
+// The load of a harness is compared with Kirchhoff's laws, segment by segment.
 #include "sim/campaigns/effects/harness.h"
 
 #include <gtest/gtest.h>

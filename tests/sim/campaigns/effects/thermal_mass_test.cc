@@ -1,4 +1,4 @@
-// A thermal mass against Euler's method with small steps.
+// A thermal mass is compared with Euler's method with small steps.
 #include "sim/campaigns/effects/thermal_mass.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// Sines by the library's own series, held against the machine's.
+// Sines by the library's own series are compared with the machine's.
 #include "sim/campaigns/effects/wave.h"
 
 #include <gtest/gtest.h>
