@@ -236,8 +236,11 @@ void Remark(std::vector<std::string> remarks, Diagnosis* diagnosis) {
   for (std::string& remark : remarks) diagnosis->remarks.push_back(std::move(remark));
 }
 
-void RemarkOnRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
+void DescribeRows(const RepeatedPlaces& repeated, const CampaignFacts& facts,
                   Diagnosis* diagnosis) {
+  diagnosis->rows = facts.campaign->rows();
+  diagnosis->units = facts.campaign->units.size();
+  diagnosis->moves = facts.exposures.size();
   Remark(RemarksOnRepeats(repeated, facts.campaign->rows()), diagnosis);
   Remark(RemarksOnOrder(facts), diagnosis);
   diagnosis->steps = FindPlaceSteps(*facts.campaign);
@@ -295,10 +298,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   options.progress(0, "reading the moves");
   const RepeatedPlaces repeated = ForgetRepeatedPlaces(&campaign);
   CampaignFacts facts = MakeFacts(campaign);
-  RemarkOnRows(repeated, facts, &diagnosis);
-  diagnosis.rows = campaign.rows();
-  diagnosis.units = campaign.units.size();
-  diagnosis.moves = facts.exposures.size();
+  DescribeRows(repeated, facts, &diagnosis);
   std::vector<char> aside;
   diagnosis.outliers = FindBeforeFit(facts, repeated, &aside);
   CampaignModel before;

@@ -124,7 +124,7 @@ TEST(Remarks, TellRowsThatDoNotJoin) {
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));
   // A command that is written a whole turn off is one slip of the table; a hundredth is rounding.
   for (double& from_deg : campaign.from_deg[kTheta]) from_deg += 360;
-  for (double& from_deg : campaign.from_deg[kPhi]) from_deg += 0.009;
+  for (double& from_deg : campaign.from_deg[kPhi]) from_deg += 0.005;
   EXPECT_THAT(RemarksOn(campaign), ElementsAre(two_break));
   // A closed loop begins where the camera sees the fibre, and homing anywhere.
   for (const char* name : {"from_measured", "rehomed"}) {
