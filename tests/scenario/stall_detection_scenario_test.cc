@@ -15,6 +15,8 @@
 namespace focalfleet {
 namespace {
 
+using test::CountOutcome;
+using test::ExpectStoreTellsTheTruth;
 using test::InProcessFleet;
 using test::TestSeed;
 

@@ -59,10 +59,10 @@ TEST(PatchedModel, ReadsBackAndPredictsTheSamePlaces) {
 }
 
 TEST(ModelFile, KeepsTheShapeOfEachUnit) {
-  const sim::Campaign campaign = sim::Planted(
+  const sim::Campaign campaign = sim::test::Planted(
       {{.cause = "tooth_damage", .amplitude = 0.1, .axis = "theta"}}, {.units = 24, .moves = 80});
-  const sim::Diagnosis diagnosis = sim::Verdicts(campaign);
-  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::Reported(diagnosis);
+  const sim::Diagnosis diagnosis = sim::test::Verdicts(campaign);
+  ASSERT_EQ(diagnosis.model.terms.size(), 1u) << sim::test::Reported(diagnosis);
   ASSERT_EQ(diagnosis.model.terms[0].form.shape_of_unit.size(), campaign.units.size());
   const std::string text = WriteModel(diagnosis, kNames, campaign);
   const auto read = ReadModelFile(text, "model.toml", campaign.units);

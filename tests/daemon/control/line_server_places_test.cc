@@ -16,6 +16,12 @@
 namespace focalfleet {
 namespace {
 
+using test::Drain;
+using test::IsStop;
+using test::OnlyUrgent;
+using test::RawClient;
+using test::Readable;
+using test::Turn;
 using ::testing::HasSubstr;
 
 /// Clients that connected one after the other, each taken by the server.

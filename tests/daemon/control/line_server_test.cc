@@ -13,8 +13,13 @@
 namespace focalfleet {
 namespace {
 
+using test::Drain;
+using test::IsStop;
+using test::OnlyUrgent;
 using test::RawClient;
+using test::Readable;
 using test::ScratchFolder;
+using test::Turn;
 using ::testing::HasSubstr;
 
 TEST(LineServer, HandsOutWholeLinesOnly) {

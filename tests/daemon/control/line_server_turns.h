@@ -9,7 +9,7 @@
 
 #include "daemon/control/line_server.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 inline bool Readable(int fd) {
   pollfd poller{fd, POLLIN, 0};
@@ -39,4 +39,4 @@ inline std::vector<IncomingLine> OnlyUrgent(LineServer* server) {
 
 inline bool IsStop(std::string_view line) { return line.starts_with("stop"); }
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -18,6 +18,8 @@
 namespace focalfleet {
 namespace {
 
+using test::Drain;
+using test::RawClient;
 using ::testing::HasSubstr;
 
 TEST(LineServer, OnlyOwnerAndGroupMayConnect) {

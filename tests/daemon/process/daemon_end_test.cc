@@ -22,10 +22,12 @@
 namespace focalfleet {
 namespace {
 
+using test::FocalfleetdTest;
+using test::kPatienceMs;
+using test::Process;
+using test::WaitUntil;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::Process;
-using testing::WaitUntil;
 
 TEST_F(FocalfleetdTest, EndsCleanlyOnSigterm) {
   auto daemon = Start();

@@ -24,12 +24,13 @@
 namespace focalfleet {
 namespace {
 
+using test::FocalfleetdTest;
+using test::kPatienceMs;
 using test::Process;
 using test::ScratchFolder;
 using test::WaitUntil;
 using ::testing::HasSubstr;
 using ::testing::Not;
-using testing::WaitUntil;
 
 TEST_F(FocalfleetdTest, GoesOnAfterSighup) {
   auto daemon = Start();

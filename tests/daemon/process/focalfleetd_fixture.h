@@ -12,7 +12,7 @@
 #include "tests/support/process.h"
 #include "tests/support/scratch_folder.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 inline constexpr int kPatienceMs = 30'000;  // limit for a hang; nothing is timed
 
@@ -30,13 +30,13 @@ class FocalfleetdTest : public ::testing::Test {
   void Configure(const std::string& text) const {
     std::ofstream(scratch_ / "f.toml") << "[dds]\nenabled = false\n" << text;
   }
-  [[nodiscard]] testing::Process Start(const std::string& log = "log") const {
-    return testing::Process({FOCALFLEETD, "--config", scratch_ / "f.toml"}, scratch_ / log);
+  [[nodiscard]] test::Process Start(const std::string& log = "log") const {
+    return test::Process({FOCALFLEETD, "--config", scratch_ / "f.toml"}, scratch_ / log);
   }
   [[nodiscard]] int Run(const std::vector<std::string>& arguments) const {
     std::vector<std::string> all{FOCALFLEETD};
     all.insert(all.end(), arguments.begin(), arguments.end());
-    return testing::Process(all, scratch_ / "log").Wait();
+    return test::Process(all, scratch_ / "log").Wait();
   }
   [[nodiscard]] std::string Log(const std::string& log = "log") const {
     std::ifstream file(scratch_ / log);
@@ -49,10 +49,10 @@ class FocalfleetdTest : public ::testing::Test {
     return client.Call(verb, args);
   }
   [[nodiscard]] bool Answers() const {
-    return testing::WaitUntil([&] { return Ask("status").has_value(); }, kPatienceMs);
+    return test::WaitUntil([&] { return Ask("status").has_value(); }, kPatienceMs);
   }
   [[nodiscard]] bool Ready() const {
-    return testing::WaitUntil(
+    return test::WaitUntil(
         [&] {
           const auto status = Ask("status");
           return status && (*status)["phases"]["ready"] == 2;
@@ -63,4 +63,4 @@ class FocalfleetdTest : public ::testing::Test {
   const test::ScratchFolder scratch_;
 };
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -7,6 +7,8 @@
 namespace focalfleet {
 namespace {
 
+using test::SmallFleet;
+
 TEST(StatusJson, StateTextIsJsonWithARowForEachUnit) {
   const SmallFleet fleet;
   const Json state = Json::parse(StateText(fleet.View()), nullptr, false);

@@ -11,11 +11,11 @@
 namespace focalfleet {
 namespace {
 
-using testing::ErrorOf;
+using test::ErrorOf;
+using test::kEight;
+using test::StoreTest;
+using test::Vector;
 using ::testing::HasSubstr;
-using testing::kEight;
-using testing::StoreTest;
-using testing::Vector;
 
 std::string Bytes(const std::string& path) {
   std::ifstream in(path, std::ios::binary);
@@ -29,9 +29,9 @@ TEST_F(StoreTest, ASecondWriterIsRefusedAndTheFirstNamed) {
   EXPECT_EQ(second.error().code, ErrorCode::kRefused);
   EXPECT_THAT(second.error().text, HasSubstr("process " + std::to_string(getpid())));
   // The same holds by another name of the file.
-  std::filesystem::create_symlink(Path(), folder_.File("link.db"));
-  EXPECT_EQ(ErrorOf(Store::Open(folder_.File("link.db"))).code, ErrorCode::kRefused);
-  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
+  std::filesystem::create_symlink(Path(), folder_ / "link.db");
+  EXPECT_EQ(ErrorOf(Store::Open(folder_ / "link.db")).code, ErrorCode::kRefused);
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(1, Witness::kReported, 1, 1)}, kEight));
   store.reset();
   EXPECT_EQ(OpenStore()->Load()->vectors.size(), 1u);
 }
@@ -61,7 +61,7 @@ TEST_F(StoreTest, TheLockEndsWithItsProcess) {
 }
 
 TEST_F(StoreTest, ANewerStoreIsLeftAsItIs) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 3), kEight));
   Sql("PRAGMA user_version = 99");
   const std::string before = Bytes(Path());
   const auto store = Store::Open(Path());
@@ -75,7 +75,7 @@ TEST_F(StoreTest, ANewerStoreIsLeftAsItIs) {
 }
 
 TEST_F(StoreTest, ANewerStoreIsSeenInItsWalToo) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 3), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 3), kEight));
   // A later version that was killed before its WAL reached the file.
   const pid_t child = fork();
   if (child == 0) {
@@ -116,7 +116,7 @@ TEST_F(StoreTest, AnEmptyFileBecomesAStore) {
 }
 
 TEST_F(StoreTest, DamagedPagesAreAnError) {
-  testing::ExpectDone(OpenStore()->Commit(testing::Batch(1, 200), kEight));
+  test::ExpectDone(OpenStore()->Commit(test::Batch(1, 200), kEight));
   std::string content = Bytes(Path());
   for (std::size_t i = 4096; i < content.size(); ++i) content[i] = static_cast<char>(i * 37);
   std::ofstream(Path(), std::ios::binary) << content;
@@ -130,7 +130,7 @@ TEST_F(StoreTest, DamagedPagesAreAnError) {
 
 TEST_F(StoreTest, ADamagedTableIsNoFaultOfTheRow) {
   const std::vector<Row> rows = {AlarmRow{.id = 1, .text = "the first"}};
-  testing::ExpectDone(OpenStore()->Commit(rows, kEight));
+  test::ExpectDone(OpenStore()->Commit(rows, kEight));
   sqlite3* db = nullptr;
   ASSERT_EQ(sqlite3_open(Path().c_str(), &db), SQLITE_OK);
   const auto number = [&](const char* sql) {
@@ -155,8 +155,8 @@ TEST_F(StoreTest, ADamagedTableIsNoFaultOfTheRow) {
 }
 
 TEST_F(StoreTest, AMissingFolderIsUnavailable) {
-  EXPECT_EQ(ErrorOf(Store::Open(folder_.File("none/fleet.db"))).code, ErrorCode::kUnavailable);
-  EXPECT_EQ(ErrorOf(StoreReader::Open(folder_.File("none.db"))).code, ErrorCode::kUnavailable);
+  EXPECT_EQ(ErrorOf(Store::Open(folder_ / "none/fleet.db")).code, ErrorCode::kUnavailable);
+  EXPECT_EQ(ErrorOf(StoreReader::Open(folder_ / "none.db")).code, ErrorCode::kUnavailable);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include "daemon/clock/wall_time.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/support/scratch_folder.h"
 
 namespace focalfleet::test {
 

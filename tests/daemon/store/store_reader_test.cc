@@ -10,14 +10,14 @@
 namespace focalfleet {
 namespace {
 
-using testing::ErrorOf;
+using test::ErrorOf;
+using test::Intent;
+using test::kEight;
+using test::kNine;
+using test::StoreTest;
+using test::Tuned;
+using test::Vector;
 using ::testing::HasSubstr;
-using testing::Intent;
-using testing::kEight;
-using testing::kNine;
-using testing::StoreTest;
-using testing::Tuned;
-using testing::Vector;
 
 ModelRow Loaded(std::uint64_t entry, const std::string& sha256, const std::string& text) {
   return {.entry = entry,
@@ -33,12 +33,12 @@ ModelRow Loaded(std::uint64_t entry, const std::string& sha256, const std::strin
 
 TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Loaded(1, "aa", "name = 'a'\n")}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 2}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Loaded(1, "aa", "name = 'a'\n")}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{ModelRow{.entry = 2}}, kNine));
   ModelRow back = Loaded(3, "aa", "");
   back.text.reset();
   back.restores = 1;
-  testing::ExpectDone(store->Commit(std::vector<Row>{back}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{back}, kNine));
   const auto reader = OpenReader();
   const auto changes = reader->Models(10);
   ASSERT_TRUE(changes) << changes.error().text;
@@ -70,7 +70,7 @@ TEST_F(StoreTest, ModelsAndWhenTheyHeldComeBack) {
 TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSince) {
   auto store = OpenStore();
   const auto home = [&](std::uint32_t unit, std::uint32_t serial, IntentEnd end, WallTime at) {
-    testing::ExpectDone(store->Commit(
+    test::ExpectDone(store->Commit(
         std::vector<Row>{Intent(unit, serial, 3, {0, 0}, {5, 5}), IntentEndRow{{serial}, {3}, end}},
         at));
   };
@@ -79,13 +79,13 @@ TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSince) {
   home(14, 7003, IntentEnd::kArrived, kNine);
   // Set by hand, found by the camera, corrected by it (no new count), bound first, replaced.
   const auto stands = [](std::uint32_t serial, Origin origin) {
-    return testing::Vector(serial, Witness::kReported, 5, 5, 1, origin);
+    return test::Vector(serial, Witness::kReported, 5, 5, 1, origin);
   };
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{BindingRow{{15}, {7004}}, BindingRow{{16}, {7005}}, BindingRow{{17}, {7006}},
                        BindingRow{{19}, {7008}}, BindingRow{{20}, {7009}}},
       kEight));
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{stands(7004, Origin::kOperator), stands(7005, Origin::kFound),
                        stands(7006, Origin::kCamera), BindingRow{{18}, {7007}},
                        BindingRow{{19}, {7999}}, BindingRow{{20}, {0}}, BindingRow{{20}, {7009}}},
@@ -102,8 +102,8 @@ TEST_F(StoreTest, ListsUnitsWhoseCountBeganAnewSince) {
 
 TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(37, 0.5)}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{Tuned(38, 0.25)}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Tuned(37, 0.5)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Tuned(38, 0.25)}, kNine));
   const auto fleet = store->Load();
   ASSERT_TRUE(fleet) << fleet.error().text;
   ASSERT_EQ(fleet->tunings.size(), 1u);
@@ -130,12 +130,12 @@ TEST_F(StoreTest, ATuningIsKeptWithMarginAndOriginAndTheOneBeforeItToo) {
 
 TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 1, {0, 0}, {10, 20})}, kEight));
   // The end stands before the vectors in the batch, and still has their place.
-  testing::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
-                                                     Vector(40, Witness::kReported, 10, 20)},
-                                    kNine));
-  testing::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 2, {10, 20}, {0, 0})}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived},
+                                                  Vector(40, Witness::kReported, 10, 20)},
+                                 kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{Intent(4, 40, 2, {10, 20}, {0, 0})}, kNine));
 
   EXPECT_EQ(store->Load()->open_intents.size(), 1u);
   const auto moves = OpenReader()->Moves(UnitId{4}, 10);
@@ -155,12 +155,12 @@ TEST_F(StoreTest, AnEndedIntentIsHistoryWithThePlaceItEndedAt) {
 TEST_F(StoreTest, AnIntentEndsOnceAndCanBeWrittenTwice) {
   auto store = OpenStore();
   const std::vector<Row> begin = {Intent(4, 40, 1, {0, 0}, {10, 20})};
-  testing::ExpectDone(store->Commit(begin, kEight));
-  testing::ExpectDone(store->Commit(begin, kEight));
+  test::ExpectDone(store->Commit(begin, kEight));
+  test::ExpectDone(store->Commit(begin, kEight));
   EXPECT_EQ(store->Load()->open_intents.size(), 1u);
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kFault}}, kEight));
-  testing::ExpectDone(
+  test::ExpectDone(
       store->Commit(std::vector<Row>{IntentEndRow{{40}, {1}, IntentEnd::kArrived}}, kNine));
   const auto moves = OpenReader()->Moves({}, 10);
   ASSERT_EQ(moves->size(), 1u);
@@ -171,12 +171,12 @@ TEST_F(StoreTest, AnIntentEndsOnceAndCanBeWrittenTwice) {
 TEST_F(StoreTest, ParametersAndPlacesKeepTheirHistory) {
   auto store = OpenStore();
   ParameterRow row{{7}, Axis::kTheta, Parameter::kRepeat, 108, Origin::kFactory};
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kEight));
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));  // nothing new
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));  // nothing new
   row.value = 37;
   row.origin = Origin::kTuning;
-  testing::ExpectDone(store->Commit(std::vector<Row>{row, EnableRow{{3}, false, "spare"}}, kNine));
-  testing::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{3}, true, "mended"}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{row, EnableRow{{3}, false, "spare"}}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{EnableRow{{3}, true, "mended"}}, kNine));
 
   const auto parameters = OpenReader()->Parameters({7}, 10);
   ASSERT_EQ(parameters->size(), 2u);
@@ -194,13 +194,13 @@ TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
   ConfigurationRow row;
   row.source = "a.csv";
   for (row.id = 1; row.id <= 3; ++row.id) {
-    testing::ExpectDone(store->Commit(
+    test::ExpectDone(store->Commit(
         std::vector<Row>{row, AlarmRow{row.id, Severity::kWarning, {}, BusId{2}, "x\0y"}}, kEight));
   }
   row.id = 3;
   row.state = ConfigurationState::kDone;
   row.makespan_s = std::nan("");
-  testing::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));
+  test::ExpectDone(store->Commit(std::vector<Row>{row}, kNine));
   const auto configurations = OpenReader()->Configurations(2);
   ASSERT_EQ(configurations->size(), 2u);
   EXPECT_EQ((*configurations)[0].row.id, 3u);
@@ -217,7 +217,7 @@ TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
 
 TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
   auto store = OpenStore();
-  testing::ExpectDone(store->Commit(
+  test::ExpectDone(store->Commit(
       std::vector<Row>{Intent(1, 1, 1, {0, 0}, {1, 1}), Intent(2, 2, 1, {0, 0}, {1, 1}),
                        IntentEndRow{{1}, {1}, IntentEnd::kArrived},
                        ConfigurationRow{.id = 8, .source = "", .state = ConfigurationState::kDone},
@@ -232,11 +232,11 @@ TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
 }
 
 TEST_F(StoreTest, GarbageInHistoryIsAnErrorToo) {
-  testing::ExpectDone(OpenStore()->Commit(
-      std::vector<Row>{
-          Intent(12, 7, 3, {0, 0}, {1, 1}), IntentEndRow{{7}, {3}, IntentEnd::kArrived},
-          Vector(7, Witness::kReported, 1, 1), AlarmRow{1, Severity::kInfo, {}, {}, ""}},
-      kEight));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{Intent(12, 7, 3, {0, 0}, {1, 1}),
+                                                        IntentEndRow{{7}, {3}, IntentEnd::kArrived},
+                                                        Vector(7, Witness::kReported, 1, 1),
+                                                        AlarmRow{1, Severity::kInfo, {}, {}, ""}},
+                                       kEight));
   Sql("UPDATE intent SET end = 77; UPDATE alarm SET severity = 3");
   auto reader = OpenReader();
   EXPECT_THAT(ErrorOf(reader->Moves({}, 9)).text, HasSubstr("end is 77"));
@@ -267,7 +267,7 @@ TEST_F(StoreTest, AMeasurementIsReadBackToTheBit) {
                       .error_um = {},
                       .target_id = {},
                       .delay_s = {}};
-  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, bare}, {6}));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, bare}, {6}));
   const auto read = OpenReader()->Measurements(7);
   ASSERT_TRUE(read) << read.error().text;
   ASSERT_EQ(read->size(), 2u);
@@ -307,7 +307,7 @@ TEST_F(StoreTest, AnOrientationIsReadBackToTheBitWithItsSource) {
   lying.unit = {13};
   lying.status = MeasurementStatus::kSensorsDoubted;
   lying.carrier = FibreCarrierReading{.used = 0x7, .verdict = "too few sensors"};
-  testing::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{row, lying}, {6}));
   const auto read = OpenReader()->Measurements(8);
   ASSERT_TRUE(read) << read.error().text;
   ASSERT_EQ(read->size(), 2u);
@@ -325,14 +325,14 @@ TEST_F(StoreTest, AReaderSeesWholeBatchesBesideTheWriter) {
   auto store = OpenStore();
   auto reader = OpenReader();
   for (std::uint32_t k = 1; k <= 50; ++k) {
-    testing::ExpectDone(store->Commit(testing::Batch(k, 20), kEight));
+    test::ExpectDone(store->Commit(test::Batch(k, 20), kEight));
     const auto fleet = reader->Load();
     ASSERT_TRUE(fleet) << fleet.error().text;
-    EXPECT_EQ(testing::BatchIn(*fleet, 20), k);
+    EXPECT_EQ(test::BatchIn(*fleet, 20), k);
   }
   store.reset();
-  EXPECT_EQ(testing::BatchIn(*reader->Load(), 20), 50u);  // and after it
-  EXPECT_EQ(testing::BatchIn(*OpenReader()->Load(), 20), 50u);
+  EXPECT_EQ(test::BatchIn(*reader->Load(), 20), 50u);  // and after it
+  EXPECT_EQ(test::BatchIn(*OpenReader()->Load(), 20), 50u);
 }
 
 }  // namespace

@@ -11,15 +11,12 @@ namespace focalfleet {
 namespace {
 
 using test::Intent;
+using test::kEight;
+using test::kNine;
 using test::StoreTest;
+using test::Tuned;
 using test::Vector;
 using ::testing::HasSubstr;
-using testing::Intent;
-using testing::kEight;
-using testing::kNine;
-using testing::StoreTest;
-using testing::Tuned;
-using testing::Vector;
 
 TEST_F(StoreTest, NewStoreIsEmpty) {
   auto store = OpenStore();
@@ -160,7 +157,7 @@ TEST_P(StoreGarbage, IsAnErrorThatNamesTableAndRow) {
   EXPECT_EQ(fleet.error().code, ErrorCode::kInvalid);
   EXPECT_THAT(fleet.error().text, HasSubstr(GetParam().reported));
   // The store can still write after the failed read.
-  testing::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
+  test::ExpectDone(store->Commit(std::vector<Row>{Vector(8, Witness::kReported, 1, 1)}, kEight));
 }
 
 INSTANTIATE_TEST_SUITE_P(

@@ -12,6 +12,7 @@
 namespace focalfleet {
 namespace {
 
+using test::ModelText;
 using ::testing::HasSubstr;
 
 class ModelRegistryTest : public ::testing::Test {

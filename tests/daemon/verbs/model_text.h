@@ -6,7 +6,7 @@
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/layout.h"
 
-namespace focalfleet {
+namespace focalfleet::test {
 
 inline std::string ModelText(const Layout& layout, const std::string& name) {
   std::string text = "name = \"" + name + "\"\ncampaign = \"night\"\nverdict = \"explained\"\n";
@@ -29,4 +29,4 @@ inline std::string ModelText(const Layout& layout, const std::string& name) {
   return text;
 }
 
-}  // namespace focalfleet
+}  // namespace focalfleet::test

@@ -13,6 +13,9 @@
 namespace focalfleet {
 namespace {
 
+using test::ModelText;
+using test::SmallFleet;
+
 class ModelUpkeepTest : public ::testing::Test {
  protected:
   ModelUpkeepTest() : store_(Store::Open(scratch_ / "fleet.db").value()) {}

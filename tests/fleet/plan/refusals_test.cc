@@ -85,7 +85,7 @@ TEST(Planner, LeadsApartWhatStartsTooNearWhenAskedTo) {
   EXPECT_THAT(plan->too_near, HasSubstr("11 and 22"));
   EXPECT_TRUE(plan->unserved.empty());
   // The two are never nearer than they start, by the checker's own distance.
-  const auto before = focalfleet::testing::Witnessed(fleet, {});
+  const auto before = focalfleet::test::Witnessed(fleet, {});
   ASSERT_LT(before.worst_margin_mm, -0.1);
   CheckOptions options;
   options.tolerance_mm = -before.worst_margin_mm + 2e-4;

@@ -7,8 +7,14 @@
 #include "fleet/plan/replan.h"
 #include "tests/fleet/plan/under_way.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::Begun;
+using test::DrawStartAndTargets;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::UnderWay;
 
 class ReplanErrors : public ::testing::Test {
  protected:
@@ -131,4 +137,4 @@ TEST_F(ReplanErrors, ADisabledUnitStays) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

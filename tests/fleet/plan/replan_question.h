@@ -3,7 +3,7 @@
 
 #include "tests/fleet/plan/under_way.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline constexpr double kLateSkewS = 0.040;
 inline constexpr std::uint64_t kSeeds = 8;
@@ -70,4 +70,4 @@ inline void ExpectEndsAt(const LateMove& late, const ReplanQuestion& question) {
   EXPECT_LT(late.start_s, question.start_s + 1e-3);
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -8,8 +8,19 @@
 #include "fleet/plan/replan.h"
 #include "tests/fleet/plan/replan_question.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::Begun;
+using test::DrawQuestion;
+using test::ExpectEndsAt;
+using test::kDraws;
+using test::kLateSkewS;
+using test::kSeeds;
+using test::Pair;
+using test::TestSeed;
+using test::UnclearPairs;
+using test::UnderWay;
 
 // The late unit or one of its neighbours ends early. With their followers stopped in time all pairs
 // are clear, but those that were named.
@@ -143,4 +154,4 @@ TEST(Replan, SeveralGoOnOneAfterTheOther) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

@@ -12,10 +12,22 @@
 namespace focalfleet {
 namespace {
 
+using test::Begun;
+using test::DrawQuestion;
 using test::DrawStartAndTargets;
+using test::DrawTarget;
+using test::ExpectClear;
+using test::ExpectEndsAt;
+using test::HasStaticWay;
 using test::HexFleet;
+using test::kDraws;
+using test::kLateSkewS;
+using test::kNever;
+using test::kSeeds;
 using test::PlanningFleet;
 using test::TestSeed;
+using test::UnderWay;
+using test::WouldMeet;
 
 TEST(Replan, IsClearOfAllOthersForEverySkewAndClock) {
   int asked = 0;

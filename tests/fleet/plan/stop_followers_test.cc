@@ -8,8 +8,18 @@
 #include "protocol/base/rng.h"
 #include "tests/fleet/plan/stopped.h"
 
-namespace focalfleet::testing {
+namespace focalfleet {
 namespace {
+
+using test::DrawStartAndTargets;
+using test::HexFleet;
+using test::kBeforeS;
+using test::kNever;
+using test::PlanningFleet;
+using test::Stopped;
+using test::StopSafety;
+using test::TestSeed;
+using test::UnnoticedPairs;
 
 struct SingleStops {
   int draws = 0;
@@ -112,4 +122,4 @@ TEST(StopTimes, TheTimeThatIsLeftHoldsForBadClocks) {
 }
 
 }  // namespace
-}  // namespace focalfleet::testing
+}  // namespace focalfleet

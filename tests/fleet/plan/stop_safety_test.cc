@@ -22,6 +22,17 @@
 namespace focalfleet {
 namespace {
 
+using test::ExpectANewPlan;
+using test::kBeforeS;
+using test::kNever;
+using test::kReplanEvery;
+using test::Stopped;
+using test::StopSafety;
+using test::Tally;
+using test::UnclearPairs;
+using test::Units;
+using test::UnnoticedPairs;
+
 constexpr int kInstants = 100;
 
 TEST_P(StopSafety, FewPairsAreUnnoticed) {

@@ -15,7 +15,7 @@
 #include "tests/fleet/plan/planning.h"
 #include "tests/fleet/plan/true_time.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline constexpr double kBeforeS = 0.1;  // walked before the first stop
 inline constexpr int kReplanEvery = 20;  // instants
@@ -279,4 +279,4 @@ class StopSafety : public ::testing::TestWithParam<int> {
   std::optional<Stopped> fleet_;
 };
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

@@ -19,7 +19,7 @@
 #include "protocol/base/rng.h"
 #include "tests/support/plan_checker.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 inline constexpr double kNever = std::numeric_limits<double>::infinity();
 
@@ -86,4 +86,4 @@ inline UnclearPairs PairsIn(const CheckReport& report, const Layout& layout) {
   return unclear;
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

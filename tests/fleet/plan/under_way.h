@@ -19,7 +19,7 @@
 #include "tests/fleet/plan/planning.h"
 #include "tests/fleet/plan/true_time.h"
 
-namespace focalfleet::testing {
+namespace focalfleet::test {
 
 /// A configuration under way in true time: the units that were stopped and when, and the late
 /// moves.
@@ -283,4 +283,4 @@ inline std::optional<UnderWay> Begun(std::uint32_t count, std::uint64_t seed,
   return std::optional<UnderWay>(std::in_place, std::move(fleet), options, std::move(*plan));
 }
 
-}  // namespace focalfleet::testing
+}  // namespace focalfleet::test

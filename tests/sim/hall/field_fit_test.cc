@@ -11,7 +11,7 @@ namespace focalfleet::sim {
 namespace {
 
 // The map of a law at 59 mm (or at `radius_mm`), every `step_deg`.
-FieldMap MapOf(const testing::FieldLaw& law, int step_deg, double noise_T, std::uint64_t seed,
+FieldMap MapOf(const test::FieldLaw& law, int step_deg, double noise_T, std::uint64_t seed,
                double radius_mm = 59) {
   Rng rng(seed);
   FieldMap map;

@@ -12,10 +12,10 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::BenchMove;
-using testing::FirmwareRig;
-using testing::kMove;
-using testing::kNew;
+using test::BenchMove;
+using test::FirmwareRig;
+using test::kMove;
+using test::kNew;
 
 constexpr std::uint16_t kOld = 6;  // the move that was begun last
 

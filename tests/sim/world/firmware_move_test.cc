@@ -8,13 +8,13 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::BenchMove;
-using testing::FirmwareRig;
-using testing::Get;
-using testing::kBenchMax;
-using testing::kBenchMin;
-using testing::kMove;
-using testing::kNew;
+using test::BenchMove;
+using test::FirmwareRig;
+using test::Get;
+using test::kBenchMax;
+using test::kBenchMin;
+using test::kMove;
+using test::kNew;
 
 // ---- a move's life
 

@@ -11,9 +11,9 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::FirmwareRig;
-using testing::kBenchMax;
-using testing::kBenchMin;
+using test::FirmwareRig;
+using test::kBenchMax;
+using test::kBenchMin;
 
 TEST(Firmware, KeepsParametersWithinTheirBounds) {
   FirmwareRig rig;

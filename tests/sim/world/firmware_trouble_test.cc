@@ -11,11 +11,11 @@
 namespace focalfleet::sim {
 namespace {
 
-using testing::BenchMove;
-using testing::FirmwareRig;
-using testing::Get;
-using testing::kMove;
-using testing::kNew;
+using test::BenchMove;
+using test::FirmwareRig;
+using test::Get;
+using test::kMove;
+using test::kNew;
 
 TEST(Firmware, AFaultStopsTheMoveAndHoldsUntilCleared) {
   FirmwareRig rig;
@@ -144,7 +144,7 @@ TEST(Firmware, AnInterruptedUnitMovesAgainWhenBothPositionsAreSet) {
 // then.
 TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
   for (std::uint64_t round = 0; round < 60; ++round) {
-    const std::uint64_t seed = focalfleet::testing::TestSeed(1) + round;
+    const std::uint64_t seed = focalfleet::test::TestSeed(1) + round;
     FOCALFLEET_TRACE_SEED(seed);
     Rng rng(seed);
     FirmwareRig rig;
@@ -217,7 +217,7 @@ TEST(Firmware, NeverBeginsAMoveTwiceWhateverComes) {
 }
 
 TEST(Firmware, AnyFrameIsTakenOrLeftButMovesNoUnitThatIsNotArmed) {
-  const std::uint64_t seed = focalfleet::testing::TestSeed(2);
+  const std::uint64_t seed = focalfleet::test::TestSeed(2);
   FOCALFLEET_TRACE_SEED(seed);
   Rng rng(seed);
   FirmwareRig rig;

@@ -176,7 +176,7 @@ TEST_F(UnitMachineTest, GroupsSayTheSameAsTheirFramesAlone) {
   for (int round = 0; round < 3000; ++round) {
     std::vector<CanFrame> frames;
     while (frames.size() < 1 + rng.Below(12)) {
-      HostMessage message = focalfleet::testing::RandomHost(rng);
+      HostMessage message = focalfleet::test::RandomHost(rng);
       // Few move ids, so that some of the moves are complete.
       const MoveId move{static_cast<std::uint16_t>(1 + rng.Below(2))};
       if (auto* begin = std::get_if<StageBegin>(&message)) *begin = {move, {1, 0}, begin->mode};
