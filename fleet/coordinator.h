@@ -49,6 +49,10 @@ class Coordinator {
   /// layout.
   /// Cost: as many units as are heard, commanded or due, and one pass over the units of a
   /// configuration.
+  /// Allocations: none where units are asked, heard and polled alone, at rest or in motion, once the
+  /// buffers have grown and where `effects` is reused. A step allocates for rows with text (alarms,
+  /// configurations), for replies, for jobs, for what a plan or an exposure brings, and for units
+  /// and places that the store had no row of.
   void Step(const Inputs& inputs, Effects* effects);
   /// Appends what must still be written when the shell ends. Units that move finish by themselves.
   void End(HostInstant now, Effects* effects);
