@@ -1,9 +1,9 @@
 // The schedule of a bus decides which frames go onto it next. Frames wait here, not in the kernel,
-// so that a stop or a start passes all of them: at most `horizon` of bus time is handed to the port
+// so that a stop or a start passes all of them. At most `horizon` of bus time is handed to the port
 // ahead of the bit clock. A request is charged with the bits of its answer too, so an upload fills
 // the bus without drowning the replies. Frames of one priority leave in the order in which they
-// came. On a bus with CAN FD staging frames that wait one behind the other leave together, charged
-// as the group that the port makes of them.
+// came. On a bus with CAN FD, consecutive staging frames leave together. They are charged as the
+// group that the port makes of them.
 #pragma once
 
 #include <algorithm>
@@ -40,8 +40,8 @@ class BusSchedule {
   /// Charges the bus time of a frame that did not pass through here (a stop, an unasked report).
   void Charge(HostInstant now, std::uint32_t bits);
 
-  /// Releases nothing before `until`: a stop of all has the highest identifier of all stops, and
-  /// any frame that is handed to a controller beside it may win arbitration against it.
+  /// Releases nothing before `until`. A stop of all has the highest identifier of all stops, so any
+  /// frame handed to a controller beside it may win arbitration against it.
   void Hold(HostInstant until) { held_until_ = std::max(held_until_, until); }
 
   /// When Release has something to do again; kNever while the queue is empty.

@@ -1,5 +1,5 @@
-// A late move takes a single unit to its target while the others move: a unit with another target,
-// or one that goes on after it was stopped.
+// A late move takes a single unit to its target while the others move. The unit has another target,
+// or goes on after it was stopped.
 //
 //   settling -> planning -> uploading -> committing -> starting -> (moves like every other unit)
 //      ^            |           |            |            |
