@@ -15,8 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/configuration.h"
 #include "fleet/coordinate/coordination.h"
+#include "fleet/coordinate/inputs.h"
 #include "fleet/coordinate/round.h"
 #include "fleet/coordinate/upload.h"
 #include "fleet/plan/replan.h"

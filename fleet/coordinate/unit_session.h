@@ -4,7 +4,9 @@
 // motion_reports.h, unit_parameters.h, sensor_reading.h, count_setting.h and clock_answers.h.
 #pragma once
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/coordination.h"
+#include "fleet/coordinate/inputs.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet {
