@@ -1,6 +1,7 @@
 // The coordinator is the one transition function of the fleet: Step(inputs) -> effects. Its state
-// is the knowledge of every unit and bus, and the work under way with them. It has no clock,
-// thread, file, socket or log. The shell polls, calls Step, and performs the effects in this order:
+// is the knowledge of every unit and bus, and the work under way with them. Clock, thread, file,
+// socket and log are the shell's. The shell polls, calls Step, and performs the effects in this
+// order:
 //
 //   rows      to the store:   one transaction a batch; Inputs::committed_through confirms it
 //   frames    to the buses:   in their order
@@ -40,15 +41,17 @@ class Coordinator {
               StoredFleet stored);
   ~Coordinator();
 
-  /// Takes in what has come since the last step and appends to `effects` what is to be done. Inputs
-  /// are taken in this order, each list from its front: notes, rows that the store refused, links,
-  /// frames, plans, exposures, commands; then everything that is due at `now`. A command is
-  /// therefore decided by the frames of the same step, and a stop ends what an answer has just
-  /// begun. The same inputs in the same order give the same effects, to the bit.
-  /// Pre: `now` is not before that of the last step; `effects` is clear; frames are of buses of the
-  /// layout.
-  /// Cost: as many units as are heard, commanded or due, and one pass over the units of a
-  /// configuration.
+  /// Takes in what has come since the last step and appends to `effects` what is to be done. Each
+  /// list of inputs is taken from its front, in this order: notes, refused rows, links, frames,
+  /// plans, exposures, commands. Everything that is due at `now` follows. A command is therefore
+  /// decided by the frames of the same step, and a stop ends what an answer has just begun. The
+  /// same inputs in the same order give the same effects, to the bit. Pre: `now` is not before that
+  /// of the last step; `effects` is clear; frames are of buses of the layout. Cost: as many units
+  /// as are heard, commanded or due, and one pass over the units of a configuration. Allocations:
+  /// none where units are asked, heard and polled alone, at rest or in motion, once the buffers
+  /// have grown and where `effects` is reused. A step allocates for rows with text (alarms,
+  /// configurations), for replies and for jobs. The results of a plan or an exposure allocate, too,
+  /// and so do units that the store had no row of.
   void Step(const Inputs& inputs, Effects* effects);
   /// Appends what must still be written when the shell ends. Units that move finish by themselves.
   void End(HostInstant now, Effects* effects);

@@ -6,9 +6,33 @@
 
 namespace focalfleet {
 
+void BusSchedule::Queue::PushBack(const Entry& entry) {
+  // Room at the front is used where that moves no more entries than have left since.
+  if (entries_.size() == entries_.capacity() && front_ > 0 && front_ >= size()) {
+    entries_.erase(entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(front_));
+    front_ = 0;
+  }
+  entries_.push_back(entry);
+}
+
+void BusSchedule::Queue::PopFront() {
+  if (++front_ < entries_.size()) return;
+  entries_.clear();
+  front_ = 0;
+}
+
+std::size_t BusSchedule::Queue::Drop(NodeId node) {
+  const auto kept = std::remove_if(
+      entries_.begin() + static_cast<std::ptrdiff_t>(front_), entries_.end(),
+      [&](const Entry& entry) { return (entry.frame.id >> 11 & 255) == node.value; });
+  const auto dropped = static_cast<std::size_t>(entries_.end() - kept);
+  entries_.erase(kept, entries_.end());
+  return dropped;
+}
+
 bool BusSchedule::Enqueue(const Entry& entry) {
   if (waiting_ == limits::kFramesPerBusQueued) return false;
-  queue_[entry.frame.id >> 26].push_back(entry);
+  queue_[entry.frame.id >> 26].PushBack(entry);
   ++waiting_;
   return true;
 }
@@ -22,11 +46,11 @@ void BusSchedule::Release(HostInstant now, DurationNs horizon, BusId bus,
       const OnWire next = Next(queue);
       std::uint32_t bits = next.bits;
       for (std::size_t i = 0; i < next.frames; ++i) {
-        const Entry& entry = queue.front();
+        const Entry& entry = queue[0];
         frames->push_back({bus, entry.frame});
         if (entry.asks) asked->push_back(*entry.asks);
         bits += entry.reply_bits;
-        queue.pop_front();
+        queue.PopFront();
       }
       busy_until_ = busy_until_ + BitTime(bits, rates_.nominal_bps);
       waiting_ -= next.frames;
@@ -34,7 +58,7 @@ void BusSchedule::Release(HostInstant now, DurationNs horizon, BusId bus,
   }
 }
 
-OnWire BusSchedule::Next(const std::deque<Entry>& queue) const {
+OnWire BusSchedule::Next(const Queue& queue) const {
   std::array<CanFrame, kGroupEntriesMax> front;
   const std::size_t count = rates_.data_bps == 0 ? 1 : std::min(queue.size(), front.size());
   for (std::size_t i = 0; i < count; ++i) front[i] = queue[i].frame;
@@ -54,9 +78,7 @@ HostInstant BusSchedule::ReadyAt(DurationNs horizon) const {
 
 std::size_t BusSchedule::Drop(NodeId node) {
   std::size_t dropped = 0;
-  for (auto& queue : queue_)
-    dropped += std::erase_if(
-        queue, [&](const Entry& entry) { return (entry.frame.id >> 11 & 255) == node.value; });
+  for (Queue& queue : queue_) dropped += queue.Drop(node);
   waiting_ -= dropped;
   return dropped;
 }

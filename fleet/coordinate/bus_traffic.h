@@ -1,5 +1,5 @@
-// The traffic of the buses, counted exactly: frames and bits of both directions, the load of the
-// last second, and the bits of the upload under way.
+// The traffic of the buses is counted exactly here: frames and bits of both directions, load of the
+// last second, bits of the upload under way.
 #pragma once
 
 #include <span>
@@ -34,8 +34,8 @@ class BusTraffic {
   const BusRates rates_;
   const StepState& step_;
   UnitTable& units_;
-  /// The end of the last frame heard. It is later than `now` where the host was held up on its way
-  /// to the frame.
+  /// The end of the last frame heard; later than `now` where the host was held up on its way to the
+  /// frame.
   HostInstant heard_until_{INT64_MIN};
 };
 

@@ -1,5 +1,5 @@
-// The view of a bus is what the coordinator publishes of it: its link, its load, its counts of
-// frames and bits, and the cost of uploading moves over it.
+// The view of a bus is what the coordinator publishes of it: link, load, counts of frames and bits,
+// and the cost of uploading moves.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@ namespace focalfleet {
 /// not armed are counted: stage_begin, stage_segment, confirm and arm with their answers. Bits are
 /// of the nominal bit rate; CAN FD counts by its time.
 struct UploadView {
-  // The prediction is made before the first frame is sent. It is exact where each frame is sent
+  // Predictions are made before the first frame is sent. They are exact where each frame is sent
   // once and groups are as full as can be.
   std::uint64_t bits_predicted = 0;
   std::uint64_t bits = 0;  // as they passed: repeats and late moves included

@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "fleet/plan/planner.h"
+
 namespace focalfleet {
 namespace {
 

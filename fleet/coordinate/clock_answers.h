@@ -1,5 +1,6 @@
-// A clock answer is a reading of a unit's counter. It feeds the unit's clock map, raises an alarm
-// where the clock runs outside of what plans allow for, and dates the start of the unit's motion.
+// A clock answer is a reading of a unit's counter, and feeds the unit's clock map. The answer also
+// dates the start of the unit's motion. An alarm is raised where the clock runs outside of what
+// plans allow for.
 #pragma once
 
 #include "fleet/coordinate/coordination.h"

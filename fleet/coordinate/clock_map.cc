@@ -23,8 +23,8 @@ bool ClockMap::Observe(const Reading& reading) {
   return true;
 }
 
-// A counter that began anew since the newest reading shows at most the time since then. One that
-// came round (every five days) looks the same, and costs what a restart does.
+// A counter that began anew since the newest reading shows at most the time since then. A counter
+// that came round (every five days) looks the same, and costs what a restart does.
 bool ClockMap::RanThrough(const Reading& reading) const {
   const auto since_ns = static_cast<double>((reading.latest - newest().earliest).ns);
   return static_cast<double>(reading.ticks) * kTickNs > kUsual.high * since_ns;
@@ -38,7 +38,7 @@ void ClockMap::Keep(std::int64_t ticks, const Reading& reading) {
   kept_[count_++] = {ticks, reading.earliest, reading.latest};
 }
 
-// Of all numbers with these low bits the one nearest to where the last reading leads.
+// Among all numbers with these low bits, the one nearest to where the last reading leads.
 std::int64_t ClockMap::Unwrap(std::uint32_t ticks, HostInstant at) const {
   const std::int64_t expected = newest().ticks + (at - newest().middle()).ns / kTick.ns;
   return expected + static_cast<std::int32_t>(ticks - static_cast<std::uint32_t>(expected));

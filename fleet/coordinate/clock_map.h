@@ -1,17 +1,17 @@
-// One unit's clock against the host's, from the answers to clock requests.
+// A clock map relates one unit's clock to the host's, from the answers to clock requests.
 //
-// An answer says what the unit's counter showed when the request had ended. When that was the host
-// knows only within bounds, and these hold wherever host, kernel and bus are held up:
+// An answer holds what the unit's counter showed when the request had ended. The host knows that
+// instant only within bounds, and these hold wherever host, kernel and bus are held up:
 //
 //   earliest   the time of the step that let the request go, read before that step began. The
 //              request is on the bus later, and the unit reads its counter later still. A request
-//              that is repeated keeps its sequence number; `earliest` is of the first copy, and
+//              that is repeated keeps its sequence number. `earliest` is of the first copy, and
 //              copies that a fault of the bus makes come later, too. Answers to earlier requests
 //              have other numbers. These come round after 254 requests: an answer that old would
 //              have to be overtaken by all later ones. An answer to a request that has not left
 //              answers none. Requests never travel in groups; staging frames alone do.
 //   latest     a time read after the answer had been, or the kernel's stamp where that is sound
-//              (FrameStamps). The unit read its counter before it answered. Of several copies of
+//              (FrameStamps). The unit read its counter before it answered. Among several copies of
 //              an answer the first counts.
 //
 // A pause anywhere between the two makes the reading wider and never wrong. A reading whose bounds
@@ -27,21 +27,21 @@
 // truth only where one of these is not so:
 //
 //   - the counter ran through from the first reading kept to the last. A restart lets it begin
-//     anew, and a young counter that did looks like a slow one. So a reading is only put beside
-//     those before it where it shows more than 1.02 times the time since: no clock that is off by
+//     anew, and a young counter that did looks like a slow one. A reading is therefore put beside
+//     earlier ones only where it shows more than 1.02 times the time since. No clock that is off by
 //     less than 2 % comes to that from 0. Else it stands alone. Readings that contradict each other
 //     are of another clock, too: then only the newest counts. Either way nothing is said of a rate
 //     before the next reading.
 //   - the rate changes by less than kWander while kReadings are taken.
 //
-// That no clock is off by more than kRateErrorMax is used for times and for the likeliest rate, and
-// never to say that a clock is off: `least` and `most` come from the readings alone.
+// The limit kRateErrorMax of all clocks is used for times and for the likeliest rate. The limit
+// never says that a clock is off: `least` and `most` come from the readings alone.
 //
 // How soon a rate is known: two readings that are w1 and w2 wide and d apart leave (w1 + w2 + 0.2
-// ms) / d between least and most. A clock that is off by 1 % is told from one that is off by 0.5 %
-// as soon as that is below 0.5 %: by the second reading where both are narrower than a fifth of a
-// percent of the time between them (2 ms of 1 s, 20 ms of the 10 s at rest), by the first two such
-// ones of the last eight where others are wide.
+// ms) / d between least and most. A clock that is off by 1 % is distinguished from one that is off
+// by 0.5 % as soon as that is below 0.5 %. Two readings are enough where both are narrower than a
+// fifth of a percent of the time between them. This share is 2 ms of 1 s, or 20 ms of the 10 s at
+// rest. Where others are wide, the first two such ones of the last eight are enough.
 #pragma once
 
 #include <algorithm>
@@ -79,7 +79,7 @@ class ClockMap {
   struct Rate {
     double error = 0;  // the likeliest
     double bound = 0;  // the true one is within error +- bound
-    // By the readings alone, the true one is within these.
+    // The true one is within these, by the readings alone.
     double least = kAny.low - 1;
     double most = kAny.high - 1;
     /// For certain it is off by more than `error_max`, one way or the other.
@@ -102,10 +102,10 @@ class ClockMap {
   [[nodiscard]] Instant TimeOf(std::uint32_t ticks) const;
 
   static constexpr std::size_t kReadings = 8;
-  /// No clock is off by more: a controller that runs by it would not keep up with a CAN bus, whose
-  /// bit timing allows for 1.58 % at most (ISO 11898-1). Wider than what units may have.
+  /// No clock is off by more. A controller with such a clock would not keep up with a CAN bus. The
+  /// bit timing there allows for 1.58 % at most (ISO 11898-1). Wider than what units may have.
   static constexpr double kRateErrorMax = 0.02;
-  /// By how much a rate may change while kReadings are taken (temperature).
+  /// The most that a rate may change while kReadings are taken (temperature).
   static constexpr double kWander = 20e-6;
 
  private:
@@ -128,9 +128,9 @@ class ClockMap {
   [[nodiscard]] bool RanThrough(const Reading& reading) const;
   void Keep(std::int64_t ticks, const Reading& reading);
   [[nodiscard]] std::int64_t Unwrap(std::uint32_t ticks, HostInstant at) const;
-  /// That the readings leave; low > high: they contradict each other.
+  /// The rates that the readings leave; low > high: they contradict each other.
   [[nodiscard]] Rates RatesByReadings() const;
-  /// Of these the usual ones, where there are any.
+  /// The usual ones among these, where there are any.
   [[nodiscard]] Rates PossibleRates() const;
   [[nodiscard]] Line Fit(const Rates& rates) const;
   /// From one reading: when the counter showed `ticks`.

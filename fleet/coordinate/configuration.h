@@ -1,6 +1,6 @@
 // The configuration under way: its goal unit by unit, its phase, its published view, and the
-// outcomes of its targets. It decides nothing about motion; the executor takes it from phase to
-// phase.
+// outcomes of its targets. Decisions about motion are not made here: the executor takes it from
+// phase to phase.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace focalfleet {
 
-/// One unit of the goal.
+/// A unit of the goal.
 struct ConfigurationUnit {
   /// The target of the goal, as near as the unit gets, theta in the whole turn that is taken.
   std::optional<Pose> goal;

@@ -74,9 +74,9 @@ ConfigurationMeasurement::Progress ConfigurationMeasurement::Advance() {
   return is_locating_ ? EndWhenLocated() : Progress::kUnderWay;
 }
 
-// The readings of all units with sensors are there, as far as they come. A unit that is read anew
-// meanwhile, because it did not hear the host for a while, is awaited and asked as soon as it is
-// known again.
+// The readings of all units with sensors are there, as far as they come. A unit may be read anew
+// meanwhile, because it did not hear the host for a while. Such a unit is awaited, and asked as
+// soon as it is known again.
 bool ConfigurationMeasurement::SensorsAreRead() {
   if (sense_at_ == kNever) return true;
   if (fleet_.now() < sense_at_) return false;

@@ -1,10 +1,10 @@
 // The measurement of a configuration: when all units rest, their own sensors are read and an
-// exposure is asked for, and each finding is put into the unit's view, its place and a row for the
-// store. Where units of unknown place have targets, an exposure comes before any unit moves, too,
-// and their counts are set to where they are found (count_setting.h).
+// exposure is asked for. Each finding is put into the unit's view, its place, and a row for the
+// store. Where units of unknown place have targets, an exposure comes before any unit moves, too.
+// The counts of such units are then set to where they are found (count_setting.h).
 //
-// A unit reports its own count. A measured place replaces it, so a correction is a configuration
-// like any other, from the true places; only the way to it is fixed (corrections.h).
+// A unit reports its own count, and a measured place replaces it. A correction is therefore a
+// configuration like any other, from the true places; only the way to it is fixed (corrections.h).
 #pragma once
 
 #include <cstdint>

@@ -1,10 +1,10 @@
 // The progress of the configuration under way: from a goal through its rounds to its end. Each
-// function takes it over one edge of the table in configuration_phase.h, when what the edge waits
-// for has come: answers, a plan, a durable batch, an exposure.
+// function takes it over one edge of the table in configuration_phase.h. An edge waits for its
+// input: answers, a plan, a durable batch, an exposure.
 //
 // Nothing starts before every unit of the plan holds its move, and before the store holds the
-// intent of each. A unit that fails before the start costs a new plan. One that fails in motion
-// stops those whose way leads through where it may stand (UnitPlan::followers). The next round
+// intent of each. A unit that fails before the start costs a new plan. A unit that fails in motion
+// stops the units whose way leads through where it may stand (UnitPlan::followers). The next round
 // takes these on, unless they find a way while the others still move (late_moves.h). Every round
 // and every late move uses a new move id, so a unit that kept an old move never starts with the
 // others.

@@ -1,5 +1,5 @@
-// The view of a configuration is what the coordinator publishes of the one under way, or of the
-// last one: its counts of outcomes, its times, its starts and its exposures.
+// The view of a configuration is what the coordinator publishes of it: its counts of outcomes, its
+// times, its starts and its exposures. Shown is the one under way, or the last one.
 #pragma once
 
 #include <cstddef>

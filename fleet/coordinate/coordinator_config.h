@@ -34,8 +34,8 @@ struct CoordinatorConfig {
   bool reads_sensors = false;  // of units that have some (units.csv, [hall] model)
   bool has_camera = false;     // else a configuration that asks for one is refused
   DurationNs sync_lead = Milliseconds(5);
-  /// The last piece of each axis' way in a measured configuration, with its direction, so that play
-  /// and wind-up of a gear are always on one side. 0: no such piece.
+  /// The last piece of each axis' way in a measured configuration, with its direction. Play and
+  /// wind-up of a gear are then always on one side. 0: no such piece.
   std::array<double, kAxisCount> approach_deg = {-2, -2};
   /// A correction that is not the last ends this far short of the target where it needed a
   /// unidirectional approach. The last way is then short and goes on in the same direction: a long

@@ -38,8 +38,8 @@ class Corrections {
   /// Notes the way of a unit whose motion ended. `reached`: its plan; null where it ended
   /// elsewhere.
   void NoteDirections(PositionerIndex i, const UnitPlan* reached);
-  /// The target where it is in reach with room for its approach and for corrections either way,
-  /// else a whole turn of theta on where that is, else as near as it gets.
+  /// The target, where it is in reach with room for its approach and for corrections either way.
+  /// Else the target a whole turn of theta on, where that has room; else as near as the unit gets.
   [[nodiscard]] Pose GoalFor(PositionerIndex i, const Pose& target) const;
 
   /// Replaces the targets by the poses to go past first; false: no unit goes anywhere first.

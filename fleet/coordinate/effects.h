@@ -1,5 +1,5 @@
-// Effects are everything that one step of the coordinator asks of the shell: rows for the store,
-// frames for the buses, jobs for the planner and the camera, replies to commands.
+// Effects are everything that one step of the coordinator asks of the shell. They are rows for the
+// store, frames for the buses, jobs for the planner and the camera, and replies to commands.
 #pragma once
 
 #include <cstdint>

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/configuration_progress.h"
 #include "fleet/coordinate/executor_rooms.h"
 

@@ -1,5 +1,5 @@
-// Homing of units, wave by wave. The moves that make way for a wave are a round like any other;
-// then the units of the wave run to their stops, each by its own firmware, and begin to count anew.
+// Homing of units, wave by wave. The moves that make way for a wave are a round like any other. The
+// units of the wave then run to their stops, each by its own firmware, and begin to count anew.
 #pragma once
 
 #include <vector>

@@ -1,5 +1,5 @@
-// Inputs are everything that one step of the coordinator takes in: frames, links, commands, answers
-// of the planner and of the camera, and how far the store has come.
+// Inputs are everything that one step of the coordinator takes in. They are frames, links,
+// commands, answers of the planner and of the camera, and how far the store has come.
 #pragma once
 
 #include <cstdint>

@@ -174,7 +174,7 @@ bool LateMoves::Settle(Move* late) {
   return true;
 }
 
-/// One job at a time.
+/// Asks for a plan, one job at a time.
 void LateMoves::AskForPlan(Move* late) {
   if (job_ != 0) return;
   const PositionerIndex i = late->unit;
@@ -248,8 +248,8 @@ void LateMoves::TakePlan(Move* late, const LateMove& move) {
   upload_.Send(i);
 }
 
-/// Brings the deviations up to date that other late moves were planned with: this move was planned
-/// around those that are about to start, so to them it is no news.
+/// Brings the deviations up to date that other late moves were planned with. This move was planned
+/// around those that are about to start, so it makes none of them stale.
 void LateMoves::ReportOther(PositionerIndex i) {
   const std::optional<Deviation> deviation = DeviationOf(fleet_, round_, i);
   for (Move& other : moves_) {
@@ -276,8 +276,8 @@ void LateMoves::Withdraw(PositionerIndex i) {
   fleet_.requests.Ask(i, focalfleet::Stop{});
 }
 
-/// True where the move has to be given back: it is too late for the start, or what it was planned
-/// with has changed, or a unit that it depends on is not heard.
+/// True where the move has to be given back. Reasons: too late for the start, a neighbour that has
+/// moved since the plan was made, a leader that is not heard.
 bool LateMoves::MustNotStart(const Move& late, HostInstant last) const {
   return fleet_.now() > last || IsStale(late) || IsUnheard(fleet_, *round_.LateOf(late.unit));
 }

@@ -1,5 +1,5 @@
-// A late move takes a single unit to its target while the others move: a unit with another target,
-// or one that goes on after it was stopped.
+// A late move takes a single unit to its target while the others move. The unit has another target,
+// or goes on after it was stopped.
 //
 //   settling -> planning -> uploading -> committing -> starting -> (moves like every other unit)
 //      ^            |           |            |            |
@@ -15,8 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/configuration.h"
 #include "fleet/coordinate/coordination.h"
+#include "fleet/coordinate/inputs.h"
 #include "fleet/coordinate/round.h"
 #include "fleet/coordinate/upload.h"
 #include "fleet/plan/replan.h"

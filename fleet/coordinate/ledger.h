@@ -1,6 +1,7 @@
-// The ledger is the coordinator's side of the store: it appends rows and alarms to the effects,
-// keeps what the store holds of each serial number, and hands out numbers that no earlier run has
-// used. Replies that promise durability wait here until their batch is committed.
+// The ledger is the coordinator's side of the store. Rows and alarms are appended to the effects
+// here, and the ledger keeps what the store holds of each serial number. Numbers that no earlier
+// run has used are handed out here, too. Replies that promise durability wait here until their
+// batch is committed.
 #pragma once
 
 #include <cstdint>
@@ -43,7 +44,7 @@ class Ledger {
   [[nodiscard]] bool store_failing() const { return store_failing_; }
 
   /// A number that no unit holds a move under. Numbers are taken from a stock that the store holds
-  /// as used: a run that is killed may leave armed units behind that do not answer, and the start
+  /// as used. A run that is killed may leave armed units behind that do not answer, and the start
   /// signals of the next run reach them. Pre: MovesAreReserved().
   MoveId TakeMoveId();
   [[nodiscard]] bool MovesAreReserved() const { return committed_through_ >= reserved_by_; }

@@ -13,8 +13,8 @@ namespace {
 
 using enum UnitPhase;
 
-/// The open question is missed in time, also where the answer may be awaited into the time in which
-/// the motion of others depends on it.
+/// Sets when the open question is missed: in time also where the answer may be awaited until the
+/// motion of others depends on it.
 void MissSoon(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   if (record.motion.seen_moving >= record.motion.watch_until) return;

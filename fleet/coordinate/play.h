@@ -1,11 +1,11 @@
-// On which side of its play a gear lies, from the way that its axis went.
+// The side of a gear's play is tracked here, from the way that its axis went.
 //
-// What is driven stands anywhere within the play of the last stage, and is taken along from one
-// end of it: an axis that went down by more than the play is pushed at one end, and small ways
-// further down arrive in full; a way up is swallowed until the play is used up. Nobody knows how
-// wide the play of a unit is, only how wide it is at most (1.4 to 1.6 degrees in service). Ways are
-// told in units of that most. Where the axis was when nobody looked, both ends are followed: the
-// side is known when both agree, and then it is right for every play that is narrower, too.
+// The driven part stands anywhere within the play of the last stage, and is taken along from one
+// end of it. An axis that went down by more than the play is pushed at one end, and small ways
+// further down arrive in full. A way up is swallowed until the play is used up. How wide the play
+// of a unit is, is not known, only how wide it is at most (1.4 to 1.6 degrees in service). Ways are
+// given in units of that most. Where the axis was not watched, both ends are followed. The side is
+// known when both agree, and then it is right for every play that is narrower, too.
 #pragma once
 
 #include <algorithm>
@@ -15,14 +15,14 @@ namespace focalfleet {
 
 class AxisPlay {
  public:
-  /// It may stand anywhere in its play.
+  /// The axis may stand anywhere in its play.
   void Forget() { *this = {}; }
   /// Units: the widest play; upwards is positive.
   void Go(double ways) {
     low_ = std::clamp(low_ + ways, 0.0, 1.0);
     high_ = std::clamp(high_ + ways, 0.0, 1.0);
   }
-  /// In which direction it was pushed last through all of its play: -1 or 1; 0: not known.
+  /// The direction in which it was pushed last through all of its play: -1 or 1; 0: not known.
   [[nodiscard]] std::int8_t side() const {
     if (high_ <= 0) return -1;
     return low_ >= 1 ? std::int8_t{1} : std::int8_t{0};

@@ -1,13 +1,14 @@
-// After a restart or a lost link, what is a unit's position worth? The unit's FLASH, its mark
-// `moving`, the move that it began last, and what the store remembers are put side by side:
+// The reconciliation decides what a unit's position is worth after a restart or a lost link. The
+// unit's FLASH, its mark `moving`, the move that it began last, and the store are put side by side:
 //
-//   mark set                                  the move was cut by a power loss: an interval over
-//   its hull mark clear, intent open, it began that    it ended by itself while nobody listened:
-//   reported mark clear, intent open, it did not       it never began: reported, if FLASH still
-//   says `from` no intent, FLASH equals the store         as good as before no intent, nothing
-//   stored                 first sessions: reported anything else unknown: home it or measure it
+//   mark set                            cut by a power loss        interval over its hull
+//   mark clear, intent open, begun      ended by itself, unheard   reported
+//   mark clear, intent open, not begun  never began                reported, if FLASH holds `from`
+//   no intent, FLASH equals the store   as good as before          as stored
+//   no intent, nothing stored           first session              reported
+//   all else                                                       unknown: home it or measure it
 //
-// The interval is half an electrical turn wider than the hull: at power-on the field pulls the
+// The interval is half an electrical turn wider than the hull. At power-on the field pulls the
 // rotor to the stored vector, at most that far.
 #pragma once
 

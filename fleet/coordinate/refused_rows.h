@@ -1,7 +1,6 @@
-// A refused row is one that the store can never keep. A unit of which the store does not hold the
-// place, the intent or the binding must not move: after a restart its place would not be known.
-// Nothing but a fault of this program, or of the file, leads here, so an operator decides when it
-// is tried again.
+// A refused row is one that the store can never keep. A unit must not move while the store does not
+// hold its place, intent or binding: after a restart its place would not be known. Nothing but a
+// fault of this program, or of the file, leads here, so an operator decides when it is tried again.
 #pragma once
 
 #include "fleet/coordinate/coordination.h"

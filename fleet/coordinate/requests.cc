@@ -134,7 +134,7 @@ void Requests::SetDeadline(PositionerIndex i) {
   if (!units_[i].request.question) return;
   Question& question = *units_[i].request.question;
   question.asked = std::min(question.asked, step_.now);
-  // Each repeat waits twice as long as the one before: a host that was held up for a moment must
+  // Each repeat waits twice as long as the one before. A host that was held up for a moment must
   // not take the silence for its units'.
   const std::int64_t patience = std::int64_t{1} << question.tries;
   question.deadline = std::min(step_.now + config_.transmit_horizon + config_.reply_wait * patience,

@@ -39,8 +39,8 @@ class Requests {
 
   /// Sends a frame past the queue: stops, starts, the clock.
   void SendNow(std::size_t bus, const HostMessage& message, NodeId node);
-  /// A `done, stopped` under this sequence number, which no open question waits for, may answer a
-  /// stop of this host: a copy, or the answer to a stop past the queue.
+  /// True where a `done, stopped` under this sequence number may answer a stop of this host. Then
+  /// it is a copy, or the answer to a stop past the queue. Pre: no open question waits for it.
   [[nodiscard]] bool MayAnswerOurStop(PositionerIndex i, std::uint8_t sequence) const;
 
   /// Sends the clock where it is due, releases what the buses have room for, and sets the deadlines

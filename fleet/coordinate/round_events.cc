@@ -28,8 +28,8 @@ void EndMotion(PositionerIndex i, UnitEventKind how, ExecutorRooms* rooms) {
   if (view.outcome == TargetOutcome::kPending && place && !rooms->corrections.Waits(i) &&
       (homed || (target && *place == *target)))
     configuration.outcomes.NoteArrival(i, fleet.ledger.batch_now());
-  // Reached is the end of the plan, not the target: a unit that only makes way has no target, and
-  // others may come to theirs by stages.
+  // `reached` is about the end of the plan, not the target. A unit that only makes way has no
+  // target, and others may come to theirs by stages.
   const UnitPlan* const plan = round.PlanOf(i);
   const bool reached = plan != nullptr && !round.IsLate(i) && place && *place == plan->to;
   rooms->corrections.NoteDirections(i, reached ? plan : nullptr);

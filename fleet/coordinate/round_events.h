@@ -1,4 +1,4 @@
-// A unit event changes the part of a unit in the round: a motion that ended settles it, a unit that
+// A unit event changes the part of a unit in the round. A motion that ended settles it; a unit that
 // is lost or fails leaves the round, and its followers are stopped.
 #pragma once
 

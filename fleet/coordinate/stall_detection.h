@@ -1,21 +1,23 @@
-// How soon it is noticed that a unit has ended by itself, while others are to pass where it may
-// stand.
+// Stall detection notices in time that a unit has ended by itself, while others are to pass where
+// it may stand.
 //
 // Such a unit is asked every `poll`. Where a question stays open for `suspicion`, repeats included,
-// those that follow the unit are stopped as a precaution, though it may only be slow. So from its
-// end to the stop it takes at most poll + suspicion, when it ends right after an answer; a quarter
-// of the notice is left for the host, the bus, and one repeat of the stop itself. Where a repeat
-// of the question would not fit into the suspicion, the notice is longer than was asked for, and
-// plans are made with what it really is; up to 5 s, beyond which plans would lose more than they
-// gain: who waits longer than half a second for an answer gets no promise.
+// the followers of the unit are stopped as a precaution, though it may only be slow. From its end
+// to the stop it takes at most poll + suspicion, when it ends right after an answer. A quarter of
+// the notice is left for the host, the bus, and one repeat of the stop itself.
 //
-// With 1 s: every 400 ms two frames of at most 80 and 160 us, so a bus of 100 units of which every
-// one is watched carries 6 % for it.
+// The notice is longer than asked for where a repeat of the question would not fit into the
+// suspicion. Plans are made with the longer one. The notice grows up to 5 s, beyond which plans
+// would lose more than they gain. A fleet that waits longer than half a second for an answer gets
+// no promise.
+//
+// With 1 s, two frames of at most 80 and 160 us pass every 400 ms for each watched unit. A bus of
+// 100 units of which every one is watched carries 6 % for it.
 #pragma once
 
 #include <algorithm>
 
-#include "fleet/coordinator.h"
+#include "fleet/coordinate/coordinator_config.h"
 
 namespace focalfleet {
 
@@ -26,7 +28,7 @@ struct StallDetection {
 };
 
 constexpr StallDetection StallDetectionOf(const CoordinatorConfig& config) {
-  // The question, and once more with twice the patience (Core::EndStep).
+  // The question, and once more with twice the patience (Requests::Release).
   const std::int64_t suspicion_least = 3 * config.reply_wait.ns + 2 * config.transmit_horizon.ns;
   const std::int64_t achievable = std::min(suspicion_least * 100 / 35, Milliseconds(5000).ns);
   const std::int64_t notice = std::max(config.notice.ns, achievable);

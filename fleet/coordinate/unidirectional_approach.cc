@@ -22,10 +22,10 @@ std::int8_t SideAfter(const ApproachUnit& unit, Axis axis, std::int32_t left) {
   return length > 0 ? unit.play[Index(axis)].SideAfter(left / length) : std::int8_t{0};
 }
 
-/// By how much axes may go farther than they are sent, arms and gears not being quite as described.
-/// Arms that are a little longer put the same fibre on another angle of phi, and the nearer phi is
-/// to stretched or folded, the more. Theta has to make up for the change of the fibre's direction
-/// by phi.
+/// Angles by which axes may go farther than they are sent, arms and gears not being quite as
+/// described. Arms that are a little longer put the same fibre on another angle of phi. The nearer
+/// phi is to stretched or folded, the larger is the effect. Theta has to make up for the change of
+/// the fibre's direction by phi.
 std::array<double, kAxisCount> GainDoubtDeg(const Unit& unit, const AxisAngles& at,
                                             const std::array<double, kAxisCount>& left_deg) {
   constexpr double kLeast = 0.05;

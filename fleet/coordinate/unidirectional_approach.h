@@ -1,6 +1,6 @@
 // A unidirectional approach ends a way by a last piece in one direction: past the target first,
-// then back. The play of a gear, 1.4 to 1.6 degrees of the axis before its last stage (DESI's
-// positioners), swallows a way that is smaller and comes from the other side.
+// then back. The play of a gear swallows a way that is smaller and comes from the other side. Such
+// play is 1.4 to 1.6 degrees of the axis, before its last stage (DESI's positioners).
 //
 // The blind way of a measured configuration approaches every target from the configured side. A
 // correction comes from the side that its axis was measured on (AxisPlay), because on the other
@@ -62,8 +62,8 @@ struct ApproachUnit {
 /// of them. Blind, also past its other side where a neighbour is in the way. Empty where no axis
 /// needs an approach.
 [[nodiscard]] std::vector<Pose> PosesPast(const ApproachUnit& unit, const Pose& target);
-/// Poses to which a unit that is corrected may be moved aside to make room: back on the side from
-/// which it was measured, so that it returns to the same place. Pre: unit.correction.
+/// Poses to which a unit that is corrected may be moved aside to make room. They are back on the
+/// side from which it was measured, so that it returns to the same place. Pre: unit.correction.
 [[nodiscard]] std::vector<Pose> PosesAside(const ApproachUnit& unit);
 /// Where a unit in a correction goes now: to its aim with those axes that will come from the right
 /// side. An axis that would not, and is near, waits. Pre: unit.correction.

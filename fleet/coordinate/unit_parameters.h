@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/coordination.h"
 #include "protocol/base/result.h"
 

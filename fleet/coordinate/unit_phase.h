@@ -1,10 +1,11 @@
-// What the coordinator is doing with a unit, as a table: a transition that is not in it is a bug.
+// The phases of the coordinator's work with a unit, as a table: a transition that is not in it is a
+// bug.
 #pragma once
 
 #include <cstdint>
 #include <initializer_list>
 
-#include "fleet/coordinator.h"
+#include "fleet/coordinate/unit_view.h"
 
 namespace focalfleet {
 
@@ -17,7 +18,7 @@ constexpr std::uint32_t Bits(std::initializer_list<UnitPhase> phases) {
 
 namespace phase_table {
 using enum UnitPhase;
-/// From anywhere but kAbsent a unit can fall silent or turn out to have restarted.
+/// A unit in any phase but kAbsent can fall silent, or prove to have restarted.
 inline constexpr std::uint32_t kLost = Bits({kSilent, kIdentifying});
 
 struct PhaseRow {
@@ -51,7 +52,7 @@ constexpr bool IsUnderWay(UnitPhase phase) {
   return (Bits({kMoving, kHoming, kSettling}) & Bit(phase)) != 0;
 }
 
-/// Holds (part of) a move that was not started.
+/// The unit holds (part of) a move that was not started.
 constexpr bool IsLoaded(UnitPhase phase) {
   using enum UnitPhase;
   return (Bits({kStaging, kConfirming, kArming, kArmed}) & Bit(phase)) != 0;

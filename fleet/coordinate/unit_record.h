@@ -1,6 +1,6 @@
-// The record of a unit is its published view together with the working state that the coordinator
-// keeps of it: the open question, the vectors being read, the watch over its motion. The record of
-// a bus is the same for a bus.
+// The record of a unit is its published view together with the coordinator's working state. The
+// working state is the open question, the vectors being read, and the watch over the motion. The
+// record of a bus is the same for a bus.
 //
 // Size: about 300 bytes a unit and 1 kB a bus.
 #pragma once
@@ -21,8 +21,8 @@
 
 namespace focalfleet {
 
-/// The one question that a unit has open. It is repeated with the same sequence number, so that the
-/// unit can tell a repeat from a new question, and an old answer is never taken for a new one.
+/// The one question that a unit has open. A repeat has the same sequence number. The unit can
+/// therefore tell a repeat from a new question, and an old answer is never taken for a new one.
 struct Question {
   HostMessage message;
   Function answer_function{};

@@ -1,10 +1,12 @@
-// Unit sessions keep in touch with every unit. A session finds out which unit answers at a place,
-// reads what it holds, polls it while it rests and while it moves, and reports when it falls
-// silent, restarts or fails. This is the door; the rooms behind it are identification.h,
+// Unit sessions keep in touch with every unit. A session finds out which unit answers at a place
+// and reads what it holds. Later it polls the unit, at rest and in motion, and reports when it
+// falls silent, restarts or fails. This is the door; the rooms behind it are identification.h,
 // motion_reports.h, unit_parameters.h, sensor_reading.h, count_setting.h and clock_answers.h.
 #pragma once
 
+#include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/coordination.h"
+#include "fleet/coordinate/inputs.h"
 #include "protocol/wire/codec.h"
 
 namespace focalfleet {

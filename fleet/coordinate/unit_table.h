@@ -1,6 +1,6 @@
-// The unit table holds the records of all units and buses, and answers about a unit: its name, why
-// it cannot be moved, the places that it can reach. A phase changes here alone, by the table of
-// unit_phase.h.
+// The unit table holds the records of all units and buses. Questions about a unit are answered
+// here: its name, why it cannot be moved, the places that it can reach. A phase changes here alone,
+// by the table of unit_phase.h.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ class UnitTable {
   /// Why the unit cannot be moved, and what helps, to follow its name or "it":
   /// "is in fault (driver): `focalfleet enable 9` clears it". Pre: it is not kReady.
   [[nodiscard]] std::string TroubleOf(PositionerIndex i) const;
-  /// What is known instead of a place, and what helps, to follow "its place": "is not known:
+  /// The knowledge in place of a place, and what helps, to follow "its place": "is not known:
   /// `focalfleet home 9` ...". Pre: it is at no known place.
   [[nodiscard]] std::string WhyNoPlace(PositionerIndex i) const;
   /// The place to which the serial number belongs that answers here: "which belongs to unit 8", or

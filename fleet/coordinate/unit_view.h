@@ -1,5 +1,5 @@
-// The view of a unit is what the coordinator publishes of it: its phase, its place and how that is
-// known, and the outcome of its target. The working state of the coordinator is in unit_record.h.
+// The view of a unit is what the coordinator publishes of it: its phase, its place with a witness,
+// and the outcome of its target. The working state of the coordinator is in unit_record.h.
 #pragma once
 
 #include <cstddef>

@@ -2,8 +2,8 @@
 // would endanger others, its followers, is polled at the pace of stall_detection.h. When it has
 // halted, is not heard, or is stopped, its followers are stopped, and their followers in turn.
 //
-// A follower is stopped only where it comes to a place that the first unit may still occupy. It
-// goes on where it passes only places that the first unit has left already, or has not reached yet.
+// A follower is stopped only where it comes to a place that the first unit may still occupy. A
+// follower that passes only places which the first unit has left, or has not reached yet, goes on.
 #pragma once
 
 #include <string>
@@ -27,7 +27,7 @@ struct Ended {
   HostInstant from;
   HostInstant until;
 };
-/// It was last seen moving at `from`.
+/// From when the unit was last seen moving, until `until`.
 [[nodiscard]] Ended SeenUntil(const Coordination& fleet, PositionerIndex i, HostInstant until);
 /// `first` may have ended within `ended`: stops the units that come where it may stand.
 void StopFollowers(const Coordination& fleet, const Round& round, PositionerIndex first,

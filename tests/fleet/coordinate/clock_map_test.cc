@@ -91,8 +91,7 @@ TEST(ClockMap, ARestartedUnitHasAnotherClock) {
   EXPECT_GE(map.TimeOf(clock.Ticks(then)).latest, then);
 }
 
-// A counter that had hardly begun when it began anew: all that is missing is what a slow clock
-// would have lost.
+// A counter had hardly begun when it began anew: it lacks only what a slow clock would have lost.
 TEST(ClockMap, ARestartOfAYoungUnitIsNotTakenForASlowClock) {
   Rng rng = Rng::Stream(test::TestSeed(12), "young units");
   for (int run = 0; run < 2000; ++run) {
@@ -124,7 +123,7 @@ TEST(ClockMap, ReadingsThatContradictEachOtherSayNothingOfARate) {
   ClockMap map;
   for (int n = 1; n <= 4; ++n)
     map.Observe(clock.Read({Seconds(10 * n).ns}, Milliseconds(1), Milliseconds(1)));
-  // A counter that jumped: with the readings before it no rate fits.
+  // The counter jumped: with the readings before it no rate fits.
   ClockMap::Reading reading = clock.Read({Seconds(50).ns}, Milliseconds(1), Milliseconds(1));
   reading.ticks += 3000;
   map.Observe(reading);
@@ -132,7 +131,7 @@ TEST(ClockMap, ReadingsThatContradictEachOtherSayNothingOfARate) {
   EXPECT_FALSE(map.rate().IsBeyond(0.005));
 }
 
-// However wide its readings are, by whatever pauses.
+// The readings may be as wide as any pauses make them.
 TEST(ClockMap, AClockWithinItsLimitIsNeverCertainlyBeyondIt) {
   Rng rng = Rng::Stream(test::TestSeed(13), "pauses");
   for (int run = 0; run < 2000; ++run) {
@@ -160,7 +159,7 @@ TEST(ClockMap, AClockOnePercentOffIsKnownToBeByItsSecondGoodReading) {
   }
 }
 
-// Wide ones between them neither hide it nor are needed.
+// Wide readings between them neither hide the rate nor are needed.
 TEST(ClockMap, WideReadingsBetweenGoodOnesDoNotHideAClockThatIsOff) {
   const TrueClock clock{1.01, {0}, 0};
   ClockMap map;

@@ -1,5 +1,5 @@
-// Every combination of what a unit can say and what the store can remember, against the rule as a
-// person would say it: never a place that is not certain, never less than what is certain.
+// Every combination of a unit's report and the store's rows is tried against the rule in plain words:
+// never a place that is not certain, never less than is certain.
 #include "fleet/coordinate/reconcile.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ TEST(Reconcile, EveryCombinationIsTruthful) {
             EXPECT_FALSE(place);
             EXPECT_EQ(result.knowledge[0].witness == Witness::kInterval, intent && began);
           } else if (intent && began) {
-            EXPECT_TRUE(place);  // it ended by itself; its own word counts
+            EXPECT_TRUE(place);  // it ended by itself; its own report counts
           } else {
             EXPECT_EQ(place, position == kFrom);
           }

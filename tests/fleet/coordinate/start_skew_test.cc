@@ -10,7 +10,7 @@ ClockMap::Instant Began(std::int64_t earliest_ms, std::int64_t at_ms, std::int64
   return {.at = after(at_ms), .earliest = after(earliest_ms), .latest = after(latest_ms)};
 }
 
-// All were told one instant: of what is only unknown of a start nothing is made.
+// All units were given one instant: the uncertainty of a start is no skew.
 TEST(StartSkew, WideStartsProveNothingAndMakeNothingLikely) {
   StartSkew skew;
   skew.Add({1}, Began(0, 10, 100));
@@ -33,7 +33,7 @@ TEST(StartSkew, IsThatOfTheStartsThatAreWellKnown) {
   EXPECT_EQ(skew.last(), PositionerIndex{3});
 }
 
-// The likeliest last one may be known so badly that another one proves more.
+// The likeliest last unit may be known so badly that another unit proves more.
 TEST(StartSkew, NamesTheTwoThatProveTheLeast) {
   StartSkew skew;
   skew.Add({1}, Began(0, 1, 2));

@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "fleet/geometry/clearance.h"
-#include "fleet/kinematics.h"
 #include "tests/fleet/plan/planning.h"
 
 namespace focalfleet {
@@ -14,52 +12,80 @@ using test::PlanningFleet;
 using test::PoseDeg;
 using test::UnitAt;
 
-// Unit 0 wishes to turn to where unit 1 reaches; unit 2 stands on the other side of unit 1.
-struct Row {
-  PlanningFleet fleet = FleetOf({UnitAt(11, 0), UnitAt(22, 25.6), UnitAt(33, 51.2)});
-  std::vector<RunUp> units = std::vector<RunUp>(3);
+struct OneUnit {
+  PlanningFleet fleet = FleetOf({UnitAt(11, 0)});
+  CoordinatorConfig config;
+  UnitKnowledge knowledge = Exactly(Witness::kReported, PoseDeg(fleet, 0, 10, 40));
+  std::array<AxisPlay, kAxisCount> play;
+  std::optional<Correction> correction;
 
-  Row() {
-    units[0] = {PoseDeg(fleet, 0, 90, 20), {PoseDeg(fleet, 0, 0, 20)}};
-    units[1] = {PoseDeg(fleet, 1, 180, 20), {}};
-    units[2] = {PoseDeg(fleet, 2, 90, 170), {}};
+  [[nodiscard]] ApproachUnit unit() const {
+    const Unit& unit = fleet.layout.unit({0});
+    ApproachUnit approach{.unit = unit,
+                          .drive = fleet.drives[0],
+                          .config = config,
+                          .knowledge = knowledge,
+                          .play = play,
+                          .correction = correction};
+    for (const Axis axis : kAxes)
+      approach.range[Index(axis)] =
+          RangeOf(unit.axis[Index(axis)], fleet.drives[0].axis[Index(axis)]);
+    return approach;
   }
-  [[nodiscard]] std::vector<std::optional<Pose>> Choose() const {
-    return ChooseRunUps(fleet.layout, fleet.drives, units, 0.02);
+  void PushDown() {
+    for (AxisPlay& axis : play) axis.Go(-1);
   }
 };
 
-TEST(RunUp, WhoFindsNoRoomStays) {
-  const Row row;
-  const auto chosen = row.Choose();
-  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(chosen[n], row.units[n].otherwise);
+TEST(UnidirectionalApproach, ABlindWayGoesPastTheTargetFirstAndComesBackFromTheUsualSide) {
+  const OneUnit one;
+  const Pose target = PoseDeg(one.fleet, 0, 30, 60);
+  const std::vector<Pose> past = PosesPast(one.unit(), target);
+  ASSERT_FALSE(past.empty());
+  for (const Axis axis : kAxes) {
+    const std::int32_t back = target[Index(axis)] - past[0][Index(axis)];
+    EXPECT_EQ(back, UsualSide(one.config, axis) * ApproachLength(one.unit(), axis));
+    EXPECT_LT(back, 0) << "two degrees, downwards";
+  }
 }
 
-TEST(RunUp, ANeighbourGoesAsideForOneWithoutRoom) {
-  Row row;
-  row.units[1].aside = {PoseDeg(row.fleet, 1, 175, 20), PoseDeg(row.fleet, 1, 90, 20)};
-  const auto chosen = row.Choose();
-  EXPECT_EQ(chosen[0], row.units[0].wished[0]);
-  EXPECT_EQ(chosen[1], row.units[1].aside[1]) << "the first that makes room";
-  EXPECT_EQ(chosen[2], row.units[2].otherwise);
+TEST(UnidirectionalApproach, AMeasuredAxisThatGoesOnAsItCameNeedsNone) {
+  OneUnit one;
+  one.knowledge = Exactly(Witness::kMeasured, PoseDeg(one.fleet, 0, 10, 40));
+  one.PushDown();
+  EXPECT_FALSE(NeedsApproach(one.unit(), Axis::kPhi, -10));
+  EXPECT_TRUE(NeedsApproach(one.unit(), Axis::kPhi, 10)) << "back";
+  EXPECT_TRUE(NeedsApproach(one.unit(), Axis::kPhi, -2 * ApproachLength(one.unit(), Axis::kPhi)))
+      << "far";
 }
 
-TEST(RunUp, NobodyGoesAsideInVain) {
-  Row row;
-  // On the one side it would not leave, on the other it would meet the third.
-  row.units[2].otherwise = PoseDeg(row.fleet, 2, 180, 20);
-  row.units[1].aside = {PoseDeg(row.fleet, 1, 175, 20), PoseDeg(row.fleet, 1, 0, 20)};
-  const auto chosen = row.Choose();
-  for (std::size_t n = 0; n < 3; ++n) EXPECT_EQ(chosen[n], row.units[n].otherwise);
+TEST(UnidirectionalApproach, ACorrectionKeepsTheSideOnWhichItWasMeasured) {
+  OneUnit one;
+  one.PushDown();
+  one.correction = Correction{.aim = PlaceOf(one.knowledge), .side = {-1, -1}};
+  EXPECT_FALSE(NeedsApproach(one.unit(), Axis::kTheta, -1));
+  EXPECT_TRUE(NeedsApproach(one.unit(), Axis::kTheta, 1));
+  one.correction->side = {};
+  EXPECT_FALSE(NeedsApproach(one.unit(), Axis::kTheta, 1)) << "the side is not known";
 }
 
-TEST(RunUp, NobodyGoesAsideForOneThatHasRoom) {
-  Row row;
-  row.units[0].wished.push_back(PoseDeg(row.fleet, 0, 120, 20));
-  row.units[1].aside = {PoseDeg(row.fleet, 1, 90, 20)};
-  const auto chosen = row.Choose();
-  EXPECT_EQ(chosen[0], row.units[0].wished[1]);
-  EXPECT_EQ(chosen[1], row.units[1].otherwise);
+TEST(UnidirectionalApproach, ACorrectionThatIsNotTheLastEndsShortOfTheTarget) {
+  OneUnit one;
+  one.PushDown();
+  const Pose goal = PoseDeg(one.fleet, 0, 9.5, 39.5);
+  one.correction = Correction{.aim = goal, .side = {-1, -1}};
+  const Pose aim = AimOf(one.unit(), goal, /*is_last=*/false, /*tolerance_um=*/10);
+  EXPECT_GT(aim[0], goal[0]);
+  EXPECT_GT(aim[1], goal[1]);
+  EXPECT_EQ(AimOf(one.unit(), goal, /*is_last=*/true, 10), goal) << "both go on as they came";
+}
+
+TEST(UnidirectionalApproach, AnAxisThatWouldComeFromTheWrongSideWaits) {
+  OneUnit one;
+  one.PushDown();
+  const Pose place = PlaceOf(one.knowledge);
+  one.correction = Correction{.aim = {place[0] + 1, place[1] - 1}, .side = {-1, -1}};
+  EXPECT_EQ(NextPose(one.unit()), (Pose{place[0], place[1] - 1}));
 }
 
 }  // namespace
