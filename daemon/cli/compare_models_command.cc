@@ -12,7 +12,7 @@
 namespace focalfleet::cli {
 namespace {
 
-/// One of the two models, as the command line gives it.
+/// A model of the two, as the command line gives it.
 struct Side {
   std::string letter;
   std::string file;  // empty: none was given

@@ -37,7 +37,9 @@ bool NoRoom(int error) { return NoDescriptor(error) || error == ENOBUFS || error
 class LineServer::Impl {
  public:
   Impl(ListeningSocket listener, const Options& options)
-      : listener_(std::move(listener)), options_(options) {}
+      : listener_(std::move(listener)), options_(options) {
+    if (!options_.urgent) options_.reserved_max = 0;
+  }
   ~Impl();
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -70,10 +72,9 @@ class LineServer::Impl {
   [[nodiscard]] std::size_t Taken(bool reserved) const {
     return reserved ? reserved_ : clients_.size() - reserved_;
   }
-  [[nodiscard]] std::size_t reserved_max() const {
-    return options_.urgent ? options_.reserved_max : 0;
+  void KeepSpares() {
+    spares_.Keep(options_.reserved_max - std::min(options_.reserved_max, reserved_));
   }
-  void KeepSpares() { spares_.Keep(reserved_max() - std::min(reserved_max(), reserved_)); }
 
   ListeningSocket listener_;
   Options options_;
@@ -132,7 +133,7 @@ bool LineServer::Impl::AcceptOne() {
   }
   if (!spared && (Taken(false) < options_.clients_max || DropIdlest(false)))
     Admit(fd, false);
-  else if (Taken(true) < reserved_max() || DropIdlest(true))
+  else if (Taken(true) < options_.reserved_max || DropIdlest(true))
     Admit(fd, true);
   else
     ReportAndClose(fd, "too many clients at " + path() + ", and none of them is idle");

@@ -16,7 +16,7 @@
 
 namespace focalfleet {
 
-/// One thing that a unit must stay clear of during one search.
+/// An obstacle that a unit must stay clear of during one search.
 struct Blocker {
   Capsule capsule;
   double need_mm = 0;

@@ -17,7 +17,7 @@
 
 namespace focalfleet::test {
 
-/// The store commits batches in order, each after the delay. It outlives the coordinator.
+/// The store commits batches in order, each after the delay, and outlives the coordinator.
 class DelayedStore {
  public:
   explicit DelayedStore(DurationNs delay) : delay_(delay) {}

@@ -198,7 +198,7 @@ TEST(Retarget, UnitAtRestGoes) {
     const std::uint64_t seed = TestSeed(540);
     FOCALFLEET_TRACE_SEED(seed);
     Retargeting run(seed);
-    // One of the units stays at its position.
+    // A unit stays at its position.
     std::vector<std::optional<Pose>> standing(37);
     run.fleet.Run(Seconds(3));
     const UnitKnowledge& stands = run.fleet.coordinator().unit({12}).knowledge;
