@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "daemon/report/embedded.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/kinematics.h"
 #include "protocol/base/rng.h"
@@ -155,6 +158,17 @@ TEST(PlanPage, NamesWhoIsNotServedAndWhoIsInTheWay) {
               unserved ? 1 + static_cast<int>(UnservedWhy::kBlocked) : 0);
     EXPECT_EQ(UnitColumn(data, "by")[i], unserved ? 1 + SceneData::kInTheWay.value : 0);
   }
+}
+
+// The script's texts are indexed by the reason's number, from 1; the first text is that of a served
+// unit.
+TEST(PlanPage, HasATextForEveryReason) {
+  const std::size_t begin = kPlanPageScript.find("const kUnservedWhy = [");
+  ASSERT_NE(begin, std::string_view::npos);
+  const std::string_view texts =
+      kPlanPageScript.substr(begin, kPlanPageScript.find("];", begin) - begin);
+  constexpr auto kLast = static_cast<std::ptrdiff_t>(UnservedWhy::kTargetCollides);
+  EXPECT_EQ(std::count(texts.begin(), texts.end(), '"'), 2 * (1 + 1 + kLast));
 }
 
 TEST(PlanPage, CarriesObstaclesAndLimits) {
