@@ -16,7 +16,8 @@ namespace focalfleet::tidy {
 namespace {
 
 // Pages that follow a way through the code: all of their functions stand beside a file.
-constexpr std::string_view kWays[] = {"docs/way_of_a_move.md", "docs/way_of_a_campaign.md"};
+constexpr std::string_view kWays[] = {"docs/way_of_a_move.md", "docs/way_of_a_campaign.md",
+                                      "docs/way_of_a_change.md"};
 
 constexpr std::string_view kFolders[] = {"protocol/", "fleet/", "sim/",   "daemon/",
                                          "tests/",    "docs/",  "deploy/"};

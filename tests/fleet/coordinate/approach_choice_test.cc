@@ -9,10 +9,10 @@
 namespace focalfleet {
 namespace {
 
-using testing::FleetOf;
-using testing::PlanningFleet;
-using testing::PoseDeg;
-using testing::UnitAt;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::UnitAt;
 
 // Unit 0 wishes to turn to where unit 1 reaches; unit 2 stands on the other side of unit 1.
 struct Row {

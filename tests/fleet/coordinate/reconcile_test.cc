@@ -1,5 +1,5 @@
-// Every combination of a report of the unit and rows of the store is tried against the rule in plain
-// words: no place that is not certain, and never less than is certain.
+// Every combination of a report of the unit and rows of the store is tried against the rule in
+// plain words: no place that is not certain, and never less than is certain.
 #include "fleet/coordinate/reconcile.h"
 
 #include <gtest/gtest.h>

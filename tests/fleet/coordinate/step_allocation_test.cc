@@ -18,10 +18,10 @@
 namespace focalfleet {
 namespace {
 
-using testing::FleetOf;
-using testing::PlanningFleet;
-using testing::PoseDeg;
-using testing::UnitAt;
+using test::FleetOf;
+using test::PlanningFleet;
+using test::PoseDeg;
+using test::UnitAt;
 
 constexpr std::uint32_t kUnits = 8;
 constexpr double kPitch_mm = 40;  // out of each other's reach
@@ -112,7 +112,7 @@ class PolledFleet {
     Steps run;
     for (const HostInstant end = now_ + duration; now_ < end;) {
       effects_.Clear();
-      const testing::AllocGuard guard;
+      const test::AllocGuard guard;
       coordinator_.Step({.now = now_,
                          .frames = heard_,
                          .links = {},
