@@ -63,21 +63,23 @@ class Observatory {
         drives_(kUnits) {
     folder_.Put("units.csv", WriteUnits(layout_.units()));
     const auto start = DrawConfiguration(layout_, drives_, {}, Rng::Stream(seed, "start"));
-    Write("state.csv", WriteState(layout_, drives_,
-                                  std::vector<std::optional<Pose>>(start->begin(), start->end())));
+    folder_.Put("state.csv",
+                WriteState(layout_, drives_,
+                           std::vector<std::optional<Pose>>(start->begin(), start->end())));
     // Deadlines are in the fleet's time, but the time that real processes need does not shrink with
     // it.
-    Write("focalfleet.toml",
-          "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
-          "[control]\nsocket = \"daemon.sock\"\n[dds]\nenabled = false\n"
-          "[bus]\nport = \"unix\"\nunix_directory = \"" +
-              directory_.string() +
-              "\"\n"
-              "[clock]\nspeed = " +
-              std::to_string(kSpeed) +
-              ".0\n"
-              "[timing]\nreply_wait_ms = 2000\nstart_delay_ms = 3000\nsettle_margin_ms = 2000\n"
-              "silence_limit_ms = 30000\npoll_period_ms = 5000\n");
+    folder_.Put(
+        "focalfleet.toml",
+        "[fleet]\nunits = \"units.csv\"\n[store]\npath = \"fleet.db\"\n"
+        "[control]\nsocket = \"daemon.sock\"\n[dds]\nenabled = false\n"
+        "[bus]\nport = \"unix\"\nunix_directory = \"" +
+            folder_.path() +
+            "\"\n"
+            "[clock]\nspeed = " +
+            std::to_string(kSpeed) +
+            ".0\n"
+            "[timing]\nreply_wait_ms = 2000\nstart_delay_ms = 3000\nsettle_margin_ms = 2000\n"
+            "silence_limit_ms = 30000\npoll_period_ms = 5000\n");
     simulator_.emplace(
         std::vector<std::string>{FOCALFLEET_SIM, "--units", Path("units.csv"), "--state",
                                  Path("state.csv"), "--unix-directory", folder_.path(), "--control",
