@@ -117,6 +117,7 @@ std::vector<SplitLine> SplitLines(const std::string& text) {
         else if (line[i] == quote)
           quote = 0;
       } else if (StartsWith(rest, "//")) {
+        split.comment_column = i;
         split.comment = rest.substr(StartsWith(rest, "///") ? 3 : 2);
         break;
       } else if (StartsWith(rest, "/*")) {

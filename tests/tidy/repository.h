@@ -42,6 +42,7 @@ bool ContainsWord(std::string_view line, std::string_view word);
 struct SplitLine {
   std::string code;     // comments and the contents of string literals blanked, except in #include
   std::string comment;  // what follows // or ///, or stands within /* */
+  std::size_t comment_column = 0;  // of its first slash; 0 within /* */
   bool has_code = false;
 };
 std::vector<SplitLine> SplitLines(const std::string& text);

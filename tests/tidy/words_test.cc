@@ -79,7 +79,9 @@ std::vector<Prose> CommentsOf(const File& file) {
   const auto lines = SplitLines(file.text);
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const std::string comment = Trimmed(lines[i].comment);
-    if (lines[i].has_code || comment.empty()) Take(&now, &out);
+    // A comment behind code goes on below where it is aligned with the line before.
+    const bool goes_on = i > 0 && lines[i].comment_column == lines[i - 1].comment_column;
+    if (lines[i].has_code || comment.empty() || !goes_on) Take(&now, &out);
     if (!comment.empty()) Append(comment, i, &now);
   }
   Take(&now, &out);
@@ -240,6 +242,8 @@ TEST(TidyRules, BareOpeningsAreCaught) {
     EXPECT_EQ(code("int a;  // " + std::string(word) + " stays\n"), 1u) << word;
     EXPECT_EQ(code("// The unit moves.\n// " + std::string(word) + " stays.\n"), 1u) << word;
   }
+  EXPECT_EQ(code("int a;  // a count\n// What moves\nint b;\n"), 1u);
+  EXPECT_EQ(code("int a;  // a count of\n        // What moves\n"), 0u) << "it goes on";
   EXPECT_EQ(code("// The unit of bus 3.\n"), 0u);
   EXPECT_EQ(code("// The unit that moves is the one\n// That is no sentence's beginning.\n"), 0u);
   EXPECT_EQ(code("// Whole numbers, Offsets, Items.\n"), 0u);
