@@ -22,10 +22,10 @@ struct WantedPlace {
   std::array<double, kAxisCount> arm_mm{};  // theta arm, phi arm
 };
 
-/// The count at which the model is nearest to the wanted place. Not held to the axes' ranges. None:
-/// the model is not finite, or its nearest count lies more than 30 degrees from the guess on an
-/// axis. Error: below 0.5 um by the model where the fibre can get there, else near the nearest
-/// point. Cost: at most 12 calls of the model.
+/// The count at which the model is at the wanted place, or near it. Not held to the axes' ranges.
+/// None: the model is not finite, or its nearest count lies more than 30 degrees from the guess on
+/// an axis. Error: below 0.5 um by the model where the fibre can get there. Elsewhere the count is
+/// the best of those tried, never farther off than the guess. Cost: at most 12 calls of the model.
 std::optional<AxisAngles> CountAt(const WantedPlace& wanted, const PlaceModel& model);
 
 }  // namespace focalfleet

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/store/store.h"
+#include "fleet/hex_layout.h"
 #include "tests/daemon/verbs/model_text.h"
 #include "tests/daemon/verbs/small_fleet.h"
 #include "tests/support/scratch_folder.h"
@@ -57,8 +58,9 @@ TEST_F(ModelUpkeepTest, TheLastModelIsRestoredForUnitsWhoseCountDidNotBeginAnew)
 
 TEST_F(ModelUpkeepTest, AModelOfAnotherFleetIsNotRestored) {
   StoreModel({5});
-  const SmallFleet other(4);
-  ModelRegistry models(&other.layout());
+  const auto other = Layout::Create(MakeHexLayout({.count = 3, .pitch_mm = 60}), {});
+  ASSERT_TRUE(other);
+  ModelRegistry models(&*other);
   EXPECT_FALSE(RestoreModel(Reader().get(), &models));
   EXPECT_EQ(models.compensation(), nullptr);
 }
