@@ -1,5 +1,5 @@
 // A rotor's radial field on the sphere of its sensors, in the rotor's frame, behind one interface.
-// There are three models, from the paper's to a better one:
+// Three models describe the field, from the one of the paper to a better one:
 //
 // - harmonic: B = A sin^4(theta) cos(4 (phi - phase)), the lowest term of the expansion that the
 //   paper begins with. The shape is the same for all magnets.
