@@ -1,7 +1,7 @@
 // The core thread. Each turn of its loop waits until an input is there (frames, requests, a plan, a
 // commit, a signal) or a time is due. All inputs go to the coordinator in one Step. Then the loop
-// performs the effects. Rows go to the store's thread, frames to the buses, a plan job to the
-// planner's thread, an exposure to the camera's thread, replies to the request handler, status to
+// performs the effects. Rows go to the store's thread and frames to the buses. A plan job goes to
+// the planner's thread, an exposure to the camera's. Replies go to the request handler, status to
 // the scheduler. The loop never waits for any of these.
 #pragma once
 

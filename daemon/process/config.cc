@@ -104,8 +104,8 @@ void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Choice("spread", &c->simulated.spread, kSpreads);
 }
 
-/// Waits that have to cover the host's own processes stay what they are in real time: a simulated
-/// fleet that runs faster than real time does not make the host faster.
+/// Waits that cover the host's own processes stay the same in real time. A simulated fleet that
+/// runs faster does not make the host faster.
 void ScaleDefaults(double speed, CoordinatorConfig* timing) {
   for (DurationNs* wait :
        {&timing->reply_wait, &timing->start_delay, &timing->settle_margin, &timing->silence_limit})

@@ -13,8 +13,6 @@
 namespace focalfleet {
 namespace {
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 void PutUpload(const UploadView& upload, Json* out) {
   (*out)["upload_bits_predicted"] = upload.bits_predicted;
   (*out)["upload_bits"] = upload.bits;
