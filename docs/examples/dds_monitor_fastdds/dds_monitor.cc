@@ -85,8 +85,6 @@ fast::DataReader* MakeReader(fast::DomainParticipant* participant, const char* n
   qos.resource_limits().max_instances = kUnitsMax;
   qos.resource_limits().max_samples_per_instance = 1;
   qos.resource_limits().max_samples = kUnitsMax;  // at least the product, or no reader is made
-  qos.endpoint().history_memory_policy =
-      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   fast::Subscriber* subscriber =
       Check(participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT), "the subscriber");
   return Check(subscriber->create_datareader(topic, qos), name);
@@ -147,7 +145,7 @@ int main(int argc, char** argv) {
   auto discovered = began;
   while (!once || (!all_seen && SecondsSince(began) < wait_s)) {
     fast::ConditionSeq active;
-    waitset.wait(active, {0, 100'000'000});  // 0.1 s
+    waitset.wait(active, {0, 100'000'000});  // 0.1 s at most
     fast::SubscriptionMatchedStatus matched;
     if (!is_discovered &&
         units->get_subscription_matched_status(matched) == ReturnCode_t::RETCODE_OK &&
