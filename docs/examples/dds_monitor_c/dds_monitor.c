@@ -20,7 +20,9 @@ struct monitor {
   dds_time_t discovered; /* 0: no daemon yet */
   unsigned units;        /* of the fleet, as the daemon says; 0: not known yet */
   unsigned seen;         /* units with at least one sample */
-  bool* is_seen;         /* by unit_id, up to `seen_size` */
+  unsigned from_history; /* of these, first seen by a sample older than this program */
+  dds_time_t began;
+  bool* is_seen; /* by unit_id, up to `seen_size` */
   size_t seen_size;
 };
 
@@ -51,7 +53,7 @@ static dds_entity_t make_reader(dds_entity_t participant, const dds_topic_descri
   return reader;
 }
 
-static void see(struct monitor* monitor, const focalfleet_UnitStatus* unit) {
+static void see(struct monitor* monitor, const focalfleet_UnitStatus* unit, dds_time_t written) {
   printf("unit %u: %s, theta %.3f..%.3f deg, phi %.3f..%.3f deg, fibre at %.4f, %.4f mm\n",
          (unsigned)unit->unit_id, phase_name(unit->phase), unit->theta_low_deg,
          unit->theta_high_deg, unit->phi_low_deg, unit->phi_high_deg, unit->x_fp_mm, unit->y_fp_mm);
@@ -62,8 +64,10 @@ static void see(struct monitor* monitor, const focalfleet_UnitStatus* unit) {
     memset(monitor->is_seen + monitor->seen_size, 0, (size - monitor->seen_size) * sizeof(bool));
     monitor->seen_size = size;
   }
-  if (!monitor->is_seen[unit->unit_id]) ++monitor->seen;
+  if (monitor->is_seen[unit->unit_id]) return;
   monitor->is_seen[unit->unit_id] = true;
+  ++monitor->seen;
+  if (written < monitor->began) ++monitor->from_history;
 }
 
 /* Takes all that has come. A sample without valid data only says that a writer is gone. */
@@ -79,7 +83,7 @@ static void take(struct monitor* monitor) {
       for (int i = 0; i < count; ++i) {
         if (!infos[i].valid_data) continue;
         if (r == 0) monitor->units = ((focalfleet_FleetStatus*)samples[i])->units;
-        if (r == 1) see(monitor, samples[i]);
+        if (r == 1) see(monitor, samples[i], infos[i].source_timestamp);
       }
       if (count > 0) dds_return_loan(readers[r], samples, count);
     } while (count > 0);
@@ -107,7 +111,7 @@ int main(int argc, char** argv) {
     else
       domain = (unsigned)atoi(argv[i]);
   }
-  struct monitor monitor = {0};
+  struct monitor monitor = {.began = dds_time()};
   dds_entity_t participant = check(dds_create_participant(domain, NULL, NULL), "participant");
   monitor.unit_reader =
       make_reader(participant, &focalfleet_UnitStatus_desc, "focalfleet/unit_status");
@@ -119,8 +123,7 @@ int main(int argc, char** argv) {
   dds_waitset_attach(waitset, monitor.unit_reader, 0);
   dds_waitset_attach(waitset, dds_create_readcondition(monitor.fleet_reader, DDS_ANY_STATE), 0);
 
-  const dds_time_t began = dds_time();
-  const dds_time_t until = once ? began + (dds_time_t)(wait_s * 1e9) : DDS_NEVER;
+  const dds_time_t until = once ? monitor.began + (dds_time_t)(wait_s * 1e9) : DDS_NEVER;
   bool all_seen = false;
   while (dds_time() < until && !(once && all_seen)) {
     dds_waitset_wait_until(waitset, NULL, 0, until);
@@ -129,8 +132,10 @@ int main(int argc, char** argv) {
     if (all_seen || monitor.units == 0 || monitor.seen < monitor.units) continue;
     all_seen = true;
     const dds_time_t now = dds_time();
-    printf("all %u of %u units seen %.3f s after discovery, %.3f s after joining\n", monitor.seen,
-           monitor.units, (double)(now - monitor.discovered) / 1e9, (double)(now - began) / 1e9);
+    printf(
+        "all %u of %u units seen %.3f s after discovery, %.3f s after joining; %u from history\n",
+        monitor.seen, monitor.units, (double)(now - monitor.discovered) / 1e9,
+        (double)(now - monitor.began) / 1e9, monitor.from_history);
     fflush(stdout);
   }
   if (!all_seen) printf("%u of %u units seen\n", monitor.seen, monitor.units);

@@ -103,7 +103,7 @@ void TakeAll(fast::DataReader* reader, Use use) {
   Sample sample;
   fast::SampleInfo info;
   while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK)
-    if (info.valid_data) use(sample);
+    if (info.valid_data) use(sample, info.source_timestamp);
 }
 
 double SecondsSince(Clock::time_point then) {
@@ -125,6 +125,8 @@ int main(int argc, char** argv) {
       domain = static_cast<unsigned>(std::atoi(argv[i]));
   }
   const auto began = Clock::now();
+  eprosima::fastrtps::rtps::Time_t began_at;
+  eprosima::fastrtps::rtps::Time_t::now(began_at);
   fast::DomainParticipant* participant = MakeParticipant(domain);
   fast::DataReader* units =
       MakeReader<focalfleet::UnitStatusPubSubType>(participant, "focalfleet/unit_status");
@@ -139,7 +141,8 @@ int main(int argc, char** argv) {
   }
 
   std::set<unsigned> seen;
-  unsigned fleet_size = 0;  // as the daemon says; 0: not known yet
+  unsigned from_history = 0;  // units first seen by a sample older than this program
+  unsigned fleet_size = 0;    // as the daemon says; 0: not known yet
   bool is_discovered = false;
   bool all_seen = false;
   auto discovered = began;
@@ -153,15 +156,17 @@ int main(int argc, char** argv) {
       is_discovered = true;
       discovered = Clock::now();
     }
-    TakeAll<focalfleet::FleetStatus>(fleet, [&](const auto& now) { fleet_size = now.units(); });
-    TakeAll<focalfleet::UnitStatus>(units, [&](const auto& unit) {
+    TakeAll<focalfleet::FleetStatus>(fleet,
+                                     [&](const auto& now, auto) { fleet_size = now.units(); });
+    TakeAll<focalfleet::UnitStatus>(units, [&](const auto& unit, auto written) {
       Print(unit);
-      seen.insert(unit.unit_id());
+      if (seen.insert(unit.unit_id()).second && written < began_at) ++from_history;
     });
     if (all_seen || fleet_size == 0 || seen.size() < fleet_size) continue;
     all_seen = true;
-    std::printf("all %zu of %u units seen %.3f s after discovery, %.3f s after joining\n",
-                seen.size(), fleet_size, SecondsSince(discovered), SecondsSince(began));
+    std::printf(
+        "all %zu of %u units seen %.3f s after discovery, %.3f s after joining; %u from history\n",
+        seen.size(), fleet_size, SecondsSince(discovered), SecondsSince(began), from_history);
     std::fflush(stdout);
   }
   if (!all_seen) std::printf("%zu of %u units seen\n", seen.size(), fleet_size);
