@@ -69,7 +69,7 @@ class Connections(unittest.TestCase):
             b"[" * 100_000 + b"\n",
             b"{}\n",
             b"null\n",
-            b'{"id":999,"ok":true}\n',
+            b'{"id":999,"ok":true,"result":{}}\n',
             b'{"id":1,"ok":true,"result":',
         ):
             def after_garbage(request, garbage=garbage):
