@@ -41,7 +41,7 @@ class Broken(Exception):
 
 
 class Connection:
-    """One connection to the daemon, opened when it is needed and again after it broke.
+    """A connection to the daemon, opened when it is needed and again after it broke.
 
     Several threads may share it: a request waits until the one before it is answered.
     """

@@ -152,7 +152,7 @@ class Fleet:
         return self._ask("alarms", all=all)
 
     def measurements(self, exposure: int | None = None) -> Any:
-        """What the camera found in an exposure; without its number the newest of the configuration.
+        """The measurements of an exposure; without its number the newest of the configuration.
 
         An astropy QTable with the columns of `Measurement`, units (mm, um, deg) and `meta`
         (exposure, configuration, origin, version); without astropy the rows as a list.
@@ -207,7 +207,7 @@ class Fleet:
 
 
 class Job:
-    """A configuration that was begun. It goes on whether anybody waits or not."""
+    """A configuration that was begun, and that goes on whether anybody waits or not."""
 
     def __init__(self, fleet: Fleet, configuration: int) -> None:
         self._fleet = fleet

@@ -1,4 +1,4 @@
-"""What the daemon answers, as values with units in their names."""
+"""Answers of the daemon, as values with units in their names."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class UnservedUnit:
 
 @dataclass(frozen=True)
 class Plan:
-    """What `apply` of the same table would begin with. Nothing has moved.
+    """The plan that `apply` of the same table would begin with. Nothing has moved.
 
     `served` of `targeted` units get to their targets; `moving` counts those that step aside, too.
     """
@@ -66,7 +66,7 @@ class Progress:
 
 @dataclass(frozen=True)
 class Measurement:
-    """What one exposure says of one unit. Numbers that are not known are NaN, never 0.
+    """The finding of one exposure on one unit. Numbers that are not known are NaN, never 0.
 
     `status` is that of `focalfleet measurements` (docs/files.md); `x_mm`, `y_mm` is the measured
     fibre on the focal plane, `error_um` its distance from the target.
@@ -150,7 +150,7 @@ def progress_of(configuration: dict[str, Any]) -> Progress:
 
 
 def measurement_of(row: dict[str, Any]) -> Measurement:
-    """One row of the answer to `measurements`."""
+    """A row of the answer to `measurements`."""
     moved_since = row.get("moved_since") is True
     # Without a spot the row has no position; that before a later move is not valid either.
     seen = number(row.get("sigma_um")) > 0 and not moved_since
