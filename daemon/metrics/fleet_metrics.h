@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/clock/wall_time.h"
+#include "daemon/dds/status_values.h"
 #include "daemon/metrics/histogram.h"
 #include "fleet/coordinator.h"
 
@@ -31,7 +32,7 @@ struct RailMetrics {
   RailId rail;
   std::uint32_t units = 0;
   std::uint32_t answering = 0;
-  double power_predicted_W = 0;
+  double power_predicted_W = 0;  // highest, by the newest plan
 };
 
 /// The frames and start signals that went wrong, of all buses.
@@ -55,7 +56,6 @@ struct ConfigurationMetrics {
   double start_skew_s = 0;
   double start_skew_allowed_s = 0;
   double energy_J = 0;
-  double peak_power_W = 0;
   double worst_error_um = 0;  // of the units with a target, as last measured; 0: none was
   WallTime began{0};          // 0: none since the daemon's start
   WallTime ended{0};          // 0: none since the daemon's start
@@ -66,14 +66,16 @@ inline constexpr const char* kConfigurationOutcomes[] = {"targeted", "arrived", 
 struct FleetMetrics {
   WallTime at;
   std::string version;
+  WallTime started;
   std::uint32_t units = 0;
   std::uint32_t enabled = 0;
   std::array<std::uint32_t, kUnitPhaseCount> by_phase{};
   std::array<std::uint32_t, kWitnessCount> by_witness{};
   std::vector<BusMetrics> buses;
   std::vector<RailMetrics> rails;
-  double rail_limit_W = 0;   // of each rail; 0: none
-  double total_limit_W = 0;  // of all rails together; 0: none
+  double rail_limit_W = 0;       // of each rail; 0: none
+  double power_predicted_W = 0;  // highest of all rails together, by the newest plan
+  double limit_W = 0;            // of all rails together; 0: none
   TrafficMetrics traffic;
   ConfigurationMetrics configuration;
   std::array<std::uint64_t, 3> configurations_ended{};  // done, stopped, failed

@@ -5,11 +5,8 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <map>
 
 #include "daemon/metrics/histogram.h"
-#include "daemon/metrics/newest_value.h"
-#include "protocol/base/ids.h"
 
 namespace focalfleet {
 
@@ -18,8 +15,7 @@ namespace focalfleet {
 inline constexpr std::array<double, 10> kCommitBounds_s = {0.001, 0.002, 0.005, 0.01, 0.02,
                                                            0.05,  0.1,   0.5,   2,    10};
 // A plan of 5000 units takes seconds on one core (docs/budgets.md).
-inline constexpr std::array<double, 10> kPlannerBounds_s = {0.1, 0.3, 1,  2,  4,
-                                                            8,   15,  30, 60, 120};
+inline constexpr std::array<double, 10> kPlannerBounds_s = {0.1, 0.3, 1, 2, 4, 8, 15, 30, 60, 120};
 
 struct WorkCounters {
   std::atomic<std::uint64_t> transactions{0};
@@ -31,14 +27,6 @@ struct WorkCounters {
   std::atomic<std::uint64_t> exposures{0};
   std::atomic<std::uint64_t> exposures_failed{0};
   std::atomic<double> exposed_at_s{0};  // Unix seconds of the last usable one; 0: none yet
-};
-
-/// The power that the newest plan will draw.
-struct PlannedPower {
-  std::map<RailId, double> peak_W;  // of each rail that a unit of the plan is on
-  double peak_total_W = 0;
-  double rail_limit_W = 0;   // that the plan was made for; 0: none
-  double total_limit_W = 0;  // the same
 };
 
 }  // namespace focalfleet
