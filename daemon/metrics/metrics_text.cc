@@ -46,8 +46,8 @@ void PutUnits(const FleetMetrics& fleet, Exposition* out) {
              "Distances of units from their targets, each as a measurement found it.",
              fleet.position_error_m);
   out->Write("focalfleet_knowledge_age_seconds",
-             "Time since the last measurement of each unit with a target, when a configuration "
-             "begins. Units that were not measured since the start are left out.",
+             "Time since the last measurement of each unit with a target when a configuration "
+             "begins, of units measured since the start.",
              fleet.knowledge_age_s);
   out->Gauge("focalfleet_clock_rate_error_ratio",
              "Rate of the unit's clock that runs farthest from the host's, less 1.",
