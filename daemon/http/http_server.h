@@ -26,7 +26,7 @@ struct HttpAnswer {
   std::string body;
 };
 
-/// What one server grants to its clients.
+/// Limits that a server sets to its clients.
 struct HttpLimits {
   /// A request line with its headers. Prometheus sends some 300 bytes, a browser up to 2 kB.
   std::size_t request_bytes = 16'384;
@@ -47,7 +47,7 @@ class HttpServer {
     std::string address;             // numeric, IPv4 or IPv6
     std::uint16_t port = 0;          // 0: any that is free
     std::vector<std::string> names;  // under which it may be asked, beside the loopback names
-    /// By path. A page is made on a thread of the server, by several at once.
+    /// Pages by their path. A page is made on a thread of the server, by several at once.
     std::map<std::string, std::function<HttpAnswer()>> pages;
     /// Receives each new reason why it does not listen, and an empty text when it listens again.
     std::function<void(const std::string& trouble)> tell = [](const std::string&) {};

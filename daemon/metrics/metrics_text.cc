@@ -41,7 +41,7 @@ void PutUnits(const FleetMetrics& fleet, Exposition* out) {
       out);
   out->Gauge("focalfleet_worst_unit_error_meters",
              "Largest distance from its target of any unit of the configuration, as last measured.",
-             1e-6 * fleet.configuration.worst_error_um);
+             fleet.configuration.worst_error_um / 1e6);
   out->Write("focalfleet_unit_position_error_meters",
              "Distances of units from their targets, each as a measurement found it.",
              fleet.position_error_m);

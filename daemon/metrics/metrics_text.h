@@ -1,7 +1,7 @@
 // The page /metrics as text. docs/metrics.md lists every family with its unit and meaning.
 //
 // The number of series does not grow with the number of units: no label names a unit. Each bus has
-// 14 series, each rail 3, and the rest has some 200 together.
+// 13 series, each rail 3, and the rest has some 160 together.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // This bench measures what the metrics cost the core: a sample of the whole fleet on the core's
-// thread, with nobody asking and with clients that scrape without a pause. It also prints the size
-// of the page, its series, and the time to make it.
+// thread, with nobody asking and with clients that scrape without a pause. The bench also prints
+// the size of the page, its series, and the time to make it.
 //   metrics_bench [--units 5000] [--samples 500] [--clients 8]
 #include <arpa/inet.h>
 #include <netinet/in.h>
@@ -62,8 +62,11 @@ void Run(int units, int samples, int clients) {
   NewestValue<const FleetMetrics> values;
   ShellFacts facts;
   facts.buses.resize(layout.buses().size());
-  MetricsSampler sampler(
-      {.layout = &layout, .facts = [&] { return facts; }, .power = &power, .out = &values});
+  MetricsSampler sampler({.layout = &layout,
+                          .facts = [&] { return facts; },
+                          .power = &power,
+                          .out = &values,
+                          .clock = HostClock()});
   HostInstant now;
   const auto sample = [&] {
     now = sampler.wake_at();

@@ -17,7 +17,8 @@ class MetricsSamplerTest : public ::testing::Test {
       : sampler_({.layout = &fleet_.layout(),
                   .facts = [this] { return facts_; },
                   .power = &power_,
-                  .out = &out_}) {
+                  .out = &out_,
+                  .clock = HostClock()}) {
     facts_.buses.resize(fleet_.layout().buses().size());
   }
   /// The sample at `now`; null where none was due.
@@ -123,7 +124,7 @@ TEST_F(MetricsSamplerTest, FollowsAConfigurationToItsEnd) {
   EXPECT_TRUE(sample->configuration.busy);
   EXPECT_EQ(sample->configuration.outcomes[0], 2u) << "targeted";
   EXPECT_EQ(CountOf(sample->knowledge_age_s), 1u);
-  EXPECT_EQ(sample->knowledge_age_s.sum, 30);
+  EXPECT_NEAR(sample->knowledge_age_s.sum, 30, 1e-9);
   EXPECT_EQ(CountOf(sample->configuration_retries), 0u) << "it is not over";
   // No unit answers, so it ends without a motion.
   HostInstant later = now;
