@@ -1,5 +1,5 @@
-// A histogram counts values by upper bounds, as Prometheus takes it. One thread observes, and any
-// thread may read meanwhile: a reading may lack the newest value in its sum.
+// A histogram counts values by upper bounds, as Prometheus takes it. A single thread observes, and
+// any thread may read meanwhile: a reading may lack the newest value in its sum.
 #pragma once
 
 #include <algorithm>
