@@ -49,7 +49,7 @@ struct TrafficMetrics {
 struct ConfigurationMetrics {
   ConfigurationState state = ConfigurationState::kDone;
   bool busy = false;
-  std::array<std::uint32_t, 6> outcomes{};  // targeted, arrived, refused, failed, stopped, ...
+  OutcomeCounts counts;
   double makespan_predicted_s = 0;
   double makespan_s = 0;
   double upload_s = 0;
@@ -60,8 +60,6 @@ struct ConfigurationMetrics {
   WallTime began{0};          // 0: none since the daemon's start
   WallTime ended{0};          // 0: none since the daemon's start
 };
-inline constexpr const char* kConfigurationOutcomes[] = {"targeted", "arrived", "refused",
-                                                         "failed",   "stopped", "unmeasured"};
 
 struct FleetMetrics {
   WallTime at;

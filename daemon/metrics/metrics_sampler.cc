@@ -144,7 +144,7 @@ void MetricsSampler::DescribeConfiguration(const FleetView& view, ConfigurationM
   const ConfigurationView& c = view.coordinator->configuration();
   out->state = c.state;
   out->busy = view.coordinator->busy();
-  out->outcomes = {c.targeted, c.arrived, c.refused, c.failed, c.stopped, c.unmeasured};
+  out->counts = c.counts;
   out->makespan_predicted_s = FiniteOr0(c.makespan_predicted_s);
   out->makespan_s = FiniteOr0(MakespanSoFar(view));
   out->upload_s = FiniteOr0(c.upload.measured_s);

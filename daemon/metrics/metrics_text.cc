@@ -59,8 +59,12 @@ void PutConfiguration(const FleetMetrics& fleet, const WorkCounters& work, Expos
   out->BeginGauge("focalfleet_configuration_units",
                   "Units of the configuration under way, or of the last one, by outcome. Targeted "
                   "are all of them.");
-  PutEach(
-      "outcome", now.outcomes, [](std::size_t i) { return kConfigurationOutcomes[i]; }, out);
+  out->Sample("outcome", "targeted", now.counts.targeted);
+  out->Sample("outcome", "arrived", now.counts.arrived);
+  out->Sample("outcome", "refused", now.counts.refused);
+  out->Sample("outcome", "failed", now.counts.failed);
+  out->Sample("outcome", "stopped", now.counts.stopped);
+  out->Sample("outcome", "unmeasured", now.counts.unmeasured);
   out->BeginGauge("focalfleet_configuration_state",
                   "State of the configuration: 1 for the present one.");
   PutState("", ConfigurationState::kFailed, now.state, out);

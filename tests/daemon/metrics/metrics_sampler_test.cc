@@ -122,7 +122,7 @@ TEST_F(MetricsSamplerTest, FollowsAConfigurationToItsEnd) {
   Note(fleet_.Step({.now = now, .commands = commands}), now);
   auto sample = Sample(now);
   EXPECT_TRUE(sample->configuration.busy);
-  EXPECT_EQ(sample->configuration.outcomes[0], 2u) << "targeted";
+  EXPECT_EQ(sample->configuration.counts.targeted, 2u);
   EXPECT_EQ(CountOf(sample->knowledge_age_s), 1u);
   EXPECT_NEAR(sample->knowledge_age_s.sum, 30, 1e-9);
   EXPECT_EQ(CountOf(sample->configuration_retries), 0u) << "it is not over";
