@@ -16,6 +16,7 @@
 #include "daemon/loop/job_thread.h"
 #include "daemon/loop/store_thread.h"
 #include "daemon/loop/sync_pulse.h"
+#include "daemon/metrics/metrics_sampler.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
 #include "daemon/verbs/model_registry.h"
@@ -44,6 +45,7 @@ class EventLoop {
     CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
+    MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line
     DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
     const EventSignal* threads = nullptr;  // raised by planner, camera, store

@@ -134,13 +134,6 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"subdivision", drive.subdivision}};
 }
 
-/// The makespan of the rounds that ended, and the time of the present one so far.
-double MakespanSoFar(const FleetView& view) {
-  const ConfigurationView& c = view.coordinator->configuration();
-  if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
-  return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
-}
-
 /// The progress of the configuration, 0..1: by time while units move, by arrivals in the end.
 double FractionOf(const FleetView& fleet) {
   const ConfigurationView& view = fleet.coordinator->configuration();
