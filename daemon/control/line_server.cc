@@ -2,6 +2,7 @@
 
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
 
@@ -51,6 +52,7 @@ class LineServer::Impl {
 
   [[nodiscard]] int fd() const { return epoll_; }
   [[nodiscard]] bool connected(ClientId id) const { return clients_.contains(id); }
+  [[nodiscard]] std::optional<std::uint32_t> user(ClientId id) const;
   [[nodiscard]] std::size_t clients() const { return clients_.size(); }
   [[nodiscard]] const std::string& path() const { return listener_.path(); }
 
@@ -322,6 +324,16 @@ bool LineServer::Impl::Queue(ClientId id, std::string_view line, bool last) {
   return false;
 }
 
+std::optional<std::uint32_t> LineServer::Impl::user(ClientId id) const {
+  const auto client = clients_.find(id);
+  ucred peer{};
+  socklen_t length = sizeof peer;
+  if (client == clients_.end() ||
+      ::getsockopt(client->second.fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0)
+    return std::nullopt;
+  return peer.uid;
+}
+
 LineServer::LineServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 LineServer::LineServer(LineServer&&) noexcept = default;
 LineServer& LineServer::operator=(LineServer&&) noexcept = default;
@@ -344,6 +356,7 @@ bool LineServer::Progress(ClientId client, std::string_view line) {
   return impl_->Queue(client, line, false);
 }
 bool LineServer::connected(ClientId client) const { return impl_->connected(client); }
+std::optional<std::uint32_t> LineServer::user(ClientId client) const { return impl_->user(client); }
 std::size_t LineServer::clients() const { return impl_->clients(); }
 const std::string& LineServer::path() const { return impl_->path(); }
 

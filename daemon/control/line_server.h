@@ -89,6 +89,8 @@ class LineServer {
   bool Progress(ClientId client, std::string_view line);
 
   [[nodiscard]] bool connected(ClientId client) const;
+  /// The user of the client's process when it connected; none: the client is gone.
+  [[nodiscard]] std::optional<std::uint32_t> user(ClientId client) const;
   [[nodiscard]] std::size_t clients() const;
   [[nodiscard]] const std::string& path() const;
 
