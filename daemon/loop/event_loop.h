@@ -5,6 +5,7 @@
 // the scheduler. The loop never waits for any of these.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -18,6 +19,7 @@
 #include "daemon/loop/sync_pulse.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
+#include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/request_handler.h"
 #include "fleet/coordinator.h"
@@ -27,6 +29,8 @@ namespace focalfleet {
 struct PlannerWork {
   PlanJob job;
   std::vector<UnitDrive> drives;
+  /// Of a preview: true once a configuration is to be planned first.
+  std::shared_ptr<const std::atomic<bool>> given_up = nullptr;
 };
 using PlannerThread = JobThread<PlannerWork, PlanDone>;
 using CameraThread = JobThread<CameraWork, ExposureDone>;
@@ -40,6 +44,7 @@ class EventLoop {
     BusLines* lines = nullptr;
     RequestHandler* handler = nullptr;
     ModelRegistry* models = nullptr;  // the model in force
+    AlarmRegister* alarms = nullptr;
     PlannerThread* planner = nullptr;
     CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
@@ -78,6 +83,7 @@ class EventLoop {
   void Step();
   void ServeSync();
   void Perform();
+  void SubmitPlan(PlanJob job);
   void PublishStatus();
   void LogChanges();
   [[nodiscard]] FleetView View() const;
@@ -97,6 +103,7 @@ class EventLoop {
   std::vector<PlanDone> plans_;
   std::vector<ExposureDone> exposures_;
   std::vector<ShellNote> notes_;
+  std::shared_ptr<std::atomic<bool>> preview_given_up_;
   std::uint64_t committed_through_ = 0;  // as the coordinator last received it
   bool store_failing_ = false;
   Effects effects_;
