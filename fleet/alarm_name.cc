@@ -67,7 +67,9 @@ static_assert(InOrder());
 
 std::span<const AlarmKind> AlarmKinds() { return kKinds; }
 
-const AlarmKind& KindOf(AlarmName name) { return kKinds[static_cast<std::size_t>(name)]; }
+const AlarmKind& KindOf(AlarmName name) {
+  return kKinds[name <= kLastAlarmName ? static_cast<std::size_t>(name) : 0];
+}
 
 const char* Name(AlarmName name) { return KindOf(name).text; }
 

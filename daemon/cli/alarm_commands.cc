@@ -40,7 +40,7 @@ std::string UserIn(const Json& object, const char* key) {
   return user == nullptr ? text : user->pw_name;
 }
 
-/// What alarms of one name that are shown as one line have in common.
+/// Alarms of one name that are shown as one line.
 struct Line {
   const Json* newest = nullptr;
   std::vector<std::uint32_t> units;

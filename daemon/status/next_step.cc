@@ -12,7 +12,7 @@ namespace {
 /// Ranges of units in the line; with more, a state chooses them.
 constexpr std::size_t kRangesShown = 8;
 
-/// What an operator can do something about, by unit_id.
+/// Units that an operator can do something about, by unit_id.
 struct Concerned {
   std::vector<std::uint32_t> fault;
   std::vector<std::uint32_t> foreign;

@@ -76,8 +76,8 @@ void Ledger::End(AlarmName name, std::optional<PositionerIndex> unit, std::optio
   unconfirmed_.erase(condition);
 }
 
-// A bus that is up, or DDS that works, is reported by nobody. What an earlier run said against them
-// is over where this run does not say it again.
+// A bus that is up, or DDS that works, is reported by nobody. An alarm of an earlier run about them
+// is over where this run does not raise it again.
 void Ledger::EndUnconfirmed() {
   if (confirm_until_ == kNever) confirm_until_ = step_.now + kConfirmWithin;
   if (unconfirmed_.empty() || step_.now < confirm_until_) return;

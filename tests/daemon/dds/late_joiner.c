@@ -71,7 +71,8 @@ int main(int argc, char** argv) {
   }
   dds_entity_t unit_reader =
       make_reader(participant, &focalfleet_UnitStatus_desc, "focalfleet/unit_status");
-  dds_entity_t alarm_reader = make_reader(participant, &focalfleet_NamedAlarm_desc, "focalfleet/named_alarm");
+  dds_entity_t alarm_reader =
+      make_reader(participant, &focalfleet_NamedAlarm_desc, "focalfleet/named_alarm");
   dds_entity_t waitset = dds_create_waitset(participant);
   dds_waitset_attach(waitset, dds_create_readcondition(unit_reader, DDS_ANY_STATE), 0);
   dds_waitset_attach(waitset, dds_create_readcondition(alarm_reader, DDS_ANY_STATE), 0);
