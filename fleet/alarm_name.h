@@ -84,6 +84,7 @@ struct AlarmKind {
 
 /// All names in their order; the entry of a name is at its number.
 std::span<const AlarmKind> AlarmKinds();
+/// The entry of the name; that of kUnnamed for a code that does not exist.
 const AlarmKind& KindOf(AlarmName name);
 /// The name as text: `BusDown`.
 const char* Name(AlarmName name);

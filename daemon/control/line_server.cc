@@ -31,6 +31,13 @@ constexpr std::uint64_t kResume = kAgain - 1;
 constexpr int kAcceptsPerTurn = 16;
 
 bool NoDescriptor(int error) { return error == EMFILE || error == ENFILE; }
+std::optional<std::uint32_t> UserOf(int fd) {
+  ucred peer{};
+  socklen_t length = sizeof peer;
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0) return std::nullopt;
+  return peer.uid;
+}
+
 bool NoRoom(int error) { return NoDescriptor(error) || error == ENOBUFS || error == ENOMEM; }
 
 }  // namespace
@@ -52,7 +59,6 @@ class LineServer::Impl {
 
   [[nodiscard]] int fd() const { return epoll_; }
   [[nodiscard]] bool connected(ClientId id) const { return clients_.contains(id); }
-  [[nodiscard]] std::optional<std::uint32_t> user(ClientId id) const;
   [[nodiscard]] std::size_t clients() const { return clients_.size(); }
   [[nodiscard]] const std::string& path() const { return listener_.path(); }
 
@@ -147,6 +153,7 @@ void LineServer::Impl::Admit(int fd, bool reserved) {
   Client& client = clients_[id];
   client.fd = fd;
   client.reserved = reserved;
+  client.user = UserOf(fd);
   client.active = ++active_;
   client.watched = EPOLLIN;
   reserved_ += reserved ? 1u : 0u;
@@ -238,7 +245,8 @@ void LineServer::Impl::TakeUrgent(std::vector<IncomingLine>* urgent) {
     if (!line) continue;
     ++client.open;
     client.active = ++active_;
-    urgent->push_back({.client = id, .text = std::move(*line), .reserved = client.reserved});
+    urgent->push_back(
+        {.client = id, .text = std::move(*line), .reserved = client.reserved, .user = client.user});
   }
   const auto taken = std::span(*urgent).subspan(before);
   for (auto& [id, client] : clients_)
@@ -290,7 +298,7 @@ std::optional<IncomingLine> LineServer::Impl::Next() {
       ++client.open;
       client.active = ++active_;
       turn_ = id;
-      next = {id, std::move(line->text), line->overtaken, client.reserved};
+      next = {id, std::move(line->text), line->overtaken, client.reserved, client.user};
     }
     if (!Settle(id, &client)) Drop(id);
   }
@@ -324,16 +332,6 @@ bool LineServer::Impl::Queue(ClientId id, std::string_view line, bool last) {
   return false;
 }
 
-std::optional<std::uint32_t> LineServer::Impl::user(ClientId id) const {
-  const auto client = clients_.find(id);
-  ucred peer{};
-  socklen_t length = sizeof peer;
-  if (client == clients_.end() ||
-      ::getsockopt(client->second.fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0)
-    return std::nullopt;
-  return peer.uid;
-}
-
 LineServer::LineServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 LineServer::LineServer(LineServer&&) noexcept = default;
 LineServer& LineServer::operator=(LineServer&&) noexcept = default;
@@ -356,7 +354,6 @@ bool LineServer::Progress(ClientId client, std::string_view line) {
   return impl_->Queue(client, line, false);
 }
 bool LineServer::connected(ClientId client) const { return impl_->connected(client); }
-std::optional<std::uint32_t> LineServer::user(ClientId client) const { return impl_->user(client); }
 std::size_t LineServer::clients() const { return impl_->clients(); }
 const std::string& LineServer::path() const { return impl_->path(); }
 

@@ -222,16 +222,16 @@ void EventLoop::Gather() {
 bool EventLoop::StepIsDue() const {
   return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
          !exposures_.empty() || !notes_.empty() ||
-         parts_.store->committed_through() != committed_through_ ||
-         parts_.store->failing() != store_failing_ || now_ >= effects_.wake_at;
+         parts_.store->committed_through() != store_.committed_through ||
+         parts_.store->failing() != store_.failing || now_ >= effects_.wake_at;
 }
 
 void EventLoop::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
-  if (store_failing_ != parts_.store->failing())
+  if (store_.failing != parts_.store->failing())
     parts_.alarms->NoteStore(WallTime::Now(), parts_.store->failure());
-  store_failing_ = parts_.store->failing();
-  committed_through_ = parts_.store->committed_through();
+  store_.failing = parts_.store->failing();
+  store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
   effects_.Clear();
   parts_.coordinator->Step({.now = now_,
@@ -241,8 +241,8 @@ void EventLoop::Step() {
                             .plans = plans_,
                             .exposures = exposures_,
                             .notes = notes_,
-                            .committed_through = committed_through_,
-                            .store_failing = store_failing_,
+                            .committed_through = store_.committed_through,
+                            .store_failing = store_.failing,
                             .refused = refused},
                            &effects_);
   ++steps_;
@@ -283,7 +283,7 @@ void EventLoop::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
-  StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_failing_);
+  StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_.failing);
   if (!parts_.store->Publish(&status)) parts_.scheduler->GiveBack(status, *parts_.layout);
 }
 

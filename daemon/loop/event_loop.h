@@ -29,7 +29,7 @@ namespace focalfleet {
 struct PlannerWork {
   PlanJob job;
   std::vector<UnitDrive> drives;
-  /// Of a preview: true once a configuration is to be planned first.
+  /// A preview alone has it: true once a configuration is to be planned first.
   std::shared_ptr<const std::atomic<bool>> given_up = nullptr;
 };
 using PlannerThread = JobThread<PlannerWork, PlanDone>;
@@ -104,8 +104,11 @@ class EventLoop {
   std::vector<ExposureDone> exposures_;
   std::vector<ShellNote> notes_;
   std::shared_ptr<std::atomic<bool>> preview_given_up_;
-  std::uint64_t committed_through_ = 0;  // as the coordinator last received it
-  bool store_failing_ = false;
+  /// The facts of the store's thread, as the coordinator last received them.
+  struct StoreFacts {
+    std::uint64_t committed_through = 0;
+    bool failing = false;
+  } store_;
   Effects effects_;
   std::uint64_t last_batch_ = 0;
   std::uint64_t steps_ = 0;

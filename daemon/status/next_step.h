@@ -8,8 +8,8 @@
 
 namespace focalfleet {
 
-/// One line: a command to type, with the units that it concerns, and in brackets the reason. What
-/// keeps most fibres from their targets comes first. Cost: one pass over the units.
+/// A line: a command to type, with the units that it concerns, and in brackets the reason. Faults
+/// of the host and of buses come first, then those of units. Cost: one pass over the units.
 std::string NextStep(const FleetView& view, const ShellFacts& facts);
 
 }  // namespace focalfleet

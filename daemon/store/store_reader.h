@@ -38,7 +38,7 @@ class StoreReader {
   Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit,
                                          const Period& period = {},
                                          std::optional<IntentEnd> end = {});
-  /// By their last change.
+  /// The period is that of their last change.
   Result<std::vector<ConfigurationHistory>> Configurations(
       std::uint32_t limit, const Period& period = {}, std::optional<ConfigurationState> state = {});
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);

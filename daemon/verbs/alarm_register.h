@@ -1,5 +1,5 @@
-// The register of open alarms, kept by the core thread. It takes the alarms and ends of conditions
-// out of each step's rows, and adds the rows that make the register durable to the same batch.
+// The register of open alarms, kept by the core thread. Alarms and ends of conditions are taken out
+// of each step's rows, and rows that make the register durable are added to the same batch.
 // Acknowledgements and mutes of operators are kept likewise, so a new daemon goes on with all of
 // it. Muting changes what is shown as open, never what is logged or stored.
 #pragma once

@@ -70,24 +70,26 @@ std::string Named(const ConfigurationRow& row) {
 }
 
 Event BeginOf(const ConfigurationHistory& entry) {
-  return {
-      .at = entry.began,
-      .kind = "configuration",
-      .name = {},
-      .text = Named(entry.row) + " begins: " + std::to_string(entry.row.targeted) + " targeted"};
+  return {.at = entry.began,
+          .kind = "configuration",
+          .name = {},
+          .text = Named(entry.row) + " begins: " + std::to_string(entry.row.counts.targeted) +
+                  " targeted"};
 }
 
 Event EndOf(const ConfigurationHistory& entry) {
   const ConfigurationRow& row = entry.row;
-  std::string text = Named(row) + " is " + Name(row.state) + ": " + std::to_string(row.arrived) +
-                     " of " + std::to_string(row.targeted) + " arrived";
-  const std::pair<const char*, std::uint32_t> rest[] = {{"refused", row.refused},
-                                                        {"failed", row.failed},
-                                                        {"stopped", row.stopped},
-                                                        {"unmeasured", row.unmeasured}};
+  std::string text = Named(row) + " is " + Name(row.state) + ": " +
+                     std::to_string(row.counts.arrived) + " of " +
+                     std::to_string(row.counts.targeted) + " arrived";
+  const std::pair<const char*, std::uint32_t> rest[] = {{"refused", row.counts.refused},
+                                                        {"failed", row.counts.failed},
+                                                        {"stopped", row.counts.stopped},
+                                                        {"unmeasured", row.counts.unmeasured}};
   for (const auto& [what, count] : rest)
     if (count > 0) text += ", " + std::to_string(count) + " " + what;
-  const bool well = row.state == ConfigurationState::kDone && row.arrived == row.targeted;
+  const bool well =
+      row.state == ConfigurationState::kDone && row.counts.arrived == row.counts.targeted;
   return {.at = entry.changed,
           .severity = well ? Severity::kInfo : Severity::kWarning,
           .kind = "configuration",

@@ -50,6 +50,11 @@ Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) 
   return Json{{"unit_ids", std::move(ids)}};
 }
 
+/// The user of the client, by number: a name may be slow to find.
+std::string UserOf(const IncomingLine& line) {
+  return line.user ? "uid " + std::to_string(*line.user) : "";
+}
+
 bool HasMoved(const ConfigurationView& configuration) {
   return configuration.started != kNever || configuration.makespan_s > 0;
 }
@@ -115,8 +120,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
-  if (!change)
-    change = ChangeAlarms(*request, options_.alarms, UserOf(line.client), WallTime::Now());
+  if (!change) change = ChangeAlarms(*request, options_.alarms, UserOf(line), WallTime::Now());
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));
@@ -238,11 +242,6 @@ std::string RequestHandler::NoteOn(const FleetView& view, const Command& command
     return "";
   return "; the model in force (" + options_.models->name() +
          ") was measured on the robot before it, so its commands go without one";
-}
-
-std::string RequestHandler::UserOf(ClientId client) const {
-  const auto user = server_.user(client);
-  return user ? "uid " + std::to_string(*user) : "";
 }
 
 Result<StoreReader*> RequestHandler::Reader() {

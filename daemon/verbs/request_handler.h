@@ -64,8 +64,8 @@ class RequestHandler {
   void Service(const FleetView& view, std::vector<Command>* commands);
   /// The client receives the coordinator's reply as its answer.
   void Reply(const FleetView& view, const ReplyEffect& reply);
-  /// The planning job of a dry run that was asked for since the last call. It never becomes the
-  /// configuration; its answer goes to PreviewDone.
+  /// The planning job of a dry run that was asked for since the last call. The job never becomes
+  /// the configuration; its answer goes to PreviewDone.
   std::optional<PlanJob> TakePreview() { return std::exchange(preview_job_, std::nullopt); }
   void PreviewDone(const FleetView& view, const PlanDone& done);
   /// Clients that wait receive progress, when it is time, or the end that they wait for.
@@ -107,8 +107,6 @@ class RequestHandler {
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
-  /// The user of a client, by number: names may be slow to find.
-  [[nodiscard]] std::string UserOf(ClientId client) const;
   [[nodiscard]] std::string NoteOn(const FleetView& view, const Command& command) const;
   Result<StoreReader*> Reader();
   void Answer(const Pending& pending, const Result<Json>& result);

@@ -55,7 +55,7 @@ struct Unserved {
   std::optional<NoWay> proof;  // of kBlocked; empty: a way may exist and was not found
 };
 
-/// What a plan is made for. A preview is shown to an operator and never carried out.
+/// The purpose of a plan. A preview is shown to an operator and never carried out.
 enum class PlanPurpose : std::uint8_t { kConfiguration, kPreview };
 
 /// Two units where they come nearest to each other.
