@@ -8,6 +8,7 @@
 #include "fleet/coordinate/coordination.h"
 #include "fleet/coordinate/executor.h"
 #include "fleet/coordinate/identification.h"
+#include "fleet/coordinate/preview.h"
 #include "fleet/coordinate/refused_rows.h"
 #include "fleet/coordinate/unit_parameters.h"
 #include "fleet/coordinate/unit_session.h"
@@ -35,7 +36,10 @@ class Coordinator::Impl {
   void Step(const Inputs& inputs, Effects* effects) {
     BeginStep(inputs.now, inputs.committed_through, inputs.store_failing, effects);
     EndEarlierConfigurations(fleet_);
-    for (const ShellNote& note : inputs.notes) ledger_.Raise(note.severity, {}, {}, note.text);
+    for (const ShellNote& note : inputs.notes) {
+      if (note.ends) ledger_.End(*note.ends, {}, {});
+      ledger_.Raise(note.name, {}, {}, note.text);
+    }
     for (const RefusedRow& refused : inputs.refused) StoreRefused(fleet_, refused);
     for (const LinkEvent& link : inputs.links) sessions_.LinkChanged(link);
     for (const ReceivedFrame& received : inputs.frames) Hear(received);
@@ -143,9 +147,12 @@ class Coordinator::Impl {
     return WriteParameter(fleet_, request, c);
   }
 
-  Status Do(std::uint64_t request, const KeepModelCommand& c) {
-    ledger_.Note(c.row);
-    ledger_.ReplyWhenDurable(request, "done");
+  Status Do(std::uint64_t request, const KeepRowsCommand& c) {
+    for (const Row& row : c.rows) ledger_.Note(row);
+    if (c.rows.empty())
+      step_.out->replies.push_back({request, true, {}, c.text});
+    else
+      ledger_.ReplyWhenDurable(request, c.text);
     return {};
   }
 
@@ -181,6 +188,10 @@ Coordinator::~Coordinator() = default;
 void Coordinator::Step(const Inputs& inputs, Effects* effects) { impl_->Step(inputs, effects); }
 
 void Coordinator::End(HostInstant now, Effects* effects) { impl_->End(now, effects); }
+
+Result<Preview> Coordinator::PreviewOf(const ApplyCommand& command) const {
+  return impl_->executor().PreviewOf(command);
+}
 
 const UnitView& Coordinator::unit(PositionerIndex i) const { return impl_->units()[i].view; }
 

@@ -35,6 +35,8 @@
 
 namespace focalfleet {
 
+struct Preview;
+
 class Coordinator {
  public:
   /// `layout` outlives the coordinator.
@@ -56,6 +58,10 @@ class Coordinator {
   void Step(const Inputs& inputs, Effects* effects);
   /// Appends what must still be written when the shell ends. Units that move finish by themselves.
   void End(HostInstant now, Effects* effects);
+
+  /// The job that plans what an `apply` would begin with, from the present places. Nothing changes;
+  /// the shell has the job done and keeps its answer from Step. Errors: those of the command.
+  [[nodiscard]] Result<Preview> PreviewOf(const ApplyCommand& command) const;
 
   [[nodiscard]] const UnitView& unit(PositionerIndex i) const;
   /// Knowledge for showing: as `unit(i).knowledge`, but a moving unit's is predicted at `now`.

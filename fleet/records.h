@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "fleet/alarm_name.h"
 #include "fleet/drive.h"
 #include "fleet/knowledge.h"
 #include "fleet/measurement.h"
@@ -187,13 +188,51 @@ struct ConfigurationRow {
   bool operator==(const ConfigurationRow&) const = default;
 };
 
-enum class Severity : std::uint8_t { kInfo, kWarning, kError };
 struct AlarmRow {
   std::uint64_t id = 0;
   Severity severity = Severity::kWarning;
   std::optional<UnitId> unit;
   std::optional<BusId> bus;
   std::string text;
+  AlarmName name = AlarmName::kUnnamed;
+};
+
+/// The condition of an alarm has ended. The shell closes the open alarm; the store has no row.
+struct AlarmEndRow {
+  AlarmName name = AlarmName::kUnnamed;
+  std::optional<UnitId> unit;
+  std::optional<BusId> bus;
+};
+
+/// An alarm from its first raise to its end. Equal alarms (of one name, unit and bus) that are
+/// raised meanwhile are counted in it.
+struct OpenAlarmRow {
+  enum class State : std::uint8_t { kOpen, kAcknowledged, kOver };
+  std::uint64_t id = 0;  // of the alarm that opened it
+  AlarmName name = AlarmName::kUnnamed;
+  Severity severity = Severity::kWarning;
+  std::optional<UnitId> unit = {};
+  std::optional<BusId> bus = {};
+  std::string text = {};  // of the newest
+  std::uint32_t count = 1;
+  State state = State::kOpen;
+  // Times since the Unix epoch; 0: not yet.
+  std::int64_t first_unix_ns = 0;
+  std::int64_t last_unix_ns = 0;
+  std::int64_t acknowledged_unix_ns = 0;
+  std::int64_t ended_unix_ns = 0;
+  std::string acknowledged_by = {};
+  bool operator==(const OpenAlarmRow&) const = default;
+};
+
+/// Alarms of this name are not shown as open until then; log and store have them as ever.
+struct MuteRow {
+  AlarmName name = AlarmName::kUnnamed;
+  std::int64_t until_unix_ns = 0;  // 0: no longer muted
+  std::int64_t since_unix_ns = 0;
+  std::string reason = {};
+  std::string by = {};
+  bool operator==(const MuteRow&) const = default;
 };
 
 /// The next move id to give out; written with the first intent that uses one.
@@ -214,9 +253,9 @@ struct ModelRow {
   std::shared_ptr<const std::string> text;  // null: the store has it under its sha256
 };
 
-using Row =
-    std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
-                 ParameterRow, TuningRow, ConfigurationRow, AlarmRow, NextMoveRow, ModelRow>;
+using Row = std::variant<VectorRow, MeasurementRow, IntentRow, IntentEndRow, BindingRow, EnableRow,
+                         ParameterRow, TuningRow, ConfigurationRow, AlarmRow, AlarmEndRow,
+                         OpenAlarmRow, MuteRow, NextMoveRow, ModelRow>;
 
 /// A row that the store can never keep. The row was set aside, and the rest of its batch was kept.
 struct RefusedRow {
@@ -243,6 +282,8 @@ struct StoredFleet {
   std::vector<TuningRow> tunings;
   /// Configurations by id: those that never ended, and the newest.
   std::vector<ConfigurationRow> configurations;
+  std::vector<OpenAlarmRow> open_alarms;  // by id; those that are not over
+  std::vector<MuteRow> mutes;             // by name
   MoveId next_move{1};
   std::uint64_t next_configuration = 1;
   std::uint64_t next_alarm = 1;

@@ -76,8 +76,26 @@ struct FlawOf {
   }
 
   const char* operator()(const AlarmRow& row) const {
-    return row.severity > kLastSeverity || !IsNumber(row.id) ? "its severity or id does not exist"
-                                                             : nullptr;
+    return row.severity > kLastSeverity || row.name > kLastAlarmName || !IsNumber(row.id)
+               ? "its severity, name or id does not exist"
+               : nullptr;
+  }
+
+  const char* operator()(const AlarmEndRow& row) const {
+    return row.name > kLastAlarmName ? "its name does not exist" : nullptr;
+  }
+
+  const char* operator()(const OpenAlarmRow& row) const {
+    return row.severity > kLastSeverity || row.name > kLastAlarmName ||
+                   row.state > OpenAlarmRow::State::kOver || !IsNumber(row.id) || row.count == 0
+               ? "its severity, name, state, count or id does not exist"
+               : nullptr;
+  }
+
+  const char* operator()(const MuteRow& row) const {
+    return row.name == AlarmName::kUnnamed || row.name > kLastAlarmName || row.until_unix_ns < 0
+               ? "its name or end does not exist"
+               : nullptr;
   }
 
   const char* operator()(const NextMoveRow&) const { return nullptr; }
@@ -118,6 +136,15 @@ struct DescriptionOf {
     return "configuration " + std::to_string(row.id);
   }
   std::string operator()(const AlarmRow& row) const { return "alarm " + std::to_string(row.id); }
+  std::string operator()(const AlarmEndRow& row) const {
+    return std::string("end of ") + Name(row.name);
+  }
+  std::string operator()(const OpenAlarmRow& row) const {
+    return "open alarm " + std::to_string(row.id);
+  }
+  std::string operator()(const MuteRow& row) const {
+    return std::string("muting of ") + Name(row.name);
+  }
   std::string operator()(const NextMoveRow&) const { return "next move"; }
   std::string operator()(const ModelRow& row) const {
     return "model change " + std::to_string(row.entry);

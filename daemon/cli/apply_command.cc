@@ -1,4 +1,4 @@
-// The command apply FILE [--wait] [--fixed] [--correct N] sends a targets file to the daemon.
+// The command apply FILE sends a targets file to the daemon; wait waits for what is under way.
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,6 +10,7 @@
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/operator_commands.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/files/text_file.h"
 #include "fleet/files/targets_file.h"
@@ -21,6 +22,7 @@ struct ApplyOptions {
   std::string file;
   bool wait = false;
   bool fixed = false;
+  bool dry_run = false;
   std::optional<std::uint32_t> corrections;  // empty: no corrections by the camera
   double tolerance_um = 10;
 };
@@ -71,6 +73,24 @@ ExitCode ReportSummary(const Context& context, const Json& configuration) {
   return exit;
 }
 
+ExitCode ReportDryRun(const Context& context, const tl::expected<Json, Failure>& preview) {
+  if (!preview) return Report(context, preview.error());
+  if (context.json) PrintJson(*preview);
+  const std::uint64_t targeted = CountIn(*preview, "targeted");
+  const std::uint64_t served = CountIn(*preview, "served");
+  Say(context,
+      fmt::format("dry run, nothing moves: {} of {} units served, {} move\n"
+                  "  makespan {}, energy {}, peak power {}",
+                  served, targeted, CountIn(*preview, "moving"),
+                  Shown(*preview, "makespan_s", "s", 1), Shown(*preview, "energy_J", "J", 1),
+                  Shown(*preview, "peak_power_W", "W", 1)));
+  if (served == targeted) return ExitCode::kOk;
+  const std::string unserved = DescribeNotServed(*preview);
+  Say(context, unserved);
+  NameUnserved(context, unserved);
+  return ExitCode::kSomeUnserved;
+}
+
 ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   auto text = ReadTextFile(options.file);
   if (!text) return Report(context, text.error());
@@ -85,6 +105,12 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   if (const auto targets = ReadTargets(*text, options.file)) {
     ReportPassedOver(context, options.file, targets->ignored_columns);
   }
+  if (options.dry_run)
+    return ReportDryRun(context, Ask(context, {.verb = "preview",
+                                               .args = {{"source", SourceOf(options.file)},
+                                                        {"targets_csv", std::move(*text)},
+                                                        {"fixed", options.fixed}},
+                                               .long_lasting = true}));
   if (options.wait) InstallInterruptNote();
   ProgressBar bar(context);
   Question question{.verb = "apply",
@@ -104,11 +130,43 @@ ExitCode RunApply(const Context& context, const ApplyOptions& options) {
   return options.wait ? ReportSummary(context, *result) : ReportAccepted(context, *result);
 }
 
+// ---- wait
+
+struct WaitOptions {
+  std::optional<double> timeout_s;
+};
+
+ExitCode RunWait(const Context& context, const WaitOptions& options) {
+  InstallInterruptNote();
+  Json args = Json::object();
+  if (options.timeout_s) args["timeout_s"] = *options.timeout_s;
+  ProgressBar bar(context);
+  const auto result = Ask(
+      context,
+      {.verb = "wait", .args = args, .long_lasting = true, .on_progress = [&bar](const Json& p) {
+         ShowProgress(&bar, p);
+       }});
+  bar.End();
+  if (!result) {
+    // A daemon that ends says so first: it is gone, too.
+    Failure failure = result.error();
+    if (failure.exit == ExitCode::kBroken) failure.exit = ExitCode::kNoDaemon;
+    return Report(context, failure);
+  }
+  if (result->contains("under_way")) {
+    if (context.json) PrintJson(*result);
+    Say(context, "nothing is under way");
+    return ExitCode::kOk;
+  }
+  return ReportSummary(context, *result);
+}
+
 }  // namespace
 
 void AddApplyCommand(CommandLine* line) {
   CLI::App* command =
       AddCommand(&line->app, "apply", "Move the fleet to the targets of a file",
+                 "  focalfleet apply targets.csv --dry-run\n"
                  "  focalfleet apply targets.csv --wait\n"
                  "  focalfleet apply targets.csv --wait --json > summary.json\n"
                  "  focalfleet apply targets.csv --wait --correct 2 --tolerance-um 10");
@@ -116,8 +174,8 @@ void AddApplyCommand(CommandLine* line) {
   AddFile(command, "FILE", &options->file,
           "targets.csv: unit_id and x_mm, y_mm or theta_deg, phi_deg")
       ->required();
-  command->add_flag("--wait", options->wait,
-                    "Wait until the configuration is over, with its progress");
+  CLI::Option* wait = command->add_flag("--wait", options->wait,
+                                        "Wait until the configuration is over, with its progress");
   command->add_flag("--fixed", options->fixed,
                     "Units that the file does not name may not step aside");
   CLI::Option* correct =
@@ -130,7 +188,22 @@ void AddApplyCommand(CommandLine* line) {
       ->check(NumberBetween(0.1, 1e6))
       ->capture_default_str()
       ->needs(correct);
+  command
+      ->add_flag("--dry-run", options->dry_run,
+                 "Plan from where the units stand now, and report; nothing moves")
+      ->excludes(wait)
+      ->excludes(correct);
   OnChosen(line, command, options, RunApply);
+}
+
+void AddWaitCommand(CommandLine* line) {
+  CLI::App* command =
+      AddCommand(&line->app, "wait", "Wait until the configuration under way is over",
+                 "  focalfleet wait\n  focalfleet wait --timeout 600");
+  auto options = std::make_shared<WaitOptions>();
+  command->add_option("--timeout", options->timeout_s, "Give up after so many seconds (1)")
+      ->check(NumberBetween(0, 1e6));
+  OnChosen(line, command, options, RunWait);
 }
 
 }  // namespace focalfleet::cli

@@ -17,8 +17,9 @@ namespace {
 constexpr DurationNs kHangs = Seconds(120);
 
 bool ChangesNothing(const std::string& verb) {
-  constexpr std::array<const char*, 5> kQuestions = {"status", "unit", "state", "history",
-                                                     "params"};
+  constexpr std::array<const char*, 10> kQuestions = {"status",  "unit",   "state",  "history",
+                                                      "params",  "alarms", "events", "select",
+                                                      "preview", "wait"};
   return std::find(kQuestions.begin(), kQuestions.end(), verb) != kQuestions.end();
 }
 

@@ -9,6 +9,8 @@
 #include <cstring>
 #include <sstream>
 
+#include "daemon/cli/operator_commands.h"
+
 namespace focalfleet::cli {
 namespace {
 
@@ -129,6 +131,9 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddApplyCommand(line.get());
   AddRetargetCommand(line.get());
   AddStatusCommands(line.get());
+  AddAlarmCommands(line.get());
+  AddEventsCommand(line.get());
+  AddWaitCommand(line.get());
   AddWatchCommand(line.get());
   AddStopCommand(line.get());
   AddUnitCommands(line.get());

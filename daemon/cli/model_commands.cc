@@ -5,6 +5,7 @@
 
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
+#include "daemon/cli/confirm.h"
 #include "daemon/cli/table.h"
 #include "daemon/files/text_file.h"
 
@@ -100,7 +101,13 @@ ExitCode Change(const Context& context, const char* verb, const Json& args) {
   return ExitCode::kOk;
 }
 
-ExitCode RunLoad(const Context& context, const std::string& file) {
+struct LoadOptions {
+  std::string file;
+  bool yes = false;
+};
+
+ExitCode RunLoad(const Context& context, const LoadOptions& options) {
+  const std::string& file = options.file;
   const auto text = ReadTextFile(file);
   if (!text) return Report(context, text.error());
   // The rest of the line and the escapes of its text must fit, too.
@@ -108,6 +115,8 @@ ExitCode RunLoad(const Context& context, const std::string& file) {
     return Report(context,
                   {ErrorCode::kInvalid, fmt::format("{}: {} bytes; the daemon takes at most {}",
                                                     file, text->size(), kControlLineBytesMax / 2)});
+  constexpr const char* kWhat = "from now on blind commands go through another model";
+  if (const auto refused = Refused(kWhat, options.yes)) return Report(context, *refused);
   return Change(context, "model_load", {{"model_toml", *text}, {"source", SourceOf(file)}});
 }
 
@@ -124,15 +133,16 @@ ExitCode RunRollback(const Context& context, const NoOptions&) {
 void AddModelCommands(CommandLine* line) {
   CLI::App* model =
       AddCommand(&line->app, "model", "The model of a campaign that blind commands go through",
-                 "  focalfleet model load night-12-report/model.toml\n"
+                 "  focalfleet model load night-12-report/model.toml --yes\n"
                  "  focalfleet model show");
   model->require_subcommand(1);
   CLI::App* load =
       AddCommand(model, "load", "Check a model.toml of `focalfleet diagnose`; from now on it holds",
-                 "  focalfleet model load night-12-report/model.toml");
-  auto file = std::make_shared<std::string>();
-  AddFile(load, "FILE", file.get(), "model.toml")->required();
-  OnChosen(line, load, file, RunLoad);
+                 "  focalfleet model load night-12-report/model.toml --yes");
+  auto options = std::make_shared<LoadOptions>();
+  AddFile(load, "FILE", &options->file, "model.toml")->required();
+  load->add_flag("--yes", options->yes, "Do not ask; needed where standard input is no terminal");
+  OnChosen(line, load, options, RunLoad);
   CLI::App* show =
       AddCommand(model, "show", "What holds, how well it is known, and what held before",
                  "  focalfleet model show --json");

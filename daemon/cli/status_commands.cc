@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
 #include "daemon/cli/table.h"
+#include "daemon/cli/time_text.h"
+#include "daemon/cli/unit_choice.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
@@ -51,6 +55,18 @@ std::string DescribeBuses(const Json& buses, double load_max, bool all, bool col
                      100 * load_max, lines);
 }
 
+/// Nothing where none is open or muted.
+std::string DescribeOpenAlarms(const Json& alarms, bool colour_on) {
+  const std::uint64_t open = CountIn(alarms, "open");
+  const std::uint64_t muted = CountIn(alarms, "muted");
+  if (open + muted == 0) return "";
+  const Colour colour = TextIn(alarms, "worst") == "error" ? Colour::kRed : Colour::kYellow;
+  std::string text =
+      open == 0 ? "none open" : Paint(colour_on, colour, fmt::format("{} open", open));
+  if (muted > 0) text += fmt::format(", {} muted", muted);
+  return fmt::format("alarms     {} (`focalfleet alarms`)\n", text);
+}
+
 std::string DescribeStatus(const Json& status, const StatusOptions& options, bool colour_on) {
   const bool busy = status.value("busy", false);
   const Json& store = ObjectIn(status, "store");
@@ -66,11 +82,13 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
       failing ? Paint(colour_on, Colour::kRed, "  FAILING: nothing new is started") : "");
   if (const std::string trouble = TextIn(ObjectIn(status, "dds"), "trouble"); !trouble.empty())
     text += fmt::format("dds        {} {}\n", Paint(colour_on, Colour::kRed, "MISSING"), trouble);
+  text += DescribeOpenAlarms(ObjectIn(status, "alarms"), colour_on);
   text += DescribeBuses(ListIn(status, "buses"), NumberIn(status, "bus_load_max"), options.buses,
                         colour_on);
   const Json& configuration = ObjectIn(status, "configuration");
   text += CountIn(configuration, "id") == 0 ? "no configuration yet"
                                             : DescribeConfiguration(configuration, colour_on);
+  if (const std::string next = TextIn(status, "next"); !next.empty()) text += "\nnext: " + next;
   return text;
 }
 
@@ -94,24 +112,27 @@ void AddStatus(CommandLine* line) {
 
 // ---- unit
 
-struct UnitOptions {
-  std::uint32_t unit_id = 0;
-};
-
-ExitCode RunUnit(const Context& context, const UnitOptions& options) {
-  const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", options.unit_id}}});
-  if (!unit) return Report(context, unit.error());
-  if (context.json) PrintJson(*unit);
-  Say(context, DescribeObject(*unit));
+/// Several units are one object with a list; a single one is an object of its own.
+ExitCode RunUnit(const Context& context, const UnitChoice& choice) {
+  const auto ids = ChosenUnits(context, choice);
+  if (!ids) return Report(context, ids.error());
+  Json units = Json::array();
+  for (const std::uint32_t id : *ids) {
+    const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", id}}});
+    if (!unit) return Report(context, unit.error());
+    Say(context, (units.empty() ? "" : "\n") + DescribeObject(*unit));
+    units.push_back(*unit);
+  }
+  if (context.json) PrintJson(units.size() == 1 ? units.front() : Json{{"units", units}});
   return ExitCode::kOk;
 }
 
 void AddUnit(CommandLine* line) {
-  CLI::App* command = AddCommand(&line->app, "unit", "Show all that is known of one unit",
-                                 "  focalfleet unit 4711");
-  auto options = std::make_shared<UnitOptions>();
-  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
-  OnChosen(line, command, options, RunUnit);
+  CLI::App* command = AddCommand(&line->app, "unit", "Show all that is known of units",
+                                 "  focalfleet unit 4711\n  focalfleet unit --state fault");
+  auto choice = std::make_shared<UnitChoice>();
+  AddUnitChoice(command, choice.get());
+  OnChosen(line, command, choice, RunUnit);
 }
 
 // ---- state
@@ -216,6 +237,9 @@ struct HistoryOptions {
   std::uint32_t unit_id = 0;
   bool of_unit = false;
   std::uint32_t limit = 20;
+  std::string since;
+  std::string until;
+  std::string state;
 };
 
 // A list with its columns in order: identity, event, time, result, cost.
@@ -228,7 +252,7 @@ std::vector<HistoryTable> HistoryTables() {
       {"configurations",
        {"id", "state", "source", "began", "changed", "targeted", "arrived", "refused", "failed",
         "stopped", "unmeasured", "makespan_s", "makespan_predicted_s", "energy_J", "peak_power_W"}},
-      {"alarms", {"id", "at", "severity", "bus_id", "unit_id", "text"}},
+      {"alarms", {"id", "at", "severity", "name", "bus_id", "unit_id", "text"}},
       {"moves",
        {"configuration", "move", "end", "began", "ended", "theta_from_vectors", "theta_to_vectors",
         "theta_low_vectors", "theta_high_vectors", "theta_witness", "phi_from_vectors",
@@ -240,6 +264,16 @@ std::vector<HistoryTable> HistoryTables() {
 ExitCode RunHistory(const Context& context, const HistoryOptions& options) {
   Json args{{"limit", options.limit}};
   if (options.of_unit) args["unit_id"] = options.unit_id;
+  if (!options.state.empty()) args["state"] = options.state;
+  const WallTime now = WallTime::Now();
+  const std::pair<const char*, const std::string&> times[] = {{"since_ns", options.since},
+                                                              {"until_ns", options.until}};
+  for (const auto& [key, text] : times) {
+    if (text.empty()) continue;
+    const auto at = InstantOf(text, now);
+    if (!at) return Report(context, at.error());
+    args[key] = at->ns;
+  }
   const auto history = Ask(context, {.verb = "history", .args = args});
   if (!history) return Report(context, history.error());
   if (context.json) PrintJson(*history);
@@ -268,6 +302,11 @@ void AddHistory(CommandLine* line) {
       },
       "Its unit_id (default: configurations of the fleet)");
   command->add_option("--limit", options->limit, "Newest rows to show")->capture_default_str();
+  command->add_option("--since", options->since, "Since then: 2h, or a time of UTC");
+  command->add_option("--until", options->until, "Until then: 2h, or a time of UTC");
+  command->add_option("--state", options->state,
+                      "Configurations that are done, stopped or failed; moves of a unit that "
+                      "arrived, stopped, ended by a fault, never_began, interrupted or homed");
   OnChosen(line, command, options, RunHistory);
 }
 

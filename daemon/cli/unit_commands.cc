@@ -9,12 +9,17 @@
 #include "daemon/cli/client.h"
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/configuration_summary.h"
+#include "daemon/cli/confirm.h"
 #include "daemon/cli/progress_bar.h"
 #include "daemon/cli/table.h"
+#include "daemon/cli/unit_choice.h"
+#include "daemon/control/id_ranges.h"
 #include "protocol/wire/messages.h"
 
 namespace focalfleet::cli {
 namespace {
+
+constexpr std::size_t kRangesShown = 10;
 
 ExitCode ReportConfiguration(const Context& context, const Json& configuration) {
   Say(context, DescribeConfiguration(configuration, context.colour_out));
@@ -32,30 +37,38 @@ ExitCode PrintAnswer(const Context& context, const tl::expected<Json, Failure>& 
   return ExitCode::kOk;
 }
 
-CLI::Option* AddUnits(CLI::App* command, std::vector<std::uint32_t>* units) {
-  return command->add_option("UNIT", *units, "Their unit_ids");
+void AddYes(CLI::App* command, bool* yes) {
+  command->add_flag("--yes", *yes, "Do not ask; needed where standard input is no terminal");
 }
 
 // ---- home
 
 struct HomeOptions {
-  std::vector<std::uint32_t> units;
+  UnitChoice choice;
   bool not_known = false;
   bool unproven = false;
+  bool yes = false;
   bool wait = false;
 };
 
 ExitCode RunHome(const Context& context, const HomeOptions& options) {
-  if (options.units.empty() != options.not_known) {
+  if (options.choice.empty() != options.not_known) {
     return Report(context,
                   {ErrorCode::kInvalid, "home: name units, or say --not-known (one of the two)"},
                   ExitCode::kUsage);
+  }
+  if (options.unproven) {
+    constexpr const char* kWhat =
+        "homing without proof that the neighbours are out of the way: arms may touch";
+    if (const auto refused = Refused(kWhat, options.yes)) return Report(context, *refused);
   }
   Json args{{"wait", options.wait}, {"unproven", options.unproven}};
   if (options.not_known) {
     args["not_known"] = true;
   } else {
-    args["unit_ids"] = options.units;
+    const auto units = ChosenUnits(context, options.choice);
+    if (!units) return Report(context, units.error());
+    args["unit_ids"] = *units;
   }
   ProgressBar bar(context);
   const auto answer = Ask(context, {.verb = "home",
@@ -79,14 +92,16 @@ ExitCode RunHome(const Context& context, const HomeOptions& options) {
 void AddHome(CommandLine* line) {
   CLI::App* command = AddCommand(
       &line->app, "home", "Drive units to their hard stops, so that their place is known",
-      "  focalfleet home 4711 4712 --wait\n  focalfleet home --not-known --wait");
+      "  focalfleet home 4711,4720-4725 --wait\n  focalfleet home --bus 3 --state unknown --wait\n"
+      "  focalfleet home --not-known --wait");
   auto options = std::make_shared<HomeOptions>();
-  AddUnits(command, &options->units);
+  AddUnitChoice(command, &options->choice);
   command->add_flag("--not-known", options->not_known, "All units whose place is not known");
   command->add_flag(
       "--unproven", options->unproven,
       "Home also where no way can be proven clear of the neighbours: your word for it");
   command->add_flag("--wait", options->wait, "Wait until it is over");
+  AddYes(command, &options->yes);
   OnChosen(line, command, options, RunHome);
 }
 
@@ -127,30 +142,36 @@ void AddMeasure(CommandLine* line) {
 // ---- disable, enable, adopt
 
 struct EnableOptions {
-  std::vector<std::uint32_t> units;
+  UnitChoice choice;
   std::string reason;
+  bool yes = false;
   double within_s = 5;  // a unit that clears a fault is read anew, within seconds with repeats
 };
 
 ExitCode RunDisable(const Context& context, const EnableOptions& options) {
+  const auto units = ChosenUnits(context, options.choice);
+  if (!units) return Report(context, units.error());
+  if (units->size() > kUnitsUnasked) {
+    const std::string what = fmt::format("{} units are disabled ({})", units->size(),
+                                         DescribeRanges(*units, kRangesShown));
+    if (const auto refused = Refused(what, options.yes)) return Report(context, *refused);
+  }
   return PrintAnswer(
       context,
-      Ask(context,
-          {.verb = "disable", .args = {{"unit_ids", options.units}, {"reason", options.reason}}}),
-      fmt::format("{} disabled", Count(options.units.size(), "unit", "units")));
+      Ask(context, {.verb = "disable", .args = {{"unit_ids", *units}, {"reason", options.reason}}}),
+      fmt::format("{} disabled", Count(units->size(), "unit", "units")));
 }
 
 constexpr std::chrono::milliseconds kLookEvery{50};
 
 /// The units that are still in fault when the daemon has had time to clear it.
 /// Errors: as Ask.
-tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(const Context& context,
-                                                               const EnableOptions& options) {
-  const auto give_up =
-      std::chrono::steady_clock::now() + std::chrono::duration<double>(options.within_s);
+tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(
+    const Context& context, const std::vector<std::uint32_t>& units, double within_s) {
+  const auto give_up = std::chrono::steady_clock::now() + std::chrono::duration<double>(within_s);
   for (;;) {
     std::vector<std::uint32_t> faulty;
-    for (const std::uint32_t id : options.units) {
+    for (const std::uint32_t id : units) {
       const auto unit = Ask(context, {.verb = "unit", .args = {{"unit_id", id}}});
       if (!unit) return tl::unexpected(unit.error());
       const std::string phase = TextIn(*unit, "phase");
@@ -162,16 +183,18 @@ tl::expected<std::vector<std::uint32_t>, Failure> StillInFault(const Context& co
 }
 
 ExitCode RunEnable(const Context& context, const EnableOptions& options) {
-  const auto answer = Ask(context, {.verb = "enable", .args = {{"unit_ids", options.units}}});
+  const auto units = ChosenUnits(context, options.choice);
+  if (!units) return Report(context, units.error());
+  const auto answer = Ask(context, {.verb = "enable", .args = {{"unit_ids", *units}}});
   if (!answer) return Report(context, answer.error());
-  const auto faulty = StillInFault(context, options);
+  const auto faulty = StillInFault(context, *units, options.within_s);
   if (!faulty) return Report(context, faulty.error());
   if (context.json) {
     Json result = *answer;
     result["still_in_fault"] = *faulty;
     PrintJson(result);
   }
-  Say(context, fmt::format("{} enabled", Count(options.units.size(), "unit", "units")));
+  Say(context, fmt::format("{} enabled", Count(units->size(), "unit", "units")));
   if (faulty->empty()) return ExitCode::kOk;
   Complain(fmt::format("focalfleet: still in fault: {} (`focalfleet unit {}` says which)\n",
                        fmt::join(*faulty, ", "), faulty->front()));
@@ -181,17 +204,19 @@ ExitCode RunEnable(const Context& context, const EnableOptions& options) {
 void AddEnable(CommandLine* line) {
   CLI::App* disable = AddCommand(
       &line->app, "disable", "Take units out: they stand where they are, obstacles to the others",
-      "  focalfleet disable 4711 --reason 'phi stalls'");
+      "  focalfleet disable 4711 --reason 'phi stalls'\n"
+      "  focalfleet disable --bus 3 --reason 'cable is off' --yes");
   auto taken_out = std::make_shared<EnableOptions>();
-  AddUnits(disable, &taken_out->units)->required();
+  AddUnitChoice(disable, &taken_out->choice);
   disable->add_option("--reason", taken_out->reason, "Why, for those who come after")->required();
+  AddYes(disable, &taken_out->yes);
   OnChosen(line, disable, taken_out, RunDisable);
 
   CLI::App* enable =
       AddCommand(&line->app, "enable", "Take units in again; of a unit in fault, clear the fault",
-                 "  focalfleet enable 4711");
+                 "  focalfleet enable 4711\n  focalfleet enable --state fault");
   auto taken_in = std::make_shared<EnableOptions>();
-  AddUnits(enable, &taken_in->units)->required();
+  AddUnitChoice(enable, &taken_in->choice);
   enable->add_option("--within-s", taken_in->within_s, "How long to wait for faults to be cleared")
       ->check(NumberBetween(0, 600))
       ->capture_default_str();
@@ -199,31 +224,45 @@ void AddEnable(CommandLine* line) {
 }
 
 struct AdoptOptions {
-  std::uint32_t unit_id = 0;
+  UnitChoice choice;
+  bool yes = false;
 };
 
+// Units are adopted one after the other; the first refusal ends it and is the answer.
 ExitCode RunAdopt(const Context& context, const AdoptOptions& options) {
-  const auto answer = Ask(context, {.verb = "adopt", .args = {{"unit_id", options.unit_id}}});
-  std::string done =
-      fmt::format("unit {}: the hardware that answers there belongs there now", options.unit_id);
-  if (const std::string text = answer ? TextIn(*answer, "text") : ""; text.starts_with("done"))
-    done += text.substr(4);
-  return PrintAnswer(context, answer, done);
+  const auto units = ChosenUnits(context, options.choice);
+  if (!units) return Report(context, units.error());
+  const std::string what =
+      fmt::format("the hardware that answers at {} ({}) becomes their own",
+                  Count(units->size(), "unit", "units"), DescribeRanges(*units, kRangesShown));
+  if (const auto refused = Refused(what, options.yes)) return Report(context, *refused);
+  for (const std::uint32_t id : *units) {
+    const auto answer = Ask(context, {.verb = "adopt", .args = {{"unit_id", id}}});
+    if (!answer) return Report(context, answer.error());
+    std::string done =
+        fmt::format("unit {}: the hardware that answers there belongs there now", id);
+    if (const std::string text = TextIn(*answer, "text"); text.starts_with("done"))
+      done += text.substr(4);
+    if (context.json && id == units->back()) PrintJson(*answer);
+    Say(context, done);
+  }
+  return ExitCode::kOk;
 }
 
 void AddAdopt(CommandLine* line) {
   CLI::App* command = AddCommand(
       &line->app, "adopt", "Accept the serial number that answers at a unit's place as its own",
-      "  focalfleet unit 4711    # shows both serial numbers\n  focalfleet adopt 4711");
+      "  focalfleet unit 4711    # shows both serial numbers\n  focalfleet adopt 4711 --yes");
   auto options = std::make_shared<AdoptOptions>();
-  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  AddUnitChoice(command, &options->choice);
+  AddYes(command, &options->yes);
   OnChosen(line, command, options, RunAdopt);
 }
 
 // ---- params
 
 struct ParamsOptions {
-  std::uint32_t unit_id = 0;
+  std::string units;  // as 7,20-25
   std::string action;
   std::string axis;
   std::string name;
@@ -238,14 +277,21 @@ std::vector<std::string> ParameterNames() {
   return names;
 }
 
-ExitCode SetParameter(const Context& context, const ParamsOptions& options) {
-  const Json args{{"unit_id", options.unit_id},
-                  {"axis", options.axis},
-                  {"parameter", options.name},
-                  {"value", *options.value}};
-  // The unit decides: it may hold another value than the requested one.
-  const auto answer = Ask(context, {.verb = "params_set", .args = args});
-  return PrintAnswer(context, answer, answer ? TextIn(*answer, "text") : "");
+// Units are written one after the other; the first refusal ends it and is the answer.
+ExitCode SetParameter(const Context& context, const ParamsOptions& options,
+                      const std::vector<std::uint32_t>& units) {
+  for (const std::uint32_t id : units) {
+    const Json args{{"unit_id", id},
+                    {"axis", options.axis},
+                    {"parameter", options.name},
+                    {"value", *options.value}};
+    // The unit decides: it may hold another value than the requested one.
+    const auto answer = Ask(context, {.verb = "params_set", .args = args});
+    if (!answer) return Report(context, answer.error());
+    if (context.json && id == units.back()) PrintJson(*answer);
+    Say(context, TextIn(*answer, "text"));
+  }
+  return ExitCode::kOk;
 }
 
 // The rows of stored or set parameters, then those of the defaults, narrowed to one axis and name
@@ -302,29 +348,33 @@ ExitCode RunParams(const Context& context, const ParamsOptions& options) {
                    "AXIS NAME VALUE`"},
                   ExitCode::kUsage);
   }
-  if (set) return SetParameter(context, options);
-  const auto answer = Ask(context, {.verb = "params", .args = {{"unit_id", options.unit_id}}});
-  if (!answer) return Report(context, answer.error());
-  const Json rows = ParameterRows(*answer, options);
-  if (context.json) {
-    Json shown = *answer;
-    shown["parameters"] = rows;
-    PrintJson(shown);
+  const auto units = ParseRanges(options.units);
+  if (!units) return Report(context, units.error(), ExitCode::kUsage);
+  if (set) return SetParameter(context, options, *units);
+  Json all = Json::array();
+  for (const std::uint32_t id : *units) {
+    const auto answer = Ask(context, {.verb = "params", .args = {{"unit_id", id}}});
+    if (!answer) return Report(context, answer.error());
+    const Json rows = ParameterRows(*answer, options);
+    const std::string tuning = options.name.empty() ? DescribeTuning(*answer, options) : "";
+    Say(context, (units->size() > 1 ? fmt::format("unit {}\n", id) : std::string()) +
+                     (rows.empty() ? "nothing is known of it: neither set nor read from the unit"
+                                   : DescribeRows(rows, {"axis", "parameter", "value", "origin"})) +
+                     tuning);
+    all.push_back(*answer);
+    all.back()["parameters"] = rows;
   }
-  const std::string tuning = options.name.empty() ? DescribeTuning(*answer, options) : "";
-  Say(context, (rows.empty() ? "nothing is known of it: neither set nor read from the unit"
-                             : DescribeRows(rows, {"axis", "parameter", "value", "origin"})) +
-                   tuning);
+  if (context.json) PrintJson(all.size() == 1 ? all.front() : Json{{"units", all}});
   return ExitCode::kOk;
 }
 
 void AddParams(CommandLine* line) {
   CLI::App* command =
-      AddCommand(&line->app, "params", "Show or set the tuned parameters of a unit",
+      AddCommand(&line->app, "params", "Show or set the tuned parameters of units",
                  "  focalfleet params 4711\n  focalfleet params 4711 get theta repeat\n"
                  "  focalfleet params 4711 set theta repeat 54");
   auto options = std::make_shared<ParamsOptions>();
-  command->add_option("UNIT", options->unit_id, "Its unit_id")->required();
+  command->add_option("UNIT", options->units, "Its unit_id, or 7,20-25")->required();
   OneOf(command->add_option("ACTION", options->action, "Show (default) or set"), {"get", "set"});
   OneOf(command->add_option("AXIS", options->axis, "Which axis"), {"theta", "phi"});
   OneOf(command->add_option("NAME", options->name, "Which parameter"), ParameterNames());

@@ -140,15 +140,11 @@ Json JsonOf(const BusStatusValue& bus) {
           {"retries", bus.view.retries}};
 }
 
-const char* Name(Severity severity) {
-  constexpr std::array<const char*, 3> kNames = {"info", "warning", "error"};
-  return kNames[static_cast<std::size_t>(severity)];
-}
-
 Json JsonOf(const AlarmValue& alarm) {
   Json row{{"time", ToIso8601(alarm.at)},
            {"id", alarm.row.id},
            {"severity", Name(alarm.row.severity)},
+           {"name", Name(alarm.row.name)},
            {"text", alarm.row.text}};
   if (alarm.row.unit) row["unit_id"] = alarm.row.unit->value;
   if (alarm.row.bus) row["bus_id"] = alarm.row.bus->value;
@@ -260,8 +256,9 @@ std::string DescribeAlarms(const Picture& picture, bool colour_on) {
   std::string text;
   for (const auto& [id, alarm] : picture.alarms) {
     const Colour colour = alarm.row.severity == Severity::kError ? Colour::kRed : Colour::kYellow;
-    text += fmt::format("{}  {}  {}\n", ToIso8601(alarm.at),
-                        Paint(colour_on, colour, Name(alarm.row.severity)), alarm.row.text);
+    text += fmt::format("{}  {}  {}: {}\n", ToIso8601(alarm.at),
+                        Paint(colour_on, colour, Name(alarm.row.severity)), Name(alarm.row.name),
+                        alarm.row.text);
   }
   return text;
 }

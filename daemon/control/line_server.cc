@@ -2,6 +2,7 @@
 
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
 
@@ -30,6 +31,13 @@ constexpr std::uint64_t kResume = kAgain - 1;
 constexpr int kAcceptsPerTurn = 16;
 
 bool NoDescriptor(int error) { return error == EMFILE || error == ENFILE; }
+std::optional<std::uint32_t> UserOf(int fd) {
+  ucred peer{};
+  socklen_t length = sizeof peer;
+  if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0) return std::nullopt;
+  return peer.uid;
+}
+
 bool NoRoom(int error) { return NoDescriptor(error) || error == ENOBUFS || error == ENOMEM; }
 
 }  // namespace
@@ -145,6 +153,7 @@ void LineServer::Impl::Admit(int fd, bool reserved) {
   Client& client = clients_[id];
   client.fd = fd;
   client.reserved = reserved;
+  client.user = UserOf(fd);
   client.active = ++active_;
   client.watched = EPOLLIN;
   reserved_ += reserved ? 1u : 0u;
@@ -236,7 +245,8 @@ void LineServer::Impl::TakeUrgent(std::vector<IncomingLine>* urgent) {
     if (!line) continue;
     ++client.open;
     client.active = ++active_;
-    urgent->push_back({.client = id, .text = std::move(*line), .reserved = client.reserved});
+    urgent->push_back(
+        {.client = id, .text = std::move(*line), .reserved = client.reserved, .user = client.user});
   }
   const auto taken = std::span(*urgent).subspan(before);
   for (auto& [id, client] : clients_)
@@ -288,7 +298,7 @@ std::optional<IncomingLine> LineServer::Impl::Next() {
       ++client.open;
       client.active = ++active_;
       turn_ = id;
-      next = {id, std::move(line->text), line->overtaken, client.reserved};
+      next = {id, std::move(line->text), line->overtaken, client.reserved, client.user};
     }
     if (!Settle(id, &client)) Drop(id);
   }

@@ -38,6 +38,8 @@ struct IncomingLine {
   std::string text;        // without its newline
   bool overtaken = false;  // an urgent line that came later was handed out before it
   bool reserved = false;   // its client has a reserved place: only urgent lines are to be handled
+  /// The user of the client's process when it connected; none: not known.
+  std::optional<std::uint32_t> user = {};
 };
 
 class LineServer {

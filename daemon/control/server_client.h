@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "daemon/control/line_buffer.h"
@@ -12,7 +13,8 @@ namespace focalfleet {
 
 struct ServerClient {
   int fd = -1;
-  bool reserved = false;     // its place is one of the reserved ones
+  bool reserved = false;                   // its place is one of the reserved ones
+  std::optional<std::uint32_t> user = {};  // of its process
   std::uint64_t active = 0;  // the server's count when it was last accepted, heard or answered
   LineBuffer input;
   std::string output;

@@ -205,12 +205,13 @@ void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationP
   CopyText(value.view.source, sample->source);
 }
 
-void ToSample(const AlarmValue& value, focalfleet_Alarm* sample) {
+void ToSample(const AlarmValue& value, focalfleet_NamedAlarm* sample) {
   sample->time_ns = value.at.ns;
   sample->alarm_id = value.row.id;
   sample->unit_id = value.row.unit ? value.row.unit->value : focalfleet_UNIT_NONE;
   sample->bus_id = value.row.bus ? value.row.bus->value : focalfleet_BUS_NONE;
   sample->severity = Code(value.row.severity);
+  CopyText(Name(value.row.name), sample->name);
   CopyText(value.row.text, sample->text);
 }
 
@@ -311,7 +312,7 @@ bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationPro
   return Take(sample.state, kLastState, &value->view.state);
 }
 
-bool FromSample(const focalfleet_Alarm& sample, AlarmValue* value) {
+bool FromSample(const focalfleet_NamedAlarm& sample, AlarmValue* value) {
   value->at = {sample.time_ns};
   value->row.id = sample.alarm_id;
   value->row.unit.reset();
@@ -319,6 +320,7 @@ bool FromSample(const focalfleet_Alarm& sample, AlarmValue* value) {
   if (sample.unit_id != focalfleet_UNIT_NONE) value->row.unit = UnitId{sample.unit_id};
   if (sample.bus_id != focalfleet_BUS_NONE) value->row.bus = BusId{sample.bus_id};
   value->row.text = TextOf(sample.text);
+  value->row.name = AlarmNameOf(TextOf(sample.name));  // one of a later version has none here
   return Take(sample.severity, kLastSeverity, &value->row.severity);
 }
 

@@ -36,8 +36,9 @@ std::uint64_t PayloadBytes(const focalfleet_FleetStatus& sample) {
 std::uint64_t PayloadBytes(const focalfleet_ConfigurationProgress& sample) {
   return TextBytes(offsetof(focalfleet_ConfigurationProgress, source), sample.source);
 }
-std::uint64_t PayloadBytes(const focalfleet_Alarm& sample) {
-  return TextBytes(offsetof(focalfleet_Alarm, text), sample.text);
+std::uint64_t PayloadBytes(const focalfleet_NamedAlarm& sample) {
+  const std::uint64_t name = TextBytes(offsetof(focalfleet_NamedAlarm, name), sample.name);
+  return TextBytes(name - 4, sample.text);  // the header of 4 bytes is there once
 }
 
 tl::unexpected<Error> BadCode(const char* of, std::uint64_t id, const char* which) {
@@ -66,7 +67,7 @@ class StatusPublisher::Impl {
         {&Impl::orientation_writer_, &focalfleet_UnitOrientation_desc, kOrientationTopic},
         {&Impl::bus_writer_, &focalfleet_BusStatus_desc, kBusTopic},
         {&Impl::configuration_writer_, &focalfleet_ConfigurationProgress_desc, kConfigurationTopic},
-        {&Impl::alarm_writer_, &focalfleet_Alarm_desc, kAlarmTopic},
+        {&Impl::alarm_writer_, &focalfleet_NamedAlarm_desc, kAlarmTopic},
     };
     for (const auto& [writer, type, name] : list) {
       FOCALFLEET_TRY_ASSIGN(const Handle topic, MakeTopic(impl->participant_, *type, name));
@@ -119,7 +120,7 @@ class StatusPublisher::Impl {
 
   Status Publish(const AlarmValue& alarm) {
     if (const char* flaw = Flaw(alarm)) return BadCode("alarm", alarm.row.id, flaw);
-    const auto same = [&alarm](const focalfleet_Alarm& reported) {
+    const auto same = [&alarm](const focalfleet_NamedAlarm& reported) {
       return reported.alarm_id == alarm.row.id;
     };
     if (std::any_of(alarms_.begin(), alarms_.end(), same)) return {};
@@ -206,8 +207,8 @@ class StatusPublisher::Impl {
   focalfleet_ConfigurationProgress configuration_{};
   bool fleet_waits_ = false;
   bool configuration_waits_ = false;
-  std::deque<focalfleet_Alarm> alarms_;  // the newest kAlarmsKept
-  std::size_t alarms_written_ = 0;       // number of these written, from the front
+  std::deque<focalfleet_NamedAlarm> alarms_;  // the newest kAlarmsKept
+  std::size_t alarms_written_ = 0;            // number of these written, from the front
   PublisherCounters counters_;
 };
 

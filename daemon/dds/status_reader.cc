@@ -25,7 +25,7 @@ class StatusReader::Impl {
     FOCALFLEET_TRY_ASSIGN(impl->configuration_,
                           impl->Open(focalfleet_ConfigurationProgress_desc, kConfigurationTopic));
     FOCALFLEET_TRY_ASSIGN(impl->buses_, impl->Open(focalfleet_BusStatus_desc, kBusTopic));
-    FOCALFLEET_TRY_ASSIGN(impl->alarms_, impl->Open(focalfleet_Alarm_desc, kAlarmTopic));
+    FOCALFLEET_TRY_ASSIGN(impl->alarms_, impl->Open(focalfleet_NamedAlarm_desc, kAlarmTopic));
     if (options.units) {
       FOCALFLEET_TRY_ASSIGN(impl->units_, impl->Open(focalfleet_UnitStatus_desc, kUnitTopic));
       FOCALFLEET_TRY_ASSIGN(impl->orientations_,
@@ -69,7 +69,7 @@ class StatusReader::Impl {
         [out](ConfigurationProgressValue value) { out->configuration = std::move(value); })));
     FOCALFLEET_TRY((Drain<focalfleet_BusStatus, BusStatusValue>(
         buses_, out, [out](BusStatusValue value) { out->buses.push_back(value); })));
-    FOCALFLEET_TRY((Drain<focalfleet_Alarm, AlarmValue>(
+    FOCALFLEET_TRY((Drain<focalfleet_NamedAlarm, AlarmValue>(
         alarms_, out, [out](AlarmValue value) { out->alarms.push_back(std::move(value)); })));
     if (units_ == 0) return {};
     FOCALFLEET_TRY((Drain<focalfleet_UnitOrientation, UnitOrientationValue>(

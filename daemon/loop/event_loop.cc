@@ -55,7 +55,8 @@ std::string TextOf(const AlarmRow& alarm) {
 }
 
 void LogRow(const AlarmRow& alarm) {
-  spdlog::log(LevelOf(alarm.severity), "alarm {}: {}", alarm.id, TextOf(alarm));
+  spdlog::log(LevelOf(alarm.severity), "alarm {} {}: {}", alarm.id, Name(alarm.name),
+              TextOf(alarm));
 }
 void LogRow(const ConfigurationRow& row) {
   spdlog::info(
@@ -131,6 +132,7 @@ void EventLoop::Run() {
   effects_.Clear();
   parts_.coordinator->End(now_, &effects_);
   LogChanges();
+  parts_.alarms->Take(WallTime::Now(), &effects_.rows);
   if (!effects_.rows.empty()) parts_.store->Commit(effects_.batch, std::move(effects_.rows));
 }
 
@@ -205,24 +207,32 @@ void EventLoop::Gather() {
   plans_.clear();
   exposures_.clear();
   parts_.lines->Receive(now_, &frames_, &links_);
-  while (auto plan = parts_.planner->Take()) plans_.push_back(std::move(*plan));
+  while (auto plan = parts_.planner->Take()) {
+    if (plan->purpose == PlanPurpose::kPreview)
+      parts_.handler->PreviewDone(View(), *plan);
+    else
+      plans_.push_back(std::move(*plan));
+  }
   while (auto done = parts_.camera != nullptr ? parts_.camera->Take() : std::nullopt)
     exposures_.push_back(std::move(*done));
   if (parts_.troubles != nullptr) notes_ = parts_.troubles->TakeNotes();
   if (std::exchange(requests_ready_, false)) parts_.handler->Service(View(), &commands_);
+  if (auto preview = parts_.handler->TakePreview()) SubmitPlan(std::move(*preview));
 }
 
 bool EventLoop::StepIsDue() const {
   return !frames_.empty() || !links_.empty() || !commands_.empty() || !plans_.empty() ||
          !exposures_.empty() || !notes_.empty() ||
-         parts_.store->committed_through() != committed_through_ ||
-         parts_.store->failing() != store_failing_ || now_ >= effects_.wake_at;
+         parts_.store->committed_through() != store_.committed_through ||
+         parts_.store->failing() != store_.failing || now_ >= effects_.wake_at;
 }
 
 void EventLoop::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
-  store_failing_ = parts_.store->failing();
-  committed_through_ = parts_.store->committed_through();
+  if (store_.failing != parts_.store->failing())
+    parts_.alarms->NoteStore(WallTime::Now(), parts_.store->failure());
+  store_.failing = parts_.store->failing();
+  store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
   effects_.Clear();
   parts_.coordinator->Step({.now = now_,
@@ -232,8 +242,8 @@ void EventLoop::Step() {
                             .plans = plans_,
                             .exposures = exposures_,
                             .notes = notes_,
-                            .committed_through = committed_through_,
-                            .store_failing = store_failing_,
+                            .committed_through = store_.committed_through,
+                            .store_failing = store_.failing,
                             .refused = refused},
                            &effects_);
   ++steps_;
@@ -243,17 +253,14 @@ void EventLoop::Perform() {
   LogChanges();
   NoteEffects(View(), effects_, parts_.models->compensation());
   if (parts_.metrics != nullptr) parts_.metrics->Note(View(), effects_);
+  parts_.alarms->Take(WallTime::Now(), &effects_.rows);
   if (!effects_.rows.empty()) {
     last_batch_ = effects_.batch;
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
   }
   for (const OutFrame& frame : effects_.frames) parts_.lines->Put(frame, now_);
   if (effects_.sync_at && parts_.sync != nullptr) parts_.sync->Plan(*effects_.sync_at);
-  if (effects_.plan_job) {
-    const auto drives = parts_.coordinator->drives();
-    PlannerWork work{std::move(*effects_.plan_job), {drives.begin(), drives.end()}};
-    if (!parts_.planner->Submit(&work)) spdlog::error("plan job {} found no room", work.job.job);
-  }
+  if (effects_.plan_job) SubmitPlan(std::move(*effects_.plan_job));
   if (effects_.exposure && parts_.camera != nullptr) {
     const auto drives = parts_.coordinator->drives();
     CameraWork work{std::move(*effects_.exposure), {drives.begin(), drives.end()}};
@@ -263,12 +270,23 @@ void EventLoop::Perform() {
   if (parts_.scheduler != nullptr) parts_.scheduler->Changed(effects_.changed);
 }
 
+// A configuration does not wait for a preview: the planner gives the preview up.
+void EventLoop::SubmitPlan(PlanJob job) {
+  const bool preview = job.purpose == PlanPurpose::kPreview;
+  if (!preview && preview_given_up_ != nullptr) *preview_given_up_ = true;
+  if (preview) preview_given_up_ = std::make_shared<std::atomic<bool>>(false);
+  const auto drives = parts_.coordinator->drives();
+  PlannerWork work{
+      std::move(job), {drives.begin(), drives.end()}, preview ? preview_given_up_ : nullptr};
+  if (!parts_.planner->Submit(&work)) spdlog::error("plan job {} found no room", work.job.job);
+}
+
 void EventLoop::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
   if (parts_.metrics != nullptr) parts_.metrics->SampleIfDue(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
-  StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_failing_);
+  StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_.failing);
   if (!parts_.store->Publish(&status)) parts_.scheduler->GiveBack(status, *parts_.layout);
 }
 

@@ -5,6 +5,7 @@
 // the scheduler. The loop never waits for any of these.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "daemon/metrics/metrics_sampler.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
+#include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/request_handler.h"
 #include "fleet/coordinator.h"
@@ -28,6 +30,8 @@ namespace focalfleet {
 struct PlannerWork {
   PlanJob job;
   std::vector<UnitDrive> drives;
+  /// A preview alone has it: true once a configuration is to be planned first.
+  std::shared_ptr<const std::atomic<bool>> given_up = nullptr;
 };
 using PlannerThread = JobThread<PlannerWork, PlanDone>;
 using CameraThread = JobThread<CameraWork, ExposureDone>;
@@ -41,6 +45,7 @@ class EventLoop {
     BusLines* lines = nullptr;
     RequestHandler* handler = nullptr;
     ModelRegistry* models = nullptr;  // the model in force
+    AlarmRegister* alarms = nullptr;
     PlannerThread* planner = nullptr;
     CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
@@ -80,6 +85,7 @@ class EventLoop {
   void Step();
   void ServeSync();
   void Perform();
+  void SubmitPlan(PlanJob job);
   void PublishStatus();
   void LogChanges();
   [[nodiscard]] FleetView View() const;
@@ -99,8 +105,12 @@ class EventLoop {
   std::vector<PlanDone> plans_;
   std::vector<ExposureDone> exposures_;
   std::vector<ShellNote> notes_;
-  std::uint64_t committed_through_ = 0;  // as the coordinator last received it
-  bool store_failing_ = false;
+  std::shared_ptr<std::atomic<bool>> preview_given_up_;
+  /// The facts of the store's thread, as the coordinator last received them.
+  struct StoreFacts {
+    std::uint64_t committed_through = 0;
+    bool failing = false;
+  } store_;
   Effects effects_;
   std::uint64_t last_batch_ = 0;
   std::uint64_t steps_ = 0;

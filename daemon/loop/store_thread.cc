@@ -61,8 +61,13 @@ bool StoreThread::Publish(StatusBatch* status) {
 }
 
 std::vector<RefusedRow> StoreThread::TakeRefused() {
-  const std::lock_guard lock(refused_lock_);
+  const std::lock_guard lock(lock_);
   return std::exchange(refused_, {});
+}
+
+std::optional<Error> StoreThread::failure() const {
+  const std::lock_guard lock(lock_);
+  return failing_ ? std::optional(last_error_) : std::nullopt;
 }
 
 Status StoreThread::Finish() {
@@ -150,14 +155,17 @@ void StoreThread::SetAside(std::size_t row, const std::string& why) {
   const auto at = open_.rows.begin() + static_cast<std::ptrdiff_t>(row);
   sinks_.log_error("the store refuses the " + Describe(*at) + ": " + why + "; it is set aside");
   {
-    const std::lock_guard lock(refused_lock_);
+    const std::lock_guard lock(lock_);
     refused_.push_back({open_.first, open_.number, std::move(*at), why});
   }
   open_.rows.erase(at);
 }
 
 void StoreThread::NoteFailure(const Error& error) {
-  last_error_ = error;
+  {
+    const std::lock_guard lock(lock_);
+    last_error_ = error;
+  }
   attempted_ = true;
   retry_at_ = std::chrono::steady_clock::now() + sinks_.retry_period;
   if (failing_.exchange(true)) return;
@@ -166,8 +174,14 @@ void StoreThread::NoteFailure(const Error& error) {
   // The number contains the time, so that a restarted daemon does not reuse it.
   const WallTime now = WallTime::Now();
   const std::uint64_t id = kOwnAlarms + static_cast<std::uint64_t>(now.ns) / 1000 + own_alarms_++;
-  sinks_.alarm(
-      {now, {.id = id, .severity = Severity::kError, .unit = {}, .bus = {}, .text = text}});
+  const bool full = error.code == ErrorCode::kFull;
+  sinks_.alarm({now,
+                {.id = id,
+                 .severity = Severity::kError,
+                 .unit = {},
+                 .bus = {},
+                 .text = text,
+                 .name = full ? AlarmName::kStoreFull : AlarmName::kStoreFailing}});
   progressed_->Raise();
 }
 

@@ -67,6 +67,8 @@ class StoreThread {
 
   [[nodiscard]] std::uint64_t committed_through() const { return committed_through_; }
   [[nodiscard]] bool failing() const { return failing_; }
+  /// Why the last attempt to commit failed; none: it did not.
+  [[nodiscard]] std::optional<Error> failure() const;
   /// Rows that were set aside since the last call. Read committed_through() first: all rows set
   /// aside up to that batch are then in this result or in an earlier one.
   std::vector<RefusedRow> TakeRefused();
@@ -99,8 +101,9 @@ class StoreThread {
   std::atomic<bool> failing_{false};
   std::atomic<bool> ending_{false};
 
-  std::mutex refused_lock_;
+  mutable std::mutex lock_;
   std::vector<RefusedRow> refused_;  // under the lock
+  Error last_error_;                 // under the lock
 
   // Members that the store's thread alone uses.
   Batch open_;                         // being committed; empty rows: none
@@ -109,7 +112,6 @@ class StoreThread {
   bool attempted_ = false;  // the open batch has failed
   std::chrono::steady_clock::time_point retry_at_;
   std::uint64_t own_alarms_ = 0;
-  Error last_error_;
 
   std::thread thread_;
 };

@@ -23,6 +23,7 @@
 #include "daemon/status/dds_troubles.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
+#include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/request_handler.h"
@@ -75,8 +76,10 @@ double SecondsSince(std::chrono::steady_clock::time_point begun) {
 }
 
 ShellNote NoteOfMetrics(const std::string& trouble) {
-  if (trouble.empty()) return {Severity::kInfo, "metrics are served again"};
-  return {Severity::kWarning, "no metrics, the fleet works on and it is tried again: " + trouble};
+  if (trouble.empty())
+    return {AlarmName::kMetricsBack, "metrics are served again", AlarmName::kMetricsMissing};
+  return {AlarmName::kMetricsMissing,
+          "no metrics, the fleet works on and it is tried again: " + trouble};
 }
 
 void Count(const ExposureDone& done, WorkCounters* work) {
@@ -131,6 +134,7 @@ class Daemon {
   std::unique_ptr<StoreThread> store_thread_;
   std::unique_ptr<PlannerThread> planner_;
   std::unique_ptr<ModelRegistry> models_;
+  AlarmRegister alarms_;
   std::unique_ptr<RequestHandler> handler_;
   std::unique_ptr<SyncPulse> sync_;  // none: no SYNC line
   std::unique_ptr<EventLoop> loop_;
@@ -146,6 +150,7 @@ Status Daemon::Start() {
   layout_ = std::make_unique<Layout>(std::move(layout));
   FOCALFLEET_TRY_ASSIGN(store_, Store::Open(config_.store.path));
   FOCALFLEET_TRY_ASSIGN(StoredFleet stored, store_->Load());
+  alarms_ = AlarmRegister(stored);
   FOCALFLEET_TRY(OpenRequestHandler());
   FOCALFLEET_TRY_ASSIGN(auto ports, OpenPorts(config_, *layout_, clock_));
   FOCALFLEET_TRY_ASSIGN(auto sync, OpenSync(config_.sync));
@@ -172,10 +177,12 @@ Status Daemon::OpenRequestHandler() {
   handler_ = std::make_unique<RequestHandler>(
       std::move(server),
       RequestHandler::Options{.progress_period = clock_.Real(Milliseconds(200)),
+                              .second = clock_.Real(Seconds(1)),
                               .facts = [this] { return Facts(); },
                               .log = [](const std::string& text) { spdlog::info("{}", text); },
                               .store_path = config_.store.path,
-                              .models = models_.get()});
+                              .models = models_.get(),
+                              .alarms = &alarms_});
   if (const Status restored = RestoreLastModel(); !restored)
     spdlog::error("no model is in force: {}", restored.error().text);
   return {};
@@ -194,7 +201,10 @@ void Daemon::OpenStatus() {
   if (!config_.dds.enabled) return;
   status_.publisher = std::make_unique<BufferedStatusPublisher>(LateJoin<StatusPublisher>::Options{
       .join = [dds = DdsOptionsOf(config_.dds)] { return StatusPublisher::Create(dds); },
-      .tell = [this](const std::string& trouble) { status_.troubles->Report("status", trouble); }});
+      .tell =
+          [this](const std::string& trouble) {
+            status_.troubles->Report(AlarmName::kDdsMissing, "status", trouble);
+          }});
   status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{
@@ -235,7 +245,7 @@ Status Daemon::OpenCamera() {
   if (config_.camera.dds) {
     port = std::make_unique<CameraDds>(CameraDds::Options{
         .dds = DdsOptionsOf(config_.dds), .sensor = site.sensor, .tell = [this](const auto& text) {
-          status_.troubles->Report("the camera", text);
+          status_.troubles->Report(AlarmName::kCameraDdsMissing, "the camera", text);
         }});
   } else {
     FOCALFLEET_TRY_ASSIGN(port, CameraFolder::Open(config_.camera.directory, site.sensor));
@@ -299,6 +309,7 @@ Status Daemon::StartThreads() {
                                                   .lines = lines_.get(),
                                                   .handler = handler_.get(),
                                                   .models = models_.get(),
+                                                  .alarms = &alarms_,
                                                   .planner = planner_.get(),
                                                   .camera = measuring_.thread.get(),
                                                   .store = store_thread_.get(),
@@ -314,7 +325,9 @@ Status Daemon::StartThreads() {
 
 PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending) {
   const auto begun = std::chrono::steady_clock::now();
-  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending] { return ending.load(); });
+  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending, &work] {
+    return ending.load() || (work.given_up != nullptr && work.given_up->load());
+  });
   metrics_.work.planner_s.Observe(SecondsSince(begun));
   if (metrics_.sampler != nullptr && done.plan && !done.plan->moves.empty())
     metrics_.power.Put(
@@ -365,6 +378,8 @@ ShellFacts Daemon::Facts() const {
   ShellFacts facts;
   facts.version = Version();
   facts.started = started_;
+  const AlarmRegister::Counts alarms = alarms_.Count(WallTime::Now());
+  facts.alarms = {alarms.open, alarms.muted, alarms.worst ? Name(*alarms.worst) : ""};
   facts.store_path = config_.store.path;
   facts.store_failing = store_thread_->failing();
   facts.batches_waiting = store_thread_->waiting();

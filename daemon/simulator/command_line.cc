@@ -14,6 +14,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
+#include "daemon/control/id_ranges.h"
 #include "daemon/control/line_client.h"
 #include "daemon/control/printable.h"
 #include "daemon/files/text_file.h"
@@ -106,7 +107,7 @@ int AskSimply(const Given& given, const ControlRequest& request) {
 }
 
 int AskAboutUnits(const Given& given, const char* verb, Json args) {
-  const auto units = ParseNumbers(given.units_text);
+  const auto units = ParseRanges(given.units_text);
   if (!units) return Complain(units.error(), ExitCode::kUsage);
   args["units"] = *units;
   return AskSimply(given, {0, verb, std::move(args)});
@@ -129,7 +130,7 @@ int Misbehave(const Given& given) {
 }
 
 int SetBuses(const Given& given, const char* verb) {
-  const auto buses = ParseNumbers(given.bus_numbers_text);
+  const auto buses = ParseRanges(given.bus_numbers_text);
   if (!buses) return Complain(buses.error(), ExitCode::kUsage);
   return AskSimply(given, {0, verb, {{"buses", *buses}}});
 }
@@ -208,7 +209,7 @@ Result<SimulatorOptions::ClockError> ParseClockError(const std::string& text) {
   if (equals == std::string::npos || !Parse(text.substr(equals + 1), &error.share) ||
       !(std::abs(error.share) <= kShareMax))
     return wrong("UNITS=SHARE is expected, with a share of -0.1 to 0.1");
-  auto units = ParseNumbers(text.substr(0, equals));
+  auto units = ParseRanges(text.substr(0, equals));
   if (!units) return wrong(units.error().text);
   error.units = std::move(*units);
   return error;
@@ -433,25 +434,6 @@ Result<std::vector<std::string>> ParseInterfaces(const std::string& text) {
     for (unsigned i = low; i <= high; ++i) names.push_back(stem + std::to_string(i));
   }
   return names;
-}
-
-Result<std::vector<std::uint32_t>> ParseNumbers(const std::string& text) {
-  std::vector<std::uint32_t> numbers;
-  for (const std::string& piece : Split(text, ',')) {
-    const std::size_t dash = piece.find('-');
-    std::uint32_t low = 0;
-    std::uint32_t high = 0;
-    const bool one = dash == std::string::npos && Parse(piece, &low);
-    if (one) high = low;
-    const bool range = dash != std::string::npos && Parse(piece.substr(0, dash), &low) &&
-                       Parse(piece.substr(dash + 1), &high);
-    if ((!one && !range) || high < low || high - low >= kNumbersMax)
-      return Fail(ErrorCode::kInvalid,
-                  "'" + piece + "' is neither a number nor a range such as 5-9");
-    for (std::uint64_t i = low; i <= high; ++i) numbers.push_back(static_cast<std::uint32_t>(i));
-    if (numbers.size() > kNumbersMax) return Fail(ErrorCode::kInvalid, "too many numbers");
-  }
-  return numbers;
 }
 
 int Main(int argc, char** argv) {

@@ -17,8 +17,4 @@ int Main(int argc, char** argv);
 /// Errors: kInvalid, names the piece.
 Result<std::vector<std::string>> ParseInterfaces(const std::string& text);
 
-/// Numbers from text such as "1,2,5-9".
-/// Errors: kInvalid, names the piece.
-Result<std::vector<std::uint32_t>> ParseNumbers(const std::string& text);
-
 }  // namespace focalfleet::simulator

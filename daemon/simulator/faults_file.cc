@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "daemon/simulator/command_line.h"
+#include "daemon/control/id_ranges.h"
 #include "fleet/files/csv.h"
 
 namespace focalfleet::simulator {
@@ -100,7 +100,7 @@ class Reader {
     const std::vector<std::uint32_t>& known = numbers_[info.of_unit ? 1 : 0];
     std::vector<std::uint32_t> named = known;
     if (const std::string text = row->Text(column); text != kAll) {
-      auto numbers = ParseNumbers(text);
+      auto numbers = ParseRanges(text);
       if (!numbers)
         return row->Reject(column, "'" + text + "' is neither 'all' nor numbers such as 1,2,5-9");
       named = std::move(*numbers);

@@ -4,18 +4,17 @@
 
 namespace focalfleet {
 
-void DdsTroubles::Report(const std::string& what, const std::string& trouble) {
+void DdsTroubles::Report(AlarmName name, const std::string& what, const std::string& trouble) {
   {
     const std::lock_guard lock(mutex_);
     if (trouble.empty()) {
       lasting_.erase(what);
-      notes_.push_back({Severity::kInfo, "DDS is there again for " + what});
+      notes_.push_back({AlarmName::kDdsBack, "DDS is there again for " + what, name});
     } else {
       ++reported_;
       lasting_[what] = trouble;
       notes_.push_back(
-          {Severity::kError,
-           "no DDS for " + what + ", the rest goes on and it is tried again: " + trouble});
+          {name, "no DDS for " + what + ", the rest goes on and it is tried again: " + trouble});
     }
   }
   wake_();

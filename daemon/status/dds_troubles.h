@@ -19,8 +19,9 @@ class DdsTroubles {
   /// `wake` is called after each report, on the thread that reports.
   explicit DdsTroubles(std::function<void()> wake) : wake_(std::move(wake)) {}
 
-  /// `what` does not work because of `trouble`; an empty text: it works again.
-  void Report(const std::string& what, const std::string& trouble);
+  /// `what` does not work because of `trouble`, which is an alarm `name`; an empty text: it works
+  /// again.
+  void Report(AlarmName name, const std::string& what, const std::string& trouble);
 
   /// A note about another part than DDS that works without the core.
   void Note(ShellNote note);

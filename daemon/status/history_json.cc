@@ -10,7 +10,6 @@
 namespace focalfleet {
 namespace {
 
-constexpr const char* kSeverities[] = {"info", "warning", "error"};
 
 }  // namespace
 
@@ -123,7 +122,8 @@ Json HistoryJson(const std::vector<AlarmHistory>& alarms) {
   for (const auto& [row, at] : alarms)
     rows.push_back({{"at", ToIso8601(at)},
                     {"id", row.id},
-                    {"severity", kSeverities[static_cast<std::size_t>(row.severity)]},
+                    {"severity", Name(row.severity)},
+                    {"name", Name(row.name)},
                     {"unit_id", row.unit ? Json(row.unit->value) : Json(nullptr)},
                     {"bus_id", row.bus ? Json(row.bus->value) : Json(nullptr)},
                     {"text", row.text}});

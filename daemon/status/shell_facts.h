@@ -21,8 +21,14 @@ struct ShellFacts {
     TransmitQueueCounters transmit_queue;
     std::size_t waiting = 0;  // frames that the port has not taken
   };
+  struct Alarms {
+    std::size_t open = 0;   // neither acknowledged nor muted
+    std::size_t muted = 0;  // open, but muted
+    std::string worst;      // severity of the worst that is open; empty: none is
+  };
   std::string version;
   WallTime started;
+  Alarms alarms;
   std::string store_path;
   bool store_failing = false;
   std::size_t batches_waiting = 0;

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 
+#include "daemon/status/next_step.h"
 #include "fleet/kinematics.h"
 
 namespace focalfleet {
@@ -239,8 +240,13 @@ Json StatusJson(const FleetView& view, const ShellFacts& facts) {
             {"trouble", facts.dds_trouble},
             {"samples", facts.dds_samples},
             {"bytes", facts.dds_bytes}}},
+          {"alarms",
+           {{"open", facts.alarms.open},
+            {"muted", facts.alarms.muted},
+            {"worst", facts.alarms.worst.empty() ? Json() : Json(facts.alarms.worst)}}},
           {"process", {{"cpu_s", facts.cpu_s}, {"steps", facts.steps}}},
           {"configuration", ConfigurationJson(view)},
+          {"next", NextStep(view, facts)},
           {"buses", std::move(buses)},
           {"bus_load_max", HighestBusLoad(view)}};
 }

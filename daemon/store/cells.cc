@@ -75,6 +75,41 @@ ConfigurationRow ReadConfiguration(Cells& cells) {
           .start_skew_bound_s = cells.Real(12)};
 }
 
+AlarmName Cells::AlarmNameAt(int column) {
+  if (IsNull(column)) return AlarmName::kUnnamed;
+  const AlarmName name = AlarmNameOf(Text(column));
+  Require(name != AlarmName::kUnnamed, "there is no alarm of this name");
+  return name;
+}
+
+AlarmRow ReadAlarm(Cells& cells) {
+  AlarmRow row;
+  row.id = cells.Whole<std::uint64_t>(0);
+  row.severity = cells.Code(1, kLastSeverity);
+  if (!cells.IsNull(2)) row.unit = UnitId{cells.Whole<std::uint32_t>(2)};
+  if (!cells.IsNull(3)) row.bus = BusId{cells.Whole<std::uint32_t>(3)};
+  row.text = cells.Text(4);
+  row.name = cells.AlarmNameAt(5);
+  return row;
+}
+
+OpenAlarmRow ReadOpenAlarm(Cells& cells) {
+  AlarmRow alarm = ReadAlarm(cells);
+  return {.id = alarm.id,
+          .name = alarm.name,
+          .severity = alarm.severity,
+          .unit = alarm.unit,
+          .bus = alarm.bus,
+          .text = std::move(alarm.text),
+          .count = static_cast<std::uint32_t>(cells.Integer(6, 1, UINT32_MAX)),
+          .state = cells.Code(7, OpenAlarmRow::State::kOver),
+          .first_unix_ns = cells.Whole<std::int64_t>(8),
+          .last_unix_ns = cells.Whole<std::int64_t>(9),
+          .acknowledged_unix_ns = cells.Whole<std::int64_t>(10),
+          .ended_unix_ns = cells.Whole<std::int64_t>(11),
+          .acknowledged_by = cells.Text(12)};
+}
+
 void Cells::Require(bool condition, const char* what) {
   if (!condition) Fault(what);
 }

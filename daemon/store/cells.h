@@ -49,6 +49,7 @@ class Cells {
         static_cast<std::uint32_t>(Integer(column, 1, std::numeric_limits<std::uint32_t>::max()))};
   }
   WallTime Time(int column) { return {Whole<std::int64_t>(column)}; }
+  AlarmName AlarmNameAt(int column);  // NULL: kUnnamed
   Axis AxisAt(int column) { return Code(column, Axis::kPhi); }
   /// The columns witness, low, high, from `column` on.
   AxisKnowledge Knowledge(int column);
@@ -74,6 +75,10 @@ ConfigurationRow ReadConfiguration(Cells& cells);
 /// The columns serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, subdivision,
 /// mode, origin, in this order from column `first` on.
 TuningRow ReadTuning(Cells& cells, int first);
+/// The columns id, severity, unit_id, bus_id, text, name, in this order from column 0 on.
+AlarmRow ReadAlarm(Cells& cells);
+/// The same, then count, state, first_ns, last_ns, acknowledged_ns, ended_ns, acknowledged_by.
+OpenAlarmRow ReadOpenAlarm(Cells& cells);
 /// The columns trusted, verdict, used, three angles and six covariances, in this order from column
 /// `first` on; no reading where the first is NULL.
 std::optional<FibreCarrierReading> ReadFibreCarrier(Cells& cells, int first);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -9,6 +10,12 @@
 #include "fleet/records.h"
 
 namespace focalfleet {
+
+/// From `since` until just before `until`.
+struct Period {
+  WallTime since{std::numeric_limits<std::int64_t>::min()};
+  WallTime until{std::numeric_limits<std::int64_t>::max()};
+};
 
 /// A motion of a unit, from the intent to its end. Units: vectors.
 struct MoveHistory {

@@ -143,6 +143,29 @@ Status LoadConfigurations(Connection& connection, StoredFleet* fleet) {
 }
 static_assert(ConfigurationState::kDone == ConfigurationState{3});
 
+Status LoadOpenAlarms(Connection& connection, StoredFleet* fleet) {
+  return ForEach(
+      connection, "open_alarm", 1,
+      "SELECT id, severity, unit_id, bus_id, text, name, count, state, first_ns, last_ns, "
+      "acknowledged_ns, ended_ns, acknowledged_by FROM open_alarm WHERE state < 2 ORDER BY id",
+      [fleet](Cells& cells) { fleet->open_alarms.push_back(ReadOpenAlarm(cells)); });
+}
+static_assert(OpenAlarmRow::State::kOver == OpenAlarmRow::State{2});
+
+Status LoadMutes(Connection& connection, StoredFleet* fleet) {
+  return ForEach(connection, "mute", 1,
+                 "SELECT name, until_ns, since_ns, reason, by FROM mute ORDER BY name",
+                 [fleet](Cells& cells) {
+                   MuteRow row;
+                   row.name = cells.AlarmNameAt(0);
+                   row.until_unix_ns = cells.Integer(1, 0, INT64_MAX);
+                   row.since_unix_ns = cells.Whole<std::int64_t>(2);
+                   row.reason = cells.Text(3);
+                   row.by = cells.Text(4);
+                   fleet->mutes.push_back(std::move(row));
+                 });
+}
+
 Status LoadNextIds(Connection& connection, StoredFleet* fleet) {
   FOCALFLEET_TRY(
       ForEach(connection, "meta", 1, "SELECT key, value FROM meta", [fleet](Cells& cells) {
@@ -169,6 +192,8 @@ Status LoadAll(Connection& connection, StoredFleet* fleet) {
   FOCALFLEET_TRY(LoadParameters(connection, fleet));
   FOCALFLEET_TRY(LoadTunings(connection, fleet));
   FOCALFLEET_TRY(LoadConfigurations(connection, fleet));
+  FOCALFLEET_TRY(LoadOpenAlarms(connection, fleet));
+  FOCALFLEET_TRY(LoadMutes(connection, fleet));
   return LoadNextIds(connection, fleet);
 }
 

@@ -8,6 +8,20 @@ std::int64_t Code(Enum value) {
   return static_cast<std::int64_t>(value);
 }
 
+/// Binds what an alarm and an open alarm have in common, from the first column on.
+template <class Alarm>
+void BindAlarm(Statement& s, const Alarm& row) {
+  s.Bind(1, static_cast<std::int64_t>(row.id));
+  s.Bind(2, Code(row.severity));
+  row.unit ? s.Bind(3, row.unit->value) : s.BindNull(3);
+  row.bus ? s.Bind(4, row.bus->value) : s.BindNull(4);
+  s.BindText(5, row.text);
+}
+
+void BindName(Statement& s, int column, AlarmName name) {
+  name == AlarmName::kUnnamed ? s.BindNull(column) : s.BindText(column, Name(name));
+}
+
 }  // namespace
 
 RowWriter::RowWriter(Statements* statements, WallTime now) : statements_(*statements), now_(now) {
@@ -165,22 +179,35 @@ Status RowWriter::Put(const ConfigurationRow& row) {
 
 Status RowWriter::Put(const AlarmRow& row) {
   Statement& s = statements_[Sql::kAlarm];
-  s.Bind(1, static_cast<std::int64_t>(row.id));
-  s.Bind(2, Code(row.severity));
-  if (row.unit) {
-    s.Bind(3, row.unit->value);
-  } else {
-    s.BindNull(3);
-  }
-  if (row.bus) {
-    s.Bind(4, row.bus->value);
-  } else {
-    s.BindNull(4);
-  }
-  s.BindText(5, row.text);
+  BindAlarm(s, row);
   s.Bind(6, now_.ns);
+  BindName(s, 7, row.name);
   FOCALFLEET_TRY(s.Run());
   return SetMeta(statements_[Sql::kRaiseMeta], "next_alarm", row.id + 1);
+}
+
+Status RowWriter::Put(const OpenAlarmRow& row) {
+  Statement& s = statements_[Sql::kOpenAlarm];
+  BindAlarm(s, row);
+  BindName(s, 6, row.name);
+  s.Bind(7, row.count);
+  s.Bind(8, Code(row.state));
+  s.Bind(9, row.first_unix_ns);
+  s.Bind(10, row.last_unix_ns);
+  s.Bind(11, row.acknowledged_unix_ns);
+  s.Bind(12, row.ended_unix_ns);
+  s.BindText(13, row.acknowledged_by);
+  return s.Run();
+}
+
+Status RowWriter::Put(const MuteRow& row) {
+  Statement& s = statements_[Sql::kMute];
+  s.BindText(1, Name(row.name));
+  s.Bind(2, row.until_unix_ns);
+  s.Bind(3, row.since_unix_ns);
+  s.BindText(4, row.reason);
+  s.BindText(5, row.by);
+  return s.Run();
 }
 
 // The number is set, not raised: move ids have 16 bits and begin again.

@@ -31,6 +31,9 @@ class RowWriter {
   Status Put(const TuningRow& row);
   Status Put(const ConfigurationRow& row);
   Status Put(const AlarmRow& row);
+  static Status Put(const AlarmEndRow&) { return {}; }  // its OpenAlarmRow is written
+  Status Put(const OpenAlarmRow& row);
+  Status Put(const MuteRow& row);
   Status Put(const NextMoveRow& row);
   Status Put(const ModelRow& row);
   Status WriteAxis(const VectorRow& row, Axis axis);

@@ -334,8 +334,40 @@ ALTER TABLE configuration ADD COLUMN stopped INTEGER NOT NULL DEFAULT 0;
 ALTER TABLE configuration ADD COLUMN unmeasured INTEGER NOT NULL DEFAULT 0;
 )sql";
 
-constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4,
-                                       kVersion5, kVersion6, kVersion7, kVersion8};
+// Alarms have names, and stay open until their condition ends or somebody acknowledges them.
+constexpr const char* kVersion9 = R"sql(
+ALTER TABLE alarm ADD COLUMN name TEXT;  -- NULL: raised before alarms had names
+CREATE INDEX alarm_by_time ON alarm(at_ns);
+
+CREATE TABLE open_alarm(
+  id INTEGER PRIMARY KEY,       -- of the alarm that opened it
+  name TEXT,
+  severity INTEGER NOT NULL,
+  unit_id INTEGER,
+  bus_id INTEGER,
+  text TEXT NOT NULL,           -- of the newest
+  count INTEGER NOT NULL,       -- equal alarms since the first, itself included
+  state INTEGER NOT NULL,       -- 0 open, 1 acknowledged while the condition lasts, 2 over
+  first_ns INTEGER NOT NULL,
+  last_ns INTEGER NOT NULL,
+  acknowledged_ns INTEGER NOT NULL,  -- 0: by nobody
+  ended_ns INTEGER NOT NULL,    -- 0: the condition lasts, or is none
+  acknowledged_by TEXT NOT NULL
+) STRICT;
+CREATE INDEX open_alarm_lasting ON open_alarm(id) WHERE state < 2;
+CREATE INDEX open_alarm_by_time ON open_alarm(last_ns) WHERE state = 2;
+
+CREATE TABLE mute(
+  name TEXT PRIMARY KEY,
+  until_ns INTEGER NOT NULL,    -- 0: no longer
+  since_ns INTEGER NOT NULL,
+  reason TEXT NOT NULL,
+  by TEXT NOT NULL
+) STRICT, WITHOUT ROWID;
+)sql";
+
+constexpr const char* kMigrations[] = {kVersion1, kVersion2, kVersion3, kVersion4, kVersion5,
+                                       kVersion6, kVersion7, kVersion8, kVersion9};
 
 constexpr std::size_t kHeaderBytes = 72;
 constexpr std::size_t kUserVersionAt = 60;

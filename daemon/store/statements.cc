@@ -98,8 +98,15 @@ constexpr const char* kConfiguration =
     "?13, stopped = ?15, unmeasured = ?16, "
     "changed_ns = ?14";
 constexpr const char* kAlarm =
-    "INSERT INTO alarm(id, severity, unit_id, bus_id, text, at_ns) VALUES(?1, ?2, ?3, ?4, ?5, ?6) "
-    "ON CONFLICT(id) DO UPDATE SET severity = ?2, unit_id = ?3, bus_id = ?4, text = ?5";
+    "INSERT INTO alarm(id, severity, unit_id, bus_id, text, at_ns, name) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7) "
+    "ON CONFLICT(id) DO UPDATE SET severity = ?2, unit_id = ?3, bus_id = ?4, text = ?5, name = ?7";
+constexpr const char* kOpenAlarm =
+    "INSERT OR REPLACE INTO open_alarm(id, severity, unit_id, bus_id, text, name, count, state, "
+    "first_ns, last_ns, acknowledged_ns, ended_ns, acknowledged_by) "
+    "VALUES(?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
+constexpr const char* kMute =
+    "INSERT OR REPLACE INTO mute(name, until_ns, since_ns, reason, by) VALUES(?1, ?2, ?3, ?4, ?5)";
 constexpr const char* kRaiseMeta =
     "INSERT INTO meta(key, value) VALUES(?1, ?2) ON CONFLICT(key) DO UPDATE SET value = ?2 WHERE "
     "value < ?2";
@@ -133,6 +140,8 @@ Result<std::unique_ptr<Statements>> PrepareAll(Connection& connection) {
       {Sql::kOrientation, kOrientation},
       {Sql::kConfiguration, kConfiguration},
       {Sql::kAlarm, kAlarm},
+      {Sql::kOpenAlarm, kOpenAlarm},
+      {Sql::kMute, kMute},
       {Sql::kModel, kModel},
       {Sql::kModelChange, kModelChange},
       {Sql::kRaiseMeta, kRaiseMeta},

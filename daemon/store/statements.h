@@ -31,6 +31,8 @@ enum class Sql : std::uint8_t {
   kOrientation,
   kConfiguration,
   kAlarm,
+  kOpenAlarm,
+  kMute,
   kModel,
   kModelChange,
   kRaiseMeta,

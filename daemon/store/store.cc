@@ -120,6 +120,8 @@ Result<std::uint64_t> Store::Prune(WallTime before, std::uint32_t rows_max) {
       "DELETE FROM orientation WHERE (exposure, unit_id) IN (SELECT exposure, unit_id FROM "
       "orientation WHERE at_ns < ?1 ORDER BY exposure LIMIT ?2)",
       "DELETE FROM alarm WHERE id IN (SELECT id FROM alarm WHERE at_ns < ?1 ORDER BY id LIMIT ?2)",
+      "DELETE FROM open_alarm WHERE id IN (SELECT id FROM open_alarm WHERE last_ns < ?1 AND "
+      "state = 2 ORDER BY id LIMIT ?2)",
   };
   static_assert(ConfigurationState::kDone == ConfigurationState{3});
   std::uint64_t deleted = 0;

@@ -17,14 +17,16 @@ using namespace store_internal;
 
 namespace {
 
-/// `sql` ends in "LIMIT ?1" and may filter by ?2; `read` makes one entry of one row.
+using Filters = std::vector<std::int64_t>;
+
+/// `sql` ends in "LIMIT ?1" and may filter by ?2 and more; `read` makes one entry of one row.
 template <class Entry, class Read>
 Result<std::vector<Entry>> Query(Connection& connection, const char* table, const char* sql,
-                                 std::uint32_t limit, std::optional<std::int64_t> filter,
-                                 Read read) {
+                                 std::uint32_t limit, const Filters& filters, Read read) {
   FOCALFLEET_TRY_ASSIGN(Statement statement, connection.Prepare(sql));
   statement.Bind(1, limit);
-  if (filter) statement.Bind(2, *filter);
+  int parameter = 2;
+  for (const std::int64_t filter : filters) statement.Bind(parameter++, filter);
   std::vector<Entry> entries;
   for (;;) {
     const auto row = statement.Next();
@@ -36,10 +38,25 @@ Result<std::vector<Entry>> Query(Connection& connection, const char* table, cons
   }
 }
 
-std::optional<std::int64_t> Filter(std::optional<UnitId> unit) {
-  if (!unit) return std::nullopt;
-  return unit->value;
-}
+/// Conditions of a query, joined by AND, with their parameters from ?2 on.
+struct Conditions {
+  std::string where;
+  Filters filters;
+
+  /// `condition` ends before the parameter.
+  void Add(const std::string& condition, std::int64_t parameter) {
+    filters.push_back(parameter);
+    where += (where.empty() ? "WHERE " : "AND ") + condition + " ?" +
+             std::to_string(filters.size() + 1) + " ";
+  }
+  void Add(std::optional<UnitId> unit) {
+    if (unit) Add("unit_id =", unit->value);
+  }
+  void Add(const Period& period, const std::string& column) {
+    Add(column + " >=", period.since.ns);
+    Add(column + " <", period.until.ns);
+  }
+};
 
 AxisKnowledge Hull(Cells& cells, int column) {
   const AxisKnowledge hull{Witness::kInterval, cells.Whole<std::int32_t>(column),
@@ -97,34 +114,43 @@ Result<std::unique_ptr<StoreReader>> StoreReader::Open(const std::string& path,
 
 Result<StoredFleet> StoreReader::Load() { return LoadFleet(*connection_); }
 
-Result<std::vector<MoveHistory>> StoreReader::Moves(std::optional<UnitId> unit,
-                                                    std::uint32_t limit) {
+Result<std::vector<MoveHistory>> StoreReader::Moves(std::optional<UnitId> unit, std::uint32_t limit,
+                                                    const Period& period,
+                                                    std::optional<IntentEnd> end) {
   static const std::string kColumns =
       "SELECT entry, configuration, unit_id, serial, move, theta_from, phi_from, theta_to, phi_to, "
       "theta_low, "
       "theta_high, phi_low, phi_high, began_ns, ended_ns, end, theta_end_witness, theta_end_low, "
       "theta_end_high, "
       "phi_end_witness, phi_end_low, phi_end_high FROM intent ";
-  const std::string sql =
-      kColumns + (unit ? "WHERE unit_id = ?2 " : "") + "ORDER BY entry DESC LIMIT ?1";
-  return Query<MoveHistory>(*connection_, "intent", sql.c_str(), limit, Filter(unit), ReadMove);
+  Conditions conditions;
+  conditions.Add(unit);
+  conditions.Add(period, "began_ns");
+  if (end) conditions.Add("end =", static_cast<std::int64_t>(*end));
+  const std::string sql = kColumns + conditions.where + "ORDER BY entry DESC LIMIT ?1";
+  return Query<MoveHistory>(*connection_, "intent", sql.c_str(), limit, conditions.filters,
+                            ReadMove);
 }
 
-Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(std::uint32_t limit) {
-  return Query<ConfigurationHistory>(
-      *connection_, "configuration",
+Result<std::vector<ConfigurationHistory>> StoreReader::Configurations(
+    std::uint32_t limit, const Period& period, std::optional<ConfigurationState> state) {
+  Conditions conditions;
+  conditions.Add(period, "changed_ns");
+  if (state) conditions.Add("state =", static_cast<std::int64_t>(*state));
+  const std::string sql =
       "SELECT id, source, state, targeted, arrived, refused, failed, makespan_predicted_s, "
       "makespan_s, energy_J, "
       "peak_power_W, start_skew_s, start_skew_bound_s, stopped, unmeasured, began_ns, changed_ns "
-      "FROM configuration "
-      "ORDER BY id DESC LIMIT ?1",
-      limit, std::nullopt, [](Cells& cells) {
-        ConfigurationHistory entry;
-        entry.row = ReadConfiguration(cells);
-        entry.began = cells.Time(15);
-        entry.changed = cells.Time(16);
-        return entry;
-      });
+      "FROM configuration " +
+      conditions.where + "ORDER BY id DESC LIMIT ?1";
+  return Query<ConfigurationHistory>(*connection_, "configuration", sql.c_str(), limit,
+                                     conditions.filters, [](Cells& cells) {
+                                       ConfigurationHistory entry;
+                                       entry.row = ReadConfiguration(cells);
+                                       entry.began = cells.Time(15);
+                                       entry.changed = cells.Time(16);
+                                       return entry;
+                                     });
 }
 
 Result<std::vector<ParameterHistory>> StoreReader::Parameters(SerialNumber serial,
@@ -133,7 +159,7 @@ Result<std::vector<ParameterHistory>> StoreReader::Parameters(SerialNumber seria
                                  "SELECT entry, serial, axis, parameter, value, origin, at_ns FROM "
                                  "parameter_history WHERE serial = ?2 "
                                  "ORDER BY entry DESC LIMIT ?1",
-                                 limit, serial.value, [](Cells& cells) {
+                                 limit, {serial.value}, [](Cells& cells) {
                                    ParameterHistory entry;
                                    entry.row.serial = cells.Serial(1);
                                    entry.row.axis = cells.AxisAt(2);
@@ -151,7 +177,7 @@ Result<std::vector<TuningHistory>> StoreReader::Tunings(SerialNumber serial, std
       "SELECT entry, serial, axis, critical, repeat, margin, load_uNm, v_bus_V, counter1, "
       "subdivision, mode, origin, at_ns FROM tuning_history WHERE serial = ?2 "
       "ORDER BY entry DESC LIMIT ?1",
-      limit, serial.value, [](Cells& cells) {
+      limit, {serial.value}, [](Cells& cells) {
         TuningHistory entry;
         entry.row = ReadTuning(cells, 1);
         entry.at = cells.Time(12);
@@ -159,20 +185,24 @@ Result<std::vector<TuningHistory>> StoreReader::Tunings(SerialNumber serial, std
       });
 }
 
-Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit) {
+Result<std::vector<AlarmHistory>> StoreReader::Alarms(std::uint32_t limit, const Period& period) {
   return Query<AlarmHistory>(
       *connection_, "alarm",
-      "SELECT id, severity, unit_id, bus_id, text, at_ns FROM alarm ORDER BY id DESC LIMIT ?1",
-      limit, std::nullopt, [](Cells& cells) {
-        AlarmHistory entry;
-        entry.row.id = cells.Whole<std::uint64_t>(0);
-        entry.row.severity = cells.Code(1, kLastSeverity);
-        if (!cells.IsNull(2)) entry.row.unit = UnitId{cells.Whole<std::uint32_t>(2)};
-        if (!cells.IsNull(3)) entry.row.bus = BusId{cells.Whole<std::uint32_t>(3)};
-        entry.row.text = cells.Text(4);
-        entry.at = cells.Time(5);
-        return entry;
+      "SELECT id, severity, unit_id, bus_id, text, name, at_ns FROM alarm "
+      "WHERE at_ns >= ?2 AND at_ns < ?3 ORDER BY at_ns DESC, id DESC LIMIT ?1",
+      limit, {period.since.ns, period.until.ns}, [](Cells& cells) {
+        return AlarmHistory{ReadAlarm(cells), cells.Time(6)};
       });
+}
+
+Result<std::vector<OpenAlarmRow>> StoreReader::EarlierAlarms(std::uint32_t limit,
+                                                             const Period& period) {
+  return Query<OpenAlarmRow>(
+      *connection_, "open_alarm",
+      "SELECT id, severity, unit_id, bus_id, text, name, count, state, first_ns, last_ns, "
+      "acknowledged_ns, ended_ns, acknowledged_by FROM open_alarm "
+      "WHERE state = 2 AND last_ns >= ?2 AND last_ns < ?3 ORDER BY last_ns DESC LIMIT ?1",
+      limit, {period.since.ns, period.until.ns}, [](Cells& cells) { return ReadOpenAlarm(cells); });
 }
 
 Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t exposure) {
@@ -187,7 +217,7 @@ Result<std::vector<MeasurementHistory>> StoreReader::Measurements(std::uint64_t 
       "0) "
       "FROM measurement AS m LEFT JOIN orientation USING (exposure, unit_id) WHERE exposure = ?2 "
       "ORDER BY unit_id LIMIT ?1",
-      limits::kUnits, static_cast<std::int64_t>(exposure), [](Cells& cells) {
+      limits::kUnits, {static_cast<std::int64_t>(exposure)}, [](Cells& cells) {
         MeasurementHistory history;
         MeasurementRow& row = history.row;
         row.exposure = cells.Whole<std::uint64_t>(0);
@@ -222,7 +252,7 @@ Result<std::optional<std::uint64_t>> StoreReader::LastExposure(std::uint64_t con
       Query<std::uint64_t>(*connection_, "measurement",
                            "SELECT exposure FROM measurement WHERE configuration = ?2 "
                            "ORDER BY exposure DESC LIMIT ?1",
-                           1, static_cast<std::int64_t>(configuration),
+                           1, {static_cast<std::int64_t>(configuration)},
                            [](Cells& cells) { return cells.Whole<std::uint64_t>(0); }));
   if (found.empty()) return std::optional<std::uint64_t>();
   return std::optional<std::uint64_t>(found.front());
@@ -233,7 +263,7 @@ Result<std::vector<ModelHistory>> StoreReader::Models(std::uint32_t limit) {
       *connection_, "model_change",
       "SELECT entry, sha256, restores, name, campaign, campaign_sha256, rms_before_um, "
       "rms_after_um, at_ns FROM model_change ORDER BY entry DESC LIMIT ?1",
-      limit, std::nullopt, [](Cells& cells) {
+      limit, Filters{}, [](Cells& cells) {
         ModelHistory entry;
         ModelRow& row = entry.row;
         row.entry = cells.Whole<std::uint64_t>(0);
@@ -262,14 +292,15 @@ Result<std::vector<UnitId>> StoreReader::CountedAnewSince(WallTime since) {
       "SELECT 1 FROM unit_history AS before WHERE before.unit_id = now.unit_id AND "
       "before.entry < now.entry AND before.serial NOT IN (0, now.serial)) "
       "ORDER BY unit_id LIMIT ?1",
-      limits::kUnits, since.ns, [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
+      limits::kUnits, {since.ns},
+      [](Cells& cells) { return UnitId{cells.Whole<std::uint32_t>(0)}; });
 }
 
 Result<std::vector<std::pair<UnitId, SerialNumber>>> StoreReader::Bindings() {
   return Query<std::pair<UnitId, SerialNumber>>(
       *connection_, "unit",
       "SELECT unit_id, serial FROM unit WHERE serial <> 0 ORDER BY unit_id LIMIT ?1",
-      limits::kUnits, std::nullopt, [](Cells& cells) {
+      limits::kUnits, Filters{}, [](Cells& cells) {
         return std::pair{UnitId{cells.Whole<std::uint32_t>(0)}, cells.Serial(1)};
       });
 }
@@ -287,13 +318,15 @@ Result<std::string> StoreReader::ModelText(const std::string& sha256) {
   return text;
 }
 
-Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit,
-                                                    std::uint32_t limit) {
+Result<std::vector<UnitHistory>> StoreReader::Units(std::optional<UnitId> unit, std::uint32_t limit,
+                                                    const Period& period) {
   static const std::string kColumns =
       "SELECT entry, unit_id, serial, enabled, reason, at_ns FROM unit_history ";
-  const std::string sql =
-      kColumns + (unit ? "WHERE unit_id = ?2 " : "") + "ORDER BY entry DESC LIMIT ?1";
-  return Query<UnitHistory>(*connection_, "unit_history", sql.c_str(), limit, Filter(unit),
+  Conditions conditions;
+  conditions.Add(unit);
+  conditions.Add(period, "at_ns");
+  const std::string sql = kColumns + conditions.where + "ORDER BY entry DESC LIMIT ?1";
+  return Query<UnitHistory>(*connection_, "unit_history", sql.c_str(), limit, conditions.filters,
                             [](Cells& cells) {
                               UnitHistory entry;
                               entry.unit = {cells.Whole<std::uint32_t>(1)};

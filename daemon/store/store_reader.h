@@ -35,11 +35,17 @@ class StoreReader {
   ~StoreReader();
 
   Result<StoredFleet> Load();
-  Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit);
-  Result<std::vector<ConfigurationHistory>> Configurations(std::uint32_t limit);
+  Result<std::vector<MoveHistory>> Moves(std::optional<UnitId> unit, std::uint32_t limit,
+                                         const Period& period = {},
+                                         std::optional<IntentEnd> end = {});
+  /// The period is that of their last change.
+  Result<std::vector<ConfigurationHistory>> Configurations(
+      std::uint32_t limit, const Period& period = {}, std::optional<ConfigurationState> state = {});
   Result<std::vector<ParameterHistory>> Parameters(SerialNumber serial, std::uint32_t limit);
   Result<std::vector<TuningHistory>> Tunings(SerialNumber serial, std::uint32_t limit);
-  Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit);
+  Result<std::vector<AlarmHistory>> Alarms(std::uint32_t limit, const Period& period = {});
+  /// The alarms that are over, by their newest raise.
+  Result<std::vector<OpenAlarmRow>> EarlierAlarms(std::uint32_t limit, const Period& period = {});
   /// The measurements of one exposure, by unit id.
   Result<std::vector<MeasurementHistory>> Measurements(std::uint64_t exposure);
   /// The newest exposure of a configuration; none: it was never measured.
@@ -52,7 +58,8 @@ class StoreReader {
   Result<std::vector<std::pair<UnitId, SerialNumber>>> Bindings();
   /// The text of a model. Errors: kRefused: the store has none of that sha256.
   Result<std::string> ModelText(const std::string& sha256);
-  Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit);
+  Result<std::vector<UnitHistory>> Units(std::optional<UnitId> unit, std::uint32_t limit,
+                                         const Period& period = {});
 
  private:
   StoreReader();

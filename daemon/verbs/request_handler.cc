@@ -5,8 +5,12 @@
 
 #include "daemon/status/history_json.h"
 #include "daemon/status/status_json.h"
+#include "daemon/verbs/alarm_requests.h"
+#include "daemon/verbs/history_requests.h"
 #include "daemon/verbs/model_upkeep.h"
+#include "daemon/verbs/preview_json.h"
 #include "daemon/verbs/requested_command.h"
+#include "daemon/verbs/unit_selection.h"
 #include "fleet/files/bad_rows.h"
 #include "protocol/base/limits.h"
 
@@ -14,6 +18,7 @@ namespace focalfleet {
 namespace {
 
 constexpr std::uint64_t kHistoryRowsMax = 1000;
+constexpr double kWaitMaxS = 1e6;
 
 /// The newest value of each axis and parameter; `history` is newest first.
 Json NewestOf(const std::vector<ParameterHistory>& history) {
@@ -35,6 +40,19 @@ Json NewestOf(const std::vector<TuningHistory>& history) {
             newest, [&](const TuningHistory& other) { return other.row.axis == entry.row.axis; }))
       newest.push_back(entry);
   return HistoryJson(newest);
+}
+
+/// The numbers of the units that the request chooses.
+Result<Json> AskSelection(const ControlRequest& request, const FleetView& view) {
+  FOCALFLEET_TRY_ASSIGN(const auto units, SelectUnits(request.args, view));
+  Json ids = Json::array();
+  for (const PositionerIndex i : units) ids.push_back(view.layout->unit(i).id.value);
+  return Json{{"unit_ids", std::move(ids)}};
+}
+
+/// The user of the client, by number: a name may be slow to find.
+std::string UserOf(const IncomingLine& line) {
+  return line.user ? "uid " + std::to_string(*line.user) : "";
 }
 
 bool HasMoved(const ConfigurationView& configuration) {
@@ -84,6 +102,12 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
     return Send(line.client, answer);
   }
   if (const auto answer = Ask(view, *request)) return Answer(pending, *answer);
+  if (request->verb == "wait") return Wait(view, *request, pending);
+  if (request->verb == "preview") {
+    const Status planned = Plan(view, *request, pending);
+    if (!planned) Answer(pending, tl::unexpected<Error>(planned.error()));
+    return;
+  }
   pending.is_configuration =
       request->verb == "apply" || request->verb == "home" || request->verb == "measure";
   pending.is_retarget = request->verb == "retarget";
@@ -96,6 +120,7 @@ void RequestHandler::Handle(const FleetView& view, const IncomingLine& line,
   if (!wait) return Answer(pending, tl::unexpected<Error>(wait.error()));
   pending.wait = *wait && pending.is_configuration;
   auto change = ChangeModel(view, *request);
+  if (!change) change = ChangeAlarms(*request, options_.alarms, UserOf(line), WallTime::Now());
   auto command = change ? std::move(*change) : CommandOf(*request, view);
   if (!command) {
     options_.log(request->verb + " refused: " + FirstRow(command.error().text));
@@ -114,7 +139,13 @@ std::optional<Result<Json>> RequestHandler::Ask(const FleetView& view,
   if (request.verb == "status") return Result<Json>(StatusJson(view, options_.facts()));
   if (request.verb == "unit") return AskUnit(view, request);
   if (request.verb == "params") return AskParameters(view, request);
-  if (request.verb == "history") return AskHistory(view, request);
+  const OpenReader reader = [this] { return Reader(); };
+  if (request.verb == "history") return AskHistory(request, view, reader);
+  if (request.verb == "events") return AskEvents(request, view, reader);
+  if (request.verb == "select") return AskSelection(request, view);
+  if (request.verb == "alarms")
+    return AskAlarms(
+        request, *options_.alarms, [this] { return Reader(); }, WallTime::Now());
   if (request.verb == "measurements") return AskMeasurements(view, request);
   if (request.verb == "model")
     return Result<Json>(options_.models->Show(ModelRegistry::kChangesMax));
@@ -145,22 +176,6 @@ Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlR
               {"tuning", NewestOf(tunings)},
               {"tuning_history", HistoryJson(tunings)},
               {"history", HistoryJson(history)}};
-}
-
-Result<Json> RequestHandler::AskHistory(const FleetView& view, const ControlRequest& request) {
-  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(request.args, "limit", 20));
-  const auto limit = static_cast<std::uint32_t>(std::min(asked, kHistoryRowsMax));
-  FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  if (!request.args.contains("unit_id")) {
-    FOCALFLEET_TRY_ASSIGN(const auto configurations, reader->Configurations(limit));
-    FOCALFLEET_TRY_ASSIGN(const auto alarms, reader->Alarms(limit));
-    return Json{{"configurations", HistoryJson(configurations)}, {"alarms", HistoryJson(alarms)}};
-  }
-  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(request.args, *view.layout));
-  const UnitId id = view.layout->unit(i).id;
-  FOCALFLEET_TRY_ASSIGN(const auto moves, reader->Moves(id, limit));
-  FOCALFLEET_TRY_ASSIGN(const auto places, reader->Units(id, limit));
-  return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
 }
 
 /// {exposure?}: without it, the newest exposure of the last configuration.
@@ -216,7 +231,7 @@ std::optional<Result<Command>> RequestHandler::ChangeModel(const FleetView& view
     options_.log("model: " + forgot.error().text);
   NoteRests(view, models.compensation());
   Command command;
-  command.what = KeepModelCommand{std::move(*row)};
+  command.what = KeepRowsCommand{{std::move(*row)}};
   return command;
 }
 
@@ -273,8 +288,71 @@ void RequestHandler::Reply(const FleetView& view, const ReplyEffect& reply) {
   Answer(pending, ConfigurationJson(view));
 }
 
+/// {timeout_s?}: the answer is the configuration when it is over, by whomever it was commanded.
+void RequestHandler::Wait(const FleetView& view, const ControlRequest& request, Pending pending) {
+  if (!view.coordinator->busy()) return Answer(pending, Json{{"under_way", false}});
+  if (request.args.contains("timeout_s")) {
+    const auto timeout_s = NumberArgument(request.args, "timeout_s");
+    if (!timeout_s) return Answer(pending, tl::unexpected<Error>(timeout_s.error()));
+    if (!(*timeout_s >= 0 && *timeout_s <= kWaitMaxS))
+      return Answer(pending, Fail(ErrorCode::kInvalid, "timeout_s must be 0 to 1e6"));
+    pending.give_up =
+        view.now +
+        DurationNs{static_cast<std::int64_t>(*timeout_s * static_cast<double>(options_.second.ns))};
+  }
+  pending.wait = true;
+  pending.awaits = view.coordinator->configuration().id;
+  pending_.emplace(next_request_++, pending);
+  ++waiting_;
+}
+
+void RequestHandler::AnswerWaiters(const FleetView& view) {
+  const ConfigurationView& configuration = view.coordinator->configuration();
+  for (auto it = pending_.begin(); it != pending_.end();) {
+    const Pending& pending = it->second;
+    const bool over = !view.coordinator->busy() || configuration.id != pending.awaits;
+    if (pending.awaits == 0 || (!over && view.now < pending.give_up)) {
+      ++it;
+      continue;
+    }
+    if (over)
+      Answer(pending, ConfigurationJson(view));
+    else
+      Answer(pending, Fail(ErrorCode::kRefused, "configuration " + std::to_string(pending.awaits) +
+                                                    " is still under way"));
+    it = pending_.erase(it);
+    --waiting_;
+  }
+}
+
+Status RequestHandler::Plan(const FleetView& view, const ControlRequest& request,
+                            const Pending& pending) {
+  if (dry_run_)
+    return Fail(ErrorCode::kFull, "another dry run is being planned; ask again when it is done");
+  FOCALFLEET_TRY_ASSIGN(const Command command,
+                        CommandOf({.id = request.id, .verb = "apply", .args = request.args}, view));
+  FOCALFLEET_TRY_ASSIGN(Preview preview,
+                        view.coordinator->PreviewOf(std::get<ApplyCommand>(command.what)));
+  dry_run_ = {
+      .pending = pending, .targeted = preview.targeted, .refused = std::move(preview.refused)};
+  preview_job_ = std::move(preview.job);
+  return {};
+}
+
+void RequestHandler::PreviewDone(const FleetView& view, const PlanDone& done) {
+  if (!dry_run_) return;
+  const DryRun run = *std::exchange(dry_run_, std::nullopt);
+  if (done.plan) return Answer(run.pending, PreviewJson(view, done, run.targeted, run.refused));
+  const bool given_up = done.plan.error().code == ErrorCode::kUnavailable;
+  Answer(run.pending,
+         given_up ? Fail(ErrorCode::kRefused, "a configuration was commanded and is planned first")
+                  : tl::unexpected<Error>(done.plan.error()));
+}
+
 void RequestHandler::ShowProgress(const FleetView& view) {
-  if (waiting_ == 0 || view.now < progress_at_) return;
+  if (waiting_ == 0) return;
+  AnswerWaiters(view);
+  if (view.now < progress_at_) return;
   progress_at_ = view.now + options_.progress_period;
   const Json progress = ProgressJson(view);
   for (const auto& [request, pending] : pending_)
@@ -282,6 +360,7 @@ void RequestHandler::ShowProgress(const FleetView& view) {
 }
 
 void RequestHandler::Close() {
+  if (dry_run_) pending_.emplace(next_request_++, std::exchange(dry_run_, std::nullopt)->pending);
   for (const auto& [request, pending] : pending_)
     Answer(pending,
            Fail(ErrorCode::kUnavailable,

@@ -18,13 +18,16 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "daemon/control/line_server.h"
 #include "daemon/status/shell_facts.h"
 #include "daemon/status/status_snapshot.h"
 #include "daemon/store/store_reader.h"
+#include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
+#include "fleet/coordinate/preview.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
@@ -33,10 +36,12 @@ class RequestHandler {
  public:
   struct Options {
     DurationNs progress_period = Milliseconds(200);
+    DurationNs second = Seconds(1);  // a second of people, in the fleet's time
     std::function<ShellFacts()> facts;
     std::function<void(const std::string&)> log;  // one sentence for each command
     std::string store_path;
     ModelRegistry* models = nullptr;  // outlives the handler
+    AlarmRegister* alarms = nullptr;  // likewise
   };
   RequestHandler(LineServer server, Options options)
       : server_(std::move(server)), options_(std::move(options)) {}
@@ -59,7 +64,11 @@ class RequestHandler {
   void Service(const FleetView& view, std::vector<Command>* commands);
   /// The client receives the coordinator's reply as its answer.
   void Reply(const FleetView& view, const ReplyEffect& reply);
-  /// Clients that wait receive progress, when it is time.
+  /// The planning job of a dry run that was asked for since the last call. The job never becomes
+  /// the configuration; its answer goes to PreviewDone.
+  std::optional<PlanJob> TakePreview() { return std::exchange(preview_job_, std::nullopt); }
+  void PreviewDone(const FleetView& view, const PlanDone& done);
+  /// Clients that wait receive progress, when it is time, or the end that they wait for.
   void ShowProgress(const FleetView& view);
   /// The instant at which ShowProgress is due; kNever while no client waits.
   [[nodiscard]] HostInstant wake_at() const { return waiting_ > 0 ? progress_at_ : kNever; }
@@ -74,16 +83,27 @@ class RequestHandler {
     bool wait = false;
     bool is_configuration = false;  // apply, home or measure: its summary is the configuration
     bool is_retarget = false;
-    bool began = false;  // the coordinator has begun it
-    std::string note;    // stands after the answer's text
+    bool began = false;            // the coordinator has begun it
+    std::string note;              // stands after the answer's text
+    std::uint64_t awaits = 0;      // of `wait`: the configuration whose end is the answer
+    HostInstant give_up = kNever;  // of `wait`
+  };
+  /// A dry run while the planner has it.
+  struct DryRun {
+    Pending pending;
+    std::uint32_t targeted = 0;
+    std::vector<Preview::Refused> refused = {};
   };
 
   void Handle(const FleetView& view, const IncomingLine& line, std::vector<Command>* commands);
+  void Wait(const FleetView& view, const ControlRequest& request, Pending pending);
+  void AnswerWaiters(const FleetView& view);
+  /// The dry run is with the planner. Errors: as `apply`; kFull: another one is.
+  Status Plan(const FleetView& view, const ControlRequest& request, const Pending& pending);
   /// The answer to a question; none: the verb is no question.
   std::optional<Result<Json>> Ask(const FleetView& view, const ControlRequest& request);
   Result<Json> AskUnit(const FleetView& view, const ControlRequest& request);
   Result<Json> AskParameters(const FleetView& view, const ControlRequest& request);
-  Result<Json> AskHistory(const FleetView& view, const ControlRequest& request);
   Result<Json> AskMeasurements(const FleetView& view, const ControlRequest& request);
   /// The command that keeps a change of the model; none: the verb changes no model.
   std::optional<Result<Command>> ChangeModel(const FleetView& view, const ControlRequest& request);
@@ -102,6 +122,8 @@ class RequestHandler {
   std::vector<IncomingLine> stops_;
   bool stopped_ = false;         // the last turn handled stops alone
   std::size_t spent_bytes_ = 0;  // in this turn
+  std::optional<DryRun> dry_run_;
+  std::optional<PlanJob> preview_job_;
 };
 
 }  // namespace focalfleet

@@ -69,14 +69,15 @@ struct WriteParameterCommand {
   Parameter parameter = Parameter::kRepeat;
   std::int32_t value = 0;
 };
-/// Stores a change of a model that the shell has made already.
-struct KeepModelCommand {
-  ModelRow row;
+/// Stores what the shell has changed already, and answers `text` when that is durable.
+struct KeepRowsCommand {
+  std::vector<Row> rows;
+  std::string text = "done";
 };
 struct Command {
   std::uint64_t request = 0;
   std::variant<ApplyCommand, RetargetCommand, StopCommand, HomeCommand, MeasureCommand,
-               EnableCommand, AdoptCommand, WriteParameterCommand, KeepModelCommand>
+               EnableCommand, AdoptCommand, WriteParameterCommand, KeepRowsCommand>
       what;
 };
 

@@ -80,7 +80,7 @@ void ConfigurationProgress::OnPlan(const PlanDone& done) {
   if (configuration_.phase() != Phase::kPlanning || done.job != round_.job) return;
   if (done.plan) return TakePlan(done);
   if (rooms_.corrections.goes_past()) {  // then the units come to their targets as they can
-    fleet_.ledger.Raise(Severity::kWarning, {}, {},
+    fleet_.ledger.Raise(AlarmName::kNoRunUp, {}, {},
                         "no run-up: from which side the targets are approached is left open (" +
                             done.plan.error().text + ")");
     rooms_.corrections.GiveUpApproach();
@@ -97,7 +97,7 @@ void ConfigurationProgress::TakePlan(const PlanDone& done) {
   round_.plan = *done.plan;
   const Plan& plan = round_.plan;
   if (!plan.too_near.empty())
-    fleet_.ledger.Raise(Severity::kWarning, {}, {},
+    fleet_.ledger.Raise(AlarmName::kUnitsTooNear, {}, {},
                         plan.too_near + ": they may touch, and are led apart");
   rooms_.homing.SetWave(done.homing);
   round_.running = done.running;

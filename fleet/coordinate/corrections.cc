@@ -123,7 +123,7 @@ bool Corrections::GoPast(std::vector<std::optional<Pose>>* targets) {
   }
   if (without > 0 && blind)
     fleet_.ledger.Raise(
-        Severity::kInfo, {}, {},
+        AlarmName::kRunUpsLeftOut, {}, {},
         std::to_string(without) +
             " units have no room for a run-up: from which side they come is left open");
   if (any) *targets = std::move(first);

@@ -23,7 +23,7 @@ void OnCountWritten(const Coordination& fleet, PositionerIndex i, const Paramete
   if (reply.axis != locating.axis) return;
   if (reply.answer != Answer::kOk) {
     record.locating.reset();
-    fleet.ledger.Raise(Severity::kWarning, i, {},
+    fleet.ledger.Raise(AlarmName::kCountRefused, i, {},
                        fleet.units.NameOf(i) + " was found, but refuses to count from there: " +
                            Name(reply.answer) + "; its place stays unknown");
     return;

@@ -33,6 +33,7 @@ struct LateJob {
 
 struct PlanJob {
   std::uint64_t job = 0;
+  PlanPurpose purpose = PlanPurpose::kConfiguration;
   std::vector<UnitKnowledge> start;
   std::vector<std::optional<Pose>> targets;
   std::vector<std::uint8_t> frozen;

@@ -28,6 +28,12 @@ Status ConfigurationExecutor::Apply(std::uint64_t request, const ApplyCommand& c
   return {};
 }
 
+Result<Preview> ConfigurationExecutor::PreviewOf(const ApplyCommand& command) const {
+  FOCALFLEET_TRY(MayBegin(view().source));
+  FOCALFLEET_TRY_ASSIGN(const Goal goal, GoalOf(fleet_, command));
+  return focalfleet::PreviewOf(fleet_, goal, rooms_.round.next_skew_s);
+}
+
 /// Settles what can be said of the unit's target before it moves.
 void ConfigurationExecutor::SetTarget(PositionerIndex i, const Goal& goal) {
   Configuration& configuration = rooms_.configuration;
@@ -59,7 +65,7 @@ Status ConfigurationExecutor::Home(std::uint64_t request, const HomeCommand& com
   progress_.Begin(request, goal);
   if (goal.unproven)
     fleet_.ledger.Raise(
-        Severity::kWarning, {}, {},
+        AlarmName::kHomingUnproven, {}, {},
         "homing of " + std::to_string(command.units.size()) +
             " units without proof that their neighbours are out of the way, as commanded");
   rooms_.configuration.view.counts.targeted = static_cast<std::uint32_t>(goal.to_home.size());
@@ -88,7 +94,7 @@ Status ConfigurationExecutor::Retarget(std::uint64_t request, const RetargetComm
   const std::string name = fleet_.units.NameOf(i);
   rooms_.configuration.Retarget(i, command.target);
   rooms_.corrections.Forget(i);
-  fleet_.ledger.Raise(Severity::kInfo, i, {}, name + " gets another target");
+  fleet_.ledger.Raise(AlarmName::kUnitRetargeted, i, {}, name + " gets another target");
   if (rooms_.round.part(i) == Part::kMoving) {
     StopFollowers(fleet_, rooms_.round, i,
                   {fleet_.now(), fleet_.now() + fleet_.requests.Patience()},
@@ -131,7 +137,7 @@ void ConfigurationExecutor::StoppedByAnotherHost(PositionerIndex i) {
   if (!busy() || configuration.stopping || configuration.phase() == ConfigurationPhase::kReporting)
     return;
   fleet_.ledger.Raise(
-      Severity::kWarning, i, {},
+      AlarmName::kStoppedByOther, i, {},
       fleet_.units.NameOf(i) + " was stopped on the bus by somebody else: configuration " +
           std::to_string(view().id) + " ends, nothing moves until an operator applies again");
   StopAll("stopped on the bus by somebody else");
@@ -140,7 +146,7 @@ void ConfigurationExecutor::StoppedByAnotherHost(PositionerIndex i) {
 void ConfigurationExecutor::GiveUp() {
   if (!busy()) return;
   rooms_.configuration.view.state = ConfigurationState::kFailed;
-  fleet_.ledger.Raise(Severity::kWarning, {}, {}, DaemonEnded(view().id));
+  fleet_.ledger.Raise(AlarmName::kConfigurationCutShort, {}, {}, DaemonEnded(view().id));
   rooms_.configuration.Record();
 }
 

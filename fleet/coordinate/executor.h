@@ -10,6 +10,7 @@
 #include "fleet/coordinate/commands.h"
 #include "fleet/coordinate/configuration_progress.h"
 #include "fleet/coordinate/executor_rooms.h"
+#include "fleet/coordinate/preview.h"
 
 namespace focalfleet {
 
@@ -20,6 +21,8 @@ class ConfigurationExecutor {
       : rooms_(fleet), fleet_(rooms_.fleet), progress_(&rooms_) {}
 
   Status Apply(std::uint64_t request, const ApplyCommand& command);
+  /// The plan that the command would begin with; nothing changes. Errors: as Apply.
+  [[nodiscard]] Result<Preview> PreviewOf(const ApplyCommand& command) const;
   /// Gives one unit another target while the others move.
   Status Retarget(std::uint64_t request, const RetargetCommand& command);
   Status Home(std::uint64_t request, const HomeCommand& command);

@@ -44,7 +44,7 @@ void NameExchange(const Coordination& fleet, PositionerIndex i) {
   const std::string id = std::to_string(fleet.layout.unit(i).id.value);
   const std::string other_id = std::to_string(fleet.layout.unit(j).id.value);
   fleet.ledger.Raise(
-      Severity::kError, i, {},
+      AlarmName::kUnitsExchanged, i, {},
       "units " + other_id + " and " + id +
           " are exchanged: each answers with the other's serial number. Exchange their "
           "cables, or, if the robots themselves changed places, `focalfleet adopt " +
@@ -67,7 +67,7 @@ bool Belongs(const Coordination& fleet, PositionerIndex i) {
   } else if (view.bound_serial != view.serial) {
     view.knowledge = {};
     fleet.units.SetPhase(i, kForeign);
-    fleet.ledger.Raise(Severity::kWarning, i, {},
+    fleet.ledger.Raise(AlarmName::kUnitForeign, i, {},
                        fleet.units.NameOf(i) + " answers with serial number " +
                            std::to_string(view.serial.value) + ", " + fleet.units.WhoseSerial(i) +
                            ", not " + std::to_string(view.bound_serial.value) +
@@ -76,6 +76,8 @@ bool Belongs(const Coordination& fleet, PositionerIndex i) {
     fleet.units.Report(i, UnitEventKind::kLost, "has another serial number");
     return false;
   }
+  fleet.ledger.End(AlarmName::kUnitForeign, i, {});
+  fleet.ledger.End(AlarmName::kUnitsExchanged, i, {});
   return true;
 }
 
@@ -100,8 +102,9 @@ bool IsReadable(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   const std::string unfit = MisfitOf(fleet, i);
   if (!unfit.empty() && unfit != record.trouble.unfit)
-    fleet.ledger.Raise(Severity::kError, i, {},
+    fleet.ledger.Raise(AlarmName::kUnitUnfit, i, {},
                        fleet.units.NameOf(i) + " is not fit to move: " + unfit);
+  if (unfit.empty()) fleet.ledger.End(AlarmName::kUnitUnfit, i, {});
   record.trouble.unfit = unfit;
   for (const Axis axis : kAxes)
     if (record.reading.subdivision[Index(axis)] != fleet.drive(i).axis[Index(axis)].subdivision)
@@ -134,8 +137,9 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
     Know(fleet, i, result.knowledge, Origin::kMove);
   view.knowledge = result.knowledge;
   const bool was_known = !store.vector || IsPlace(store.vector->knowledge);
+  if (IsPlace(result.knowledge)) fleet.ledger.End(AlarmName::kUnitPlaceLost, i, {});
   if (!IsPlace(result.knowledge) && (result.intent_end || was_known))
-    fleet.ledger.Raise(Severity::kWarning, i, {},
+    fleet.ledger.Raise(AlarmName::kUnitPlaceLost, i, {},
                        fleet.units.NameOf(i) + ": position " + Name(result.knowledge[0].witness) +
                            ", " + result.reason);
   if (reading.status.state == UnitState::kFault) {
@@ -148,6 +152,7 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
     return;
   }
   fleet.units.SetPhase(i, kReady);
+  fleet.ledger.End(AlarmName::kUnitFault, i, {});
   const bool short_of_its_end = result.intent_end && *result.intent_end != IntentEnd::kArrived;
   fleet.units.Report(i, short_of_its_end ? UnitEventKind::kStopped : UnitEventKind::kReady);
 }
@@ -203,7 +208,7 @@ void NotToBeRead(const Coordination& fleet, PositionerIndex i, const std::string
 void OnOtherVersion(const Coordination& fleet, PositionerIndex i, const IdentifyReply& identity) {
   UnitRecord& record = fleet.units[i];
   if (record.trouble.other_version != identity.protocol_version)
-    fleet.ledger.Raise(Severity::kError, i, {},
+    fleet.ledger.Raise(AlarmName::kUnitOtherVersion, i, {},
                        fleet.units.NameOf(i) + " speaks protocol version " +
                            std::to_string(identity.protocol_version) + ", not " +
                            std::to_string(kProtocolVersion) + " or " +
@@ -218,7 +223,7 @@ void OnOtherVersion(const Coordination& fleet, PositionerIndex i, const Identify
 void OnNoSerial(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   if (!std::exchange(record.trouble.no_serial, true))
-    fleet.ledger.Raise(Severity::kError, i, {},
+    fleet.ledger.Raise(AlarmName::kUnitWithoutSerial, i, {},
                        fleet.units.NameOf(i) +
                            " answers with serial number 0: its memory is lost, or it was never "
                            "programmed; it is not moved");
@@ -270,7 +275,7 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
   record.next_poll = fleet.now() + fleet.config.identify_period;
   fleet.timers.Set(i, record.next_poll);
   if (alarm)
-    fleet.ledger.Raise(Severity::kError, i, {},
+    fleet.ledger.Raise(phase == kSilent ? AlarmName::kUnitSilent : AlarmName::kUnitFault, i, {},
                        fleet.units.NameOf(i) + " " + reason + " (was " + Name(before) + ")");
   fleet.units.Report(i, UnitEventKind::kLost, reason);
 }
@@ -278,8 +283,11 @@ void Lose(const Coordination& fleet, PositionerIndex i, UnitPhase phase, const s
 void OnIdentity(const Coordination& fleet, PositionerIndex i, const IdentifyReply& identity) {
   UnitRecord& record = fleet.units[i];
   record.asked_once = true;
+  fleet.ledger.End(AlarmName::kUnitSilent, i, {});
   if (!IsSpoken(identity.protocol_version)) return OnOtherVersion(fleet, i, identity);
   if (identity.serial.value == 0) return OnNoSerial(fleet, i);
+  fleet.ledger.End(AlarmName::kUnitOtherVersion, i, {});
+  fleet.ledger.End(AlarmName::kUnitWithoutSerial, i, {});
   record.trouble.no_serial = false;
   record.protocol_version = identity.protocol_version;
   record.trouble.other_version.reset();

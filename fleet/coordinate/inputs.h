@@ -36,6 +36,7 @@ struct PlanPrediction {
 /// A planner's answer (fleet/plan/job.h).
 struct PlanDone {
   std::uint64_t job = 0;
+  PlanPurpose purpose = PlanPurpose::kConfiguration;
   Result<Plan> plan;
   std::vector<PositionerIndex>
       homing;  // units that may home at once when `plan` has been carried out
@@ -53,8 +54,9 @@ struct ExposureDone {
 
 /// A message of the shell about itself; it becomes an alarm.
 struct ShellNote {
-  Severity severity = Severity::kInfo;
+  AlarmName name = AlarmName::kUnnamed;
   std::string text;
+  std::optional<AlarmName> ends = {};  // the condition that has ended with it
 };
 
 struct Inputs {

@@ -7,6 +7,11 @@
 namespace focalfleet {
 namespace {
 
+/// The time in which a new daemon has found buses and DDS as they are: a link is reported when its
+/// port is opened, and the first attempt to join DDS takes 5 s at most. Half would end the alarm of
+/// a slow joining too early; twice as much would only show an old one longer.
+constexpr DurationNs kConfirmWithin = Seconds(10);
+
 MoveId MoveAfter(MoveId move, std::uint32_t count) {
   constexpr std::uint32_t kIds = 65'535;  // 0 is none
   return {static_cast<std::uint16_t>((move.value + count - 1) % kIds + 1)};
@@ -24,6 +29,12 @@ Ledger::Ledger(const Layout& layout, StoredFleet stored, const StepState& step)
       next_move_(stored.next_move) {
   for (const auto& row : stored.vectors) vectors[row.serial] = row;
   for (const auto& row : stored.open_intents) intents[row.serial] = row;
+  for (const auto& row : stored.open_alarms) {
+    const AlarmLife life = KindOf(row.name).life;
+    const Condition condition{row.name, row.unit, row.bus};
+    if (life == AlarmLife::kCondition || life == AlarmLife::kOfHost) conditions_.insert(condition);
+    if (life == AlarmLife::kOfHost) unconfirmed_.insert(condition);
+  }
 }
 
 MoveId Ledger::TakeMoveId() {
@@ -39,12 +50,42 @@ void Ledger::ReserveMoves() {
   if (reserved_by_ == 0) reserved_by_ = batch_now();
 }
 
-void Ledger::Raise(Severity severity, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
+void Ledger::Raise(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
                    std::string text) {
-  AlarmRow row{
-      .id = next_alarm_++, .severity = severity, .unit = {}, .bus = bus, .text = std::move(text)};
+  const AlarmKind& kind = KindOf(name);
+  AlarmRow row{.id = next_alarm_++,
+               .severity = kind.severity,
+               .unit = {},
+               .bus = bus,
+               .text = std::move(text),
+               .name = name};
   if (unit) row.unit = layout_.unit(*unit).id;
+  if (kind.life == AlarmLife::kCondition || kind.life == AlarmLife::kOfHost) {
+    const Condition condition{name, row.unit, row.bus};
+    conditions_.insert(condition);
+    unconfirmed_.erase(condition);
+  }
   Note(std::move(row));
+}
+
+void Ledger::End(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus) {
+  if (conditions_.empty()) return;
+  Condition condition{name, {}, bus};
+  if (unit) condition.unit = layout_.unit(*unit).id;
+  if (conditions_.erase(condition) > 0) Note(AlarmEndRow{name, condition.unit, bus});
+  unconfirmed_.erase(condition);
+}
+
+// A bus that is up, or DDS that works, is reported by nobody. An alarm of an earlier run about them
+// is over where this run does not raise it again.
+void Ledger::EndUnconfirmed() {
+  if (confirm_until_ == kNever) confirm_until_ = step_.now + kConfirmWithin;
+  if (unconfirmed_.empty() || step_.now < confirm_until_) return;
+  for (const Condition& condition : unconfirmed_) {
+    conditions_.erase(condition);
+    Note(AlarmEndRow{condition.name, condition.unit, condition.bus});
+  }
+  unconfirmed_.clear();
 }
 
 void Ledger::ReplyWhenDurable(std::uint64_t request, std::string text) {
@@ -96,6 +137,7 @@ void Ledger::BeginStep(std::uint64_t committed_through, bool store_failing) {
   committed_through_ = committed_through;
   store_failing_ = store_failing;
   if (reserved_by_ == 0) ReserveMoves();
+  EndUnconfirmed();
 }
 
 void Ledger::CloseBatch() {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <set>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -27,9 +28,11 @@ class Ledger {
   void Note(AnyRow&& row) {
     step_.out->rows.emplace_back(std::forward<AnyRow>(row));
   }
-  /// Notes an alarm.
-  void Raise(Severity severity, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
+  /// Notes an alarm, with the severity of its name.
+  void Raise(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus,
              std::string text);
+  /// The condition of an alarm has ended, if it was one. Cost: a look-up among lasting conditions.
+  void End(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus);
   /// Replies when this step's rows are durable; at once, with an error, where they cannot be
   /// written.
   void ReplyWhenDurable(std::uint64_t request, std::string text);
@@ -69,7 +72,16 @@ class Ledger {
     std::string refused = {};  // why it is not stored, and never will be
   };
 
+  /// A condition that lasts, from its alarm to its end.
+  struct Condition {
+    AlarmName name = AlarmName::kUnnamed;
+    std::optional<UnitId> unit;
+    std::optional<BusId> bus;
+    auto operator<=>(const Condition&) const = default;
+  };
+
   void ReserveMoves();
+  void EndUnconfirmed();
 
   const Layout& layout_;
   const StepState& step_;
@@ -79,6 +91,10 @@ class Ledger {
   std::uint64_t next_configuration_ = 1;
   std::uint64_t next_alarm_ = 1;
   std::uint64_t next_exposure_ = 1;
+  std::set<Condition> conditions_;
+  // Conditions of the host that an earlier run has left, until `confirm_until_`.
+  std::set<Condition> unconfirmed_;
+  HostInstant confirm_until_ = kNever;
   MoveId next_move_;
   std::uint32_t moves_left_ = 0;
   std::uint64_t reserved_by_ = 0;  // the batch of the first stock

@@ -44,9 +44,11 @@ void StoreRefused(const Coordination& fleet, const RefusedRow& refused) {
     if (fleet.units[{n}].view.serial == serial) unit = PositionerIndex{n};
   const bool stands = unit && IsOfAPlace(refused.row);
   // An alarm about an alarm would be refused like it, and so on. The log has it.
-  if (std::holds_alternative<AlarmRow>(refused.row)) return;
+  if (std::holds_alternative<AlarmRow>(refused.row) ||
+      std::holds_alternative<OpenAlarmRow>(refused.row))
+    return;
   fleet.ledger.Raise(
-      Severity::kError, unit, {},
+      AlarmName::kRowRefused, unit, {},
       "the store refuses the " + Describe(refused.row) + ": " + refused.why +
           (stands ? "; " + fleet.units.NameOf(*unit) + " is not moved until it is enabled again"
                   : ""));

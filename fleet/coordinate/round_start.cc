@@ -104,7 +104,7 @@ void RoundStart::Judge() {
     return fleet_.units.NameOf(i) + " (bus " + std::to_string(fleet_.units.bus_of(i).id.value) +
            ")";
   };
-  fleet_.ledger.Raise(Severity::kError, last.unit, fleet_.units.bus_of(last.unit).id,
+  fleet_.ledger.Raise(AlarmName::kStartsApart, last.unit, fleet_.units.bus_of(last.unit).id,
                       name(last.unit) + " began " + InMilliseconds(least_s) + " to " +
                           InMilliseconds((last.began.latest - first.began.earliest).seconds()) +
                           " after " + name(first.unit) + ", more than the " +

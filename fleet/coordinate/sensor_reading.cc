@@ -36,13 +36,15 @@ void OnSensors(const Coordination& fleet, PositionerIndex i, const SensorsReply&
   for (std::size_t k = 0; k < kSensorsPerPart; ++k)
     sensing.reading.counts[reply.part * kSensorsPerPart + k] = reply.counts[k];
   ++sensing.next_part;
-  if (!sensing.under_way()) sensing.reading.sensors = fleet.layout.unit(i).sensors;
+  if (sensing.under_way()) return;
+  sensing.reading.sensors = fleet.layout.unit(i).sensors;
+  fleet.ledger.End(AlarmName::kSensorsSilent, i, {});
 }
 
 void SensorsDoNotAnswer(const Coordination& fleet, PositionerIndex i, const std::string& what) {
   fleet.units[i].sensing = {};
   fleet.units[i].sensing.given_up = true;
-  fleet.ledger.Raise(Severity::kWarning, i, {},
+  fleet.ledger.Raise(AlarmName::kSensorsSilent, i, {},
                      fleet.units.NameOf(i) + " has sensors, but " + what);
 }
 

@@ -55,7 +55,7 @@ void OnParameter(const Coordination& fleet, PositionerIndex i, const ParameterRe
     // A misfit is read with every poll, and one alarm is enough.
     if (reply.answer != Answer::kOk && record.trouble.unfit.empty())
       fleet.ledger.Raise(
-          Severity::kWarning, i, {},
+          AlarmName::kParameterRefused, i, {},
           fleet.units.NameOf(i) + " refuses " + Name(reply.parameter) + ": " + Name(reply.answer));
     return;
   }

@@ -33,7 +33,7 @@ Result<Plan> PlanWayFor(PositionerIndex unit, const std::vector<std::optional<Po
 
 PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request,
                         const PlanOptions& options) {
-  PlanDone done{.job = job.job, .plan = Plan{}};
+  PlanDone done{.job = job.job, .purpose = job.purpose, .plan = Plan{}};
   Error refusal;
   std::vector<std::pair<PositionerIndex, std::vector<std::optional<Pose>>>> crowded;
   for (const PositionerIndex unit : job.to_home) {
@@ -67,7 +67,7 @@ PlanDone PlanHomingWave(const PlanJob& job, const PlanRequest& request,
 }
 
 PlanDone PlanLateMove(const PlanJob& job, const Layout& layout, std::span<const UnitDrive> drives) {
-  PlanDone done{.job = job.job, .plan = Plan{}};
+  PlanDone done{.job = job.job, .purpose = job.purpose, .plan = Plan{}};
   done.late = job.late->running->Replan(job.late->question, job.late->deviations);
   if (!*done.late) return done;
   Plan alone;
@@ -81,9 +81,9 @@ PlanDone PlanOf(const PlanJob& job, const PlanRequest& request, const Abandoned&
   PlanOptions options = job.options;
   options.abandoned = abandoned;
   if (!job.to_home.empty()) return PlanHomingWave(job, request, options);
-  PlanDone done{.job = job.job, .plan = MakePlan(request, options)};
+  PlanDone done{.job = job.job, .purpose = job.purpose, .plan = MakePlan(request, options)};
   // The running plan is kept with options that cannot be abandoned: it outlives the caller.
-  if (done.plan)
+  if (done.plan && job.purpose == PlanPurpose::kConfiguration)
     done.running = std::make_shared<const RunningPlan>(request, done.plan->moves, job.options);
   return done;
 }

@@ -55,6 +55,9 @@ struct Unserved {
   std::optional<NoWay> proof;  // of kBlocked; empty: a way may exist and was not found
 };
 
+/// The purpose of a plan. A preview is shown to an operator and never carried out.
+enum class PlanPurpose : std::uint8_t { kConfiguration, kPreview };
+
 /// Two units where they come nearest to each other.
 struct TightPair {
   PositionerIndex a, b;

@@ -51,7 +51,7 @@ void CheckUnits(const Command& command) {
           return;  // all units at once
         } else if constexpr (std::is_same_v<What, ApplyCommand>) {
           FOCALFLEET_CHECK(what.targets.size() == kUnitCount);
-        } else if constexpr (std::is_same_v<What, KeepModelCommand>) {
+        } else if constexpr (std::is_same_v<What, KeepRowsCommand>) {
           FOCALFLEET_CHECK(false);  // the request handler makes it itself
         } else {
           exists(what.unit);

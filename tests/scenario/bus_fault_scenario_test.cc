@@ -27,6 +27,13 @@ bool HasAlarm(InProcessFleet* fleet, const std::string& part) {
   });
 }
 
+/// The condition of the bus' alarm has ended.
+bool HasEnded(InProcessFleet* fleet, AlarmName name, BusId bus) {
+  return std::ranges::any_of(fleet->store().alarm_ends, [&](const AlarmEndRow& end) {
+    return end.name == name && end.bus == bus;
+  });
+}
+
 std::uint64_t ErrorFrames(InProcessFleet* fleet) {
   std::uint64_t sum = 0;
   for (const BusId bus : fleet->layout().buses())
@@ -123,10 +130,13 @@ TEST(BusFaults, BusOffInMidMotionIsReportedWithItsCauseAndTheBusComesBack) {
     EXPECT_TRUE(HasAlarm(&fleet, part)) << part;
   fleet.Run(Milliseconds(500));
   EXPECT_EQ(state(), LinkState::kOff) << "restarted after a second";
+  EXPECT_FALSE(HasEnded(&fleet, AlarmName::kBusDown, sick));
   fleet.world().faults(sick)->bit_error_rate = 0;
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kUp; }, Seconds(2)));
   ASSERT_TRUE(fleet.RunUntilIdle());
   ExpectOnlyTheSickBusSuffers(&fleet, sick);
+  EXPECT_TRUE(HasEnded(&fleet, AlarmName::kBusDown, sick)) << "the bus is up again";
+  EXPECT_TRUE(HasEnded(&fleet, AlarmName::kBusPassive, sick));
   ExpectAllArriveNow(&fleet, 35);
 }
 

@@ -80,7 +80,7 @@ TEST(Configuration, ACommandWhoseRowIsRefusedIsNotDone) {
   InProcessFleet fleet(Small(46));
   fleet.Run(Seconds(3));
   fleet.storage.refuse = [](const Row& row) { return std::holds_alternative<ModelRow>(row); };
-  fleet.Send({900, KeepModelCommand{{.entry = 1}}});
+  fleet.Send({900, KeepRowsCommand{{ModelRow{.entry = 1}}}});
   fleet.Send({901, EnableCommand{{{5}}, false, "fibre broken"}});
   fleet.Run(Seconds(1));
   ASSERT_TRUE(fleet.LastReply(900));

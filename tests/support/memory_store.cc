@@ -126,6 +126,16 @@ void MemoryStore::Keep(const AlarmRow& row) {
   fleet.next_alarm = std::max(fleet.next_alarm, row.id + 1);
 }
 
+void MemoryStore::Keep(const OpenAlarmRow& row) {
+  Slot(&fleet.open_alarms, row, [](const OpenAlarmRow& r) { return r.id; }) = row;
+  std::erase_if(fleet.open_alarms,
+                [](const OpenAlarmRow& r) { return r.state == OpenAlarmRow::State::kOver; });
+}
+
+void MemoryStore::Keep(const MuteRow& row) {
+  Slot(&fleet.mutes, row, [](const MuteRow& r) { return std::string_view(Name(r.name)); }) = row;
+}
+
 void MemoryStore::Keep(const NextMoveRow& row) { fleet.next_move = row.next; }
 
 void MemoryStore::Keep(const ModelRow& row) { model_entries_.insert(row.entry); }

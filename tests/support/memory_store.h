@@ -28,6 +28,7 @@ class MemoryStore {
   std::vector<IntentRow> begun;
   std::vector<IntentEndRow> ended;
   std::vector<AlarmRow> alarms;
+  std::vector<AlarmEndRow> alarm_ends;
   std::vector<ConfigurationRow> configurations;
 
   [[nodiscard]] const VectorRow* Vector(SerialNumber serial) const;
@@ -43,6 +44,9 @@ class MemoryStore {
   void Keep(const TuningRow& row);
   void Keep(const ConfigurationRow& row);
   void Keep(const AlarmRow& row);
+  void Keep(const AlarmEndRow& row) { alarm_ends.push_back(row); }
+  void Keep(const OpenAlarmRow& row);
+  void Keep(const MuteRow& row);
   void Keep(const NextMoveRow& row);
   void Keep(const ModelRow& row);
 

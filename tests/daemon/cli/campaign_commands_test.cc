@@ -76,7 +76,7 @@ TEST(ModelCommands, LoadSaysWhatItDoesNotCompensate) {
   const auto loaded = [&](std::vector<std::string> left_out) {
     const FakeDaemon daemon(scratch / "control.sock",
                             {{"model_load", {}}, {"model", {.result = InForce(left_out)}}});
-    return Focalfleet({"model", "load", file, "--socket", daemon.path()});
+    return Focalfleet({"model", "load", file, "--yes", "--socket", daemon.path()});
   };
   const auto partly = loaded({"supply_droop", "relaxation"});
   EXPECT_EQ(partly.exit, 0) << partly.err;

@@ -221,7 +221,7 @@ TEST_F(DaemonCommands, DisableWantsAReason) {
 }
 
 TEST_F(DaemonCommands, AdoptUnitAndHistoryAskForTheirUnit) {
-  EXPECT_EQ(Ask({"adopt", "9"}, {{"adopt", {}}}).exit, 0);
+  EXPECT_EQ(Ask({"adopt", "9", "--yes"}, {{"adopt", {}}}).exit, 0);
   EXPECT_EQ(requests_.at(0).args, (Json{{"unit_id", 9}}));
   const auto unit = Ask({"unit", "9"}, {{"unit", {.result = Json{{"phase", "ready"}}}}});
   EXPECT_THAT(unit.out, HasSubstr("phase  ready"));

@@ -69,7 +69,8 @@ bool FakeDaemon::AnswerLine(const IncomingLine& line) {
   for (const Json& progress : answer.progress) {
     server_->Progress(line.client, EncodeProgress(request->id, progress));
   }
-  if (answer.hang_up) return false;
+  if (answer.hang_up || answer.answers_most == 0) return false;
+  if (answer.answers_most > 0) --answer.answers_most;
   server_->Answer(line.client, answer.result ? EncodeResult(request->id, *answer.result)
                                              : EncodeError(request->id, answer.result.error()));
   return true;

@@ -20,7 +20,8 @@ struct FakeAnswer {
   std::vector<Json> progress;
   int full_first = 0;  // so many requests find no place before the result is given
   Result<Json> result = Json::object();
-  bool hang_up = false;  // closes everything instead of answering
+  bool hang_up = false;   // closes everything instead of answering
+  int answers_most = -1;  // after so many answers it hangs up; below 0: never
 };
 
 class FakeDaemon {

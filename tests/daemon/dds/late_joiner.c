@@ -37,7 +37,7 @@ static void take(dds_entity_t reader, int alarms, unsigned* seen, unsigned ids) 
     count = dds_take(reader, samples, infos, BATCH, BATCH);
     for (int i = 0; i < count; ++i) {
       if (!infos[i].valid_data) continue;
-      unsigned long long id = alarms ? ((focalfleet_Alarm*)samples[i])->alarm_id
+      unsigned long long id = alarms ? ((focalfleet_NamedAlarm*)samples[i])->alarm_id
                                      : ((focalfleet_UnitStatus*)samples[i])->unit_id;
       if (id >= 1 && id <= ids) ++seen[id];
     }
@@ -71,7 +71,8 @@ int main(int argc, char** argv) {
   }
   dds_entity_t unit_reader =
       make_reader(participant, &focalfleet_UnitStatus_desc, "focalfleet/unit_status");
-  dds_entity_t alarm_reader = make_reader(participant, &focalfleet_Alarm_desc, "focalfleet/alarm");
+  dds_entity_t alarm_reader =
+      make_reader(participant, &focalfleet_NamedAlarm_desc, "focalfleet/named_alarm");
   dds_entity_t waitset = dds_create_waitset(participant);
   dds_waitset_attach(waitset, dds_create_readcondition(unit_reader, DDS_ANY_STATE), 0);
   dds_waitset_attach(waitset, dds_create_readcondition(alarm_reader, DDS_ANY_STATE), 0);

@@ -85,6 +85,7 @@ AlarmValue Alarm(std::uint64_t id, std::string text = {}) {
   AlarmValue alarm;
   alarm.row.id = id;
   alarm.row.text = std::move(text);
+  alarm.row.name = AlarmName::kBusDown;
   return alarm;
 }
 
@@ -271,6 +272,7 @@ TEST(Status, TextIsCutAtItsBoundBetweenCharacters) {
   ASSERT_TRUE(TakeUntil(*reader, &seen, [&] { return seen.alarms.size() == 3; }));
   EXPECT_EQ(seen.alarm_values[1].row.text, std::string(254, 'a'));
   EXPECT_EQ(seen.alarm_values[2].row.text, std::string(255, 'b'));
+  EXPECT_EQ(seen.alarm_values[2].row.name, AlarmName::kBusDown);
   EXPECT_EQ(seen.alarm_values[3].row.text, std::string(255, 'c'));
 }
 

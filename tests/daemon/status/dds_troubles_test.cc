@@ -8,22 +8,25 @@ namespace {
 TEST(DdsTroubles, EachReportWakesAndIsTakenOnce) {
   int woken = 0;
   DdsTroubles troubles([&] { ++woken; });
-  troubles.Report("status", "no domain");
-  troubles.Report("the camera", "no topic");
+  troubles.Report(AlarmName::kDdsMissing, "status", "no domain");
+  troubles.Report(AlarmName::kCameraDdsMissing, "the camera", "no topic");
   EXPECT_EQ(woken, 2);
   EXPECT_EQ(troubles.Summary(), "status: no domain; the camera: no topic");
   const auto notes = troubles.TakeNotes();
   ASSERT_EQ(notes.size(), 2u);
-  EXPECT_EQ(notes[0].severity, Severity::kError);
+  EXPECT_EQ(notes[0].name, AlarmName::kDdsMissing);
+  EXPECT_EQ(notes[1].name, AlarmName::kCameraDdsMissing);
   EXPECT_TRUE(troubles.TakeNotes().empty());
 }
 
 TEST(DdsTroubles, ATroubleThatEndedIsNotInTheSummary) {
   DdsTroubles troubles([] {});
-  troubles.Report("status", "no domain");
-  troubles.Report("status", "");
+  troubles.Report(AlarmName::kDdsMissing, "status", "no domain");
+  troubles.Report(AlarmName::kDdsMissing, "status", "");
   EXPECT_EQ(troubles.Summary(), "");
-  EXPECT_EQ(troubles.TakeNotes().back().severity, Severity::kInfo);
+  const ShellNote back = troubles.TakeNotes().back();
+  EXPECT_EQ(back.name, AlarmName::kDdsBack);
+  EXPECT_EQ(back.ends, AlarmName::kDdsMissing);
 }
 
 TEST(DdsTroubles, CountsTroublesAndPassesOnNotesOfOthers) {

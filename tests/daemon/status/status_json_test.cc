@@ -31,5 +31,18 @@ TEST(StatusJson, StatusCountsEveryUnitOnce) {
   EXPECT_EQ(status["configuration"]["unserved"].size(), 0u);
 }
 
+TEST(StatusJson, StatusTellsAlarmsAndTheNextStep) {
+  const SmallFleet fleet;
+  ShellFacts facts;
+  facts.buses.resize(1);
+  facts.alarms = {.open = 3, .muted = 1, .worst = "warning"};
+  const Json status = StatusJson(fleet.View(), facts);
+  EXPECT_EQ(status["alarms"], (Json{{"open", 3}, {"muted", 1}, {"worst", "warning"}}));
+  EXPECT_EQ(status["next"], "focalfleet unit 1-3  (3 units are not heard)");
+  facts.store_failing = true;
+  EXPECT_EQ(StatusJson(fleet.View(), facts)["next"],
+            "focalfleet alarms  (the store cannot be written)");
+}
+
 }  // namespace
 }  // namespace focalfleet

@@ -34,7 +34,7 @@ class RowSource {
 
  private:
   Row Next() {
-    switch (rng_.Below(12)) {
+    switch (rng_.Below(14)) {
       case 0:
         return VectorRow{.serial = Serial(),
                          .knowledge = {Knowledge(), Knowledge()},
@@ -96,9 +96,19 @@ class RowSource {
                                 .counts = {.arrived = 3, .stopped = 4, .unmeasured = 5},
                                 .energy_J = Real()};
       case 9:
-        return AlarmRow{Id(), Code(kLastSeverity), Unit(), {}, "a"};
+        return AlarmRow{Id(), Code(kLastSeverity), Unit(), {}, "a", Code(kLastAlarmName)};
       case 10:
         return NextMoveRow{Move()};
+      case 11:
+        return OpenAlarmRow{.id = Id(),
+                            .name = Code(kLastAlarmName),
+                            .severity = Code(kLastSeverity),
+                            .unit = Unit(),
+                            .text = "a",
+                            .count = Odd() ? 0u : 2u,
+                            .state = Code(OpenAlarmRow::State::kOver)};
+      case 12:
+        return MuteRow{.name = Code(kLastAlarmName), .until_unix_ns = Place(), .reason = "r"};
       default:
         return ModelRow{.entry = rng_.Below(40),
                         .sha256 = {},
@@ -167,6 +177,8 @@ void ExpectSameFleet(const StoredFleet& stored, const StoredFleet& in_memory) {
   EXPECT_EQ(stored.parameters, in_memory.parameters);
   EXPECT_EQ(stored.tunings, in_memory.tunings);
   EXPECT_EQ(stored.configurations, in_memory.configurations);
+  EXPECT_EQ(stored.open_alarms, in_memory.open_alarms);
+  EXPECT_EQ(stored.mutes, in_memory.mutes);
   EXPECT_EQ(stored.next_move, in_memory.next_move);
   EXPECT_EQ(stored.next_configuration, in_memory.next_configuration);
   EXPECT_EQ(stored.next_alarm, in_memory.next_alarm);

@@ -107,6 +107,23 @@ TEST_F(StoreTest, AStoreOfVersionFourGetsRoundCovariancesOfItsMeasurements) {
   EXPECT_FALSE(row.delay_s);
 }
 
+TEST_F(StoreTest, AlarmsOfVersionEightHaveNoNameAndNoneIsOpen) {
+  {
+    auto connection = Open(Path());
+    ASSERT_TRUE(Migrate(*connection, 0, Migrations().first(8)));
+    ASSERT_TRUE(connection->Execute("INSERT INTO alarm VALUES(7, 2, 12, NULL, 'old', 5)"));
+  }
+  const auto fleet = OpenStore()->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_TRUE(fleet->open_alarms.empty());
+  EXPECT_TRUE(fleet->mutes.empty());
+  const auto alarms = OpenReader()->Alarms(9);
+  ASSERT_TRUE(alarms) << alarms.error().text;
+  ASSERT_EQ(alarms->size(), 1u);
+  EXPECT_EQ(alarms->front().row.text, "old");
+  EXPECT_STREQ(Name(alarms->front().row.name), "unnamed");
+}
+
 TEST_F(StoreTest, OpeningANewStoreSurvivesEveryFailingWrite) {
   focalfleet::test::FaultyDisk disk;
   std::uint64_t n = 1;

@@ -215,16 +215,48 @@ TEST_F(StoreTest, ConfigurationsAndAlarmsComeNewestFirst) {
   EXPECT_FALSE((*alarms)[0].row.unit);
 }
 
+TEST_F(StoreTest, HistoryIsReadByPeriodAndState) {
+  auto store = OpenStore();
+  const std::vector<Row> first{
+      ConfigurationRow{.id = 1, .source = "a.csv", .state = ConfigurationState::kDone},
+      AlarmRow{1, Severity::kWarning, {}, BusId{2}, "x"}, EnableRow{{12}, false, "bent"},
+      Intent(12, 7001, 13, {0, 0}, {1, 1}), IntentEndRow{{7001}, {13}, IntentEnd::kArrived}};
+  const std::vector<Row> second{
+      ConfigurationRow{.id = 2, .source = "b.csv", .state = ConfigurationState::kStopped},
+      AlarmRow{2, Severity::kWarning, {}, BusId{2}, "y"}, EnableRow{{12}, true, "mended"},
+      Intent(12, 7001, 14, {0, 0}, {1, 1}), IntentEndRow{{7001}, {14}, IntentEnd::kStopped}};
+  test::ExpectDone(store->Commit(first, kEight));
+  test::ExpectDone(store->Commit(second, kNine));
+  auto reader = OpenReader();
+  const Period late{.since = kNine};
+  const Period early{.until = kNine};
+  EXPECT_EQ(reader->Alarms(9, late)->at(0).row.id, 2u);
+  EXPECT_EQ(reader->Alarms(9, early)->at(0).row.id, 1u);
+  EXPECT_EQ(reader->Alarms(9, late)->size(), 1u);
+  EXPECT_EQ(reader->Configurations(9, late)->at(0).row.id, 2u);
+  EXPECT_EQ(reader->Configurations(9, {}, ConfigurationState::kDone)->at(0).row.id, 1u);
+  EXPECT_TRUE(reader->Configurations(9, late, ConfigurationState::kDone)->empty());
+  EXPECT_EQ(reader->Units(UnitId{12}, 9, early)->at(0).reason, "bent");
+  EXPECT_EQ(reader->Units({}, 9, late)->size(), 1u);
+  EXPECT_EQ(reader->Moves(UnitId{12}, 9, early)->at(0).move.value, 13);
+  EXPECT_EQ(reader->Moves(UnitId{12}, 9, {}, IntentEnd::kStopped)->at(0).move.value, 14);
+  EXPECT_EQ(reader->Moves({}, 9, late)->size(), 1u);
+  EXPECT_EQ(reader->Moves(UnitId{12}, 9)->size(), 2u);
+}
+
 TEST_F(StoreTest, PruneTakesOldHistoryAndNoNextIds) {
   auto store = OpenStore();
   test::ExpectDone(store->Commit(
-      std::vector<Row>{Intent(1, 1, 1, {0, 0}, {1, 1}), Intent(2, 2, 1, {0, 0}, {1, 1}),
-                       IntentEndRow{{1}, {1}, IntentEnd::kArrived},
-                       ConfigurationRow{.id = 8, .source = "", .state = ConfigurationState::kDone},
-                       AlarmRow{9, Severity::kInfo, {}, {}, ""}},
+      std::vector<Row>{
+          Intent(1, 1, 1, {0, 0}, {1, 1}), Intent(2, 2, 1, {0, 0}, {1, 1}),
+          IntentEndRow{{1}, {1}, IntentEnd::kArrived},
+          ConfigurationRow{.id = 8, .source = "", .state = ConfigurationState::kDone},
+          AlarmRow{9, Severity::kInfo, {}, {}, ""},
+          OpenAlarmRow{.id = 8, .last_unix_ns = kEight.ns},
+          OpenAlarmRow{.id = 9, .state = OpenAlarmRow::State::kOver, .last_unix_ns = kEight.ns}},
       kEight));
   EXPECT_EQ(store->Prune(kEight, 100), 0u);
-  EXPECT_EQ(store->Prune(kNine, 100), 3u);
+  EXPECT_EQ(store->Prune(kNine, 100), 4u) << "an alarm that lasts stays";
   const auto fleet = store->Load();
   EXPECT_EQ(fleet->open_intents.size(), 1u);
   EXPECT_EQ(fleet->next_configuration, 9u);

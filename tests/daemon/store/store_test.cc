@@ -30,6 +30,48 @@ TEST_F(StoreTest, NewStoreIsEmpty) {
   EXPECT_EQ(fleet->next_alarm, 1u);
 }
 
+TEST_F(StoreTest, AlarmsKeepTheirNamesAndStayOpenUntilTheyAreOver) {
+  const OpenAlarmRow open{.id = 9,
+                          .name = AlarmName::kUnitSilent,
+                          .severity = Severity::kError,
+                          .unit = UnitId{12},
+                          .text = "unit 12 does not answer",
+                          .count = 3,
+                          .state = OpenAlarmRow::State::kAcknowledged,
+                          .first_unix_ns = 5,
+                          .last_unix_ns = 7,
+                          .acknowledged_unix_ns = 8,
+                          .acknowledged_by = "uid 7"};
+  const MuteRow mute{.name = AlarmName::kBusDown,
+                     .until_unix_ns = 90,
+                     .since_unix_ns = 80,
+                     .reason = "repair",
+                     .by = "uid 7"};
+  const AlarmRow alarm{9, Severity::kError, UnitId{12}, {}, "silent", AlarmName::kUnitSilent};
+  test::ExpectDone(OpenStore()->Commit(
+      std::vector<Row>{alarm, open, mute, AlarmEndRow{AlarmName::kBusDown, {}, BusId{1}}}, kEight));
+  auto fleet = OpenStore()->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text;
+  EXPECT_EQ(fleet->open_alarms, std::vector{open});
+  EXPECT_EQ(fleet->mutes, std::vector{mute});
+  EXPECT_EQ(OpenReader()->Alarms(9)->at(0).row.name, AlarmName::kUnitSilent);
+  EXPECT_TRUE(OpenReader()->EarlierAlarms(9)->empty());
+  OpenAlarmRow over = open;
+  over.state = OpenAlarmRow::State::kOver;
+  over.ended_unix_ns = 11;
+  MuteRow ended = mute;
+  ended.until_unix_ns = 0;
+  test::ExpectDone(OpenStore()->Commit(std::vector<Row>{over, ended}, kNine));
+  fleet = OpenStore()->Load();
+  EXPECT_TRUE(fleet->open_alarms.empty());
+  EXPECT_EQ(fleet->mutes, std::vector{ended});
+  EXPECT_EQ(*OpenReader()->EarlierAlarms(9), std::vector{over});
+  EXPECT_TRUE(OpenReader()->EarlierAlarms(9, {.since = {8}})->empty());
+  Sql("UPDATE mute SET name = 'UnitQuiet'");
+  EXPECT_THAT(test::ErrorOf(OpenStore()->Load()).text,
+              ::testing::HasSubstr("there is no alarm of this name"));
+}
+
 TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
   VectorRow half_known = Vector(7001, Witness::kMeasured, -1, 96, 12, Origin::kCampaign);
   half_known.knowledge[1] = {Witness::kInterval, -500, 700};

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <unistd.h>
 
 #include <memory>
 #include <string>
@@ -37,7 +38,8 @@ class RequestHandlerTest : public ::testing::Test {
                  {.facts = [] { return ShellFacts{}; },
                   .log = [this](const std::string& text) { log_ += text + "\n"; },
                   .store_path = scratch_ / "none.db",
-                  .models = &models_}) {}
+                  .models = &models_,
+                  .alarms = &alarms_}) {}
 
   RawClient& Add(const std::string& says = "") {
     RawClient& client = *clients_.emplace_back(std::make_unique<RawClient>(scratch_ / "s"));
@@ -66,6 +68,7 @@ class RequestHandlerTest : public ::testing::Test {
   SmallFleet fleet_;
   std::string log_;
   ModelRegistry models_{&fleet_.layout()};
+  AlarmRegister alarms_;
   RequestHandler handler_;
   std::vector<std::unique_ptr<RawClient>> clients_;
   std::vector<Command> commands_;
@@ -182,6 +185,82 @@ TEST_F(RequestHandlerTest, WhereAllPlacesAreBusyOnlyStopIsTaken) {
       "\n");
   TurnUntilQuiet();
   EXPECT_EQ(Stops(), 2u) << "written otherwise it is a stop all the same";
+}
+
+TEST_F(RequestHandlerTest, AnAcknowledgementIsKeptWithItsUser) {
+  std::vector<Row> rows = {
+      AlarmRow{4, Severity::kError, UnitId{1}, {}, "silent", AlarmName::kUnitSilent}};
+  alarms_.Take(WallTime::Now(), &rows);
+  Add(Line(1, "alarms"));
+  TurnUntilQuiet();
+  const std::string listed = clients_[0]->Receive();
+  EXPECT_THAT(listed, HasSubstr(R"("name":"UnitSilent")"));
+  EXPECT_THAT(listed, HasSubstr(R"("runbook":"docs/runbook.md#unitsilent")"));
+  clients_[0]->Send(Line(2, "alarms_ack", {{"ids", {5}}}) + Line(3, "alarms_ack", {{"ids", {4}}}));
+  TurnUntilQuiet();
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("alarm 5 is not open"));
+  ASSERT_EQ(commands_.size(), 1u);
+  const auto& keep = std::get<KeepRowsCommand>(commands_[0].what);
+  EXPECT_EQ(keep.text, "acknowledged 1");
+  EXPECT_EQ(std::get<OpenAlarmRow>(keep.rows.at(0)).acknowledged_by,
+            "uid " + std::to_string(::getuid()));
+  const Effects effects = fleet_.Step({.now = {}, .commands = commands_});
+  EXPECT_TRUE(effects.replies.empty()) << "it is answered when it is durable";
+  clients_[0]->Send(Line(4, "alarms") + Line(5, "alarms", {{"severity", "bad"}}) +
+                    Line(6, "alarms_mute", {{"name", "BusDown"}, {"reason", "r"}, {"for_s", 1e9}}));
+  TurnUntilQuiet();
+  const std::string after = clients_[0]->Receive();
+  EXPECT_THAT(after, HasSubstr(R"("alarms":[])"));
+  EXPECT_THAT(after, HasSubstr("severity must be info, warning or error"));
+  EXPECT_THAT(after, HasSubstr("at most 31 days"));
+}
+
+TEST_F(RequestHandlerTest, WaitIsAnsweredAtOnceWhereNothingIsUnderWay) {
+  Add(Line(1, "wait"));
+  TurnUntilQuiet();
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr(R"({"under_way":false})"));
+  EXPECT_EQ(handler_.wake_at(), kNever);
+}
+
+TEST_F(RequestHandlerTest, UnitsAreSelectedByConditionsThatHoldTogether) {
+  Add(Line(1, "select", {{"unit_ids", {3, 1}}, {"states", {"absent"}}}) +
+      Line(2, "select", {{"bus_ids", {0}}, {"states", {"unknown", "fault"}}}) +
+      Line(3, "select", {{"states", {"fault"}}}) + Line(4, "select", {{"states", {"lazy"}}}) +
+      Line(5, "select", {{"bus_ids", {9}}}) + Line(6, "select", {{"unit_ids", {9}}}) +
+      Line(7, "select"));
+  TurnUntilQuiet();
+  const std::string answers = clients_[0]->Receive();
+  EXPECT_THAT(answers, HasSubstr(R"("id":1,"ok":true,"result":{"unit_ids":[1,3]})"));
+  EXPECT_THAT(answers, HasSubstr(R"("id":2,"ok":true,"result":{"unit_ids":[1,2,3]})"));
+  EXPECT_THAT(answers, HasSubstr("no unit is so"));
+  EXPECT_THAT(answers, HasSubstr("there is no state 'lazy'"));
+  EXPECT_THAT(answers, HasSubstr("there is no bus 9"));
+  EXPECT_THAT(answers, HasSubstr("there is no unit 9"));
+  EXPECT_THAT(answers, HasSubstr("no unit named"));
+}
+
+TEST_F(RequestHandlerTest, ADryRunIsPlannedAndChangesNothing) {
+  const Json args = {{"targets_csv", "unit_id,theta_deg,phi_deg\n1,10,90\n"}};
+  Add(Line(1, "preview", args) + Line(2, "preview", args));
+  TurnUntilQuiet();
+  EXPECT_TRUE(commands_.empty());
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("another dry run is being planned"));
+  const auto job = handler_.TakePreview();
+  ASSERT_TRUE(job);
+  EXPECT_EQ(job->purpose, PlanPurpose::kPreview);
+  EXPECT_FALSE(job->targets[0]) << "the unit was never heard, so it cannot go";
+  EXPECT_FALSE(handler_.TakePreview()) << "it is handed out once";
+  handler_.PreviewDone(fleet_.View(), {.purpose = PlanPurpose::kPreview, .plan = Plan{}});
+  const std::string answer = clients_[0]->Receive();
+  EXPECT_THAT(answer, HasSubstr(R"("served":0,"targeted":1)"));
+  EXPECT_THAT(answer, HasSubstr(R"("outcome":"refused")"));
+  EXPECT_FALSE(fleet_.View().coordinator->busy());
+  clients_[0]->Send(Line(3, "preview", args));
+  TurnUntilQuiet();
+  ASSERT_TRUE(handler_.TakePreview());
+  handler_.PreviewDone(fleet_.View(), {.purpose = PlanPurpose::kPreview,
+                                       .plan = Fail(ErrorCode::kUnavailable, "given up")});
+  EXPECT_THAT(clients_[0]->Receive(), HasSubstr("is planned first"));
 }
 
 TEST(RequestHandler, KnowsAStopFromEverythingElse) {

@@ -1,0 +1,200 @@
+#include "daemon/verbs/history_requests.h"
+
+#include <algorithm>
+#include <iterator>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/status/history_json.h"
+#include "daemon/verbs/requested_command.h"
+#include "daemon/verbs/unit_selection.h"
+#include "fleet/row_check.h"
+
+namespace focalfleet {
+namespace {
+
+constexpr std::uint64_t kHistoryRowsMax = 1000;
+/// Rows of a table that are looked at for events of some units or severities: some 20 ms.
+constexpr std::uint32_t kRowsLookedAt = 10'000;
+
+Result<std::uint32_t> LimitArgument(const Json& args, std::uint64_t otherwise) {
+  FOCALFLEET_TRY_ASSIGN(const std::uint64_t asked, UnsignedArgumentOr(args, "limit", otherwise));
+  return static_cast<std::uint32_t>(std::min(asked, kHistoryRowsMax));
+}
+
+/// The code of {state?} among those up to `last`; none: not given.
+template <class Enum>
+Result<std::optional<Enum>> StateArgument(const Json& args, Enum last) {
+  if (!args.contains("state")) return std::optional<Enum>();
+  FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgument(args, "state"));
+  std::string known;
+  for (std::uint8_t code = 0; code <= static_cast<std::uint8_t>(last); ++code) {
+    if (text == Name(static_cast<Enum>(code))) return std::optional(static_cast<Enum>(code));
+    known += std::string(known.empty() ? "" : ", ") + Name(static_cast<Enum>(code));
+  }
+  return Fail(ErrorCode::kInvalid, "there is no state '" + text + "'; they are " + known);
+}
+
+struct Event {
+  WallTime at;
+  Severity severity = Severity::kInfo;
+  const char* kind = "";
+  Json name;
+  std::optional<UnitId> unit = {};
+  std::optional<BusId> bus = {};
+  std::string text = {};
+};
+
+Event EventOf(const AlarmHistory& alarm) {
+  return {.at = alarm.at,
+          .severity = alarm.row.severity,
+          .kind = "alarm",
+          .name = Name(alarm.row.name),
+          .unit = alarm.row.unit,
+          .bus = alarm.row.bus,
+          .text = alarm.row.text};
+}
+
+Event EventOf(const UnitHistory& unit) {
+  std::string text = "unit " + std::to_string(unit.unit.value) + ": ";
+  if (unit.serial.value != 0) text += "serial " + std::to_string(unit.serial.value) + ", ";
+  text += unit.enabled ? "enabled" : "disabled: " + unit.reason;
+  return {.at = unit.at, .kind = "unit", .name = {}, .unit = unit.unit, .text = std::move(text)};
+}
+
+std::string Named(const ConfigurationRow& row) {
+  return "configuration " + std::to_string(row.id) + " (" + row.source + ")";
+}
+
+Event BeginOf(const ConfigurationHistory& entry) {
+  return {.at = entry.began,
+          .kind = "configuration",
+          .name = {},
+          .text = Named(entry.row) + " begins: " + std::to_string(entry.row.counts.targeted) +
+                  " targeted"};
+}
+
+Event EndOf(const ConfigurationHistory& entry) {
+  const ConfigurationRow& row = entry.row;
+  std::string text = Named(row) + " is " + Name(row.state) + ": " +
+                     std::to_string(row.counts.arrived) + " of " +
+                     std::to_string(row.counts.targeted) + " arrived";
+  const std::pair<const char*, std::uint32_t> rest[] = {{"refused", row.counts.refused},
+                                                        {"failed", row.counts.failed},
+                                                        {"stopped", row.counts.stopped},
+                                                        {"unmeasured", row.counts.unmeasured}};
+  for (const auto& [what, count] : rest)
+    if (count > 0) text += ", " + std::to_string(count) + " " + what;
+  const bool well =
+      row.state == ConfigurationState::kDone && row.counts.arrived == row.counts.targeted;
+  return {.at = entry.changed,
+          .severity = well ? Severity::kInfo : Severity::kWarning,
+          .kind = "configuration",
+          .name = {},
+          .text = std::move(text)};
+}
+
+Json JsonOf(const Event& event) {
+  return {{"at", ToIso8601(event.at)},
+          {"at_ns", event.at.ns},
+          {"severity", Name(event.severity)},
+          {"kind", event.kind},
+          {"name", event.name},
+          {"unit_id", event.unit ? Json(event.unit->value) : Json()},
+          {"bus_id", event.bus ? Json(event.bus->value) : Json()},
+          {"text", event.text}};
+}
+
+/// All events of the period, as far as they are looked at, in any order.
+Result<std::vector<Event>> EventsIn(const Period& period, StoreReader* store) {
+  std::vector<Event> events;
+  FOCALFLEET_TRY_ASSIGN(const auto alarms, store->Alarms(kRowsLookedAt, period));
+  for (const AlarmHistory& alarm : alarms) events.push_back(EventOf(alarm));
+  FOCALFLEET_TRY_ASSIGN(const auto units, store->Units(std::nullopt, kRowsLookedAt, period));
+  for (const UnitHistory& unit : units) events.push_back(EventOf(unit));
+  FOCALFLEET_TRY_ASSIGN(const auto configurations,
+                        store->Configurations(kRowsLookedAt, {.since = period.since}));
+  for (const ConfigurationHistory& entry : configurations) {
+    events.push_back(BeginOf(entry));
+    if (IsOver(entry.row.state)) events.push_back(EndOf(entry));
+  }
+  std::erase_if(events, [&](const Event& event) {
+    return event.at < period.since || event.at >= period.until;
+  });
+  return events;
+}
+
+}  // namespace
+
+Result<Period> PeriodArgument(const Json& args) {
+  Period period;
+  if (args.contains("since_ns")) {
+    FOCALFLEET_TRY_ASSIGN(period.since.ns, IntegerArgument(args, "since_ns"));
+  }
+  if (args.contains("until_ns")) {
+    FOCALFLEET_TRY_ASSIGN(period.until.ns, IntegerArgument(args, "until_ns"));
+  }
+  return period;
+}
+
+Result<Severity> SeverityArgumentOr(const Json& args, Severity otherwise) {
+  if (!args.contains("severity")) return otherwise;
+  FOCALFLEET_TRY_ASSIGN(const std::string text, TextArgument(args, "severity"));
+  for (const Severity severity : {Severity::kInfo, Severity::kWarning, Severity::kError})
+    if (text == Name(severity)) return severity;
+  return Fail(ErrorCode::kInvalid, "severity must be info, warning or error, not '" + text + "'");
+}
+
+Result<Json> AskHistory(const ControlRequest& request, const FleetView& view,
+                        const OpenReader& reader) {
+  const Json& args = request.args;
+  FOCALFLEET_TRY_ASSIGN(const std::uint32_t limit, LimitArgument(args, 20));
+  FOCALFLEET_TRY_ASSIGN(const Period period, PeriodArgument(args));
+  if (!args.contains("unit_id")) {
+    FOCALFLEET_TRY_ASSIGN(const auto state, StateArgument(args, kLastConfigurationState));
+    FOCALFLEET_TRY_ASSIGN(StoreReader* const store, reader());
+    FOCALFLEET_TRY_ASSIGN(const auto configurations, store->Configurations(limit, period, state));
+    // A state is one of configurations; alarms have none.
+    if (state) return Json{{"configurations", HistoryJson(configurations)}};
+    FOCALFLEET_TRY_ASSIGN(const auto alarms, store->Alarms(limit, period));
+    return Json{{"configurations", HistoryJson(configurations)}, {"alarms", HistoryJson(alarms)}};
+  }
+  FOCALFLEET_TRY_ASSIGN(const PositionerIndex i, UnitArgument(args, *view.layout));
+  FOCALFLEET_TRY_ASSIGN(const auto end, StateArgument(args, kLastIntentEnd));
+  const UnitId id = view.layout->unit(i).id;
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const store, reader());
+  FOCALFLEET_TRY_ASSIGN(const auto moves, store->Moves(id, limit, period, end));
+  if (end) return Json{{"moves", HistoryJson(moves)}};
+  FOCALFLEET_TRY_ASSIGN(const auto places, store->Units(id, limit, period));
+  return Json{{"moves", HistoryJson(moves)}, {"unit", HistoryJson(places)}};
+}
+
+Result<Json> AskEvents(const ControlRequest& request, const FleetView& view,
+                       const OpenReader& reader) {
+  const Json& args = request.args;
+  FOCALFLEET_TRY_ASSIGN(const std::uint32_t limit, LimitArgument(args, 100));
+  FOCALFLEET_TRY_ASSIGN(const Period period, PeriodArgument(args));
+  FOCALFLEET_TRY_ASSIGN(const Severity least, SeverityArgumentOr(args, Severity::kInfo));
+  std::set<UnitId> wanted;
+  if (args.contains("unit_ids")) {
+    FOCALFLEET_TRY_ASSIGN(const auto units,
+                          SelectUnits(Json{{"unit_ids", args["unit_ids"]}}, view));
+    for (const PositionerIndex i : units) wanted.insert(view.layout->unit(i).id);
+  }
+  FOCALFLEET_TRY_ASSIGN(StoreReader* const store, reader());
+  FOCALFLEET_TRY_ASSIGN(std::vector<Event> events, EventsIn(period, store));
+  std::erase_if(events, [&](const Event& event) {
+    return event.severity < least ||
+           (!wanted.empty() && !(event.unit && wanted.contains(*event.unit)));
+  });
+  std::ranges::stable_sort(events, {}, &Event::at);
+  Json list = Json::array();
+  const std::size_t first = events.size() - std::min<std::size_t>(events.size(), limit);
+  for (std::size_t k = first; k < events.size(); ++k) list.push_back(JsonOf(events[k]));
+  return Json{{"events", std::move(list)}};
+}
+
+}  // namespace focalfleet

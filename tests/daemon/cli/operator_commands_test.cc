@@ -1,0 +1,209 @@
+// The commands about alarms, events and the configuration under way, and what several commands have
+// in common: units by range, bus and state, and the question before what cannot be taken back.
+#include <gmock/gmock.h>
+
+#include "tests/daemon/cli/daemon_commands.h"
+
+namespace focalfleet {
+namespace {
+
+using test::ConfigurationAnswer;
+using test::DaemonCommands;
+using test::kTargets;
+using test::StatusAnswer;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+Json Alarm(std::uint64_t id, const std::string& name, const Json& unit, bool muted = false) {
+  return {{"id", id},
+          {"name", name},
+          {"severity", "error"},
+          {"state", "open"},
+          {"muted", muted},
+          {"unit_id", unit},
+          {"bus_id", nullptr},
+          {"text", "text of " + std::to_string(id)},
+          {"count", 2},
+          {"last", "2026-11-26T20:00:00.000Z"},
+          {"runbook", "docs/runbook.md#x"}};
+}
+
+TEST_F(DaemonCommands, AlarmsOfOneNameAreOneLineWithTheirUnits) {
+  const Json answer{
+      {"open", 4},
+      {"muted", 1},
+      {"alarms",
+       {Alarm(1, "UnitSilent", 7), Alarm(2, "UnitSilent", 9), Alarm(3, "UnitSilent", 8),
+        Alarm(4, "StoreFull", nullptr), Alarm(5, "UnitFault", 3, true)}},
+      {"mutes",
+       {{{"name", "UnitFault"},
+         {"until", "2026-11-26T21:00:00.000Z"},
+         {"reason", "repair"},
+         {"by", "uid 4294967294"},
+         {"open", 1}}}}};
+  const auto text = Ask({"alarms"}, {{"alarms", {.result = answer}}});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("3 units (7-9), the newest: text of 3"));
+  EXPECT_THAT(text.out, HasSubstr("UnitSilent  open, 6 times"));
+  EXPECT_THAT(text.out, HasSubstr("text of 4 (alarm 4)"));
+  EXPECT_THAT(text.out, HasSubstr("docs/runbook.md#x"));
+  EXPECT_THAT(text.out, Not(HasSubstr("text of 5")));
+  EXPECT_THAT(text.out, HasSubstr("muted  UnitFault until 2026-11-26T21:00:00.000Z by uid "
+                                  "4294967294: repair (1 open)"));
+  EXPECT_EQ(requests_.at(0).args, (Json{{"all", false}}));
+  EXPECT_THAT(Ask({"alarms", "--all"}, {{"alarms", {.result = answer}}}).out,
+              HasSubstr("text of 5"));
+  EXPECT_THAT(Ask({"alarms"}, {{"alarms", {}}}).out, HasSubstr("no open alarms"));
+}
+
+TEST_F(DaemonCommands, AlarmsAreAcknowledgedByIdAndName) {
+  const auto done = Ask({"alarms", "ack", "4711", "UnitNeverBegan"},
+                        {{"alarms_ack", {.result = Json{{"text", "acknowledged 3"}}}}});
+  EXPECT_EQ(done.exit, 0) << done.err;
+  EXPECT_THAT(done.out, HasSubstr("acknowledged 3"));
+  EXPECT_EQ(requests_.at(0).args, (Json{{"ids", {4711}}, {"names", {"UnitNeverBegan"}}}));
+  EXPECT_EQ(Ask({"alarms", "ack"}, {}).exit, 2);
+}
+
+TEST_F(DaemonCommands, AMuteWantsAnEndAndAReason) {
+  EXPECT_EQ(Ask({"alarms", "mute", "BusDown", "--reason", "repair"}, {}).exit, 2);
+  EXPECT_EQ(Ask({"alarms", "mute", "BusDown", "--for", "2h"}, {}).exit, 2);
+  EXPECT_EQ(Ask({"alarms", "mute", "BusDown", "--for", "soon", "--reason", "x"}, {}).exit, 1);
+  EXPECT_EQ(
+      Ask({"alarms", "mute", "BusDown", "--for", "2h", "--reason", "repair"}, {{"alarms_mute", {}}})
+          .exit,
+      0);
+  EXPECT_EQ(requests_.at(0).args,
+            (Json{{"name", "BusDown"}, {"for_s", 7200.0}, {"reason", "repair"}}));
+  EXPECT_EQ(Ask({"alarms", "unmute", "BusDown"}, {{"alarms_unmute", {}}}).exit, 0);
+}
+
+TEST_F(DaemonCommands, StatusCountsOpenAlarmsAndNamesTheNextStep) {
+  Json status = StatusAnswer();
+  EXPECT_THAT(Ask({"status"}, {{"status", {.result = status}}}).out, Not(HasSubstr("alarms")));
+  status["alarms"] = {{"open", 3}, {"muted", 1}, {"worst", "error"}};
+  status["next"] = "focalfleet home 7,9 --wait";
+  const auto text = Ask({"status"}, {{"status", {.result = status}}});
+  EXPECT_THAT(text.out, HasSubstr("alarms     3 open, 1 muted (`focalfleet alarms`)"));
+  EXPECT_THAT(text.out, ::testing::EndsWith("\nnext: focalfleet home 7,9 --wait\n"));
+}
+
+TEST_F(DaemonCommands, EventsAskForAPeriodUnitsAndASeverity) {
+  const Json event{{"at", "2026-11-26T20:00:00.000Z"},
+                   {"severity", "warning"},
+                   {"name", "UnitNeverBegan"},
+                   {"text", "unit 7 did not begin to move"}};
+  const auto text = Ask({"events", "--since", "2026-11-26T19:00Z", "--until", "2026-11-27",
+                         "--unit", "7,20-22", "--severity", "warning", "--limit", "5"},
+                        {{"events", {.result = Json{{"events", {event}}}}}});
+  EXPECT_EQ(text.exit, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("UnitNeverBegan: unit 7 did not begin to move"));
+  EXPECT_EQ(requests_.at(0).args, (Json{{"since_ns", 1795719600000000000},
+                                        {"until_ns", 1795737600000000000},
+                                        {"unit_ids", {7, 20, 21, 22}},
+                                        {"severity", "warning"},
+                                        {"limit", 5}}));
+  EXPECT_EQ(Ask({"events", "--since", "yesterday"}, {}).exit, 1);
+  EXPECT_EQ(Ask({"events", "-f", "--until", "1h"}, {}).exit, 2);
+}
+
+TEST_F(DaemonCommands, FollowedEventsBeginAfterTheLastOneShown) {
+  const Json event{{"at_ns", 41}, {"severity", "info"}, {"text", "once"}};
+  const auto text =
+      Ask({"events", "-f"}, {{"events", {.result = Json{{"events", {event}}}, .answers_most = 2}}});
+  EXPECT_EQ(text.exit, 4) << "the daemon is gone";
+  ASSERT_GE(requests_.size(), 2u);
+  EXPECT_FALSE(requests_[0].args.contains("since_ns"));
+  EXPECT_EQ(requests_[1].args["since_ns"], 42);
+}
+
+TEST_F(DaemonCommands, WaitEndsAsTheConfigurationDid) {
+  const auto exit = [&](const Json& answer) {
+    return Ask({"wait"}, {{"wait", {.result = answer}}, {"status", {.result = StatusAnswer()}}})
+        .exit;
+  };
+  EXPECT_EQ(exit(ConfigurationAnswer("done", 2, 0)), 0);
+  EXPECT_EQ(exit(ConfigurationAnswer("done", 1, 1)), 3);
+  EXPECT_EQ(exit(ConfigurationAnswer("stopped", 1, 0)), 5);
+  const auto nothing = Ask({"wait"}, {{"wait", {.result = Json{{"under_way", false}}}}});
+  EXPECT_EQ(nothing.exit, 0);
+  EXPECT_THAT(nothing.out, HasSubstr("nothing is under way"));
+  EXPECT_EQ(Ask({"wait"}, {{"wait", {.hang_up = true}}}).exit, 4);
+  const Error ends{ErrorCode::kUnavailable, "the daemon ends"};
+  EXPECT_EQ(Ask({"wait"}, {{"wait", {.result = tl::unexpected<Error>(ends)}}}).exit, 4);
+  const Error late{ErrorCode::kRefused, "configuration 7 is still under way"};
+  EXPECT_EQ(
+      Ask({"wait", "--timeout", "2.5"}, {{"wait", {.result = tl::unexpected<Error>(late)}}}).exit,
+      1);
+  EXPECT_EQ(requests_.at(0).args, (Json{{"timeout_s", 2.5}}));
+}
+
+TEST_F(DaemonCommands, ADryRunReportsWhoIsServedAndApplyIsNotSent) {
+  Json answer{{"dry_run", true},
+              {"targeted", 2},
+              {"served", 1},
+              {"moving", 1},
+              {"makespan_s", 12},
+              {"energy_J", 3.5},
+              {"peak_power_W", 2},
+              {"unserved", {{{"unit_id", 2}, {"outcome", "refused"}, {"reason", "disabled: x"}}}}};
+  const std::string file = scratch_.Put("t.csv", kTargets);
+  const auto some = Ask({"apply", file, "--dry-run"}, {{"preview", {.result = answer}}});
+  EXPECT_EQ(some.exit, 3) << some.err;
+  EXPECT_THAT(some.out, HasSubstr("dry run, nothing moves: 1 of 2 units served"));
+  EXPECT_THAT(some.out, HasSubstr("makespan 12.0 s, energy 3.5 J, peak power 2.0 W"));
+  EXPECT_THAT(some.out, HasSubstr("unit 2: refused: disabled: x"));
+  ASSERT_EQ(requests_.size(), 1u);
+  EXPECT_EQ(requests_[0].args["targets_csv"], kTargets);
+  answer["served"] = 2;
+  answer["unserved"] = Json::array();
+  EXPECT_EQ(Ask({"apply", file, "--dry-run"}, {{"preview", {.result = answer}}}).exit, 0);
+  const Error busy{ErrorCode::kRefused, "configuration 7 is under way"};
+  EXPECT_EQ(
+      Ask({"apply", file, "--dry-run"}, {{"preview", {.result = tl::unexpected<Error>(busy)}}})
+          .exit,
+      1);
+  EXPECT_EQ(Ask({"apply", file, "--dry-run", "--wait"}, {}).exit, 2);
+}
+
+TEST_F(DaemonCommands, UnitsAreNamedByRangeBusAndState) {
+  EXPECT_EQ(Ask({"home", "7,20-22", "9"}, {{"home", {}}}).exit, 0);
+  EXPECT_EQ(requests_.at(0).args["unit_ids"], (Json{7, 20, 21, 22, 9}));
+  EXPECT_EQ(Ask({"enable", "--bus", "3,5", "--state", "fault", "--within-s", "0"},
+                {{"select", {.result = Json{{"unit_ids", {4, 6}}}}},
+                 {"enable", {}},
+                 {"unit", {.result = Json{{"phase", "ready"}}}}})
+                .exit,
+            0);
+  ASSERT_GE(requests_.size(), 2u);
+  EXPECT_EQ(requests_[0].args, (Json{{"bus_ids", {3, 5}}, {"states", {"fault"}}}));
+  EXPECT_EQ(requests_[1].args, (Json{{"unit_ids", {4, 6}}}));
+  const auto units =
+      Ask({"unit", "7-8", "--json"}, {{"unit", {.result = Json{{"phase", "ready"}}}}});
+  EXPECT_EQ(Json::parse(units.out, nullptr, false)["units"].size(), 2u);
+  for (const char* bad : {"7-", "a", "9-7", "7,,8"})
+    EXPECT_EQ(Ask({"home", bad}, {{"home", {}}}).exit, 2) << bad;
+  EXPECT_EQ(Ask({"disable", "--reason", "x"}, {{"disable", {}}}).exit, 2) << "no unit";
+}
+
+TEST_F(DaemonCommands, WhatCannotBeTakenBackIsRefusedWithoutATerminal) {
+  const std::string model = scratch_.Put("m.toml", "x");
+  for (std::vector<std::string> words :
+       std::vector<std::vector<std::string>>{{"home", "7", "--unproven"},
+                                             {"adopt", "7"},
+                                             {"disable", "1-11", "--reason", "x"},
+                                             {"model", "load", model}}) {
+    const std::map<std::string, test::FakeAnswer> answers = {
+        {"home", {}}, {"adopt", {}}, {"disable", {}}, {"model_load", {}}, {"model", {}}};
+    const auto refused = Ask(words, answers);
+    EXPECT_EQ(refused.exit, 1) << words[0];
+    EXPECT_THAT(refused.err, HasSubstr("add --yes")) << words[0];
+    EXPECT_TRUE(requests_.empty()) << words[0];
+    words.emplace_back("--yes");
+    EXPECT_EQ(Ask(words, answers).exit, 0) << words[0];
+  }
+  EXPECT_EQ(Ask({"disable", "1-10", "--reason", "x"}, {{"disable", {}}}).exit, 0) << "a few";
+}
+
+}  // namespace
+}  // namespace focalfleet
