@@ -42,7 +42,7 @@ class Coordinator::Impl {
     for (const PlanDone& plan : inputs.plans) executor_.OnPlan(plan);
     for (const ExposureDone& exposure : inputs.exposures) executor_.OnExposure(exposure);
     for (const Command& command : inputs.commands) Obey(command);
-    while (const auto due = timers_.TakeDue(step_.now)) static_cast<void>(sessions_.Service(*due));
+    while (const auto due = timers_.TakeDue(step_.now)) sessions_.Service(*due);
     executor_.Advance();
     effects->wake_at = std::min(effects->wake_at, executor_.due());
     ledger_.SendReplies();

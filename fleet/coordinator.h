@@ -8,6 +8,7 @@
 //   plan_job  to the planner: RunPlanJob on a thread of its own; PlanDone brings the answer
 //   exposure  to the camera:  ExposureDone brings the answer
 //   replies   to the senders of the commands
+//   sync_at   to the SYNC line: an edge at this instant, where there is a line
 //   changed   to DDS:         the newest value of each unit is enough
 //
 // Rows that a motion needs come first. A start signal is among the frames of a later step, when the

@@ -16,7 +16,7 @@ namespace focalfleet {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kNeverS = std::numeric_limits<double>::infinity();
 constexpr double kPi = std::numbers::pi;
 constexpr int kLegs = 3;
 
@@ -36,8 +36,8 @@ double Along(Complex value, Complex axis) {
 // A leg in one carrier: high from the start or not, and from `rise_s` to `fall_s`.
 struct LegPulse {
   bool high_at_start = false;
-  double rise_s = kNever;
-  double fall_s = kNever;
+  double rise_s = kNeverS;
+  double fall_s = kNeverS;
 };
 using Pulses = std::array<LegPulse, kLegs>;
 
@@ -48,7 +48,7 @@ LegPulse PulseOf(double high_counts, double counter1, WaveMode mode) {
   const double low_counts = counter1 - high_counts;
   const double rise = centred ? low_counts / 2 : low_counts;
   // The pulse lasts up to the end of the carrier: the next one begins low.
-  const double fall = centred ? rise + high_counts : kNever;
+  const double fall = centred ? rise + high_counts : kNeverS;
   return {false, rise / kTimerHz, fall / kTimerHz};
 }
 
@@ -82,14 +82,14 @@ Pulses PulsesOf(std::uint32_t vector, const AxisDrive& drive, WaveMode mode) {
 
 // ---- voltages and currents of bridge and winding
 
-struct Leg {
+struct CurrentLeg {
   double level = 0;  // of the output, in bus voltages
   bool target = false;
-  bool by_diode = false;    // both switches are open
-  bool floats = false;      // and no diode conducts
-  double flip_s = kNever;   // the diode has taken over
-  double close_s = kNever;  // the switch of the target holds the leg
-  std::size_t next = 0;     // command of this carrier
+  bool by_diode = false;     // both switches are open
+  bool floats = false;       // and no diode conducts
+  double flip_s = kNeverS;   // the diode has taken over
+  double close_s = kNeverS;  // the switch of the target holds the leg
+  std::size_t next = 0;      // command of this carrier
 };
 
 // Runs through carriers and sums energies with a weight.
@@ -110,7 +110,7 @@ class Bridge {
     rotor_ = std::polar(1.0, rotor_rad);
     weight_ = weight;
     now_s_ = 0;
-    for (Leg& leg : legs_) leg.next = 0;
+    for (CurrentLeg& leg : legs_) leg.next = 0;
     for (;;) {
       double next_s = Due(pulses);
       SetVoltage();
@@ -118,7 +118,7 @@ class Bridge {
       next_s = std::min(next_s, carrier_s_);
       Advance(next_s);
     }
-    for (Leg& leg : legs_) {
+    for (CurrentLeg& leg : legs_) {
       leg.flip_s -= carrier_s_;
       leg.close_s -= carrier_s_;
     }
@@ -143,12 +143,12 @@ class Bridge {
 
   // Carries out all that is due now. Returns when the next event is due.
   double Due(const Pulses& pulses) {
-    double next_s = kNever;
+    double next_s = kNeverS;
     for (std::size_t k = 0; k < kLegs; ++k) {
-      Leg& leg = legs_[k];
+      CurrentLeg& leg = legs_[k];
       if (leg.flip_s <= now_s_) {
         leg.level = leg.level < 0.5 ? 1 : 0;
-        leg.flip_s = kNever;
+        leg.flip_s = kNeverS;
       }
       if (leg.close_s <= now_s_) Close(k);
       for (; leg.next < 3 && CommandTime(pulses[k], leg.next) <= now_s_; ++leg.next) {
@@ -169,32 +169,32 @@ class Bridge {
   }
 
   void Command(std::size_t k, bool target) {
-    Leg& leg = legs_[k];
+    CurrentLeg& leg = legs_[k];
     if (leg.target == target) return;
     leg.target = target;
     leg.by_diode = true;
     const bool diode = Along(Current(), LegAxes()[k]) <= 0;  // which diode takes the current
     leg.close_s = now_s_ + motor_.dead_time_s + (diode == target ? 0 : RampOf(target) / 2);
-    leg.flip_s = kNever;
+    leg.flip_s = kNeverS;
     if (leg.floats || diode == (leg.level > 0.5)) return;
     leg.flip_s = now_s_ + RampOf(diode) / 2;
     leg.close_s = std::max(leg.close_s, leg.flip_s);
   }
 
   void Close(std::size_t k) {
-    Leg& leg = legs_[k];
+    CurrentLeg& leg = legs_[k];
     const double level = leg.target ? 1 : 0;
     const double step = std::abs(level - leg.level);
     const double current_A = std::abs(Along(Current(), LegAxes()[k]));
     sum_.switching_J += weight_ * 0.5 * v_bus_V_ * step * current_A * RampOf(leg.target);
     leg.level = level;
     leg.by_diode = leg.floats = false;
-    leg.close_s = leg.flip_s = kNever;
+    leg.close_s = leg.flip_s = kNeverS;
   }
 
   void SetVoltage() {
     for (std::size_t k = 0; k < kLegs; ++k) {
-      Leg& leg = legs_[k];
+      CurrentLeg& leg = legs_[k];
       if (!leg.floats) continue;
       // No current along the leg's axis: its voltage there is the back EMF; the star point is the
       // mean of all three.
@@ -214,8 +214,8 @@ class Bridge {
     double first_s = until_s;
     std::optional<std::size_t> which;
     for (std::size_t k = 0; k < kLegs; ++k) {
-      const Leg& leg = legs_[k];
-      if (!leg.by_diode || leg.floats || leg.flip_s < kNever) continue;
+      const CurrentLeg& leg = legs_[k];
+      if (!leg.by_diode || leg.floats || leg.flip_s < kNeverS) continue;
       const double sign = leg.level > 0.5 ? -1 : 1;
       const double end = sign * Along(end_A, LegAxes()[k]);
       if (end >= 0) continue;
@@ -287,7 +287,7 @@ class Bridge {
   Complex driven_A_;  // i_v
   Complex rotor_;
   Complex voltage_V_;
-  std::array<Leg, kLegs> legs_;
+  std::array<CurrentLeg, kLegs> legs_;
   double now_s_ = 0;  // since the carrier began
   double weight_ = 0;
   Sums sum_;

@@ -105,7 +105,6 @@ class DrivePowers {
  public:
   explicit DrivePowers(const MotorModel& motor) : motor_(motor) {}
   const MotorPower& Of(const Feed& feed);
-  [[nodiscard]] const MotorModel& motor() const { return motor_; }
 
  private:
   using Key = std::tuple<std::uint16_t, std::uint8_t, std::uint16_t, WaveMode, double>;

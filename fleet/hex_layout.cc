@@ -13,8 +13,7 @@ constexpr double kGear = 337.0 * 45 / 17;
 constexpr double kArmPerPitch = 16.5 / 2 / 25.6;
 constexpr double kThetaEndDeg = 190;
 constexpr double kPhiMaxDeg = 180;
-constexpr double kHalfWidthShare = 0.08;  // of the pitch: the width that Layout gives the arms
-constexpr double kFiducialRoomMm = 1.5;   // a ferrule of 2 mm and the clearance
+constexpr double kFiducialRoomMm = 1.5;  // a ferrule of 2 mm and the clearance
 constexpr double kGoldenTurn = 0.38196601125010515;
 
 struct LatticePoint {

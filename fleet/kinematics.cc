@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
 // Rounding of a table's last digit at the end of a range must not cost a solution.
 constexpr double kRangeToleranceDeg = 1e-6;
 constexpr double kVectorToleranceDeg = 1e-9;  // rounding of a range that ends at a whole vector
@@ -27,23 +27,23 @@ std::vector<double> TurnsWithin(double angle_deg, const AxisGeometry& axis, doub
 }
 
 PointFp Moved(PointFp from, double length_mm, double direction_deg) {
-  return {from.x_mm + length_mm * std::cos(direction_deg * kDegree),
-          from.y_mm + length_mm * std::sin(direction_deg * kDegree)};
+  return {from.x_mm + length_mm * std::cos(direction_deg * kRadiansPerDegree),
+          from.y_mm + length_mm * std::sin(direction_deg * kRadiansPerDegree)};
 }
 
 double DistanceAt(const Unit& unit, double phi_deg) {
   const double a = unit.theta().arm_mm;
   const double b = unit.phi().arm_mm;
-  const double c = std::cos((phi_deg + unit.phi().zero_deg) * kDegree);
+  const double c = std::cos((phi_deg + unit.phi().zero_deg) * kRadiansPerDegree);
   return std::sqrt(std::max(0.0, a * a + b * b + 2 * a * b * c));
 }
 
 // The theta that points the fibre at a direction, for a given phi; without whole turns.
 double ThetaFor(const Unit& unit, double direction_deg, double phi_deg) {
-  const double p = (phi_deg + unit.phi().zero_deg) * kDegree;
+  const double p = (phi_deg + unit.phi().zero_deg) * kRadiansPerDegree;
   const double lead = std::atan2(unit.phi().arm_mm * std::sin(p),
                                  unit.theta().arm_mm + unit.phi().arm_mm * std::cos(p));
-  return direction_deg - lead / kDegree - unit.theta().zero_deg;
+  return direction_deg - lead / kRadiansPerDegree - unit.theta().zero_deg;
 }
 
 bool SamePlace(const AxisAngles& a, const AxisAngles& b) {
@@ -56,7 +56,7 @@ std::vector<double> PhisFor(const Unit& unit, double distance_mm) {
   const double a = unit.theta().arm_mm;
   const double b = unit.phi().arm_mm;
   const double c = (distance_mm * distance_mm - a * a - b * b) / (2 * a * b);
-  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kDegree;
+  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kRadiansPerDegree;
   std::vector<double> phis = TurnsWithin(bend_deg - unit.phi().zero_deg, unit.phi(), kClampTryDeg);
   for (const double phi : TurnsWithin(-bend_deg - unit.phi().zero_deg, unit.phi(), kClampTryDeg))
     phis.push_back(phi);
@@ -128,7 +128,8 @@ std::vector<AxisAngles> AnglesFor(const Unit& unit, PointFp fibre_fp, double fre
   if (!std::isfinite(distance)) return solutions;
   const bool direction_is_free = distance < kReachToleranceMm / 2;
   const double direction_deg =
-      std::atan2(fibre_fp.y_mm - unit.base_fp.y_mm, fibre_fp.x_mm - unit.base_fp.x_mm) / kDegree;
+      std::atan2(fibre_fp.y_mm - unit.base_fp.y_mm, fibre_fp.x_mm - unit.base_fp.x_mm) /
+      kRadiansPerDegree;
   for (const double phi : PhisFor(unit, distance)) {
     const double theta = ThetaFor(unit, direction_deg, phi);
     const std::vector<double> thetas =
@@ -157,7 +158,7 @@ AxisAngles AnglesSeen(const Unit& unit, PointFp seen_fp, const AxisAngles& belie
   const double b = unit.phi().arm_mm;
   const double distance = DistanceMm(unit.base_fp, seen_fp);
   const double c = (distance * distance - a * a - b * b) / (2 * a * b);
-  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kDegree;
+  const double bend_deg = std::acos(std::clamp(c, -1.0, 1.0)) / kRadiansPerDegree;
   const auto nearest = [](double angle_deg, double to_deg) {
     return to_deg + std::remainder(angle_deg - to_deg, 360);
   };
@@ -166,7 +167,8 @@ AxisAngles AnglesSeen(const Unit& unit, PointFp seen_fp, const AxisAngles& belie
   const double phi =
       std::abs(one - believed.phi_deg) <= std::abs(other - believed.phi_deg) ? one : other;
   const double direction_deg =
-      std::atan2(seen_fp.y_mm - unit.base_fp.y_mm, seen_fp.x_mm - unit.base_fp.x_mm) / kDegree;
+      std::atan2(seen_fp.y_mm - unit.base_fp.y_mm, seen_fp.x_mm - unit.base_fp.x_mm) /
+      kRadiansPerDegree;
   return {nearest(ThetaFor(unit, direction_deg, phi), believed.theta_deg), phi};
 }
 
@@ -178,16 +180,18 @@ AxisAngles Improved(const Unit& unit, PointFp seen_fp, const AxisAngles& at,
   const double jt_x = -(arm.b.y_mm - unit.base_fp.y_mm), jt_y = arm.b.x_mm - unit.base_fp.x_mm;
   const double jp_x = -(arm.b.y_mm - arm.a.y_mm), jp_y = arm.b.x_mm - arm.a.x_mm;
   const double rx = seen_fp.x_mm - arm.b.x_mm, ry = seen_fp.y_mm - arm.b.y_mm;
-  const double prior = with.sigma_mm / (with.believed_deg * kDegree);
+  const double prior = with.sigma_mm / (with.believed_deg * kRadiansPerDegree);
   const double weight = prior * prior;
   const double tt = jt_x * jt_x + jt_y * jt_y + weight;
   const double pp = jp_x * jp_x + jp_y * jp_y + weight;
   const double tp = jt_x * jp_x + jt_y * jp_y;
-  const double bt = jt_x * rx + jt_y * ry + weight * (believed.theta_deg - at.theta_deg) * kDegree;
-  const double bp = jp_x * rx + jp_y * ry + weight * (believed.phi_deg - at.phi_deg) * kDegree;
+  const double bt =
+      jt_x * rx + jt_y * ry + weight * (believed.theta_deg - at.theta_deg) * kRadiansPerDegree;
+  const double bp =
+      jp_x * rx + jp_y * ry + weight * (believed.phi_deg - at.phi_deg) * kRadiansPerDegree;
   const double determinant = tt * pp - tp * tp;  // positive because of the prior
-  return {at.theta_deg + (pp * bt - tp * bp) / determinant / kDegree,
-          at.phi_deg + (tt * bp - tp * bt) / determinant / kDegree};
+  return {at.theta_deg + (pp * bt - tp * bp) / determinant / kRadiansPerDegree,
+          at.phi_deg + (tt * bp - tp * bt) / determinant / kRadiansPerDegree};
 }
 
 }  // namespace

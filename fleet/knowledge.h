@@ -1,6 +1,5 @@
 // Knowledge of the coordinator about a unit's place. A bare number hides how it is known, so each
-// has its witness.
-// - measured: by a camera.
+// has its witness. - measured: by a camera, or by the unit's own Hall sensors.
 // - reported: the unit's own vectors after a clean end.
 // - predicted: by the plan, while the unit moves.
 // - interval: a move was cut short, so the unit is somewhere in low..high.

@@ -15,10 +15,8 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kHalfWidthShare = 0.08;   // of the nearest neighbour's distance
 constexpr double kClearanceShare = 0.012;  // of the pitch
 constexpr std::size_t kUnitsPerBus = 100;
-constexpr double kCoordinateMaxMm = 1e5;
 /// A joint that tilts 45 degrees takes the tip this share of its arms' length away.
 constexpr double kFibreCarrierOverArms = 1.4143;
 constexpr double kArmMaxMm = 1e4;
@@ -290,6 +288,13 @@ Result<Layout> Layout::Create(std::vector<Unit> units, Options options) {
   FOCALFLEET_TRY(layout.MeasurePitch(options.clearance_mm));
   FOCALFLEET_TRY(layout.FindNeighbours());
   return layout;
+}
+
+Result<Layout> Layout::Part(std::span<const PositionerIndex> chosen) const {
+  std::vector<Unit> units;
+  units.reserve(chosen.size());
+  for (const PositionerIndex i : chosen) units.push_back(unit(i));
+  return Create(std::move(units), {.clearance_mm = clearance_mm_, .obstacles = obstacles_});
 }
 
 Status Layout::MeasurePitch(double clearance_mm) {

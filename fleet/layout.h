@@ -38,6 +38,11 @@ inline constexpr BusId kNoBus{UINT32_MAX};
 /// The node is not given: Create takes the lowest that is free on the bus, in the order of the
 /// units.
 inline constexpr NodeId kNoNode{0};
+/// The half-width that arms are given where none is stated, as a share of the distance to the
+/// nearest neighbour.
+inline constexpr double kHalfWidthShare = 0.08;
+/// A coordinate on the plate beyond this is a mistake. Units: mm.
+inline constexpr double kCoordinateMaxMm = 1e5;
 
 struct Unit {
   UnitId id;
@@ -93,6 +98,9 @@ class Layout {
   /// 100 a bus, on buses above all that were given (from 0 where none was). Errors: kInvalid, names
   /// the unit. Cost: O(n) for an even plate.
   static Result<Layout> Create(std::vector<Unit> units, Options options);
+
+  /// The layout of these units alone, with this one's clearance and obstacles. Errors: as Create.
+  [[nodiscard]] Result<Layout> Part(std::span<const PositionerIndex> chosen) const;
 
   [[nodiscard]] std::span<const Unit> units() const { return units_; }
   [[nodiscard]] const Unit& unit(PositionerIndex i) const { return units_[i.value]; }

@@ -1,6 +1,6 @@
-// The result of one exposure of the camera over the plate for one unit, as the coordinator takes
-// it. Only certain statuses (IsCertain) give the unit a place. All others are the reason why its
-// place is not known, and the knowledge of the unit stays as it was.
+// A measurement is the result of one exposure for one unit, by the camera over the plate or by the
+// unit's own sensors. Only certain statuses (IsCertain) give the unit a place. All others are the
+// reason why its place is not known, and the knowledge of the unit stays as it was.
 #pragma once
 
 #include <array>

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kEnoughMm = 2e-4;  // the iteration ends this near to the wanted place
 constexpr double kStepMaxDeg = 10;  // of one iteration
 constexpr double kAwayMaxDeg = 30;  // from the guess: beyond, it is another way, not a correction
@@ -30,7 +30,7 @@ std::array<double, kAxisCount> StepTowards(const WantedPlace& wanted, const Segm
   const double u = theta_x * x + theta_y * y, v = phi_x * x + phi_y * y;
   const double determinant = a * d - b * b;
   const auto bounded = [](double radians) {
-    return std::clamp(radians / kRadians, -kStepMaxDeg, kStepMaxDeg);
+    return std::clamp(radians / kRadiansPerDegree, -kStepMaxDeg, kStepMaxDeg);
   };
   return {bounded((d * u - b * v) / determinant), bounded((a * v - b * u) / determinant)};
 }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "daemon/campaign/campaign_log.h"
 #include "fleet/place_inverse.h"
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
@@ -14,7 +14,6 @@ namespace {
 using sim::kPhi;
 using sim::kTheta;
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr double kSameDeg = 1e-6;
 constexpr std::size_t kRestsMax = 32;
 constexpr std::size_t kRestsKept = 8;  // effects that fade have faded by then
@@ -90,7 +89,7 @@ std::optional<AxisAngles> Compensation::CountFor(PositionerIndex i, const Wish& 
     const PointFp fibre = PlaceAfter(unit, &way, &errors);
     const double theta = (count.theta_deg + errors.angle_deg[kTheta].back() +
                           unit.added_deg[kTheta] + arms.zero_deg[kTheta]) *
-                         kRadians;
+                         kRadiansPerDegree;
     return SegmentFp{{arms.base_x_mm + arms.arm_mm[kTheta] * std::cos(theta),
                       arms.base_y_mm + arms.arm_mm[kTheta] * std::sin(theta)},
                      fibre};

@@ -21,7 +21,7 @@ constexpr ClaimStatus kStatuses[] = {ClaimStatus::kReproduced, ClaimStatus::kOrd
                                      ClaimStatus::kNotTestable};
 
 // A number that is not finite becomes null, as JSON has no other form for it.
-Json Numbers(const std::vector<double>& numbers) {
+Json NumbersJson(const std::vector<double>& numbers) {
   const auto one = [](double number) {
     return std::isfinite(number) ? Json(number) : Json(nullptr);
   };
@@ -46,8 +46,8 @@ Json ClaimsJson(const std::vector<Claim>& claims) {
   for (const Claim& claim : claims)
     list.push_back({{"id", claim.id},
                     {"text", claim.text},
-                    {"paper", Numbers(claim.paper)},
-                    {"simulated", Numbers(claim.simulated)},
+                    {"paper", NumbersJson(claim.paper)},
+                    {"simulated", NumbersJson(claim.simulated)},
                     {"unit", claim.unit},
                     {"conditions", claim.conditions},
                     {"status", Name(claim.status)},

@@ -21,7 +21,7 @@
 namespace focalfleet::cli {
 namespace {
 
-constexpr unsigned kSubdivisionMax = 6144;
+constexpr unsigned kStartSubdivisionMax = 6144;
 
 struct EstimateOptions {
   FleetFiles files;
@@ -283,12 +283,12 @@ CLI::Validator MultipleOfSix() {
   return CLI::Validator(
       [](const std::string& text) {
         unsigned value = 0;
-        if (CLI::detail::lexical_cast(text, value) && value > 0 && value <= kSubdivisionMax &&
+        if (CLI::detail::lexical_cast(text, value) && value > 0 && value <= kStartSubdivisionMax &&
             value % 6 == 0) {
           return std::string();
         }
         return fmt::format("{} is not a multiple of 6 up to {}: the field has six sectors", text,
-                           kSubdivisionMax);
+                           kStartSubdivisionMax);
       },
       "");
 }

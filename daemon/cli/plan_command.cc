@@ -12,6 +12,7 @@
 #include "daemon/cli/start_check.h"
 #include "daemon/files/text_file.h"
 #include "daemon/report/plan_page.h"
+#include "daemon/report/plan_picture.h"
 #include "fleet/estimate.h"
 #include "fleet/files/plan_file.h"
 #include "fleet/plan/power_statement.h"
@@ -52,15 +53,21 @@ std::vector<report::RailLimit> LimitsOf(const PlanCommandOptions& options,
   return limits;
 }
 
-std::string PageOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
+constexpr double kPictureSpeed = 4;  // times as fast as the plan: nobody watches a minute
+
+/// The page, or the picture where the file's name says so.
+std::string PlotOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
                    const StatePoses& state, const OfflinePlan& planned) {
-  return report::PlanPage({.title = fmt::format("Plan: {} from {}", options.targets, options.from),
-                           .layout = &fleet.layout,
-                           .drives = fleet.drives,
-                           .start = state,
-                           .targets = planned.targets,
-                           .plan = &planned.plan,
-                           .rail_limits = LimitsOf(options, fleet)});
+  const report::PlanScene scene{
+      .title = fmt::format("Plan: {} from {}", options.targets, options.from),
+      .layout = &fleet.layout,
+      .drives = fleet.drives,
+      .start = state,
+      .targets = planned.targets,
+      .plan = &planned.plan,
+      .rail_limits = LimitsOf(options, fleet)};
+  return options.plot.ends_with(".svg") ? report::PlanPicture(scene, kPictureSpeed)
+                                        : report::PlanPage(scene);
 }
 
 Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& options) {
@@ -75,7 +82,7 @@ Result<Planned> MakeAndWrite(const Context& context, const PlanCommandOptions& o
   const MotorModel& motor = options.plan.motor;
   const auto rows = RowsOf(planned.plan, fleet.layout, fleet.drives, motor);
   if (!options.plot.empty()) {
-    FOCALFLEET_TRY(WriteFileAtomically(options.plot, PageOf(options, fleet, state, planned)));
+    FOCALFLEET_TRY(WriteFileAtomically(options.plot, PlotOf(options, fleet, state, planned)));
   }
   // The plan is written last: where it exists, all files exist.
   FOCALFLEET_TRY(WriteFileAtomically(options.out, WritePlan(rows)));
@@ -278,7 +285,7 @@ void AddPlanCommand(CommandLine* line) {
       ->check(CLI::Range(1, 512));
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
   AddFile(command, "--plot", &options->plot,
-          "plan.html to write: the plan to look at, in a browser")
+          "plan.html to write: the plan to look at, in a browser; plan.svg: a small moving picture")
       ->check(NoStdout());
   OnChosen(line, command, options, RunPlan);
 }

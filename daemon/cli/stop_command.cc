@@ -63,7 +63,7 @@ ExitCode RunDirectStop(const Context& context, const StopOptions& options) {
   return ExitCode::kSomeUnserved;
 }
 
-constexpr std::chrono::milliseconds kLookEvery{50};
+constexpr std::chrono::milliseconds kConfirmEvery{50};
 
 struct NotStanding {
   std::uint64_t moving = 0;     // by the daemon's state
@@ -103,7 +103,7 @@ ExitCode ReportWhetherAllStand(const Context& context, const StopOptions& option
     const bool over = std::chrono::steady_clock::now() >= give_up;
     // A daemon whose places are all taken accepts a stop, but not a question.
     if (!units && units.error().error.code == ErrorCode::kFull && !over) {
-      std::this_thread::sleep_for(kLookEvery);
+      std::this_thread::sleep_for(kConfirmEvery);
       continue;
     }
     if (!units)
@@ -113,7 +113,7 @@ ExitCode ReportWhetherAllStand(const Context& context, const StopOptions& option
                                           units.error().error.text}});
     const bool all_stand = units->moving == 0 && units->not_known == 0;
     if (!all_stand && !over) {
-      std::this_thread::sleep_for(kLookEvery);
+      std::this_thread::sleep_for(kConfirmEvery);
       continue;
     }
     if (context.json)

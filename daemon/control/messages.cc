@@ -1,6 +1,7 @@
 #include "daemon/control/messages.h"
 
 #include <array>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -83,6 +84,8 @@ Result<std::uint64_t> IdOf(const Json& object) {
 }
 
 }  // namespace
+
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 const char* CodeName(ErrorCode code) {
   for (const auto& [known, name] : kCodes)

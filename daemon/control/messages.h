@@ -23,6 +23,9 @@ namespace focalfleet {
 
 using Json = nlohmann::json;
 
+/// The number; null where it is not finite, which JSON cannot say.
+Json Number(double value);
+
 /// Limit of a request line. A targets file of 32,768 units is about 1 MiB, a model of as many units
 /// is several MiB.
 inline constexpr std::size_t kControlLineBytesMax = std::size_t{16} << 20;

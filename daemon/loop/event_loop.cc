@@ -139,6 +139,7 @@ void EventLoop::Wait() {
   HostInstant wake = std::min(
       {effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock), parts_.handler->wake_at()});
   if (parts_.scheduler != nullptr) wake = std::min(wake, parts_.scheduler->wake_at());
+  if (parts_.metrics != nullptr) wake = std::min(wake, parts_.metrics->wake_at());
   if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
   if (wake <= now_) return;
   ArmTimer(wake);
@@ -241,6 +242,7 @@ void EventLoop::Step() {
 void EventLoop::Perform() {
   LogChanges();
   NoteEffects(View(), effects_, parts_.models->compensation());
+  if (parts_.metrics != nullptr) parts_.metrics->Note(View(), effects_);
   if (!effects_.rows.empty()) {
     last_batch_ = effects_.batch;
     parts_.store->Commit(effects_.batch, std::move(effects_.rows));
@@ -264,6 +266,7 @@ void EventLoop::Perform() {
 void EventLoop::PublishStatus() {
   parts_.store->HandOver();
   parts_.handler->ShowProgress(View());
+  if (parts_.metrics != nullptr) parts_.metrics->SampleIfDue(View());
   if (parts_.scheduler == nullptr || !parts_.scheduler->due(now_)) return;
   StatusBatch status = parts_.scheduler->Take(View(), last_batch_, store_failing_);
   if (!parts_.store->Publish(&status)) parts_.scheduler->GiveBack(status, *parts_.layout);

@@ -1,7 +1,7 @@
 // The core thread. Each turn of its loop waits until an input is there (frames, requests, a plan, a
 // commit, a signal) or a time is due. All inputs go to the coordinator in one Step. Then the loop
-// performs the effects. Rows go to the store's thread, frames to the buses, a plan job to the
-// planner's thread, an exposure to the camera's thread, replies to the request handler, status to
+// performs the effects. Rows go to the store's thread and frames to the buses. A plan job goes to
+// the planner's thread, an exposure to the camera's. Replies go to the request handler, status to
 // the scheduler. The loop never waits for any of these.
 #pragma once
 
@@ -16,6 +16,7 @@
 #include "daemon/loop/job_thread.h"
 #include "daemon/loop/store_thread.h"
 #include "daemon/loop/sync_pulse.h"
+#include "daemon/metrics/metrics_sampler.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/status/status_scheduler.h"
 #include "daemon/verbs/model_registry.h"
@@ -44,6 +45,7 @@ class EventLoop {
     CameraThread* camera = nullptr;  // none: neither camera nor sensors
     StoreThread* store = nullptr;
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
+    MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line
     DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
     const EventSignal* threads = nullptr;  // raised by planner, camera, store

@@ -64,8 +64,6 @@ class TransmitWindow {
 
   [[nodiscard]] const Options& options() const { return options_; }
   [[nodiscard]] std::size_t unconfirmed() const { return unconfirmed_; }
-  /// True while the kernel still holds frames.
-  [[nodiscard]] bool charged() const { return charged_bytes_ > 0; }
 
  private:
   template <class Frame>

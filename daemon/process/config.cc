@@ -2,6 +2,7 @@
 
 #define TOML_EXCEPTIONS 0
 #define TOML_HEADER_ONLY 1
+#include <arpa/inet.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
@@ -48,6 +49,10 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("log");
   visit->Choice("level", &c->log.level, kLogLevels);
   visit->Path("file", &c->log.file);
+  visit->Section("metrics");
+  visit->Text("address", &c->metrics.address);
+  visit->Whole("port", &c->metrics.port, {0, 65'535});
+  visit->Texts("names", &c->metrics.names);
   visit->Section("bus");
   visit->Index("port", &c->bus.port, kPortKindNames);
   visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});
@@ -104,8 +109,8 @@ void VisitTimingKeys(Config* c, Visitor* visit) {
   visit->Choice("spread", &c->simulated.spread, kSpreads);
 }
 
-/// Waits that have to cover the host's own processes stay what they are in real time: a simulated
-/// fleet that runs faster than real time does not make the host faster.
+/// Waits that cover the host's own processes stay the same in real time. A simulated fleet that
+/// runs faster does not make the host faster.
 void ScaleDefaults(double speed, CoordinatorConfig* timing) {
   for (DurationNs* wait :
        {&timing->reply_wait, &timing->start_delay, &timing->settle_margin, &timing->silence_limit})
@@ -275,11 +280,12 @@ class Reader {
 class Writer {
  public:
   void Section(const char* name) { out_ << (out_.tellp() > 0 ? "\n[" : "[") << name << "]\n"; }
-  void Path(const char* key, const std::string* value) {
+  void Text(const char* key, const std::string* value) {
     Put(key) << toml::value<std::string>(*value) << "\n";
   }
+  void Path(const char* key, const std::string* value) { Text(key, value); }
   void Choice(const char* key, const std::string* value, std::span<const char* const>) {
-    Path(key, value);
+    Text(key, value);
   }
   void Flag(const char* key, const bool* value) { Put(key) << (*value ? "true" : "false") << "\n"; }
   void Real(const char* key, const double* value, Range<double>) {
@@ -305,6 +311,12 @@ class Writer {
   std::ostream& Put(const char* key) { return out_ << key << " = "; }
   std::ostringstream out_;
 };
+
+bool IsNumericAddress(const std::string& address) {
+  in6_addr place{};  // room for either kind
+  return ::inet_pton(AF_INET, address.c_str(), &place) == 1 ||
+         ::inet_pton(AF_INET6, address.c_str(), &place) == 1;
+}
 
 void CheckTogether(const DaemonConfig& config, Reader* reader) {
   const bool socketcan = config.bus.port == PortKind::kSocketCan;
@@ -332,6 +344,8 @@ void CheckTogether(const DaemonConfig& config, Reader* reader) {
                   "fiducials", "camera.fiducials must name a file where there is a camera");
   reader->Require(!config.camera.dds || config.camera.directory.empty(), "camera", "dds",
                   "a camera answers through camera.directory or through camera.dds, not both");
+  reader->Require(IsNumericAddress(config.metrics.address), "metrics", "address",
+                  "metrics.address must be a numeric address of this host, such as \"127.0.0.1\"");
   reader->Require(!config.fleet.units.empty(), "fleet", "units", "fleet.units must name a file");
   reader->Require(!config.store.path.empty(), "store", "path", "store.path must name a file");
   reader->Require(!config.control.socket.empty(), "control", "socket",

@@ -42,6 +42,11 @@ struct DaemonConfig {
     std::string file;     // empty: standard error
     std::string file_at;  // file:line, for messages
   } log;
+  struct Metrics {
+    std::string address = "127.0.0.1";  // numeric
+    std::uint16_t port = 0;             // 0: no metrics are served
+    std::vector<std::string> names;     // of this host, beside the loopback names and `address`
+  } metrics;
   struct Bus {
     PortKind port = PortKind::kUnix;
     std::uint32_t bit_rate_bps = 1'000'000;

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <memory>
 #include <utility>
@@ -13,6 +14,8 @@
 #include "daemon/camera/camera_folder.h"
 #include "daemon/hall/measure.h"
 #include "daemon/loop/event_loop.h"
+#include "daemon/metrics/metrics_endpoint.h"
+#include "daemon/metrics/metrics_sampler.h"
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/log.h"
@@ -44,12 +47,6 @@ double ProcessCpuSeconds() {
 /// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
 
-/// Counters of the store that its thread writes and the core thread reads.
-struct SharedCounters {
-  std::atomic<std::uint64_t> transactions{0};
-  std::atomic<std::uint64_t> rows{0};
-};
-
 /// The fleet's status on its way to DDS.
 struct StatusOutput {
   std::unique_ptr<DdsTroubles> troubles;
@@ -63,6 +60,34 @@ struct Measuring {
   std::unique_ptr<FibreCarrierWorker> carriers;  // none: no unit has sensors of its own
   std::unique_ptr<CameraThread> thread;          // none: neither camera nor sensors
 };
+
+/// Numbers for /metrics. The counters are kept also where there is no endpoint.
+struct Metrics {
+  WorkCounters work;
+  NewestValue<const PlannedPower> power;
+  NewestValue<const FleetMetrics> values;
+  std::unique_ptr<MetricsSampler> sampler;    // none: [metrics] has no port
+  std::unique_ptr<MetricsEndpoint> endpoint;  // none: the same, or not yet
+};
+
+double SecondsSince(std::chrono::steady_clock::time_point begun) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+ShellNote NoteOfMetrics(const std::string& trouble) {
+  if (trouble.empty()) return {Severity::kInfo, "metrics are served again"};
+  return {Severity::kWarning, "no metrics, the fleet works on and it is tried again: " + trouble};
+}
+
+void Count(const ExposureDone& done, WorkCounters* work) {
+  if (done.exposure && !done.exposure->camera && done.exposure->camera_trouble.empty())
+    return;  // the units' own sensors were enough
+  ++work->exposures;
+  if (done.exposure && done.exposure->camera_trouble.empty())
+    work->exposed_at_s = 1e-9 * static_cast<double>(WallTime::Now().ns);
+  else
+    ++work->exposures_failed;
+}
 
 DdsOptions DdsOptionsOf(const DaemonConfig::Dds& dds) {
   return {.domain = dds.domain, .config_xml = dds.config.empty() ? "" : "file://" + dds.config};
@@ -86,18 +111,21 @@ class Daemon {
   Status OpenRequestHandler();
   Status RestoreLastModel();
   void OpenStatus();
+  void OpenMetrics();
+  void ServeMetrics();
+  PlanDone Plan(const PlannerWork& work, const std::atomic<bool>& ending);
   Status OpenCamera();
   ShellFacts Facts() const;
 
   DaemonConfig config_;
   HostClock clock_;
   WallTime started_ = WallTime::Now();
-  SharedCounters counters_;
   std::unique_ptr<Layout> layout_;
   std::unique_ptr<Store> store_;
   std::unique_ptr<EventSignal> signal_;
   StatusOutput status_;
   Measuring measuring_;
+  Metrics metrics_;
   std::unique_ptr<Coordinator> coordinator_;
   std::unique_ptr<BusLines> lines_;
   std::unique_ptr<StoreThread> store_thread_;
@@ -130,6 +158,7 @@ Status Daemon::Start() {
   FOCALFLEET_TRY(OpenCamera());
   FOCALFLEET_TRY_ASSIGN(measuring_.carriers, OpenFibreCarriers(config_.hall, *layout_));
   OpenStatus();
+  OpenMetrics();
   coordinator_ = std::make_unique<Coordinator>(
       layout_.get(), std::vector<UnitDrive>(layout_->size(), config_.drive), config_.timing,
       std::move(stored));
@@ -173,6 +202,32 @@ void Daemon::OpenStatus() {
       clock_);
 }
 
+void Daemon::OpenMetrics() {
+  if (config_.metrics.port == 0) return;
+  metrics_.sampler =
+      std::make_unique<MetricsSampler>(MetricsSampler::Parts{.layout = layout_.get(),
+                                                             .facts = [this] { return Facts(); },
+                                                             .power = &metrics_.power,
+                                                             .out = &metrics_.values,
+                                                             .clock = clock_});
+}
+
+void Daemon::ServeMetrics() {
+  const DaemonConfig::Metrics& metrics = config_.metrics;
+  if (metrics.port == 0) return;
+  std::vector<std::string> names = metrics.names;
+  names.push_back(metrics.address);
+  metrics_.endpoint = std::make_unique<MetricsEndpoint>(
+      MetricsEndpoint::Parts{
+          .values = &metrics_.values, .work = &metrics_.work, .store_path = config_.store.path},
+      HttpServer::Options{.address = metrics.address,
+                          .port = metrics.port,
+                          .names = std::move(names),
+                          .tell = [this](const std::string& trouble) {
+                            status_.troubles->Note(NoteOfMetrics(trouble));
+                          }});
+}
+
 Status Daemon::OpenCamera() {
   if (!config_.camera.present()) return {};
   FOCALFLEET_TRY_ASSIGN(CameraSite site, LoadCameraSite(config_.camera));
@@ -199,9 +254,15 @@ Status Daemon::OpenCamera() {
 StoreThread::Sinks Daemon::StoreSinks() {
   StoreThread::Sinks sinks;
   sinks.commit = [this](std::span<const Row> rows, WallTime at, std::size_t* refused) {
+    const auto begun = std::chrono::steady_clock::now();
     Status done = store_->Commit(rows, at, refused);
-    counters_.transactions = store_->counters().transactions;
-    counters_.rows = store_->counters().rows;
+    WorkCounters& work = metrics_.work;
+    work.commit_s.Observe(SecondsSince(begun));
+    work.transactions = store_->counters().transactions;
+    work.rows = store_->counters().rows;
+    work.transactions_failed = store_->counters().failed;
+    if (!done && done.error().code == ErrorCode::kInvalid && *refused < rows.size())
+      ++work.rows_refused;
     return done;
   };
   sinks.publish = [this](const StatusBatch& status) {
@@ -219,17 +280,17 @@ Status Daemon::StartThreads() {
   FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
       planner_,
-      PlannerThread::Create(
-          [layout = layout_.get()](const PlannerWork& work, const std::atomic<bool>& ending) {
-            return RunPlanJob(work.job, *layout, work.drives, [&ending] { return ending.load(); });
-          },
-          signal_.get()));
+      PlannerThread::Create([this](const PlannerWork& work,
+                                   const std::atomic<bool>& ending) { return Plan(work, ending); },
+                            signal_.get()));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
     FOCALFLEET_TRY_ASSIGN(measuring_.thread,
                           CameraThread::Create(
                               [this](const CameraWork& work, const std::atomic<bool>& ending) {
-                                return MeasureUnits(work, measuring_.carriers.get(),
-                                                    measuring_.camera.get(), ending);
+                                ExposureDone done = MeasureUnits(work, measuring_.carriers.get(),
+                                                                 measuring_.camera.get(), ending);
+                                Count(done, &metrics_.work);
+                                return done;
                               },
                               signal_.get()));
   }
@@ -242,11 +303,23 @@ Status Daemon::StartThreads() {
                                                   .camera = measuring_.thread.get(),
                                                   .store = store_thread_.get(),
                                                   .scheduler = status_.scheduler.get(),
+                                                  .metrics = metrics_.sampler.get(),
                                                   .sync = sync_.get(),
                                                   .troubles = status_.troubles.get(),
                                                   .threads = signal_.get(),
                                                   .clock = clock_}));
+  ServeMetrics();
   return {};
+}
+
+PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending) {
+  const auto begun = std::chrono::steady_clock::now();
+  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending] { return ending.load(); });
+  metrics_.work.planner_s.Observe(SecondsSince(begun));
+  if (metrics_.sampler != nullptr && done.plan && !done.plan->moves.empty())
+    metrics_.power.Put(
+        std::make_unique<const PlannedPower>(PowerOf(*done.plan, work.job, *layout_, work.drives)));
+  return done;
 }
 
 Status Daemon::Run() {
@@ -269,7 +342,8 @@ Status Daemon::End() {
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
-                                    {"the camera", [this] { measuring_.thread.reset(); }}});
+                                    {"the camera", [this] { measuring_.thread.reset(); }},
+                                    {"the metrics", [this] { metrics_.endpoint.reset(); }}});
   const Status stored = store_thread_->Finish();
   handler_->Close();
   status_.publisher.reset();
@@ -294,10 +368,11 @@ ShellFacts Daemon::Facts() const {
   facts.store_path = config_.store.path;
   facts.store_failing = store_thread_->failing();
   facts.batches_waiting = store_thread_->waiting();
-  facts.store.transactions = counters_.transactions;
-  facts.store.rows = counters_.rows;
+  facts.store.transactions = metrics_.work.transactions;
+  facts.store.rows = metrics_.work.rows;
   facts.dds_enabled = status_.publisher != nullptr;
   facts.dds_trouble = status_.troubles->Summary();
+  facts.dds_troubles = status_.troubles->reported();
   if (status_.publisher != nullptr) {
     facts.dds_samples = status_.publisher->samples();
     facts.dds_bytes = status_.publisher->bytes();

@@ -12,13 +12,14 @@
 namespace focalfleet::simulator {
 namespace {
 
-constexpr double kSecondsMax = 86'400;
+constexpr double kRequestSecondsMax = 86'400;
 constexpr std::uint64_t kCopiesMax = 100;
 
 Result<double> SecondsOr(const Json& args, const char* name, double otherwise) {
   const auto found = args.find(name);
   if (found == args.end()) return otherwise;
-  if (!found->is_number() || !(found->get<double>() >= 0) || found->get<double>() > kSecondsMax)
+  if (!found->is_number() || !(found->get<double>() >= 0) ||
+      found->get<double>() > kRequestSecondsMax)
     return Fail(ErrorCode::kInvalid, std::string(name) + " is not a number of 0..86400 seconds");
   return found->get<double>();
 }

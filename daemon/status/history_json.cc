@@ -12,8 +12,6 @@ namespace {
 
 constexpr const char* kSeverities[] = {"info", "warning", "error"};
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 }  // namespace
 
 Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {

@@ -28,7 +28,8 @@ struct ShellFacts {
   std::size_t batches_waiting = 0;
   StoreCounters store;
   bool dds_enabled = false;
-  std::string dds_trouble;  // why DDS is absent (it is tried again); empty: present, or off
+  std::string dds_trouble;         // why DDS is absent (it is tried again); empty: present, or off
+  std::uint64_t dds_troubles = 0;  // reported since the start
   std::uint64_t dds_samples = 0;
   std::uint64_t dds_bytes = 0;
   std::uint64_t steps = 0;

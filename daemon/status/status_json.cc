@@ -13,8 +13,6 @@
 namespace focalfleet {
 namespace {
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
 void PutUpload(const UploadView& upload, Json* out) {
   (*out)["upload_bits_predicted"] = upload.bits_predicted;
   (*out)["upload_bits"] = upload.bits;
@@ -134,13 +132,6 @@ Json AxisJson(const FleetView& view, PositionerIndex i, const UnitKnowledge& kno
           {"counter1", drive.counter1},
           {"repeat", drive.repeat},
           {"subdivision", drive.subdivision}};
-}
-
-/// The makespan of the rounds that ended, and the time of the present one so far.
-double MakespanSoFar(const FleetView& view) {
-  const ConfigurationView& c = view.coordinator->configuration();
-  if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
-  return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
 }
 
 /// The progress of the configuration, 0..1: by time while units move, by arrivals in the end.

@@ -75,6 +75,12 @@ FleetCounts CountFleet(const FleetView& view) {
   return counts;
 }
 
+double MakespanSoFar(const FleetView& view) {
+  const ConfigurationView& c = view.coordinator->configuration();
+  if (!view.coordinator->busy() || c.started == kNever) return c.makespan_s;
+  return c.makespan_s + std::max(0.0, (view.now - c.started).seconds());
+}
+
 double HighestBusLoad(const FleetView& view) {
   double highest = 0;
   for (const BusId bus : view.layout->buses())

@@ -38,6 +38,8 @@ struct FleetCounts {
 };
 /// The number of units by phase and by witness. Cost: one pass over the units.
 FleetCounts CountFleet(const FleetView& view);
+/// The makespan of the rounds that ended, and the time of the present one so far. Units: s.
+double MakespanSoFar(const FleetView& view);
 double HighestBusLoad(const FleetView& view);
 
 }  // namespace focalfleet

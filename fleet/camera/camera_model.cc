@@ -9,8 +9,6 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::size_t kTermsMax = MonomialCount(kDistortionDegreeMax);
-
 std::complex<double> Ideal(const CameraModel& model, double x_px, double y_px) {
   const std::complex<double> seen =
       std::complex<double>(x_px - model.centre_x_px, y_px - model.centre_y_px) /
@@ -44,7 +42,7 @@ PointFp PlateOf(const CameraModel& model, double x_px, double y_px) {
   PointFp at{w.real(), w.imag()};
   const int degree = DegreeOf(model.distortion.size());
   if (degree < 0) return at;
-  std::array<double, kTermsMax> terms{};
+  std::array<double, kDistortionTermsMax> terms{};
   Monomials(w.real() / model.radius_mm, w.imag() / model.radius_mm, degree, terms);
   for (std::size_t k = 0; k < model.distortion.size(); ++k) {
     at.x_mm += model.distortion[k].x_mm * terms[k];

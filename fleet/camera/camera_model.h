@@ -36,6 +36,7 @@ constexpr std::size_t MonomialCount(int degree) {
   return static_cast<std::size_t>((degree + 1) * (degree + 2) / 2);
 }
 inline constexpr int kDistortionDegreeMax = 7;
+inline constexpr std::size_t kDistortionTermsMax = MonomialCount(kDistortionDegreeMax);
 
 PointFp PlateOf(const CameraModel& model, double x_px, double y_px);
 

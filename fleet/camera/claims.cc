@@ -27,7 +27,7 @@ double PatrolAreaMm2(const Unit& unit) {
   return std::numbers::pi * (limits.max_mm * limits.max_mm - limits.min_mm * limits.min_mm);
 }
 
-CovarianceFp Round(double sigma_mm) { return {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm}; }
+CovarianceFp CovarianceOf(double sigma_mm) { return {sigma_mm * sigma_mm, 0, sigma_mm * sigma_mm}; }
 
 }  // namespace
 
@@ -42,7 +42,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
               std::vector<ExpectedPlace>* places) {
   places->clear();
   const CovarianceFp as_before =
-      Round(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
+      CovarianceOf(std::hypot(expectation.before_sigma_mm, options.still_sigma_mm));
   const double as_reported =
       1 - options.shares.did_not_move - options.shares.strayed - options.shares.missing;
   if (expectation.lost) {
@@ -66,7 +66,7 @@ void PlacesOf(const Unit& unit, const UnitExpectation& expectation, const Identi
   };
   const auto& commanded = expectation.commanded;
   places->push_back({PlaceKind::kExpected, *expectation.expected_fp,
-                     commanded ? at(*commanded) : Round(expectation.blind.place_sigma_mm),
+                     commanded ? at(*commanded) : CovarianceOf(expectation.blind.place_sigma_mm),
                      as_reported});
   if (!commanded || !expectation.before) return;
   const AxisAngles only_phi{expectation.before->theta_deg, commanded->phi_deg};

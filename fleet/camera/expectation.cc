@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kRadian = std::numbers::pi / 180;
 // Sides of the elbow nearer than this count as one: the arm is stretched or folded. Units: degrees.
 constexpr double kSameElbowDeg = 1;
 
@@ -23,8 +23,10 @@ CovarianceFp CovarianceAt(const Unit& unit, const AxisAngles& angles, const Blin
   const double ty = arm.b.x_mm - unit.base_fp.x_mm;
   const double px = -(arm.b.y_mm - arm.a.y_mm);
   const double py = arm.b.x_mm - arm.a.x_mm;
-  const double t2 = blind.theta_sigma_deg * blind.theta_sigma_deg * kRadian * kRadian;
-  const double p2 = blind.phi_sigma_deg * blind.phi_sigma_deg * kRadian * kRadian;
+  const double t2 =
+      blind.theta_sigma_deg * blind.theta_sigma_deg * kRadiansPerDegree * kRadiansPerDegree;
+  const double p2 =
+      blind.phi_sigma_deg * blind.phi_sigma_deg * kRadiansPerDegree * kRadiansPerDegree;
   const double s2 = blind.place_sigma_mm * blind.place_sigma_mm;
   return {t2 * tx * tx + p2 * px * px + s2, t2 * tx * ty + p2 * px * py,
           t2 * ty * ty + p2 * py * py + s2};

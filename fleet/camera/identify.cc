@@ -305,9 +305,9 @@ struct Looked {
   Claims claims;
 };
 
-tl::expected<Looked, Refusal> Look(const IdentificationRequest& request,
-                                   const IdentifyOptions& options, Orientation orientation,
-                                   Identification* result) {
+tl::expected<Looked, Refusal> LookOnce(const IdentificationRequest& request,
+                                       const IdentifyOptions& options, Orientation orientation,
+                                       Identification* result) {
   auto spots = MapSpots(request, options, orientation, result);
   if (!spots) return tl::unexpected<Refusal>(std::move(spots.error()));
   SpotGrid grid(spots->at_fp, kCellMm);
@@ -318,7 +318,7 @@ tl::expected<Looked, Refusal> Look(const IdentificationRequest& request,
 bool Fits(const IdentificationRequest& request, const IdentifyOptions& options,
           Orientation orientation) {
   Identification ignored;
-  const auto looked = Look(request, options, orientation, &ignored);
+  const auto looked = LookOnce(request, options, orientation, &ignored);
   return looked && looked->claims.recognised >= options.recognised_share_min * looked->claims.units;
 }
 
@@ -361,7 +361,7 @@ tl::expected<Identification, Refusal> Identify(const IdentificationRequest& requ
   if (auto refusal = Implausible(request, options))
     return tl::unexpected<Refusal>(std::move(*refusal));
   Identification result;
-  auto looked = Look(request, options, {}, &result);
+  auto looked = LookOnce(request, options, {}, &result);
   if (!looked) {
     if (auto turned = Turned(request, options)) return tl::unexpected<Refusal>(std::move(*turned));
     return tl::unexpected<Refusal>(std::move(looked.error()));

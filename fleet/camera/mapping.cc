@@ -11,7 +11,7 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kCellMm = 12;
+constexpr double kMappingCellMm = 12;
 constexpr std::size_t kLightsMax = 400;  // the map's cost grows with the square
 /// A spot farther away is not the light of a unit that stands still.
 constexpr double kStillSigmas = 6;
@@ -45,7 +45,7 @@ class Mapping {
 
   tl::expected<MappedSpots, Refusal> Run(Orientation orientation) {
     seen_ = SeenBy(*request_.camera, request_.exposure->spots, orientation);
-    const SpotGrid grid(seen_, kCellMm);
+    const SpotGrid grid(seen_, kMappingCellMm);
     const auto alignment = FindFiducials(request_.fiducials, seen_, grid, options_.bounds);
     if (!alignment)
       return tl::unexpected<Refusal>(
@@ -127,7 +127,7 @@ class Mapping {
     std::vector<PointFp> at;
     at.reserve(seen_.size());
     for (const PointFp& p : seen_) at.push_back(PlateBy(fit, map_options_, p));
-    const SpotGrid grid(at, kCellMm);
+    const SpotGrid grid(at, kMappingCellMm);
     // Every k-th unit is taken, so that they stand all over the plate.
     const std::size_t room = kLightsMax - used->size();
     const std::size_t stride = (still.size() + room - 1) / room;

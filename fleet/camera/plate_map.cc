@@ -11,12 +11,11 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::size_t kTermsMax = MonomialCount(kDistortionDegreeMax);
 constexpr std::size_t kLightsPerTerm = 3;  // the degree falls where there are fewer
 constexpr double kNodesMax = 2500;         // of the grid, about; the step grows beyond
 constexpr double kNoiseMinMm = 1e-5;       // keeps the matrix positive definite
 
-using Terms = std::array<double, kTermsMax>;
+using Terms = std::array<double, kDistortionTermsMax>;
 
 Terms TermsAt(PointFp p, double radius_mm, int degree) {
   Terms terms{};

@@ -2,22 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <unordered_map>
+
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double kRadian = std::numbers::pi / 180;
 constexpr std::size_t kRingMax = 8;   // units of a ring, at most
 constexpr double kCommandCellMm = 1;  // of the grid of commands
 
 // The place of the reference arm with a command, zero angle of phi included.
 PointFp AtReference(const Unit& reference, const AxisAngles& angles) {
-  const double t = angles.theta_deg * kRadian;
-  const double p = t + (angles.phi_deg + reference.phi().zero_deg) * kRadian;
+  const double t = angles.theta_deg * kRadiansPerDegree;
+  const double p = t + (angles.phi_deg + reference.phi().zero_deg) * kRadiansPerDegree;
   return {reference.theta().arm_mm * std::cos(t) + reference.phi().arm_mm * std::cos(p),
           reference.theta().arm_mm * std::sin(t) + reference.phi().arm_mm * std::sin(p)};
 }
@@ -51,14 +51,14 @@ class Finder {
           std::abs(arms.phi().arm_mm - reference_.phi().arm_mm) +
           reference_.phi().arm_mm *
               std::abs(std::remainder(arms.phi().zero_deg - reference_.phi().zero_deg, 360)) *
-              kRadian;
+              kRadiansPerDegree;
       const double gate_mm = GateMm(unit);
       const double reach_mm = arms.theta().arm_mm + arms.phi().arm_mm + gate_mm;
       search_.grid->ForNear(arms.base_fp, reach_mm, [&](std::uint32_t spot, double) {
         if (search_.is_free[spot] == 0) return;
         const PointFp at = search_.spots->at_fp[spot];
         const Complex turned = Complex(at.x_mm - arms.base_fp.x_mm, at.y_mm - arms.base_fp.y_mm) *
-                               std::polar(1.0, -arms.theta().zero_deg * kRadian);
+                               std::polar(1.0, -arms.theta().zero_deg * kRadiansPerDegree);
         by_command.ForNear({turned.real(), turned.imag()}, gate_mm + differs_mm,
                            [&](std::uint32_t row, double) {
                              TryTrace({unit, search_.units[row], spot});
@@ -80,10 +80,10 @@ class Finder {
     const Unit& arms = layout_.unit({unit});
     const double reach_mm = arms.theta().arm_mm + arms.phi().arm_mm;
     const BlindError& blind = Expectation(unit).blind;
-    const double sigma_mm =
-        std::hypot(blind.theta_sigma_deg * kRadian * reach_mm,
-                   blind.phi_sigma_deg * kRadian * arms.phi().arm_mm, blind.place_sigma_mm) +
-        kMapSigmaMm;
+    const double sigma_mm = std::hypot(blind.theta_sigma_deg * kRadiansPerDegree * reach_mm,
+                                       blind.phi_sigma_deg * kRadiansPerDegree * arms.phi().arm_mm,
+                                       blind.place_sigma_mm) +
+                            kMapSigmaMm;
     return std::sqrt(search_.options->gate_squared_sigmas) * sigma_mm;
   }
 

@@ -23,8 +23,6 @@ class BusTraffic {
   /// taken where it is over.
   void EndStep();
 
-  [[nodiscard]] const BusRates& rates() const { return rates_; }
-
  private:
   /// Frames that passed the bus together: one, or those of a group.
   void Count(BusRecord* bus, std::span<const CanFrame> frames) const;

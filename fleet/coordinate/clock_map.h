@@ -29,7 +29,8 @@
 //   - the counter ran through from the first reading kept to the last. A restart lets it begin
 //     anew, and a young counter that did looks like a slow one. A reading is therefore put beside
 //     earlier ones only where it shows more than 1.02 times the time since. No clock that is off by
-//     less than 2 % comes to that from 0. Else it stands alone. Readings that contradict each other
+// less than 2 % shows so much after a restart from 0. A reading that shows less stands alone.
+// Readings that contradict each other
 //     are of another clock, too: then only the newest counts. Either way nothing is said of a rate
 //     before the next reading.
 //   - the rate changes by less than kWander while kReadings are taken.
@@ -37,11 +38,11 @@
 // The limit kRateErrorMax of all clocks is used for times and for the likeliest rate. The limit
 // never says that a clock is off: `least` and `most` come from the readings alone.
 //
-// How soon a rate is known: two readings that are w1 and w2 wide and d apart leave (w1 + w2 + 0.2
-// ms) / d between least and most. A clock that is off by 1 % is distinguished from one that is off
-// by 0.5 % as soon as that is below 0.5 %. Two readings are enough where both are narrower than a
-// fifth of a percent of the time between them. This share is 2 ms of 1 s, or 20 ms of the 10 s at
-// rest. Where others are wide, the first two such ones of the last eight are enough.
+// Two readings that are w1 and w2 wide and d apart leave a width of (w1 + w2 + 0.2 ms) / d between
+// `least` and `most`. A clock that is off by 1 % is distinguished from one that is off by 0.5 % as
+// soon as that is below 0.5 %. Two readings are enough where both are narrower than a fifth of a
+// percent of the time between them. This share is 2 ms of 1 s, or 20 ms of the 10 s at rest. Where
+// other readings are wide, two narrow ones among the last eight are enough.
 #pragma once
 
 #include <algorithm>

@@ -1,6 +1,6 @@
 // The coordination is what every room of the coordinator works with: the units, the questions to
-// them, the ledger of rows, and the present step. A room takes it by reference and keeps only what
-// it owns itself.
+// them, the ledger of rows, and the present step. A room keeps a copy of these references, and owns
+// nothing else but its own data.
 #pragma once
 
 #include "fleet/coordinate/coordinator_config.h"

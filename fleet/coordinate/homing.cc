@@ -94,7 +94,8 @@ bool Homing::Commit() {
     // The unit begins to count anew at its stop, so the offset of its old count is over.
     Intend(fleet_, HomingIntentOf(fleet_, configuration_.view.id, round_.move, i), {}, i, &round_);
   }
-  // A wave has a few feeds: no work for the planner's thread.
+  // The units of a wave have few different drive settings, so the estimate is quick enough for this
+  // thread.
   const PlanEstimate estimate =
       Estimate(HomingMotion(fleet_, wave_), fleet_.layout, fleet_.units.drives, MotorModel{});
   round_.prediction = {estimate.makespan_s, estimate.energy_J, estimate.peak_power_W};

@@ -13,8 +13,8 @@ namespace {
 
 using enum UnitPhase;
 
-/// Sets when the open question is missed: in time also where the answer may be awaited until the
-/// motion of others depends on it.
+/// Sets when the unit counts as unheard. That instant comes early where the motion of others may
+/// depend on its place before the question is given up.
 void MissSoon(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];
   if (record.motion.seen_moving >= record.motion.watch_until) return;

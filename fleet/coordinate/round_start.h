@@ -21,7 +21,6 @@ class RoundStart {
   HostInstant Begin();
   /// Says the start signal again where that is due; returns as Begin.
   HostInstant Repeat();
-  [[nodiscard]] HostInstant repeat_at() const { return repeat_at_; }
   /// The start signal is not said any more.
   void Cancel() { repeat_at_ = kNever; }
 

@@ -1,6 +1,6 @@
 // A unit with sensors of its own is asked for their readings part by part, with one question open
-// as ever. Where it gives none, or others than it was asked for, the reading is given up with an
-// alarm. The unit is not lost then: the next poll shows whether it answers at all.
+// at a time. Where the unit sends no readings, or another part than was asked, the reading is given
+// up with an alarm. The unit is not lost then: the next poll shows whether it answers at all.
 #pragma once
 
 #include <string>

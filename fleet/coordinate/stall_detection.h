@@ -1,10 +1,10 @@
 // Stall detection notices in time that a unit has ended by itself, while others are to pass where
 // it may stand.
 //
-// Such a unit is asked every `poll`. Where a question stays open for `suspicion`, repeats included,
-// the followers of the unit are stopped as a precaution, though it may only be slow. From its end
-// to the stop it takes at most poll + suspicion, when it ends right after an answer. A quarter of
-// the notice is left for the host, the bus, and one repeat of the stop itself.
+// A moving unit with followers is asked every `poll`. Where a question stays open for `suspicion`,
+// repeats included, the followers of the unit are stopped as a precaution, though it may only be
+// slow. From its end to the stop it takes at most poll + suspicion, when it ends right after an
+// answer. A quarter of the notice is left for the host, the bus, and one repeat of the stop itself.
 //
 // The notice is longer than asked for where a repeat of the question would not fit into the
 // suspicion. Plans are made with the longer one. The notice grows up to 5 s, beyond which plans

@@ -46,7 +46,7 @@ void NoAnswer(const Coordination& fleet, PositionerIndex i) {
 
 }  // namespace
 
-bool UnitSessions::Service(PositionerIndex i) {
+void UnitSessions::Service(PositionerIndex i) {
   UnitRecord& record = fleet_.units[i];
   if (record.request.question) {
     if (fleet_.now() >= record.request.question->suspect_at) {
@@ -58,15 +58,15 @@ bool UnitSessions::Service(PositionerIndex i) {
     } else if (!fleet_.requests.AskAgain(i)) {
       NoAnswer(fleet_, i);
     }
-    return true;
+    return;
   }
   if (record.view.phase == kReady && record.sensing.under_way()) {
     AskSensors(fleet_, i);
-    return true;
+    return;
   }
   if (record.view.phase == kReady && record.locating) {
     WriteCount(fleet_, i);
-    return true;
+    return;
   }
   const bool poll = fleet_.now() >= record.next_poll;
   switch (record.view.phase) {
@@ -79,10 +79,10 @@ bool UnitSessions::Service(PositionerIndex i) {
       } else {
         fleet_.timers.Set(i, record.next_poll);
       }
-      return true;
+      return;
     case kIdentifying:
       AskNext(fleet_, i);
-      return true;
+      return;
     case kForeign:
     case kFault:
     case kReady:
@@ -91,21 +91,20 @@ bool UnitSessions::Service(PositionerIndex i) {
     case kSettling: {
       if (!poll) {
         fleet_.timers.Set(i, record.next_poll);
-        return true;
+        return;
       }
       const bool moves = IsUnderWay(record.view.phase);
       record.next_poll = fleet_.now() + fleet_.config.poll_period * (moves ? 1 : kRestPollFactor);
       fleet_.requests.Ask(i, StatusRequest{});
       if (record.view.phase == kMoving) PollSooner(fleet_, i);
-      return true;
+      return;
     }
     case kStaging:
     case kConfirming:
     case kArming:
     case kArmed:
-      return false;
+      return;
   }
-  return false;
 }
 
 void UnitSessions::LinkChanged(const LinkEvent& event) {

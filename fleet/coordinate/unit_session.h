@@ -17,9 +17,9 @@ class UnitSessions {
   explicit UnitSessions(const Coordination& fleet) : fleet_(fleet) {}
 
   /// The unit's timer ran out: repeats the open question, gives it up, or asks what the unit's
-  /// phase asks for. Phases of an upload belong to ConfigurationExecutor; this returns false for
-  /// them when no question is open.
-  bool Service(PositionerIndex i);
+  /// phase asks for. Nothing happens in a phase of an upload without an open question: the
+  /// executor acts there.
+  void Service(PositionerIndex i);
 
   /// Takes one valid frame of a unit on its own bus, that had ended at `at`.
   void Hear(PositionerIndex i, const Addressed<UnitMessage>& heard, HostInstant at);

@@ -55,10 +55,10 @@ constexpr bool IsUnserved(TargetOutcome outcome) { return outcome > TargetOutcom
 
 /// How a unit's clock runs against the host's (fleet/coordinate/clock_map.h).
 struct ClockView {
-  std::uint32_t readings = 0;  // that it is known from
-  double rate_error = 0;       // its seconds a second of the host's, less 1
-  double rate_bound = 0;       // the true one is within rate_error +- rate_bound
-  double bound_s = 0;          // of the time of the newest reading
+  std::uint32_t readings = 0;  // on which the rate rests
+  double rate_error = 0;       // the unit's seconds a host second, less 1
+  double rate_bound = 0;       // the true rate error is within rate_error +- rate_bound
+  double bound_s = 0;          // error of the time of the newest reading
 };
 
 struct UnitView {
@@ -66,12 +66,12 @@ struct UnitView {
   UnitKnowledge knowledge;  // while it moves: the hull
   Pose offset{};            // its place less its own count of vectors (VectorRow::offset)
   std::optional<MeasurementStatus> measurement;  // in the last exposure; none: not looked for
-  std::optional<double> error_um;                // from its target, as last measured
-  MeasurementSource source = MeasurementSource::kCamera;  // of that
-  CovarianceFp covariance;                                // of that; of its place, where it was put
-  std::optional<FibreCarrierReading> carrier;             // of its sensors' last reading
-  SerialNumber serial;                                    // that answers; 0: none yet
-  SerialNumber bound_serial;                              // that belongs here; 0: none yet
+  std::optional<double> error_um;                // distance from the target in the last measurement
+  MeasurementSource source = MeasurementSource::kCamera;  // source of error_um
+  CovarianceFp covariance;                                // covariance of the measured place
+  std::optional<FibreCarrierReading> carrier;             // last reading of the unit's own sensors
+  SerialNumber serial;                                    // serial number that answers; 0: none yet
+  SerialNumber bound_serial;  // serial number bound to this place; 0: none yet
   UnitState reported_state = UnitState::kRest;
   FaultCode fault = FaultCode::kNone;
   MoveId move;

@@ -12,7 +12,6 @@ namespace focalfleet {
 namespace {
 
 constexpr std::size_t kFiducialsMin = 3;
-constexpr double kCoordinateMaxMm = 1e5;
 
 }  // namespace
 

@@ -6,11 +6,10 @@
 #include <numbers>
 
 #include "fleet/kinematics.h"
+#include "protocol/base/units.h"
 
 namespace focalfleet {
 namespace {
-
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 /// A part of a sweep: middle and half-widths in radians. While `half_along` is not 0 it is the part
 /// of a band around the fraction `along` and is halved there. Once that is shorter than the band is

@@ -7,16 +7,17 @@
 #include <limits>
 #include <span>
 
+#include "protocol/base/instants.h"
+
 namespace focalfleet {
 namespace {
 
-constexpr double kTickS = 1e-4;
 /// Delays as shares of the time to spare, far from each other first: where one delay meets a
 /// neighbour, a slightly longer one does, too.
 constexpr std::array kDelays{0.0,   1.0,   0.5,    0.25,   0.75,   0.125, 0.375,
                              0.625, 0.875, 0.0625, 0.3125, 0.5625, 0.8125};
 
-std::uint32_t TicksOf(double t_s) {
+std::uint32_t TicksNotBefore(double t_s) {
   return static_cast<std::uint32_t>(std::ceil(std::max(t_s, 0.0) / kTickS - 1e-6));
 }
 
@@ -47,7 +48,7 @@ class Builder {
   double Add(std::size_t axis, double begin_s, std::int32_t delta, Candidate* to) const {
     const double lasts_s = Seconds(axis, std::abs(delta));
     if (delta == 0) return begin_s;
-    const std::uint32_t ticks = TicksOf(begin_s);
+    const std::uint32_t ticks = TicksNotBefore(begin_s);
     to->path[axis].Append({ticks, delta, q_.drive->axis[axis].repeat});
     const double end_s = ticks * kTickS + lasts_s;
     to->end_s = std::max(to->end_s, end_s);
@@ -209,7 +210,7 @@ Candidate Builder::Along(const Way& way, std::span<const double> waits_s) const 
     std::optional<InStep> in_step;
     if (way[n].out_of_step < 1) in_step = KeepInStep(from, to, *q_.drive);
     if (n < waits_s.size()) at += waits_s[n];
-    const std::uint32_t ticks = TicksOf(at);
+    const std::uint32_t ticks = TicksNotBefore(at);
     double end_s = ticks * kTickS;
     for (std::size_t k = 0; k < kAxisCount; ++k) {
       if (to[k] == from[k]) continue;
@@ -295,7 +296,7 @@ Candidate Delayed(const UnitDrive& drive, const Candidate& straight,
   Candidate later;
   for (std::size_t k = 0; k < kAxisCount; ++k) {
     for (Segment segment : straight.path[k].segments()) {
-      segment.start_ticks += TicksOf(begin_s[k]);
+      segment.start_ticks += TicksNotBefore(begin_s[k]);
       const AxisDrive as_sent{drive.axis[k].counter1, segment.repeat, drive.axis[k].subdivision};
       later.path[k].Append(segment);
       later.end_s =

@@ -14,10 +14,10 @@ struct Nearest {
 };
 
 /// The least distance of two motions, where it is below `below_mm`; else a larger number.
-class Search {
+class NearestApproach {
  public:
-  Search(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b, const Track& b,
-         const Tolerance& tolerance)
+  NearestApproach(const ArmGeometry& arm_a, const Track& a, const ArmGeometry& arm_b,
+                  const Track& b, const Tolerance& tolerance)
       : arm_a_(arm_a), arm_b_(arm_b), a_(a), b_(b), tolerance_(tolerance) {}
 
   Nearest Run(double below_mm) {
@@ -142,8 +142,9 @@ std::vector<TightPair> FindTightest(const Scene& scene, std::span<const Track> t
     if (limit_mm < 1e8 && PassesClear(scene.arm(i), tracks[i], scene.arm(j), tracks[j],
                                       need_mm + limit_mm, tolerance))
       continue;
-    const Nearest nearest = Search(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
-                                .Run(seen_mm + need_mm + kTightToMm);
+    const Nearest nearest =
+        NearestApproach(scene.arm(i), tracks[i], scene.arm(j), tracks[j], tolerance)
+            .Run(seen_mm + need_mm + kTightToMm);
     // The pair is proven clear by the planned need; the search stops short of the very least. A
     // pair that is led apart is not proven: it may start nearer.
     const bool proven = nearest.distance_mm >= NeedOf(scene, i, j) - kTightToMm;

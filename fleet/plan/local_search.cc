@@ -14,9 +14,9 @@
 namespace focalfleet {
 namespace {
 
-constexpr double kNever = Motions::kNever;
-constexpr int kAttemptsPerUnit = 16;  // a unit looks for another way so often, then it stays
-/// The time that a unit may take grows from this attempt on, by so much for each attempt.
+constexpr double kImpossible = Motions::kNever;
+constexpr int kAttemptsPerUnit = 16;  // attempts of one unit; afterwards it keeps its last way
+/// From this attempt on, each attempt allows the unit 3 % more time.
 constexpr int kAttemptsInTime = 5;
 constexpr double kExtension = 0.03;
 constexpr double kWithin = 1.005;  // times the time that may be used at no cost
@@ -90,7 +90,7 @@ class LocalSearch {
   std::vector<std::uint8_t> attempts_;
   std::deque<std::uint32_t> queue_;
   int attempts_most_ = kAttemptsPerUnit;
-  double extend_most_ = kNever;
+  double extend_most_ = kImpossible;
   std::vector<Candidate> candidates_;
   bool starved_ = false;
 };
@@ -216,7 +216,8 @@ bool LocalSearch::GoViaCell(std::uint32_t unit, std::uint32_t other) {
   // Where nothing else helps, third units have to find another way.
   for (const Candidate& way : ways) {
     Track track = motions_.TrackOf(other, way.path);
-    if (motions_.Cost(other, track, kNever) == kNever || !motions_.KeepsLimits(other, way.path))
+    if (motions_.Cost(other, track, kImpossible) == kImpossible ||
+        !motions_.KeepsLimits(other, way.path))
       continue;
     motions_.Replace(other, way.path, std::move(track));
     if (ways_.TakeBySearchInTime(unit, within_s, attempts)) {
@@ -255,7 +256,7 @@ bool LocalSearch::GoAlong(std::uint32_t unit, const Way& way) {
   std::size_t chosen = 0;
   const double best = ways_.Cheapest(unit, within_s, candidates_, 0, &chosen);
   // Only where nothing else helps third units have to find another way.
-  if (best == kNever || (best >= 1 && attempts_[unit] < kAttemptsInTime)) return false;
+  if (best == kImpossible || (best >= 1 && attempts_[unit] < kAttemptsInTime)) return false;
   motions_.Replace(unit, candidates_[chosen].path);
   PushMet(unit);
   return true;
@@ -264,7 +265,7 @@ bool LocalSearch::GoAlong(std::uint32_t unit, const Way& way) {
 /// The cost of the cheapest candidate of the unit as the others move now; `chosen` is its index.
 double LocalSearch::FindCandidate(std::uint32_t unit, int attempts, std::size_t* chosen) {
   const double within_s = TimeAt(attempts);
-  double best = kNever;
+  double best = kImpossible;
   candidates_.clear();
   CandidateQuestion question = ways_.QuestionFor(unit, within_s);
   for (const CandidateRound& round : kCandidateRounds) {
@@ -280,7 +281,7 @@ double LocalSearch::FindCandidate(std::uint32_t unit, int attempts, std::size_t*
     }
     if (best < 1) break;
   }
-  if (best != kNever || attempts < 1) return best;
+  if (best != kImpossible || attempts < 1) return best;
   // Things that stand are in every way: the unit tries one around them.
   candidates_.clear();
   AppendAlong(
@@ -300,11 +301,11 @@ void LocalSearch::Improve(std::uint32_t unit) {
     motions_.Replace(unit, candidates_[chosen].path);
     return;
   }
-  if (attempts >= 1 || best == kNever) {
+  if (attempts >= 1 || best == kImpossible) {
     if (ways_.TakeBySearchInTime(unit, TimeAt(attempts), attempts)) return;
     Push(unit);
   }
-  if (best != kNever) motions_.Replace(unit, candidates_[chosen].path);
+  if (best != kImpossible) motions_.Replace(unit, candidates_[chosen].path);
   ResolveWithNeighbours(unit, attempts);
 }
 

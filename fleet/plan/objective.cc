@@ -9,11 +9,11 @@
 #include "fleet/plan/candidates.h"
 #include "fleet/plan/proof.h"
 #include "fleet/plan/rail_curves.h"
+#include "protocol/base/instants.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kTickS = 1e-4;
 constexpr int kPassesMax = 12;     // over all units
 constexpr double kGainMin = 2e-3;  // of the figure; a pass that gains less is the last
 constexpr int kLimitTrials = 8;    // steps of the bisection for the least peak

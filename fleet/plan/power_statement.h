@@ -1,5 +1,5 @@
-// The power that a plan drawsin a few figures: is the supply strong enough, how even is the load,
-// what does it cost.
+// The power that a plan draws, in a few figures: whether the supply is strong enough, how even the
+// load is, and what the plan costs.
 #pragma once
 
 #include <algorithm>

@@ -28,7 +28,7 @@ std::vector<Pose> EndsOf(const PlanRequest& request, std::span<const UnitPlan> m
 }
 
 Scene SceneOf(const PlanRequest& request, std::span<const UnitPlan> moves) {
-  Scene scene(*request.layout, request.drives, request.start);
+  Scene scene(*request.layout, request.drives, request.start, request.offsets);
   scene.AllowFor(EndsOf(request, {}));
   scene.AllowFor(EndsOf(request, moves));
   return scene;

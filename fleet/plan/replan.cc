@@ -11,11 +11,11 @@
 #include "fleet/plan/replan_neighbourhood.h"
 #include "fleet/plan/service.h"
 #include "fleet/plan/time_search.h"
+#include "protocol/base/instants.h"
 
 namespace focalfleet {
 namespace {
 
-constexpr double kTickS = 1e-4;
 /// Grids of the searches among the others as they move, and as they stand in the end. They are as
 /// fine as an answer within some milliseconds allows.
 struct Effort {

@@ -6,12 +6,13 @@
 #include <cstdio>
 #include <numeric>
 
+#include "protocol/base/instants.h"
+
 namespace focalfleet {
 namespace {
 
-constexpr double kTickS = 1e-4;
-constexpr double kGuardMm = 1.5e-4;     // of a pair that may be as near as the rule allows
-constexpr double kCoverSlackMm = 0.05;  // capsules of a cover may be this much too wide
+constexpr double kNearGuardMm = 1.5e-4;  // of a pair that may be as near as the rule allows
+constexpr double kCoverSlackMm = 0.05;   // capsules of a cover may be this much too wide
 
 }  // namespace
 
@@ -62,7 +63,7 @@ void ReplanNeighbourhood::AllowFor(Other* other, const Pose& starts) const {
   for (const Pose& mine : {q_.from, q_.to}) {
     for (const Pose& theirs : {starts, other->ends}) {
       const double distance = DistanceMm(arm().At(mine), scene_.arm(other->unit).At(theirs));
-      other->need_mm = std::max(least, std::min(other->need_mm, distance - kGuardMm));
+      other->need_mm = std::max(least, std::min(other->need_mm, distance - kNearGuardMm));
     }
   }
 }
@@ -123,9 +124,9 @@ void ReplanNeighbourhood::LookAround(std::span<const Deviation> deviations) {
     double need_mm = thing.need_mm;
     if (thing.by == kNoUnitIndex)
       for (const Pose& pose : {q_.from, q_.to})
-        need_mm =
-            std::max(thing.least_mm,
-                     std::min(need_mm, DistanceMm(arm().At(pose), thing.capsule.line) - kGuardMm));
+        need_mm = std::max(
+            thing.least_mm,
+            std::min(need_mm, DistanceMm(arm().At(pose), thing.capsule.line) - kNearGuardMm));
     standing_.push_back({thing.capsule, need_mm, thing.by});
   }
   order_.resize(others_.size());

@@ -102,6 +102,7 @@ struct LocalRequest {
   std::vector<std::uint8_t> frozen;
   std::vector<AxisPaths> motions;
   std::vector<std::uint8_t> given;
+  std::vector<Pose> offsets;  // empty where the request has none
 
   [[nodiscard]] std::uint32_t LocalOf(PositionerIndex unit) const {
     const auto it = std::lower_bound(units.begin(), units.end(), unit);
@@ -116,7 +117,8 @@ struct LocalRequest {
             .targets = targets,
             .frozen = frozen,
             .motions = motions,
-            .given = any ? std::span<const std::uint8_t>(given) : std::span<const std::uint8_t>()};
+            .given = any ? std::span<const std::uint8_t>(given) : std::span<const std::uint8_t>(),
+            .offsets = offsets};
   }
 };
 
@@ -124,19 +126,14 @@ Result<LocalRequest> LocalOf(const PlanRequest& request, const Sector& sector) {
   LocalRequest local;
   std::merge(sector.own.begin(), sector.own.end(), sector.halo.begin(), sector.halo.end(),
              std::back_inserter(local.units));
-  std::vector<Unit> units;
   for (const PositionerIndex i : local.units) {
-    units.push_back(request.layout->unit(i));
     local.drives.push_back(request.drives[i.value]);
     local.start.push_back(request.start[i.value]);
     local.targets.push_back(request.targets[i.value]);
     local.frozen.push_back(request.frozen[i.value]);
+    if (!request.offsets.empty()) local.offsets.push_back(request.offsets[i.value]);
   }
-  const auto obstacles = request.layout->obstacles();
-  FOCALFLEET_TRY_ASSIGN(
-      local.layout,
-      Layout::Create(std::move(units), {.clearance_mm = request.layout->clearance_mm(),
-                                        .obstacles = {obstacles.begin(), obstacles.end()}}));
+  FOCALFLEET_TRY_ASSIGN(local.layout, request.layout->Part(local.units));
   local.motions.resize(local.units.size());
   local.given.assign(local.units.size(), 0);
   return local;

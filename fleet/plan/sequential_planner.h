@@ -43,7 +43,6 @@ class SequentialPlanner {
   [[nodiscard]] const std::vector<Piece>& pieces() const { return pieces_; }
   /// Where each unit stands in the end. Shape: (n).
   [[nodiscard]] const std::vector<Pose>& poses() const { return poses_; }
-  [[nodiscard]] const std::vector<SegmentFp>& lines() const { return lines_; }
   /// Movers that did not get into their cells; ascending.
   [[nodiscard]] const std::vector<std::uint32_t>& stuck() const { return waiting_; }
 

@@ -5,10 +5,11 @@
 #include <cstdlib>
 #include <numbers>
 
+#include "protocol/base/instants.h"
+
 namespace focalfleet {
 namespace {
 
-constexpr double kTickS = 1e-4;
 constexpr std::uint8_t kPerhaps = 1;
 constexpr std::uint8_t kBlocked = 2;
 

@@ -13,8 +13,8 @@ namespace {
 
 /// Two cells count as one pose below this distance, in mm: a pair that is closer than this to
 /// touching is "not clear".
-constexpr double kResolutionMm = 2e-5;
-constexpr std::size_t kStackSize = 128;
+constexpr double kTrackResolutionMm = 2e-5;
+constexpr std::size_t kTrackStackSize = 128;
 
 struct Span1 {
   double low = 0;
@@ -25,7 +25,7 @@ struct Span1 {
 
 /// Own times of both units, a part of the band |a - b| <= slip, and where the arms are in the
 /// middle of them.
-struct Cell {
+struct PairCell {
   Span1 a;
   Span1 b;
   SegmentFp line_a;
@@ -37,13 +37,13 @@ template <class T>
 class Stack {
  public:
   [[nodiscard]] bool empty() const { return size_ == 0; }
-  [[nodiscard]] bool HasRoomForTwo() const { return size_ + 2 <= kStackSize; }
+  [[nodiscard]] bool HasRoomForTwo() const { return size_ + 2 <= kTrackStackSize; }
   void Push(const T& value) { new (&room_[sizeof(T) * size_++]) T(value); }
   T Pop() { return *std::launder(reinterpret_cast<const T*>(&room_[sizeof(T) * --size_])); }
 
  private:
   static_assert(std::is_trivially_destructible_v<T>);
-  alignas(T) std::byte room_[sizeof(T) * kStackSize];  // NOLINT: uninitialised on purpose
+  alignas(T) std::byte room_[sizeof(T) * kTrackStackSize];  // NOLINT: uninitialised on purpose
   std::size_t size_ = 0;
 };
 
@@ -59,10 +59,10 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
   const auto at = [](const Mover& mover, const Span1& span) {
     return ArmAt(*mover.arm, *mover.leg, span.middle());
   };
-  Stack<Cell> stack;
+  Stack<PairCell> stack;
   stack.Push({span_a, span_b, at(a, span_a), at(b, span_b)});
   while (!stack.empty()) {
-    const Cell whole = stack.Pop();
+    const PairCell whole = stack.Pop();
     const double travel_a = a.leg->speed_mm_per_s * whole.a.half();
     const double travel_b = b.leg->speed_mm_per_s * whole.b.half();
     const double enough = need_mm + travel_a + travel_b;
@@ -80,12 +80,12 @@ bool LegsClear(const Mover& a, const Mover& b, const Span1& span_a, const Span1&
       if (b.leg->stands()) at_b = std::clamp(at_a, whole.b.low, whole.b.high);
       if (std::abs(at_a - at_b) <= slip_s) return false;
     }
-    if (travel_a + travel_b < kResolutionMm || --*budget < 0 || !stack.HasRoomForTwo())
+    if (travel_a + travel_b < kTrackResolutionMm || --*budget < 0 || !stack.HasRoomForTwo())
       return false;
     const bool halve_a = travel_a >= travel_b;
     const double middle = halve_a ? whole.a.middle() : whole.b.middle();
     for (const bool upper : {false, true}) {
-      Cell half = whole;
+      PairCell half = whole;
       Span1& cut = halve_a ? half.a : half.b;
       (upper ? cut.low : cut.high) = middle;
       if (half.a.low > half.b.high + slip_s || half.b.low > half.a.high + slip_s) continue;
@@ -385,7 +385,7 @@ bool LegPassesClearOf(const ArmGeometry& arm, const Leg& leg, const Capsule& sta
     const double travel = leg.speed_mm_per_s * span.half();
     const double distance2 = SquaredDistance(ArmAt(arm, leg, at), standing.line);
     if (distance2 > (need + travel) * (need + travel)) continue;
-    if (distance2 <= need * need || travel < kResolutionMm || --budget < 0 ||
+    if (distance2 <= need * need || travel < kTrackResolutionMm || --budget < 0 ||
         !stack.HasRoomForTwo())
       return false;
     stack.Push({span.low, at});

@@ -36,5 +36,6 @@ struct DeviceTicks {
   constexpr auto operator<=>(const DeviceTicks&) const = default;
 };
 inline constexpr DurationNs kTick = Microseconds(100);
+inline constexpr double kTickS = 1e-4;  // the same in seconds
 
 }  // namespace focalfleet

@@ -8,14 +8,13 @@ namespace focalfleet::sim {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr Complex kJ{0, 1};
 constexpr double kRoot3Half = 0.86602540378443864676;
 constexpr std::array<Complex, kLegCount> kPhase = {
     {{1, 0}, {-0.5, kRoot3Half}, {-0.5, -kRoot3Half}}};
 
 // Every interval is at most this long. The bound limits the turn of the rotor and the change of its
 // speed within an interval.
-constexpr double kStepMax_s = 1e-6;
+constexpr double kCircuitStepMax_s = 1e-6;
 // The search for the instant at which a current dies out advances by at least this much.
 constexpr double kCrossingMin_s = 1e-14;
 
@@ -349,7 +348,7 @@ void Drive::RunCarrier(const Pattern& pattern, const Modulation& modulation) {
     SettleDiodes(now_s);
     if (now_s >= period_s) break;
 
-    double until_s = std::min(period_s, now_s + kStepMax_s);
+    double until_s = std::min(period_s, now_s + kCircuitStepMax_s);
     if (next < edges.count) until_s = std::min(until_s, edges.in_order[next].at_s);
     bool diode = false;
     for (const Leg& leg : legs_) {

@@ -23,6 +23,8 @@
 
 namespace focalfleet::sim {
 
+inline constexpr std::complex<double> kJ{0, 1};  // the imaginary unit
+
 /// The energies since the start. Units: J. supply = copper + switching + load + viscous + the rise
 /// of stored, up to rounding and the constant speed between events.
 struct DriveEnergy {

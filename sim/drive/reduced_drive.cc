@@ -6,9 +6,8 @@ namespace focalfleet::sim {
 namespace {
 
 using Complex = std::complex<double>;
-constexpr Complex kJ{0, 1};
 // A hundredth of the fastest swing of the rotor about its field (0.5 ms at 9 V and 0.3 mWb).
-constexpr double kStepMax_s = 20e-6;
+constexpr double kRotorStepMax_s = 20e-6;
 // The number of time constants until the currents of a blocked rotor repeat: e^-20.
 constexpr double kSettling = 20;
 
@@ -64,7 +63,7 @@ Complex ReducedDrive::Current(const Vector& vector, double angle_rad,
 void ReducedDrive::RunVectors(std::int64_t first, std::int64_t count, double repeat) {
   const std::int64_t subdivision = modulation_.subdivision;
   const double vector_s = repeat * modulation_.carrier_s();
-  const double steps = std::ceil(vector_s / kStepMax_s);
+  const double steps = std::ceil(vector_s / kRotorStepMax_s);
   const double step_s = vector_s / steps;
   const double flux = setting_.motor.flux_linkage_Wb;
   const auto torque_of = [flux](Complex current, double angle_rad) {

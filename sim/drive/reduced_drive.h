@@ -37,7 +37,6 @@ class ReducedDrive {
   [[nodiscard]] const Shaft& shaft() const { return shaft_; }
   [[nodiscard]] double t_s() const { return t_s_; }
   [[nodiscard]] double copper_J() const { return copper_J_; }
-  [[nodiscard]] double switching_J() const { return switching_J_; }
   /// Electrical input, copper, switching and energy into the shaft. Units: J.
   [[nodiscard]] double supply_J() const {
     return copper_J_ + switching_J_ + shaft_.load_J() + shaft_.viscous_J() + shaft_.kinetic_J();

@@ -3,15 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numbers>
 
 #include "protocol/base/check.h"
+#include "protocol/base/units.h"
 #include "sim/drive/steady.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kRealResolution = 1e-3;  // of a critical n that is not whole
 constexpr int kRepeatMax = 255;           // the most that a unit's timer table holds
 
@@ -58,7 +57,7 @@ class Pwm {
 template <class Level>
 bool Rest(Level* level, const Modulation& modulation, std::int64_t field, double stall_Nm,
           int direction) {
-  const double angle = static_cast<double>(field) * kTurn / modulation.subdivision;
+  const double angle = static_cast<double>(field) * kTurnRad / modulation.subdivision;
   level->Place(angle);
   const double share = level->load_Nm() / stall_Nm;
   if (share >= 1) return false;
@@ -89,7 +88,7 @@ MoveCount TryMovesAt(Level level, double stall_Nm, const Drive::Setting& setting
       RunProfile(&level, field, MakeProfile(direction * vectors, modulation, rule.ramp));
       const std::int64_t end = field + direction * vectors;
       const double off =
-          level.angle_rad() / kTurn - static_cast<double>(end) / modulation.subdivision;
+          level.angle_rad() / kTurnRad - static_cast<double>(end) / modulation.subdivision;
       // Lost turns stay lost: the next move starts where the rotor is.
       const auto lost = std::llround(off);
       count.succeeded += lost == 0 ? 1 : 0;
@@ -106,7 +105,7 @@ bool StartsAt(Level level, double stall_Nm, const Modulation& modulation, const 
   if (!Rest(&level, modulation, 0, stall_Nm, 1)) return false;
   const std::int64_t vectors = static_cast<std::int64_t>(trial.turns) * modulation.subdivision;
   RunProfile(&level, 0, MakeProfile(vectors, modulation, trial.ramp));
-  return std::abs(level.angle_rad() - trial.turns * kTurn) < kTurn / 2;
+  return std::abs(level.angle_rad() - trial.turns * kTurnRad) < kTurnRad / 2;
 }
 
 Drive::Setting AtWorstLoad(Drive::Setting setting) {
@@ -130,7 +129,7 @@ bool StartsReal(const ReducedDrive& rested, double load_Nm, const Modulation& mo
   for (int turn = 0; turn < kTurns; ++turn) {
     drive.RunVectors(1, modulation.subdivision, repeat);
     // A lost turn is not regained.
-    if (drive.shaft().angle_rad() < (turn + 0.5) * kTurn) return false;
+    if (drive.shaft().angle_rad() < (turn + 0.5) * kTurnRad) return false;
   }
   return true;
 }

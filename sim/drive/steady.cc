@@ -5,12 +5,11 @@
 #include <numbers>
 
 #include "protocol/base/check.h"
+#include "protocol/base/units.h"
 #include "sim/drive/torque_ripple.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr double kTurn = 2 * std::numbers::pi;
 
 Drive::Setting HeldAtSpeed(Drive::Setting setting) {
   setting.motor.inertia_kg_m2 = 1e9;
@@ -19,7 +18,7 @@ Drive::Setting HeldAtSpeed(Drive::Setting setting) {
   return setting;
 }
 
-double FieldSpeed(const Modulation& modulation) { return kTurn * modulation.field_Hz(); }
+double FieldSpeed(const Modulation& modulation) { return kTurnRad * modulation.field_Hz(); }
 
 // The first vector is centred on the angle that it is shown for. The field stands still at angle 0
 // while a turning rotor passes from half a vector before to half a vector after.
@@ -48,7 +47,7 @@ std::int64_t SettlingVectors(const Drive::Setting& setting, const Modulation& mo
 void RunIn(Drive* held, const Modulation& modulation, const std::vector<Pattern>& table,
            double lag_rad, std::int64_t vectors) {
   held->Place(AngleAtBegin(modulation, lag_rad) -
-                  kTurn * static_cast<double>(vectors) / modulation.subdivision,
+                  kTurnRad * static_cast<double>(vectors) / modulation.subdivision,
               FieldSpeed(modulation));
   RunVectors(held, modulation, table, -vectors, vectors);
 }
@@ -133,8 +132,8 @@ double PullOutTorque(const Drive::Setting& setting, const Modulation& modulation
   const double top_rad = LagOfPullOut(held, FieldSpeed(modulation));
   // The top of a sine is flat: values within 3 degrees of it differ by 0.14 %.
   for (int deg = -30; deg <= 12; deg += 6)
-    best_Nm =
-        std::max(best_Nm, TorqueAt(held, modulation, table, top_rad + deg * kTurn / 360).torque_Nm);
+    best_Nm = std::max(best_Nm,
+                       TorqueAt(held, modulation, table, top_rad + deg * kTurnRad / 360).torque_Nm);
   return best_Nm;
 }
 
@@ -168,13 +167,13 @@ WaveFigures MeasureSteadyWave(const Drive::Setting& setting, const Modulation& m
   drive.Listen([&](const DriveInterval& interval) {
     for (int m = -kHarmonics; m <= kHarmonics; ++m) {
       // e^(-j m w t) about the interval's begin, to third order.
-      const std::complex<double> rate(0, -kTurn * m / turn_s);
+      const std::complex<double> rate(0, -kTurnRad * m / turn_s);
       const std::complex<double> around =
           interval.moments[0] +
           rate * (interval.moments[1] +
                   rate * (0.5 * interval.moments[2] + rate / 6.0 * interval.moments[3]));
       components[static_cast<std::size_t>(kHarmonics + m)] +=
-          around * std::polar(1.0, -kTurn * m * (interval.t_s - begin_s) / turn_s);
+          around * std::polar(1.0, -kTurnRad * m * (interval.t_s - begin_s) / turn_s);
     }
     ripple.Hear(interval);
   });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "sim/hall/median.h"
 #include "sim/hall/suspicion.h"
 
 namespace focalfleet::sim {
@@ -42,13 +43,6 @@ std::string OfSensors(const HallRig& rig, const VoltageRow& row, bool magnitudes
   if (!saturated.empty()) Append(&text, "saturated" + saturated);
   if (!missing.empty()) Append(&text, "missing" + missing);
   return text;
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // The median of chi^2 a degree of freedom is below 1 (Wilson and Hilferty).

@@ -16,13 +16,13 @@ constexpr std::size_t kPointsMin = 12;
 constexpr double kSameRadius_mm = 0.5;
 
 // B = profile(theta) (c cos 4 phi + s sin 4 phi).
-struct Wave {
+struct WaveTerm {
   Vector2d coefficients;
   Matrix2d inverse;  // of the normal matrix
   double squares = 0;
 };
 template <class Profile>
-Wave FitWave(const FieldMap& map, Profile profile) {
+WaveTerm FitWave(const FieldMap& map, Profile profile) {
   Matrix2d normal = Matrix2d::Zero();
   Vector2d right = Vector2d::Zero();
   double squares = 0;
@@ -33,7 +33,7 @@ Wave FitWave(const FieldMap& map, Profile profile) {
     right += row * point.b_T;
     squares += point.b_T * point.b_T;
   }
-  Wave wave;
+  WaveTerm wave;
   // A map along a single meridian does not determine the phase; the phase then stays as it is.
   normal += 1e-12 * (normal.trace() + 1e-300) * Matrix2d::Identity();
   wave.inverse = normal.inverse();
@@ -73,12 +73,13 @@ struct Polar {
   double amplitude_T = 0;
   double phase_rad = 0;
 };
-Polar PolarOf(const Wave& wave) {
+Polar PolarOf(const WaveTerm& wave) {
   return {wave.coefficients.norm(), std::atan2(wave.coefficients[1], wave.coefficients[0]) / 4};
 }
 
 FieldParameters FitHarmonic(const FieldMap& map) {
-  const Wave wave = FitWave(map, [](double theta_rad) { return std::pow(std::sin(theta_rad), 4); });
+  const WaveTerm wave =
+      FitWave(map, [](double theta_rad) { return std::pow(std::sin(theta_rad), 4); });
   const double variance = wave.squares / static_cast<double>(map.size() - 2);
   const auto [amplitude_T, phase_rad] = PolarOf(wave);
   const double sd_T = std::sqrt(variance * wave.inverse.trace() / 2);
@@ -87,7 +88,7 @@ FieldParameters FitHarmonic(const FieldMap& map) {
 
 FieldParameters FitSurface(const FieldMap& map) {
   const double width_rad = BestWidth_rad(map);
-  const Wave wave = FitWave(map, [&](double theta_rad) {
+  const WaveTerm wave = FitWave(map, [&](double theta_rad) {
     const double x = (theta_rad - std::numbers::pi / 2) / width_rad;
     return std::exp(-x * x);
   });

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::size_t kTilts = 13;
 constexpr std::size_t kSpins = 16;
-constexpr std::size_t kNodes = kTilts * kTilts * kSpins;
+constexpr std::size_t kGridNodes = kTilts * kTilts * kSpins;
 constexpr std::size_t kStartsMax = 8;
 constexpr double kSame_rad = 1e-4;
 constexpr double kGammaRange_rad = 90 * kRadPerDeg;
@@ -109,7 +109,7 @@ FOCALFLEET_WIDE void Accumulate(const TurnedLanes& turned, const SampleLanes& fi
   }
 }
 
-Orientation Moved(const Orientation& from, const Triple& by) {
+Orientation MovedBy(const Orientation& from, const Triple& by) {
   return {from.alpha_rad + by[0], from.beta_rad + by[1], from.gamma_rad + by[2]};
 }
 
@@ -222,7 +222,7 @@ OrientationFit OrientationSolver::Refine(const HallReading& reading,
     }
     if (size > 0.35)  // 20 deg: beyond any linear reach
       for (double& part : step) part *= 0.35 / size;
-    const Orientation next = Moved(fit.orientation, step);
+    const Orientation next = MovedBy(fit.orientation, step);
     if (damping == 0 && size < options_.last_step_rad) {
       fit.orientation = next;
       for (std::size_t i = 0; i < 3; ++i) here.squares -= step[i] * here.right[i];
@@ -264,27 +264,27 @@ Orientation OrientationSolver::Node(std::size_t index) const {
 
 void OrientationSolver::MakeAtlas() {
   const std::size_t sensors = count();
-  atlas_.resize(sensors * kNodes);
+  atlas_.resize(sensors * kGridNodes);
   std::array<double, kSensorsMax> b_T{};
-  for (std::size_t node = 0; node < kNodes; ++node) {
+  for (std::size_t node = 0; node < kGridNodes; ++node) {
     Predict(Node(node), {b_T.data(), sensors});
     for (std::size_t k = 0; k < sensors; ++k)
-      atlas_[k * kNodes + node] = static_cast<float>(b_T[k]);
+      atlas_[k * kGridNodes + node] = static_cast<float>(b_T[k]);
   }
 }
 
 std::vector<Orientation> OrientationSolver::Starts(const HallReading& reading) const {
-  std::vector<float> miss(kNodes, 0.0F);
+  std::vector<float> miss(kGridNodes, 0.0F);
   for (std::size_t k = 0; k < count(); ++k) {
     if ((reading.used >> k & 1u) == 0) continue;
-    const float* row = atlas_.data() + k * kNodes;
+    const float* row = atlas_.data() + k * kGridNodes;
     const auto b_T = static_cast<float>(reading.b_T[k]);
-    for (std::size_t node = 0; node < kNodes; ++node)
+    for (std::size_t node = 0; node < kGridNodes; ++node)
       miss[node] += (row[node] - b_T) * (row[node] - b_T);
   }
   // The nodes that are lower than their six neighbours; gamma is periodic.
   std::vector<std::size_t> lowest;
-  for (std::size_t node = 0; node < kNodes; ++node) {
+  for (std::size_t node = 0; node < kGridNodes; ++node) {
     const std::size_t spin = node % kSpins, rest = node / kSpins;
     const std::size_t a = rest / kTilts, b = rest % kTilts;
     const auto at = [&](std::size_t i, std::size_t j, std::size_t k) {

@@ -67,7 +67,6 @@ class OrientationSolver {
   [[nodiscard]] std::vector<OrientationFit> Solve(const HallReading& reading) const;
 
   [[nodiscard]] const HallRig& rig() const { return rig_; }
-  [[nodiscard]] const FieldModel& field() const { return *field_; }
   /// The readings of each sensor at an orientation. Shape: as many as sensors.
   void Predict(const Orientation& orientation, std::span<double> b_T) const;
   /// The orientation with gamma within its period, where the field has one of 90 deg.

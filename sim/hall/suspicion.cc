@@ -11,7 +11,6 @@ constexpr std::size_t kRowsForVerdict = 4;
 constexpr double kVarianceLeft = 0.25;
 // Share of the variance that the best leaves: within it a hypothesis cannot be distinguished.
 constexpr double kNear = 2;
-constexpr double kAlike_V = 2e-3;  // a sensor that moves less stands still
 constexpr double kOthersMove_V = 0.1;
 constexpr double kHarmless = 0.1;  // of the same: no orientation suffers from it
 constexpr double kSuspicious = 9;  // of the usual noise's variance, where rows are few

@@ -5,11 +5,12 @@
 #include <map>
 #include <span>
 
+#include "protocol/base/units.h"
+
 namespace focalfleet::sim {
 namespace {
 
 constexpr double kMargin_deg = 3;
-constexpr double kTurn_deg = 360;
 constexpr double kNominalDrive = 1, kNominalDelay_s = 3;
 constexpr double kBetweenExposures_s = 45;
 
@@ -80,7 +81,7 @@ std::array<double, 2> AnglesAt(const CampaignUnit& unit, const ProposedMove& mov
     const double own = wanted[axis] - unit.zero_deg[axis];
     const double low = std::min(unit.min_deg[axis] + kMargin_deg, middle);
     const double high = std::max(unit.max_deg[axis] - kMargin_deg, middle);
-    angles[axis] = std::clamp(own - kTurn_deg * std::round((own - middle) / kTurn_deg), low, high);
+    angles[axis] = std::clamp(own - kTurnDeg * std::round((own - middle) / kTurnDeg), low, high);
   }
   return angles;
 }
@@ -154,7 +155,7 @@ Campaign Ahead(const Campaign& made, const std::vector<PlateMove>& moves) {
         ahead.from_deg[axis].push_back(walker.at_deg[axis]);
         const double next = to ? (*to)[axis] : walker.at_deg[axis];
         ahead.cmd_deg[axis].push_back(next);
-        walker.cycles[axis] += std::abs(next - walker.at_deg[axis]) / kTurn_deg;
+        walker.cycles[axis] += std::abs(next - walker.at_deg[axis]) / kTurnDeg;
         walker.at_deg[axis] = next;
       }
       walker.time_s += kBetweenExposures_s + moves[m].conditions.delay_s;

@@ -1,7 +1,7 @@
 // A cause with one amplitude for both axes is one template, and a cause with its own on each axis
-// is two. Neither of the two does alone what the other cause does. Terms of both axes are therefore
-// compared with pairs, too. The pairs are fitted, because the effects of two axes on a fibre are
-// not independent, so that their evidence does not add up.
+// is two. A pair of templates for single axes cannot be replaced by one of them alone. Terms of
+// both axes are therefore compared with pairs as well. The pairs are fitted, because the effects of
+// two axes on a fibre are not independent, so that their evidence does not add up.
 #pragma once
 
 #include <cstddef>

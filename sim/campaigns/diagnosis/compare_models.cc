@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kFar = 6;  // medians of the unit's, or of the fleet's, residuals
+constexpr double kFarMedians = 6;  // medians of the unit's, or of the fleet's, residuals
 // A unit's median: it is at another place than the model has it.
 constexpr double kElsewhereUm = 1e3;
 constexpr double kSameUm = 1e-3;  // smaller differences are the digits of a file
@@ -54,7 +54,7 @@ FarOff FindFarOff(const Campaign& campaign, const std::vector<double>& lengths) 
     const double own_um = MedianOf(std::span(lengths).subspan(begin, end - begin));
     far.unit[unit] = own_um > kElsewhereUm ? 1 : 0;
     for (std::size_t row = begin; row < end; ++row)
-      far.row[row] = lengths[row] > kFar * std::max(fleet_um, own_um) ? 1 : 0;
+      far.row[row] = lengths[row] > kFarMedians * std::max(fleet_um, own_um) ? 1 : 0;
   }
   return far;
 }

@@ -34,7 +34,7 @@ namespace {
 constexpr std::size_t kMovesMin = 8;  // seen moves of a unit
 // Median; a larger miss means that the geometry is another unit's.
 constexpr double kMissMax_mm = 1;
-constexpr double kKeptMin = 0.03;
+constexpr double kKeptOfTermMin = 0.03;
 
 // Templates that the data can test; the reasons for the others go to `not_testable`.
 Templates ListLibrary(const CampaignFacts& facts, const DiagnoseOptions& options,
@@ -72,7 +72,7 @@ void FindNotExcited(const Templates& templates, const Selection& selection,
     most = std::max(most, selection.kept_share[k]);
   }
   for (const auto& [cause, most] : best)
-    if (most < kKeptMin)
+    if (most < kKeptOfTermMin)
       out->push_back({std::string(cause), most > 0 ? "static geometry explains the same as well"
                                                    : "the moves never excite it"});
 }
@@ -220,8 +220,8 @@ HeldOutGain GainOf(const Fit& fit, const std::optional<Campaign>& as_named,
 }
 
 // Measures the gain on held-out moves, and proposes the moves to make next.
-void LookAhead(const Fit& fit, const std::optional<Campaign>& as_named,
-               const DiagnoseOptions& options, Diagnosis* diagnosis) {
+void ProposeNextMoves(const Fit& fit, const std::optional<Campaign>& as_named,
+                      const DiagnoseOptions& options, Diagnosis* diagnosis) {
   if (options.with_gain) {
     options.progress(0.9, "held-out moves");
     diagnosis->gain = GainOf(fit, as_named, options);
@@ -351,7 +351,7 @@ Diagnosis Diagnose(const Campaign& given, const DiagnoseOptions& options) {
   JudgeBesideUnknown(&diagnosis.causes, &diagnosis.unknown);
   if (!diagnosis.unknown.empty()) AddRivalsBehind(&diagnosis.causes);
   Conclude(&diagnosis);
-  LookAhead(fit, as_named, options, &diagnosis);
+  ProposeNextMoves(fit, as_named, options, &diagnosis);
   diagnosis.x_after_um = fit.x_um, diagnosis.y_after_um = fit.y_um;
   diagnosis.model = fit.model;
   diagnosis.model.terms.insert(diagnosis.model.terms.begin(), before.terms.begin(),

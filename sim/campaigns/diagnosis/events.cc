@@ -13,7 +13,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr std::size_t kEventsMax = 40;  // events of a unit at once
+constexpr std::size_t kEventsOfUnitMax = 40;  // events of a unit at once
 constexpr int kTurnsMax = 20;
 constexpr double kEventLogLikelihood = 25;  // the least of an event that was taken
 
@@ -154,7 +154,7 @@ std::vector<EventTerm> Slips(const Fit& fit, std::size_t unit, std::size_t axis,
   }
   const bool many = whole >= 4 && whole >= 0.8 * all;
   for (const Jump& jump : jumped)
-    if (jump.whole && (many || jump.is_lasting) && events.size() < kEventsMax)
+    if (jump.whole && (many || jump.is_lasting) && events.size() < kEventsOfUnitMax)
       events.push_back({unit, track.first_row + jump.move, axis, true, jump.turns * turn});
   return events;
 }
@@ -243,8 +243,8 @@ double SizeOf_um(const Fit& fit, const EventTerm& event) {
   return 1e3 * lever_mm * std::abs(event.step_deg) * std::numbers::pi / 180;
 }
 
-CauseFound CauseOf(const Fit& fit, std::string_view name, std::string_view paragraph,
-                   const std::vector<EventTerm>& events) {
+CauseFound CauseOfSteps(const Fit& fit, std::string_view name, std::string_view paragraph,
+                        const std::vector<EventTerm>& events) {
   CauseFound cause = CauseNamed(name);
   cause.scope = "unit";
   cause.amplitude_unit = kEvents;
@@ -331,7 +331,7 @@ std::vector<CauseFound> EventCauses(const Fit& fit) {
   std::vector<CauseFound> causes;
   for (const Named* one : {&turns, &commands, &contacts})
     if (!one->events.empty())
-      causes.push_back(CauseOf(fit, one->name, one->paragraph, one->events));
+      causes.push_back(CauseOfSteps(fit, one->name, one->paragraph, one->events));
   return causes;
 }
 

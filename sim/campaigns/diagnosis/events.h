@@ -1,8 +1,8 @@
-// A step is an axis that from one move on is off by a fixed angle, until it is homed. Steps of a
-// size that physics gives come first. They are whole motor turns lost against the motion
-// (step_loss), or a whole command lost or done twice (lost_command). A move that stops short by any
-// angle has touched a neighbour where that one was stopped in the same move (collision_contact).
-// The cause of other steps is unknown.
+// A step is a fixed error of an axis that begins at one move and lasts until the next homing. Steps
+// of a size that physics gives come first. They are whole motor turns lost against the motion
+// (step_loss), or a whole command lost or done twice (lost_command). A move that stops short has
+// touched a neighbour, where that neighbour stopped short in the same move (collision_contact). The
+// cause of other steps is unknown.
 #pragma once
 
 #include <string_view>

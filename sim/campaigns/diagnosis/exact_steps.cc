@@ -3,17 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <span>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::size_t kEventsMax = 40;  // steps of a unit at once
 // A smaller lost command cannot be distinguished from other steps.
 constexpr double kStepMin_deg = 0.3;
@@ -70,9 +69,10 @@ AnglesOff AnglesOffAt(const UnitRows& rows, std::size_t i) {
     const double phi = side * std::acos(std::clamp(cosine, -1.0, 1.0));
     const double theta = std::atan2(y, x) - std::atan2(b * std::sin(phi), a + b * std::cos(phi));
     const double off[2] = {
-        std::remainder(theta / kRadians - unit.zero_deg[kTheta] - rows.track.cmd_deg[kTheta][i],
-                       360),
-        std::remainder(phi / kRadians - unit.zero_deg[kPhi] - rows.track.cmd_deg[kPhi][i], 360)};
+        std::remainder(
+            theta / kRadiansPerDegree - unit.zero_deg[kTheta] - rows.track.cmd_deg[kTheta][i], 360),
+        std::remainder(phi / kRadiansPerDegree - unit.zero_deg[kPhi] - rows.track.cmd_deg[kPhi][i],
+                       360)};
     const double far = std::abs(off[0]) + std::abs(off[1]);
     if (far < least) least = far, best = {{off[0], off[1]}};
   }

@@ -16,12 +16,12 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kBad_mm = 0.3;       // distance from the expected place
-constexpr double kSwapBetter = 0.2;   // of the distance that is left once names are exchanged
-constexpr double kSwapNear_mm = 3;    // absolute limit: the table's zeros may be wrong
-constexpr std::size_t kRowsMin = 3;   // rows that both units have
-constexpr double kChange = 2.5;       // votes that a change of the exchange costs
-constexpr std::size_t kBadMost = 64;  // units: more are no exchange, but another table
+constexpr double kBad_mm = 0.3;            // distance from the expected place
+constexpr double kSwapBetter = 0.2;        // of the distance that is left once names are exchanged
+constexpr double kSwapNear_mm = 3;         // absolute limit: the table's zeros may be wrong
+constexpr std::size_t kCommonRowsMin = 3;  // rows that both units have
+constexpr double kChange = 2.5;            // votes that a change of the exchange costs
+constexpr std::size_t kBadMost = 64;       // units: more are no exchange, but another table
 
 // Rows of an exposure that both units have.
 struct RowPair {
@@ -61,7 +61,7 @@ std::vector<std::size_t> OffAtTheEnd(const Campaign& campaign) {
     std::vector<double> misses;
     for (std::size_t row = end - (end - begin) / 3; row < end; ++row)
       if (std::isfinite(campaign.x_mm[row])) misses.push_back(OwnMiss(campaign, row, unit));
-    if (misses.size() >= kRowsMin && Median(std::move(misses)) > kBad_mm) off.push_back(unit);
+    if (misses.size() >= kCommonRowsMin && Median(std::move(misses)) > kBad_mm) off.push_back(unit);
   }
   return off;
 }
@@ -102,7 +102,7 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
   const Campaign& campaign = *facts.campaign;
   const std::vector<RowPair> rows = RowsOfBoth(facts, a, b);
   const std::size_t since = SinceWhen(campaign, rows, a, b);
-  if (since + kRowsMin > rows.size()) return std::nullopt;
+  if (since + kCommonRowsMin > rows.size()) return std::nullopt;
   const std::array<std::vector<double>, 2> off = Offsets(facts, rows, since);
   std::vector<double> own, crossed;
   double square = 0;
@@ -118,7 +118,7 @@ std::optional<CommandSwap> AsCommandSwap(const CampaignFacts& facts, std::size_t
     };
     take(rows[k].a, a, rows[k].b, 1), take(rows[k].b, b, rows[k].a, -1);
   }
-  if (own.size() < 2 * kRowsMin) return std::nullopt;
+  if (own.size() < 2 * kCommonRowsMin) return std::nullopt;
   const double rms_mm = std::sqrt(square / static_cast<double>(own.size()));
   if (Median(std::move(crossed)) >= kSwapBetter * Median(std::move(own))) return std::nullopt;
   return CommandSwap{a, b, rows[since].exposure, rms_mm};
@@ -236,7 +236,7 @@ std::optional<FibreSwap> AsFibreSwap(const CampaignFacts& facts, const Expected&
     std::size_t crossed = 0;
     for (end = begin; end < rows.size() && exchanged[end] == exchanged[begin]; ++end)
       if (AreCrossed(campaign, expected, rows[end].a, rows[end].b)) ++crossed;
-    if (exchanged[begin] == 0 || crossed < kRowsMin) continue;
+    if (exchanged[begin] == 0 || crossed < kCommonRowsMin) continue;
     // An exchange to the end of the rows that both units have is one to the end of each unit.
     FibreSwap::Stretch stretch = FibreSwap::Whole(campaign, a, b).stretches.front();
     if (begin > 0) stretch.begin_a = rows[begin].a, stretch.begin_b = rows[begin].b;
@@ -331,7 +331,7 @@ std::vector<FibreSwap> FindFibreSwaps(const CampaignFacts& facts) {
   for (const Crossing& one : FindCrossings(facts, expected)) ++crossed[{one.unit_a, one.unit_b}];
   std::vector<std::pair<std::size_t, std::pair<std::size_t, std::size_t>>> pairs;
   for (const auto& [pair, exposures] : crossed)
-    if (exposures >= kRowsMin) pairs.emplace_back(exposures, pair);
+    if (exposures >= kCommonRowsMin) pairs.emplace_back(exposures, pair);
   std::ranges::stable_sort(pairs, std::greater{}, [](const auto& one) { return one.first; });
   std::vector<FibreSwap> swaps;
   std::set<std::size_t> taken;

@@ -1,5 +1,6 @@
 // Families are causes whose signatures are near each other. Where the library has the true shape of
-// one only roughly, it leaves a misfit artefact that looks like another.
+// a cause only roughly, the cause leaves a misfit artefact that looks like another cause of its
+// family.
 #pragma once
 
 #include <string_view>

@@ -25,7 +25,7 @@ constexpr double kShareOfRate = 0.3;  // of the family-wise rate
 constexpr std::array kNear = {1.0 / 20000, 1.0 / 5000, 1.0 / 1250, 1.0 / 300, 1.0 / 80};
 
 // Orders of a ripple beyond the screen's, in halves of one: bins are of two turns.
-constexpr std::size_t kBins = 65536;
+constexpr std::size_t kPairBins = 65536;
 constexpr double kFolded_deg = 720;
 constexpr std::size_t kBinOfOrder = 2, kOrderMin = 60, kOrders = 16000;
 
@@ -165,8 +165,8 @@ class Clearest {
 // ln of a normal deviate's one-sided tail probability.
 double LogTail(double z) { return z > 0 ? LogChiSquareTail(z * z, 1) - std::numbers::ln2 : 0; }
 
-// Explained ln L of a share of the rows' variance.
-double Explained(double share, std::size_t rows) {
+// The gain of ln L by a share of the rows' variance.
+double GainOfShare(double share, std::size_t rows) {
   return -static_cast<double>(rows) / 2 * std::log1p(-std::min(share, 0.99));
 }
 
@@ -198,7 +198,7 @@ void LookAtRepeats(const Fit& fit, const std::vector<Row>& rows, const Column& c
       clearest->Look(LogTail(z), {.covariate = column.name,
                                   .channel = std::string(kChannelName[c]),
                                   .size_um = std::sqrt(sum.share()) * SpreadOf(rows, c),
-                                  .delta_log_likelihood = Explained(sum.share(), order.size())});
+                                  .delta_log_likelihood = GainOfShare(sum.share(), order.size())});
     }
   }
 }
@@ -214,15 +214,15 @@ void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axi
   const Channel c = axis == kTheta ? kAlongTheta : kAlongPhi;
   const std::span<const double> angle_deg = facts.Find(kCommand[axis])->values;
   std::vector<std::size_t> arrivals;
-  std::vector<double> at_angle(kBins, 0.0);
+  std::vector<double> at_angle(kPairBins, 0.0);
   double squares = 0;
   for (std::size_t row = 0; row < rows.size(); ++row) {
     const double along = rows[row].along[c];
     if (along == 0 || !Arrives(facts, axis, row)) continue;
     arrivals.push_back(row);
     const double turns = angle_deg[row] / kFolded_deg;
-    const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * kBins);
-    at_angle[std::min(bin, kBins - 1)] += along;
+    const auto bin = static_cast<std::size_t>((turns - std::floor(turns)) * kPairBins);
+    at_angle[std::min(bin, kPairBins - 1)] += along;
     squares += along * along;
   }
   if (static_cast<double>(arrivals.size()) < kPairsMin) return;
@@ -252,7 +252,7 @@ void LookAtRipples(const Fit& fit, const std::vector<Row>& rows, std::size_t axi
                  {.covariate = std::string(kCommand[axis]),
                   .channel = std::string(kChannelName[c]),
                   .size_um = std::sqrt(share) * SpreadOf(rows, c),
-                  .delta_log_likelihood = Explained(share, arrivals.size())});
+                  .delta_log_likelihood = GainOfShare(share, arrivals.size())});
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
-// Fine structure varies faster than any curve of the screen can follow. Two methods find it without
-// a shape for it: roundings, teeth of an unknown order, effects of small steps, fractions of a
-// pixel.
+// Fine structure varies faster than any curve of the screen can follow. Examples are roundings,
+// teeth of an unknown order, effects of small steps and fractions of a pixel. Two methods find it
+// without a shape for it.
 //
 // Near repeats: noise differs each time, an effect repeats. Residuals of pairs of rows with nearly
 // one value of a column are multiplied. The products' mean is zero by chance, whatever the noise of

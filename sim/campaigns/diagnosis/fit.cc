@@ -2,12 +2,11 @@
 
 #include <cmath>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/plain_geometry.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr double kMicrons = 1e3;  // in a millimetre
 
 std::vector<PlainRow> PlainRows(const Fit& fit, std::size_t unit) {
   const Campaign& campaign = *fit.facts->campaign;
@@ -27,8 +26,8 @@ void UpdateResiduals(Fit* fit) {
   fit->x_um.resize(campaign.rows());
   fit->y_um.resize(campaign.rows());
   for (std::size_t row = 0; row < campaign.rows(); ++row) {
-    fit->x_um[row] = (campaign.x_mm[row] - places.x_mm[row]) * kMicrons;
-    fit->y_um[row] = (campaign.y_mm[row] - places.y_mm[row]) * kMicrons;
+    fit->x_um[row] = (campaign.x_mm[row] - places.x_mm[row]) * kUmPerMm;
+    fit->y_um[row] = (campaign.y_mm[row] - places.y_mm[row]) * kUmPerMm;
   }
 }
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
 
 namespace focalfleet::sim {
@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kSizeMin_um = 1;  // tables are rounded, and shared terms leave a trace in it
+constexpr double kGeometrySizeMin_um =
+    1;  // tables are rounded, and shared terms leave a trace in it
 
 struct Group {
   const char* cause;
@@ -101,8 +101,8 @@ double SizeAtFibre(const UnitOffset& unit, const Group& group, const CampaignUni
   double square = 0;
   for (const Index at : group.at) {
     double lever_mm = 1;
-    if (at == 4) lever_mm = std::hypot(geometry.arm_mm[0], geometry.arm_mm[1]) * kRadians;
-    if (at == 5) lever_mm = geometry.arm_mm[1] * kRadians;
+    if (at == 4) lever_mm = std::hypot(geometry.arm_mm[0], geometry.arm_mm[1]) * kRadiansPerDegree;
+    if (at == 5) lever_mm = geometry.arm_mm[1] * kRadiansPerDegree;
     square += unit.offset[at] * unit.offset[at] * lever_mm * lever_mm;
   }
   return 1e3 * std::sqrt(square);
@@ -209,7 +209,7 @@ std::vector<CauseFound> FindGeometryCauses(const Fit& fit, double family_wise) {
       return std::find(group.begin(), group.end(), at) != group.end();
     });
     CauseFound cause = Report(fit, offsets, Groups()[best], best_test);
-    if (cause.size_um >= kSizeMin_um) causes.push_back(std::move(cause));
+    if (cause.size_um >= kGeometrySizeMin_um) causes.push_back(std::move(cause));
   }
   return causes;
 }

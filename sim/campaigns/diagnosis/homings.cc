@@ -1,11 +1,11 @@
 #include "sim/campaigns/diagnosis/homings.h"
 
-#include <numbers>
+#include "protocol/base/units.h"
 
 namespace focalfleet::sim {
 
 HomingScatter ScatterOfHomings(const Fit& fit) {
-  constexpr double kMicrons = 1e3 * std::numbers::pi / 180;  // of a degree at a millimetre
+  constexpr double kUmPerDegAndMm = kUmPerMm * kRadiansPerDegree;  // of arc, at a radius of 1 mm
   const CampaignUnit& first = fit.model.units.front();
   const double lever_mm[2] = {std::hypot(first.arm_mm[0], first.arm_mm[1]), first.arm_mm[1]};
   HomingScatter scatter;
@@ -13,7 +13,7 @@ HomingScatter ScatterOfHomings(const Fit& fit) {
     double square = 0;
     for (const double zero : fit.model.homing_zero_deg[axis]) square += zero * zero;
     scatter.rms_deg[axis] = std::sqrt(square / static_cast<double>(fit.weight.size()));
-    scatter.um[axis] = scatter.rms_deg[axis] * kMicrons * lever_mm[axis];
+    scatter.um[axis] = scatter.rms_deg[axis] * kUmPerDegAndMm * lever_mm[axis];
   }
   return scatter;
 }

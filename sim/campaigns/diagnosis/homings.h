@@ -1,5 +1,5 @@
-// Zeros that differ from homing to homing: their scatter, and the cause that they are. fit.h frees
-// them, multi_start.h decides whether they are worth it.
+// Homings may leave different zeros. Here are the scatter of these zeros and the cause that names
+// it. fit.h frees the zeros; multi_start.h decides whether they are worth it.
 #pragma once
 
 #include <cmath>

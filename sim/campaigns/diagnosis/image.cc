@@ -12,7 +12,7 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr std::string_view kCameraSimilarity = "camera_similarity";
-constexpr std::size_t kUnitsMin = 6;
+constexpr std::size_t kImageUnitsMin = 6;
 constexpr double kNeighbourReach = 1.3;  // of the pitch
 constexpr double kNeighboursAgree = 6;   // standard deviations
 constexpr double kSizeMin_um = 0.1;
@@ -317,7 +317,7 @@ bool HidesAColumn(const Fit& fit, double family_wise) {
 
 ImageFound AddImageTerms(Fit* fit, double family_wise) {
   ImageFound image;
-  if (fit->model.units.size() < kUnitsMin) return image;
+  if (fit->model.units.size() < kImageUnitsMin) return image;
   Motion motion = FindMotion(*fit);
   double turbulence_um = 0;
   const double before = NeighboursAgree(*fit, &turbulence_um);

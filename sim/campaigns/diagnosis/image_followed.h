@@ -1,5 +1,5 @@
-// The image may move with a column of the table. The image is then no cause: a motion that follows
-// the wind belongs to the wind.
+// The motion of the image may follow a column of the table. The image itself is then not the cause:
+// a motion that follows the wind is caused by the wind.
 #pragma once
 
 #include <Eigen/Dense>

@@ -5,24 +5,25 @@
 #include <cstdint>
 #include <vector>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/neighbour_sum.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr double kMicrons = 1e3;  // in a millimetre
 
 // Two lanes in one register, which every machine has. A compiler left to itself gathers lanes
 // across rows instead.
 struct PairOf {
   using Numbers [[gnu::vector_size(16), gnu::may_alias]] = double;
 };
-using Pair = PairOf::Numbers;
-constexpr std::size_t kPairs = sizeof(Lanes) / sizeof(Pair);
+using NumberPair = PairOf::Numbers;
+constexpr std::size_t kPairs = sizeof(Lanes) / sizeof(NumberPair);
 
-Pair* PairsOf(Lanes* lanes) { return reinterpret_cast<Pair*>(lanes->at); }
-const Pair* PairsOf(const Lanes* lanes) { return reinterpret_cast<const Pair*>(lanes->at); }
-void Put(const Pair* pairs, Lanes* lanes) {
+NumberPair* PairsOf(Lanes* lanes) { return reinterpret_cast<NumberPair*>(lanes->at); }
+const NumberPair* PairsOf(const Lanes* lanes) {
+  return reinterpret_cast<const NumberPair*>(lanes->at);
+}
+void Put(const NumberPair* pairs, Lanes* lanes) {
   for (std::size_t j = 0; j < kPairs; ++j) PairsOf(lanes)[j] = pairs[j];
 }
 
@@ -60,16 +61,16 @@ void PutDisplacement(const WhiteUnit& white, const PoseErrors& errors, std::size
 }
 
 void WhitenLanes(const WhiteUnit& white, Lanes* rows) {
-  Pair theta[kPairs] = {}, phi[kPairs] = {};  // rest errors, estimated from the rows so far
+  NumberPair theta[kPairs] = {}, phi[kPairs] = {};  // rest errors, estimated from the rows so far
   const RowFilter* f = white.filter.data();
   const double* t = white.turn_um.data();
   for (std::size_t k = 0; k < white.filter.size(); ++k, ++f, t += 4) {
-    Pair* x = PairsOf(rows + 2 * k);
-    Pair* y = PairsOf(rows + 2 * k + 1);
+    NumberPair* x = PairsOf(rows + 2 * k);
+    NumberPair* y = PairsOf(rows + 2 * k + 1);
     for (std::size_t j = 0; j < kPairs; ++j) {
-      const Pair a = theta[j] * f->keep[0], b = phi[j] * f->keep[1];
-      const Pair dx = x[j] - t[0] * a - t[2] * b;
-      const Pair dy = y[j] - t[1] * a - t[3] * b;
+      const NumberPair a = theta[j] * f->keep[0], b = phi[j] * f->keep[1];
+      const NumberPair dx = x[j] - t[0] * a - t[2] * b;
+      const NumberPair dy = y[j] - t[1] * a - t[3] * b;
       theta[j] = a + (f->gain[0] * dx + f->gain[1] * dy);
       phi[j] = b + (f->gain[2] * dx + f->gain[3] * dy);
       x[j] = f->w[0] * dx + f->w[1] * dy;
@@ -85,9 +86,9 @@ void MultiplyLanes(const Eigen::MatrixXd& columns, const Lanes* rows, Lanes* sum
   for (std::size_t c = 0; c < count; c += 2, a += 2 * n) {
     // Two sums at a time wait less for each other.
     const double* b = c + 1 < count ? a + n : a;
-    Pair first[kPairs] = {}, second[kPairs] = {};
+    NumberPair first[kPairs] = {}, second[kPairs] = {};
     for (std::size_t r = 0; r < n; ++r) {
-      const Pair* row = PairsOf(rows + r);
+      const NumberPair* row = PairsOf(rows + r);
       for (std::size_t j = 0; j < kPairs; ++j) {
         first[j] += a[r] * row[j];
         second[j] += b[r] * row[j];
@@ -103,11 +104,11 @@ void SubtractColumns(const Eigen::MatrixXd& columns, const Lanes* parts, const L
   const auto n = static_cast<std::size_t>(columns.rows());
   const auto count = static_cast<std::size_t>(columns.cols());
   for (std::size_t r = 0; r < n; ++r) {
-    const Pair* row = PairsOf(rows + r);
-    Pair sum[kPairs] = {row[0], row[1], row[2], row[3]};
+    const NumberPair* row = PairsOf(rows + r);
+    NumberPair sum[kPairs] = {row[0], row[1], row[2], row[3]};
     const double* a = columns.data() + r;
     for (std::size_t c = 0; c < count; ++c, a += n) {
-      const Pair* part = PairsOf(parts + c);
+      const NumberPair* part = PairsOf(parts + c);
       for (std::size_t j = 0; j < kPairs; ++j) sum[j] -= *a * part[j];
     }
     Put(sum, left + r);
@@ -115,9 +116,9 @@ void SubtractColumns(const Eigen::MatrixXd& columns, const Lanes* parts, const L
 }
 
 Lanes SquareLanes(const Lanes* rows, std::size_t count) {
-  Pair sum[kPairs] = {};
+  NumberPair sum[kPairs] = {};
   for (std::size_t r = 0; r < count; ++r) {
-    const Pair* row = PairsOf(rows + r);
+    const NumberPair* row = PairsOf(rows + r);
     for (std::size_t j = 0; j < kPairs; ++j) sum[j] += row[j] * row[j];
   }
   Lanes out;
@@ -126,13 +127,13 @@ Lanes SquareLanes(const Lanes* rows, std::size_t count) {
 }
 
 OwnProducts MultiplyByThemselves(const Lanes* rows, std::size_t moves, Lanes* products) {
-  Pair sum[kPairs] = {}, most[kPairs] = {};
+  NumberPair sum[kPairs] = {}, most[kPairs] = {};
   for (std::size_t k = 0; k < moves; ++k) {
-    const Pair* x = PairsOf(rows + 2 * k);
-    const Pair* y = PairsOf(rows + 2 * k + 1);
-    Pair* product = PairsOf(products + k);
+    const NumberPair* x = PairsOf(rows + 2 * k);
+    const NumberPair* y = PairsOf(rows + 2 * k + 1);
+    NumberPair* product = PairsOf(products + k);
     for (std::size_t j = 0; j < kPairs; ++j) {
-      const Pair both = x[j] * x[j] + y[j] * y[j];
+      const NumberPair both = x[j] * x[j] + y[j] * y[j];
       product[j] = both;
       sum[j] += both;
       most[j] = most[j] < both ? both : most[j];
@@ -144,15 +145,15 @@ OwnProducts MultiplyByThemselves(const Lanes* rows, std::size_t moves, Lanes* pr
 }
 
 Lanes MultiplyByData(const Lanes* rows, const Eigen::VectorXd& y, Lanes* products) {
-  Pair sum[kPairs] = {};
+  NumberPair sum[kPairs] = {};
   const double* data = y.data();
   const auto moves = static_cast<std::size_t>(y.size()) / 2;
   for (std::size_t k = 0; k < moves; ++k, data += 2) {
-    const Pair* first = PairsOf(rows + 2 * k);
-    const Pair* second = PairsOf(rows + 2 * k + 1);
-    Pair* product = PairsOf(products + k);
+    const NumberPair* first = PairsOf(rows + 2 * k);
+    const NumberPair* second = PairsOf(rows + 2 * k + 1);
+    NumberPair* product = PairsOf(products + k);
     for (std::size_t j = 0; j < kPairs; ++j) {
-      const Pair both = first[j] * data[0] + second[j] * data[1];
+      const NumberPair both = first[j] * data[0] + second[j] * data[1];
       product[j] = both;
       sum[j] += both;
     }
@@ -172,10 +173,10 @@ Lanes SumAlikeNeighbours(const Lanes* b, const Lanes* g, const Lanes& own, std::
                           NeighbourShare(4)};
   Lanes out;
   for (std::size_t j = 0; j < kPairs; ++j) {
-    const Pair mean = PairsOf(&own)[j];
-    Pair sum = {}, past[kNeighbourLags] = {};
+    const NumberPair mean = PairsOf(&own)[j];
+    NumberPair sum = {}, past[kNeighbourLags] = {};
     for (std::size_t k = 0; k < moves; ++k) {
-      const Pair v = PairsOf(b + k)[j] - PairsOf(g + k)[j] * mean;
+      const NumberPair v = PairsOf(b + k)[j] - PairsOf(g + k)[j] * mean;
       sum += v * (v + 2 * (w[0] * past[0] + w[1] * past[1] + w[2] * past[2] + w[3] * past[3]));
       past[3] = past[2], past[2] = past[1], past[1] = past[0], past[0] = v;
     }

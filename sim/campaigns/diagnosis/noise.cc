@@ -14,8 +14,8 @@ namespace focalfleet::sim {
 namespace {
 
 constexpr double kMedianSquare = 2 * std::numbers::ln2;  // of a whitened 2-D normal residual
-constexpr std::size_t kRowsMax = 4000;                   // rows that the variances come from
-constexpr std::size_t kRowsMin = 200;                    // fewer: one variance only
+constexpr std::size_t kVarianceRowsMax = 4000;           // rows that the variances come from
+constexpr std::size_t kVarianceRowsMin = 200;            // fewer: one variance only
 
 struct NoiseMove {
   bool restarts = false, theta_moves = false, phi_moves = false;
@@ -58,7 +58,8 @@ Eigen::MatrixXd OwnDisplacements(const Fit& fit, std::size_t unit, const WhiteUn
 std::vector<NoiseUnit> Sample(const Fit& fit) {
   const Campaign& campaign = *fit.facts->campaign;
   const std::size_t units = campaign.units.size();
-  const std::size_t stride = std::max<std::size_t>(1, (campaign.rows() + kRowsMax - 1) / kRowsMax);
+  const std::size_t stride =
+      std::max<std::size_t>(1, (campaign.rows() + kVarianceRowsMax - 1) / kVarianceRowsMax);
   std::vector<NoiseUnit> sample;
   for (std::size_t unit = 0; unit < units; unit += stride) {
     NoiseUnit one{fit.noise.unit_factor[unit], {}, {}, {}};
@@ -228,7 +229,7 @@ void FitVariances(const std::vector<NoiseUnit>& sample, Noise* noise) {
         squares.push_back((move.x_um * move.x_um + move.y_um * move.y_um) /
                           (unit.factor * unit.factor));
   if (squares.empty()) return;
-  const bool with_axes = squares.size() >= kRowsMin;
+  const bool with_axes = squares.size() >= kVarianceRowsMin;
   const double typical = std::max(std::sqrt(Median(squares) / kMedianSquare), noise->least_um);
   // A previous result that is near makes the search short. Without one, or with one far away, the
   // search is anew.

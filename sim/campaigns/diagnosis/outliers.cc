@@ -12,7 +12,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kFar = 6;  // whitened length
+constexpr double kFarWhitened = 6;  // whitened length
 constexpr double kStuckTravel_deg = 5;
 constexpr double kStuckSpread_mm = 0.03;
 constexpr double kClusterShare = 0.3;      // of the family-wise rate
@@ -254,7 +254,7 @@ std::vector<std::size_t> FindAfterFit(const Fit& fit, OutliersFound* found) {
       const std::size_t row = white.track.first_row + white.moves[k];
       const auto at = static_cast<Eigen::Index>(2 * k);
       const double length = std::hypot(white.y[at], white.y[at + 1]) / std::sqrt(fit.weight[row]);
-      if (length <= kFar) continue;
+      if (length <= kFarWhitened) continue;
       ++far;
       far_rows.push_back(row);
       ++found->rows;

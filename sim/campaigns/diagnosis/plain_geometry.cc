@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/static_geometry.h"
 
 namespace focalfleet::sim {
 namespace {
-
-constexpr double kRadians = std::numbers::pi / 180;
 
 // Median distance, which a minority of bad rows does not move.
 double MedianMiss(const std::vector<PlainRow>& rows, const CampaignUnit& unit) {
@@ -34,14 +32,14 @@ CampaignUnit FitPlain(const std::vector<PlainRow>& rows, const CampaignUnit& tab
     StaticMatrix normal = StaticMatrix::Zero();
     StaticVector right = StaticVector::Zero();
     for (const PlainRow& row : rows) {
-      const double a = (row.theta_deg + unit.zero_deg[0]) * kRadians;
-      const double b = a + (row.phi_deg + unit.zero_deg[1]) * kRadians;
+      const double a = (row.theta_deg + unit.zero_deg[0]) * kRadiansPerDegree;
+      const double b = a + (row.phi_deg + unit.zero_deg[1]) * kRadiansPerDegree;
       const double ca = std::cos(a), sa = std::sin(a), cb = std::cos(b), sb = std::sin(b);
       const double ex = unit.arm_mm[0] * ca, ey = unit.arm_mm[0] * sa;
       const double rx = unit.arm_mm[1] * cb, ry = unit.arm_mm[1] * sb;
       Eigen::Matrix<double, 2, 6> j;
-      j << 1, 0, ca, cb, -(ey + ry) * kRadians, -ry * kRadians, 0, 1, sa, sb, (ex + rx) * kRadians,
-          rx * kRadians;
+      j << 1, 0, ca, cb, -(ey + ry) * kRadiansPerDegree, -ry * kRadiansPerDegree, 0, 1, sa, sb,
+          (ex + rx) * kRadiansPerDegree, rx * kRadiansPerDegree;
       const Eigen::Vector2d r(row.x_mm - unit.base_x_mm - ex - rx,
                               row.y_mm - unit.base_y_mm - ey - ry);
       const double w = 1 / std::max(1.0, r.norm() / (2 * miss_mm)) / (miss_mm * miss_mm);

@@ -1,7 +1,7 @@
 // A planted campaign has chosen effects in it, for tests, load and demonstration. Units are on a
-// hexagonal lattice. Moves are a diagnostic campaign: long and short ones both ways, of single axes
-// and both. They have few and many movers, several drive levels, delays and temperatures. Places
-// are measured with noise.
+// hexagonal lattice. The moves are those of a diagnostic campaign: long and short, both ways, of
+// single axes and of both. Few or many units move at once, at several drive levels, delays and
+// temperatures. Places are measured with noise.
 //
 // The physics are those of the library. A test of the diagnosis that must not share them plants its
 // own campaigns (tests/hidden).

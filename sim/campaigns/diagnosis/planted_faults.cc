@@ -10,14 +10,13 @@
 #include <vector>
 
 #include "protocol/base/rng.h"
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/exchanged.h"
 
 namespace focalfleet::sim {
 namespace {
 
-using Plane = std::complex<double>;  // x + i y, mm
-
-constexpr double kRadians = std::numbers::pi / 180;
+using ComplexPlane = std::complex<double>;  // x + i y, mm
 
 constexpr std::string_view kFaults[] = {"lost_command", "step_loss", "identity_swap", "sensor_bias",
                                         "air_turbulence"};
@@ -30,12 +29,13 @@ bool IsOf(std::span<const std::string_view> causes, std::string_view cause) {
 // Moves the fibre to where it is when the axis is `off_deg` from its command.
 void Turn(std::size_t unit, std::size_t row, std::size_t axis, double off_deg, Campaign* campaign) {
   const CampaignUnit& u = campaign->units[unit];
-  Plane pivot(u.base_x_mm, u.base_y_mm);
+  ComplexPlane pivot(u.base_x_mm, u.base_y_mm);
   if (axis == kPhi)
     pivot += std::polar(u.arm_mm[kTheta],
-                        (campaign->cmd_deg[kTheta][row] + u.zero_deg[kTheta]) * kRadians);
-  const Plane fibre(campaign->x_mm[row], campaign->y_mm[row]);
-  const Plane turned = pivot + (fibre - pivot) * std::polar(1.0, off_deg * kRadians);
+                        (campaign->cmd_deg[kTheta][row] + u.zero_deg[kTheta]) * kRadiansPerDegree);
+  const ComplexPlane fibre(campaign->x_mm[row], campaign->y_mm[row]);
+  const ComplexPlane turned =
+      pivot + (fibre - pivot) * std::polar(1.0, off_deg * kRadiansPerDegree);
   campaign->x_mm[row] = turned.real(), campaign->y_mm[row] = turned.imag();
 }
 
@@ -140,8 +140,8 @@ void MoveAir(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
   constexpr int kWaves = 8;
   const double longest_mm = 2 * facts.radius_mm;
   struct Wave {
-    Plane along;  // 1/mm
-    Plane shift;  // um
+    ComplexPlane along;  // 1/mm
+    ComplexPlane shift;  // um
     double phase;
   };
   std::vector<std::vector<Wave>> waves(facts.exposures.size());
@@ -149,14 +149,15 @@ void MoveAir(const PlantedEffect& planted, const CampaignFacts& facts, Rng* rng,
     for (int k = 0; k < kWaves; ++k)
       one.push_back(
           {std::polar(rng->Uniform(1, 3) / longest_mm, rng->Uniform(0, 2 * std::numbers::pi)),
-           std::sqrt(2.0 / kWaves) * planted.amplitude * Plane(rng->Normal(), rng->Normal()),
+           std::sqrt(2.0 / kWaves) * planted.amplitude * ComplexPlane(rng->Normal(), rng->Normal()),
            rng->Uniform()});
   for (std::size_t unit = 0; unit < campaign->units.size(); ++unit) {
     const CampaignUnit& u = campaign->units[unit];
     for (std::size_t row = campaign->first_row[unit]; row < campaign->first_row[unit + 1]; ++row)
       for (const Wave& wave : waves[facts.exposures.of_row[row]]) {
         const double turns = wave.along.real() * u.base_x_mm + wave.along.imag() * u.base_y_mm;
-        const Plane shift = wave.shift * std::sin(2 * std::numbers::pi * (turns + wave.phase));
+        const ComplexPlane shift =
+            wave.shift * std::sin(2 * std::numbers::pi * (turns + wave.phase));
         campaign->x_mm[row] += 1e-3 * shift.real();
         campaign->y_mm[row] += 1e-3 * shift.imag();
       }

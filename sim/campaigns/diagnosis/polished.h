@@ -1,5 +1,6 @@
-// Misfit artefacts of a strong cause are in the model, under other names. There they polish the
-// strong one: a rival that is as near the truth has all of them against itself.
+// The misfit artefacts of a strong cause may be in the model under other names. They improve the
+// fit of the strong cause as it is. A rival that is as near the truth then loses only because they
+// do not suit it.
 #pragma once
 
 #include <vector>

@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "protocol/base/units.h"
+
 namespace focalfleet::sim {
 namespace {
 
@@ -11,7 +13,6 @@ namespace {
 // hundredths is within it. Half of it would call such rounding a break. Twice of it is what a
 // camera sees.
 constexpr double kJoins_deg = 0.01;
-constexpr double kTurn_deg = 360;
 
 std::string OfRows(std::size_t some, std::size_t all) {
   return std::to_string(some) + " of " + std::to_string(all) + " rows";
@@ -20,7 +21,7 @@ std::string OfRows(std::size_t some, std::size_t all) {
 bool Joins(const Campaign& campaign, std::size_t row) {
   for (const std::size_t axis : {kTheta, kPhi}) {
     const double gap_deg = campaign.from_deg[axis][row] - campaign.cmd_deg[axis][row - 1];
-    if (std::abs(std::remainder(gap_deg, kTurn_deg)) > kJoins_deg) return false;
+    if (std::abs(std::remainder(gap_deg, kTurnDeg)) > kJoins_deg) return false;
   }
   return true;
 }

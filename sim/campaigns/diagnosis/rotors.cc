@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/angle_errors.h"
 #include "sim/campaigns/diagnosis/chances.h"
 #include "sim/campaigns/diagnosis/term_trace.h"
@@ -15,7 +16,6 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
 constexpr std::string_view kCogging = "cogging", kImbalance = "phase_imbalance";
 
 // A way to turn a rotor: the error in electrical radians by the wave's phase in radians, and its
@@ -30,7 +30,7 @@ struct Way {
 double Straight(double, double wave_rad, double strength) { return strength * std::sin(wave_rad); }
 
 double OfDetent(double harmonic, double wave_rad, double strength) {
-  return kRadians * DetentError(harmonic, wave_rad / kRadians, strength);
+  return kRadiansPerDegree * DetentError(harmonic, wave_rad / kRadiansPerDegree, strength);
 }
 
 // Ellipse and shifted circle: the field is 1 + strength exp(-i wave) in its own frame.
@@ -96,9 +96,9 @@ double CostOf(const Rotor& rotor, const Way& way, double strength, double phase_
   left->clear();
   double sum = 0, weights = 0;
   for (const RotorRow& row : rotor.rows) {
-    const double wave = way.harmonic * row.motor_deg * kRadians + phase_rad;
+    const double wave = way.harmonic * row.motor_deg * kRadiansPerDegree + phase_rad;
     const double at_drive = strength / std::pow(row.drive, way.falls);
-    const double error = way.error(way.harmonic, wave, at_drive) / kRadians / rotor.gear;
+    const double error = way.error(way.harmonic, wave, at_drive) / kRadiansPerDegree / rotor.gear;
     const double weight = 1 / (row.sigma_deg * row.sigma_deg);
     left->push_back(row.error_deg - error);
     sum += weight * left->back(), weights += weight;
@@ -142,7 +142,7 @@ bool IsOfRotor(const ModelTerm& term, std::size_t axis) {
 }
 
 // The term of the axis with the largest effect; kNoTerm: it has none.
-std::size_t StrongestOf(const Fit& fit, std::size_t axis, std::vector<double>* square_um2) {
+std::size_t StrongestOfAxis(const Fit& fit, std::size_t axis, std::vector<double>* square_um2) {
   std::size_t strongest = kNoTerm;
   double most_um = 0;
   for (std::size_t t = 0; t < fit.model.terms.size(); ++t) {
@@ -268,7 +268,7 @@ double MedianGear(const CampaignModel& model, std::size_t axis) {
 double DetentError(double harmonic, double wave_deg, double detent) {
   // The lag nearest to zero: sin(lag) - detent sin(wave - n lag) goes from -sin(wave) to its first
   // zero.
-  const double wave = wave_deg * kRadians;
+  const double wave = wave_deg * kRadiansPerDegree;
   const auto excess = [&](double lag) {
     return std::sin(lag) - detent * std::sin(wave - harmonic * lag);
   };
@@ -281,7 +281,7 @@ double DetentError(double harmonic, double wave_deg, double detent) {
     const double middle = (low + high) / 2;
     (sign * excess(sign * middle) < 0 ? low : high) = middle;
   }
-  return -sign * (low + high) / 2 / kRadians;
+  return -sign * (low + high) / 2 / kRadiansPerDegree;
 }
 
 RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
@@ -293,7 +293,7 @@ RotorCauses SettleRotors(const Templates& templates, const SelectionRule& rule,
     if (std::ranges::find(left_out, name) != left_out.end()) return reported;
   for (const std::size_t axis : {std::size_t{kTheta}, std::size_t{kPhi}}) {
     std::vector<double> square_um2;
-    const std::size_t at = StrongestOf(*fit, axis, &square_um2);
+    const std::size_t at = StrongestOfAxis(*fit, axis, &square_um2);
     if (at == kNoTerm || !IsFar(*fit, at, kFar_deg)) continue;
     const std::vector<Rotor> rotors = TakeRotors(*fit, axis, square_um2);
     const BestWay cogging = BestWayOf(kCogging, rotors, fit->parallel);

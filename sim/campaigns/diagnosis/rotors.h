@@ -4,9 +4,10 @@
 // follow either. The waves are therefore compared by their physics.
 //   detent:           U sin(lag) = t sin(n (angle - lag) + phase), the nearest rest;
 //   unequal gains:    the field goes round an ellipse;
-//   an offset:        round a circle beside the origin, the more so the smaller U is;
-//   the bridge's dead time: the same off the voltage against each phase's current, which turns in
-//                     steps of 60 degrees.
+//   an offset:        the field goes round a circle beside the origin, farther off where U is
+//                     smaller;
+//   dead time of the bridge: a constant voltage against the current of each phase. Its direction
+//                     turns in steps of 60 degrees.
 // Each unit has its own strength and phase, and U is the level of the drive. A rotor in its field
 // is pulled back by the sine of the angle between them (load_angle.h). The field is the sum of
 // those of the three phases.

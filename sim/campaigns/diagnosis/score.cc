@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kLeverageMax = 0.5;  // of a signature in one row: an outlier looks the same
-constexpr double kKeptMin = 0.01;     // of a unit's signature beside its geometry
+constexpr double kKeptOfSignatureMin = 0.01;  // of a unit's signature beside its geometry
 
 // The part that a chunk of units adds to a template's sums over the fleet.
 struct FleetPart {
@@ -188,7 +188,7 @@ class BlockScorer {
     for (std::size_t lane = placed.lane; lane < placed.lane + c; ++lane)
       raw += raw_.at[lane], kept += kept_.at[lane];
     // Less than this is what the unit's geometry explains as well, and large amplitudes of it.
-    if (!(kept > kKeptMin * raw)) return false;
+    if (!(kept > kKeptOfSignatureMin * raw)) return false;
     return c > 1 || own.most.at[placed.lane] / kept <= kLeverageMax;
   }
 
@@ -406,7 +406,7 @@ void TakeFleet(const PassPlan& plan, const LookPart& all, ScorePass* pass) {
     score.fleet_target_b -= gone.transpose() * all.shared_target_b;
     score.fleet_g -= cross.transpose() * gone;
     // A template that the model has already gives only rounding.
-    if (score.fleet_g.trace() > kKeptMin * own) return;
+    if (score.fleet_g.trace() > kKeptOfSignatureMin * own) return;
     score.fleet_b.setZero();
     score.fleet_target_b.setZero();
     score.fleet_g.setZero();

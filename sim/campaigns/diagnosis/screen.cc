@@ -15,7 +15,7 @@ namespace {
 constexpr double kUnknownShare = 0.3, kShareOfLittle = 0.01, kLittle = 0.1;
 // Share of a look that has to be left beside the model. A cause is often nearly the true one, and
 // the screen looks for the little that it leaves.
-constexpr double kKeptMin = 0.012;
+constexpr double kKeptOfScreenMin = 0.012;
 
 // Adds the orders of the rotor behind the gear, where all units have the same gear.
 void AddRotorOrders(const CampaignFacts& facts, std::size_t axis, std::vector<double>* orders) {
@@ -85,8 +85,8 @@ std::optional<StructureLeft> FindStructure(const Fit& fit, double family_wise, s
   const FleetGroups groups = GroupsOf(*fit.facts);
   const ScorePass pass = ScoreTemplates(fit, looks);
   const double tests = EffectiveTests(pass.scores, looks, seed);
-  const Best best =
-      FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise, kKeptMin);
+  const Best best = FindBest(pass, looks, groups, fit.parallel, tests, kUnknownShare * family_wise,
+                             kKeptOfScreenMin);
   if (best.at == kNoTerm) return std::nullopt;
   Evidence evidence = best.evidence;
   const Template look = looks[best.at].effect == &EmpiricalRipple()

@@ -7,13 +7,13 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRemembers = 0.3;  // of a rest error
+constexpr double kRemembersShare = 0.3;  // of a rest error
 
 // Whether the structure is of an axis whose noise remembers: only effects of that axis are hidden
 // by its noise.
 bool IsOfSuchAxis(const UnknownFound& reported, const Noise& noise) {
-  return (reported.channel.starts_with("theta") && noise.carry[kTheta] >= kRemembers) ||
-         (reported.channel.starts_with("phi") && noise.carry[kPhi] >= kRemembers);
+  return (reported.channel.starts_with("theta") && noise.carry[kTheta] >= kRemembersShare) ||
+         (reported.channel.starts_with("phi") && noise.carry[kPhi] >= kRemembersShare);
 }
 
 }  // namespace
@@ -21,7 +21,8 @@ bool IsOfSuchAxis(const UnknownFound& reported, const Noise& noise) {
 std::optional<UnknownFound> FindSharedWalk(const Fit& fit, double family_wise, std::uint64_t seed) {
   constexpr double kClearly = 20;
   constexpr int kCurves = 3, kRounds = 2;  // curves: a step is no smooth one
-  if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembers) return std::nullopt;
+  if (std::max(fit.noise.carry[kTheta], fit.noise.carry[kPhi]) < kRemembersShare)
+    return std::nullopt;
   Fit forgetful = fit;
   forgetful.noise = {
       .least_um = fit.noise.least_um, .may_carry = false, .unit_factor = fit.noise.unit_factor};

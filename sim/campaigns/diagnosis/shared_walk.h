@@ -2,7 +2,7 @@
 // errors that the next moves take along are a random walk of each unit, and a walk can reach
 // anything. Noise that remembers therefore hides what all units do together: a zero that steps or
 // drifts. Independent walks would not agree, though. Where the noise remembers, the fit is compared
-// with noise that forgets and empirical curves of all units together.
+// with another one. In that one the noise forgets, and all units share empirical curves.
 #pragma once
 
 #include <cstdint>

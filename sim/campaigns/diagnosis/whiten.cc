@@ -2,18 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/diagnosis/fit.h"
 #include "sim/campaigns/diagnosis/rest_filter.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kMicrons = 1e3;  // in a millimetre
-constexpr double kHuber = 3;      // whitened length from which a row counts less
-constexpr double kFar = 5;        // length from which the weight falls on and on
+constexpr double kHuber = 3;  // whitened length from which a row counts less
+constexpr double kFar = 5;    // length from which the weight falls on and on
 
 // Huber's weight, and beyond kFar less and less: a row far away has no bearing on the rest.
 double WeightOf(double square) {
@@ -32,7 +30,7 @@ WhiteUnit Begin(const Fit& fit, std::size_t unit, bool anew) {
         anew ? fit.aside[row] == 0 && std::isfinite(fit.x_um[row]) : fit.weight[row] > 0;
     if (!used) continue;
     white.moves.push_back(i);
-    const double per = kRadians * kMicrons;
+    const double per = kRadiansPerDegree * kUmPerMm;
     white.turn_um.insert(white.turn_um.end(),
                          {-(track.elbow_y_mm[i] + track.reach_y_mm[i]) * per,
                           (track.elbow_x_mm[i] + track.reach_x_mm[i]) * per,
@@ -100,10 +98,10 @@ Eigen::MatrixXd GeometryDisplacements(const WhiteUnit& white) {
     const std::size_t i = white.moves[k];
     const double* t = &white.turn_um[4 * k];
     const double columns[6][2] = {
-        {kMicrons, 0},
-        {0, kMicrons},
-        {kMicrons * track.elbow_x_mm[i] / arm[0], kMicrons * track.elbow_y_mm[i] / arm[0]},
-        {kMicrons * track.reach_x_mm[i] / arm[1], kMicrons * track.reach_y_mm[i] / arm[1]},
+        {kUmPerMm, 0},
+        {0, kUmPerMm},
+        {kUmPerMm * track.elbow_x_mm[i] / arm[0], kUmPerMm * track.elbow_y_mm[i] / arm[0]},
+        {kUmPerMm * track.reach_x_mm[i] / arm[1], kUmPerMm * track.reach_y_mm[i] / arm[1]},
         {t[0], t[1]},
         {t[2], t[3]}};
     const auto at = static_cast<Eigen::Index>(2 * k);
@@ -130,15 +128,15 @@ WhiteUnit WhitenAnew(const Fit& fit, std::size_t unit, std::vector<double>* weig
 
 void Displacement(const WhiteUnit& white, const PoseErrors& errors, double* out) {
   const UnitTrack& track = white.track;
-  const double per_arm[2] = {kMicrons / track.unit->arm_mm[0], kMicrons / track.unit->arm_mm[1]};
+  const double per_arm[2] = {kUmPerMm / track.unit->arm_mm[0], kUmPerMm / track.unit->arm_mm[1]};
   for (std::size_t k = 0; k < white.moves.size(); ++k) {
     const std::size_t i = white.moves[k];
     const double* t = &white.turn_um[4 * k];
     const double a = errors.angle_deg[0][i], b = errors.angle_deg[1][i];
     const double m = errors.arm_mm[0][i] * per_arm[0], n = errors.arm_mm[1][i] * per_arm[1];
-    out[2 * k] = kMicrons * errors.x_mm[i] + t[0] * a + t[2] * b + m * track.elbow_x_mm[i] +
+    out[2 * k] = kUmPerMm * errors.x_mm[i] + t[0] * a + t[2] * b + m * track.elbow_x_mm[i] +
                  n * track.reach_x_mm[i];
-    out[2 * k + 1] = kMicrons * errors.y_mm[i] + t[1] * a + t[3] * b + m * track.elbow_y_mm[i] +
+    out[2 * k + 1] = kUmPerMm * errors.y_mm[i] + t[1] * a + t[3] * b + m * track.elbow_y_mm[i] +
                      n * track.reach_y_mm[i];
   }
 }

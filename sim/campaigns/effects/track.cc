@@ -4,17 +4,15 @@
 #include <cctype>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
 
+#include "protocol/base/units.h"
 #include "sim/campaigns/effects/arm_gap.h"
 #include "sim/campaigns/effects/harness.h"
 
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kRadians = std::numbers::pi / 180;
-constexpr double kTurn_deg = 360;
 constexpr double kMissingShareMax = 0.5;
 constexpr std::size_t kNeighboursMax = 6;
 
@@ -124,9 +122,9 @@ void FindPlate(const Campaign& campaign, CampaignFacts* facts) {
 // A command that is written a whole turn off moves the axis as the short one does.
 double StepOf(double from_deg, double cmd_deg) {
   const double step_deg = cmd_deg - from_deg;
-  const double turns = std::round(step_deg / kTurn_deg);
+  const double turns = std::round(step_deg / kTurnDeg);
   // Real moves may be a whole turn long. Longer ones are a slip of the table.
-  return std::abs(step_deg) > 1.5 * kTurn_deg ? step_deg - turns * kTurn_deg : step_deg;
+  return std::abs(step_deg) > 1.5 * kTurnDeg ? step_deg - turns * kTurnDeg : step_deg;
 }
 
 void FindHistory(const Campaign& campaign, CampaignFacts* facts) {
@@ -231,9 +229,10 @@ void FindNeighbourPull(const Campaign& campaign, CampaignFacts* facts) {
         const std::size_t other = row_of[facts->exposures.of_row[row]];
         if (other == SIZE_MAX) continue;
         for (const std::size_t axis : {kTheta, kPhi})
-          pull[axis][row] += near * near * near *
-                             std::sin(kRadians * (a.gear[axis] * campaign.cmd_deg[axis][row] -
-                                                  b.gear[axis] * campaign.cmd_deg[axis][other]));
+          pull[axis][row] +=
+              near * near * near *
+              std::sin(kRadiansPerDegree * (a.gear[axis] * campaign.cmd_deg[axis][row] -
+                                            b.gear[axis] * campaign.cmd_deg[axis][other]));
       }
     }
   facts->columns[std::string(kNeighbourTheta)] = Fill(pull[kTheta], campaign, facts->exposures);
@@ -375,8 +374,8 @@ void SizePoses(UnitTrack* track) {
 
 void TakePose(double theta_deg, double phi_deg, std::size_t i, UnitTrack* track) {
   const CampaignUnit& geometry = *track->unit;
-  const double theta = (theta_deg + geometry.zero_deg[kTheta]) * kRadians;
-  const double both = theta + (phi_deg + geometry.zero_deg[kPhi]) * kRadians;
+  const double theta = (theta_deg + geometry.zero_deg[kTheta]) * kRadiansPerDegree;
+  const double both = theta + (phi_deg + geometry.zero_deg[kPhi]) * kRadiansPerDegree;
   track->elbow_x_mm[i] = geometry.arm_mm[kTheta] * std::cos(theta);
   track->elbow_y_mm[i] = geometry.arm_mm[kTheta] * std::sin(theta);
   track->reach_x_mm[i] = geometry.arm_mm[kPhi] * std::cos(both);

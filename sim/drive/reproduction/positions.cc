@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "protocol/base/rng.h"
+#include "protocol/base/units.h"
 #include "sim/drive/reduced_drive.h"
 #include "sim/drive/reproduction/parts.h"
 #include "sim/drive/start_study.h"
@@ -14,7 +14,6 @@
 namespace focalfleet::sim::reproduction {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kArm_um = 8250;  // assumed: the paper does not print it
 
 // The output errors of turns there and back, in um at the arm, from the drive with play in its
@@ -24,7 +23,7 @@ std::vector<double> Closures_um(Drive::Setting setting, double play_um, int turn
   const Modulation modulation{.repeat = 108};
   ReducedDrive drive(setting, modulation);
   // A few electrical turns each way cross the play, as 360 degrees do.
-  const double cross = setting.gearhead.play_rad / kTurn;
+  const double cross = setting.gearhead.play_rad / kTurnRad;
   const auto vectors = static_cast<std::int64_t>(cross + 5) * modulation.subdivision;
   drive.Place(0, 0);
   drive.RunVectors(1, vectors);
@@ -38,7 +37,7 @@ std::vector<double> Closures_um(Drive::Setting setting, double play_um, int turn
     const double after = drive.shaft().output_rad();
     // The difference of commanded and travelled is play and lag.
     const double commanded =
-        static_cast<double>(way) / modulation.subdivision * kTurn / setting.gearhead.ratio;
+        static_cast<double>(way) / modulation.subdivision * kTurnRad / setting.gearhead.ratio;
     closures.push_back(std::abs(commanded - (after - before)) * kArm_um);
     before = after;
   }
@@ -163,14 +162,14 @@ void AddPositions(const ReproduceOptions& options, Reproduction* out) {
     const double turn = static_cast<double>(off) / modulation.subdivision;
     curve.x.push_back(360 * turn);
     // The error is the firmware's position less the true one.
-    curve.y.push_back(turn * kTurn * um_per_rad - error_um);
+    curve.y.push_back(turn * kTurnRad * um_per_rad - error_um);
     worst_um = std::max(worst_um, std::abs(curve.y.back()));
   }
   out->curves.push_back(curve);
   out->claims.push_back(
       {.id = "stored_vector",
        .text = "the vector stored at the end of a move is applied first at the next power-on",
-       .simulated = {kTurn * um_per_rad, worst_um},
+       .simulated = {kTurnRad * um_per_rad, worst_um},
        .unit = "um: one lost motor turn, worst error of a vector lost",
        .conditions = "any vector of a turn applied to a rotor at rest; arm of 8.25 mm (assumed)",
        .status = ClaimStatus::kNotTestable,

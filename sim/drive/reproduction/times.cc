@@ -5,13 +5,12 @@
 #include <numbers>
 #include <vector>
 
+#include "protocol/base/units.h"
 #include "sim/drive/reproduction/parts.h"
 #include "sim/drive/steady.h"
 
 namespace focalfleet::sim::reproduction {
 namespace {
-
-constexpr double kTurn = 2 * std::numbers::pi;
 
 // The duration of an output turn by the drive's own clock: an electrical turn is simulated and
 // geared down.
@@ -75,7 +74,7 @@ double RotorSpeed_rpm(Drive::Setting setting, const Modulation& modulation, doub
   const double begin_rad = drive.shaft().angle_rad();
   const double begin_s = drive.t_s();
   RunVectors(&drive, modulation, table, 0, vectors);
-  return (drive.shaft().angle_rad() - begin_rad) / kTurn / (drive.t_s() - begin_s) * 60;
+  return (drive.shaft().angle_rad() - begin_rad) / kTurnRad / (drive.t_s() - begin_s) * 60;
 }
 
 double BlockedFundamental_A(const Drive::Setting& setting) {
@@ -89,9 +88,9 @@ double BlockedFundamental_A(const Drive::Setting& setting) {
   const double field_Hz = modulation.field_Hz();
   std::complex<double> component;
   drive.Listen([&](const DriveInterval& interval) {
-    const std::complex<double> rate(0, -kTurn * field_Hz);
+    const std::complex<double> rate(0, -kTurnRad * field_Hz);
     component += (interval.moments[0] + rate * interval.moments[1]) *
-                 std::polar(1.0, -kTurn * field_Hz * (interval.t_s - begin_s));
+                 std::polar(1.0, -kTurnRad * field_Hz * (interval.t_s - begin_s));
   });
   RunVectors(&drive, modulation, table, 0, 96);
   return std::abs(component) * field_Hz;
@@ -302,9 +301,9 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
       for (std::size_t leg = 0; leg < kLegCount; ++leg)
         if (!pattern[leg].none())
           sum += 2.0 / 3 * (pattern[leg].off - pattern[leg].on) / modulation.counter1 *
-                 std::polar(1.0, kTurn / 3 * static_cast<double>(leg));
+                 std::polar(1.0, kTurnRad / 3 * static_cast<double>(leg));
       worst = std::max(worst, std::abs(sum - std::polar(1 / std::numbers::sqrt3,
-                                                        kTurn * k / modulation.subdivision)));
+                                                        kTurnRad * k / modulation.subdivision)));
     }
     add({.id = "eq4",
          .text = "eq. 4 gives the occupation times of the basic vectors",
@@ -331,8 +330,8 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
       std::complex<double> sum;
       for (std::size_t leg = 0; leg < kLegCount; ++leg)
         sum += (pattern[leg].none() ? 0.0 : pattern[leg].off - pattern[leg].on) *
-               std::polar(1.0, kTurn / 3 * static_cast<double>(leg));
-      return std::arg(sum) * 360 / kTurn;
+               std::polar(1.0, kTurnRad / 3 * static_cast<double>(leg));
+      return std::arg(sum) * 360 / kTurnRad;
     };
     add({.id = "sector_width",
          .text = "the basic vectors have a 60r distribution",
@@ -375,7 +374,7 @@ void AddTimes(const ReproduceOptions& options, Reproduction* out) {
     add({.id = "gear_ratio",
          .text = "the gearhead's ratio is 337",
          .paper = {337},
-         .simulated = {ratio, 360 * off, kTurn * off * 8250},
+         .simulated = {ratio, 360 * off, kTurnRad * off * 8250},
          .unit = "ratio; degrees and um at the arm that a turn is off if so",
          .conditions = "a gearhead (46/14 + 1)^4; arm of 8.25 mm (assumed)",
          .status = ClaimStatus::kNotTestable,

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "protocol/base/check.h"
+#include "protocol/base/units.h"
 #include "sim/drive/reduced_drive.h"
 #include "sim/drive/scope/spectrum.h"
 #include "sim/drive/torque_ripple.h"
@@ -12,7 +13,6 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kSamplesWanted = 600'000;
 
 // The quantities of a drive that grow with time, read at one instant.
@@ -61,7 +61,7 @@ Begun BeginInStep(Drive::Setting setting, const Modulation& modulation) {
   const auto state = FindSteadyState(setting, modulation, setting.motor.load_Nm);
   // Where no lag holds the load, the rotor begins with the most torque there is, and falls behind.
   const SteadyState begun = state.value_or(
-      SteadyState{.lag_rad = kTurn / 4, .speed_rad_per_s = kTurn * modulation.field_Hz()});
+      SteadyState{.lag_rad = kTurnRad / 4, .speed_rad_per_s = kTurnRad * modulation.field_Hz()});
   return {InSteadyRotation(setting, modulation, begun), 0, state.has_value()};
 }
 
@@ -123,7 +123,7 @@ class Recorder {
       if (shown < sampled_) peak_A_ = std::max(peak_A_, drive.peak_A());
       if (in_last_turn_) recording_.carrier_peak_A.push_back(drive.peak_A());
     }
-    const double middle = (static_cast<double>(field) + 0.5) * kTurn / modulation_.subdivision;
+    const double middle = (static_cast<double>(field) + 0.5) * kTurnRad / modulation_.subdivision;
     recording_.vectors.push_back({drive.t_s(), middle - drive.shaft().angle_rad(),
                                   vector_impulse_ / (repeat * modulation_.carrier_s())});
     if (shown + 1 == sampled_) EndSampling();
@@ -205,14 +205,14 @@ class Recorder {
 
   void Judge(std::int64_t shown) {
     const std::vector<VectorRecord>& vectors = recording_.vectors;
-    recording_.in_step = begun_.can_turn && std::abs(vectors.back().lag_rad) < kTurn / 2;
+    recording_.in_step = begun_.can_turn && std::abs(vectors.back().lag_rad) < kTurnRad / 2;
     const auto turn = static_cast<std::size_t>(modulation_.subdivision);
     const std::size_t from = static_cast<std::size_t>(shown) - turn;
     for (std::size_t k = from; k < vectors.size(); ++k)
       recording_.lag_rad += vectors[k].lag_rad / static_cast<double>(turn);
     // The field turned once between the first and the last lag, which are a turn apart.
     const std::size_t start = from > 0 ? from - 1 : 0;
-    const double field = static_cast<double>(vectors.size() - 1 - start) * kTurn /
+    const double field = static_cast<double>(vectors.size() - 1 - start) * kTurnRad /
                          static_cast<double>(modulation_.subdivision);
     recording_.speed_rad_per_s = (field - (vectors.back().lag_rad - vectors[start].lag_rad)) /
                                  (vectors.back().t_s - vectors[start].t_s);

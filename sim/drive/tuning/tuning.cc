@@ -12,7 +12,7 @@
 namespace focalfleet::sim {
 namespace {
 
-constexpr int kRepeatMax = 255;            // the most that a unit's table holds
+constexpr int kTableRepeatMax = 255;       // the most that a unit's table holds
 constexpr double kCopper_per_K = 0.00393;  // rise of resistance, from 20 degrees Celsius
 constexpr int kSettlingCarriers = 30;      // e^-20 at 250 counts
 
@@ -25,7 +25,8 @@ std::optional<Critical> FindCritical(Drive::Setting setting, const Modulation& m
                                      const TuningRule& rule, double load_factor) {
   setting.motor.load_Nm *= load_factor;
   const StartTrial trial{.ramp = rule.ramp};
-  const auto reduced = CriticalRepeat(setting, modulation, trial, DriveLevel::kReduced, kRepeatMax);
+  const auto reduced =
+      CriticalRepeat(setting, modulation, trial, DriveLevel::kReduced, kTableRepeatMax);
   if (!reduced) return std::nullopt;
   Critical critical{*reduced, *reduced};
   if (!rule.cross_check) return critical;
@@ -35,7 +36,7 @@ std::optional<Critical> FindCritical(Drive::Setting setting, const Modulation& m
     return StartsAtWorstLoad(setting, at, trial, DriveLevel::kPwm);
   };
   while (!starts(critical.repeat))
-    if (++critical.repeat > kRepeatMax) return std::nullopt;
+    if (++critical.repeat > kTableRepeatMax) return std::nullopt;
   if (critical.repeat == *reduced)
     while (critical.repeat > 1 && starts(critical.repeat - 1)) --critical.repeat;
   return critical;

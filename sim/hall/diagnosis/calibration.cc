@@ -15,15 +15,13 @@ using Eigen::Vector4d;
 using Eigen::VectorXd;
 
 constexpr std::size_t kReadingsMin = 12;
-constexpr std::size_t kFolds = 5;
 constexpr int kSteps = 60;
 constexpr int kPasses = 4;
-constexpr double kFarOff = 6;  // robust standard deviations
-constexpr double kHuber = 2;   // of robust standard deviations; larger residuals pull no harder
+constexpr double kHuber = 2;  // of robust standard deviations; larger residuals pull no harder
 constexpr std::size_t kFarOffMost = 8;  // one in this many; more is structure
 constexpr double kFollows = 5;          // standard deviations of a gain that is not chance
 constexpr double kContradicts = 3;      // times the residual of the median sensor
-constexpr double kLeast_V = 1e-6;
+constexpr double kNoiseLeast_V = 1e-6;
 // A place less certain than this counts as unknown.
 constexpr double kReported_rad = 10 * kRadPerDeg;
 constexpr double kGainReported = 0.5;
@@ -53,7 +51,7 @@ double RobustSd(const VectorXd& residuals) {
   for (double& size : sizes) size = std::abs(size);
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
-  return std::max(kLeast_V, 1.4826 * *middle);
+  return std::max(kNoiseLeast_V, 1.4826 * *middle);
 }
 
 double Rms(const VectorXd& residuals) {
@@ -258,7 +256,7 @@ std::vector<SensorFit> CalibrateSensors(const HallCampaign& campaign, const Hall
   for (std::size_t sensor = 0; sensor < fits.size(); ++sensor) {
     SensorFit& fit = fits[sensor];
     if (fit.status != CalibrationStatus::kOk ||
-        fit.rms_after_V <= kContradicts * std::max(kLeast_V, *middle))
+        fit.rms_after_V <= kContradicts * std::max(kNoiseLeast_V, *middle))
       continue;
     fit.status = CalibrationStatus::kContradicts;
     fit.sensor = rig.sensors[sensor];

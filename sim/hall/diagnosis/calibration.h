@@ -16,6 +16,11 @@
 
 namespace focalfleet::sim {
 
+/// A reading farther off is no reading of this field. Units: robust standard deviations.
+inline constexpr double kFarOff = 6;
+/// Cross-validation leaves out one reading in this many at a time.
+inline constexpr std::size_t kFolds = 5;
+
 enum class CalibrationStatus {
   kOk,
   kMissing,       // it gives no readings

@@ -4,16 +4,14 @@
 #include <cmath>
 #include <span>
 
+#include "sim/hall/diagnosis/calibration.h"
+
 namespace focalfleet::sim {
 namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-constexpr std::size_t kFolds = 5;
-
-Index At(std::size_t k) { return static_cast<Index>(k); }
 
 // All accepted hypotheses of one cause, merged.
 struct Merged {

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <set>
 
+#include "sim/hall/diagnosis/calibration.h"
 #include "sim/hall/diagnosis/findings.h"
 #include "sim/hall/diagnosis/selection.h"
+#include "sim/hall/median.h"
+#include "sim/hall/suspicion.h"
 
 namespace focalfleet::sim {
 namespace {
@@ -15,24 +18,22 @@ using Eigen::VectorXd;
 
 constexpr std::size_t kRowsMin = 15;
 constexpr std::size_t kSpareReadings = 60;  // beyond the parameters
-constexpr double kAlike_V = 2e-3;
 constexpr double kMove_V = 0.1;
 constexpr double kSwapLeaves = 0.3;  // of the squares
 constexpr int kPassesMax = 8;
-constexpr double kFarOff = 6;  // robust standard deviations
 constexpr double kPosesSpread_rad = 0.5 * kRadPerDeg;
 // The margin by which an effect outside of the causes has to be the better explanation, in 2 ln L
 // less ln n a number. The margin is that of every rival, plus an allowance for the some 140 effects
 // tried.
 constexpr double kOutsideMargin = 9 + 10;
 
-struct Column {
+struct SensorColumn {
   std::size_t count = 0;
   double range_V = 0;
 };
-Column ColumnOf(const HallCampaign& campaign, std::size_t sensor) {
+SensorColumn ColumnOf(const HallCampaign& campaign, std::size_t sensor) {
   double low = 1e300, high = -1e300;
-  Column column;
+  SensorColumn column;
   for (const VoltageRow& row : campaign.rows)
     if (std::isfinite(row.voltages_V[sensor])) {
       low = std::min(low, row.voltages_V[sensor]);
@@ -59,7 +60,7 @@ std::vector<Reading> Usable(const HallCampaign& campaign, const HallRig& rig, Ha
   std::sort(sorted.begin(), sorted.end());
   const bool others_move = sorted[sorted.size() / 2] > kMove_V;
   for (std::size_t s = 0; s < rig.sensors.size(); ++s) {
-    const Column column = ColumnOf(campaign, s);
+    const SensorColumn column = ColumnOf(campaign, s);
     const bool missing = column.count == 0;
     if (missing || (others_move && column.range_V < kAlike_V)) {
       out->troubles.push_back({missing ? "missing" : "stuck", {s}});
@@ -149,13 +150,6 @@ void FindSwaps(const HallForward& forward, const HallRig& rig, HallCampaign* cam
         campaign->rows.size();
     out->outlier_rows = campaign->rows.size();
   }
-}
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // Drops single readings that nothing in the library comes near to. A reading that is far enough off

@@ -20,6 +20,9 @@
 
 namespace focalfleet::sim {
 
+/// Eigen counts with a sign.
+inline Eigen::Index At(std::size_t k) { return static_cast<Eigen::Index>(k); }
+
 enum class HallCause {
   kFieldHarmonics,
   kFieldWidth,
@@ -99,8 +102,6 @@ class HallForward {
 
   [[nodiscard]] double zero_V() const { return rig_.electronics.zero_V(); }
   [[nodiscard]] const ParameterLayout& layout() const { return layout_; }
-  [[nodiscard]] double peak_T() const { return peak_T_; }
-  [[nodiscard]] double width_rad() const { return width_rad_; }
 
   /// The voltages of the readings. Shape: as many as readings.
   void Predict(const Eigen::VectorXd& parameters, const std::vector<Reading>& readings,

@@ -16,8 +16,6 @@ constexpr int kCausesMax = 12;
 constexpr std::size_t kRivalsTried = 4;
 constexpr double kDecays[] = {-5, -3, -1, 0, 1, 3, 4.5, 6, 7.5};
 
-Index At(std::size_t k) { return static_cast<Index>(k); }
-
 std::vector<HallHypothesis> MakeHypotheses(const ParameterLayout& layout, bool temperature) {
   std::vector<HallHypothesis> list;
   HallHypothesis gains{HallCause::kSensorGain, {}, {}, 0};

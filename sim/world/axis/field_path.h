@@ -39,7 +39,6 @@ class FieldPath {
 
   /// The vector applied at `at`.
   [[nodiscard]] std::int32_t Applied(HostInstant at) const;
-  [[nodiscard]] std::int32_t from() const { return from_; }
   [[nodiscard]] std::int32_t to() const { return to_; }
   /// The instant at which the last vector has been shown for its time; the beginning where there is
   /// none.

@@ -1,5 +1,5 @@
-// The course of one attempt to send a frame, in bits. No other file contains how long frames and
-// error frames hold the wire (ISO 11898-1; Bosch CAN 2.0 part B, sections 3 and 6):
+// The course of one attempt to send a frame, in bits. No other file says how long frames and error
+// frames hold the wire (ISO 11898-1; Bosch CAN 2.0 part B, sections 3 and 6):
 //
 //   good        the frame, its intermission included (protocol/wire/frame_bits.h)
 //   destroyed   the frame up to the bit in which a node sees the error, the superposed error

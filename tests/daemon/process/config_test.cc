@@ -32,6 +32,7 @@ TEST(Config, DefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(config->control.socket, "control.sock");
   EXPECT_TRUE(config->dds.enabled);
   EXPECT_EQ(config->dds.rate_hz, 10);
+  EXPECT_EQ(config->metrics.port, 0u);
   EXPECT_EQ(config->bus.bit_rate_bps, 1'000'000u);
   EXPECT_FALSE(config->bus.can_fd);
   EXPECT_EQ(config->timing.data_bit_rate_bps, 0u) << "no groups, whatever data_bit_rate_bps is";
@@ -58,6 +59,10 @@ config = "c.xml"
 [log]
 level = "debug"
 file = "l.log"
+[metrics]
+address = "::1"
+port = 9890
+names = ["plate", "plate.example.org"]
 [bus]
 port = "socketcan"
 bit_rate_bps = 500000
@@ -95,6 +100,9 @@ spread = "real"
   EXPECT_EQ(config->fleet.units, "/etc/ff/u.csv") << "relative to the file";
   EXPECT_EQ(config->fleet.clearance_mm, 0.25);
   EXPECT_EQ(config->dds.domain, 7u);
+  EXPECT_EQ(config->metrics.address, "::1");
+  EXPECT_EQ(config->metrics.port, 9890u);
+  EXPECT_EQ(config->metrics.names, (std::vector<std::string>{"plate", "plate.example.org"}));
   EXPECT_EQ(config->bus.port, PortKind::kSocketCan);
   EXPECT_EQ(config->bus.interfaces, (std::vector<std::string>{"can0", "can1"}));
   EXPECT_EQ(config->timing.bit_rate_bps, 500'000u);
@@ -105,11 +113,11 @@ spread = "real"
   EXPECT_EQ(config->timing.silence_limit, Milliseconds(7));
   EXPECT_EQ(config->simulated.seed, 8u);
   EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:24");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:28");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:26");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:30");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
 }
@@ -121,6 +129,17 @@ TEST(Config, ASyncLineAsksForRealTimeAndAnEdgeWithinTheUnitsWindow) {
               HasSubstr(":4: sync.chip asks for clock.speed = 1"));
   EXPECT_THAT(ErrorOf(bus + "[timing]\nsync_lead_ms = 20\n"),
               HasSubstr(":4: timing.sync_lead_ms must be below 20"));
+}
+
+TEST(Config, MetricsAreOffUnlessTheyHaveAPortAndGoToANumericAddress) {
+  const std::string bus = "[bus]\nport = \"simulated\"\n";
+  EXPECT_EQ(ParseConfig(kMinimal, "f.toml")->metrics.port, 0u);
+  EXPECT_EQ(ParseConfig(kMinimal, "f.toml")->metrics.address, "127.0.0.1");
+  EXPECT_THAT(ErrorOf(bus + "[metrics]\nport = 65536\n"),
+              HasSubstr(":4: metrics.port must be in 0..65535"));
+  for (const char* address : {"", "localhost", "127.0.0.1:9890", "[::1]"})
+    EXPECT_THAT(ErrorOf(bus + "[metrics]\naddress = \"" + address + "\"\n"),
+                HasSubstr(":4: metrics.address must be a numeric address"));
 }
 
 TEST(Config, AbsolutePathsStay) {

@@ -361,6 +361,22 @@ TEST(Sectors, KeepLimitsOfPowerTogether) {
   EXPECT_FALSE(PlanBySectors(fleet.request(), options, {.count = 5})) << "there are four rails";
 }
 
+// A unit that counts from another zero than its geometry holds itself to its range by its count.
+TEST(Sectors, HoldUnitsToTheRangeOfTheirCounts) {
+  PlanningFleet fleet = Drawn(61, TestSeed(755));
+  std::vector<Pose> offsets(fleet.layout.size());
+  PlanRequest request = fleet.request();
+  request.offsets = offsets;
+  ASSERT_TRUE(PlanBySectors(request, {}, {.count = 4}));
+  const std::uint32_t moved = 30;
+  ASSERT_TRUE(fleet.targets[moved]);
+  const Pose edge = PoseDeg(fleet, moved, fleet.layout.unit({moved}).theta().max_deg, 0);
+  offsets[moved][0] = (*fleet.targets[moved])[0] - edge[0] - 10;
+  const auto made = PlanBySectors(request, {}, {.count = 4});
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().text, MakePlan(request, {}).error().text);
+}
+
 TEST(Sectors, BadTargetsAreAllNamedAtOnce) {
   PlanningFleet fleet = Drawn(217, TestSeed(750));
   for (const std::uint32_t i : {3u, 200u}) fleet.targets[i] = Pose{10'000'00, 0};

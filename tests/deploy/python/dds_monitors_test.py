@@ -1,0 +1,92 @@
+"""Both example monitors, built as a user outside the project would, see all 5000 units.
+
+    dds_monitors_test.py PROGRAMS BUILD_FOLDER
+"""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+from simulated_fleet import WAIT_S, SimulatedFleet
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
+UNITS = 5000
+
+
+def build(example, folder):
+    folder = pathlib.Path(folder, example)
+    configure = ["cmake", "-S", ROOT / "docs/examples" / example, "-B", folder, "-G", "Ninja",
+                 f"-DFOCALFLEET_IDL={ROOT / 'daemon/dds/focalfleet.idl'}"]  # fmt: skip
+    for command in (configure, ["cmake", "--build", folder]):
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "warning:" not in done.stdout + done.stderr, done.stdout + done.stderr
+    return folder
+
+
+class Monitor:
+    """A monitor that runs until it has seen all. A file takes its lines, as nobody reads them yet."""
+
+    def __init__(self, name, program, domain):
+        self.name = name
+        self._printed = tempfile.TemporaryFile("w+")
+        loopback = {"CYCLONEDDS_URI": f"file://{ROOT}/deploy/cyclonedds.xml"}
+        command = [program, str(domain), "--once", "--wait", str(WAIT_S)]
+        self._process = subprocess.Popen(
+            command, stdout=self._printed, stderr=subprocess.STDOUT, env=os.environ | loopback
+        )
+
+    def finish(self):
+        """The exit code and the printed lines."""
+        code = self._process.wait()
+        with self._printed:
+            self._printed.seek(0)
+            return code, self._printed.read().splitlines()
+
+
+def check(monitor, history=False):
+    """Every unit was printed. With `history`, some states are older than the monitor."""
+    name = monitor.name
+    code, lines = monitor.finish()
+    last = lines[-1] if lines else ""
+    assert code == 0, f"{name} ended with {code}: {last}"
+    states = [re.fullmatch(r"unit (\d+): (\w+), theta .* mm", line) for line in lines[:-1]]
+    assert all(states), f"{name}: {[line for line, state in zip(lines, states) if not state][:3]}"
+    seen = {int(state[1]) for state in states}
+    assert seen == set(range(1, UNITS + 1)), f"{name} printed {len(seen)} units"
+    summary = rf"all {UNITS} of {UNITS} units seen \S+ s after discovery, \S+ s after joining; (\d+) from history"
+    found = re.fullmatch(summary, last)
+    assert found, last
+    assert not history or int(found[1]) > 0, f"{name} got nothing that it was too late for: {last}"
+    print(f"{name}: {last}", flush=True)
+
+
+def main(programs, folder):
+    programs_of = {
+        "Cyclone DDS": build("dds_monitor_c", folder) / "dds_monitor",
+        "Fast DDS": build("dds_monitor_fastdds", folder) / "dds_monitor_fastdds",
+    }
+    fleet = SimulatedFleet(programs, UNITS, speed=1, dds=True, awaited="heard")
+
+    def start(when):
+        return [
+            Monitor(f"{when}, {vendor}", program, fleet.domain)
+            for vendor, program in programs_of.items()
+        ]
+
+    early = start("there before the daemon")
+    with fleet:
+        for monitor in early:
+            check(monitor)
+        # The fleet rests, and what a late joiner sees is history.
+        for monitor in start("late joiner, fleet at rest"):
+            check(monitor, history=True)
+        fleet.cli("apply", "targets.csv")
+        for monitor in start("late joiner, fleet busy"):
+            check(monitor)
+
+
+main(*sys.argv[1:])
