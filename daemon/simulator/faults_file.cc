@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "daemon/simulator/command_line.h"
+#include "daemon/simulator/number_list.h"
 #include "fleet/files/csv.h"
 
 namespace focalfleet::simulator {
