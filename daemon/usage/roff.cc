@@ -85,7 +85,14 @@ void Roff::Literal(std::string_view lines) {
 }
 
 void Roff::References(std::string_view list) {
-  text_ += ".PP\n" + CLI::detail::find_and_replace(Escaped(list), "(", "\\fR(") + "\n";
+  std::string line;
+  for (const std::string& one : CLI::detail::split(std::string(list), ',')) {
+    const std::string name = one.substr(one.find_first_not_of(' '));
+    const std::size_t open = name.find('(');
+    line += (line.empty() ? "\\fB" : ", \\fB") + Escaped(name.substr(0, open)) + "\\fR" +
+            name.substr(open);
+  }
+  text_ += ".PP\n" + line + "\n";
 }
 
 }  // namespace focalfleet::usage

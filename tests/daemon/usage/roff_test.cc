@@ -20,6 +20,8 @@ TEST(Roff, EscapesWhatRoffWouldRead) {
   EXPECT_THAT(page.text(), HasSubstr("\\fBship sail\\fR \\-\\-far\n"));
   page.Item("--knots", "N", "How fast.");
   EXPECT_THAT(page.text(), HasSubstr(".TP\n\\fB\\-\\-knots\\fR \\fIN\\fR\nHow fast.\n"));
+  page.References("ship(1), ship-sail(1)");
+  EXPECT_THAT(page.text(), HasSubstr("\n\\fBship\\fR(1), \\fBship\\-sail\\fR(1)\n"));
   page.Literal("one\n.two");
   EXPECT_THAT(page.text(), HasSubstr(".nf\none\n\\&.two\n.fi\n"));
 }
