@@ -22,7 +22,7 @@ using ::testing::Contains;
 using ::testing::IsEmpty;
 
 using Words = std::set<std::string>;
-/// What a shell offers after each line that is being typed.
+/// The words that a shell offers, by the line that is being typed.
 using Offers = std::map<std::string, Words>;
 
 struct Shell {
