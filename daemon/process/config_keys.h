@@ -21,8 +21,49 @@ struct Range {
 };
 inline constexpr Range<std::int64_t> kMillisecondRange{1, 3'600'000};
 
-/// The list of keys stands here and in VisitTimingKeys. `visit` is a reader, a writer or the maker
-/// of the man page; each visits every key once, in the order of the file.
+/// The keys of what stands beside the buses: SYNC line, camera, sensors.
+template <class Config, class Visitor>
+void VisitInstrumentKeys(Config* c, Visitor* visit) {
+  visit->Section("sync", "A line that pulses at the common start, for units with a SYNC input");
+  visit->Path(
+      "chip", &c->sync.chip,
+      "GPIO chip that pulses at the common start, such as /dev/gpiochip0; empty: no such line");
+  visit->Whole("line", &c->sync.line, {0, 1023}, "Line of the chip, counted from 0");
+  visit->Flag("active_low", &c->sync.active_low, "Whether the pulse is low");
+  visit->Section("camera", "The fibre-view camera, for corrections");
+  visit->Path("directory", &c->camera.directory,
+              "Folder for exposure requests and spot lists; empty: no camera there");
+  visit->Flag("dds", &c->camera.dds,
+              "Whether requests and spot lists go by DDS topics in the domain of [dds]");
+  visit->Path("fiducials", &c->camera.fiducials,
+              "fiducials.csv: lights at known places of the plate");
+  visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6}, "Columns of the image");
+  visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6}, "Rows of the image");
+  visit->Real("pixels_per_mm", &c->camera.model.pixels_per_mm, {1e-3, 1e4},
+              "Approximate scale of the image; the own scale of each exposure is found");
+  visit->Real("rotation_deg", &c->camera.model.rotation_deg, {-360, 360},
+              "Rotation of the image against the plate, counter-clockwise");
+  visit->Real("centre_x_px", &c->camera.model.centre_x_px, {-1e6, 1e6},
+              "Column of the plate's 0, 0 in the image");
+  visit->Real("centre_y_px", &c->camera.model.centre_y_px, {-1e6, 1e6},
+              "Row of the plate's 0, 0 in the image");
+  visit->Flag("mirrored", &c->camera.model.mirrored, "Whether the image is mirrored");
+  visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000},
+              "Error of one coordinate of one spot, at the plate");
+  visit->Wait("patience_ms", &c->camera.patience,
+              "Real time within which an exposure must have come");
+  visit->Section("hall", "Units with Hall sensors at their joint");
+  visit->Path(
+      "model", &c->hall.model,
+      "Model of the joints' field, as focalfleet hall fit writes it; empty: sensors are not read");
+  visit->Real("noise_mT", &c->hall.noise_mT, {1e-5, 10},
+              "Noise of a sensor's reading, including what model and calibration leave");
+  visit->Real("tilt_max_deg", &c->hall.tilt_max_deg, {1, 60}, "Largest tilt of a joint");
+}
+
+/// The list of keys stands here, in VisitInstrumentKeys and in VisitTimingKeys. `visit` is a
+/// reader, a writer or the maker of the man page; each visits every key once, in the order of the
+/// file.
 template <class Config, class Visitor>
 void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("fleet", "The focal plane");
@@ -63,41 +104,7 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Texts("interfaces", &c->bus.interfaces,
                "socketcan: one interface a bus, in ascending order of bus_id; a missing one is a "
                "bus that is down");
-  visit->Section("sync", "A line that pulses at the common start, for units with a SYNC input");
-  visit->Path(
-      "chip", &c->sync.chip,
-      "GPIO chip that pulses at the common start, such as /dev/gpiochip0; empty: no such line");
-  visit->Whole("line", &c->sync.line, {0, 1023}, "Line of the chip, counted from 0");
-  visit->Flag("active_low", &c->sync.active_low, "Whether the pulse is low");
-  visit->Section("camera", "The fibre-view camera, for corrections");
-  visit->Path("directory", &c->camera.directory,
-              "Folder for exposure requests and spot lists; empty: no camera there");
-  visit->Flag("dds", &c->camera.dds,
-              "Whether requests and spot lists go by DDS topics in the domain of [dds]");
-  visit->Path("fiducials", &c->camera.fiducials,
-              "fiducials.csv: lights at known places of the plate");
-  visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6}, "Columns of the image");
-  visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6}, "Rows of the image");
-  visit->Real("pixels_per_mm", &c->camera.model.pixels_per_mm, {1e-3, 1e4},
-              "Approximate scale of the image; the own scale of each exposure is found");
-  visit->Real("rotation_deg", &c->camera.model.rotation_deg, {-360, 360},
-              "Rotation of the image against the plate, counter-clockwise");
-  visit->Real("centre_x_px", &c->camera.model.centre_x_px, {-1e6, 1e6},
-              "Column of the plate's 0, 0 in the image");
-  visit->Real("centre_y_px", &c->camera.model.centre_y_px, {-1e6, 1e6},
-              "Row of the plate's 0, 0 in the image");
-  visit->Flag("mirrored", &c->camera.model.mirrored, "Whether the image is mirrored");
-  visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000},
-              "Error of one coordinate of one spot, at the plate");
-  visit->Wait("patience_ms", &c->camera.patience,
-              "Real time within which an exposure must have come");
-  visit->Section("hall", "Units with Hall sensors at their joint");
-  visit->Path(
-      "model", &c->hall.model,
-      "Model of the joints' field, as focalfleet hall fit writes it; empty: sensors are not read");
-  visit->Real("noise_mT", &c->hall.noise_mT, {1e-5, 10},
-              "Noise of a sensor's reading, including what model and calibration leave");
-  visit->Real("tilt_max_deg", &c->hall.tilt_max_deg, {1, 60}, "Largest tilt of a joint");
+  VisitInstrumentKeys(c, visit);
   visit->Section("clock", "Host time");
   visit->Real("speed", &c->clock.speed, {0.01, 1000},
               "Host time runs this many times faster than real time; not on SocketCAN");
