@@ -15,6 +15,7 @@ namespace {
 
 // Progress arrives several times a second; a daemon that is silent for this long hangs.
 constexpr DurationNs kHangs = Seconds(120);
+constexpr double kConnect_s = 10;  // a daemon takes a connection within a turn
 
 bool ChangesNothing(const std::string& verb) {
   constexpr std::array<const char*, 10> kQuestions = {"status",  "unit",   "state",  "history",
@@ -27,7 +28,7 @@ bool ChangesNothing(const std::string& verb) {
 
 tl::expected<Json, Failure> Ask(const Context& context, const Question& question) {
   const std::string path = context.SocketPath();
-  auto client = LineClient::Connect(path);
+  auto client = LineClient::Connect(path, Seconds(context.timeout_s.value_or(kConnect_s)));
   if (!client) {
     return tl::unexpected<Failure>(
         Failure{ExitCode::kNoDaemon,
@@ -38,6 +39,7 @@ tl::expected<Json, Failure> Ask(const Context& context, const Question& question
   }
   LineClient::CallOptions options;
   if (question.long_lasting) options.silence_max = kHangs;
+  if (context.timeout_s) options.silence_max = Seconds(*context.timeout_s);
   options.on_progress = question.on_progress;
   auto answer = client->Call(question.verb, question.args, options);
   if (answer) return std::move(*answer);

@@ -10,48 +10,77 @@
 #include <sstream>
 
 #include "daemon/cli/operator_commands.h"
+#include "daemon/usage/complaint.h"
+#include "daemon/usage/help.h"
+#include "daemon/usage/option_text.h"
 
 namespace focalfleet::cli {
 namespace {
 
 constexpr const char* kEveryCommand =
-    "Every command takes --json, --quiet and --socket PATH; `focalfleet --help` lists the exit "
-    "codes.";
+    "Every command takes --json, --quiet, --socket, --timeout and --color; `focalfleet --help` "
+    "has them, and lists the exit codes.";
+
+const usage::HelpClosing kClosing{
+    .of_commands = kEveryCommand, .manual = "focalfleet", .page_a_command = true};
+
+struct Group {
+  const char* name;
+  std::vector<std::string> commands;
+};
+
+/// The groups of the commands in help, in their order. A command of no group is under kTools.
+const std::vector<Group>& Groups() {
+  static const std::vector<Group> groups = {
+      {"Prepare a configuration", {"layout", "targets", "plan", "estimate"}},
+      {"Operate the fleet", {"apply", "wait", "retarget", "stop", "home", "measure"}},
+      {"Watch the fleet", {"status", "unit", "state", "alarms", "events", "history", "watch", "measurements"}},
+      {"Maintain units", {"disable", "enable", "adopt", "params"}},
+      {"Study and tune",
+       {"campaign", "diagnose", "model", "simulate", "tune", "reproduce", "hall"}},
+  };
+  return groups;
+}
+constexpr const char* kTools = "Tools";  // can, completion, help
+
+/// Puts each command into its group. Help lists groups in the order of their first command.
+void AssignGroups(CLI::App* app) {
+  for (CLI::App* command : app->get_subcommands({})) {
+    const auto group = std::ranges::find_if(Groups(), [&](const Group& each) {
+      return std::ranges::find(each.commands, command->get_name()) != each.commands.end();
+    });
+    command->group(group != Groups().end() ? group->name : kTools);
+  }
+}
+
+std::string ExitCodesHelp() {
+  std::string text = "Exit codes:";
+  for (const ExitCodeText& each : kExitCodeTexts)
+    text += fmt::format("\n  {}  {}", static_cast<int>(each.code), each.text);
+  return text;
+}
 
 void AddGlobalOptions(CommandLine* line) {
   CLI::App& app = line->app;
-  app.set_version_flag("--version", "focalfleet " FOCALFLEET_VERSION);
+  app.set_version_flag("--version", "focalfleet " FOCALFLEET_VERSION, "Show the version");
   app.add_flag("--json", line->context.json, "One JSON object on stdout, nothing else there");
   app.add_flag("-q,--quiet", line->context.quiet, "No progress, no summary; errors are still told");
   app.add_option("--socket", line->context.socket,
                  fmt::format("Control socket of the daemon (default: $FOCALFLEET_SOCKET, else {})",
                              kDefaultSocket))
       ->type_name("FILE");
+  app.add_option("--timeout", line->context.timeout_s,
+                 "How long the daemon may be silent, s (otherwise 10; 120 while units move)")
+      ->check(NumberBetween(0.01, 86'400));
+  OneOf(app.add_option("--color", line->context.colour, "Colours in what is shown"),
+        {"auto", "always", "never"})
+      ->capture_default_str();
 }
 
 // Commands that never ask a daemon. They end with kRefused where their answer cannot be written.
-constexpr std::array<std::string_view, 11> kOffline = {
-    "can",  "completion", "diagnose", "estimate", "hall", "layout",
-    "plan", "reproduce",  "simulate", "targets",  "tune"};
-
-/// The deepest command of the tree that the command line named.
-const CLI::App& Chosen(const CLI::App& app) {
-  const CLI::App* chosen = &app;
-  while (!chosen->get_subcommands().empty()) chosen = chosen->get_subcommands().front();
-  return *chosen;
-}
-
-std::string Complaint(const CLI::App& app, const CLI::ParseError& error) {
-  const CLI::App& chosen = Chosen(app);
-  if (chosen.get_require_subcommand_min() > 0) {
-    for (const std::string& word : app.remaining(true)) {
-      if (word.starts_with('-')) continue;
-      return fmt::format("there is no command '{}{}'",
-                         &chosen == &app ? "" : chosen.get_name() + " ", word);
-    }
-  }
-  return error.what();
-}
+constexpr std::array<std::string_view, 12> kOffline = {
+    "can",    "completion", "diagnose",  "estimate", "hall",    "help",
+    "layout", "plan",       "reproduce", "simulate", "targets", "tune"};
 
 // Fills standard streams that the caller closed. Otherwise an opened file would get the number of a
 // closed stream, and messages would end in it. The file /dev/null, opened in the wrong direction,
@@ -66,7 +95,7 @@ void HoldStandardStreams() {
 
 /// True if the result file goes to stdout.
 bool OutIsStdout(const CLI::App& app) {
-  const CLI::Option* out = Chosen(app).get_option_no_throw("--out");
+  const CLI::Option* out = usage::Chosen(app).get_option_no_throw("--out");
   return out != nullptr && out->count() == 1 && out->results().front() == "-";
 }
 
@@ -84,11 +113,25 @@ int AfterOutput(const CommandLine& line, ExitCode exit) {
   return static_cast<int>(offline ? ExitCode::kRefused : ExitCode::kBroken);
 }
 
+/// Reports a line that was not understood: the reason, and where no command was named the commands
+/// there are.
+int ReportUsage(const CommandLine& line, const CLI::ParseError& error) {
+  const CLI::App& chosen = usage::Chosen(line.app);
+  const bool names_no_command =
+      chosen.get_require_subcommand_min() > 0 && line.app.remaining(true).empty();
+  if (names_no_command) Complain(usage::ShortHelp(chosen) + "\n");
+  const std::string more =
+      names_no_command ? "" : fmt::format(" (`{} --help` shows the usage)", usage::PathOf(chosen));
+  return static_cast<int>(Report(
+      line.context,
+      Failure{ExitCode::kUsage, {ErrorCode::kInvalid, usage::Complaint(line.app, error) + more}}));
+}
+
 }  // namespace
 
 CLI::App* AddCommand(CLI::App* parent, const char* name, const char* what, const char* examples) {
   CLI::App* command = parent->add_subcommand(name, what);
-  command->footer(fmt::format("Examples:\n{}\n{}", examples, kEveryCommand));
+  command->footer(examples);
   return command;
 }
 
@@ -110,7 +153,7 @@ CLI::Validator NumberBetween(double low, double high) {
             return good ? std::string()
                         : fmt::format("{} is not a number of {:g} to {:g}", text, low, high);
           },
-          ""};
+          fmt::format("from {:.12g} to {:.12g}", low, high)};
 }
 
 std::unique_ptr<CommandLine> MakeCommandLine() {
@@ -120,7 +163,8 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   app.description(
       "Operates a fleet of fibre positioners: prepares configurations from files, and talks to "
       "focalfleetd.");
-  app.footer(kExitCodesHelp);
+  app.formatter(std::make_shared<usage::HelpFormatter>(kClosing));
+  app.set_help_flag("-h,--help", "Show this help");
   app.fallthrough();  // a global option may stand after the command, too
   app.require_subcommand(1);
   AddGlobalOptions(line.get());
@@ -147,7 +191,32 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddModelCommands(line.get());
   AddCanCommands(line.get());
   AddCompletionCommand(line.get());
+  AddHelpCommand(line.get());
+  AssignGroups(&app);
+  app.footer(ExitCodesHelp());  // last: commands would inherit it
   return line;
+}
+
+std::vector<usage::ManualPage> Manual() {
+  usage::ManualFrame frame{
+      .closing = kClosing,
+      .section = 1,
+      .version = FOCALFLEET_VERSION,
+      .description =
+          {"focalfleet operates a fleet of fibre positioners. Some commands prepare configurations "
+           "from files and need no daemon. The others talk to focalfleetd(8) over its control "
+           "socket.",
+           "stdout carries the answer, stderr everything else. With --json the answer is one JSON "
+           "object. Result files appear complete or not at all."},
+      .environment = {{"FOCALFLEET_SOCKET", "Control socket of the daemon, without --socket."},
+                      {"NO_COLOR", "Where it is not empty, no colours are used."},
+                      {"CYCLONEDDS_URI", "Configuration of DDS for focalfleet watch."}},
+      .files = {{kDefaultSocket, "Control socket of the daemon."}},
+      .see_also = "focalfleetd(8), focalfleet-sim(1), focalfleet.toml(5), focalfleet-protocol(7)"};
+  for (const ExitCodeText& each : kExitCodeTexts)
+    frame.exit_codes.emplace_back(std::to_string(static_cast<int>(each.code)),
+                                  std::string(each.text) + ".");
+  return usage::ManualOf(MakeCommandLine()->app, frame);
 }
 
 int Main(int argc, char** argv) {
@@ -164,11 +233,7 @@ int Main(int argc, char** argv) {
       return AfterOutput(*line, ExitCode::kOk);
     }
     line->context.LookAtTerminals();
-    return static_cast<int>(
-        Report(line->context,
-               Failure{ExitCode::kUsage,
-                       {ErrorCode::kInvalid, fmt::format("{} (`focalfleet --help` shows the usage)",
-                                                         Complaint(line->app, error))}}));
+    return ReportUsage(*line, error);
   }
   line->context.LookAtTerminals();
   line->context.stdout_is_file = OutIsStdout(line->app);

@@ -8,8 +8,10 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "daemon/cli/context.h"
+#include "daemon/usage/manual.h"
 
 namespace focalfleet::cli {
 
@@ -23,6 +25,9 @@ struct CommandLine {
 
 /// The complete tree.
 std::unique_ptr<CommandLine> MakeCommandLine();
+
+/// The man pages of focalfleet and its commands.
+std::vector<usage::ManualPage> Manual();
 
 /// Parses the command line and runs the command. Returns the exit code; the reason of a failure is
 /// on stderr.
@@ -39,6 +44,7 @@ void OnChosen(CommandLine* line, CLI::App* command, std::shared_ptr<Options> opt
   });
 }
 
+/// Adds a command. Help shows the examples, each behind two blanks, under a title of their own.
 CLI::App* AddCommand(CLI::App* parent, const char* name, const char* what, const char* examples);
 
 /// Adds the name of a file that is read. The command itself checks that the file is readable: a
@@ -48,7 +54,8 @@ CLI::Option* AddFile(CLI::App* command, const char* name, std::string* path, con
 /// Restricts the value to one of the words; completion offers them.
 CLI::Option* OneOf(CLI::Option* option, const std::vector<std::string>& words);
 
-/// A finite number of the range; CLI::Range lets a nan pass and prints 309 digits.
+/// Accepts a finite number of the range, which help shows; CLI::Range lets a nan pass and prints
+/// 309 digits.
 CLI::Validator NumberBetween(double low, double high);
 
 void AddLayoutCommand(CommandLine* line);
@@ -72,5 +79,6 @@ void AddHallCommands(CommandLine* line);
 void AddMeasurementsCommand(CommandLine* line);
 void AddModelCommands(CommandLine* line);
 void AddCompletionCommand(CommandLine* line);
+void AddHelpCommand(CommandLine* line);
 
 }  // namespace focalfleet::cli

@@ -68,21 +68,6 @@ std::string ShellQuote(std::string_view text) {
   return quoted + "'";
 }
 
-// The value as one word for the shell's tables: @file, @any, or the words themselves.
-std::string Spell(const CompletionValue& value) {
-  switch (value.kind) {
-    case CompletionValue::Kind::kNone:
-      return "";
-    case CompletionValue::Kind::kFile:
-      return "@file";
-    case CompletionValue::Kind::kAny:
-      return "@any";
-    case CompletionValue::Kind::kWords:
-      return fmt::format("{}", fmt::join(value.words, ","));
-  }
-  return "";
-}
-
 std::string FirstLine(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 // The text `word:what` as zsh's _describe reads it; bash has no place for the description.
@@ -240,8 +225,9 @@ struct CompletionOptions {
 
 ExitCode RunCompletion(const Context& context, const CompletionOptions& options) {
   const std::unique_ptr<CommandLine> line = MakeCommandLine();
-  const std::string script =
-      options.shell == "zsh" ? ZshCompletion(line->app) : BashCompletion(line->app);
+  const std::string script = options.shell == "fish"  ? FishCompletion(line->app)
+                             : options.shell == "zsh" ? ZshCompletion(line->app)
+                                                      : BashCompletion(line->app);
   if (context.json) {
     PrintJson({{"shell", options.shell}, {"script", script}});
   } else {
@@ -251,6 +237,20 @@ ExitCode RunCompletion(const Context& context, const CompletionOptions& options)
 }
 
 }  // namespace
+
+std::string Spell(const CompletionValue& value) {
+  switch (value.kind) {
+    case CompletionValue::Kind::kNone:
+      return "";
+    case CompletionValue::Kind::kFile:
+      return "@file";
+    case CompletionValue::Kind::kAny:
+      return "@any";
+    case CompletionValue::Kind::kWords:
+      return fmt::format("{}", fmt::join(value.words, ","));
+  }
+  return "";
+}
 
 std::vector<CompletionNode> WalkCommands(const CLI::App& app) {
   std::vector<CompletionNode> nodes;
@@ -273,9 +273,11 @@ void AddCompletionCommand(CommandLine* line) {
   CLI::App* command =
       AddCommand(&line->app, "completion", "Print the tab completion script of a shell",
                  "  source <(focalfleet completion bash)\n"
-                 "  focalfleet completion zsh > ~/.zfunc/_focalfleet");
+                 "  focalfleet completion zsh > ~/.zfunc/_focalfleet\n"
+                 "  focalfleet completion fish > ~/.config/fish/completions/focalfleet.fish");
   auto options = std::make_shared<CompletionOptions>();
-  OneOf(command->add_option("shell", options->shell, "Which shell"), {"bash", "zsh"})->required();
+  OneOf(command->add_option("shell", options->shell, "Which shell"), {"bash", "zsh", "fish"})
+      ->required();
   OnChosen(line, command, options, RunCompletion);
 }
 

@@ -1,7 +1,7 @@
-// Tab completion for bash and zsh is generated from the tree of commands itself. A new command or
-// option is therefore completed as soon as it exists. The script holds three tables, by the path of
-// a command ("params", "layout hex"). They list its subcommands, its options, and what may follow
-// an option or stand as an argument.
+// Tab completion for bash, zsh and fish is generated from the tree of commands itself. A new
+// command or option is therefore completed as soon as it exists. The script holds three tables, by
+// the path of a command ("params", "layout hex"). They list its subcommands, its options, and what
+// may follow an option or stand as an argument.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -38,5 +38,9 @@ std::vector<CompletionNode> WalkCommands(const CLI::App& app);
 
 std::string BashCompletion(const CLI::App& app);
 std::string ZshCompletion(const CLI::App& app);
+std::string FishCompletion(const CLI::App& app);
+
+/// The value as one word for the tables of a script: @file, @any, or the words with commas.
+std::string Spell(const CompletionValue& value);
 
 }  // namespace focalfleet::cli

@@ -13,6 +13,10 @@
 namespace focalfleet::cli {
 namespace {
 
+// The form of all answers (docs/schemas/). A member that is added keeps the number; where a member
+// changes or goes, the number rises.
+constexpr int kAnswerSchema = 1;
+
 int output_error = 0;  // one a process, as standard output itself
 
 void Write(std::string_view text) {
@@ -53,9 +57,10 @@ void Context::LookAtTerminals() {
   terminal_out = isatty(STDOUT_FILENO) == 1;
   terminal_err = isatty(STDERR_FILENO) == 1;
   const char* no_colour = std::getenv("NO_COLOR");
-  const bool wanted = no_colour == nullptr || *no_colour == '\0';
-  colour_out = wanted && terminal_out && !json;
-  colour_err = wanted && terminal_err;
+  const bool unwanted = colour == "never" || (no_colour != nullptr && *no_colour != '\0');
+  const bool always = colour == "always";  // the option is nearer than the environment
+  colour_out = (always || (!unwanted && terminal_out)) && !json;
+  colour_err = always || (!unwanted && terminal_err);
 }
 
 std::string Paint(bool colour_on, Colour colour, std::string_view text) {
@@ -109,7 +114,9 @@ void NameUnserved(const Context& context, std::string_view lines) {
 }
 
 void PrintJson(const Json& object) {
-  Write(PrintableJson(object.dump(-1, ' ', false, Json::error_handler_t::replace)) + "\n");
+  Json answer = object;
+  answer["schema"] = kAnswerSchema;
+  Write(PrintableJson(answer.dump(-1, ' ', false, Json::error_handler_t::replace)) + "\n");
 }
 
 ExitCode Report(const Context& context, const Failure& failure) {

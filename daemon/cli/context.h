@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,7 +19,9 @@ enum class Colour { kPlain, kGreen, kYellow, kRed, kBold };
 struct Context {
   bool json = false;
   bool quiet = false;
-  std::string socket;  // as given; empty: $FOCALFLEET_SOCKET, else the installed place
+  std::string socket;               // as given; empty: $FOCALFLEET_SOCKET, else the installed place
+  std::string colour = "auto";      // auto, always, never
+  std::optional<double> timeout_s;  // of the daemon's silence; none: as the command has it
   bool colour_out = false;
   bool colour_err = false;
   bool terminal_out = false;
@@ -26,7 +29,7 @@ struct Context {
   bool stdout_is_file = false;  // with --out -: other messages go to stderr
 
   [[nodiscard]] std::string SocketPath() const;
-  /// Determines from the terminals and NO_COLOR whether colours are used.
+  /// Determines from --color, the terminals and NO_COLOR whether colours are used.
   void LookAtTerminals();
 };
 

@@ -281,7 +281,7 @@ void AddDiagnoseCommand(CommandLine* line) {
   command
       ->add_option("--threads", options->threads,
                    "Threads (default: all cores); the verdict is the same with any number")
-      ->check(CLI::Range(1, 256).description(""));
+      ->check(CLI::Range(1, 256));
   command->add_option("--without", options->leave_out, "Causes to leave out of the library")
       ->delimiter(',');
   command->add_option("--shuffle", options->shuffle,
@@ -316,10 +316,10 @@ void AddSimulateCampaign(CLI::App* parent, CommandLine* line) {
       ->check(NumberBetween(0, 1))
       ->capture_default_str();
   command->add_option("--units", planted.units, "Units, on a hexagonal lattice")
-      ->check(CLI::Range(1, 20000).description(""))
+      ->check(CLI::Range(1, 20000))
       ->capture_default_str();
   command->add_option("--moves", planted.moves, "Moves of each unit")
-      ->check(CLI::Range(1, 2000).description(""))
+      ->check(CLI::Range(1, 2000))
       ->capture_default_str();
   command->add_option("--seed", planted.seed, "Of all that is drawn")->capture_default_str();
   command->add_option("--noise-um", planted.noise_um, "Of one measured coordinate")

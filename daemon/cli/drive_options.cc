@@ -40,7 +40,7 @@ CLI::Validator Subdivision() {
         "{} is not a multiple of 6 from 6 to {}: the six sectors have the same vectors", text,
         kSubdivisionMax);
   };
-  return {check, "", "subdivision"};
+  return {check, fmt::format("multiple of 6 up to {}", kSubdivisionMax), "subdivision"};
 }
 
 Result<sim::MotorParameters> MotorOf(const DriveOptions& options) {
@@ -78,7 +78,7 @@ CLI::Validator PositiveNumberUpTo(double high, const std::string& why) {
     if (value && *value > 0 && *value <= high) return "";
     return fmt::format("{} is not a number above 0 and up to {:g}{}", text, high, why);
   };
-  return {check, "", "number"};
+  return {check, fmt::format("above 0 up to {:.12g}", high), "number"};
 }
 
 WaveMode ModeOf(const std::string& word) {
@@ -127,7 +127,7 @@ void AddBridgeOptions(CLI::App* command, DriveOptions* options) {
   command
       ->add_option("--counter1", options->modulation.counter1,
                    "Timer counts of a carrier period, V_counter1")
-      ->check(CLI::Range(1, 65'535).description(""))
+      ->check(CLI::Range(1, 65'535))
       ->capture_default_str();
   command
       ->add_option("--subdivision", options->modulation.subdivision,
@@ -155,7 +155,7 @@ void AddRepeatOption(CLI::App* command, DriveOptions* options) {
   command
       ->add_option("--repeat", options->modulation.repeat,
                    "Carrier periods that a vector is shown, n")
-      ->check(CLI::Range(1, 255).description(""))
+      ->check(CLI::Range(1, 255))
       ->capture_default_str();
 }
 

@@ -290,7 +290,7 @@ CLI::Validator MultipleOfSix() {
         return fmt::format("{} is not a multiple of 6 up to {}: the field has six sectors", text,
                            kStartSubdivisionMax);
       },
-      "");
+      fmt::format("multiple of 6 up to {}", kSubdivisionMax));
 }
 
 }  // namespace
@@ -318,7 +318,7 @@ void AddEstimateCommand(CommandLine* line) {
       ->check(NumberBetween(0.1, kBridgeMax_V))
       ->capture_default_str();
   command->add_option("--counter1", axis.counter1, "Timer counts of a carrier period, V_counter1")
-      ->check(CLI::Range(1, 65'535).description(""))
+      ->check(CLI::Range(1, 65'535))
       ->capture_default_str();
   // The option uses a wider type: a byte would be read as a character.
   command
@@ -326,7 +326,7 @@ void AddEstimateCommand(CommandLine* line) {
           "--repeat",
           [options](unsigned n) { options->drive.axis[0].repeat = static_cast<std::uint8_t>(n); },
           "Carrier periods of a vector, n")
-      ->check(CLI::Range(1, 255).description(""))
+      ->check(CLI::Range(1, 255))
       ->default_str(std::to_string(axis.repeat));
   command->add_option("--subdivision", axis.subdivision, "Vectors of an electrical turn")
       ->check(MultipleOfSix())

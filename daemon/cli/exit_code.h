@@ -21,13 +21,18 @@ struct Failure {
   Error error;
 };
 
-inline constexpr const char* kExitCodesHelp =
-    "Exit codes:\n"
-    "  0  done\n"
-    "  1  refused or invalid input; nothing changed\n"
-    "  2  wrong usage\n"
-    "  3  done, but some units were not served (they are named)\n"
-    "  4  the daemon cannot be reached\n"
-    "  5  stopped or failed on the way";
+struct ExitCodeText {
+  ExitCode code;
+  const char* text;
+};
+
+inline constexpr ExitCodeText kExitCodeTexts[] = {
+    {ExitCode::kOk, "done"},
+    {ExitCode::kRefused, "refused or invalid input; nothing changed"},
+    {ExitCode::kUsage, "wrong usage"},
+    {ExitCode::kSomeUnserved, "done, but some units were not served (they are named)"},
+    {ExitCode::kNoDaemon, "the daemon cannot be reached"},
+    {ExitCode::kBroken, "stopped or failed on the way"},
+};
 
 }  // namespace focalfleet::cli

@@ -73,7 +73,7 @@ void AddLayoutCommand(CommandLine* line) {
   auto options = std::make_shared<LayoutOptions>();
   command->add_option("--count", options->hex.count, "How many units")
       ->required()
-      ->check(CLI::Range(1u, limits::kUnits).description(""));
+      ->check(CLI::Range(1u, limits::kUnits));
   const CLI::Validator length = NumberBetween(0.01, 1000);
   command->add_option("--pitch-mm", options->hex.pitch_mm, "Distance of neighbours")
       ->check(length)
@@ -89,10 +89,10 @@ void AddLayoutCommand(CommandLine* line) {
       ->expected(1, 2)
       ->check(NumberBetween(0.001, 1e6));
   command->add_option("--units-per-bus", options->hex.units_per_bus, "Units on one CAN bus")
-      ->check(CLI::Range(1u, limits::kNodesPerBus).description(""))
+      ->check(CLI::Range(1u, limits::kNodesPerBus))
       ->capture_default_str();
   command->add_option("--units-per-rail", options->hex.units_per_rail, "Units on one supply rail")
-      ->check(CLI::Range(1u, limits::kUnits).description(""))
+      ->check(CLI::Range(1u, limits::kUnits))
       ->capture_default_str();
   command
       ->add_option("--hall-sensors", options->hex.sensors,
@@ -105,7 +105,7 @@ void AddLayoutCommand(CommandLine* line) {
   CLI::Option* fiducials = command
                                ->add_option("--fiducials", options->hex.fiducials,
                                             "Lights for the camera, on places that no arm reaches")
-                               ->check(CLI::Range(3u, limits::kFiducials).description(""));
+                               ->check(CLI::Range(3u, limits::kFiducials));
   fiducials->needs(
       AddFile(command, "--fiducials-out", &options->fiducials_out, "fiducials.csv to write")
           ->needs(fiducials));

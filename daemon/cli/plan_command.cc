@@ -244,7 +244,7 @@ void AddObjectives(CLI::App* command, PlanCommandOptions* options) {
   command
       ->add_option("--within-s", options->plan.within_s,
                    "All have arrived by then, s; with one of the three above "
-                   "[the end of the soonest plan]")
+                   "(default: the end of the soonest plan)")
       ->check(CLI::Range(0.001, 1677.0));
 }
 
@@ -273,7 +273,7 @@ void AddPlanCommand(CommandLine* line) {
   command
       ->add_option("--notice-s", options->plan.notice_s,
                    "Time to notice that a unit has stopped by itself, and to stop those that "
-                   "follow it, s [1]")
+                   "follow it, s (default: 1)")
       ->check(CLI::Range(0.0, 60.0));
   command->add_flag("--stall-tolerant", options->plan.stall_tolerant,
                     "In stages, in which a unit that halts unseen touches nobody; all must be "
@@ -281,7 +281,7 @@ void AddPlanCommand(CommandLine* line) {
   AddObjectives(command, options.get());
   command
       ->add_option("--sectors", options->sectors,
-                   "Plan by this many strips of the plate, each with those around it [1]")
+                   "Plan by this many strips of the plate, each with those around it (default: 1)")
       ->check(CLI::Range(1, 512));
   AddFile(command, "--out", &options->out, "plan.csv to write")->required();
   AddFile(command, "--plot", &options->plot,

@@ -233,14 +233,14 @@ void AddDrive(CLI::App* parent, CommandLine* line) {
   AddRepeatOption(command, &options->drive);
   AddMotorOptions(command, &options->drive);
   command->add_option("--turns", options->turns, "Turns of the field to sample")
-      ->check(CLI::Range(1, 1000).description(""))
+      ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   command->add_flag("--from-rest", options->from_rest,
                     "Begin at rest, at the place of the highest load (default: in step)");
   command
       ->add_option("--ramp-stages", options->ramp.stages,
                    "Stages of a start, each faster than the one before")
-      ->check(CLI::Range(0, 100).description(""))
+      ->check(CLI::Range(0, 100))
       ->capture_default_str();
   command->add_option("--ramp-stage-ms", options->ramp_stage_ms, "How long a stage lasts")
       ->check(PositiveNumberUpTo(1e4))

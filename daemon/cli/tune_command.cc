@@ -84,7 +84,7 @@ void AddRuleOptions(CLI::App* command, TuneOptions* options) {
       ->check(PositiveNumberUpTo(3600))
       ->capture_default_str();
   command->add_option("--ramp-stages", rule.ramp.stages, "Stages of a start")
-      ->check(CLI::Range(0, 100).description(""))
+      ->check(CLI::Range(0, 100))
       ->capture_default_str();
   command->add_option("--ramp-stage-ms", options->ramp_stage_ms, "How long a stage lasts")
       ->check(PositiveNumberUpTo(1e4))

@@ -344,7 +344,7 @@ void AddWatchCommand(CommandLine* line) {
                                  "  focalfleet watch --json | jq -c .fleet");
   auto options = std::make_shared<WatchOptions>();
   command->add_option("--domain", options->domain, "DDS domain")
-      ->check(CLI::Range(0, 230).description(""))
+      ->check(CLI::Range(0, 230))
       ->capture_default_str();
   command->add_flag("--once", options->once, "Show the whole fleet once and end");
   command

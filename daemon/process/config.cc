@@ -15,99 +15,10 @@
 #include <sstream>
 #include <utility>
 
+#include "daemon/process/config_keys.h"
+
 namespace focalfleet {
 namespace {
-
-constexpr const char* kLogLevels[] = {"trace", "debug", "info", "warning", "error"};
-constexpr const char* kModes[] = {"asymmetric", "five_segment", "seven_segment"};
-constexpr const char* kSpreads[] = {"nominal", "real"};
-
-template <class T>
-struct Range {
-  T low;
-  T high;
-};
-constexpr Range<std::int64_t> kMillisecondRange{1, 3'600'000};
-
-/// The one list of keys stands here and in VisitTimingKeys. `visit` is a reader or a writer; both
-/// visit every key once, in the order of the file.
-template <class Config, class Visitor>
-void VisitKeys(Config* c, Visitor* visit) {
-  visit->Section("fleet");
-  visit->Path("units", &c->fleet.units);
-  visit->Path("obstacles", &c->fleet.obstacles);
-  visit->Real("clearance_mm", &c->fleet.clearance_mm, {0, 1000});
-  visit->Section("store");
-  visit->Path("path", &c->store.path);
-  visit->Section("control");
-  visit->Path("socket", &c->control.socket);
-  visit->Section("dds");
-  visit->Flag("enabled", &c->dds.enabled);
-  visit->Whole("domain", &c->dds.domain, {0, 230});
-  visit->Real("rate_hz", &c->dds.rate_hz, {0.1, 100});
-  visit->Path("config", &c->dds.config);
-  visit->Section("log");
-  visit->Choice("level", &c->log.level, kLogLevels);
-  visit->Path("file", &c->log.file);
-  visit->Section("metrics");
-  visit->Text("address", &c->metrics.address);
-  visit->Whole("port", &c->metrics.port, {0, 65'535});
-  visit->Texts("names", &c->metrics.names);
-  visit->Section("bus");
-  visit->Index("port", &c->bus.port, kPortKindNames);
-  visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});
-  visit->Flag("can_fd", &c->bus.can_fd);
-  visit->Whole("data_bit_rate_bps", &c->bus.data_bit_rate_bps, {10'000, 8'000'000});
-  visit->Path("unix_directory", &c->bus.unix_directory);
-  visit->Texts("interfaces", &c->bus.interfaces);
-  visit->Section("sync");
-  visit->Path("chip", &c->sync.chip);
-  visit->Whole("line", &c->sync.line, {0, 1023});
-  visit->Flag("active_low", &c->sync.active_low);
-  visit->Section("camera");
-  visit->Path("directory", &c->camera.directory);
-  visit->Flag("dds", &c->camera.dds);
-  visit->Path("fiducials", &c->camera.fiducials);
-  visit->Real("columns_px", &c->camera.sensor.columns_px, {1, 1e6});
-  visit->Real("rows_px", &c->camera.sensor.rows_px, {1, 1e6});
-  visit->Real("pixels_per_mm", &c->camera.model.pixels_per_mm, {1e-3, 1e4});
-  visit->Real("rotation_deg", &c->camera.model.rotation_deg, {-360, 360});
-  visit->Real("centre_x_px", &c->camera.model.centre_x_px, {-1e6, 1e6});
-  visit->Real("centre_y_px", &c->camera.model.centre_y_px, {-1e6, 1e6});
-  visit->Flag("mirrored", &c->camera.model.mirrored);
-  visit->Real("centroid_sigma_um", &c->camera.centroid_sigma_um, {0.01, 1000});
-  visit->Wait("patience_ms", &c->camera.patience);
-  visit->Section("hall");
-  visit->Path("model", &c->hall.model);
-  visit->Real("noise_mT", &c->hall.noise_mT, {1e-5, 10});
-  visit->Real("tilt_max_deg", &c->hall.tilt_max_deg, {1, 60});
-  visit->Section("clock");
-  visit->Real("speed", &c->clock.speed, {0.01, 1000});
-  visit->Section("drive");
-  visit->Real("v_bus_V", &c->drive.v_bus_V, {0.1, 60});
-  auto* axis = &c->drive.axis[0];  // both axes alike
-  visit->Whole("counter1", &axis->counter1, {1, 65'535});
-  visit->Whole("repeat", &axis->repeat, {1, 255});
-  visit->Whole("subdivision", &axis->subdivision, {6, 65'535});
-  visit->Index("mode", &c->drive.mode, kModes);
-}
-
-template <class Config, class Visitor>
-void VisitTimingKeys(Config* c, Visitor* visit) {
-  visit->Section("timing");
-  visit->Wait("reply_wait_ms", &c->timing.reply_wait);
-  visit->Wait("identify_period_ms", &c->timing.identify_period);
-  visit->Wait("poll_period_ms", &c->timing.poll_period);
-  visit->Wait("notice_ms", &c->timing.notice);
-  visit->Wait("clock_period_ms", &c->timing.clock_period);
-  visit->Wait("start_delay_ms", &c->timing.start_delay);
-  visit->Wait("sync_lead_ms", &c->timing.sync_lead);
-  visit->Wait("settle_margin_ms", &c->timing.settle_margin);
-  visit->Wait("silence_limit_ms", &c->timing.silence_limit);
-  visit->Section("simulated");
-  visit->Whole("seed", &c->simulated.seed, {0, std::numeric_limits<std::int64_t>::max()});
-  visit->Choice("spread", &c->simulated.spread, kSpreads);
-}
 
 /// Waits that cover the host's own processes stay the same in real time. A simulated fleet that
 /// runs faster does not make the host faster.
@@ -127,7 +38,7 @@ class Reader {
  public:
   Reader(const toml::table& root, std::string file) : root_(root), file_(std::move(file)) {}
 
-  void Section(const char* name) {
+  void Section(const char* name, const char* /*meaning*/) {
     name_ = name;
     section_ = nullptr;
     known_.insert(name_);
@@ -136,7 +47,7 @@ class Reader {
     section_ = node->as_table();
     if (section_ == nullptr) Wrong(*node, name_ + " must be a table: [" + name_ + "]");
   }
-  void Text(const char* key, std::string* out) {
+  void Text(const char* key, std::string* out, const char* /*meaning*/) {
     if (const toml::node* node = Find(key)) {
       if (const auto value = node->value_exact<std::string>())
         *out = *value;
@@ -144,13 +55,13 @@ class Reader {
         WrongType(*node, key, "a text in quotes");
     }
   }
-  void Path(const char* key, std::string* out) {
-    Text(key, out);
+  void Path(const char* key, std::string* out, const char* /*meaning*/) {
+    Text(key, out, nullptr);
     if (out->empty()) return;
     const std::filesystem::path directory = std::filesystem::path(file_).parent_path();
     *out = (directory / *out).lexically_normal().string();
   }
-  void Flag(const char* key, bool* out) {
+  void Flag(const char* key, bool* out, const char* /*meaning*/) {
     if (const toml::node* node = Find(key)) {
       if (const auto value = node->value_exact<bool>())
         *out = *value;
@@ -158,7 +69,7 @@ class Reader {
         WrongType(*node, key, "true or false");
     }
   }
-  void Real(const char* key, double* out, Range<double> range) {
+  void Real(const char* key, double* out, Range<double> range, const char* /*meaning*/) {
     const toml::node* node = Find(key);
     if (node == nullptr) return;
     const auto value = node->is_number() ? node->value<double>() : std::nullopt;
@@ -167,7 +78,7 @@ class Reader {
     *out = *value;
   }
   template <class T>
-  void Whole(const char* key, T* out, Range<std::int64_t> range) {
+  void Whole(const char* key, T* out, Range<std::int64_t> range, const char* /*meaning*/) {
     const toml::node* node = Find(key);
     if (node == nullptr) return;
     const auto value = node->value_exact<std::int64_t>();
@@ -175,26 +86,27 @@ class Reader {
     if (*value < range.low || *value > range.high) return WrongRange(*node, key, range);
     *out = static_cast<T>(*value);
   }
-  void Wait(const char* key, DurationNs* out) {
+  void Wait(const char* key, DurationNs* out, const char* meaning) {
     std::int64_t ms = out->ns / 1'000'000;
-    Whole(key, &ms, kMillisecondRange);
+    Whole(key, &ms, kMillisecondRange, meaning);
     *out = Milliseconds(ms);
   }
-  void Choice(const char* key, std::string* out, std::span<const char* const> names) {
+  void Choice(const char* key, std::string* out, std::span<const char* const> names,
+              const char* /*meaning*/) {
     std::string value = *out;
-    Text(key, &value);
+    Text(key, &value, nullptr);
     if (std::ranges::find(names, value) != names.end())
       *out = value;
     else
       Wrong(*Find(key), Full(key) + " must be one of " + ListOf(names) + ", not '" + value + "'");
   }
   template <class Enum>
-  void Index(const char* key, Enum* out, std::span<const char* const> names) {
+  void Index(const char* key, Enum* out, std::span<const char* const> names, const char* meaning) {
     std::string value = names[static_cast<std::size_t>(*out)];
-    Choice(key, &value, names);
+    Choice(key, &value, names, meaning);
     *out = static_cast<Enum>(std::ranges::find(names, value) - names.begin());
   }
-  void Texts(const char* key, std::vector<std::string>* out) {
+  void Texts(const char* key, std::vector<std::string>* out, const char* /*meaning*/) {
     const toml::node* node = Find(key);
     if (node == nullptr) return;
     const toml::array* array = node->as_array();
@@ -279,28 +191,38 @@ class Reader {
 
 class Writer {
  public:
-  void Section(const char* name) { out_ << (out_.tellp() > 0 ? "\n[" : "[") << name << "]\n"; }
-  void Text(const char* key, const std::string* value) {
+  void Section(const char* name, const char* /*meaning*/) {
+    out_ << (out_.tellp() > 0 ? "\n[" : "[") << name << "]\n";
+  }
+  void Text(const char* key, const std::string* value, const char* /*meaning*/) {
     Put(key) << toml::value<std::string>(*value) << "\n";
   }
-  void Path(const char* key, const std::string* value) { Text(key, value); }
-  void Choice(const char* key, const std::string* value, std::span<const char* const>) {
-    Text(key, value);
+  void Path(const char* key, const std::string* value, const char* meaning) {
+    Text(key, value, meaning);
   }
-  void Flag(const char* key, const bool* value) { Put(key) << (*value ? "true" : "false") << "\n"; }
-  void Real(const char* key, const double* value, Range<double>) {
+  void Choice(const char* key, const std::string* value, std::span<const char* const>,
+              const char* meaning) {
+    Text(key, value, meaning);
+  }
+  void Flag(const char* key, const bool* value, const char* /*meaning*/) {
+    Put(key) << (*value ? "true" : "false") << "\n";
+  }
+  void Real(const char* key, const double* value, Range<double>, const char* /*meaning*/) {
     Put(key) << toml::value<double>(*value) << "\n";
   }
   template <class T>
-  void Whole(const char* key, const T* value, Range<std::int64_t>) {
+  void Whole(const char* key, const T* value, Range<std::int64_t>, const char* /*meaning*/) {
     Put(key) << std::to_string(*value) << "\n";
   }
-  void Wait(const char* key, const DurationNs* value) { Put(key) << value->ns / 1'000'000 << "\n"; }
+  void Wait(const char* key, const DurationNs* value, const char* /*meaning*/) {
+    Put(key) << value->ns / 1'000'000 << "\n";
+  }
   template <class Enum>
-  void Index(const char* key, const Enum* value, std::span<const char* const> names) {
+  void Index(const char* key, const Enum* value, std::span<const char* const> names,
+             const char* /*meaning*/) {
     Put(key) << "\"" << names[static_cast<std::size_t>(*value)] << "\"\n";
   }
-  void Texts(const char* key, const std::vector<std::string>* value) {
+  void Texts(const char* key, const std::vector<std::string>* value, const char* /*meaning*/) {
     toml::array array;
     for (const std::string& text : *value) array.push_back(text);
     Put(key) << array << "\n";

@@ -2,22 +2,22 @@
 
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
-#include <string>
 
 #include "daemon/control/printable.h"
+#include "daemon/process/command_line.h"
 #include "daemon/process/config.h"
 #include "daemon/process/daemon.h"
+#include "daemon/usage/complaint.h"
 
 namespace {
 
 constexpr int kCannotRun = 1;
 constexpr int kUsage = 2;
 
-int Report(const focalfleet::Error& error) {
+int Report(const focalfleet::Error& error, int code = kCannotRun) {
   std::fprintf(stderr, "focalfleetd: %s\n", focalfleet::PrintableLines(error.text).c_str());
-  return kCannotRun;
+  return code;
 }
 
 int Check(const focalfleet::DaemonConfig& config) {
@@ -30,24 +30,18 @@ int Check(const focalfleet::DaemonConfig& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The daemon of a focal plane: it owns the CAN buses, the store and the DDS status.");
-  app.footer(
-      "Exit codes: 0 ended by SIGTERM or SIGINT with everything stored (or --check found no "
-      "fault); "
-      "1 could not start, or could not store everything, said on standard error; 2 wrong usage.");
-  std::string file;
-  bool check = false;
-  app.add_option("--config", file, "The configuration, a TOML file")->required();
-  app.add_flag("--check", check, "Read all files, print the effective configuration, and end");
-  app.set_version_flag("--version", std::string("focalfleetd ") + focalfleet::Version());
+  const auto line = focalfleet::MakeDaemonCommandLine();
   try {
-    app.parse(argc, argv);
+    line->app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {  // CLI11 throws to end, also after --help
-    return app.exit(error) == 0 ? 0 : kUsage;
+    if (error.get_exit_code() == 0) return line->app.exit(error);
+    return Report({focalfleet::ErrorCode::kInvalid, focalfleet::usage::Complaint(line->app, error) +
+                                                        " (`focalfleetd --help` shows the usage)"},
+                  kUsage);
   }
-  const auto config = focalfleet::LoadConfig(file);
+  const auto config = focalfleet::LoadConfig(line->config);
   if (!config) return Report(config.error());
-  if (check) return Check(*config);
+  if (line->check) return Check(*config);
   const auto ended = focalfleet::RunDaemon(*config);
   const int code = ended.status ? 0 : Report(ended.status.error());
   if (ended.left) ::_exit(code);  // no destructor may destroy what a hanging part uses

@@ -4,176 +4,37 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <functional>
-#include <optional>
 
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
-#include "daemon/control/id_ranges.h"
-#include "daemon/control/line_client.h"
-#include "daemon/control/printable.h"
-#include "daemon/files/text_file.h"
+#include "daemon/simulator/interface_names.h"
 #include "daemon/simulator/simulator.h"
-#include "sim/hall/fibre_carrier.h"
+#include "daemon/simulator/subcommands.h"
+#include "daemon/usage/complaint.h"
+#include "daemon/usage/help.h"
 
 namespace focalfleet::simulator {
 namespace {
 
 using cli::ExitCode;
 
-constexpr std::size_t kNumbersMax = 100'000;
-
-constexpr const char* kExitCodes =
-    "Exit codes:\n"
-    "  0  done\n"
-    "  1  refused or failed; stderr says why\n"
-    "  2  wrong usage\n"
-    "  4  nobody answers at the control socket";
-
-int Complain(const Error& error, ExitCode code) {
-  std::fprintf(stderr, "focalfleet-sim: %s\n", PrintableLines(error.text).c_str());
-  return static_cast<int>(code);
-}
-
-template <class Number>
-bool Parse(std::string_view text, Number* number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *number);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-std::vector<std::string> Split(const std::string& text, char separator) {
-  std::vector<std::string> pieces;
-  std::size_t begin = 0;
-  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
-    end = text.find(separator, begin);
-    pieces.push_back(text.substr(begin, end == std::string::npos ? end : end - begin));
-  }
-  return pieces;
-}
-
-/// The options of `misbehave`: the ways in which units answer wrongly.
-struct Misbehaviour {
-  std::optional<double> late_s;
-  std::optional<std::uint32_t> copies;
-  std::optional<std::uint32_t> foreign_serial;
-  bool deaf = false;
-  bool wrong_digest = false;
-  bool mute_done = false;
+const usage::HelpClosing kClosing{
+    .of_commands = "`focalfleet-sim --help` lists the exit codes.",
+    .manual = "focalfleet-sim",
 };
 
-/// The options of all subcommands, as CLI11 fills them in.
-struct Given {
-  SimulatorOptions run;
-  std::string spread = "nominal";
-  std::vector<std::string> plant;
-  std::vector<std::string> clock_errors;
-  std::string buses_text;
-  std::string control;
-  std::string units_text;
-  std::string bus_numbers_text;
-  std::string out;
-  std::string targets;
-  std::string code;
-  std::string axis = "theta";
-  std::uint32_t exposures = 1;
-  double seconds = -1;
-  double after_s = -1;
-  Misbehaviour misbehaviour;
-  bool off = false;
-  bool json = false;
-};
-
-/// Sends a request to the running simulation; `on_result` reports its result.
-int Ask(const Given& given, const ControlRequest& request,
-        const std::function<int(const Json&)>& on_result) {
-  auto client = LineClient::Connect(given.control);
-  if (!client) return Complain(client.error(), ExitCode::kNoDaemon);
-  const auto result = client->Call(request.verb, request.args);
-  if (!result)
-    return Complain(result.error(), client->connected() ? ExitCode::kRefused : ExitCode::kNoDaemon);
-  return on_result(*result);
-}
-
-int AskSimply(const Given& given, const ControlRequest& request) {
-  return Ask(given, request, [&](const Json& result) {
-    if (given.json) cli::PrintJson(result);
-    return static_cast<int>(ExitCode::kOk);
-  });
-}
-
-int AskAboutUnits(const Given& given, const char* verb, Json args) {
-  const auto units = ParseRanges(given.units_text);
-  if (!units) return Complain(units.error(), ExitCode::kUsage);
-  args["units"] = *units;
-  return AskSimply(given, {0, verb, std::move(args)});
-}
-
-int Misbehave(const Given& given) {
-  Json args = Json::object();
-  if (given.off) args["off"] = true;
-  if (given.misbehaviour.late_s) args["late_s"] = *given.misbehaviour.late_s;
-  if (given.misbehaviour.copies) args["copies"] = *given.misbehaviour.copies;
-  if (given.misbehaviour.deaf) args["deaf"] = true;
-  if (given.misbehaviour.wrong_digest) args["wrong_digest"] = true;
-  if (given.misbehaviour.mute_done) args["mute_done"] = true;
-  if (given.misbehaviour.foreign_serial)
-    args["foreign_serial"] = *given.misbehaviour.foreign_serial;
-  if (args.empty())
-    return Complain({ErrorCode::kInvalid, "misbehave: say how (--help lists the ways)"},
-                    ExitCode::kUsage);
-  return AskAboutUnits(given, "misbehave", std::move(args));
-}
-
-int SetBuses(const Given& given, const char* verb) {
-  const auto buses = ParseRanges(given.bus_numbers_text);
-  if (!buses) return Complain(buses.error(), ExitCode::kUsage);
-  return AskSimply(given, {0, verb, {{"buses", *buses}}});
-}
-
-int WriteField(const Given& given) {
-  std::string text = "theta_deg,phi_deg,b_T\n";
-  constexpr int kStepDeg = 4;
-  const sim::FibreCarrierJoints joints({});
-  for (int theta = 0; theta <= 180; theta += kStepDeg)
-    for (int phi = 0; phi < 360; phi += kStepDeg)
-      text += fmt::format("{},{},{}\n", theta, phi,
-                          joints.Field_T(theta * sim::kRadPerDeg, phi * sim::kRadPerDeg));
-  const auto written = WriteFileAtomically(given.out, text);
-  return written ? static_cast<int>(ExitCode::kOk) : Complain(written.error(), ExitCode::kRefused);
-}
-
-int ReportTruth(const Given& given) {
-  Json args = Json::object();
-  if (!given.targets.empty()) {
-    const auto text = ReadTextFile(given.targets);
-    if (!text) return Complain(text.error(), ExitCode::kRefused);
-    args = {{"targets_csv", *text}, {"targets_name", given.targets}};
-  }
-  return Ask(given, {0, "truth", args}, [&](const Json& result) {
-    if (!given.out.empty()) {
-      const auto written = WriteFileAtomically(given.out, result.value("csv", ""));
-      if (!written) return Complain(written.error(), ExitCode::kRefused);
-    }
-    if (given.json) {
-      Json summary = result;
-      summary.erase("csv");
-      cli::PrintJson(summary);
-    } else if (result.contains("targets")) {
-      const Json& errors = result["targets"];
-      cli::PrintText(fmt::format(
-          "{} units compared, worst is unit {} with {:.1f} um\ntrue position {:.1f} um rms\n",
-          errors.value("units", 0ull), errors.value("worst_unit_id", 0u),
-          errors.value("max_um", 0.0), errors.value("rms_um", 0.0)));
-    } else if (given.out.empty()) {
-      cli::PrintText(result.value("csv", ""));
-    }
-    return static_cast<int>(ExitCode::kOk);
-  });
+const std::vector<std::pair<std::string, std::string>>& ExitCodes() {
+  static const std::vector<std::pair<std::string, std::string>> codes = {
+      {"0", "done"},
+      {"1", "refused or failed; stderr has the reason"},
+      {"2", "wrong usage"},
+      {"4", "nobody answers at the control socket"},
+  };
+  return codes;
 }
 
 Result<sim::PlantedTrait> ParsePlant(const std::string& text) {
@@ -257,205 +118,117 @@ int Run(Given* given, const CLI::App& app) {
 
 void AddRunOptions(CLI::App* app, Given* given) {
   SimulatorOptions& run = given->run;
-  app->add_option("--units", run.units_path, "units.csv: the fleet");
+  app->add_option("--units", run.units_path, "units.csv: the fleet")->type_name("FILE");
   app->add_option("--state", run.state_path,
-                  "state.csv: where the axes stand at first; folded without");
+                  "state.csv: where the axes stand at first (otherwise folded)")
+      ->type_name("FILE");
   app->add_option("--unix-directory", run.unix_directory,
-                  "one UNIX socket a bus, bus<ID>.sock, in this directory");
+                  "Folder for one UNIX socket a bus, bus<ID>.sock")
+      ->type_name("DIR");
   app->add_option("--bus", given->buses_text,
-                  "SocketCAN interfaces by ascending bus_id: vcan0,vcan1 or vcan0...vcan49");
-  app->add_option("--control", given->control, "control socket for the subcommands");
+                  "SocketCAN interfaces by ascending bus_id: vcan0,vcan1 or vcan0...vcan49")
+      ->type_name("LIST");
+  app->add_option("--control", given->control, "Control socket for the commands")
+      ->type_name("FILE");
   app->add_option("--flash", run.flash_path,
-                  "what survives power-off: read at the start where it is, written at the end");
+                  "The units' FLASH: read at the start if it is there, written at the end")
+      ->type_name("FILE");
   app->add_option(
-      "--faults", run.faults_path,
-      "faults.csv: which bus or unit misbehaves how, from when to when; chance by --seed");
+         "--faults", run.faults_path,
+         "faults.csv: which bus or unit misbehaves how, from when to when; chance by --seed")
+      ->type_name("FILE");
   app->add_option("--camera", run.camera_directory,
-                  "folder where focalfleetd asks a camera for exposures; it is answered there");
-  app->add_option("--fiducials", run.fiducials_path, "fiducials.csv: what the camera sees beside");
-  app->add_option("--camera-noise-um", run.camera_noise_um, "of one coordinate of a usual spot")
+                  "Folder where focalfleetd asks a camera for exposures, which are answered there")
+      ->type_name("DIR");
+  app->add_option("--fiducials", run.fiducials_path,
+                  "fiducials.csv: the lights that the camera sees, too")
+      ->type_name("FILE");
+  app->add_option("--camera-noise-um", run.camera_noise_um,
+                  "Noise of one coordinate of a usual spot")
       ->check(cli::NumberBetween(0, 1000))
       ->capture_default_str();
   app->add_option("--camera-air-um", run.camera_air_um,
-                  "turbulence, of one coordinate; nearly the same for neighbours")
+                  "Turbulence of one coordinate, nearly the same for neighbours")
       ->check(cli::NumberBetween(0, 1000))
       ->capture_default_str();
-  app->add_option("--speed", run.speed, "times faster than life")
+  app->add_option("--speed", run.speed, "So many times faster than real time")
       ->check(cli::NumberBetween(0.01, 1000))
       ->capture_default_str();
-  app->add_option("--seed", run.seed, "of all chance")->capture_default_str();
+  app->add_option("--seed", run.seed, "Seed of all chance")->capture_default_str();
   app->add_option("--spread", given->spread,
                   "nominal: units as described; real: the spread of service")
-      ->check(CLI::IsMember({"nominal", "real"}))
+      ->check(CLI::IsMember({"nominal", "real"}).description(""))
+      ->type_name("{nominal,real}")
       ->capture_default_str();
   app->add_option("--plant", given->plant,
-                  "CAUSE=SIZE or CAUSE:AXIS=SIZE, on top of the spread; repeat: zero_offset (deg), "
-                  "arm_length (mm), gear_scale (share), backlash (deg), eccentricity (deg)");
-  app->add_option("--clock-error", given->clock_errors,
-                  "UNITS=SHARE: the clocks of these units run that much fast, or slow below 0; "
-                  "repeat. Otherwise up to 50 ppm");
-  app->add_option("--bit-rate", run.bit_rate_bps, "bit/s of the simulated buses")
+                  "A cause on top of the spread: zero_offset (deg), arm_length (mm), gear_scale "
+                  "(share), backlash (deg) or eccentricity (deg)")
+      ->type_name("CAUSE[:AXIS]=SIZE");
+  app->add_option(
+         "--clock-error", given->clock_errors,
+         "The clocks of these units run that much fast, or slow below 0 (otherwise up to 50 "
+         "ppm)")
+      ->type_name("UNITS=SHARE");
+  app->add_option("--bit-rate", run.bit_rate_bps, "Bit rate of the simulated buses, bit/s")
       ->check(CLI::Range(10'000, 1'000'000))
       ->capture_default_str();
 }
 
-struct Subcommand {
-  CLI::App* app;
-  std::function<int()> run;
+/// The tree of commands, with what each runs.
+struct CommandTree {
+  Given given;
+  CLI::App app{"Simulates a fleet", "focalfleet-sim"};
+  std::vector<Subcommand> subcommands;
 };
 
-CLI::App* AddSubcommand(CLI::App* app, Given* given, const char* name, const char* what) {
-  CLI::App* sub = app->add_subcommand(name, what);
-  sub->add_option("--control", given->control, "control socket of the running simulation")
-      ->required();
-  sub->add_flag("--json", given->json, "the result as one line of JSON");
-  return sub;
-}
-
-CLI::App* AddUnitsSubcommand(CLI::App* app, Given* given, const char* name, const char* what) {
-  CLI::App* sub = AddSubcommand(app, given, name, what);
-  sub->add_option("--units", given->units_text, "unit ids: 1,2,5-9")->required();
-  return sub;
-}
-
-CLI::App* AddMisbehave(CLI::App* app, Given* given) {
-  CLI::App* sub = AddUnitsSubcommand(app, given, "misbehave",
-                                     "units answer wrongly; their motors obey as ever. Ways add up "
-                                     "until --off");
-  sub->add_option("--late", given->misbehaviour.late_s, "every answer comes so many seconds later")
-      ->check(cli::NumberBetween(0, 86'400));
-  sub->add_option("--copies", given->misbehaviour.copies, "every answer is sent so many times")
-      ->check(CLI::Range(1, 100));
-  sub->add_flag("--deaf", given->misbehaviour.deaf, "they hear nothing");
-  sub->add_flag("--wrong-digest", given->misbehaviour.wrong_digest,
-                "what they say they hold is not what was staged");
-  sub->add_flag("--mute-done", given->misbehaviour.mute_done,
-                "they never report the end of a motion unasked");
-  sub->add_option(
-      "--foreign", given->misbehaviour.foreign_serial,
-      "other hardware, with this serial number, sits at the place of the one unit; 0: its "
-      "number is lost");
-  sub->add_flag("--off", given->off, "first: they behave again");
-  return sub;
-}
-
-std::vector<Subcommand> AddSubcommands(CLI::App* app, Given* given) {
-  CLI::App* truth = AddSubcommand(app, given, "truth", "where all axes and fibres truly are");
-  truth->add_option("--out", given->out, "truth.csv; without it and --targets: to stdout");
-  truth->add_option("--targets", given->targets, "targets.csv: compare the named units with it");
-  CLI::App* cut = AddUnitsSubcommand(app, given, "power-cut", "cut the power of units, now");
-  cut->add_option("--seconds", given->seconds, "power comes back after so much of the fleet's time")
-      ->check(cli::NumberBetween(0, 86'400));
-  CLI::App* on = AddUnitsSubcommand(app, given, "power-on", "give units their power back");
-  CLI::App* fault = AddUnitsSubcommand(app, given, "fault", "let units fail");
-  fault
-      ->add_option("--code", given->code,
-                   "over_temperature, under_voltage, over_current, flash, driver")
-      ->required();
-  fault->add_option("--axis", given->axis, "theta or phi")->capture_default_str();
-  fault->add_option("--after", given->after_s, "not now: so many seconds into the next motion")
-      ->check(cli::NumberBetween(0, 86'400));
-  CLI::App* silence =
-      AddUnitsSubcommand(app, given, "silence", "units act as told and say nothing");
-  silence->add_flag("--off", given->off, "they speak again");
-  CLI::App* misbehave = AddMisbehave(app, given);
-  CLI::App* kill = AddSubcommand(app, given, "kill-bus", "nothing passes on these buses any more");
-  kill->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
-  CLI::App* revive = AddSubcommand(app, given, "revive-bus", "these buses work again");
-  revive->add_option("--buses", given->bus_numbers_text, "bus ids: 1,2,5-9")->required();
-  CLI::App* camera = AddSubcommand(app, given, "camera", "let the next exposures go wrong");
-  camera->add_option("--fault", given->code, "dead, late, doubled, turned, other_field, or none")
-      ->required();
-  camera->add_option("--exposures", given->exposures, "so many")->capture_default_str();
-  CLI::App* field = app->add_subcommand(
-      "field", "write the field map of the joints' magnets, for `focalfleet hall fit`");
-  field->add_option("--out", given->out, "FIELD.csv")->required();
-  CLI::App* status = AddSubcommand(app, given, "status", "counters of all buses, as JSON");
-  CLI::App* quit =
-      AddSubcommand(app, given, "quit", "end the simulation; it writes its FLASH file");
-
-  return {{truth, [given] { return ReportTruth(*given); }},
-          {cut,
-           [given] {
-             Json args = Json::object();
-             if (given->seconds >= 0) args["seconds"] = given->seconds;
-             return AskAboutUnits(*given, "power_cut", args);
-           }},
-          {on, [given] { return AskAboutUnits(*given, "power_on", Json::object()); }},
-          {fault,
-           [given] {
-             Json args = {{"code", given->code}, {"axis", given->axis}};
-             if (given->after_s >= 0) args["after_s"] = given->after_s;
-             return AskAboutUnits(*given, "fault", args);
-           }},
-          {silence,
-           [given] {
-             return AskAboutUnits(*given, "silence", {{"off", given->off}});
-           }},
-          {misbehave, [given] { return Misbehave(*given); }},
-          {kill, [given] { return SetBuses(*given, "kill_bus"); }},
-          {revive, [given] { return SetBuses(*given, "revive_bus"); }},
-          {camera,
-           [given] {
-             return AskSimply(
-                 *given, {0, "camera", {{"fault", given->code}, {"exposures", given->exposures}}});
-           }},
-          {field, [given] { return WriteField(*given); }},
-          {status,
-           [given] {
-             given->json = true;
-             return AskSimply(*given, {0, "status", Json::object()});
-           }},
-          {quit, [given] {
-             return AskSimply(*given, {0, "quit", Json::object()});
-           }}};
+std::unique_ptr<CommandTree> MakeCommandTree() {
+  auto tree = std::make_unique<CommandTree>();
+  CLI::App& app = tree->app;
+  app.description(
+      "Simulates a fleet that answers on UNIX sockets or SocketCAN interfaces as units do, until "
+      "SIGTERM. It prints `ready` when all of them are open.");
+  app.formatter(std::make_shared<usage::HelpFormatter>(kClosing));
+  app.set_help_flag("-h,--help", "Show this help");
+  app.set_version_flag("--version", FOCALFLEET_VERSION, "Show the version");
+  app.require_subcommand(0, 1);
+  AddRunOptions(&app, &tree->given);
+  tree->subcommands = AddSubcommands(&app, &tree->given);
+  std::string footer = "Exit codes:";
+  for (const auto& [code, text] : ExitCodes()) footer += fmt::format("\n  {}  {}", code, text);
+  app.footer(footer);
+  return tree;
 }
 
 }  // namespace
 
-Result<std::vector<std::string>> ParseInterfaces(const std::string& text) {
-  std::vector<std::string> names;
-  for (const std::string& piece : Split(text, ',')) {
-    const std::size_t dots = piece.find("...");
-    if (dots == std::string::npos) {
-      if (piece.empty()) return Fail(ErrorCode::kInvalid, "--bus: an interface name is empty");
-      names.push_back(piece);
-      continue;
-    }
-    const std::string first = piece.substr(0, dots);
-    const std::string last = piece.substr(dots + 3);
-    const std::size_t digits = first.find_last_not_of("0123456789") + 1;
-    const std::string stem = first.substr(0, digits);
-    unsigned low = 0;
-    unsigned high = 0;
-    if (stem.empty() || last.substr(0, digits) != stem || !Parse(first.substr(digits), &low) ||
-        !Parse(last.substr(digits), &high) || high < low || high - low >= kNumbersMax)
-      return Fail(ErrorCode::kInvalid, "--bus: '" + piece + "' is no range such as vcan0...vcan49");
-    for (unsigned i = low; i <= high; ++i) names.push_back(stem + std::to_string(i));
-  }
-  return names;
+std::vector<usage::ManualPage> Manual() {
+  return usage::ManualOf(
+      MakeCommandTree()->app,
+      {.closing = kClosing,
+       .section = 1,
+       .version = FOCALFLEET_VERSION,
+       .description =
+           {"focalfleet-sim simulates the units of units.csv with their firmware, motors and "
+            "buses. "
+            "focalfleetd(8) finds them behind UNIX sockets (port = \"unix\") or on CAN interfaces.",
+            "Without a command the simulation runs. The commands ask a simulation that runs, "
+            "through its control socket: they show where units truly are, and plant faults."},
+       .exit_codes = ExitCodes(),
+       .see_also = "focalfleet(1), focalfleetd(8), focalfleet-protocol(7)"});
 }
 
 int Main(int argc, char** argv) {
-  Given given;
-  CLI::App app{
-      "The simulated fleet: answers on UNIX sockets or SocketCAN interfaces as units do, until "
-      "SIGTERM.\n"
-      "Says `ready` when all of them are open.",
-      "focalfleet-sim"};
-  app.footer(kExitCodes);
-  app.set_version_flag("--version", FOCALFLEET_VERSION);
-  app.require_subcommand(0, 1);
-  AddRunOptions(&app, &given);
-  const std::vector<Subcommand> subcommands = AddSubcommands(&app, &given);
+  const std::unique_ptr<CommandTree> tree = MakeCommandTree();
   // CLI11 is the only library here that throws; its exceptions end here.
   try {
-    app.parse(argc, argv);
+    tree->app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? static_cast<int>(ExitCode::kOk)
-                                : static_cast<int>(ExitCode::kUsage);
+    if (error.get_exit_code() == 0) return tree->app.exit(error);
+    return Complain({ErrorCode::kInvalid, usage::Complaint(tree->app, error) +
+                                              " (`focalfleet-sim --help` shows the usage)"},
+                    ExitCode::kUsage);
   }
-  for (const Subcommand& subcommand : subcommands) {
+  for (const Subcommand& subcommand : tree->subcommands) {
     if (!subcommand.app->parsed()) continue;
     const int exit = subcommand.run();
     if (exit != 0 || cli::OutputError() == 0) return exit;
@@ -463,7 +236,7 @@ int Main(int argc, char** argv) {
                                                   std::strerror(cli::OutputError())},
                     ExitCode::kRefused);
   }
-  return Run(&given, app);
+  return Run(&tree->given, tree->app);
 }
 
 }  // namespace focalfleet::simulator

@@ -2,10 +2,9 @@
 // send requests to a running simulation through its control socket.
 #pragma once
 
-#include <string>
 #include <vector>
 
-#include "protocol/base/result.h"
+#include "daemon/usage/manual.h"
 
 namespace focalfleet::simulator {
 
@@ -13,8 +12,7 @@ namespace focalfleet::simulator {
 /// no answer at the control socket.
 int Main(int argc, char** argv);
 
-/// Interface names in the order of the buses, from text such as "vcan0,vcan1" or "vcan0...vcan49".
-/// Errors: kInvalid, names the piece.
-Result<std::vector<std::string>> ParseInterfaces(const std::string& text);
+/// The man page of focalfleet-sim.
+std::vector<usage::ManualPage> Manual();
 
 }  // namespace focalfleet::simulator

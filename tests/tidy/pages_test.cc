@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <iterator>
 #include <set>
 #include <string>
@@ -205,6 +206,51 @@ Complaints PagesNameTestsThatExist(const Files& files) {
   return out;
 }
 
+// The targets of a page's links within the repository, from its root. A folder ends with `/`.
+std::vector<std::string> LinksOf(const File& page) {
+  std::vector<std::string> links;
+  const std::string folder = page.path.substr(0, page.path.rfind('/') + 1);
+  for (std::size_t at = page.text.find("]("); at != std::string::npos;
+       at = page.text.find("](", at + 2)) {
+    const std::size_t end = page.text.find_first_of(")# \n", at + 2);
+    if (end == std::string::npos) break;
+    const std::string target = page.text.substr(at + 2, end - at - 2);
+    if (target.empty() || target.find("://") != std::string::npos) continue;
+    links.push_back(std::filesystem::path(folder + target).lexically_normal().generic_string());
+  }
+  return links;
+}
+
+// The pages that a link opens: the page itself, or those that a folder lists.
+std::vector<const File*> OpenedBy(const Files& files, const std::string& link) {
+  std::vector<const File*> pages;
+  for (const File& file : files) {
+    const bool listed = EndsWith(link, "/") && StartsWith(file.path, link);
+    if (EndsWith(file.path, ".md") && (file.path == link || listed)) pages.push_back(&file);
+  }
+  return pages;
+}
+
+// A reader comes from README.md to each page of docs/ by two links at most.
+Complaints PagesAreTwoLinksAway(const Files& files) {
+  std::set<std::string> reached = {"README.md"};
+  std::vector<const File*> last = OpenedBy(files, "README.md");
+  for (int links = 0; links < 2; ++links) {
+    std::vector<const File*> next;
+    for (const File* page : last)
+      for (const std::string& link : LinksOf(*page))
+        for (const File* opened : OpenedBy(files, link))
+          if (reached.insert(opened->path).second) next.push_back(opened);
+    last = std::move(next);
+  }
+  Complaints out;
+  for (const File& page : files)
+    if (StartsWith(page.path, "docs/") && EndsWith(page.path, ".md") &&
+        reached.count(page.path) == 0)
+      out.push_back(page.path + ": more than two links away from README.md");
+  return out;
+}
+
 Complaints WaysAreThere(const Files& files) {
   Complaints out;
   for (const std::string_view way : kWays)
@@ -218,7 +264,22 @@ TEST(Tidy, WaysNameFunctionsThatExist) {
   ExpectNone(WaysNameFunctionsThatExist(Tree()));
 }
 
+TEST(Tidy, PagesAreTwoLinksAway) { ExpectNone(PagesAreTwoLinksAway(Tree())); }
 TEST(Tidy, PagesNameTestsThatExist) { ExpectNone(PagesNameTestsThatExist(Tree())); }
+
+TEST(TidyRules, PagesThatAreFarAreCaught) {
+  const auto complaints = [](const std::string& index) {
+    return PagesAreTwoLinksAway({{"README.md", "[pages](docs/README.md#all)\n"},
+                                 {"docs/README.md", index},
+                                 {"docs/a.md", "[next](b.md)\n"},
+                                 {"docs/b.md", ""},
+                                 {"docs/adr/1.md", ""}})
+        .size();
+  };
+  EXPECT_EQ(complaints("[a](a.md), [b](../docs/b.md), [adr](adr/)\n"), 0u);
+  EXPECT_EQ(complaints("[a](a.md), [adr](adr/)\n"), 1u) << "three links to b";
+  EXPECT_EQ(complaints("[a](a.md), [b](https://b.md), `b.md`, [adr](adr/1.md)\n"), 1u);
+}
 
 TEST(TidyRules, TestsThatDoNotExistAreCaught) {
   const auto complaints = [](const std::string& text) {

@@ -81,10 +81,74 @@ TEST(CommandLine, NoCommandAndAnUnknownCommandAreWrongUsage) {
     const auto unknown = Focalfleet(words);
     EXPECT_EQ(unknown.exit, 2);
     EXPECT_THAT(unknown.err, HasSubstr("there is no command 'teleport' (`focalfleet --help`"));
+    EXPECT_THAT(unknown.out, IsEmpty());
   }
+  const auto none = Focalfleet({});
+  EXPECT_THAT(none.out, IsEmpty()) << "a script that lost its command gets no answer";
+  EXPECT_THAT(none.err, HasSubstr("Watch the fleet:\n  status "));
   const auto below = Focalfleet({"layout", "cubic"});
   EXPECT_EQ(below.exit, 2);
   EXPECT_THAT(below.err, HasSubstr("there is no command 'layout cubic'"));
+}
+
+TEST(CommandLine, SuggestsTheNearestCommandAndOption) {
+  const auto command = Focalfleet({"stauts"});
+  EXPECT_EQ(command.exit, 2);
+  EXPECT_THAT(command.err, HasSubstr("there is no command 'stauts'; did you mean 'status'?"));
+  const auto option = Focalfleet({"plan", "--unit", "u.csv", "--targets", "t.csv"});
+  EXPECT_EQ(option.exit, 2);
+  EXPECT_THAT(option.err, HasSubstr("there is no option '--unit'; did you mean '--units'?"));
+}
+
+TEST(CommandLine, HelpShowsTheHelpOfACommand) {
+  for (const CompletionNode& node : Nodes()) {
+    auto words = Words(node.path);
+    words.insert(words.begin(), "help");
+    const auto shown = Focalfleet(words);
+    words.erase(words.begin());
+    words.emplace_back("--help");
+    EXPECT_EQ(shown.exit, 0) << node.path;
+    EXPECT_EQ(shown.out, Focalfleet(words).out) << node.path;
+  }
+  const auto unknown = Focalfleet({"help", "layout", "hxe"});
+  EXPECT_EQ(unknown.exit, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("did you mean 'layout hex'?"));
+  const Json tree = Json::parse(Focalfleet({"help", "--json"}).out);
+  EXPECT_EQ(tree["commands"].size(), Nodes().size());
+}
+
+TEST(CommandLine, EveryCommandIsInAGroupOfItsOwnAndHelpIsWithoutTheParsersWords) {
+  const auto line = cli::MakeCommandLine();
+  std::vector<std::string> tools;
+  for (const CLI::App* command : line->app.get_subcommands({})) {
+    if (command->get_group() == "Tools") tools.push_back(command->get_name());
+  }
+  EXPECT_THAT(tools, ::testing::UnorderedElementsAre("can", "completion", "help"))
+      << "a new command joins a group of Groups() in command_line.cc, or this list";
+  for (const CompletionNode& node : Nodes()) {
+    auto words = Words(node.path);
+    words.emplace_back("--help");
+    const std::string help = Focalfleet(words).out;
+    for (const char* word : {"UINT", "INT:", "FLOAT", "REQUIRED", " in [", "SUBCOMMAND"})
+      EXPECT_THAT(help, ::testing::Not(HasSubstr(word))) << node.path;
+    EXPECT_THAT(help, HasSubstr("\nManual: man focalfleet")) << node.path;
+  }
+}
+
+TEST(CommandLine, TheTimeoutIsThatOfTheDaemonsSilence) {
+  const auto result = Focalfleet({"status", "--timeout", "0"});
+  EXPECT_EQ(result.exit, 2);
+  EXPECT_THAT(result.err, HasSubstr("0 is not a number of 0.01 to 86400"));
+}
+
+TEST(CommandLine, ColoursAreAsAskedFor) {
+  const auto err = [](const std::string& when) {
+    return Focalfleet({"status", "--socket", "/nowhere/s", "--color", when}).err;
+  };
+  EXPECT_THAT(err("always"), HasSubstr("\033[31merror:"));
+  EXPECT_THAT(err("never"), ::testing::Not(HasSubstr("\033")));
+  EXPECT_THAT(err("auto"), ::testing::Not(HasSubstr("\033"))) << "a pipe";
+  EXPECT_EQ(Focalfleet({"status", "--color", "pink"}).exit, 2);
 }
 
 TEST(CommandLine, AnAnswerThatStdoutDoesNotTakeIsNotDone) {

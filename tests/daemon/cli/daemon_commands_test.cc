@@ -136,7 +136,9 @@ TEST_F(DaemonCommands, StatusShowsTroubleAndPassesJsonThrough) {
   EXPECT_THAT(Ask({"status", "--buses"}, {{"status", {.result = StatusAnswer()}}}).out,
               HasSubstr("bus 0: up"));
   const auto json = Ask({"status", "--json"}, {{"status", {.result = StatusAnswer()}}});
-  EXPECT_EQ(Json::parse(json.out, nullptr, false), StatusAnswer());
+  Json answer = StatusAnswer();
+  answer["schema"] = 1;  // the version of the form of all answers (docs/schemas/)
+  EXPECT_EQ(Json::parse(json.out, nullptr, false), answer);
 }
 
 TEST_F(DaemonCommands, StatusTellsTheTimeSoFarOfAConfigurationUnderWay) {

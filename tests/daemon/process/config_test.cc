@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <iterator>
 
+#include "daemon/process/config_manual.h"
 #include "tests/support/scratch_folder.h"
 
 namespace focalfleet {
@@ -247,6 +249,43 @@ TEST(Config, FileThatIsNotThereOrNoFileIsNamed) {
   const auto config = LoadConfig(scratch / "f.toml");
   ASSERT_TRUE(config);
   EXPECT_EQ(config->fleet.units, scratch / "units.csv");
+}
+
+TEST(Config, TheExampleHasEveryKeyWithItsDefault) {
+  std::ifstream file(FOCALFLEET_SOURCE_DIR "/deploy/focalfleet.toml");
+  const std::string text{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  const auto example = ParseConfig(text, "focalfleet.toml");
+  ASSERT_TRUE(example) << example.error().text;
+  DaemonConfig expected;
+  expected.bus.port = PortKind::kSocketCan;  // the example is for real buses
+  expected.bus.interfaces = {"can0", "can1"};
+  EXPECT_EQ(EffectiveConfig(*example), EffectiveConfig(expected));
+  for (const ConfigSection& section : DescribeConfig()) {
+    const std::size_t begin = text.find("\n[" + section.name + "]");
+    ASSERT_NE(begin, std::string::npos) << section.name;
+    const std::string body = text.substr(begin, text.find("\n[", begin + 1) - begin);
+    for (const ConfigKey& key : section.keys) {
+      const std::string name = key.name.substr(section.name.size() + 1);
+      EXPECT_THAT(body, HasSubstr("\n" + name + " = ")) << key.name;
+    }
+  }
+}
+
+TEST(Config, TheListOfKeysHasTypeRangeDefaultAndMeaning) {
+  const auto sections = DescribeConfig();
+  ASSERT_EQ(sections.front().name, "fleet");
+  const ConfigKey& clearance = sections.front().keys.at(2);
+  EXPECT_EQ(clearance.name, "fleet.clearance_mm");
+  EXPECT_EQ(clearance.kind, "number from 0 to 1000");
+  EXPECT_EQ(clearance.initial, "0");
+  for (const ConfigSection& section : sections) {
+    EXPECT_NE(section.meaning, "") << section.name;
+    for (const ConfigKey& key : section.keys) {
+      EXPECT_NE(key.meaning, "") << key.name;
+      EXPECT_NE(key.kind, "") << key.name;
+      EXPECT_NE(key.initial, "") << key.name;
+    }
+  }
 }
 
 }  // namespace

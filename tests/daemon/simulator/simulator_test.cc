@@ -6,7 +6,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "daemon/simulator/command_line.h"
+#include "daemon/simulator/interface_names.h"
 #include "daemon/simulator/memory_file.h"
 #include "daemon/simulator/truth_report.h"
 #include "fleet/files/targets_file.h"
