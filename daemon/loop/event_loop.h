@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "daemon/loop/bus_lines.h"
 #include "daemon/loop/event_signal.h"
 #include "daemon/loop/job_thread.h"
+#include "daemon/loop/service_report.h"
 #include "daemon/loop/store_thread.h"
 #include "daemon/loop/sync_pulse.h"
 #include "daemon/status/dds_troubles.h"
@@ -47,6 +49,8 @@ class EventLoop {
     SyncPulse* sync = nullptr;             // none: no SYNC line
     DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
     const EventSignal* threads = nullptr;  // raised by planner, camera, store
+    ServiceReport* service = nullptr;
+    std::function<void()> hang_up;  // what SIGHUP asks for: the log is opened anew
     HostClock clock;
   };
 

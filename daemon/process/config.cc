@@ -48,6 +48,7 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Section("log");
   visit->Choice("level", &c->log.level, kLogLevels);
   visit->Path("file", &c->log.file);
+  visit->Flag("journal", &c->log.journal);
   visit->Section("bus");
   visit->Index("port", &c->bus.port, kPortKindNames);
   visit->Whole("bit_rate_bps", &c->bus.bit_rate_bps, {10'000, 1'000'000});

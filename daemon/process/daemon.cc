@@ -16,10 +16,12 @@
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/log.h"
+#include "daemon/process/slow_end.h"
 #include "daemon/status/buffered_status_publisher.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
+#include "daemon/systemd/notify_socket.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
 #include "daemon/verbs/request_handler.h"
@@ -48,6 +50,17 @@ constexpr std::chrono::milliseconds kEndWithin{1000};
 struct SharedCounters {
   std::atomic<std::uint64_t> transactions{0};
   std::atomic<std::uint64_t> rows{0};
+};
+
+/// What the service manager is told.
+struct Service {
+  WallTime started = WallTime::Now();
+  NotifySocket socket;
+  Heartbeat store;
+  Heartbeat planner;
+  Heartbeat camera;
+  std::unique_ptr<Watchdog> watchdog;  // none: the manager expects no sign of life
+  std::unique_ptr<ServiceReport> report;
 };
 
 /// The fleet's status on its way to DDS.
@@ -82,6 +95,8 @@ class Daemon {
  private:
   Status End();
   Status StartThreads();
+  std::function<void()> Answering(Heartbeat* heartbeat);
+  void OpenService();
   StoreThread::Sinks StoreSinks();
   Status OpenRequestHandler();
   Status RestoreLastModel();
@@ -91,11 +106,11 @@ class Daemon {
 
   DaemonConfig config_;
   HostClock clock_;
-  WallTime started_ = WallTime::Now();
   SharedCounters counters_;
   std::unique_ptr<Layout> layout_;
   std::unique_ptr<Store> store_;
   std::unique_ptr<EventSignal> signal_;
+  Service service_;
   StatusOutput status_;
   Measuring measuring_;
   std::unique_ptr<Coordinator> coordinator_;
@@ -169,7 +184,7 @@ void Daemon::OpenStatus() {
   status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{
-          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = started_},
+          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = service_.started},
       clock_);
 }
 
@@ -192,7 +207,8 @@ Status Daemon::OpenCamera() {
           .site = std::move(site),
           .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
           .speed = config_.clock.speed,
-          .log = [](const std::string& text) { spdlog::warn("{}", text); }});
+          .log = [](const std::string& text) { spdlog::warn("{}", text); },
+          .alive = Answering(&service_.camera)});
   return {};
 }
 
@@ -212,27 +228,40 @@ StoreThread::Sinks Daemon::StoreSinks() {
   };
   sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
   sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
+  sinks.alive = Answering(&service_.store);
   return sinks;
+}
+
+/// A thread that answers wakes the core, which waits for the answer.
+std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
+  return [this, heartbeat] {
+    if (heartbeat->Answer()) signal_->Raise();
+  };
 }
 
 Status Daemon::StartThreads() {
   FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
-      planner_,
-      PlannerThread::Create(
-          [layout = layout_.get()](const PlannerWork& work, const std::atomic<bool>& ending) {
-            return RunPlanJob(work.job, *layout, work.drives, [&ending] { return ending.load(); });
-          },
-          signal_.get()));
+      planner_, PlannerThread::Create(
+                    [layout = layout_.get(), alive = Answering(&service_.planner)](
+                        const PlannerWork& work, const std::atomic<bool>& ending) {
+                      // A plan shows that it proceeds by asking whether it is still wanted.
+                      return RunPlanJob(work.job, *layout, work.drives, [&alive, &ending] {
+                        alive();
+                        return ending.load();
+                      });
+                    },
+                    signal_.get(), {.name = "planner", .alive = Answering(&service_.planner)}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
-    FOCALFLEET_TRY_ASSIGN(measuring_.thread,
-                          CameraThread::Create(
-                              [this](const CameraWork& work, const std::atomic<bool>& ending) {
-                                return MeasureUnits(work, measuring_.carriers.get(),
-                                                    measuring_.camera.get(), ending);
-                              },
-                              signal_.get()));
+    FOCALFLEET_TRY_ASSIGN(
+        measuring_.thread,
+        CameraThread::Create(
+            [this](const CameraWork& work, const std::atomic<bool>& ending) {
+              return MeasureUnits(work, measuring_.carriers.get(), measuring_.camera.get(), ending);
+            },
+            signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
+  OpenService();
   FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
                                                   .coordinator = coordinator_.get(),
                                                   .lines = lines_.get(),
@@ -245,8 +274,35 @@ Status Daemon::StartThreads() {
                                                   .sync = sync_.get(),
                                                   .troubles = status_.troubles.get(),
                                                   .threads = signal_.get(),
+                                                  .service = service_.report.get(),
+                                                  .hang_up = &ReopenLog,
                                                   .clock = clock_}));
   return {};
+}
+
+void Daemon::OpenService() {
+  const Environment environment = [](const char* name) { return std::getenv(name); };
+  service_.socket = NotifySocket::FromEnvironment(environment);
+  const auto interval = WatchdogInterval(environment);
+  if (interval && service_.socket.present()) {
+    std::vector<Watchdog::Thread> threads = {
+        {"store", &service_.store, [this] { store_thread_->Wake(); }},
+        {"planner", &service_.planner, [this] { planner_->Wake(); }}};
+    if (measuring_.thread != nullptr)
+      threads.push_back({"camera", &service_.camera, [this] { measuring_.thread->Wake(); }});
+    // Rounds begin four times an interval, and a thread has half of one to answer. Two signs of
+    // life are then never further apart than three quarters of what the manager allows, and a
+    // thread is named before the daemon is killed.
+    service_.watchdog = std::make_unique<Watchdog>(
+        std::move(threads),
+        Watchdog::Options{.period = clock_.Real({interval->ns / 4}),
+                          .limit = clock_.Real({interval->ns / 2}),
+                          .feed = [this] { static_cast<void>(service_.socket.Send("WATCHDOG=1")); },
+                          .log_error = [](const std::string& text) { spdlog::error("{}", text); },
+                          .log_info = [](const std::string& text) { spdlog::info("{}", text); }});
+  }
+  service_.report = std::make_unique<ServiceReport>(&service_.socket, service_.watchdog.get(),
+                                                    clock_.Real(Seconds(1)));
 }
 
 Status Daemon::Run() {
@@ -266,6 +322,8 @@ Status Daemon::Run() {
 /// clients and readers learn of the end. At last the store is one file and free for the next
 /// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
+  const SlowEnd slow_end(&service_.socket,
+                         {.progress = [this] { return store_thread_->committed_through(); }});
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
@@ -290,7 +348,7 @@ Status Daemon::End() {
 ShellFacts Daemon::Facts() const {
   ShellFacts facts;
   facts.version = Version();
-  facts.started = started_;
+  facts.started = service_.started;
   facts.store_path = config_.store.path;
   facts.store_failing = store_thread_->failing();
   facts.batches_waiting = store_thread_->waiting();
@@ -314,7 +372,7 @@ const char* Version() { return FOCALFLEET_VERSION; }
 
 DaemonEnd RunDaemon(const DaemonConfig& config) {
   EventLoop::BlockSignals();
-  if (Status open = OpenLog(config.log); !open) return {std::move(open)};
+  if (Status open = OpenLog(config.log, JournalOfThisProcess()); !open) return {std::move(open)};
   auto daemon = std::make_unique<Daemon>(config);
   Status ended = daemon->Start();
   if (ended) ended = daemon->Run();

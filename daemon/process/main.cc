@@ -32,6 +32,12 @@ int Check(const focalfleet::DaemonConfig& config) {
 int main(int argc, char** argv) {
   CLI::App app("The daemon of a focal plane: it owns the CAN buses, the store and the DDS status.");
   app.footer(
+      "Signals: SIGTERM and SIGINT end it; SIGHUP opens log.file anew, for logrotate.\n"
+      "Environment: NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID of systemd: it reports when it "
+      "is "
+      "ready, how it stands and that all its threads work. JOURNAL_STREAM: events go to the "
+      "journal "
+      "with fields.\n"
       "Exit codes: 0 ended by SIGTERM or SIGINT with everything stored (or --check found no "
       "fault); "
       "1 could not start, or could not store everything, said on standard error; 2 wrong usage.");
