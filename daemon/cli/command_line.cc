@@ -9,6 +9,8 @@
 #include <cstring>
 #include <sstream>
 
+#include "daemon/cli/versions.h"
+
 namespace focalfleet::cli {
 namespace {
 
@@ -18,7 +20,7 @@ constexpr const char* kEveryCommand =
 
 void AddGlobalOptions(CommandLine* line) {
   CLI::App& app = line->app;
-  app.set_version_flag("--version", "focalfleet " FOCALFLEET_VERSION);
+  app.set_version_flag("--version", std::string("focalfleet ") + ClientVersion());
   app.add_flag("--json", line->context.json, "One JSON object on stdout, nothing else there");
   app.add_flag("-q,--quiet", line->context.quiet, "No progress, no summary; errors are still told");
   app.add_option("--socket", line->context.socket,
@@ -66,6 +68,20 @@ void HoldStandardStreams() {
 bool OutIsStdout(const CLI::App& app) {
   const CLI::Option* out = Chosen(app).get_option_no_throw("--out");
   return out != nullptr && out->count() == 1 && out->results().front() == "-";
+}
+
+/// The daemon's version beside this program's, where a daemon answers.
+void ShowDaemonVersion(CommandLine* line) {
+  // --version ends the parser before it stores the values of other options.
+  const auto& socket = line->app.get_option("--socket")->results();
+  if (!socket.empty()) line->context.socket = socket.back();
+  line->context.LookAtTerminals();
+  const auto version = DaemonVersion(line->context);
+  if (!version) return;
+  PrintText(fmt::format("focalfleetd {}\n", *version));
+  if (const std::string difference = DifferenceFrom(*version); !difference.empty())
+    Complain(fmt::format("focalfleet: {} {}\n",
+                         Paint(line->context.colour_err, Colour::kYellow, "warning:"), difference));
 }
 
 /// `exit`, unless the answer could not be written.
@@ -141,6 +157,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddCampaignCommands(line.get());
   AddModelCommands(line.get());
   AddCanCommands(line.get());
+  AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());
   return line;
 }
@@ -156,6 +173,7 @@ int Main(int argc, char** argv) {
       std::ostringstream text;
       line->app.exit(error, text, text);
       PrintText(text.str());
+      if (error.get_name() == "CallForVersion") ShowDaemonVersion(line.get());
       return AfterOutput(*line, ExitCode::kOk);
     }
     line->context.LookAtTerminals();

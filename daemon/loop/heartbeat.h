@@ -1,4 +1,4 @@
-// A question to a thread whether it still works, and its answer. One thread asks. The other answers
+// A question to a thread whether it still works, and its answer. The core asks. The thread answers
 // whenever it passes a place that shows it at work: a turn of its loop, a step of a long plan.
 // Neither waits.
 #pragma once

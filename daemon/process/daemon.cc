@@ -52,7 +52,7 @@ struct SharedCounters {
   std::atomic<std::uint64_t> rows{0};
 };
 
-/// What the service manager is told.
+/// The parts that report to the service manager.
 struct Service {
   WallTime started = WallTime::Now();
   NotifySocket socket;
