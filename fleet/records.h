@@ -161,14 +161,22 @@ constexpr const char* Name(ConfigurationState state) {
 
 constexpr bool IsOver(ConfigurationState state) { return state >= ConfigurationState::kDone; }
 
-struct ConfigurationRow {
-  std::uint64_t id = 0;
-  std::string source;
-  ConfigurationState state = ConfigurationState::kPlanning;
+/// Units by the outcome of their targets. Units whose outcome is open are in `targeted` alone.
+struct OutcomeCounts {
   std::uint32_t targeted = 0;
   std::uint32_t arrived = 0;
   std::uint32_t refused = 0;
   std::uint32_t failed = 0;
+  std::uint32_t stopped = 0;
+  std::uint32_t unmeasured = 0;
+  bool operator==(const OutcomeCounts&) const = default;
+};
+
+struct ConfigurationRow {
+  std::uint64_t id = 0;
+  std::string source;
+  ConfigurationState state = ConfigurationState::kPlanning;
+  OutcomeCounts counts;
   double makespan_predicted_s = 0;
   double makespan_s = 0;
   double energy_J = 0;
@@ -176,8 +184,6 @@ struct ConfigurationRow {
   // Skew of the starts of its units, where they are known; otherwise NaN.
   double start_skew_s = std::numeric_limits<double>::quiet_NaN();
   double start_skew_bound_s = std::numeric_limits<double>::quiet_NaN();
-  std::uint32_t stopped = 0;
-  std::uint32_t unmeasured = 0;
   bool operator==(const ConfigurationRow&) const = default;
 };
 

@@ -93,12 +93,12 @@ Json JsonOf(const ConfigurationProgressValue& value) {
       {"source", view.source},
       {"state", Name(view.state)},
       {"round", view.round},
-      {"targeted", view.targeted},
-      {"arrived", view.arrived},
-      {"refused", view.refused},
-      {"failed", view.failed},
-      {"stopped", view.stopped},
-      {"unmeasured", view.unmeasured},
+      {"targeted", view.counts.targeted},
+      {"arrived", view.counts.arrived},
+      {"refused", view.counts.refused},
+      {"failed", view.counts.failed},
+      {"stopped", view.counts.stopped},
+      {"unmeasured", view.counts.unmeasured},
       {"makespan_predicted_s", view.makespan_predicted_s},
       {"makespan_s", view.makespan_s},
       {"energy_J", view.energy_J},
@@ -206,15 +206,17 @@ std::string DescribeFleet(const FleetStatusValue& fleet, bool colour_on) {
 
 std::string DescribeProgress(const ConfigurationProgressValue& value) {
   const ConfigurationView& view = value.view;
-  const double fraction = view.targeted == 0 ? 0 : double{1.0 * view.arrived} / view.targeted;
-  return fmt::format("configuration {} ({}): {}, round {}\n{}\n", view.id, view.source,
-                     Name(view.state), view.round,
-                     DrawBar(fraction,
-                             fmt::format("{} of {} arrived, {} refused, {} failed, {} stopped, {} "
-                                         "unmeasured",
-                                         view.arrived, view.targeted, view.refused, view.failed,
-                                         view.stopped, view.unmeasured),
-                             100));
+  const double fraction =
+      view.counts.targeted == 0 ? 0 : double{1.0 * view.counts.arrived} / view.counts.targeted;
+  return fmt::format(
+      "configuration {} ({}): {}, round {}\n{}\n", view.id, view.source, Name(view.state),
+      view.round,
+      DrawBar(fraction,
+              fmt::format("{} of {} arrived, {} refused, {} failed, {} stopped, {} "
+                          "unmeasured",
+                          view.counts.arrived, view.counts.targeted, view.counts.refused,
+                          view.counts.failed, view.counts.stopped, view.counts.unmeasured),
+              100));
 }
 
 std::string DescribeBuses(const Picture& picture, bool colour_on) {

@@ -195,12 +195,12 @@ void ToSample(const ConfigurationProgressValue& value, focalfleet_ConfigurationP
   PutUpload(value.view.upload, sample);
   sample->frames = value.view.frames;
   sample->round = value.view.round;
-  sample->targeted = value.view.targeted;
-  sample->arrived = value.view.arrived;
-  sample->refused = value.view.refused;
-  sample->failed = value.view.failed;
-  sample->stopped = value.view.stopped;
-  sample->unmeasured = value.view.unmeasured;
+  sample->targeted = value.view.counts.targeted;
+  sample->arrived = value.view.counts.arrived;
+  sample->refused = value.view.counts.refused;
+  sample->failed = value.view.counts.failed;
+  sample->stopped = value.view.counts.stopped;
+  sample->unmeasured = value.view.counts.unmeasured;
   sample->state = Code(value.view.state);
   CopyText(value.view.source, sample->source);
 }
@@ -301,12 +301,12 @@ bool FromSample(const focalfleet_ConfigurationProgress& sample, ConfigurationPro
   value->view.upload = UploadOf(sample);
   value->view.frames = sample.frames;
   value->view.round = sample.round;
-  value->view.targeted = sample.targeted;
-  value->view.arrived = sample.arrived;
-  value->view.refused = sample.refused;
-  value->view.failed = sample.failed;
-  value->view.stopped = sample.stopped;
-  value->view.unmeasured = sample.unmeasured;
+  value->view.counts.targeted = sample.targeted;
+  value->view.counts.arrived = sample.arrived;
+  value->view.counts.refused = sample.refused;
+  value->view.counts.failed = sample.failed;
+  value->view.counts.stopped = sample.stopped;
+  value->view.counts.unmeasured = sample.unmeasured;
   value->view.source = TextOf(sample.source);
   return Take(sample.state, kLastState, &value->view.state);
 }

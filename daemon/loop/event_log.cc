@@ -53,8 +53,9 @@ void Log(const ConfigurationRow& row) {
   spdlog::info(
       "configuration {} ({}) is {}: {} targeted, {} arrived, {} refused, {} failed, {} stopped, "
       "{} unmeasured, makespan {:.1f} s of {:.1f} s predicted",
-      row.id, row.source, Name(row.state), row.targeted, row.arrived, row.refused, row.failed,
-      row.stopped, row.unmeasured, row.makespan_s, row.makespan_predicted_s);
+      row.id, row.source, Name(row.state), row.counts.targeted, row.counts.arrived,
+      row.counts.refused, row.counts.failed, row.counts.stopped, row.counts.unmeasured,
+      row.makespan_s, row.makespan_predicted_s);
 }
 void Log(const EnableRow& row) {
   const WithFields fields(

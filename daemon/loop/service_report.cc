@@ -15,7 +15,8 @@ std::string ServiceStatusLine(const FleetView& view, const std::string& trouble)
   const ConfigurationView& configuration = view.coordinator->configuration();
   if (view.coordinator->busy())
     line += fmt::format("; configuration {} is {}: {} of {} arrived", configuration.id,
-                        Name(configuration.state), configuration.arrived, configuration.targeted);
+                        Name(configuration.state), configuration.counts.arrived,
+                        configuration.counts.targeted);
   if (!trouble.empty()) line += "; " + trouble;
   return line;
 }

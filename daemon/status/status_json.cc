@@ -147,7 +147,8 @@ double MakespanSoFar(const FleetView& view) {
 double FractionOf(const FleetView& fleet) {
   const ConfigurationView& view = fleet.coordinator->configuration();
   if (view.state == ConfigurationState::kDone) return 1;
-  const double arrived = view.targeted > 0 ? double(view.arrived) / view.targeted : 0;
+  const double arrived =
+      view.counts.targeted > 0 ? double(view.counts.arrived) / view.counts.targeted : 0;
   if (view.started == kNever || view.makespan_predicted_s <= 0) return arrived;
   return std::clamp(MakespanSoFar(fleet) / view.makespan_predicted_s, arrived, 1.0);
 }
@@ -176,12 +177,12 @@ Json ConfigurationJson(const FleetView& view) {
             {"source", c.source},
             {"state", Name(c.state)},
             {"round", c.round},
-            {"targeted", c.targeted},
-            {"arrived", c.arrived},
-            {"refused", c.refused},
-            {"failed", c.failed},
-            {"stopped", c.stopped},
-            {"unmeasured", c.unmeasured},
+            {"targeted", c.counts.targeted},
+            {"arrived", c.counts.arrived},
+            {"refused", c.counts.refused},
+            {"failed", c.counts.failed},
+            {"stopped", c.counts.stopped},
+            {"unmeasured", c.counts.unmeasured},
             {"makespan_predicted_s", Number(c.makespan_predicted_s)},
             {"makespan_s", Number(MakespanSoFar(view))},
             {"energy_J", Number(c.energy_J)},
@@ -202,12 +203,12 @@ Json ProgressJson(const FleetView& view) {
           {"kind", Name(c.kind)},
           {"state", Name(c.state)},
           {"round", c.round},
-          {"targeted", c.targeted},
-          {"arrived", c.arrived},
-          {"refused", c.refused},
-          {"failed", c.failed},
-          {"stopped", c.stopped},
-          {"unmeasured", c.unmeasured},
+          {"targeted", c.counts.targeted},
+          {"arrived", c.counts.arrived},
+          {"refused", c.counts.refused},
+          {"failed", c.counts.failed},
+          {"stopped", c.counts.stopped},
+          {"unmeasured", c.counts.unmeasured},
           {"frames", c.frames},
           {"makespan_predicted_s", Number(c.makespan_predicted_s)},
           {"waiting_for", c.waiting_for},

@@ -61,18 +61,18 @@ ConfigurationRow ReadConfiguration(Cells& cells) {
   return {.id = cells.Whole<std::uint64_t>(0),
           .source = cells.Text(1),
           .state = cells.Code(2, kLastConfigurationState),
-          .targeted = cells.Whole<std::uint32_t>(3),
-          .arrived = cells.Whole<std::uint32_t>(4),
-          .refused = cells.Whole<std::uint32_t>(5),
-          .failed = cells.Whole<std::uint32_t>(6),
+          .counts = {.targeted = cells.Whole<std::uint32_t>(3),
+                     .arrived = cells.Whole<std::uint32_t>(4),
+                     .refused = cells.Whole<std::uint32_t>(5),
+                     .failed = cells.Whole<std::uint32_t>(6),
+                     .stopped = cells.Whole<std::uint32_t>(13),
+                     .unmeasured = cells.Whole<std::uint32_t>(14)},
           .makespan_predicted_s = cells.Real(7),
           .makespan_s = cells.Real(8),
           .energy_J = cells.Real(9),
           .peak_power_W = cells.Real(10),
           .start_skew_s = cells.Real(11),
-          .start_skew_bound_s = cells.Real(12),
-          .stopped = cells.Whole<std::uint32_t>(13),
-          .unmeasured = cells.Whole<std::uint32_t>(14)};
+          .start_skew_bound_s = cells.Real(12)};
 }
 
 void Cells::Require(bool condition, const char* what) {

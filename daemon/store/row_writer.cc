@@ -146,10 +146,10 @@ Status RowWriter::Put(const ConfigurationRow& row) {
   s.Bind(1, static_cast<std::int64_t>(row.id));
   s.BindText(2, row.source);
   s.Bind(3, Code(row.state));
-  s.Bind(4, row.targeted);
-  s.Bind(5, row.arrived);
-  s.Bind(6, row.refused);
-  s.Bind(7, row.failed);
+  s.Bind(4, row.counts.targeted);
+  s.Bind(5, row.counts.arrived);
+  s.Bind(6, row.counts.refused);
+  s.Bind(7, row.counts.failed);
   s.BindReal(8, row.makespan_predicted_s);
   s.BindReal(9, row.makespan_s);
   s.BindReal(10, row.energy_J);
@@ -157,8 +157,8 @@ Status RowWriter::Put(const ConfigurationRow& row) {
   s.BindReal(12, row.start_skew_s);
   s.BindReal(13, row.start_skew_bound_s);
   s.Bind(14, now_.ns);
-  s.Bind(15, row.stopped);
-  s.Bind(16, row.unmeasured);
+  s.Bind(15, row.counts.stopped);
+  s.Bind(16, row.counts.unmeasured);
   FOCALFLEET_TRY(s.Run());
   return SetMeta(statements_[Sql::kRaiseMeta], "next_configuration", row.id + 1);
 }

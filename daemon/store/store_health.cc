@@ -19,19 +19,20 @@ std::uint64_t BytesOf(const std::string& path) {
   return ::stat(path.c_str(), &status) == 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
 }
 
-/// The connection's last operation failed because the file is damaged.
-bool IsDamaged(const Connection& connection) {
+/// The error of the connection's last operation, as a flaw of the file where it is one.
+Result<std::string> FlawOf(const Connection& connection, const Error& error) {
   const int code = sqlite3_errcode(connection.db()) & 0xff;
-  return code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
+  if (code == SQLITE_CORRUPT || code == SQLITE_NOTADB) return error.text;
+  return tl::unexpected<Error>(error);
 }
 
 /// The first finding of quick_check; empty: the file is sound.
 Result<std::string> FirstFlaw(Connection& connection) {
-  FOCALFLEET_TRY_ASSIGN(Statement check, connection.Prepare("PRAGMA quick_check(1)"));
-  const auto row = check.Next();
-  if (!row && !IsDamaged(connection)) return tl::unexpected<Error>(connection.Named(row.error()));
-  if (!row) return row.error().text;  // too damaged to be checked
-  const auto* text = *row ? sqlite3_column_text(check.get(), 0) : nullptr;
+  auto check = connection.Prepare("PRAGMA quick_check(1)");
+  if (!check) return FlawOf(connection, check.error());
+  const auto row = check->Next();
+  if (!row) return FlawOf(connection, connection.Named(row.error()));
+  const auto* text = *row ? sqlite3_column_text(check->get(), 0) : nullptr;
   if (text == nullptr) return std::string("quick_check finds nothing to say");
   std::string finding(static_cast<const char*>(static_cast<const void*>(text)));
   return finding == "ok" ? std::string() : finding;
@@ -50,16 +51,11 @@ Result<StoreHealth> InspectHealth(const std::string& path, const StoreOptions& o
                                          static_cast<int>(options.busy_wait.count())));
   StoreHealth health;
   health.version_expected = version_max;
-  const auto version = InspectSchema(*connection, version_max);
-  if (!version && IsDamaged(*connection)) {
-    health.flaw = version.error().text;
-    return health;
-  }
-  if (!version) return tl::unexpected<Error>(version.error());
-  health.version = *version;
-  FOCALFLEET_TRY_ASSIGN(health.flaw, FirstFlaw(*connection));
   health.bytes = BytesOf(path) + BytesOf(path + "-wal");
-  if (health.version == 0 || !health.flaw.empty()) return health;
+  FOCALFLEET_TRY_ASSIGN(health.flaw, FirstFlaw(*connection));
+  if (!health.flaw.empty()) return health;
+  FOCALFLEET_TRY_ASSIGN(health.version, InspectSchema(*connection, version_max));
+  if (health.version == 0) return health;
   const auto count = [&](const char* sql) { return connection->Integer(sql); };
   FOCALFLEET_TRY_ASSIGN(const auto motions, count("SELECT coalesce(max(entry), 0) FROM intent"));
   FOCALFLEET_TRY_ASSIGN(const auto configurations, count("SELECT count(*) FROM configuration"));

@@ -47,12 +47,7 @@ Configuration::Configuration(const Coordination& fleet)
   view = {.id = last.id,
           .source = last.source,
           .state = IsOver(last.state) ? last.state : ConfigurationState::kFailed,
-          .targeted = last.targeted,
-          .arrived = last.arrived,
-          .refused = last.refused,
-          .failed = last.failed,
-          .stopped = last.stopped,
-          .unmeasured = last.unmeasured,
+          .counts = last.counts,
           .makespan_predicted_s = last.makespan_predicted_s,
           .makespan_s = last.makespan_s,
           .energy_J = last.energy_J,
@@ -119,7 +114,7 @@ void Configuration::ForgetStrikes() {
 
 void Configuration::Retarget(PositionerIndex i, const Pose& target) {
   ConfigurationUnit& unit = units_[i.value];
-  if (!unit.target) ++view.targeted;
+  if (!unit.target) ++view.counts.targeted;
   unit.target = unit.goal = fleet_.units[i].view.target = target;
   unit.target_id.clear();  // the name was the other target's
   unit.excluded = false;
@@ -146,21 +141,17 @@ void Configuration::ReplyLast(std::optional<Error> error, std::string text) {
 void Configuration::Record() {
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   const bool known = view.starts.reported > 0;
-  fleet_.ledger.Note(ConfigurationRow{.id = view.id,
-                                      .source = view.source,
-                                      .state = view.state,
-                                      .targeted = view.targeted,
-                                      .arrived = view.arrived,
-                                      .refused = view.refused,
-                                      .failed = view.failed,
-                                      .makespan_predicted_s = view.makespan_predicted_s,
-                                      .makespan_s = view.makespan_s,
-                                      .energy_J = view.energy_J,
-                                      .peak_power_W = view.peak_power_W,
-                                      .start_skew_s = known ? view.starts.skew_s : kNotKnown,
-                                      .start_skew_bound_s = known ? view.starts.bound_s : kNotKnown,
-                                      .stopped = view.stopped,
-                                      .unmeasured = view.unmeasured});
+  fleet_.ledger.Note(
+      ConfigurationRow{.id = view.id,
+                       .source = view.source,
+                       .state = view.state,
+                       .counts = view.counts,
+                       .makespan_predicted_s = view.makespan_predicted_s,
+                       .makespan_s = view.makespan_s,
+                       .energy_J = view.energy_J,
+                       .peak_power_W = view.peak_power_W,
+                       .start_skew_s = known ? view.starts.skew_s : kNotKnown,
+                       .start_skew_bound_s = known ? view.starts.bound_s : kNotKnown});
 }
 
 }  // namespace focalfleet

@@ -313,7 +313,7 @@ void ConfigurationProgress::JudgeTargets() {
 
 void ConfigurationProgress::MeasureOrEnd() {
   // Some unit must have arrived, durably or not yet, for there to be anything to measure.
-  const bool any = configuration_.view.arrived != 0 || configuration_.outcomes.IsAnyNoted();
+  const bool any = configuration_.view.counts.arrived != 0 || configuration_.outcomes.IsAnyNoted();
   if (configuration_.measure && any)
     rooms_.measurement.Start(Look::kAfter);
   else

@@ -55,12 +55,7 @@ struct ConfigurationView {
   std::string source;
   ConfigurationState state = ConfigurationState::kDone;
   std::uint32_t round = 0;
-  std::uint32_t targeted = 0;
-  std::uint32_t arrived = 0;
-  std::uint32_t refused = 0;
-  std::uint32_t failed = 0;
-  std::uint32_t stopped = 0;
-  std::uint32_t unmeasured = 0;
+  OutcomeCounts counts;
   double makespan_predicted_s = 0;  // all rounds that were started
   double makespan_s = 0;            // start signals to last arrival, all rounds
   double energy_J = 0;              // predicted, of the same

@@ -35,7 +35,7 @@ void ConfigurationExecutor::SetTarget(PositionerIndex i, const Goal& goal) {
   const UnitView& view = fleet_.units[i].view;
   const auto& measure = goal.measure;
   if (unit.target) {
-    ++configuration.view.targeted;
+    ++configuration.view.counts.targeted;
     configuration.outcomes.Set(i, TargetOutcome::kPending);
     if (!view.enabled)
       configuration.outcomes.Set(i, TargetOutcome::kRefused, "disabled: " + view.disabled_reason);
@@ -62,7 +62,7 @@ Status ConfigurationExecutor::Home(std::uint64_t request, const HomeCommand& com
         Severity::kWarning, {}, {},
         "homing of " + std::to_string(command.units.size()) +
             " units without proof that their neighbours are out of the way, as commanded");
-  rooms_.configuration.view.targeted = static_cast<std::uint32_t>(goal.to_home.size());
+  rooms_.configuration.view.counts.targeted = static_cast<std::uint32_t>(goal.to_home.size());
   for (const PositionerIndex i : goal.to_home)
     rooms_.configuration.outcomes.Set(i, TargetOutcome::kPending);
   rooms_.configuration.Record();
@@ -75,7 +75,7 @@ Status ConfigurationExecutor::Measure(std::uint64_t request) {
   progress_.Begin(request, goal);
   for (std::uint32_t n = 0; n < fleet_.units.size(); ++n) {
     if (!fleet_.units[{n}].view.enabled) continue;
-    ++rooms_.configuration.view.targeted;
+    ++rooms_.configuration.view.counts.targeted;
     rooms_.configuration.outcomes.Set({n}, TargetOutcome::kPending);
   }
   rooms_.configuration.Record();

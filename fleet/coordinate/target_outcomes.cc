@@ -57,15 +57,15 @@ void TargetOutcomes::ReportArrivals() {
 std::uint32_t* TargetOutcomes::CountOf(TargetOutcome outcome) const {
   switch (outcome) {
     case TargetOutcome::kArrived:
-      return &view_.arrived;
+      return &view_.counts.arrived;
     case TargetOutcome::kRefused:
-      return &view_.refused;
+      return &view_.counts.refused;
     case TargetOutcome::kFailed:
-      return &view_.failed;
+      return &view_.counts.failed;
     case TargetOutcome::kStopped:
-      return &view_.stopped;
+      return &view_.counts.stopped;
     case TargetOutcome::kUnmeasured:
-      return &view_.unmeasured;
+      return &view_.counts.unmeasured;
     case TargetOutcome::kNone:
     case TargetOutcome::kPending:
       break;

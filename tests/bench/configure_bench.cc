@@ -123,7 +123,7 @@ class Run {
     figures_.upload_frames = coordinator_->configuration().frames - before;
     while (coordinator_->busy()) Turn();
     figures_.frames = coordinator_->configuration().frames - before;
-    figures_.arrived = coordinator_->configuration().arrived;
+    figures_.arrived = coordinator_->configuration().counts.arrived;
     return figures_;
   }
 

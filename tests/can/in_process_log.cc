@@ -159,9 +159,9 @@ int Main(char** arguments) {
   const ConfigurationView& end = run.coordinator().configuration();
   std::fprintf(stderr,
                "in-process: %u of %u arrived, makespan %.1f s, rotors within %.1f vectors\n",
-               end.arrived, end.targeted, end.makespan_s, run.WorstSlip());
+               end.counts.arrived, end.counts.targeted, end.makespan_s, run.WorstSlip());
   // A drive too fast for the motor would leave rotors whole electrical turns behind, of 96 vectors.
-  return end.arrived == layout.size() && run.WorstSlip() < 48 ? 0 : 1;
+  return end.counts.arrived == layout.size() && run.WorstSlip() < 48 ? 0 : 1;
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(Configuration, AllUnitsArriveAndTheStoreKnowsIt) {
     const auto request = fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), 37u);
-    EXPECT_EQ(fleet.coordinator().configuration().arrived, 37u);
+    EXPECT_EQ(fleet.coordinator().configuration().counts.arrived, 37u);
     EXPECT_EQ(fleet.coordinator().configuration().round, 1u);
     ASSERT_TRUE(fleet.LastReply(request));
     EXPECT_TRUE(fleet.LastReply(request)->last);
@@ -103,7 +103,7 @@ TEST(Configuration, HomingIsPredicted) {
   fleet.Send({900, HomeCommand{{{4}}, true}});
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
-  EXPECT_EQ(view.arrived, 1u);
+  EXPECT_EQ(view.counts.arrived, 1u);
   EXPECT_GT(view.makespan_s, 10);
   EXPECT_NEAR(view.makespan_predicted_s, view.makespan_s, 0.1 * view.makespan_s);
   EXPECT_GT(view.energy_J, 0);

@@ -53,15 +53,16 @@ InProcessFleet::Options WithCamera(std::uint64_t seed) {
 void ExpectAccounted(InProcessFleet& fleet) {
   fleet.Run(Seconds(1));  // the last rows become durable
   const ConfigurationView& view = fleet.coordinator().configuration();
-  EXPECT_EQ(view.arrived + view.refused + view.failed + view.stopped + view.unmeasured,
-            view.targeted);
-  EXPECT_EQ(view.arrived, CountOutcome(fleet, TargetOutcome::kArrived));
-  EXPECT_EQ(view.stopped, CountOutcome(fleet, TargetOutcome::kStopped));
-  EXPECT_EQ(view.unmeasured, CountOutcome(fleet, TargetOutcome::kUnmeasured));
+  EXPECT_EQ(view.counts.arrived + view.counts.refused + view.counts.failed + view.counts.stopped +
+                view.counts.unmeasured,
+            view.counts.targeted);
+  EXPECT_EQ(view.counts.arrived, CountOutcome(fleet, TargetOutcome::kArrived));
+  EXPECT_EQ(view.counts.stopped, CountOutcome(fleet, TargetOutcome::kStopped));
+  EXPECT_EQ(view.counts.unmeasured, CountOutcome(fleet, TargetOutcome::kUnmeasured));
   const ConfigurationRow& stored = fleet.store().configurations.back();
-  EXPECT_EQ(stored.arrived, view.arrived);
-  EXPECT_EQ(stored.stopped, view.stopped);
-  EXPECT_EQ(stored.unmeasured, view.unmeasured);
+  EXPECT_EQ(stored.counts.arrived, view.counts.arrived);
+  EXPECT_EQ(stored.counts.stopped, view.counts.stopped);
+  EXPECT_EQ(stored.counts.unmeasured, view.counts.unmeasured);
   for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
     const UnitView& unit = fleet.coordinator().unit({n});
     EXPECT_EQ(unit.outcome_reason.empty(), !IsUnserved(unit.outcome)) << n;
@@ -76,8 +77,8 @@ TEST(Measured, NobodyHasArrivedWhereTheCameraIsDark) {
   fleet.ApplyRandomMeasured(1, {.corrections = 2, .tolerance_um = 10});
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
-  EXPECT_EQ(view.unmeasured, 37u);
-  EXPECT_EQ(view.arrived, 0u);
+  EXPECT_EQ(view.counts.unmeasured, 37u);
+  EXPECT_EQ(view.counts.arrived, 0u);
   EXPECT_NE(view.not_measured.find("nothing came from the camera"), std::string::npos);
   ExpectAccounted(fleet);
 }
@@ -89,7 +90,7 @@ TEST(Measured, NobodyIsServedInAnObservedMoveThatNobodySaw) {
   };
   fleet.ApplyRandomMeasured(1, {.observe = true});
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.coordinator().configuration().unmeasured, 37u);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.unmeasured, 37u);
   ExpectAccounted(fleet);
 }
 
@@ -107,9 +108,9 @@ TEST(Measured, CorrectionsThatNobodySawAreUnmeasured) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
   ASSERT_EQ(view.measured.size(), 1u);
-  EXPECT_GT(view.unmeasured, 5u);
-  EXPECT_GT(view.arrived, 0u);
-  EXPECT_LE(view.arrived, view.measured[0].within_tolerance);
+  EXPECT_GT(view.counts.unmeasured, 5u);
+  EXPECT_GT(view.counts.arrived, 0u);
+  EXPECT_LE(view.counts.arrived, view.measured[0].within_tolerance);
   for (std::uint32_t n = 0; n < 37; ++n) {
     const UnitView& unit = fleet.coordinator().unit({n});
     EXPECT_EQ(unit.outcome == TargetOutcome::kArrived,
@@ -134,7 +135,7 @@ TEST(Measured, UnitsThatTheCameraDoesNotFindHaveNotArrived) {
   };
   fleet.ApplyRandomMeasured(3, {.corrections = 1, .tolerance_um = 100});
   ASSERT_TRUE(fleet.RunUntilIdle());
-  EXPECT_EQ(fleet.coordinator().configuration().unmeasured, std::size(kUnsure));
+  EXPECT_EQ(fleet.coordinator().configuration().counts.unmeasured, std::size(kUnsure));
   for (std::uint32_t k = 0; k < std::size(kUnsure); ++k) {
     const UnitView& unit = fleet.coordinator().unit({2 * k});
     EXPECT_EQ(unit.outcome, TargetOutcome::kUnmeasured) << Name(kUnsure[k]);
@@ -154,7 +155,7 @@ TEST(Measured, AStopBeforeTheExposureLeavesNobodyArrived) {
   fleet.Send({900, StopCommand{}});
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kStopped);
-  EXPECT_EQ(fleet.coordinator().configuration().stopped, 37u);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.stopped, 37u);
   ExpectAccounted(fleet);
 }
 
@@ -206,7 +207,7 @@ TEST(Measured, AMeasurementFindsUnitsOfUnknownPlace) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.Run(Seconds(1));
   EXPECT_EQ(fleet.coordinator().configuration().kind, ConfigurationKind::kMeasure);
-  EXPECT_EQ(fleet.coordinator().configuration().arrived, 37u);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.arrived, 37u);
   for (std::uint32_t n = 0; n < 37; ++n) {
     const UnitView& unit = fleet.coordinator().unit({n});
     EXPECT_EQ(unit.knowledge[0].witness, Witness::kMeasured) << n;
@@ -264,9 +265,9 @@ TEST(Measured, ALookThatFailsFindsNobody) {
   fleet.Send({900, MeasureCommand{}});
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().configuration().state, ConfigurationState::kFailed);
-  EXPECT_EQ(fleet.coordinator().configuration().arrived, 0u);
-  EXPECT_EQ(fleet.coordinator().configuration().unmeasured,
-            fleet.coordinator().configuration().targeted);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.arrived, 0u);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.unmeasured,
+            fleet.coordinator().configuration().counts.targeted);
   ExpectAccounted(fleet);
 }
 

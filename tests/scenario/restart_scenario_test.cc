@@ -150,7 +150,7 @@ TEST(Configuration, TheOneThatTheDaemonDidNotEndHasFailed) {
     fleet.Run(Milliseconds(100));
     const ConfigurationRow& row = fleet.store().configurations.back();
     EXPECT_EQ(row.state, ConfigurationState::kFailed);
-    EXPECT_EQ(row.targeted, 37u);
+    EXPECT_EQ(row.counts.targeted, 37u);
     EXPECT_TRUE(HasAlarm(fleet, "configuration 1 has failed: the daemon ended"));
     EXPECT_EQ(fleet.store().alarms.size(), 1u) << "said once";
     EXPECT_EQ(fleet.coordinator().configuration().id, 1u);

@@ -149,9 +149,9 @@ TEST(Retarget, MovingUnitGoesToItsNewTargetAndAllOthersGoOn) {
     ExpectStoreTellsTheTruth(run.fleet, "at the end");
     EXPECT_TRUE(run.fleet.store().fleet.open_intents.empty());
     const ConfigurationView& configuration = run.fleet.coordinator().configuration();
-    EXPECT_EQ(configuration.targeted, 37u);
-    EXPECT_EQ(configuration.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
-    EXPECT_EQ(configuration.refused, CountOutcome(run.fleet, TargetOutcome::kRefused));
+    EXPECT_EQ(configuration.counts.targeted, 37u);
+    EXPECT_EQ(configuration.counts.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
+    EXPECT_EQ(configuration.counts.refused, CountOutcome(run.fleet, TargetOutcome::kRefused));
   }
   std::printf("%d new targets: %d arrived, %d refused; %d configurations in one round\n", draws,
               arrived, refused, one_round);
@@ -228,7 +228,7 @@ TEST(Retarget, UnitAtRestGoes) {
     const UnitView& view = run.fleet.coordinator().unit({12});
     EXPECT_EQ(view.outcome, TargetOutcome::kArrived) << view.outcome_reason;
     EXPECT_EQ(PlaceOf(view.knowledge), target);
-    EXPECT_EQ(run.fleet.coordinator().configuration().targeted, 37u);
+    EXPECT_EQ(run.fleet.coordinator().configuration().counts.targeted, 37u);
     EXPECT_EQ(CountOutcome(run.fleet, TargetOutcome::kArrived), 37u);
   }
 }
@@ -337,14 +337,15 @@ TEST(Retarget, AStoppedUnitThatGetsAnotherTargetIsCountedOnce) {
   const PositionerIndex unit = run.Moving(5);
   run.fleet.Send({1, StopCommand{unit}});
   run.fleet.Run(Milliseconds(300));
-  EXPECT_EQ(run.fleet.coordinator().configuration().stopped, 1u);
+  EXPECT_EQ(run.fleet.coordinator().configuration().counts.stopped, 1u);
   run.Send(unit, run.DrawTarget(unit, 1));
   ASSERT_TRUE(run.fleet.RunUntilIdle());
   const ConfigurationView& view = run.fleet.coordinator().configuration();
-  EXPECT_EQ(view.stopped, CountOutcome(run.fleet, TargetOutcome::kStopped));
-  EXPECT_EQ(view.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
-  EXPECT_EQ(view.arrived + view.refused + view.failed + view.stopped + view.unmeasured,
-            view.targeted);
+  EXPECT_EQ(view.counts.stopped, CountOutcome(run.fleet, TargetOutcome::kStopped));
+  EXPECT_EQ(view.counts.arrived, CountOutcome(run.fleet, TargetOutcome::kArrived));
+  EXPECT_EQ(view.counts.arrived + view.counts.refused + view.counts.failed + view.counts.stopped +
+                view.counts.unmeasured,
+            view.counts.targeted);
 }
 
 TEST(Retarget, UnitThatFallsSilentAtAnyStageIsNamed) {

@@ -215,7 +215,7 @@ TEST(StartSkew, AUnitWithABrokenSyncWireBeginsByItsOwnClockALittleLater) {
   const StartView& said = fleet.coordinator().configuration().starts;
   EXPECT_EQ(said.last, PositionerIndex{4});
   EXPECT_NEAR(said.skew_s, truth.skew_s(), said.bound_s + kLook_s);
-  EXPECT_EQ(fleet.coordinator().configuration().arrived, 19u);
+  EXPECT_EQ(fleet.coordinator().configuration().counts.arrived, 19u);
   EXPECT_TRUE(Troubles(fleet).empty());
 }
 

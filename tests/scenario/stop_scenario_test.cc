@@ -78,11 +78,11 @@ TEST(Configuration, AStopIsAnOutcomeOfItsOwn) {
   fleet.Run(Seconds(1));  // its last row becomes durable
   const ConfigurationView& view = fleet.coordinator().configuration();
   EXPECT_EQ(view.state, ConfigurationState::kStopped);
-  EXPECT_EQ(view.failed, 0u) << "nobody failed";
-  EXPECT_GT(view.stopped, 20u);
-  EXPECT_EQ(view.stopped + view.arrived + view.refused, view.targeted);
-  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kStopped), view.stopped);
-  EXPECT_EQ(fleet.store().configurations.back().stopped, view.stopped);
+  EXPECT_EQ(view.counts.failed, 0u) << "nobody failed";
+  EXPECT_GT(view.counts.stopped, 20u);
+  EXPECT_EQ(view.counts.stopped + view.counts.arrived + view.counts.refused, view.counts.targeted);
+  EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kStopped), view.counts.stopped);
+  EXPECT_EQ(fleet.store().configurations.back().counts.stopped, view.counts.stopped);
   ASSERT_TRUE(fleet.LastReply(request));
   EXPECT_EQ(fleet.LastReply(request)->text, "stopped");
 }

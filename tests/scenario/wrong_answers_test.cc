@@ -33,7 +33,7 @@ std::uint32_t Begun(InProcessFleet& fleet) {
 /// Expects that no unit moved, and that each is named with a reason that has `part` in it.
 void ExpectNothingStarted(InProcessFleet& fleet, const std::string& part, const std::string& when) {
   EXPECT_EQ(Begun(fleet), 0u) << when;
-  EXPECT_EQ(fleet.coordinator().configuration().arrived, 0u) << when;
+  EXPECT_EQ(fleet.coordinator().configuration().counts.arrived, 0u) << when;
   for (std::uint32_t n = 0; n < fleet.layout().size(); ++n) {
     const UnitView& view = fleet.coordinator().unit({n});
     EXPECT_EQ(view.outcome, TargetOutcome::kFailed) << when << ", row " << n;

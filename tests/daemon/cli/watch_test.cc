@@ -46,8 +46,8 @@ void PublishFleet(StatusPublisher* publisher) {
   configuration.view.id = 7;
   configuration.view.source = "night.csv";
   configuration.view.state = ConfigurationState::kMoving;
-  configuration.view.targeted = 2;
-  configuration.view.arrived = 1;
+  configuration.view.counts.targeted = 2;
+  configuration.view.counts.arrived = 1;
   AlarmValue alarm;
   alarm.at = fleet.at;
   alarm.row.id = 5;

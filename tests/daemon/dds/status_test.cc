@@ -172,7 +172,7 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   configuration.view.id = 3;
   configuration.view.source = "night.csv";
   configuration.view.state = ConfigurationState::kStopped;
-  configuration.view.arrived = 4999;
+  configuration.view.counts.arrived = 4999;
   configuration.view.peak_power_W = 12.5;
   configuration.view.frames = 90'000;
   configuration.view.starts = {
@@ -198,7 +198,7 @@ TEST(Status, FleetBusAndConfigurationComeAcross) {
   EXPECT_EQ(seen.buses[7].view.retries, 3u);
   EXPECT_EQ(seen.configuration->view.source, "night.csv");
   EXPECT_EQ(seen.configuration->view.state, ConfigurationState::kStopped);
-  EXPECT_EQ(seen.configuration->view.arrived, 4999u);
+  EXPECT_EQ(seen.configuration->view.counts.arrived, 4999u);
   EXPECT_EQ(seen.configuration->view.frames, 90'000u);
   EXPECT_EQ(seen.configuration->view.starts.begun, 5000u);
   EXPECT_EQ(seen.configuration->view.starts.reported, 4998u);

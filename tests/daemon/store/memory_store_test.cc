@@ -93,10 +93,8 @@ class RowSource {
         return ConfigurationRow{.id = Id(),
                                 .source = "c",
                                 .state = Code(kLastConfigurationState),
-                                .arrived = 3,
-                                .energy_J = Real(),
-                                .stopped = 4,
-                                .unmeasured = 5};
+                                .counts = {.arrived = 3, .stopped = 4, .unmeasured = 5},
+                                .energy_J = Real()};
       case 9:
         return AlarmRow{Id(), Code(kLastSeverity), Unit(), {}, "a"};
       case 10:

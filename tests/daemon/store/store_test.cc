@@ -44,8 +44,14 @@ TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {
       intent,
       ParameterRow{{7001}, Axis::kPhi, Parameter::kRepeat, 37, Origin::kTuning},
       NextMoveRow{{14}},
-      ConfigurationRow{5, "night.csv", ConfigurationState::kMoving, 5000, 3, 2, 1, 22.5,
-                       std::nan(""), 1.25, 9.0},
+      ConfigurationRow{5,
+                       "night.csv",
+                       ConfigurationState::kMoving,
+                       {5000, 3, 2, 1},
+                       22.5,
+                       std::nan(""),
+                       1.25,
+                       9.0},
       AlarmRow{9, Severity::kError, UnitId{12}, BusId{3}, "over_temperature"}};
   test::ExpectDone(OpenStore()->Commit(rows, kEight));
 
