@@ -118,9 +118,10 @@ void JudgeFiles(const Facts& facts, Checks* checks) {
   if (!facts.config) return;
   const Identity& user = facts.daemon_user;
   for (const FileFacts& folder : facts.bus_sockets_folder) {
-    if (folder.trouble.empty()) continue;
-    checks->push_back(Fail("buses", fmt::format("{}: {}", folder.path, folder.trouble),
-                           "start focalfleet-sim, or mend bus.unix_directory"));
+    checks->push_back(folder.trouble.empty()
+                          ? Ok("bus sockets", folder.path + " is there")
+                          : Fail("bus sockets", fmt::format("{}: {}", folder.path, folder.trouble),
+                                 "start focalfleet-sim, or mend bus.unix_directory"));
   }
   checks->push_back(JudgeFolder("store folder", facts.store_folder, user));
   if (facts.camera_folder)

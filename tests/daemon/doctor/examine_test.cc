@@ -131,10 +131,13 @@ TEST(Examine, AVirtualInterfaceHasNoTiming) {
 
 TEST(Examine, OtherPortsNeedNoCan) {
   Facts facts = WellMachine();
-  facts.config->bus.port = PortKind::kSimulated;
+  facts.config->bus.port = PortKind::kUnix;
   facts.interfaces.clear();
+  facts.bus_sockets_folder = {test::Folder("/run/sim", 1, 1, 0755)};
   facts.host.af_can_error = EAFNOSUPPORT;
-  EXPECT_EQ(Find(facts, "af_can").verdict, Verdict::kOk);
+  EXPECT_EQ(Worst(Examine(facts)), Verdict::kOk);
+  facts.bus_sockets_folder[0].trouble = "No such file";
+  EXPECT_THAT(Find(facts, "bus sockets").todo, HasSubstr("focalfleet-sim"));
 }
 
 TEST(Examine, DiagnosesTheDaemon) {
