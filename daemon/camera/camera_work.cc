@@ -22,6 +22,7 @@ ExposureDone CameraWorker::Do(const CameraWork& work, const std::atomic<bool>& e
                                              std::to_string(options_.patience.count()) + " ms"};
   const auto give_up = std::chrono::steady_clock::now() + options_.patience;
   while (!ending) {
+    options_.alive();
     auto taken = port_->Take();
     if (taken && *taken) {
       auto findings = Judge(work, **taken, since);

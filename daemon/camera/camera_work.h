@@ -34,6 +34,7 @@ class CameraWorker {
     double speed = 1;                            // of the host's clock, relative to real time
     std::function<WallTime()> now = &WallTime::Now;
     std::function<void(const std::string&)> log = [](const std::string&) {};
+    std::function<void()> alive = [] {};  // called with each look
   };
   CameraWorker(std::unique_ptr<CameraPort> port, Options options)
       : port_(std::move(port)), options_(std::move(options)) {}

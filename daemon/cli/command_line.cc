@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "daemon/cli/operator_commands.h"
+#include "daemon/cli/versions.h"
 #include "daemon/usage/complaint.h"
 #include "daemon/usage/help.h"
 #include "daemon/usage/option_text.h"
@@ -34,7 +35,8 @@ const std::vector<Group>& Groups() {
   static const std::vector<Group> groups = {
       {"Prepare a configuration", {"layout", "targets", "plan", "estimate"}},
       {"Operate the fleet", {"apply", "wait", "retarget", "stop", "home", "measure"}},
-      {"Watch the fleet", {"status", "unit", "state", "alarms", "events", "history", "watch", "measurements"}},
+      {"Watch the fleet",
+       {"status", "unit", "state", "alarms", "events", "history", "watch", "measurements"}},
       {"Maintain units", {"disable", "enable", "adopt", "params"}},
       {"Study and tune",
        {"campaign", "diagnose", "model", "simulate", "tune", "reproduce", "hall"}},
@@ -62,7 +64,8 @@ std::string ExitCodesHelp() {
 
 void AddGlobalOptions(CommandLine* line) {
   CLI::App& app = line->app;
-  app.set_version_flag("--version", "focalfleet " FOCALFLEET_VERSION, "Show the version");
+  app.set_version_flag("--version", std::string("focalfleet ") + ClientVersion(),
+                       "Show the version");
   app.add_flag("--json", line->context.json, "One JSON object on stdout, nothing else there");
   app.add_flag("-q,--quiet", line->context.quiet, "No progress, no summary; errors are still told");
   app.add_option("--socket", line->context.socket,
@@ -97,6 +100,20 @@ void HoldStandardStreams() {
 bool OutIsStdout(const CLI::App& app) {
   const CLI::Option* out = usage::Chosen(app).get_option_no_throw("--out");
   return out != nullptr && out->count() == 1 && out->results().front() == "-";
+}
+
+/// The daemon's version beside this program's, where a daemon answers.
+void ShowDaemonVersion(CommandLine* line) {
+  // --version ends the parser before it stores the values of other options.
+  const auto& socket = line->app.get_option("--socket")->results();
+  if (!socket.empty()) line->context.socket = socket.back();
+  line->context.LookAtTerminals();
+  const auto version = DaemonVersion(line->context);
+  if (!version) return;
+  PrintText(fmt::format("focalfleetd {}\n", *version));
+  if (const std::string difference = DifferenceFrom(*version); !difference.empty())
+    Complain(fmt::format("focalfleet: {} {}\n",
+                         Paint(line->context.colour_err, Colour::kYellow, "warning:"), difference));
 }
 
 /// `exit`, unless the answer could not be written.
@@ -190,6 +207,7 @@ std::unique_ptr<CommandLine> MakeCommandLine() {
   AddCampaignCommands(line.get());
   AddModelCommands(line.get());
   AddCanCommands(line.get());
+  AddDoctorCommand(line.get());
   AddCompletionCommand(line.get());
   AddHelpCommand(line.get());
   AssignGroups(&app);
@@ -230,6 +248,7 @@ int Main(int argc, char** argv) {
       std::ostringstream text;
       line->app.exit(error, text, text);
       PrintText(text.str());
+      if (error.get_name() == "CallForVersion") ShowDaemonVersion(line.get());
       return AfterOutput(*line, ExitCode::kOk);
     }
     line->context.LookAtTerminals();

@@ -46,11 +46,15 @@ std::string ForTerminal(std::string_view text) {
 
 }  // namespace
 
-std::string Context::SocketPath() const {
+std::string Context::NamedSocketPath() const {
   if (!socket.empty()) return socket;
   const char* from_environment = std::getenv("FOCALFLEET_SOCKET");
-  return from_environment != nullptr && *from_environment != '\0' ? from_environment
-                                                                  : kDefaultSocket;
+  return from_environment != nullptr ? from_environment : "";
+}
+
+std::string Context::SocketPath() const {
+  const std::string named = NamedSocketPath();
+  return named.empty() ? kDefaultSocket : named;
 }
 
 void Context::LookAtTerminals() {

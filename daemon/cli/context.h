@@ -29,11 +29,14 @@ struct Context {
   bool stdout_is_file = false;  // with --out -: other messages go to stderr
 
   [[nodiscard]] std::string SocketPath() const;
+  /// As SocketPath; empty where neither option nor environment names a socket.
+  [[nodiscard]] std::string NamedSocketPath() const;
   /// Determines from --color, the terminals and NO_COLOR whether colours are used.
   void LookAtTerminals();
 };
 
 inline constexpr const char* kDefaultSocket = "/run/focalfleet/control.sock";
+inline constexpr const char* kDefaultConfig = "/etc/focalfleet/focalfleet.toml";
 
 std::string Paint(bool colour_on, Colour colour, std::string_view text);
 

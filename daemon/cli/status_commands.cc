@@ -10,6 +10,7 @@
 #include "daemon/cli/table.h"
 #include "daemon/cli/time_text.h"
 #include "daemon/cli/unit_choice.h"
+#include "daemon/cli/versions.h"
 #include "daemon/files/text_file.h"
 
 namespace focalfleet::cli {
@@ -74,6 +75,8 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
   std::string text = fmt::format(
       "focalfleetd {}, {}\n", TextIn(status, "version"),
       busy ? Paint(colour_on, Colour::kYellow, "busy") : Paint(colour_on, Colour::kGreen, "idle"));
+  if (const std::string difference = DifferenceFrom(TextIn(status, "version")); !difference.empty())
+    text += fmt::format("version    {}\n", Paint(colour_on, Colour::kYellow, difference));
   text += fmt::format("units      {}, {} enabled: {}\n", CountIn(status, "units"),
                       CountIn(status, "enabled"), Counted(ObjectIn(status, "phases")));
   text += fmt::format("positions  {}\n", Counted(ObjectIn(status, "positions")));
@@ -93,8 +96,9 @@ std::string DescribeStatus(const Json& status, const StatusOptions& options, boo
 }
 
 ExitCode RunStatus(const Context& context, const StatusOptions& options) {
-  const auto status = Ask(context, {.verb = "status"});
+  auto status = Ask(context, {.verb = "status"});
   if (!status) return Report(context, status.error());
+  (*status)["client_version"] = ClientVersion();
   if (context.json) PrintJson(*status);
   Say(context, DescribeStatus(*status, options, context.colour_out));
   return ExitCode::kOk;

@@ -21,7 +21,7 @@ struct StopOptions {
   // Units answer a stop within some tens of milliseconds. The daemon repeats a lost frame for up to
   // 1.6 s (CoordinatorConfig::reply_wait).
   double within_s = 5;
-  std::string config = "/etc/focalfleet/focalfleet.toml";
+  std::string config = kDefaultConfig;
 };
 
 Json JsonOf(const std::vector<DirectStopBus>& buses) {

@@ -6,6 +6,8 @@
 #include <memory>
 #include <mutex>
 
+#include "daemon/dds/loopback_config.h"
+
 namespace focalfleet::dds_internal {
 namespace {
 

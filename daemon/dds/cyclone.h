@@ -12,8 +12,6 @@ struct dds_topic_descriptor;
 
 namespace focalfleet::dds_internal {
 
-extern const char* const kLoopbackConfig;  // text of deploy/cyclonedds.xml
-
 using Handle = std::int32_t;  // dds_entity_t
 
 inline constexpr const char* kFleetTopic = "focalfleet/fleet_status";

@@ -14,8 +14,8 @@
 #include <cstring>
 #include <string>
 #include <utility>
-#include <variant>
 
+#include "daemon/loop/event_log.h"
 #include "daemon/verbs/model_upkeep.h"
 
 namespace focalfleet {
@@ -33,47 +33,6 @@ sigset_t OurSignals() {
   for (const int number : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&set, number);
   return set;
 }
-
-spdlog::level::level_enum LevelOf(Severity severity) {
-  switch (severity) {
-    case Severity::kInfo:
-      return spdlog::level::info;
-    case Severity::kWarning:
-      return spdlog::level::warn;
-    case Severity::kError:
-      return spdlog::level::err;
-  }
-  return spdlog::level::err;
-}
-
-/// The text of an alarm with its unit or bus; most alarms name it themselves.
-std::string TextOf(const AlarmRow& alarm) {
-  std::string where;
-  if (alarm.bus) where = "bus " + std::to_string(alarm.bus->value);
-  if (alarm.unit) where = "unit " + std::to_string(alarm.unit->value);
-  return where.empty() || alarm.text.starts_with(where) ? alarm.text : where + ": " + alarm.text;
-}
-
-void LogRow(const AlarmRow& alarm) {
-  spdlog::log(LevelOf(alarm.severity), "alarm {} {}: {}", alarm.id, Name(alarm.name),
-              TextOf(alarm));
-}
-void LogRow(const ConfigurationRow& row) {
-  spdlog::info(
-      "configuration {} ({}) is {}: {} targeted, {} arrived, {} refused, {} failed, {} stopped, "
-      "{} unmeasured, makespan {:.1f} s of {:.1f} s predicted",
-      row.id, row.source, Name(row.state), row.counts.targeted, row.counts.arrived,
-      row.counts.refused, row.counts.failed, row.counts.stopped, row.counts.unmeasured,
-      row.makespan_s, row.makespan_predicted_s);
-}
-void LogRow(const EnableRow& row) {
-  spdlog::info("unit {} {}{}", row.unit.value, row.enabled ? "enabled" : "disabled: ", row.reason);
-}
-void LogRow(const BindingRow& row) {
-  spdlog::debug("unit {} is serial {}", row.unit.value, row.serial.value);
-}
-template <class T>
-void LogRow(const T&) {}
 
 }  // namespace
 
@@ -122,13 +81,16 @@ void EventLoop::Run() {
     Wait();
     ServeSync();
     Gather();
-    if (StepIsDue()) {
+    const bool due = StepIsDue();
+    if (due) {
       Step();
       Perform();
     }
     parts_.lines->Flush(parts_.clock);
     PublishStatus();
+    parts_.service->Serve(View(), due);
   }
+  parts_.service->Ending();
   effects_.Clear();
   parts_.coordinator->End(now_, &effects_);
   LogChanges();
@@ -138,8 +100,8 @@ void EventLoop::Run() {
 
 void EventLoop::Wait() {
   now_ = parts_.clock.Now();
-  HostInstant wake = std::min(
-      {effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock), parts_.handler->wake_at()});
+  HostInstant wake = std::min({effects_.wake_at, parts_.lines->wake_at(now_, parts_.clock),
+                               parts_.handler->wake_at(), parts_.service->wake_at()});
   if (parts_.scheduler != nullptr) wake = std::min(wake, parts_.scheduler->wake_at());
   if (parts_.metrics != nullptr) wake = std::min(wake, parts_.metrics->wake_at());
   if (parts_.sync != nullptr) wake = std::min(wake, parts_.sync->wake_at());
@@ -190,7 +152,13 @@ void EventLoop::Dispatch(std::uint64_t what) {
 void EventLoop::ReadSignals() {
   signalfd_siginfo info{};
   while (::read(signals_, &info, sizeof info) == sizeof info) {
-    if (info.ssi_signo == SIGHUP) continue;  // nothing to read anew while units may move
+    if (info.ssi_signo == SIGHUP) {
+      // The configuration is not read anew while units may move.
+      parts_.service->BeginReload();
+      parts_.hang_up();
+      parts_.service->EndReload();
+      continue;
+    }
     spdlog::info("{} received, ending", info.ssi_signo == SIGTERM ? "SIGTERM" : "SIGINT");
     stopping_ = true;
   }
@@ -291,13 +259,9 @@ void EventLoop::PublishStatus() {
 }
 
 void EventLoop::LogChanges() {
-  for (const LinkEvent& link : links_) {
-    const std::string& trouble = parts_.lines->trouble(link.bus);
-    spdlog::log(link.state == LinkState::kUp ? spdlog::level::info : spdlog::level::warn,
-                "bus {} ({}) is {}{}{}", link.bus.value, parts_.lines->name(link.bus),
-                Name(link.state), trouble.empty() ? "" : ": ", trouble);
-  }
-  for (const Row& row : effects_.rows) std::visit([](const auto& what) { LogRow(what); }, row);
+  for (const LinkEvent& link : links_)
+    LogLink(link, parts_.lines->name(link.bus), parts_.lines->trouble(link.bus));
+  for (const Row& row : effects_.rows) LogRow(row);
 }
 
 FleetView EventLoop::View() const {

@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "daemon/loop/bus_lines.h"
 #include "daemon/loop/event_signal.h"
 #include "daemon/loop/job_thread.h"
+#include "daemon/loop/service_report.h"
 #include "daemon/loop/store_thread.h"
 #include "daemon/loop/sync_pulse.h"
 #include "daemon/metrics/metrics_sampler.h"
@@ -54,6 +56,8 @@ class EventLoop {
     SyncPulse* sync = nullptr;             // none: no SYNC line
     DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
     const EventSignal* threads = nullptr;  // raised by planner, camera, store
+    ServiceReport* service = nullptr;
+    std::function<void()> hang_up;  // what SIGHUP asks for: the log is opened anew
     HostClock clock;
   };
 

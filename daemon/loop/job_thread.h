@@ -12,6 +12,7 @@
 
 #include "daemon/loop/event_signal.h"
 #include "daemon/loop/spsc_queue.h"
+#include "daemon/loop/thread_name.h"
 
 namespace focalfleet {
 
@@ -20,12 +21,22 @@ class JobThread {
  public:
   /// `ending` turns true when the answer of the running job is no longer wanted.
   using Work = std::function<Answer(const Job&, const std::atomic<bool>& ending)>;
+  struct Options {
+    const char* name = "jobs";  // of the thread; lives as long as the thread
+    /// Called on the thread between jobs, and after each Wake. A job calls it by itself.
+    std::function<void()> alive = [] {};
+  };
 
   /// The thread runs. `done` is raised with each answer; it outlives the thread.
   /// Errors: kUnavailable: no descriptors left.
-  static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done) {
+  static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done,
+                                                   Options options) {
     FOCALFLEET_TRY_ASSIGN(EventSignal wake, EventSignal::Create());
-    return std::unique_ptr<JobThread>(new JobThread(std::move(work), done, std::move(wake)));
+    return std::unique_ptr<JobThread>(
+        new JobThread(std::move(work), done, std::move(wake), std::move(options)));
+  }
+  static Result<std::unique_ptr<JobThread>> Create(Work work, const EventSignal* done) {
+    return Create(std::move(work), done, Options{});
   }
   JobThread(const JobThread&) = delete;
   JobThread& operator=(const JobThread&) = delete;
@@ -44,12 +55,15 @@ class JobThread {
     return true;
   }
   std::optional<Answer> Take() { return answers_.Pop(); }
+  /// A thread that sleeps takes a turn.
+  void Wake() const { wake_.Raise(); }
 
  private:
   static constexpr std::size_t kJobs = 8;
 
-  JobThread(Work work, const EventSignal* done, EventSignal wake)
+  JobThread(Work work, const EventSignal* done, EventSignal wake, Options options)
       : work_(std::move(work)),
+        options_(std::move(options)),
         done_(done),
         wake_(std::move(wake)),
         jobs_(kJobs),
@@ -58,7 +72,9 @@ class JobThread {
         thread_([this] { Run(); }) {}
 
   void Run() {
+    NameThisThread(options_.name);
     while (!ending_) {
+      options_.alive();
       auto job = jobs_.Pop();
       if (!job) {
         wake_.Wait(std::nullopt);
@@ -71,6 +87,7 @@ class JobThread {
   }
 
   Work work_;
+  Options options_;
   const EventSignal* done_;
   EventSignal wake_;
   SpscQueue<Job> jobs_;

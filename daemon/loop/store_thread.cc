@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "daemon/loop/thread_name.h"
 #include "fleet/row_check.h"
 
 namespace focalfleet {
@@ -85,7 +86,9 @@ Status StoreThread::Finish() {
 // ---- called on the store's thread
 
 void StoreThread::Run() {
+  NameThisThread("store");
   for (;;) {
+    sinks_.alive();
     const bool ending = ending_;  // read before the queues: earlier batches are seen below
     Gather();
     const bool committed = TryCommit();

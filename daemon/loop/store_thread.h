@@ -42,6 +42,8 @@ class StoreThread {
     std::function<void(const AlarmValue&)> alarm;
     std::function<void(const std::string&)> log_error;
     std::function<void(const std::string&)> log_info;
+    /// Called in each turn of the thread, and after each Wake.
+    std::function<void()> alive = [] {};
     std::chrono::milliseconds retry_period{1000};
   };
 
@@ -61,6 +63,8 @@ class StoreThread {
   [[nodiscard]] bool Publish(StatusBatch* status);
   /// Hands over batches that found the queue full, as far as there is room. Call once a turn.
   void HandOver();
+  /// A thread that sleeps takes a turn.
+  void Wake() const { wake_.Raise(); }
   /// All is durable and published, and the thread has ended. Errors: that of the last attempt to
   /// commit; then rows are lost.
   Status Finish();

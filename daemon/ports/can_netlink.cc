@@ -239,6 +239,8 @@ Result<CanLink> ReadLink(std::span<const std::byte> answer) {
                              if (type == IFLA_LINKINFO) well &= ReadLinkInfo(payload, &link);
                              if (type == IFLA_MTU)
                                link.mtu = Value<std::uint32_t>(payload).value_or(0);
+                             if (type == IFLA_TXQLEN)
+                               link.queue_frames = Value<std::uint32_t>(payload).value_or(0);
                            });
   if (!well) return NoAnswer();
   return link;

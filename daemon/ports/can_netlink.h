@@ -37,6 +37,7 @@ struct CanLink {
   std::uint32_t bit_rate_bps = 0;       // 0: it has no bit timing
   std::uint32_t data_bit_rate_bps = 0;  // of CAN FD frames' data phase; 0: as above, or unset
   std::uint32_t mtu = 0;                // bytes: 72 where it carries CAN FD frames, else 16
+  std::uint32_t queue_frames = 0;       // frames that the kernel queues for the controller
   std::optional<ControllerState> state;
   std::uint32_t restart_ms = 0;  // the kernel's delay before a restart after bus-off; 0: none
   std::uint16_t tx_errors = 0;   // the controller's counters, where available

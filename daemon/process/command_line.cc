@@ -37,6 +37,13 @@ std::unique_ptr<DaemonCommandLine> MakeDaemonCommandLine() {
                "Read all files, print the effective configuration, and end");
   std::string footer = "Exit codes:";
   for (const auto& [code, text] : ExitCodes()) footer += "\n  " + code + "  " + text;
+  footer +=
+      "\n\nSignals: SIGTERM and SIGINT end it; SIGHUP opens log.file anew, for logrotate.\n"
+      "Environment: NOTIFY_SOCKET, WATCHDOG_USEC and WATCHDOG_PID of systemd: it reports when it "
+      "is "
+      "ready, how it stands and that all its threads work. JOURNAL_STREAM: events go to the "
+      "journal "
+      "with fields.";
   app.footer(footer);
   return line;
 }

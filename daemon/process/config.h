@@ -40,6 +40,7 @@ struct DaemonConfig {
   struct Log {
     std::string level = "info";
     std::string file;     // empty: standard error
+    bool journal = true;  // events carry fields where standard error is the journal
     std::string file_at;  // file:line, for messages
   } log;
   struct Metrics {

@@ -88,6 +88,8 @@ void VisitKeys(Config* c, Visitor* visit) {
   visit->Choice("level", &c->log.level, kLogLevels, "The least important lines that are logged");
   visit->Path("file", &c->log.file,
               "File of the log; empty: standard error; its folder must exist");
+  visit->Flag("journal", &c->log.journal,
+              "Whether events have fields in systemd's journal where standard error leads there");
   visit->Section("metrics", "Numbers for Prometheus, at http://ADDRESS:PORT/metrics");
   visit->Text("address", &c->metrics.address,
               "Numeric address to listen at; whoever reaches it may read the page");

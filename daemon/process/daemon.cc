@@ -19,10 +19,12 @@
 #include "daemon/process/bounded_end.h"
 #include "daemon/process/fleet_setup.h"
 #include "daemon/process/log.h"
+#include "daemon/process/slow_end.h"
 #include "daemon/status/buffered_status_publisher.h"
 #include "daemon/status/dds_troubles.h"
 #include "daemon/store/store.h"
 #include "daemon/store/store_reader.h"
+#include "daemon/systemd/notify_socket.h"
 #include "daemon/verbs/alarm_register.h"
 #include "daemon/verbs/model_registry.h"
 #include "daemon/verbs/model_upkeep.h"
@@ -47,6 +49,17 @@ double ProcessCpuSeconds() {
 /// the limit would leave such a driver behind without need. With twice as much, the end of a daemon
 /// with a dead camera would take longer than the 2 s that docs/cli.md promises.
 constexpr std::chrono::milliseconds kEndWithin{1000};
+
+/// The parts that report to the service manager.
+struct Service {
+  WallTime started = WallTime::Now();
+  NotifySocket socket;
+  Heartbeat store;
+  Heartbeat planner;
+  Heartbeat camera;
+  std::unique_ptr<Watchdog> watchdog;  // none: the manager expects no sign of life
+  std::unique_ptr<ServiceReport> report;
+};
 
 /// The fleet's status on its way to DDS.
 struct StatusOutput {
@@ -110,22 +123,25 @@ class Daemon {
  private:
   Status End();
   Status StartThreads();
+  std::function<void()> Answering(Heartbeat* heartbeat);
+  void OpenService();
   StoreThread::Sinks StoreSinks();
   Status OpenRequestHandler();
   Status RestoreLastModel();
   void OpenStatus();
   void OpenMetrics();
   void ServeMetrics();
-  PlanDone Plan(const PlannerWork& work, const std::atomic<bool>& ending);
+  PlanDone Plan(const PlannerWork& work, const std::atomic<bool>& ending,
+                const std::function<void()>& alive);
   Status OpenCamera();
   ShellFacts Facts() const;
 
   DaemonConfig config_;
   HostClock clock_;
-  WallTime started_ = WallTime::Now();
   std::unique_ptr<Layout> layout_;
   std::unique_ptr<Store> store_;
   std::unique_ptr<EventSignal> signal_;
+  Service service_;
   StatusOutput status_;
   Measuring measuring_;
   Metrics metrics_;
@@ -208,7 +224,7 @@ void Daemon::OpenStatus() {
   status_.scheduler = std::make_unique<StatusScheduler>(
       layout_->size(),
       StatusScheduler::Options{
-          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = started_},
+          .rate_hz = config_.dds.rate_hz, .version = Version(), .started = service_.started},
       clock_);
 }
 
@@ -257,7 +273,8 @@ Status Daemon::OpenCamera() {
           .site = std::move(site),
           .patience = std::chrono::milliseconds(config_.camera.patience.ns / 1'000'000),
           .speed = config_.clock.speed,
-          .log = [](const std::string& text) { spdlog::warn("{}", text); }});
+          .log = [](const std::string& text) { spdlog::warn("{}", text); },
+          .alive = Answering(&service_.camera)});
   return {};
 }
 
@@ -283,27 +300,39 @@ StoreThread::Sinks Daemon::StoreSinks() {
   };
   sinks.log_error = [](const std::string& text) { spdlog::error("{}", text); };
   sinks.log_info = [](const std::string& text) { spdlog::info("{}", text); };
+  sinks.alive = Answering(&service_.store);
   return sinks;
+}
+
+/// A thread that answers wakes the core, which waits for the answer.
+std::function<void()> Daemon::Answering(Heartbeat* heartbeat) {
+  return [this, heartbeat] {
+    if (heartbeat->Answer()) signal_->Raise();
+  };
 }
 
 Status Daemon::StartThreads() {
   FOCALFLEET_TRY_ASSIGN(store_thread_, StoreThread::Create(StoreSinks(), signal_.get()));
   FOCALFLEET_TRY_ASSIGN(
-      planner_,
-      PlannerThread::Create([this](const PlannerWork& work,
-                                   const std::atomic<bool>& ending) { return Plan(work, ending); },
-                            signal_.get()));
+      planner_, PlannerThread::Create(
+                    [this, alive = Answering(&service_.planner)](const PlannerWork& work,
+                                                                 const std::atomic<bool>& ending) {
+                      return Plan(work, ending, alive);
+                    },
+                    signal_.get(), {.name = "planner", .alive = Answering(&service_.planner)}));
   if (measuring_.camera != nullptr || measuring_.carriers != nullptr) {
-    FOCALFLEET_TRY_ASSIGN(measuring_.thread,
-                          CameraThread::Create(
-                              [this](const CameraWork& work, const std::atomic<bool>& ending) {
-                                ExposureDone done = MeasureUnits(work, measuring_.carriers.get(),
-                                                                 measuring_.camera.get(), ending);
-                                Count(done, &metrics_.work);
-                                return done;
-                              },
-                              signal_.get()));
+    FOCALFLEET_TRY_ASSIGN(
+        measuring_.thread,
+        CameraThread::Create(
+            [this](const CameraWork& work, const std::atomic<bool>& ending) {
+              ExposureDone done =
+                  MeasureUnits(work, measuring_.carriers.get(), measuring_.camera.get(), ending);
+              Count(done, &metrics_.work);
+              return done;
+            },
+            signal_.get(), {.name = "camera", .alive = Answering(&service_.camera)}));
   }
+  OpenService();
   FOCALFLEET_TRY_ASSIGN(loop_, EventLoop::Create({.layout = layout_.get(),
                                                   .coordinator = coordinator_.get(),
                                                   .lines = lines_.get(),
@@ -318,14 +347,18 @@ Status Daemon::StartThreads() {
                                                   .sync = sync_.get(),
                                                   .troubles = status_.troubles.get(),
                                                   .threads = signal_.get(),
+                                                  .service = service_.report.get(),
+                                                  .hang_up = &ReopenLog,
                                                   .clock = clock_}));
   ServeMetrics();
   return {};
 }
 
-PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending) {
+PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending,
+                      const std::function<void()>& alive) {
   const auto begun = std::chrono::steady_clock::now();
-  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending, &work] {
+  PlanDone done = RunPlanJob(work.job, *layout_, work.drives, [&ending, &work, &alive] {
+    alive();  // a plan shows that it proceeds by asking whether it is still wanted
     return ending.load() || (work.given_up != nullptr && work.given_up->load());
   });
   metrics_.work.planner_s.Observe(SecondsSince(begun));
@@ -333,6 +366,31 @@ PlanDone Daemon::Plan(const PlannerWork& work, const std::atomic<bool>& ending) 
     metrics_.power.Put(
         std::make_unique<const PlannedPower>(PowerOf(*done.plan, work.job, *layout_, work.drives)));
   return done;
+}
+
+void Daemon::OpenService() {
+  const Environment environment = [](const char* name) { return std::getenv(name); };
+  service_.socket = NotifySocket::FromEnvironment(environment);
+  const auto interval = WatchdogInterval(environment);
+  if (interval && service_.socket.present()) {
+    std::vector<Watchdog::Thread> threads = {
+        {"store", &service_.store, [this] { store_thread_->Wake(); }},
+        {"planner", &service_.planner, [this] { planner_->Wake(); }}};
+    if (measuring_.thread != nullptr)
+      threads.push_back({"camera", &service_.camera, [this] { measuring_.thread->Wake(); }});
+    // Rounds begin four times an interval, and a thread has half of one to answer. Two signs of
+    // life are then never further apart than three quarters of what the manager allows, and a
+    // thread is named before the daemon is killed.
+    service_.watchdog = std::make_unique<Watchdog>(
+        std::move(threads),
+        Watchdog::Options{.period = clock_.Real({interval->ns / 4}),
+                          .limit = clock_.Real({interval->ns / 2}),
+                          .feed = [this] { static_cast<void>(service_.socket.Send("WATCHDOG=1")); },
+                          .log_error = [](const std::string& text) { spdlog::error("{}", text); },
+                          .log_info = [](const std::string& text) { spdlog::info("{}", text); }});
+  }
+  service_.report = std::make_unique<ServiceReport>(&service_.socket, service_.watchdog.get(),
+                                                    clock_.Real(Seconds(1)));
 }
 
 Status Daemon::Run() {
@@ -352,6 +410,8 @@ Status Daemon::Run() {
 /// clients and readers learn of the end. At last the store is one file and free for the next
 /// daemon, and the socket is gone. Parts that may hang end meanwhile, or are left behind.
 Status Daemon::End() {
+  const SlowEnd slow_end(&service_.socket,
+                         {.progress = [this] { return store_thread_->committed_through(); }});
   ending_ = std::make_unique<BoundedEnd>(
       std::vector<BoundedEnd::Part>{{"the buses", [this] { lines_.reset(); }},
                                     {"the planner", [this] { planner_.reset(); }},
@@ -377,7 +437,7 @@ Status Daemon::End() {
 ShellFacts Daemon::Facts() const {
   ShellFacts facts;
   facts.version = Version();
-  facts.started = started_;
+  facts.started = service_.started;
   const AlarmRegister::Counts alarms = alarms_.Count(WallTime::Now());
   facts.alarms = {alarms.open, alarms.muted, alarms.worst ? Name(*alarms.worst) : ""};
   facts.store_path = config_.store.path;
@@ -404,7 +464,7 @@ const char* Version() { return FOCALFLEET_VERSION; }
 
 DaemonEnd RunDaemon(const DaemonConfig& config) {
   EventLoop::BlockSignals();
-  if (Status open = OpenLog(config.log); !open) return {std::move(open)};
+  if (Status open = OpenLog(config.log, JournalOfThisProcess()); !open) return {std::move(open)};
   auto daemon = std::make_unique<Daemon>(config);
   Status ended = daemon->Start();
   if (ended) ended = daemon->Run();

@@ -26,6 +26,7 @@ class Process {
   /// As Wait; returns none where the process has not ended within `limit_ms`.
   std::optional<int> WaitFor(int limit_ms);
   [[nodiscard]] bool running();
+  [[nodiscard]] pid_t pid() const { return pid_; }
 
  private:
   pid_t pid_ = -1;

@@ -101,12 +101,14 @@ TEST(CanNetlink, ReadsWhatCanFdNeeds) {
   info.Attribute(IFLA_INFO_DATA, can);
   const auto link = ReadLink(Head(IFF_UP)
                                  .Attribute(IFLA_MTU, Answer().Put(std::uint32_t{72}))
+                                 .Attribute(IFLA_TXQLEN, Answer().Put(std::uint32_t{10}))
                                  .Attribute(IFLA_LINKINFO, info)
                                  .Message(RTM_NEWLINK));
   ASSERT_TRUE(link) << link.error().text;
   EXPECT_EQ(link->bit_rate_bps, 500'000u);
   EXPECT_EQ(link->data_bit_rate_bps, 4'000'000u);
   EXPECT_EQ(link->mtu, 72u);
+  EXPECT_EQ(link->queue_frames, 10u);
   const auto without = ReadLink(Controller());
   ASSERT_TRUE(without);
   EXPECT_EQ(without->data_bit_rate_bps, 0u);

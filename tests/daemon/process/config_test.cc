@@ -61,6 +61,7 @@ config = "c.xml"
 [log]
 level = "debug"
 file = "l.log"
+journal = false
 [metrics]
 address = "::1"
 port = 9890
@@ -114,12 +115,13 @@ spread = "real"
   EXPECT_EQ(config->drive.axis[0].counter1, 400);
   EXPECT_EQ(config->timing.silence_limit, Milliseconds(7));
   EXPECT_EQ(config->simulated.seed, 8u);
+  EXPECT_FALSE(config->log.journal);
   EXPECT_EQ(config->log.file_at, "/etc/ff/f.toml:17");
-  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:28");
+  EXPECT_EQ(config->bus.interfaces_at, "/etc/ff/f.toml:29");
   EXPECT_EQ(config->sync.chip, "/dev/gpiochip3");
   EXPECT_EQ(config->sync.line, 9u);
   EXPECT_TRUE(config->sync.active_low);
-  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:30");
+  EXPECT_EQ(config->sync.chip_at, "/etc/ff/f.toml:31");
   EXPECT_TRUE(config->timing.sync_line);
   EXPECT_EQ(config->timing.sync_lead, Milliseconds(9));
 }

@@ -10,18 +10,14 @@
 #include <vector>
 
 #include "daemon/control/line_client.h"
-#include "fleet/files/layout_file.h"
-#include "fleet/hex_layout.h"
-#include "fleet/kinematics.h"
-#include "fleet/targets.h"
-#include "protocol/base/rng.h"
-#include "protocol/wire/messages.h"
+#include "tests/daemon/process/crowded_fleet.h"
 #include "tests/daemon/process/focalfleetd_fixture.h"
 #include "tests/support/process.h"
 
 namespace focalfleet {
 namespace {
 
+using test::CrowdedFleet;
 using test::FocalfleetdTest;
 using test::kPatienceMs;
 using test::Process;
@@ -82,65 +78,22 @@ class FocalfleetdEndTest : public FocalfleetdTest {
   }
 };
 
-/// A fleet whose arms reach far into their neighbours' cells, from one random configuration to
-/// another. The planner needs a minute, because it abandons units by ones and twos.
-class CrowdedFocalfleetdTest : public FocalfleetdEndTest {
+class CrowdedFocalfleetdEndTest : public FocalfleetdEndTest {
  protected:
-  static constexpr std::uint32_t kUnits = 300;
-  CrowdedFocalfleetdTest()
-      : layout_(Layout::Create(
-                    MakeHexLayout(
-                        {.count = kUnits, .pitch_mm = 14, .theta_arm_mm = 9, .phi_arm_mm = 10}),
-                    {})
-                    .value()) {
-    std::vector<Unit> units;
-    for (std::uint32_t n = 0; n < kUnits; ++n) units.push_back(layout_.unit({n}));
-    std::ofstream(scratch_ / "units.csv") << WriteUnits(units);
-  }
-  [[nodiscard]] std::vector<Pose> Draw(std::uint64_t seed) const {
-    return DrawConfiguration(layout_, drives_, std::vector<std::optional<Pose>>(kUnits),
-                             Rng::Stream(seed, "configuration"))
-        .value();
-  }
-  [[nodiscard]] std::string Targets(std::uint64_t seed) const {
-    const std::vector<Pose> poses = Draw(seed);
-    std::string targets = "unit_id,theta_deg,phi_deg\n";
-    for (std::uint32_t n = 0; n < kUnits; ++n) {
-      const AxisAngles angles = AnglesOf(layout_.unit({n}), drives_[n], poses[n]);
-      targets += std::to_string(layout_.unit({n}).id.value) + "," +
-                 std::to_string(angles.theta_deg) + "," + std::to_string(angles.phi_deg) + "\n";
-    }
-    return targets;
-  }
-  /// Sets the position of each unit to this pose.
-  void StandAt(const std::vector<Pose>& poses) const {
-    auto client = LineClient::Connect(scratch_ / "control.sock");
-    ASSERT_TRUE(client);
-    for (std::uint32_t n = 0; n < kUnits; ++n)
-      for (const Axis axis : kAxes) {
-        const auto set = client->Call("params_set", {{"unit_id", layout_.unit({n}).id.value},
-                                                     {"axis", Name(axis)},
-                                                     {"parameter", Name(Parameter::kPosition)},
-                                                     {"value", poses[n][Index(axis)]}});
-        ASSERT_TRUE(set) << set.error().text;
-      }
-  }
-
-  Layout layout_;
-  std::vector<UnitDrive> drives_ = std::vector<UnitDrive>(kUnits);
+  const CrowdedFleet fleet_{scratch_ / ""};
 };
 
-TEST_F(CrowdedFocalfleetdTest, DoesNotWaitForAPlanThatTakesAMinute) {
+TEST_F(CrowdedFocalfleetdEndTest, DoesNotWaitForAPlanThatTakesAMinute) {
   auto daemon = Start();
   ASSERT_TRUE(WaitUntil(
       [&] {
         const auto status = Ask("status");
-        return status && (*status)["phases"]["ready"] == kUnits;
+        return status && (*status)["phases"]["ready"] == CrowdedFleet::kUnits;
       },
       kPatienceMs))
       << Log();
-  StandAt(Draw(1));
-  const auto taken = Ask("apply", {{"targets_csv", Targets(2)}});
+  fleet_.StandAt(1);
+  const auto taken = Ask("apply", {{"targets_csv", fleet_.Targets(2)}});
   ASSERT_TRUE(taken) << taken.error().text;
   ASSERT_TRUE(Reaches("planning")) << Log();
   ExpectEndOn(SIGTERM, &daemon);
