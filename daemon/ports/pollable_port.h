@@ -19,14 +19,17 @@ struct PortCounters {
   std::uint64_t reconnects = 0;   // times the link came up again
 };
 
+/// The wait of a port that has no better figure: about eight frames at 1 Mbit/s, in real time.
+inline constexpr DurationNs kRetryFull = Milliseconds(1);
+
 class PollablePort : public FramePort {
  public:
   /// Readable when Receive or another Send can succeed. -1: this port only uses wake_at.
   [[nodiscard]] virtual int fd() const = 0;
   [[nodiscard]] virtual HostInstant wake_at() const = 0;
   /// The wait before another Send can succeed, where one was refused and no event reports room.
-  /// Units: real time. The default lasts about eight frames at 1 Mbit/s.
-  [[nodiscard]] virtual DurationNs retry_full() const { return Milliseconds(1); }
+  /// Units: real time.
+  [[nodiscard]] virtual DurationNs retry_full() const = 0;
   [[nodiscard]] virtual const PortCounters& counters() const = 0;
   /// The interface or path, for messages.
   [[nodiscard]] virtual const std::string& name() const = 0;

@@ -103,7 +103,7 @@ std::shared_ptr<const sim::JointSensors> MakeJoints(const Layout& layout, std::u
 
 bool SimulatedLink::Look(const sim::World& world) {
   const sim::Controller controller = world.controller(bus_);
-  const auto& errors = world.counters(bus_).errors;
+  const auto errors = world.counters(bus_).wire.errors;
   for (std::size_t kind = 0; kind < errors.size(); ++kind) {
     const std::uint64_t more = errors[kind] - std::exchange(counted_[kind], errors[kind]);
     if (more == 0) continue;

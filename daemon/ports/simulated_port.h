@@ -83,6 +83,7 @@ class SimulatedPort : public PollablePort {
   [[nodiscard]] LinkState state() const override;
   [[nodiscard]] int fd() const override { return -1; }
   [[nodiscard]] HostInstant wake_at() const override { return fleet_->NextEvent(bus_); }
+  [[nodiscard]] DurationNs retry_full() const override { return kRetryFull; }
   [[nodiscard]] const PortCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::string& name() const override { return name_; }
   [[nodiscard]] const std::string& trouble() const override { return link_.trouble(); }

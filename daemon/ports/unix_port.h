@@ -31,6 +31,7 @@ class UnixPort : public PollablePort {
   }
   [[nodiscard]] int fd() const override { return socket_.fd(); }
   [[nodiscard]] HostInstant wake_at() const override { return wake_at_; }
+  [[nodiscard]] DurationNs retry_full() const override { return kRetryFull; }
   [[nodiscard]] const PortCounters& counters() const override { return counters_; }
   [[nodiscard]] const std::string& name() const override { return options_.path; }
   [[nodiscard]] const std::string& trouble() const override { return trouble_; }

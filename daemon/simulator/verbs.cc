@@ -92,7 +92,7 @@ Result<Json> Verbs::PowerCut(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
   FOCALFLEET_TRY_ASSIGN(const double seconds, SecondsOr(args, "seconds", -1));
   for (const UnitId unit : units) {
-    world_->PowerCut(unit);
+    world_->disturb().PowerCut(unit);
     std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.unit == unit; });
     if (seconds >= 0) power_returns_.push_back({world_->now() + Seconds(seconds), unit});
   }
@@ -103,7 +103,7 @@ Result<Json> Verbs::PowerOn(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
   for (const UnitId unit : units) {
     std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.unit == unit; });
-    world_->PowerOn(unit);
+    world_->disturb().PowerOn(unit);
   }
   return Json{{"units", units.size()}};
 }
@@ -120,9 +120,9 @@ Result<Json> Verbs::RaiseFault(const Json& args) {
   const Axis axis = axis_name == "phi" ? Axis::kPhi : Axis::kTheta;
   for (const UnitId unit : units) {
     if (after_s < 0) {
-      world_->RaiseFault(unit, *code, axis);
+      world_->disturb().RaiseFault(unit, *code, axis);
     } else {
-      world_->faults(unit)->in_motion = {Seconds(after_s), *code, axis};
+      world_->disturb().faults(unit)->in_motion = {Seconds(after_s), *code, axis};
     }
   }
   return Json{{"units", units.size()}};
@@ -131,7 +131,7 @@ Result<Json> Verbs::RaiseFault(const Json& args) {
 Result<Json> Verbs::Silence(const Json& args) {
   FOCALFLEET_TRY_ASSIGN(const auto units, Units(args));
   FOCALFLEET_TRY_ASSIGN(const bool off, FlagArgumentOr(args, "off", false));
-  for (const UnitId unit : units) world_->faults(unit)->silent = !off;
+  for (const UnitId unit : units) world_->disturb().faults(unit)->silent = !off;
   return Json{{"units", units.size()}};
 }
 
@@ -164,7 +164,7 @@ Result<Json> Verbs::Misbehave(const Json& args) {
     return Fail(ErrorCode::kInvalid,
                 "one serial number is one unit's; " + std::to_string(units.size()) + " are named");
   for (const UnitId unit : units) {
-    sim::UnitFaults& faults = *world_->faults(unit);
+    sim::UnitFaults& faults = *world_->disturb().faults(unit);
     if (off) {
       const sim::UnitFaults before = faults;
       faults = {};
@@ -184,13 +184,13 @@ Result<Json> Verbs::Misbehave(const Json& args) {
 Result<Json> Verbs::SetBuses(const Json& args, bool alive) {
   FOCALFLEET_TRY_ASSIGN(const auto numbers, UnsignedListArgument(args, "buses"));
   for (const std::uint32_t number : numbers)
-    if (world_->faults(BusId{number}) == nullptr)
+    if (world_->disturb().faults(BusId{number}) == nullptr)
       return Fail(ErrorCode::kInvalid, "no bus " + std::to_string(number) + " in this fleet");
   for (const std::uint32_t number : numbers) {
     if (alive) {
-      world_->ReviveBus(BusId{number});
+      world_->disturb().ReviveBus(BusId{number});
     } else {
-      world_->KillBus(BusId{number});
+      world_->disturb().KillBus(BusId{number});
     }
   }
   return Json{{"buses", numbers.size()}};
@@ -199,33 +199,33 @@ Result<Json> Verbs::SetBuses(const Json& args, bool alive) {
 Json Verbs::StatusOfAll() const {
   Json buses = Json::array();
   for (const BusId bus : world_->buses()) {
-    const sim::BusCounters& c = world_->counters(bus);
+    const sim::BusCounters c = world_->counters(bus);
     buses.push_back({{"bus_id", bus.value},
                      {"dead", world_->dead(bus)},
                      {"host_frames", c.host_frames},
                      {"unit_frames", c.unit_frames},
-                     {"bits", c.bits},
-                     {"busy_s", c.busy.seconds()},
-                     {"dropped", c.dropped},
+                     {"bits", c.wire.bits},
+                     {"busy_s", c.wire.busy.seconds()},
+                     {"dropped", c.mailboxes.dropped},
                      {"host_controller", Name(world_->controller(bus).state)},
-                     {"error_frames", c.error_frames()},
-                     {"error_bits", c.error_bits},
+                     {"error_frames", c.wire.error_frames()},
+                     {"error_bits", c.wire.error_bits},
                      {"repeats", c.repeats},
                      {"received_twice", c.received_twice},
                      {"babbled", c.babbled},
-                     {"went_passive", c.went_passive},
-                     {"went_off", c.went_off},
-                     {"recovered", c.recovered},
-                     {"stuck_s", c.stuck.seconds()},
-                     {"refused", c.refused},
-                     {"waiting_max", c.waiting_max}});
+                     {"went_passive", c.controllers.went_passive},
+                     {"went_off", c.controllers.went_off},
+                     {"recovered", c.controllers.recovered},
+                     {"stuck_s", c.wire.stuck.seconds()},
+                     {"refused", c.mailboxes.refused},
+                     {"waiting_max", c.mailboxes.waiting_max}});
   }
   return {{"units", world_->units().size()}, {"now_ns", world_->now().ns}, {"buses", buses}};
 }
 
 void Verbs::Tick(HostInstant now) {
   for (const PowerReturn& back : power_returns_)
-    if (back.at <= now) world_->PowerOn(back.unit);
+    if (back.at <= now) world_->disturb().PowerOn(back.unit);
   std::erase_if(power_returns_, [&](const PowerReturn& back) { return back.at <= now; });
 }
 

@@ -77,7 +77,7 @@ CanFrame Babble(const UnitDescription& unit, double priority) {
 }
 
 void ApplyToBus(const PlannedFault& fault, bool begins, World* world) {
-  BusFaults& faults = *world->faults(fault.bus);
+  BusFaults& faults = *world->disturb().faults(fault.bus);
   const double chance = begins ? fault.chance : 0;
   switch (fault.kind) {
     case FaultKind::kNoise:
@@ -94,13 +94,13 @@ void ApplyToBus(const PlannedFault& fault, bool begins, World* world) {
       faults.late_by = Seconds(fault.value);
       return;
     case FaultKind::kStuck:
-      begins ? world->StickBus(fault.bus) : world->ReleaseBus(fault.bus);
+      begins ? world->disturb().StickBus(fault.bus) : world->disturb().ReleaseBus(fault.bus);
       return;
     case FaultKind::kDead:
-      begins ? world->KillBus(fault.bus) : world->ReviveBus(fault.bus);
+      begins ? world->disturb().KillBus(fault.bus) : world->disturb().ReviveBus(fault.bus);
       return;
     default:
-      if (begins) world->ThrowHostOff(fault.bus);
+      if (begins) world->disturb().ThrowHostOff(fault.bus);
   }
 }
 
@@ -122,19 +122,19 @@ UnitFaults::Sensor SensorFault(const PlannedFault& fault) {
 }
 
 void ApplyToUnit(const PlannedFault& fault, bool begins, World* world) {
-  UnitFaults& faults = *world->faults(fault.unit);
+  UnitFaults& faults = *world->disturb().faults(fault.unit);
   switch (fault.kind) {
     case FaultKind::kBabble: {
       std::optional<CanFrame> frame;
       if (begins) frame = Babble(world->units()[*world->Find(fault.unit)], fault.value);
-      world->Babble(fault.unit, frame);
+      world->disturb().Babble(fault.unit, frame);
       return;
     }
     case FaultKind::kUnplugged:
-      begins ? world->Unplug(fault.unit) : world->Plug(fault.unit);
+      begins ? world->disturb().Unplug(fault.unit) : world->disturb().Plug(fault.unit);
       return;
     case FaultKind::kPowerCut:
-      begins ? world->PowerCut(fault.unit) : world->PowerOn(fault.unit);
+      begins ? world->disturb().PowerCut(fault.unit) : world->disturb().PowerOn(fault.unit);
       return;
     case FaultKind::kSilent:
       faults.silent = begins;

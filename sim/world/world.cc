@@ -11,9 +11,9 @@
 namespace focalfleet::sim {
 namespace {
 
-Controller ControllerOf(const Bus& bus, std::uint32_t node) {
-  const ErrorCounters& errors = bus.errors(node);
-  return {bus.state(node), errors.warns(), errors.transmit(), errors.receive()};
+Controller ControllerOf(const BusNode& node) {
+  const ErrorCounters& errors = node.errors;
+  return {node.state(), errors.warns(), errors.transmit(), errors.receive()};
 }
 
 Status Complain(const UnitDescription& unit, const std::string& what) {
@@ -123,14 +123,14 @@ std::span<const BusId> World::buses() const { return core_->buses(); }
 std::optional<std::size_t> World::Find(UnitId unit) const { return core_->Find(unit); }
 UnitTruth World::Truth(UnitId unit) const { return Truth(core_->Row(unit)); }
 const Flash& World::flash(UnitId unit) const { return core_->unit(core_->Row(unit)).flash(); }
-const BusCounters& World::counters(BusId bus) const { return core_->At(bus).bus.counters(); }
+BusCounters World::counters(BusId bus) const { return core_->At(bus).bus.counters(); }
 Controller World::controller(BusId bus) const {
-  return ControllerOf(core_->At(bus).bus, Bus::kHost);
+  return ControllerOf(core_->At(bus).bus.node(kHostNode));
 }
 Controller World::controller(UnitId unit) const {
   Controller controller;
-  core_->OnBusOf(core_->Row(unit), [&](const Bus* wire, std::uint32_t node) {
-    controller = ControllerOf(*wire, node);
+  core_->OnBusOf(core_->Row(unit), [&](const Bus* bus, std::uint32_t node) {
+    controller = ControllerOf(bus->node(node));
   });
   return controller;
 }

@@ -29,7 +29,7 @@
 #include "protocol/link/frame_port.h"
 #include "sim/world/axis/axis_memory.h"
 #include "sim/world/bus/bus.h"
-#include "sim/world/disturbable.h"
+#include "sim/world/disturbances.h"
 #include "sim/world/fault_plan.h"
 #include "sim/world/faults.h"
 #include "sim/world/spread.h"
@@ -105,7 +105,7 @@ struct WireFrame {
   std::uint32_t client = 0;  // the client that injected it, where it is not from a unit
 };
 
-class World : public Disturbable {
+class World {
  public:
   /// Returns the first fault in the units (bus, node or id used twice, range the wrong way round
   /// ...).
@@ -134,6 +134,9 @@ class World : public Disturbable {
   /// Puts an edge on the SYNC line, which goes to every unit of every bus; at now().
   void PulseSync();
 
+  /// The disturbances of this world; valid as long as the world.
+  [[nodiscard]] Disturbances disturb() { return Disturbances(core_.get()); }
+
   // ---- the true state
 
   [[nodiscard]] std::span<const UnitDescription> units() const;
@@ -145,13 +148,14 @@ class World : public Disturbable {
   [[nodiscard]] bool dead(BusId bus) const;
   /// The number of frames that wait or are on their way on this bus.
   [[nodiscard]] std::size_t waiting(BusId bus) const;
-  [[nodiscard]] const BusCounters& counters(BusId bus) const;
+  [[nodiscard]] BusCounters counters(BusId bus) const;
   [[nodiscard]] Controller controller(BusId bus) const;    // the host's. Pre: there is such a bus
   [[nodiscard]] Controller controller(UnitId unit) const;  // Pre: it exists
   /// FLASH and mechanics of all units at now(), as a later run would find them.
   [[nodiscard]] std::vector<UnitMemory> Memory() const;
 
  private:
+  std::unique_ptr<WorldCore> core_;
   FaultSchedule schedule_;
 };
 

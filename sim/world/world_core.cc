@@ -72,7 +72,7 @@ WorldCore::WorldCore(WorldConfig config)
   MakeUnits();
 }
 
-bool WorldCore::Inject(BusId bus, const Bus::Waiting& waiting, HostInstant at) {
+bool WorldCore::Inject(BusId bus, const WaitingFrame& waiting, HostInstant at) {
   const auto found = segment_of_.find(bus);
   if (found == segment_of_.end()) return false;
   Wire& segment = segments_[found->second];
@@ -109,13 +109,13 @@ void WorldCore::PulseSync() {
 
 void WorldCore::PowerCut(std::uint32_t row) {
   units_[row]->firmware().PowerOff(now_);
-  OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->PowerOff(node, now_); });
+  OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->disturb().PowerOff(node, now_); });
   Reschedule(row);
 }
 
 void WorldCore::PowerOn(std::uint32_t row) {
   units_[row]->firmware().PowerOn(now_);
-  OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->PowerOn(node, now_); });
+  OnBusOf(row, [&](Bus* bus, std::uint32_t node) { bus->disturb().PowerOn(node, now_); });
   Reschedule(row);
 }
 
@@ -187,13 +187,13 @@ void WorldCore::AdvanceBus(std::size_t slot, std::vector<ReceivedFrame>* deliver
   Wire& segment = segments_[slot];
   Bus::Heard heard;
   if (segment.bus.Advance(&heard) && !heard.lost) {
-    const Bus::Waiting& sent = heard.sent;
+    const WaitingFrame& sent = heard.sent;
     if (wire != nullptr)
       wire->push_back(
           {segment.id, heard.at, sent.frame, sent.from_unit, sent.from_unit ? 0 : sent.sender});
     if (!sent.from_unit) {
       Deliver(segment, heard);
-    } else if (segment.bus.Hears(Bus::kHost) && heard.but_not != Bus::kHost) {
+    } else if (segment.bus.node(kHostNode).hears() && heard.but_not != kHostNode) {
       delivered->push_back({segment.id, heard.at, sent.frame});
     }
   }
@@ -212,7 +212,7 @@ void WorldCore::Deliver(Wire& segment, const Bus::Heard& heard) {
 
 void WorldCore::DeliverTo(std::uint32_t row, const Bus::Heard& heard) {
   const std::uint32_t node = node_of_row_[row];
-  if (!segments_[bus_of_row_[row]].bus.Hears(node) || heard.but_not == node) return;
+  if (!segments_[bus_of_row_[row]].bus.node(node).hears() || heard.but_not == node) return;
   if (units_[row]->faults().deaf) return;
   TransmitQueue out;
   units_[row]->OnFrame(heard.sent.frame, now_, &out);

@@ -33,7 +33,7 @@ class WorldCore {
 
   // ---- the operations of World, at now() or up to `at`
 
-  bool Inject(BusId bus, const Bus::Waiting& waiting, HostInstant at);
+  bool Inject(BusId bus, const WaitingFrame& waiting, HostInstant at);
   void AdvanceTo(HostInstant at, std::vector<ReceivedFrame>* delivered,
                  std::vector<WireFrame>* wire);
   void PulseSync();

@@ -65,7 +65,7 @@ class StopBench {
       lines_.push_back({bus, std::make_unique<SimulatedPort>(fleet_, bus), TransmitQueue()});
     while (!AllReady()) Turn();
     for (const Unit& unit : layout_.units())
-      fleet_->world().faults(unit.id)->copies = kAnswerCopies;
+      fleet_->world().disturb().faults(unit.id)->copies = kAnswerCopies;
     std::vector<std::optional<Pose>> standing(layout_.size());
     const auto targets =
         DrawConfiguration(layout_, drives_, standing, Rng::Stream(seed, "targets")).value();

@@ -63,7 +63,7 @@ if classic.keys() != groups_received.keys():
     fail(f"other units: {classic.keys() ^ groups_received.keys()}")
 for unit, received in classic.items():
     if received != groups_received[unit]:
-        fail(f"unit {unit} was told {groups_received[unit]}, not {received}")
+        fail(f"unit {unit} received {groups_received[unit]}, not {received}")
 if grouped < 2 * groups or fd_frames * 2 > classic_frames:
     fail(f"{fd_frames} frames stage what {classic_frames} did: hardly any are saved")
 print(f"fd_groups: {len(classic)} units were staged the same by {classic_frames} classic frames and by {groups} groups "

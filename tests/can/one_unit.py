@@ -265,16 +265,16 @@ class Unit:
         self.send(PROGRESS, sequence, data, self.state)
 
     def on_status(self, sequence, detail, _data, frame):
-        told = self.restarted
+        restarted = self.restarted
         if detail == 1:
             if self.resume and self.resume[0] == frame[0]:
-                told = self.resume[1]
-            self.resume = (frame[0], told)
+                restarted = self.resume[1]
+            self.resume = (frame[0], restarted)
             self.restarted = self.host_lost = False
             if self.state == HOST_LOST:
                 self.state = REST
         interrupted = self.flash.marked and self.state not in (MOVING, HOMING)
-        flags = 1 * interrupted | 2 * self.host_lost | 4 * told
+        flags = 1 * interrupted | 2 * self.host_lost | 4 * restarted
         percent = 0
         if self.state == MOVING:
             begin, end = self.began_and_ends()

@@ -70,13 +70,13 @@ void Run(const std::uint8_t* data, std::size_t size) {
        ++i, data += kRecord, size -= kRecord) {
     switch (data[0] % 16) {
       case 0:
-        world.PowerCut(kUnit);
+        world.disturb().PowerCut(kUnit);
         break;
       case 1:
-        world.PowerOn(kUnit);
+        world.disturb().PowerOn(kUnit);
         break;
       case 2:
-        world.RaiseFault(kUnit, static_cast<FaultCode>(data[2] % kFaultCodeCount));
+        world.disturb().RaiseFault(kUnit, static_cast<FaultCode>(data[2] % kFaultCodeCount));
         break;
       default:
         world.Inject({}, FrameOf(data), world.now());

@@ -37,7 +37,7 @@ bool HasEnded(InProcessFleet* fleet, AlarmName name, BusId bus) {
 std::uint64_t ErrorFrames(InProcessFleet* fleet) {
   std::uint64_t sum = 0;
   for (const BusId bus : fleet->layout().buses())
-    sum += fleet->world().counters(bus).error_frames();
+    sum += fleet->world().counters(bus).wire.error_frames();
   return sum;
 }
 
@@ -74,7 +74,8 @@ TEST(BusFaults, NoiseCostsTimeAndNoUnit) {
   for (const double rate : {1e-5, 1e-4}) {
     SCOPED_TRACE(rate);
     InProcessFleet fleet({.count = kUnits, .seed = 31});
-    for (const BusId bus : fleet.layout().buses()) fleet.world().faults(bus)->bit_error_rate = rate;
+    for (const BusId bus : fleet.layout().buses())
+      fleet.world().disturb().faults(bus)->bit_error_rate = rate;
     fleet.ApplyRandom(31);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_EQ(CountOutcome(fleet, TargetOutcome::kArrived), kUnits);
@@ -99,12 +100,12 @@ TEST(BusFaults, ABabblingUnitTakesOnlyItsBus) {
       [&] { return fleet.coordinator().configuration().state == ConfigurationState::kUploading; },
       Seconds(60)));
   CanFrame babble{1u << 26 | 63u << 20 | 1u << 19, 8, {}};
-  fleet.world().Babble(babbler, babble);
+  fleet.world().disturb().Babble(babbler, babble);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_GT(fleet.world().counters(sick).babbled, 10'000u);
   ExpectOnlyTheSickBusSuffers(&fleet, sick);
   EXPECT_GT(CountOutcome(fleet, TargetOutcome::kFailed), 5u) << "nothing below passed";
-  fleet.world().Babble(babbler, std::nullopt);
+  fleet.world().disturb().Babble(babbler, std::nullopt);
   ExpectAllArriveNow(&fleet, 33);
 }
 
@@ -118,7 +119,7 @@ TEST(BusFaults, BusOffInMidMotionIsReportedWithItsCauseAndTheBusComesBack) {
       Seconds(60)));
   fleet.Run(Seconds(1));
   // Hardly a frame survives on this bus; the controllers' error counters do the rest.
-  fleet.world().faults(sick)->bit_error_rate = 0.05;
+  fleet.world().disturb().faults(sick)->bit_error_rate = 0.05;
   const auto state = [&] { return fleet.coordinator().bus(sick).link; };
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kPassive; }, Seconds(20)));
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kOff; }, Seconds(20)));
@@ -131,7 +132,7 @@ TEST(BusFaults, BusOffInMidMotionIsReportedWithItsCauseAndTheBusComesBack) {
   fleet.Run(Milliseconds(500));
   EXPECT_EQ(state(), LinkState::kOff) << "restarted after a second";
   EXPECT_FALSE(HasEnded(&fleet, AlarmName::kBusDown, sick));
-  fleet.world().faults(sick)->bit_error_rate = 0;
+  fleet.world().disturb().faults(sick)->bit_error_rate = 0;
   ASSERT_TRUE(fleet.RunUntil([&] { return state() == LinkState::kUp; }, Seconds(2)));
   ASSERT_TRUE(fleet.RunUntilIdle());
   ExpectOnlyTheSickBusSuffers(&fleet, sick);
@@ -148,10 +149,10 @@ TEST(BusFaults, AWireStuckDominantLosesItsUnitsAndNoTruth) {
     const BusId sick = fleet.layout().buses()[0];
     fleet.ApplyRandom(run);
     fleet.Run(Milliseconds(static_cast<std::int64_t>(1900 + 300 * (run - seed))));
-    fleet.world().StickBus(sick);
+    fleet.world().disturb().StickBus(sick);
     fleet.Run(Seconds(8));
     EXPECT_NE(fleet.world().controller(sick).state, sim::Confinement::kActive);
-    fleet.world().ReleaseBus(sick);
+    fleet.world().disturb().ReleaseBus(sick);
     ASSERT_TRUE(fleet.RunUntilIdle());
     ExpectOnlyTheSickBusSuffers(&fleet, sick);
     ExpectAllArriveNow(&fleet, run + 100);
@@ -174,8 +175,8 @@ TEST(BusFaults, APlanOfFaultsGivesTheSameRunTwice) {
     EXPECT_TRUE(fleet.RunUntilIdle());
     fleet.Run(Milliseconds(100));
     ExpectStoreTellsTheTruth(fleet, "at the end");
-    EXPECT_GT(fleet.world().counters({0}).error_frames(), 0u);
-    EXPECT_EQ(fleet.world().counters({1}).went_off, 1u);
+    EXPECT_GT(fleet.world().counters({0}).wire.error_frames(), 0u);
+    EXPECT_EQ(fleet.world().counters({1}).controllers.went_off, 1u);
     EXPECT_GT(fleet.world().counters({2}).received_twice, 0u);
     return fleet.digest();
   };

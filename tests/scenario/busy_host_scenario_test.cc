@@ -149,9 +149,9 @@ TEST(BusyHost, UnitsThatLosePowerAgainAndAgainHaveNoSlowClocks) {
   InProcessFleet fleet({.count = 19, .units_per_bus = 10, .seed = seed});
   for (int i = 0; i < 200; ++i) {
     const UnitId unit = fleet.id(static_cast<std::uint32_t>(rng.Below(19)));
-    fleet.world().PowerCut(unit);
+    fleet.world().disturb().PowerCut(unit);
     fleet.Run(Seconds(rng.Uniform(0, 0.2)));
-    fleet.world().PowerOn(unit);
+    fleet.world().disturb().PowerOn(unit);
     fleet.Run(Seconds(rng.Uniform(0, 1.5)));
   }
   EXPECT_THAT(AlarmsOfTime(fleet), ::testing::IsEmpty());
@@ -161,7 +161,7 @@ TEST(BusyHost, OtherHardwareHasAnotherClock) {
   InProcessFleet fleet({.count = 7, .units_per_bus = 7, .seed = TestSeed(88)});
   fleet.Run(Seconds(45));
   EXPECT_GE(fleet.coordinator().unit({2}).clock.readings, 4u);
-  sim::UnitFaults& faults = *fleet.world().faults(fleet.id(2));
+  sim::UnitFaults& faults = *fleet.world().disturb().faults(fleet.id(2));
   faults.silent = true;
   fleet.Run(Seconds(15));
   EXPECT_EQ(fleet.coordinator().unit({2}).phase, UnitPhase::kSilent);

@@ -43,7 +43,7 @@ print(
 )
 
 
-def told(file):
+def estimated(file):
     with open(file) as text:
         estimate = json.load(text)
     return estimate["makespan_s"]["value"], estimate["modes"][0]["energy_J"]["value"]
@@ -51,9 +51,9 @@ def told(file):
 
 with open("one.json") as text:
     one = json.load(text)
-makespan_s, energy_J = told("estimate.json")
+makespan_s, energy_J = estimated("estimate.json")
 assert makespan_s == one["makespan_predicted_s"], (makespan_s, one)
 assert math.isclose(energy_J, one["energy_J"], rel_tol=1e-6), (energy_J, one)  # summed in another order
-assert told("nominal.json") != told("estimate.json"), told("nominal.json")
+assert estimated("nominal.json") != estimated("estimate.json"), estimated("nominal.json")
 assert achieved < 0.5 * before, (before, achieved)
 assert achieved < 1.3 * predicted + 2, (predicted, achieved)

@@ -64,7 +64,7 @@ TEST(Configuration, WhileOneRunsAnotherIsRefused) {
 TEST(Configuration, SilentUnitIsNamedAndTheOthersArrive) {
   InProcessFleet fleet(Small(11));
   fleet.Run(Seconds(2));
-  fleet.world().faults(fleet.id(4))->silent = true;
+  fleet.world().disturb().faults(fleet.id(4))->silent = true;
   fleet.ApplyRandom(11);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const UnitView& view = fleet.coordinator().unit({4});
@@ -77,7 +77,7 @@ TEST(Configuration, SilentUnitIsNamedAndTheOthersArrive) {
 
 TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
   InProcessFleet fleet(Small(12));
-  fleet.world().faults(fleet.id(0))->deaf = true;
+  fleet.world().disturb().faults(fleet.id(0))->deaf = true;
   fleet.ApplyRandom(12);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({0}).outcome, TargetOutcome::kFailed);
@@ -88,7 +88,8 @@ TEST(Configuration, UnitThatNeverAnsweredIsNamedAndTheOthersArrive) {
 
 TEST(Configuration, PredictsOnlyWhatIsStarted) {
   InProcessFleet fleet(Small(14));
-  fleet.world().faults(fleet.id(7))->wrong_digest = true;  // costs a plan before any start
+  fleet.world().disturb().faults(fleet.id(7))->wrong_digest =
+      true;  // costs a plan before any start
   fleet.ApplyRandom(14);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const ConfigurationView& view = fleet.coordinator().configuration();
@@ -112,7 +113,7 @@ TEST(Configuration, HomingIsPredicted) {
 
 TEST(Configuration, HomingTellsNothingOfTheOneBefore) {
   InProcessFleet fleet(Small(45));
-  fleet.world().faults(fleet.id(7))->wrong_digest = true;
+  fleet.world().disturb().faults(fleet.id(7))->wrong_digest = true;
   fleet.ApplyRandom(45);
   ASSERT_TRUE(fleet.RunUntilIdle());
   ASSERT_EQ(fleet.coordinator().unit({7}).outcome, TargetOutcome::kFailed);
@@ -129,7 +130,7 @@ TEST(Configuration, HomingTellsNothingOfTheOneBefore) {
 TEST(Configuration, TellsTheWayOutOfAFault) {
   InProcessFleet fleet(Small(46));
   fleet.Run(Seconds(5));
-  fleet.world().RaiseFault(fleet.id(8), FaultCode::kDriver);
+  fleet.world().disturb().RaiseFault(fleet.id(8), FaultCode::kDriver);
   fleet.Run(Seconds(30));
   fleet.Send({900, HomeCommand{{{8}}}});
   fleet.Run(Seconds(1));
@@ -148,8 +149,9 @@ TEST(Configuration, TellsTheWayOutOfAFault) {
 TEST(Configuration, LateAndDoubledAnswersAreNoTrouble) {
   InProcessFleet fleet(Small(13));
   for (std::uint32_t n = 0; n < 37; ++n) {
-    fleet.world().faults(fleet.id(n))->late = Milliseconds(n * 2);  // up to past the deadline
-    fleet.world().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
+    fleet.world().disturb().faults(fleet.id(n))->late =
+        Milliseconds(n * 2);  // up to past the deadline
+    fleet.world().disturb().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
   }
   fleet.ApplyRandom(13);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -158,7 +160,7 @@ TEST(Configuration, LateAndDoubledAnswersAreNoTrouble) {
 
 TEST(Configuration, WrongReadBackIsRetriedThenNamed) {
   InProcessFleet fleet(Small(14));
-  fleet.world().faults(fleet.id(7))->wrong_digest = true;
+  fleet.world().disturb().faults(fleet.id(7))->wrong_digest = true;
   fleet.ApplyRandom(14);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({7}).outcome, TargetOutcome::kFailed);
@@ -169,7 +171,8 @@ TEST(Configuration, WrongReadBackIsRetriedThenNamed) {
 
 TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
   InProcessFleet fleet(Small(15));
-  fleet.world().faults(fleet.id(3))->in_motion = sim::UnitFaults::InMotion{.after = Seconds(2)};
+  fleet.world().disturb().faults(fleet.id(3))->in_motion =
+      sim::UnitFaults::InMotion{.after = Seconds(2)};
   fleet.ApplyRandom(15);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({3}).outcome, TargetOutcome::kFailed);
@@ -180,7 +183,8 @@ TEST(Configuration, FaultInMotionStopsWhoDependsOnItAndTheOthersArriveLater) {
 
 TEST(Configuration, LostDoneReportsAreAskedFor) {
   InProcessFleet fleet(Small(16));
-  for (const std::uint32_t n : {1u, 8u, 20u}) fleet.world().faults(fleet.id(n))->mute_done = true;
+  for (const std::uint32_t n : {1u, 8u, 20u})
+    fleet.world().disturb().faults(fleet.id(n))->mute_done = true;
   fleet.ApplyRandom(16);
   ASSERT_TRUE(fleet.RunUntilIdle());
   ExpectOthersArrive(&fleet, 0);
@@ -191,8 +195,8 @@ TEST(Configuration, FramesLostAtRandomDelayButDoNotFail) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet(Small(seed));
     for (const BusId bus : fleet.layout().buses()) {
-      fleet.world().faults(bus)->drop = 0.02;
-      fleet.world().faults(bus)->duplicate = 0.02;
+      fleet.world().disturb().faults(bus)->drop = 0.02;
+      fleet.world().disturb().faults(bus)->duplicate = 0.02;
     }
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
@@ -204,7 +208,7 @@ TEST(Configuration, DeadBusTakesOnlyItsUnits) {
   InProcessFleet fleet(Small(20));
   fleet.Run(Seconds(2));
   const BusId dead = fleet.layout().buses()[1];
-  fleet.world().KillBus(dead);
+  fleet.world().disturb().KillBus(dead);
   fleet.ApplyRandom(20);
   ASSERT_TRUE(fleet.RunUntilIdle());
   for (std::uint32_t n = 0; n < 37; ++n) {
@@ -216,7 +220,7 @@ TEST(Configuration, DeadBusTakesOnlyItsUnits) {
     }
   }
   EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 15u);
-  fleet.world().ReviveBus(dead);
+  fleet.world().disturb().ReviveBus(dead);
   fleet.Run(Seconds(10));
   fleet.ApplyRandom(21);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -243,7 +247,7 @@ TEST(Configuration, EveryStepOfALinkIsReportedWithItsCauseAndOnlyOffLosesUnits) 
   fleet.ApplyRandom(23);
   RunIntoMotion(&fleet, Seconds(2));
   EXPECT_GT(phases(UnitPhase::kMoving), 0) << "a passive controller still carries frames";
-  fleet.world().KillBus(sick);
+  fleet.world().disturb().KillBus(sick);
   fleet.ReportLink({sick, LinkState::kOff, "the controller is bus-off (no acknowledgement)"});
   fleet.Run(Milliseconds(10));
   EXPECT_EQ(phases(UnitPhase::kSilent), of_bus) << "at once, from passive as from up";
@@ -264,7 +268,7 @@ TEST(Configuration, EveryStepOfALinkIsReportedWithItsCauseAndOnlyOffLosesUnits) 
   EXPECT_FALSE(HasAlarm(fleet, "the interface is down; its")) << "they were lost before";
   EXPECT_NE(Unserved(fleet).find("it cannot be reached: " + name + " is off"), std::string::npos)
       << Unserved(fleet);
-  fleet.world().ReviveBus(sick);
+  fleet.world().disturb().ReviveBus(sick);
   fleet.ReportLink({sick, LinkState::kUp, ""});
   fleet.Run(Seconds(10));
   EXPECT_EQ(phases(UnitPhase::kReady), of_bus);
@@ -295,9 +299,9 @@ TEST(Configuration, PowerCutInMidMoveLeavesAnIntervalThatHoldsTheTruth) {
   fleet.ApplyRandom(22);
   RunIntoMotion(&fleet, Seconds(2));
   const PositionerIndex victim = SomebodyMoving(&fleet);
-  fleet.world().PowerCut(fleet.id(victim.value));
+  fleet.world().disturb().PowerCut(fleet.id(victim.value));
   fleet.Run(Seconds(3));
-  fleet.world().PowerOn(fleet.id(victim.value));
+  fleet.world().disturb().PowerOn(fleet.id(victim.value));
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.Run(Seconds(15));
   const UnitView& view = fleet.coordinator().unit(victim);
@@ -335,7 +339,7 @@ TEST(Configuration, SameSeedSameFrames) {
   std::uint64_t digests[2];
   for (auto& digest : digests) {
     InProcessFleet fleet(Small(31));
-    for (const BusId bus : fleet.layout().buses()) fleet.world().faults(bus)->drop = 0.01;
+    for (const BusId bus : fleet.layout().buses()) fleet.world().disturb().faults(bus)->drop = 0.01;
     fleet.ApplyRandom(31);
     EXPECT_TRUE(fleet.RunUntilIdle());
     digest = fleet.digest();

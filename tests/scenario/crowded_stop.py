@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """crowded_stop.py BIN [--units N] [--stops K]: measures how long `stop` takes on the control socket of a daemon that many clients
 ask. The daemon is a real focalfleetd with a simulated fleet in it. The clients are a process of their own and ask again as soon as they
-are answered. The program prints the times of K stops on a connection of their own beside each crowd of clients. The exit code is 1
+are answered. The program prints the times of K stops on a connection of their own beside each group of clients. The exit code is 1
 where a stop was not answered."""
 
 import argparse
@@ -25,7 +25,7 @@ port = "simulated"
 [log]
 level = "error"
 """
-CROWDS = (("nobody", 0, ""), ("10 ask status", 10, "status"), ("10 ask state", 10, "state"), ("40 ask state", 40, "state"),
+GROUPS = (("nobody", 0, ""), ("10 ask status", 10, "status"), ("10 ask state", 10, "state"), ("40 ask state", 40, "state"),
           ("64 idle", 64, ""))
 
 
@@ -54,7 +54,7 @@ def ask(end, verb):
     return answer["result"]
 
 
-def be_crowd(path, count, verb):
+def be_clients(path, count, verb):
     """Does not return."""
     ends = {}
     ready = select.epoll()
@@ -85,11 +85,11 @@ def time_stops(path, count):
     return sorted(times_ms)
 
 
-def try_crowd(path, name, count, verb, stops):
-    crowd = None
+def try_clients(path, name, count, verb, stops):
+    clients = None
     if count:
-        crowd = subprocess.Popen([sys.executable, __file__, "--crowd", path, str(count), verb], stdout=subprocess.PIPE)
-        crowd.stdout.readline()
+        clients = subprocess.Popen([sys.executable, __file__, "--clients", path, str(count), verb], stdout=subprocess.PIPE)
+        clients.stdout.readline()
     try:
         ms = time_stops(path, stops)
         print(f"{name:16} {ms[len(ms) // 2]:8.2f} {ms[len(ms) * 99 // 100]:8.2f} {ms[-1]:8.2f}", flush=True)
@@ -98,9 +98,9 @@ def try_crowd(path, name, count, verb, stops):
         print(f"{name:16} NOT ANSWERED: {error}", flush=True)
         return False
     finally:
-        if crowd:
-            crowd.kill()
-            crowd.wait()
+        if clients:
+            clients.kill()
+            clients.wait()
 
 
 def wait_until_ready(path, daemon):
@@ -118,8 +118,8 @@ def wait_until_ready(path, daemon):
 
 
 def main():
-    if sys.argv[1:2] == ["--crowd"]:
-        be_crowd(sys.argv[2], int(sys.argv[3]), sys.argv[4])
+    if sys.argv[1:2] == ["--clients"]:
+        be_clients(sys.argv[2], int(sys.argv[3]), sys.argv[4])
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("bin")
     parser.add_argument("--units", type=int, default=5000)
@@ -134,7 +134,7 @@ def main():
         try:
             wait_until_ready(f"{folder}/control.sock", daemon)
             print(f"{'beside':16} {'p50_ms':>8} {'p99_ms':>8} {'most_ms':>8}")
-            answered = [try_crowd(f"{folder}/control.sock", *crowd, options.stops) for crowd in CROWDS]
+            answered = [try_clients(f"{folder}/control.sock", *clients, options.stops) for clients in GROUPS]
         finally:
             daemon.send_signal(signal.SIGTERM)
             daemon.wait()

@@ -81,9 +81,9 @@ TEST_F(HallScenario, CorrectionsBringUnitsToTheirTargetsWithoutACamera) {
 TEST_F(HallScenario, WhoseSensorLiesIsNamedAndStaysAsItReports) {
   Make({.count = 40, .seed = 5, .config = {.reads_sensors = true}, .sensors = 8});
   using Kind = sim::UnitFaults::Sensor::Kind;
-  fleet_->world().faults(fleet_->id(3))->sensor = {Kind::kStuck, 2, 0};
-  fleet_->world().faults(fleet_->id(4))->sensor = {Kind::kSwapped, 0, 5};
-  fleet_->world().faults(fleet_->id(5))->sensor = {Kind::kMissing, 6, 0};
+  fleet_->world().disturb().faults(fleet_->id(3))->sensor = {Kind::kStuck, 2, 0};
+  fleet_->world().disturb().faults(fleet_->id(4))->sensor = {Kind::kSwapped, 0, 5};
+  fleet_->world().disturb().faults(fleet_->id(5))->sensor = {Kind::kMissing, 6, 0};
   fleet_->ApplyRandomMeasured(1, {.corrections = 1, .tolerance_um = 20});
   ASSERT_TRUE(fleet_->RunUntilIdle());
   for (const std::uint32_t liar : {3u, 4u}) {
@@ -106,8 +106,8 @@ TEST_F(HallScenario, WhoseSensorLiesIsNamedAndStaysAsItReports) {
 
 TEST_F(HallScenario, WhoDoesNotTellItsSensorsIsNotLost) {
   Make({.count = 20, .seed = 6, .config = {.reads_sensors = true}, .sensors = 8});
-  fleet_->world().faults(fleet_->id(2))->ignores = Function::kSensors;
-  fleet_->world().faults(fleet_->id(7))->protocol_version = kProtocolVersion;
+  fleet_->world().disturb().faults(fleet_->id(2))->ignores = Function::kSensors;
+  fleet_->world().disturb().faults(fleet_->id(7))->protocol_version = kProtocolVersion;
   fleet_->ApplyRandomMeasured(1, {.corrections = 0, .tolerance_um = 20});
   ASSERT_TRUE(fleet_->RunUntilIdle());
   for (const std::uint32_t mute : {2u, 7u}) {

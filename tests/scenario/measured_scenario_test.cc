@@ -233,9 +233,9 @@ TEST(Measured, UnitsThatLostPowerInMidMoveAreFoundAndMoveAgain) {
   InProcessFleet fleet(WithCamera(11));
   fleet.ApplyRandom(15);
   RunIntoMotion(&fleet, Seconds(2));
-  for (const std::uint32_t n : {3u, 9u, 17u}) fleet.world().PowerCut(fleet.id(n));
+  for (const std::uint32_t n : {3u, 9u, 17u}) fleet.world().disturb().PowerCut(fleet.id(n));
   fleet.Run(Seconds(1));
-  for (const std::uint32_t n : {3u, 9u, 17u}) fleet.world().PowerOn(fleet.id(n));
+  for (const std::uint32_t n : {3u, 9u, 17u}) fleet.world().disturb().PowerOn(fleet.id(n));
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.Run(Seconds(5));
   ASSERT_LE(CountKnown(fleet), 34u);

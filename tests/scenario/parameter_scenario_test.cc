@@ -39,7 +39,7 @@ TEST(Configuration, ParameterIsSetWhenTheUnitSaysSo) {
             "unit 4: phi subdivision = 192");
   EXPECT_EQ(fleet.coordinator().drives()[3].axis[1].subdivision, 192);
   EXPECT_FALSE(IsPlace(fleet.coordinator().unit({3}).knowledge)) << "rounded: not the same place";
-  fleet.world().faults(fleet.id(3))->silent = true;
+  fleet.world().disturb().faults(fleet.id(3))->silent = true;
   const auto silent = Write(&fleet, {{3}, Axis::kTheta, Parameter::kRepeat, 60});
   ASSERT_TRUE(silent.error);
   EXPECT_EQ(silent.error->code, ErrorCode::kUnavailable);
@@ -51,9 +51,9 @@ TEST(Configuration, WritingItsPositionMakesAUnitKnown) {
   fleet.ApplyRandom(22);
   RunIntoMotion(&fleet, Seconds(2));
   const PositionerIndex one = SomebodyMoving(&fleet);
-  fleet.world().PowerCut(fleet.id(one.value));
+  fleet.world().disturb().PowerCut(fleet.id(one.value));
   fleet.Run(Seconds(3));
-  fleet.world().PowerOn(fleet.id(one.value));
+  fleet.world().disturb().PowerOn(fleet.id(one.value));
   ASSERT_TRUE(fleet.RunUntilIdle());
   fleet.Run(Seconds(15));
   const UnitView& view = fleet.coordinator().unit(one);

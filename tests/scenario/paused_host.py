@@ -82,7 +82,7 @@ class Watcher:
                 while not self.over.is_set():
                     what()
                     self.over.wait(period_s)
-            except Exception as error:  # told by end()
+            except Exception as error:  # end() reports it
                 self.trouble = error
 
         self.thread = threading.Thread(target=run)

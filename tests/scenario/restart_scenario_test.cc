@@ -64,7 +64,7 @@ TEST(Configuration, CutHomingIsNotAPlace) {
     });
     ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) { StopDirectly(fleet); });
     ExpectCutHomingIsNotAPlace(ms, [](InProcessFleet* fleet) {
-      fleet->world().RaiseFault(fleet->id(4), FaultCode::kDriver);
+      fleet->world().disturb().RaiseFault(fleet->id(4), FaultCode::kDriver);
     });
   }
 }
@@ -99,11 +99,11 @@ TEST(Configuration, KilledAnywhereTheStoreTellsTheTruthAndItCanBeCompleted) {
     fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 40'000))));
     const bool cut = rng.Uniform() < 0.5;
     const UnitId victim = fleet.id(static_cast<std::uint32_t>(rng.Below(19)));
-    if (cut) fleet.world().PowerCut(victim);
+    if (cut) fleet.world().disturb().PowerCut(victim);
     fleet.Restart();
     if (cut) {
       fleet.Run(Milliseconds(static_cast<std::int64_t>(rng.Uniform(0, 5000))));
-      fleet.world().PowerOn(victim);
+      fleet.world().disturb().PowerOn(victim);
     }
     fleet.Run(Seconds(120));
     ExpectStoreTellsTheTruth(fleet, "after the kill");

@@ -274,10 +274,10 @@ TEST(Retarget, WhatCannotBeIsRefusedAndNothingHappens) {
         }
   }
   EXPECT_TRUE(found);
-  fleet.world().PowerCut(fleet.id(9));
+  fleet.world().disturb().PowerCut(fleet.id(9));
   fleet.Run(Seconds(4));
   expect({9}, {}, ErrorCode::kRefused, "does not answer");
-  fleet.world().PowerOn(fleet.id(9));
+  fleet.world().disturb().PowerOn(fleet.id(9));
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({4}).outcome, TargetOutcome::kArrived);
   EXPECT_EQ(fleet.world().Truth(std::size_t{4}).moves_begun, 1u);
@@ -353,7 +353,7 @@ TEST(Retarget, UnitThatFallsSilentAtAnyStageIsNamed) {
     Disturb(
         TestSeed(562), Milliseconds(ms),
         [](Retargeting* run, PositionerIndex unit) {
-          run->fleet.world().PowerCut(run->fleet.id(unit.value));
+          run->fleet.world().disturb().PowerCut(run->fleet.id(unit.value));
           run->fleet.RunUntilIdle();
           EXPECT_EQ(run->fleet.coordinator().unit(unit).outcome, TargetOutcome::kFailed);
         },
@@ -379,7 +379,7 @@ TEST(Retarget, LostFramesAndASlowStoreDelayIt) {
       TestSeed(564), Milliseconds(0),
       [](Retargeting* run, PositionerIndex) {
         for (const BusId bus : run->fleet.layout().buses())
-          run->fleet.world().faults(bus)->drop = 0.02;
+          run->fleet.world().disturb().faults(bus)->drop = 0.02;
       },
       true);
   Disturb(
@@ -396,7 +396,7 @@ TEST(Retarget, UnitThatDoesNotTakeItsMoveIsNamed) {
   Disturb(
       TestSeed(566), Milliseconds(0),
       [](Retargeting* run, PositionerIndex unit) {
-        run->fleet.world().faults(run->fleet.id(unit.value))->wrong_digest = true;
+        run->fleet.world().disturb().faults(run->fleet.id(unit.value))->wrong_digest = true;
         run->fleet.RunUntilIdle();
         EXPECT_TRUE(run->fleet.LastReply(kRequest)->error);
         EXPECT_EQ(run->fleet.coordinator().unit(unit).outcome, TargetOutcome::kFailed);
@@ -441,14 +441,14 @@ TEST(Retarget, WhoMissedTheStartGoesLateInTheSameRound) {
         Seconds(60)));
     ASSERT_TRUE(run.fleet.RunUntil(
         [&] { return run.fleet.coordinator().unit({5}).phase == UnitPhase::kArmed; }, Seconds(5)));
-    run.fleet.world().faults(run.fleet.id(5))->deaf = true;
+    run.fleet.world().disturb().faults(run.fleet.id(5))->deaf = true;
     ASSERT_TRUE(run.fleet.RunUntil(
         [&] {
           return run.fleet.coordinator().configuration().state == ConfigurationState::kMoving;
         },
         Seconds(5)));
     run.fleet.Run(Milliseconds(350));
-    run.fleet.world().faults(run.fleet.id(5))->deaf = false;
+    run.fleet.world().disturb().faults(run.fleet.id(5))->deaf = false;
     EXPECT_GT(run.RunAndSeeNearest(), 0.5 * run.fleet.layout().clearance_mm());
     ++draws;
     late += run.fleet.coordinator().configuration().round == 1 ? 1 : 0;

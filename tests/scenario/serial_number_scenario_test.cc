@@ -19,7 +19,7 @@ TEST(Configuration, ForeignHardwareIsNotMovedUntilAdopted) {
   InProcessFleet fleet(Small(26));
   fleet.ApplyRandom(26);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  fleet.world().faults(fleet.id(2))->foreign_serial = SerialNumber{99'999};
+  fleet.world().disturb().faults(fleet.id(2))->foreign_serial = SerialNumber{99'999};
   fleet.Restart();
   fleet.ApplyRandom(27);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -39,7 +39,7 @@ TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
   for (const bool from_the_start : {true, false}) {
     InProcessFleet fleet(Small(44));
     if (!from_the_start) fleet.Run(Seconds(3));
-    fleet.world().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
+    fleet.world().disturb().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
     fleet.Restart();
     fleet.ApplyRandom(44);
     ASSERT_TRUE(fleet.RunUntilIdle()) << "a batch that the store refuses holds up all others";
@@ -50,7 +50,7 @@ TEST(Configuration, AUnitWithoutASerialNumberHoldsUpNobody) {
     EXPECT_EQ(fleet.world().Truth(std::size_t{5}).moves_begun, 0u);
     EXPECT_TRUE(HasAlarm(fleet, "unit 6 answers with serial number 0"));
     // Programmed again, the unit is like the others.
-    fleet.world().faults(fleet.id(5))->foreign_serial.reset();
+    fleet.world().disturb().faults(fleet.id(5))->foreign_serial.reset();
     fleet.Run(Seconds(5));
     EXPECT_EQ(fleet.coordinator().unit({5}).phase, UnitPhase::kReady);
   }
@@ -60,7 +60,7 @@ TEST(Configuration, ASerialNumberThatAnswersElsewhereIsNotAdopted) {
   InProcessFleet fleet(Small(50));
   fleet.Run(Seconds(3));
   const SerialNumber eight = fleet.coordinator().unit({8}).serial;
-  fleet.world().faults(fleet.id(7))->foreign_serial = eight;
+  fleet.world().disturb().faults(fleet.id(7))->foreign_serial = eight;
   fleet.Restart();
   fleet.Run(Seconds(3));
   fleet.Send({900, AdoptCommand{{7}}});
@@ -78,8 +78,8 @@ TEST(Configuration, ExchangedCablesAreNamed) {
   ASSERT_TRUE(fleet.RunUntilIdle());
   const SerialNumber seven = fleet.coordinator().unit({7}).serial;
   const SerialNumber eight = fleet.coordinator().unit({8}).serial;
-  fleet.world().faults(fleet.id(7))->foreign_serial = eight;
-  fleet.world().faults(fleet.id(8))->foreign_serial = seven;
+  fleet.world().disturb().faults(fleet.id(7))->foreign_serial = eight;
+  fleet.world().disturb().faults(fleet.id(8))->foreign_serial = seven;
   fleet.Restart();
   fleet.Run(Seconds(3));
   EXPECT_TRUE(HasAlarm(fleet, "which belongs to unit 9"));

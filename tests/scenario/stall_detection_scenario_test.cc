@@ -90,12 +90,13 @@ TEST_F(Noticed, ThoseThatFollowAreStoppedInTime) {
     ++draws;
     const UnitId leader = fleet_->id(pair.leader.value);
     const HostInstant ended = fleet_->now();
-    if (k % 3 == 0) fleet_->world().PowerCut(leader);
-    if (k % 3 == 1) fleet_->world().faults(leader)->silent = true;  // moves on without any report
+    if (k % 3 == 0) fleet_->world().disturb().PowerCut(leader);
+    if (k % 3 == 1)
+      fleet_->world().disturb().faults(leader)->silent = true;  // moves on without any report
     if (k % 3 == 2) {
-      fleet_->world().PowerCut(leader);
+      fleet_->world().disturb().PowerCut(leader);
       fleet_->Run(Milliseconds(30));
-      fleet_->world().PowerOn(leader);
+      fleet_->world().disturb().PowerOn(leader);
     }
     EXPECT_TRUE(fleet_->RunUntil([&] { return !Moves(pair.follower.unit); }, Seconds(3)))
         << "unit " << fleet_->id(pair.follower.unit.value).value << " was not stopped";
@@ -123,9 +124,9 @@ TEST_F(Noticed, ThoseThatFollowOneThatNeverBeganAreStoppedInTime) {
     if (pair == pairs_.end()) continue;
     ++draws;
     // The unit is armed, and hears no start.
-    fleet_->world().faults(fleet_->id(pair->leader.value))->deaf = true;
+    fleet_->world().disturb().faults(fleet_->id(pair->leader.value))->deaf = true;
     RunTo(0.1);
-    fleet_->world().faults(fleet_->id(pair->leader.value))->deaf = false;
+    fleet_->world().disturb().faults(fleet_->id(pair->leader.value))->deaf = false;
     ASSERT_FALSE(Moves(pair->leader));
     ASSERT_TRUE(Moves(pair->follower.unit));
     EXPECT_TRUE(fleet_->RunUntil([&] { return !Moves(pair->follower.unit); }, Seconds(3)));
@@ -144,7 +145,8 @@ TEST_F(Noticed, InTimeAlsoWhereFramesAreLost) {
     const std::uint64_t seed = TestSeed(200 + k);
     FOCALFLEET_TRACE_SEED(seed);
     ASSERT_NO_FATAL_FAILURE(Begin(seed));
-    for (const BusId bus : fleet_->layout().buses()) fleet_->world().faults(bus)->drop = 0.02;
+    for (const BusId bus : fleet_->layout().buses())
+      fleet_->world().disturb().faults(bus)->drop = 0.02;
     Rng rng = Rng::Stream(seed, "noticed");
     const auto drawn = Draw(
         &rng, [](const Led& p) { return p.follower.since_s; },
@@ -155,7 +157,7 @@ TEST_F(Noticed, InTimeAlsoWhereFramesAreLost) {
     if (!Moves(pair.leader) || !Moves(pair.follower.unit)) continue;
     ++draws;
     const HostInstant ended = fleet_->now();
-    fleet_->world().PowerCut(fleet_->id(pair.leader.value));
+    fleet_->world().disturb().PowerCut(fleet_->id(pair.leader.value));
     EXPECT_TRUE(fleet_->RunUntil([&] { return !Moves(pair.follower.unit); }, Seconds(3)));
     longest_s = std::max(longest_s, (fleet_->now() - ended).seconds());
   }
@@ -198,9 +200,9 @@ TEST_F(Noticed, OthersGoOn) {
     RunTo(t_s);
     if (!Moves(leader) || !Moves(follower)) continue;
     ++(late ? left : not_yet);
-    fleet_->world().PowerCut(fleet_->id(leader.value));
+    fleet_->world().disturb().PowerCut(fleet_->id(leader.value));
     fleet_->Run(Milliseconds(30));
-    fleet_->world().PowerOn(fleet_->id(leader.value));
+    fleet_->world().disturb().PowerOn(fleet_->id(leader.value));
     RunTo(EndOf(follower) - 0.2);
     EXPECT_TRUE(Moves(follower)) << "unit " << fleet_->id(leader.value).value << " ended at " << t_s
                                  << " s, since " << pair.follower.since_s << " left "
@@ -250,7 +252,7 @@ TEST(LateStart, NobodyIsGivenUpThatOnlyStartsLate) {
       {.count = 61, .units_per_bus = 20, .seed = seed, .commit_delay = Milliseconds(400)});
   fleet.ApplyRandom(seed);
   const auto each_bus = [&](const sim::BusFaults& faults) {
-    for (const BusId bus : fleet.layout().buses()) *fleet.world().faults(bus) = faults;
+    for (const BusId bus : fleet.layout().buses()) *fleet.world().disturb().faults(bus) = faults;
   };
   const auto all_armed = [&] {
     for (std::uint32_t i = 0; i < fleet.layout().size(); ++i)

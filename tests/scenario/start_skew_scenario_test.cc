@@ -122,10 +122,11 @@ TEST(StartSkew, BeyondTheToleranceIsReportedAndPlannedWithNextTime) {
         return armed == fleet.layout().size();
       },
       Seconds(60)));
-  *fleet.world().faults(late_bus) = sim::BusFaults{.late = 1, .late_by = Milliseconds(70)};
+  *fleet.world().disturb().faults(late_bus) =
+      sim::BusFaults{.late = 1, .late_by = Milliseconds(70)};
   ASSERT_TRUE(IsAboutToStart(&fleet, configuration, Milliseconds(30)));
   const TrueStarts truth = WatchStarts(&fleet);
-  *fleet.world().faults(late_bus) = sim::BusFaults{};
+  *fleet.world().disturb().faults(late_bus) = sim::BusFaults{};
   ASSERT_GT(truth.skew_s(), 0.06);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const StartView said = fleet.coordinator().configuration().starts;
@@ -203,7 +204,7 @@ TEST(StartSkew, AUnitWithABrokenSyncWireBeginsByItsOwnClockALittleLater) {
   CoordinatorConfig config;
   config.sync_line = true;
   InProcessFleet fleet({.count = 19, .units_per_bus = 10, .seed = seed, .config = config});
-  fleet.world().faults(fleet.id(4))->deaf_to_sync = true;
+  fleet.world().disturb().faults(fleet.id(4))->deaf_to_sync = true;
   fleet.Run(Seconds(15));
   const std::uint64_t configuration = NextConfiguration(&fleet);
   fleet.ApplyRandom(seed);

@@ -143,7 +143,8 @@ TEST(Configuration, LateAnswersToOurStopsAreNobodyElsesStops) {
     InProcessFleet fleet(Small(seed));
     fleet.Run(Seconds(2));
     for (const BusId bus : fleet.layout().buses())
-      *fleet.world().faults(bus) = {.duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(1200)};
+      *fleet.world().disturb().faults(bus) = {
+          .duplicate = 0.2, .late = 0.3, .late_by = Milliseconds(1200)};
     fleet.ApplyRandom(seed);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_FALSE(HasAlarm(fleet, "by somebody else"));
@@ -163,8 +164,8 @@ TEST(Configuration, StopOfOneUnitBySomebodyElseStopsAll) {
 TEST(Configuration, AnswersToAnOwnStopDoNotEndTheNextOne) {
   InProcessFleet fleet(Small(24));
   for (std::uint32_t n = 0; n < 37; ++n) {
-    fleet.world().faults(fleet.id(n))->late = Milliseconds(n * 2);
-    fleet.world().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
+    fleet.world().disturb().faults(fleet.id(n))->late = Milliseconds(n * 2);
+    fleet.world().disturb().faults(fleet.id(n))->copies = static_cast<std::uint8_t>(1 + n % 3);
   }
   fleet.ApplyRandom(24);
   RunIntoMotion(&fleet, Seconds(3));

@@ -96,7 +96,7 @@ TEST(Configuration, AnAlarmThatTheStoreRefusesBegetsNoOther) {
     refused += is_alarm ? 1u : 0u;
     return is_alarm;
   };
-  fleet.world().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
+  fleet.world().disturb().faults(fleet.id(5))->foreign_serial = SerialNumber{0};
   fleet.Restart();
   fleet.Run(Seconds(5));
   EXPECT_GE(refused, 1u);

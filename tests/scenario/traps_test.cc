@@ -53,7 +53,7 @@ TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
     fleet.ApplyRandom(80);
     ASSERT_TRUE(RunUntilUploading(&fleet));
     fleet.Run(Milliseconds(2));
-    fleet.world().KillBus(dead);
+    fleet.world().disturb().KillBus(dead);
     if (reported) fleet.ReportLink({dead, LinkState::kDown, "write failed"});
     ASSERT_TRUE(fleet.RunUntilIdle());
     for (std::uint32_t n = 0; n < 60; ++n)
@@ -62,7 +62,7 @@ TEST(DeadLink, InMidUploadTakesItsUnitsAndNothingElseAndComesBack) {
         EXPECT_EQ(fleet.world().Truth(n).moves_begun, 0u) << n;
       }
     EXPECT_GE(CountOutcome(fleet, TargetOutcome::kArrived), 25u) << Unserved(fleet);
-    fleet.world().ReviveBus(dead);
+    fleet.world().disturb().ReviveBus(dead);
     if (reported) fleet.ReportLink({dead, LinkState::kUp, ""});
     fleet.Run(Seconds(10));
     fleet.ApplyRandom(81);
@@ -161,7 +161,7 @@ TEST(HostGone, WhatAnEarlierRunArmedNeverStarts) {
     ASSERT_TRUE(fleet.RunUntil(
         [&] { return fleet.world().Truth(std::size_t{12}).state == UnitState::kArmed; },
         Seconds(60)));
-    fleet.world().faults(fleet.id(12))->silent = true;
+    fleet.world().disturb().faults(fleet.id(12))->silent = true;
     fleet.Run(Milliseconds(ms - 100));
     ASSERT_EQ(fleet.world().Truth(std::size_t{12}).moves_begun, 0u);
     fleet.Restart();
@@ -176,12 +176,12 @@ TEST(Rest, UnitThatLosesPowerBetweenConfigurationsIsNoticed) {
   InProcessFleet fleet({.count = 7, .seed = 86});
   fleet.ApplyRandom(86);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  fleet.world().PowerCut(fleet.id(3));
+  fleet.world().disturb().PowerCut(fleet.id(3));
   // The unit is asked every 10 s, and given up after five tries.
   fleet.Run(Seconds(12));
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kSilent);
   EXPECT_TRUE(HasAlarm(fleet, "unit 4 does not answer"));
-  fleet.world().PowerOn(fleet.id(3));
+  fleet.world().disturb().PowerOn(fleet.id(3));
   fleet.Run(Seconds(5));
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kReady);
   EXPECT_TRUE(IsPlace(fleet.coordinator().unit({3}).knowledge));
@@ -193,7 +193,7 @@ TEST(Rest, UnitThatLosesPowerBetweenConfigurationsIsNoticed) {
 TEST(Stop, LeavesTheEvidenceOfAFault) {
   for (const bool direct : {false, true}) {
     InProcessFleet fleet({.count = 37, .seed = 87});
-    fleet.world().faults(fleet.id(3))->in_motion =
+    fleet.world().disturb().faults(fleet.id(3))->in_motion =
         sim::UnitFaults::InMotion{.after = Seconds(2), .code = FaultCode::kOverCurrent};
     fleet.ApplyRandom(87);
     ASSERT_TRUE(fleet.RunUntil(
@@ -436,7 +436,7 @@ TEST(Checked, IsWhatTheFramesOnTheWireSay) {
   for (const std::uint64_t seed : {94u, 95u, 96u}) {
     FOCALFLEET_TRACE_SEED(seed);
     InProcessFleet fleet({.count = 61, .units_per_bus = 20, .seed = seed});
-    fleet.world().faults(fleet.id(9))->loses_segments = 1;
+    fleet.world().disturb().faults(fleet.id(9))->loses_segments = 1;
     SentMoves moves(&fleet);
     for (int k = 0; k < 3; ++k) {
       fleet.ApplyRandom(seed * 10 + static_cast<std::uint64_t>(k));

@@ -101,7 +101,7 @@ TEST(Upload, SaysWhatRepeatsCost) {
   const std::uint64_t seed = TestSeed(1);
   InProcessFleet fleet({.count = 40, .units_per_bus = 40, .seed = seed});
   fleet.Run(Milliseconds(2500));
-  fleet.world().faults(fleet.layout().buses()[0])->drop = 0.02;
+  fleet.world().disturb().faults(fleet.layout().buses()[0])->drop = 0.02;
   fleet.ApplyRandom(seed);
   ASSERT_TRUE(fleet.RunUntil(
       [&] { return fleet.coordinator().configuration().state == ConfigurationState::kMoving; },

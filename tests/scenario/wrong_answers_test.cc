@@ -48,7 +48,7 @@ void ExpectNothingStarted(InProcessFleet& fleet, const std::string& part, const 
 template <class Plant>
 void PlantInAll(InProcessFleet* fleet, const Plant& plant) {
   for (std::uint32_t n = 0; n < fleet->layout().size(); ++n)
-    plant(fleet->world().faults(fleet->id(n)));
+    plant(fleet->world().disturb().faults(fleet->id(n)));
 }
 
 constexpr Answer kRefusals[] = {Answer::kWrongMove,  Answer::kIncomplete,  Answer::kOutOfRange,
@@ -89,7 +89,7 @@ TEST(WrongAnswer, NobodyAnswersAndNothingStarts) {
 TEST(WrongAnswer, OneRefusesAndOnlyItStays) {
   for (const Function what : {Function::kConfirm, Function::kArm}) {
     InProcessFleet fleet({.count = 37, .seed = 62});
-    fleet.world().faults(fleet.id(9))->refuses =
+    fleet.world().disturb().faults(fleet.id(9))->refuses =
         sim::UnitFaults::Refusal{what, Answer::kOutOfRange};
     fleet.ApplyRandom(62);
     ASSERT_TRUE(fleet.RunUntilIdle());
@@ -103,7 +103,7 @@ TEST(WrongAnswer, OneRefusesAndOnlyItStays) {
 TEST(WrongAnswer, RefusedHomingIsNamed) {
   InProcessFleet fleet({.count = 7, .seed = 63});
   fleet.Run(Seconds(5));
-  fleet.world().faults(fleet.id(2))->refuses =
+  fleet.world().disturb().faults(fleet.id(2))->refuses =
       sim::UnitFaults::Refusal{Function::kHome, Answer::kBadValue};
   fleet.Send({900, HomeCommand{{{2}}, true}});
   ASSERT_TRUE(fleet.RunUntilIdle(Seconds(120)));
@@ -125,7 +125,7 @@ TEST(OneUnit, DiesInTheUploadOfTwoHundredAndHoldsThemUpForAMoment) {
       [&] { return fleet.coordinator().configuration().state == ConfigurationState::kUploading; },
       Seconds(60)));
   const HostInstant uploading = fleet.now();
-  fleet.world().faults(fleet.id(150))->silent = true;
+  fleet.world().disturb().faults(fleet.id(150))->silent = true;
   ASSERT_TRUE(fleet.RunUntil([&] { return Begun(fleet) != 0; }, Seconds(60)));
   // The time is five tries of 50 to 800 ms, then a plan around the unit and another upload.
   EXPECT_LT((fleet.now() - uploading).seconds(), 3.0);
@@ -148,7 +148,7 @@ TEST(OneUnit, LosesAFrameOfItsMoveAndIsSentItAgainAlone) {
   InProcessFleet fleet({.count = 37, .seed = 65});
   std::vector<OutFrame> sent;
   fleet.sent = &sent;
-  fleet.world().faults(fleet.id(12))->loses_segments = 1;
+  fleet.world().disturb().faults(fleet.id(12))->loses_segments = 1;
   fleet.ApplyRandom(65);
   ASSERT_TRUE(fleet.RunUntilIdle());
   ExpectOthersArrive(&fleet, 0);
@@ -162,7 +162,7 @@ TEST(OneUnit, LosesAFrameOfItsMoveAndIsSentItAgainAlone) {
 
 TEST(OneUnit, LosesItsMoveForEverAndIsNamedWhileTheOthersArrive) {
   InProcessFleet fleet({.count = 37, .seed = 65});
-  fleet.world().faults(fleet.id(12))->loses_segments = 1'000'000;
+  fleet.world().disturb().faults(fleet.id(12))->loses_segments = 1'000'000;
   fleet.ApplyRandom(65);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const UnitView& view = fleet.coordinator().unit({12});
@@ -175,12 +175,12 @@ TEST(OneUnit, LosesItsMoveForEverAndIsNamedWhileTheOthersArrive) {
 TEST(OneUnit, AskedMoreOftenThanThereAreSequenceNumbersComesBackAtOnce) {
   InProcessFleet fleet({.count = 7, .seed = 66});
   fleet.Run(Seconds(3));
-  fleet.world().faults(fleet.id(3))->silent = true;
+  fleet.world().disturb().faults(fleet.id(3))->silent = true;
   const std::uint64_t before = fleet.coordinator().bus({0}).retries;
   fleet.Run(Seconds(1200));
   EXPECT_GT(fleet.coordinator().bus({0}).retries - before, 254u * 4) << "or this tries nothing";
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kSilent);
-  fleet.world().faults(fleet.id(3))->silent = false;
+  fleet.world().disturb().faults(fleet.id(3))->silent = false;
   fleet.Run(Seconds(4));
   EXPECT_EQ(fleet.coordinator().unit({3}).phase, UnitPhase::kReady);
   fleet.ApplyRandom(66);
@@ -193,7 +193,7 @@ TEST(OneUnit, AskedMoreOftenThanThereAreSequenceNumbersComesBackAtOnce) {
 TEST(LateAnswer, UnderTheNumberOfTheRequestBeforeIsNoAnswer) {
   InProcessFleet fleet({.count = 37, .seed = 67});
   fleet.Run(Seconds(5));
-  fleet.world().faults(fleet.id(20))->stale_sequence = true;
+  fleet.world().disturb().faults(fleet.id(20))->stale_sequence = true;
   fleet.ApplyRandom(67);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const UnitView& view = fleet.coordinator().unit({20});
@@ -208,13 +208,13 @@ TEST(LateAnswer, AfterTheLastRepeatIsNoAnswerToTheNextQuestion) {
     FOCALFLEET_TRACE_SEED(static_cast<std::uint64_t>(late_ms));
     InProcessFleet fleet({.count = 37, .seed = 68});
     fleet.Run(Seconds(5));
-    fleet.world().faults(fleet.id(20))->late = Milliseconds(late_ms);
+    fleet.world().disturb().faults(fleet.id(20))->late = Milliseconds(late_ms);
     fleet.ApplyRandom(68);
     ASSERT_TRUE(fleet.RunUntilIdle());
     EXPECT_EQ(fleet.coordinator().unit({20}).outcome, TargetOutcome::kFailed);
     EXPECT_EQ(fleet.world().Truth(std::size_t{20}).moves_begun, 0u);
     ExpectOthersArrive(&fleet, 4);
-    fleet.world().faults(fleet.id(20))->late = {};
+    fleet.world().disturb().faults(fleet.id(20))->late = {};
     fleet.Run(Seconds(15));
     EXPECT_EQ(fleet.coordinator().unit({20}).phase, UnitPhase::kReady);
     fleet.ApplyRandom(69);
@@ -262,9 +262,9 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
   InProcessFleet fleet({.count = 37, .seed = 78});
   fleet.ApplyRandom(77);
   ASSERT_TRUE(fleet.RunUntilIdle());
-  fleet.world().faults(fleet.id(11))->protocol_version = 0;
-  fleet.world().PowerCut(fleet.id(11));
-  fleet.world().PowerOn(fleet.id(11));
+  fleet.world().disturb().faults(fleet.id(11))->protocol_version = 0;
+  fleet.world().disturb().PowerCut(fleet.id(11));
+  fleet.world().disturb().PowerOn(fleet.id(11));
   fleet.Run(Seconds(12));  // the next question finds it restarted
   std::vector<OutFrame> sent;
   fleet.sent = &sent;
@@ -292,7 +292,7 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
                                     return alarm.text.find("protocol version") != std::string::npos;
                                   });
   EXPECT_EQ(said, 1);
-  fleet.world().faults(fleet.id(11))->protocol_version.reset();
+  fleet.world().disturb().faults(fleet.id(11))->protocol_version.reset();
   fleet.Run(Seconds(4));
   EXPECT_EQ(fleet.coordinator().unit({11}).phase, UnitPhase::kReady);
   fleet.ApplyRandom(79);
@@ -304,7 +304,7 @@ TEST(WrongAnswer, WhoSpeaksAnotherVersionIsLeftAloneAndComesBack) {
 
 TEST(Liar, WhoSaysThatItHasArrivedAndNeverStartedIsNotBelieved) {
   InProcessFleet fleet({.count = 37, .seed = 71});
-  fleet.world().faults(fleet.id(5))->claims_arrival = true;
+  fleet.world().disturb().faults(fleet.id(5))->claims_arrival = true;
   fleet.ApplyRandom(71);
   ASSERT_TRUE(fleet.RunUntilIdle());
   const UnitView& view = fleet.coordinator().unit({5});
@@ -315,7 +315,7 @@ TEST(Liar, WhoSaysThatItHasArrivedAndNeverStartedIsNotBelieved) {
 
 TEST(Liar, WhoIgnoresEveryStartIsNamedAndItsMoveTakenBack) {
   InProcessFleet fleet({.count = 37, .seed = 72});
-  fleet.world().faults(fleet.id(5))->ignores = Function::kStart;
+  fleet.world().disturb().faults(fleet.id(5))->ignores = Function::kStart;
   fleet.ApplyRandom(72);
   ASSERT_TRUE(fleet.RunUntilIdle());
   EXPECT_EQ(fleet.coordinator().unit({5}).outcome, TargetOutcome::kFailed);
@@ -338,7 +338,7 @@ TEST(Settings, AUnitsOwnCarrierIsReplacedBeforeItMoves) {
 
 TEST(Settings, WhoKeepsAnotherCarrierIsNotMoved) {
   InProcessFleet fleet({.count = 37, .seed = 74, .factory = {.counter1 = 400}});
-  fleet.world().faults(fleet.id(5))->refuses =
+  fleet.world().disturb().faults(fleet.id(5))->refuses =
       sim::UnitFaults::Refusal{Function::kParameterWrite, Answer::kBadValue};
   fleet.ApplyRandom(74);
   ASSERT_TRUE(fleet.RunUntilIdle());
@@ -353,7 +353,7 @@ TEST(Settings, WhoKeepsAnotherCarrierIsNotMoved) {
   fleet.Run(Seconds(60));
   EXPECT_EQ(fleet.store().alarms.size(), alarms) << "said once";
   // The unit is checked repeatedly, and goes when it accepts its setting.
-  fleet.world().faults(fleet.id(5))->refuses.reset();
+  fleet.world().disturb().faults(fleet.id(5))->refuses.reset();
   fleet.Run(Seconds(15));
   fleet.ApplyRandom(75);
   ASSERT_TRUE(fleet.RunUntilIdle());

@@ -31,7 +31,7 @@ Complaints FilesAreShort(const Files& files) {
 std::string CodeOf(const File& file) {
   std::string code;
   for (const SplitLine& line : SplitLines(file.text))
-    if (line.code.find('#') == std::string::npos) code += line.code + "\n";
+    code += (line.code.find('#') == std::string::npos ? line.code : "") + "\n";
   return code;
 }
 
@@ -64,11 +64,17 @@ std::string WithoutAccess(std::string declaration) {
 struct Size {
   std::size_t data_members = 0;
   std::size_t functions = 0;
+  std::size_t bodies = 0;  // functions that are neither pure virtual nor left to the compiler
 };
 
 bool IsFunction(const std::string& declaration) {
+  if (ContainsWord(declaration.substr(0, declaration.find('(')), "operator")) return true;
   const std::string plain = WithoutTemplateArguments(declaration);
   return plain.substr(0, plain.find_first_of("={")).find('(') != std::string::npos;
+}
+
+bool IsPureOrDefault(const std::string& declaration) {
+  return EndsWith(declaration, "= 0") || EndsWith(declaration, "= default");
 }
 
 void Count(const std::string& text, Size* size) {
@@ -78,7 +84,9 @@ void Count(const std::string& text, Size* size) {
        {"using", "friend", "enum", "class", "struct", "static_assert", "typedef", "union"})
     if (WordAt(declaration, 0, word)) return;
   if (IsFunction(declaration)) {
+    if (EndsWith(declaration, "= delete")) return;
     ++size->functions;
+    if (!IsPureOrDefault(declaration)) ++size->bodies;
     return;
   }
   if (StartsWith(declaration, "static const")) return;
@@ -110,26 +118,128 @@ Size SizeOfBody(const std::string& code, std::size_t at) {
   return size;
 }
 
-// Plain values, structs without functions, may have as many fields as there are things to say.
-Complaints ClassesAreSmall(const Files& files) {
-  Complaints out;
-  for (const File& file : files) {
-    if (!IsCode(file.path)) continue;
-    const std::string code = CodeOf(file);
+struct Class {
+  std::string head;  // from `class` to its brace
+  std::string name;
+  std::vector<std::string> bases;  // without namespaces and template arguments
+  std::size_t file = 0;            // index in the files
+  std::size_t line = 0;
+  bool is_class = false;
+  Size own;
+};
+
+// The brace of the class whose keyword stands at `at`; npos: no class is defined there.
+std::size_t BraceOf(const std::string& code, std::size_t at) {
+  int depth = 0;
+  for (; at < code.size(); ++at) {
+    const char c = code[at];
+    if (c == '{') return at;
+    if (c == '<') ++depth;
+    if (std::string_view(";()=").find(c) != std::string_view::npos || (c == '>' && --depth < 0))
+      break;
+  }
+  return std::string::npos;
+}
+
+// The last word of a text that names a type, without `final`.
+std::string LastWord(std::string text) {
+  std::string word;
+  for (const char c : text + " ") {
+    if (IsWordCharacter(c)) {
+      word += c;
+    } else if (!word.empty()) {
+      text = word == "final" ? text : word;
+      word.clear();
+    }
+  }
+  return text;
+}
+
+void SplitHead(const std::string& head, Class* it) {
+  const std::string plain = WithoutTemplateArguments(head);
+  std::size_t colon = plain.find(':');
+  while (colon != std::string::npos && colon + 1 < plain.size() && plain[colon + 1] == ':')
+    colon = plain.find(':', colon + 2);
+  it->name = LastWord(plain.substr(0, colon));
+  for (std::size_t at = colon; at != std::string::npos;) {
+    const std::size_t comma = plain.find(',', at);
+    const std::size_t count = comma == std::string::npos ? comma : comma - at;
+    it->bases.push_back(LastWord(plain.substr(at, count)));
+    at = comma == std::string::npos ? comma : comma + 1;
+  }
+}
+
+std::vector<Class> ClassesOf(const Files& files) {
+  std::vector<Class> out;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!IsCode(files[i].path)) continue;
+    const std::string code = CodeOf(files[i]);
     for (std::size_t at = 0; at < code.size(); ++at) {
       const bool is_class = WordAt(code, at, "class");
       if (!is_class && !WordAt(code, at, "struct")) continue;
-      const std::size_t begin = code.find_first_of("{;()=>", at);
-      if (begin == std::string::npos || code[begin] != '{') continue;
-      const Size size = SizeOfBody(code, begin + 1);
-      if (!is_class && size.functions == 0) continue;
-      if (size.data_members <= kDataMembersMax && size.functions <= kFunctionsMax) continue;
-      const auto line = static_cast<std::size_t>(
+      const std::size_t begin = BraceOf(code, at);
+      if (begin == std::string::npos) continue;
+      Class it;
+      it.head = code.substr(at, begin - at);
+      it.file = i;
+      it.is_class = is_class;
+      it.line = static_cast<std::size_t>(
           std::count(code.begin(), code.begin() + static_cast<std::ptrdiff_t>(at), '\n'));
-      out.push_back(At(file, line,
-                       code.substr(at, begin - at) + "has " + std::to_string(size.data_members) +
-                           " data members and " + std::to_string(size.functions) + " functions"));
+      it.own = SizeOfBody(code, begin + 1);
+      SplitHead(it.head, &it);
+      out.push_back(std::move(it));
     }
+  }
+  return out;
+}
+
+// The class of the tree that `name` means in the file of `user`: one of that file or of a header
+// that it includes, or the only one of that name. Null: a class of a library, or unclear.
+const Class* Meant(const std::string& name, const Class& user, const std::vector<Class>& classes,
+                   const Files& files) {
+  const Class* included = nullptr;
+  const Class* any = nullptr;
+  std::size_t count = 0;
+  for (const Class& it : classes) {
+    if (it.name != name || &it == &user) continue;
+    if (it.file == user.file) return &it;
+    if (files[user.file].text.find("\"" + files[it.file].path + "\"") != std::string::npos)
+      included = &it;
+    any = &it;
+    ++count;
+  }
+  if (included != nullptr) return included;
+  return count == 1 ? any : nullptr;
+}
+
+// A base gives its members to the class; a base without data and bodies is an interface and gives
+// none.
+Size WithBases(const Class& it, const std::vector<Class>& classes, const Files& files, int depth) {
+  Size size = it.own;
+  for (const std::string& name : it.bases) {
+    const Class* base = Meant(name, it, classes, files);
+    if (base == nullptr || depth == 0) continue;
+    const Size more = WithBases(*base, classes, files, depth - 1);
+    if (more.data_members == 0 && more.bodies == 0) continue;
+    size.data_members += more.data_members;
+    size.functions += more.functions;
+    size.bodies += more.bodies;
+  }
+  return size;
+}
+
+// Plain values, structs without functions, may have as many fields as there are things to say.
+Complaints ClassesAreSmall(const Files& files) {
+  constexpr int kBasesDeep = 8;
+  Complaints out;
+  const std::vector<Class> classes = ClassesOf(files);
+  for (const Class& it : classes) {
+    const Size size = WithBases(it, classes, files, kBasesDeep);
+    if (!it.is_class && size.functions == 0) continue;
+    if (size.data_members <= kDataMembersMax && size.functions <= kFunctionsMax) continue;
+    out.push_back(At(files[it.file], it.line,
+                     it.head + "has " + std::to_string(size.data_members) + " data members and " +
+                         std::to_string(size.functions) + " functions"));
   }
   return out;
 }
@@ -160,6 +270,8 @@ TEST(TidyRules, LargeClassesAreCaught) {
   EXPECT_EQ(found(Repeated("  void F(int a);\n", 26)), 1u);
   EXPECT_EQ(found(Repeated("  void F() { int x; G(); }\n", 26)), 1u);
   EXPECT_EQ(found(Repeated("  void F() const { return a_; }\n", 25)), 0u);
+  EXPECT_EQ(found(Repeated("  bool operator<(const A& other) const;\n", 26)), 1u);
+  EXPECT_EQ(found(Repeated("  A& operator=(const A&) = delete;\n", 26)), 0u) << "absent";
   EXPECT_EQ(found(Repeated("  std::function<void(int)> a_;\n", 21)), 1u);
   EXPECT_EQ(found(Repeated("  using X = int;\n  static constexpr int kX = 1;\n", 30)), 0u);
   EXPECT_EQ(found(Repeated("  struct X { int a; int b; };\n", 21)), 0u) << "classes of their own";
@@ -167,6 +279,41 @@ TEST(TidyRules, LargeClassesAreCaught) {
   EXPECT_EQ(Found(ClassesAreSmall, "fleet/a.h", "struct A {\n" + fields + "};\n"), 0u) << "values";
   EXPECT_EQ(Found(ClassesAreSmall, "fleet/a.h", "struct A {\n" + fields + "void F();};\n"), 1u);
   EXPECT_EQ(Found(ClassesAreSmall, "fleet/a.h", "enum class A { a, b };\n"), 0u);
+}
+
+TEST(TidyRules, BasesCountAsPartsOfAClass) {
+  const std::string functions = Repeated("  void F() { G(); }\n", 13);
+  const auto found = [](const std::string& base, const std::string& derived) {
+    return ClassesAreSmall({{"sim/b.h", base}, {"sim/a.h", "#include \"sim/b.h\"\n" + derived}})
+        .size();
+  };
+  const auto base = [](const std::string& body) { return "class B {\n" + body + "};\n"; };
+  const auto derived = [](const std::string& body) {
+    return "class A final : public x::B {\n" + body + "};\n";
+  };
+  EXPECT_EQ(found(base(functions), derived(functions)), 1u);
+  EXPECT_EQ(found(base(functions), derived(Repeated("  void F();\n", 12))), 0u);
+  EXPECT_EQ(found(base(Repeated("  int a_ = 0;\n", 11)), derived(Repeated("  int b_;\n", 10))), 1u);
+  EXPECT_EQ(found(base(functions), "class M : B {};\nclass A : M {\n" + functions + "};\n"), 1u);
+  EXPECT_EQ(found(base(functions), "class A : C<D>, B {\n" + functions + "};\n"), 1u);
+  EXPECT_EQ(found(base(functions), "struct A : B {\n" + functions + "};\n"), 1u);
+  const std::string pure = Repeated("  virtual void F(int a) const = 0;\n", 13);
+  const std::string pinned = "  B& operator=(const B&) = delete;\n  virtual ~B() = default;\n";
+  EXPECT_EQ(found(base(pure + pinned), derived(functions)), 0u);
+  EXPECT_EQ(found(base(pure + "  void F();\n"), derived(functions)), 1u);
+  // Two classes of one name: the included one is meant.
+  const std::string other = "class B {\n" + functions + "};\n";
+  EXPECT_EQ(ClassesAreSmall({{"fleet/b.h", other},
+                             {"sim/b.h", base("")},
+                             {"sim/a.h", "#include \"sim/b.h\"\n" + derived(functions)}})
+                .size(),
+            0u);
+  const auto line = ClassesAreSmall(
+      {{"sim/b.h", base(functions)}, {"sim/a.h", "#include \"sim/b.h\"\n" + derived(functions)}});
+  ASSERT_EQ(line.size(), 1u);
+  EXPECT_EQ(line[0].find("sim/a.h:2: class A final : public x::B has 0 data members and 26"), 0u)
+      << line[0];
+  EXPECT_EQ(Found(ClassesAreSmall, "fleet/a.h", "template <class A>\nvoid F() {\n}\n"), 0u);
 }
 
 }  // namespace

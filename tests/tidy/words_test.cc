@@ -22,7 +22,8 @@ constexpr std::size_t kTableCellSentencesMax = 2;
 constexpr std::string_view kBareOpenings[] = {"Who", "What", "Of", "By", "It", "That", "One", "So"};
 
 // Names that hid a standard term of the field; docs/glossary.md has those that took their place.
-// They are written in halves, so that this file does not complain about itself.
+// A term of two words is also caught within an identifier. The terms are written in halves, so that
+// this file does not complain about itself.
 const std::vector<std::pair<std::string, std::string>>& GoneTerms() {
   static const std::vector<std::pair<std::string, std::string>> terms = {
       {std::string("pur") + "suit", "configuration executor"},
@@ -43,10 +44,20 @@ const std::vector<std::pair<std::string, std::string>>& GoneTerms() {
       {std::string("mer") + "it", "-BIC"},
       {std::string("cr") + "owd", "cluster"},
       {std::string("to") + "ld", "reported"},
+      {std::string("lone ") + "way", "single-unit feasibility"},
   };
   return terms;
 }
 
+// Words that are right in code and hide a term in a page.
+constexpr std::pair<std::string_view, std::string_view> kGoneFromPages[] = {
+    {"remainder", "misfit artefact, or rest"},
+    {"remainders", "misfit artefacts"},
+};
+
+bool IsScript(std::string_view path) {
+  return EndsWith(path, ".py") || EndsWith(path, "CMakeLists.txt");
+}
 bool IsPage(std::string_view path) { return EndsWith(path, ".md") && path != "CHANGELOG.md"; }
 
 // ---- sentences
@@ -191,6 +202,13 @@ std::string WithoutQuotedCode(const std::string& line) {
   return out;
 }
 
+// The words of a text between blanks, in which a term of several words is found as well.
+std::string SpokenLine(const std::string& text) {
+  std::string line = " ";
+  for (const std::string& word : WordsOf(text)) line += word + " ";
+  return line;
+}
+
 // Texts of programs, keys and columns may keep an older word: others read them.
 Complaints TermsAreOfTheField(const Files& files) {
   Complaints out;
@@ -201,10 +219,19 @@ Complaints TermsAreOfTheField(const Files& files) {
         lines.push_back(StartsWith(line.code, "#include") ? "" : line.code + " " + line.comment);
     else if (IsPage(file.path) && file.path != "docs/glossary.md")
       for (const std::string& line : Lines(file.text)) lines.push_back(WithoutQuotedCode(line));
-    for (std::size_t i = 0; i < lines.size(); ++i)
-      for (const std::string& word : WordsOf(lines[i]))
-        for (const auto& [term, instead] : GoneTerms())
-          if (word == term) out.push_back(At(file, i, term + ": say " + instead));
+    else if (IsScript(file.path))
+      lines = Lines(file.text);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const std::string spoken = SpokenLine(lines[i]);
+      const auto look_for = [&](std::string_view term, std::string_view instead) {
+        const std::string word(term);
+        if (spoken.find(" " + word + " ") != std::string::npos)
+          out.push_back(At(file, i, word + ": say " + std::string(instead)));
+      };
+      for (const auto& [term, instead] : GoneTerms()) look_for(term, instead);
+      if (!IsPage(file.path)) continue;
+      for (const auto& [term, instead] : kGoneFromPages) look_for(term, instead);
+    }
   }
   return out;
 }
@@ -270,7 +297,13 @@ TEST(TidyRules, GoneTermsAreCaught) {
     EXPECT_EQ(Found(TermsAreOfTheField, "docs/a.md", "The " + term + ".\n"), 1u) << term;
     EXPECT_EQ(Found(TermsAreOfTheField, "fleet/a.cc", "Key(\"" + term + "\");\n"), 0u) << "a text";
     EXPECT_EQ(Found(TermsAreOfTheField, "docs/a.md", "The key `" + term + "`.\n"), 0u) << term;
+    EXPECT_EQ(Found(TermsAreOfTheField, "tests/a.py", "def " + term + "(unit):\n"), 1u) << term;
+    EXPECT_EQ(Found(TermsAreOfTheField, "tests/CMakeLists.txt", "# The " + term + ".\n"), 1u)
+        << term;
   }
+  EXPECT_EQ(Found(TermsAreOfTheField, "docs/a.md", "A remainder of the cause.\n"), 1u);
+  EXPECT_EQ(Found(TermsAreOfTheField, "fleet/a.cc", "a = std::remainder(a, 360);\n"), 0u);
+  EXPECT_EQ(Found(TermsAreOfTheField, "fleet/a.h", "class LoneWay;\n"), 1u);
 }
 
 TEST(TidyRules, UnreadablePagesAreCaught) {

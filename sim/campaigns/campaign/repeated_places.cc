@@ -110,7 +110,7 @@ std::vector<char> FindCopies(const Exposures& exposures, const std::vector<Revis
   // Probability that chance alone makes an exposure a copy: one in a million, and a campaign has 10
   // to 1000. Half and twice of it change the least number of units that can show a copy by less
   // than one.
-  constexpr double kChance = 1e-6;
+  constexpr double kCopyChance = 1e-6;
   // Shorter moves may be held back by play and stiction, some 10 um at the fibre, and rounded away.
   // Half of this bound is still above those. Twice of it only leaves fewer rows as evidence.
   constexpr double kMoved_mm = 0.1;
@@ -131,7 +131,7 @@ std::vector<char> FindCopies(const Exposures& exposures, const std::vector<Revis
   for (const ExposureCount& count : counts) {
     const bool by_most = count.far_repeat >= kRowsMin && 2 * count.far_repeat >= count.far_moved;
     const bool by_all = count.moved > 0 && count.all >= kRowsMin && count.repeat == count.all &&
-                        std::pow(share, count.all) < kChance;
+                        std::pow(share, count.all) < kCopyChance;
     copies.push_back(by_most || by_all ? 1 : 0);
   }
   return copies;

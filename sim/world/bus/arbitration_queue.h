@@ -20,6 +20,8 @@ struct WaitingFrame {
   CanFrame frame;
   bool from_unit = false;
   std::uint32_t sender = 0;  // node of the unit, or the host's client
+
+  [[nodiscard]] std::uint32_t node() const { return from_unit ? sender : kHostNode; }
 };
 
 struct QueuedFrame {
@@ -27,9 +29,7 @@ struct QueuedFrame {
   std::uint64_t order = 0;
   WaitingFrame waiting;
   bool repeated = false;
-  [[nodiscard]] std::uint32_t node() const {
-    return waiting.from_unit ? waiting.sender : kHostNode;
-  }
+  [[nodiscard]] std::uint32_t node() const { return waiting.node(); }
 };
 
 class ArbitrationQueue {

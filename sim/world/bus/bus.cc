@@ -1,147 +1,136 @@
 #include "sim/world/bus/bus.h"
 
 #include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "sim/world/bus/error_rules.h"
 
 namespace focalfleet::sim {
 
-void Bus::RestartHost(HostInstant now) {
-  BusNode& host = nodes_[kHost];
-  if (host.off) host.counts_from = std::min(host.counts_from, now);
-}
+Bus::Bus(const BusOptions& options, Rng chance)
+    : options_(options),
+      chance_(chance),
+      wire_(options),
+      nodes_(options),
+      arbitration_(options.mailboxes_max) {}
 
-void Bus::ThrowHostOff(HostInstant now) {
-  if (nodes_[kHost].off || dead_) return;
-  if (on_wire_.sending && on_wire_.entry.node() == kHost) CutOff(kHost, now);
-  while (!nodes_[kHost].off)
-    Count(kHost, now, [](ErrorCounters* errors) { errors->TransmitError(); });
-}
-
-// ---- presence of nodes
-
-/// The bits of the frame on the wire that are over at `now`. Pre: `now` is within the frame.
-std::uint32_t Bus::BitsOnWire(HostInstant now) const {
-  return static_cast<std::uint32_t>((now - on_wire_.began_at).ns * options_.bit_rate_bps /
-                                    1'000'000'000);
-}
-
-/// The frame on the wire, if it is the node's own, ends here and is not sent again.
-void Bus::CutOff(std::uint32_t node, HostInstant now) {
-  if (!on_wire_.sending || on_wire_.entry.node() != node || on_wire_.abandoned) return;
-  on_wire_.abandoned = true;
-  const std::uint32_t at = BitsOnWire(now);
-  if (on_wire_.course.error != FrameError::kNone || at >= ExposedBits(on_wire_.entry.waiting.frame))
-    return;
-  on_wire_.course = CutOffAt(on_wire_.entry.waiting.frame, at);
-  idle_at_ = on_wire_.began_at + options_.Bits(on_wire_.course.bits);
-  on_wire_.refusing = kNobody;
-}
-
-void Bus::PowerOff(std::uint32_t number, HostInstant now) {
-  BusNode& node = nodes_[number];
-  CutOff(number, now);
-  nodes_.Leave(number);
-  queue_.TakeAllOf(number, &node.kept);
-  counters_.dropped += node.kept.size();
-  node.kept.clear();
-  nodes_.ClearOff(number);
-  Count(number, now, [](ErrorCounters* errors) { errors->Recover(); });
-}
-
-void Bus::PowerOn(std::uint32_t number, HostInstant now) {
-  if (nodes_[number].there) return;
-  nodes_[number].there = true;
-  Rejoin(number, now);
-}
-
-void Bus::Unplug(std::uint32_t number, HostInstant now) {
-  BusNode& node = nodes_[number];
-  if (!node.there) return;
-  if (on_wire_.sending && on_wire_.entry.node() == number && !on_wire_.abandoned) {
-    CutOff(number, now);
-    if (!on_wire_.course.accepted) node.kept.push_back(on_wire_.entry);
+bool Bus::Offer(const WaitingFrame& waiting, HostInstant ready) {
+  if (wire_.dead()) {
+    arbitration_.CountDropped();
+    return false;
   }
-  nodes_.Leave(number);
-  queue_.TakeAllOf(number, &node.kept);
-  std::ranges::sort(node.kept, {}, &QueuedFrame::order);
+  if (faults_.late > 0 && arbitration_.TakesPart(nodes_[waiting.node()]) &&
+      chance_.Uniform() < faults_.late)
+    ready = ready + faults_.late_by;
+  return arbitration_.Offer(waiting, ready, nodes_);
 }
 
-void Bus::Plug(std::uint32_t number, HostInstant now) {
-  BusNode& node = nodes_[number];
-  if (node.there) return;
-  node.there = true;
-  if (node.off) node.counts_from = std::max(node.counts_from, now);
-  // Alone the node was not acknowledged: rule 3 up to passive, then exception 1.
-  while (!node.kept.empty() && node.errors.state() == Confinement::kActive)
-    Count(number, now, [](ErrorCounters* errors) { errors->TransmitError(); });
-  Rejoin(number, now);
+BusCounters Bus::counters() const {
+  BusCounters counters = counters_;
+  counters.wire = wire_.use();
+  counters.mailboxes = arbitration_.counters();
+  counters.controllers = nodes_.counters();
+  return counters;
 }
 
-void Bus::Babble(std::uint32_t node, const std::optional<CanFrame>& frame, HostInstant now) {
-  std::erase_if(babblers_, [node](const Babbler& babbler) { return babbler.node == node; });
-  if (frame) babblers_.push_back({node, *frame, now});
+HostInstant Bus::NextEvent() const {
+  if (wire_.dead()) return kNever;
+  if (wire_.stuck()) return wire_.stuck()->step_at;
+  if (wire_.sending()) return wire_.idle_at();
+  return std::min(arbitration_.NextBegin(nodes_, wire_.idle_at()),
+                  nodes_.NextRecovery(wire_.idle_at()));
 }
 
-// ---- a wire that is dead or stuck
-
-void Bus::Kill(HostInstant now) {
-  if (dead_) return;
-  Release(now);
-  counters_.dropped += waiting();
-  if (on_wire_.sending) {
-    on_wire_.course.error =
-        on_wire_.course.error == FrameError::kNone ? FrameError::kForm : on_wire_.course.error;
-    counters_.Charge(now - on_wire_.began_at, true);
-  } else {
-    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
+bool Bus::Advance(Heard* heard) {
+  if (wire_.stuck()) {
+    const StuckCount counted = CountStuck(*wire_.stuck(), &nodes_);
+    for (const std::uint32_t node : counted.off) arbitration_.Hold(node);
+    wire_.StickOn(counted.last);
+    return false;
   }
-  dead_at_ = on_wire_.sending ? now : std::max(now, idle_at_);
-  queue_ = {};
-  on_wire_.sending = false;
-  dead_ = true;
-}
-
-void Bus::Revive(HostInstant now) {
-  if (!dead_) return;
-  dead_ = false;
-  idle_at_ = std::max(now, dead_at_);
-  counters_.dead = counters_.dead + (idle_at_ - dead_at_);
-}
-
-void Bus::Stick(HostInstant now) {
-  if (dead_ || stuck_.at != kNever || !options_.bit_clock) return;
-  stuck_.sender = kNobody;
-  stuck_.at = now;
-  if (on_wire_.sending) {
-    // From here on the sender sees other levels than it drives; its frame is repeated later.
-    stuck_.sender = on_wire_.abandoned ? kNobody : on_wire_.entry.node();
-    on_wire_.course.error = FrameError::kBit;
-    ++counters_.errors[static_cast<std::size_t>(FrameError::kBit)];
-    counters_.error_bits += BitsOnWire(now);
-    counters_.Charge(now - on_wire_.began_at, true);
-    if (!on_wire_.abandoned && !on_wire_.babbling) {
-      on_wire_.entry.repeated = true;
-      queue_.Return(on_wire_.entry);
+  if (!wire_.sending()) {
+    const HostInstant recovery = nodes_.NextRecovery(wire_.idle_at());
+    const HostInstant begin = arbitration_.NextBegin(nodes_, wire_.idle_at());
+    if (recovery != kNever && recovery <= begin) {
+      Recover(recovery);
+      return false;
     }
-    on_wire_.sending = false;
-  } else {
-    if (nodes_.any_off()) nodes_.CountRowsWhileIdle(idle_at_, now);
-    counters_.idle = counters_.idle + std::max(now - idle_at_, DurationNs{0});
-    stuck_.at = std::max(now, idle_at_);
+    BeginFrame(begin);
+    if (options_.bit_clock || !wire_.sending()) return false;
   }
-  idle_at_ = stuck_.at;
-  stuck_.steps = 0;
-  stuck_.step_at = stuck_.at + options_.Bits(kFlagBits);
+  return EndFrame(heard);
 }
 
-void Bus::Release(HostInstant now) {
-  if (stuck_.at == kNever) return;
-  // All nodes wait for the end of the error frame that they see.
-  idle_at_ = std::max(now, stuck_.at) + options_.Bits(kDelimiterBits + kIntermissionBits);
-  counters_.stuck = counters_.stuck + (idle_at_ - stuck_.at);
-  counters_.busy = counters_.busy + (idle_at_ - stuck_.at);
-  stuck_.at = stuck_.step_at = kNever;
-  stuck_.sender = kNobody;
-  nodes_.CountRowsNotBefore(now);
+void Bus::Recover(HostInstant now) {
+  for (const std::uint32_t node : nodes_.TakeRecovered(wire_.idle_at(), now))
+    arbitration_.LetIn(node, now);
+}
+
+// ---- the begin of a frame
+
+void Bus::BeginFrame(HostInstant now) {
+  const std::optional<Arbitration::Winner> winner = arbitration_.Take(nodes_, now);
+  if (!winner) return;
+  nodes_.CountRowsWhileIdle(wire_.idle_at(), now);
+  if (winner->entry.repeated) ++counters_.repeats;
+  wire_.Begin(DrawCourse(*winner), now);
+}
+
+/// The first disturbed bit is geometric: P(none in b bits) = (1 - rate)^b.
+FrameOnWire Bus::DrawCourse(const Arbitration::Winner& winner) {
+  const CanFrame& frame = winner.entry.waiting.frame;
+  const std::uint32_t sender = winner.entry.node();
+  FrameOnWire drawn{.entry = winner.entry, .babbling = winner.babbling};
+  FrameCourse& course = drawn.course;
+  if (options_.bit_clock) course = nodes_.hearing() > 1 ? WellSent(frame) : Unacknowledged(frame);
+  if (faults_.bit_error_rate > 0 && options_.bit_clock) {
+    const double first =
+        std::log1p(-chance_.Uniform()) / std::log1p(-std::min(faults_.bit_error_rate, 0.5));
+    const std::uint32_t exposed = ExposedBits(frame);
+    if (first < exposed) {
+      const FrameCourse disturbed =
+          DisturbedAt(frame, static_cast<std::uint32_t>(first),
+                      nodes_[sender].errors.state() == Confinement::kPassive);
+      if (course.accepted || disturbed.bits < course.bits) course = disturbed;
+    }
+  }
+  if (faults_.duplicate > 0 && course.error == FrameError::kNone &&
+      chance_.Uniform() < faults_.duplicate) {
+    course = RefusedByOne(frame);
+    if (!options_.bit_clock) course.bits = 0;
+    if (nodes_.hearing() > 2) drawn.refusing = nodes_.DrawReceiver(sender, &chance_);
+  }
+  return drawn;
+}
+
+// ---- the end of a frame
+
+bool Bus::EndFrame(Heard* heard) {
+  const HostInstant now = wire_.idle_at();
+  const FrameOnWire frame = wire_.End();
+  const std::uint32_t sender = frame.entry.node();
+  nodes_.CountRowOfFrame(now);
+  if (frame.course.error == FrameError::kNone) {
+    CountWell(sender, now, &nodes_);
+  } else {
+    for (const std::uint32_t node : CountError(frame, now, &nodes_)) arbitration_.Hold(node);
+    if (frame.course.accepted) ++counters_.received_twice;
+    if (frame.is_repeated()) arbitration_.Repeat(frame.entry, nodes_);
+  }
+  if (nodes_[sender].errors.state() == Confinement::kPassive)
+    arbitration_.Suspend(sender, now + options_.Bits(kSuspendBits));
+  Recover(now);
+  if (!frame.course.accepted) return false;
+  heard->sent = frame.entry.waiting;
+  heard->at = now;
+  heard->but_not = frame.refusing;
+  ++(heard->sent.from_unit ? counters_.unit_frames : counters_.host_frames);
+  if (frame.babbling) ++counters_.babbled;
+  heard->lost = faults_.drop > 0 && chance_.Uniform() < faults_.drop;
+  if (heard->lost) arbitration_.CountDropped();
+  return true;
 }
 
 }  // namespace focalfleet::sim

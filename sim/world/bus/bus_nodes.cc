@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "protocol/wire/frame_bits.h"
 #include "sim/world/bus/frame_course.h"
 
 namespace focalfleet::sim {
@@ -16,37 +15,73 @@ std::uint32_t BusNodes::Attach() {
 std::uint32_t BusNodes::DrawReceiver(std::uint32_t sender, Rng* chance) const {
   std::uint64_t skip = chance->Below(hearing_ - 1);
   for (std::uint32_t node = 0;; ++node) {
-    if (node == sender || !Hears(node)) continue;
+    if (node == sender || !nodes_[node].hears()) continue;
     if (skip-- == 0) return node;
   }
 }
 
-void BusNodes::GoOff(std::uint32_t node, HostInstant counts_from) {
-  BusNode& off = nodes_[node];
-  off.off = true;
-  off.rows_missing = kRecessiveRows;
-  off.counts_from = counts_from;
-  off_.push_back(node);
-  hearing_ -= off.there ? 1u : 0u;
-}
+// ---- presence
 
-void BusNodes::Leave(std::uint32_t node) {
-  hearing_ -= Hears(node) ? 1u : 0u;
-  nodes_[node].there = false;
-}
-
-void BusNodes::ClearOff(std::uint32_t node) {
+void BusNodes::PowerOff(std::uint32_t node) {
+  Unplug(node);
   std::erase(off_, node);
   nodes_[node].off = false;
+  Count(node, {}, [](ErrorCounters* errors) { errors->Recover(); });
 }
 
-DurationNs BusNodes::Rows(std::uint32_t count) const {
-  return BitTime(count * kRecessiveRowBits, bit_rate_bps_);
+bool BusNodes::PowerOn(std::uint32_t number) {
+  BusNode& node = nodes_[number];
+  if (node.there) return false;
+  node.there = true;
+  hearing_ += node.hears() ? 1u : 0u;
+  return node.hears();
+}
+
+void BusNodes::Unplug(std::uint32_t number) {
+  BusNode& node = nodes_[number];
+  hearing_ -= node.hears() ? 1u : 0u;
+  node.there = false;
+}
+
+bool BusNodes::Plug(std::uint32_t number, bool has_frames, HostInstant now) {
+  BusNode& node = nodes_[number];
+  if (node.there) return false;
+  if (node.off) node.counts_from = std::max(node.counts_from, now);
+  // Alone the node was not acknowledged: rule 3 up to passive, then exception 1.
+  while (has_frames && node.errors.state() == Confinement::kActive)
+    Count(number, now, [](ErrorCounters* errors) { errors->TransmitError(); });
+  return PowerOn(number);
+}
+
+// ---- the way to bus-off and back
+
+void BusNodes::GoOff(std::uint32_t number, HostInstant now) {
+  BusNode& node = nodes_[number];
+  hearing_ -= node.hears() ? 1u : 0u;
+  node.off = true;
+  node.rows_missing = kRecessiveRows;
+  node.counts_from = now;
+  if (number == kHostNode) {
+    const bool waits = options_.host_restart == DurationNs{kNever.ns};
+    node.counts_from = waits ? kNever : now + options_.host_restart;
+  }
+  off_.push_back(number);
+  ++counters_.went_off;
+}
+
+void BusNodes::ThrowOff(std::uint32_t node, HostInstant now) {
+  while (!nodes_[node].off)
+    Count(node, now, [](ErrorCounters* errors) { errors->TransmitError(); });
+}
+
+void BusNodes::RestartHost(HostInstant now) {
+  BusNode& host = nodes_[kHostNode];
+  if (host.off) host.counts_from = std::min(host.counts_from, now);
 }
 
 HostInstant BusNodes::BackAt(const BusNode& node, HostInstant idle_at) const {
   if (node.counts_from == kNever || !node.there) return kNever;
-  return std::max(idle_at, node.counts_from) + Rows(node.rows_missing);
+  return std::max(idle_at, node.counts_from) + options_.Bits(node.rows_missing * kRecessiveRowBits);
 }
 
 HostInstant BusNodes::NextRecovery(HostInstant idle_at) const {
@@ -56,7 +91,7 @@ HostInstant BusNodes::NextRecovery(HostInstant idle_at) const {
 }
 
 void BusNodes::CountRowsWhileIdle(HostInstant idle_at, HostInstant now) {
-  const DurationNs row = Rows(1);
+  const DurationNs row = options_.Bits(kRecessiveRowBits);
   for (const std::uint32_t number : off_) {
     BusNode& node = nodes_[number];
     const DurationNs seen = now - std::max(idle_at, node.counts_from);
@@ -67,7 +102,7 @@ void BusNodes::CountRowsWhileIdle(HostInstant idle_at, HostInstant now) {
 }
 
 void BusNodes::CountRowOfFrame(HostInstant idle_at) {
-  const HostInstant row_began = idle_at - Rows(1);
+  const HostInstant row_began = idle_at - options_.Bits(kRecessiveRowBits);
   for (const std::uint32_t number : off_) {
     BusNode& node = nodes_[number];
     if (node.counts_from <= row_began && node.rows_missing > 0) --node.rows_missing;
@@ -86,7 +121,12 @@ std::vector<std::uint32_t> BusNodes::TakeRecovered(HostInstant idle_at, HostInst
     back.push_back(node);
     return true;
   });
-  for (const std::uint32_t node : back) nodes_[node].off = false;
+  for (const std::uint32_t node : back) {
+    nodes_[node].off = false;
+    ++hearing_;  // a node that is away never comes back
+    Count(node, now, [](ErrorCounters* errors) { errors->Recover(); });
+  }
+  counters_.recovered += back.size();
   return back;
 }
 

@@ -17,6 +17,7 @@ struct FakePort : PollablePort {
   [[nodiscard]] LinkState state() const override { return link; }
   [[nodiscard]] int fd() const override { return -1; }
   [[nodiscard]] HostInstant wake_at() const override { return wake; }
+  [[nodiscard]] DurationNs retry_full() const override { return kRetryFull; }
   [[nodiscard]] const PortCounters& counters() const override { return none; }
   [[nodiscard]] const std::string& name() const override { return text; }
   [[nodiscard]] const std::string& trouble() const override { return text; }

@@ -91,7 +91,7 @@ TEST(SimulatedPort, ADeadBusIsDownAndTakesNothing) {
   const auto fleet = SimulatedFleet::Create(std::move(config)).value();
   SimulatedPort port(fleet, BusId{0});
   EXPECT_EQ(port.state(), LinkState::kUp);
-  fleet->world().KillBus(BusId{0});
+  fleet->world().disturb().KillBus(BusId{0});
   EXPECT_EQ(port.state(), LinkState::kDown);
   EXPECT_EQ(port.Send(std::vector<CanFrame>{CanFrame{}}), 0u);
 }
@@ -114,7 +114,7 @@ TEST(SimulatedPort, TellsHowItsControllerStandsByTheInterfaceOfARealOne) {
   run(Milliseconds(1));
   EXPECT_EQ(port.trouble(), "");
   // The only other node leaves, so no node acknowledges.
-  fleet->world().PowerCut(UnitId{1});
+  fleet->world().disturb().PowerCut(UnitId{1});
   const std::vector<CanFrame> ask{Encode(HostMessage(IdentifyRequest{}), {kBroadcastNode, 9})};
   EXPECT_EQ(port.Send(ask), 1u);
   run(Microseconds(1100));
@@ -124,12 +124,12 @@ TEST(SimulatedPort, TellsHowItsControllerStandsByTheInterfaceOfARealOne) {
   EXPECT_EQ(port.state(), LinkState::kPassive);
   EXPECT_EQ(port.trouble(), "the controller is error-passive (no acknowledgement)");
   EXPECT_GT(port.counters().link_errors, 100u);
-  fleet->world().ThrowHostOff(BusId{0});
+  fleet->world().disturb().ThrowHostOff(BusId{0});
   run(Milliseconds(1));
   EXPECT_EQ(port.state(), LinkState::kOff);
   EXPECT_EQ(port.trouble(), "the controller is bus-off (no acknowledgement)");
   EXPECT_EQ(port.Send(ask), 0u);
-  fleet->world().PowerOn(UnitId{1});
+  fleet->world().disturb().PowerOn(UnitId{1});
   run(Milliseconds(1100));
   EXPECT_EQ(port.state(), LinkState::kUp);
   EXPECT_EQ(port.trouble(), "");

@@ -19,7 +19,7 @@ CanFrame FrameOf(std::uint32_t id, std::uint8_t length = 0, std::uint8_t fill = 
 }
 
 /// A bus with eight units: nodes 1..8.
-Bus BusOfEight(const Bus::Options& options, Rng chance = Rng(1)) {
+Bus BusOfEight(const BusOptions& options, Rng chance = Rng(1)) {
   Bus bus(options, chance);
   for (int i = 0; i < 8; ++i) bus.Attach();
   return bus;
@@ -86,9 +86,9 @@ TEST(Bus, HoldsTheWireForExactlyTheFramesBits) {
     EXPECT_EQ(heard[0].at.ns, end_ns);
     EXPECT_EQ(heard[0].sent.frame, frame);
   }
-  EXPECT_EQ(bus.counters().bits, bits);
-  EXPECT_EQ(bus.counters().busy.ns, end_ns);
-  EXPECT_DOUBLE_EQ(bus.counters().Load({2 * end_ns}), 0.5);
+  EXPECT_EQ(bus.counters().wire.bits, bits);
+  EXPECT_EQ(bus.counters().wire.busy.ns, end_ns);
+  EXPECT_DOUBLE_EQ(bus.counters().wire.Load({2 * end_ns}), 0.5);
 }
 
 TEST(Bus, SlowerBitsTakeLonger) {
@@ -107,7 +107,7 @@ TEST(Bus, LowestIdentifierWinsAmongAllThatWait) {
   ASSERT_EQ(heard.size(), 6u);
   const std::uint32_t senders[] = {6, 2, 4, 5, 3, 1};  // equal identifiers in order of coming
   for (std::size_t i = 0; i < 6; ++i) EXPECT_EQ(heard[i].sent.sender, senders[i]);
-  EXPECT_EQ(bus.counters().waiting_max, 6u);
+  EXPECT_EQ(bus.counters().mailboxes.waiting_max, 6u);
 }
 
 TEST(Bus, AFrameOnTheWireIsNotInterrupted) {
@@ -128,7 +128,7 @@ TEST(Bus, RefusesWhatItHasNoMailboxFor) {
   Bus bus = BusOfEight({.mailboxes_max = 3}, Rng(1));
   for (std::uint32_t i = 0; i < 3; ++i) EXPECT_TRUE(bus.Offer({FrameOf(i), false, 0}, {0}));
   EXPECT_FALSE(bus.Offer({FrameOf(9), false, 0}, {0}));
-  EXPECT_EQ(bus.counters().refused, 1u);
+  EXPECT_EQ(bus.counters().mailboxes.refused, 1u);
   EXPECT_EQ(Drain(&bus).size(), 3u);
   EXPECT_TRUE(bus.Offer({FrameOf(9), false, 0}, {0}));
 }
@@ -137,11 +137,11 @@ TEST(Bus, ADeadBusLosesWhatWaitsAndCarriesAgainWhenRevived) {
   Bus bus = BusOfEight({}, Rng(1));
   bus.Offer({FrameOf(1), false, 0}, {0});
   bus.Offer({FrameOf(2), false, 0}, {0});
-  bus.Kill({0});
+  bus.disturb().Kill({0});
   EXPECT_EQ(bus.NextEvent(), kNever);
   EXPECT_FALSE(bus.Offer({FrameOf(3), false, 0}, {0}));
-  EXPECT_EQ(bus.counters().dropped, 3u);
-  bus.Revive({0});
+  EXPECT_EQ(bus.counters().mailboxes.dropped, 3u);
+  bus.disturb().Revive({0});
   EXPECT_TRUE(bus.Offer({FrameOf(4), false, 0}, {0}));
   EXPECT_EQ(Drain(&bus).size(), 1u);
 }

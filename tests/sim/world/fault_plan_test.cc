@@ -25,16 +25,16 @@ TEST(FaultPlan, EveryFaultEndsAsItBegan) {
   EXPECT_EQ(rig.world().counters({0}).babbled, 0u);
   EXPECT_TRUE(rig.world().Truth(UnitId{2}).powered);
   rig.Run(DurationNs{1});
-  EXPECT_TRUE(rig.world().faults(UnitId{1})->silent);
+  EXPECT_TRUE(rig.world().disturb().faults(UnitId{1})->silent);
   EXPECT_FALSE(rig.world().Truth(UnitId{2}).powered);
-  EXPECT_EQ(rig.world().faults(BusId{0})->bit_error_rate, 1e-3);
+  EXPECT_EQ(rig.world().disturb().faults(BusId{0})->bit_error_rate, 1e-3);
   rig.Run(Milliseconds(900));
-  EXPECT_FALSE(rig.world().faults(UnitId{1})->silent);
+  EXPECT_FALSE(rig.world().disturb().faults(UnitId{1})->silent);
   EXPECT_TRUE(rig.world().Truth(UnitId{2}).powered);
-  EXPECT_EQ(rig.world().faults(BusId{0})->bit_error_rate, 0);
-  const BusCounters& counters = rig.world().counters({0});
+  EXPECT_EQ(rig.world().disturb().faults(BusId{0})->bit_error_rate, 0);
+  const BusCounters counters = rig.world().counters({0});
   EXPECT_GT(counters.babbled, 500u);
-  EXPECT_LT(counters.busy.ns, Milliseconds(101).ns) << "100 ms of babble, and nothing after";
+  EXPECT_LT(counters.wire.busy.ns, Milliseconds(101).ns) << "100 ms of babble, and nothing after";
   EXPECT_EQ(rig.world().NextEvent().ns > Seconds(1).ns, true);
 }
 
@@ -49,7 +49,7 @@ TEST(FaultPlan, ChanceHitsItsShareOfTheUnitsAndTheSameOnesForOneSeed) {
     World world(config);
     std::vector<std::uint32_t> hit;
     for (const UnitDescription& unit : world.units())
-      if (world.faults(unit.id)->silent) hit.push_back(unit.id.value);
+      if (world.disturb().faults(unit.id)->silent) hit.push_back(unit.id.value);
     return hit;
   };
   EXPECT_NEAR(static_cast<double>(silent(seed).size()), 100, 5 * 9.5);

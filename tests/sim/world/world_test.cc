@@ -70,13 +70,13 @@ TEST(World, EveryUnitAnswersABroadcastOnceInOrderOfNodes) {
     if (i == 0) continue;
     EXPECT_GT(rig.heard()[i].at, rig.heard()[i - 1].at);
   }
-  const BusCounters& counters = rig.world().counters({1});
+  const BusCounters counters = rig.world().counters({1});
   EXPECT_EQ(counters.host_frames, 1u);
   EXPECT_EQ(counters.unit_frames, 100u);
   // A frame has 64 + 0 to 64 + 8 * 8 bits and stuffing: 100 frames of 8 bytes take 13.1 to 16 ms.
-  EXPECT_GT(counters.busy, Milliseconds(13));
-  EXPECT_LT(counters.busy, Milliseconds(17));
-  EXPECT_EQ(rig.world().counters({0}).bits, 0u);
+  EXPECT_GT(counters.wire.busy, Milliseconds(13));
+  EXPECT_LT(counters.wire.busy, Milliseconds(17));
+  EXPECT_EQ(rig.world().counters({0}).wire.bits, 0u);
 }
 
 TEST(World, AnAnswerComesAfterTheFrameItsDelayAndItsOwnTimeOnTheWire) {
@@ -104,12 +104,12 @@ TEST(World, RestingUnitsAreNoEventsButTheHostsSilence) {
 
 TEST(World, PlantedMisbehaviourIsHeardAsNamed) {
   Rig rig(FleetOf(1, 6));
-  rig.world().faults(UnitId{1})->silent = true;
-  rig.world().faults(UnitId{2})->deaf = true;
-  rig.world().faults(UnitId{3})->copies = 2;
-  rig.world().faults(UnitId{4})->late = Milliseconds(80);
-  rig.world().faults(UnitId{5})->foreign_serial = SerialNumber{99};
-  rig.world().faults(UnitId{6})->wrong_digest = true;
+  rig.world().disturb().faults(UnitId{1})->silent = true;
+  rig.world().disturb().faults(UnitId{2})->deaf = true;
+  rig.world().disturb().faults(UnitId{3})->copies = 2;
+  rig.world().disturb().faults(UnitId{4})->late = Milliseconds(80);
+  rig.world().disturb().faults(UnitId{5})->foreign_serial = SerialNumber{99};
+  rig.world().disturb().faults(UnitId{6})->wrong_digest = true;
   rig.Send(0, 255, IdentifyRequest{});
   rig.Run(Milliseconds(50));
   for (const std::uint8_t node : std::initializer_list<std::uint8_t>{1, 2, 4})
@@ -137,12 +137,12 @@ TEST(World, PlantedMisbehaviourIsHeardAsNamed) {
 
 TEST(World, ADeadBusTakesOnlyItsUnitsWithIt) {
   Rig rig(FleetOf(2, 2));
-  rig.world().KillBus({0});
+  rig.world().disturb().KillBus({0});
   EXPECT_TRUE(rig.world().dead({0}));
   EXPECT_FALSE(rig.Ask(0, 1, IdentifyRequest{}));
   EXPECT_TRUE(rig.Ask(1, 1, IdentifyRequest{}));
   EXPECT_FALSE(rig.world().Inject({7}, {}, {0})) << "no such bus";
-  rig.world().ReviveBus({0});
+  rig.world().disturb().ReviveBus({0});
   EXPECT_TRUE(rig.Ask(0, 1, IdentifyRequest{}));
 }
 
@@ -198,16 +198,17 @@ Trail RunBusyFleet(std::uint64_t seed) {
   config.spread = Spread::kReal;
   Rig rig(std::move(config));
   for (const BusId bus : rig.world().buses())
-    *rig.world().faults(bus) = {.drop = 0.02, .duplicate = 0.02, .late = 0.05};
-  rig.world().faults(UnitId{4})->in_motion = {Milliseconds(40), FaultCode::kDriver, Axis::kPhi};
+    *rig.world().disturb().faults(bus) = {.drop = 0.02, .duplicate = 0.02, .late = 0.05};
+  rig.world().disturb().faults(UnitId{4})->in_motion = {Milliseconds(40), FaultCode::kDriver,
+                                                        Axis::kPhi};
   for (std::uint32_t bus = 0; bus < 3; ++bus)
     for (std::uint8_t node = 1; node <= 10; ++node)
       (void)rig.StageAndArm(bus, node, MakeMove(1, 100 * node, -50 * node));
   for (std::uint32_t bus = 0; bus < 3; ++bus) rig.Send(bus, 255, Start{{1}, 500});
   rig.Run(Milliseconds(150));
-  rig.world().PowerCut({15});
+  rig.world().disturb().PowerCut({15});
   rig.RunWatched(Milliseconds(2000));
-  rig.world().PowerOn({15});
+  rig.world().disturb().PowerOn({15});
   for (std::uint32_t bus = 0; bus < 3; ++bus) rig.Send(bus, 255, StatusRequest{});
   rig.Run(Milliseconds(50));
   Trail outcome{DigestOf(rig.wire()), 0};
@@ -311,7 +312,7 @@ TEST(World, NoUnitBeginsAMoveTwiceOnBadBuses) {
   config.seed = seed;
   Rig rig(std::move(config));
   for (const BusId bus : rig.world().buses())
-    *rig.world().faults(bus) = {
+    *rig.world().disturb().faults(bus) = {
         .drop = 0.1, .duplicate = 0.2, .late = 0.2, .late_by = Milliseconds(30)};
   std::uint64_t begun = 0;
   for (std::uint16_t move = 1; move <= 60; ++move) {
@@ -326,9 +327,9 @@ TEST(World, NoUnitBeginsAMoveTwiceOnBadBuses) {
       rig.Run(Milliseconds(static_cast<std::int64_t>(rng.Below(40))));
       const UnitId victim{static_cast<std::uint32_t>(1 + rng.Below(16))};
       if (rng.Below(3) == 0) {
-        rig.world().PowerCut(victim);
+        rig.world().disturb().PowerCut(victim);
         rig.Run(Milliseconds(1));
-        rig.world().PowerOn(victim);
+        rig.world().disturb().PowerOn(victim);
       }
     }
     rig.RunWatched(Milliseconds(300));

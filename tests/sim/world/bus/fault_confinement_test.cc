@@ -20,7 +20,7 @@ CanFrame FrameOf(std::uint32_t id, std::uint8_t length = 8) {
   return frame;
 }
 
-Bus BusOf(std::uint32_t units, std::uint64_t seed = 1, const Bus::Options& options = {}) {
+Bus BusOf(std::uint32_t units, std::uint64_t seed = 1, const BusOptions& options = {}) {
   Bus bus(options, Rng(seed));
   for (std::uint32_t i = 0; i < units; ++i) bus.Attach();
   return bus;
@@ -54,15 +54,16 @@ class Oracle {
   // `bus` did something. The oracle takes the event from its counters, and nothing of how it counts
   // errors.
   void Follow(const BusCounters& before, const Bus& bus, std::size_t sender) {
-    const BusCounters& after = bus.counters();
+    const BusCounters after = bus.counters();
     for (OracleNode& node : nodes_)
-      if (after.recovered > before.recovered && node.off && bus.Hears(IndexOf(node))) {
+      if (after.controllers.recovered > before.controllers.recovered && node.off &&
+          bus.node(IndexOf(node)).hears()) {
         node.off = false;
         node.transmit = node.receive = 0;
       }
     std::size_t kind = 0;
     for (std::size_t k = 1; k < kFrameErrorCount; ++k)
-      if (after.errors[k] > before.errors[k]) kind = k;
+      if (after.wire.errors[k] > before.wire.errors[k]) kind = k;
     const bool passed =
         after.host_frames + after.unit_frames > before.host_frames + before.unit_frames;
     if (kind == 0 && passed) Well(sender, bus);
@@ -73,16 +74,18 @@ class Oracle {
     for (std::size_t i = 0; i < nodes_.size(); ++i) {
       const auto node = static_cast<std::uint32_t>(i);
       const OracleNode& should = nodes_[i];
-      ASSERT_EQ(bus.Hears(node), should.hears()) << when << " node " << i;
+      ASSERT_EQ(bus.node(node).hears(), should.hears()) << when << " node " << i;
       if (should.off) {
-        ASSERT_EQ(bus.state(node), Confinement::kOff) << when << " node " << i;
+        ASSERT_EQ(bus.node(node).state(), Confinement::kOff) << when << " node " << i;
         continue;
       }
-      ASSERT_EQ(bus.errors(node).transmit(), static_cast<unsigned>(should.transmit))
+      ASSERT_EQ(bus.node(node).errors.transmit(), static_cast<unsigned>(should.transmit))
           << when << " node " << i;
-      ASSERT_EQ(bus.errors(node).receive(), static_cast<unsigned>(std::min(should.receive, 255)))
+      ASSERT_EQ(bus.node(node).errors.receive(),
+                static_cast<unsigned>(std::min(should.receive, 255)))
           << when << " node " << i;
-      ASSERT_EQ(bus.state(node) == Confinement::kPassive, should.passive()) << when << " " << i;
+      ASSERT_EQ(bus.node(node).state() == Confinement::kPassive, should.passive())
+          << when << " " << i;
     }
   }
 
@@ -97,7 +100,7 @@ class Oracle {
       if (i == sender) {
         node.transmit = std::max(node.transmit - 1, 0);  // rule 7
       } else if (node.receive > 127) {                   // rule 8: any of 119..127
-        node.receive = static_cast<int>(bus.errors(IndexOf(node)).receive());
+        node.receive = static_cast<int>(bus.node(IndexOf(node)).errors.receive());
         EXPECT_GE(node.receive, 119);
         EXPECT_LE(node.receive, 127);
       } else {
@@ -111,7 +114,7 @@ class Oracle {
     if (kind == FrameError::kStuff) {
       // In arbitration the sender sees the error as a receiver, or by exception 2 not at all.
       const int more =
-          static_cast<int>(bus.errors(IndexOf(from)).receive()) - std::min(from.receive, 255);
+          static_cast<int>(bus.node(IndexOf(from)).errors.receive()) - std::min(from.receive, 255);
       EXPECT_TRUE(more == 0 || more == 1);
       from.receive += more;
     } else if (kind != FrameError::kAcknowledgement || hearing > 1 ||
@@ -124,7 +127,7 @@ class Oracle {
       if (i == sender || !node.hears()) continue;
       if (!passed) {
         node.receive += 1;
-      } else if (bus.errors(IndexOf(node)).receive() != static_cast<unsigned>(node.receive)) {
+      } else if (bus.node(IndexOf(node)).errors.receive() != static_cast<unsigned>(node.receive)) {
         node.receive += 9;  // rules 1 and 2: the node that refused the frame that the others have
         ++refusing;
       }
@@ -147,13 +150,13 @@ class RandomFaults {
       SendOne(round);
       if (::testing::Test::HasFatalFailure()) return;
     }
-    const BusCounters& c = bus_.counters();
+    const BusCounters c = bus_.counters();
     // All time is accounted for, to the bit.
-    EXPECT_EQ((c.busy + c.idle).ns, ended_.ns);
-    EXPECT_EQ(c.busy.ns, static_cast<std::int64_t>(c.bits + c.error_bits) * kBit);
-    EXPECT_EQ(c.destroyed.ns, static_cast<std::int64_t>(c.error_bits) * kBit);
+    EXPECT_EQ((c.wire.busy + c.wire.idle).ns, ended_.ns);
+    EXPECT_EQ(c.wire.busy.ns, static_cast<std::int64_t>(c.wire.bits + c.wire.error_bits) * kBit);
+    EXPECT_EQ(c.wire.destroyed.ns, static_cast<std::int64_t>(c.wire.error_bits) * kBit);
   }
-  [[nodiscard]] const BusCounters& counters() const { return bus_.counters(); }
+  [[nodiscard]] BusCounters counters() const { return bus_.counters(); }
 
  private:
   void Change() {
@@ -164,10 +167,10 @@ class RandomFaults {
     OracleNode& should = oracle_.nodes()[node];
     if (rng_.Below(5) != 0) return;
     if (should.there) {
-      bus_.PowerOff(node, ended_);
+      bus_.disturb().PowerOff(node, ended_);
       should = {.there = false};
     } else {
-      bus_.PowerOn(node, ended_);
+      bus_.disturb().PowerOn(node, ended_);
       should = {};
     }
   }
@@ -188,7 +191,7 @@ class RandomFaults {
     }
     // A node that still tries gets another one between two attempts, and a bus without errors.
     if (bus_.waiting() > 0) {
-      for (const auto busy = bus_.counters().busy; busy == bus_.counters().busy;)
+      for (const auto busy = bus_.counters().wire.busy; busy == bus_.counters().wire.busy;)
         AdvanceOnce(sender, when);
       PowerOnSomebody();
     }
@@ -203,14 +206,14 @@ class RandomFaults {
     const HostInstant now = bus_.NextEvent();
     Bus::Heard heard;
     bus_.Advance(&heard);
-    if (bus_.counters().busy.ns > before.busy.ns) ended_ = now;
+    if (bus_.counters().wire.busy.ns > before.wire.busy.ns) ended_ = now;
     oracle_.Follow(before, bus_, sender);
     oracle_.ExpectSame(bus_, when);
   }
   void PowerOnSomebody() {
     for (std::uint32_t node = 1; node <= units_; ++node) {
       if (oracle_.nodes()[node].there) continue;
-      bus_.PowerOn(node, ended_);
+      bus_.disturb().PowerOn(node, ended_);
       oracle_.nodes()[node] = {};
       return;
     }
@@ -233,9 +236,9 @@ TEST(FaultConfinement, CountersAndTimeFollowTheRulesOnAnySequenceOfFaults) {
     RandomFaults run(seed, 1 + static_cast<std::uint32_t>(seed % 5));
     run.Run(400);
     if (HasFatalFailure()) return;
-    passive += run.counters().went_passive;
-    off += run.counters().went_off;
-    back += run.counters().recovered;
+    passive += run.counters().controllers.went_passive;
+    off += run.counters().controllers.went_off;
+    back += run.counters().controllers.recovered;
   }
   // The sequences must reach the passive and the off state often.
   EXPECT_GT(passive, 100u);
@@ -262,43 +265,44 @@ TEST(FaultConfinement, AFrameIsDestroyedWithTheProbabilityOfItsBits) {
     const double lost = 1 - std::pow(1 - rate, bits);
     const auto attempts = static_cast<double>(kFrames + bus.counters().repeats);
     const double deviation = std::sqrt(attempts * lost * (1 - lost));
-    EXPECT_NEAR(static_cast<double>(bus.counters().error_frames()), attempts * lost, 5 * deviation);
+    EXPECT_NEAR(static_cast<double>(bus.counters().wire.error_frames()), attempts * lost,
+                5 * deviation);
     EXPECT_EQ(bus.counters().host_frames, kFrames + bus.counters().received_twice);
   }
 }
 
 TEST(FaultConfinement, AloneOnTheBusTheHostGoesPassiveAndNeverOff) {
   Bus bus = BusOf(1);
-  bus.PowerOff(1, {0});
+  bus.disturb().PowerOff(1, {0});
   bus.Offer({FrameOf(7), false, 0}, {0});
   RunUntil(&bus, {Seconds(1).ns});
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kPassive);
-  EXPECT_EQ(bus.errors(Bus::kHost).transmit(), 128u);
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kPassive);
+  EXPECT_EQ(bus.node(kHostNode).errors.transmit(), 128u);
   EXPECT_EQ(bus.waiting(), 1u);
   // Once the host is passive, each attempt costs its bits and the eight of suspend transmission.
   const std::int64_t attempt = (Unacknowledged(FrameOf(7)).bits + 8) * kBit;
-  EXPECT_NEAR(static_cast<double>(bus.counters().error_frames()),
+  EXPECT_NEAR(static_cast<double>(bus.counters().wire.error_frames()),
               1e9 / static_cast<double>(attempt), 2);
-  bus.PowerOn(1, {Seconds(1).ns});
+  bus.disturb().PowerOn(1, {Seconds(1).ns});
   EXPECT_EQ(RunUntil(&bus, {Seconds(1).ns + 1'000'000}).size(), 1u) << "it gets through at last";
-  EXPECT_EQ(bus.errors(Bus::kHost).transmit(), 127u);
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kActive);
+  EXPECT_EQ(bus.node(kHostNode).errors.transmit(), 127u);
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kActive);
 }
 
 TEST(FaultConfinement, APassiveSenderLeavesEightBitsToTheOthers) {
   Bus bus = BusOf(2);
-  bus.PowerOff(1, {0});
-  bus.PowerOff(2, {0});
+  bus.disturb().PowerOff(1, {0});
+  bus.disturb().PowerOff(2, {0});
   bus.Offer({FrameOf(7), false, 0}, {0});
   RunUntil(&bus, {Milliseconds(100).ns});
-  ASSERT_EQ(bus.state(Bus::kHost), Confinement::kPassive);
-  bus.PowerOn(1, {Milliseconds(100).ns});
+  ASSERT_EQ(bus.node(kHostNode).state(), Confinement::kPassive);
+  bus.disturb().PowerOn(1, {Milliseconds(100).ns});
   RunUntil(&bus, {Milliseconds(101).ns});
   // The host is active again for one more frame. Then it is passive, with two frames after one
   // another.
   for (int i = 0; i < 5; ++i) bus.Offer({FrameOf(9), false, 0}, {Milliseconds(200).ns});
   bus.faults().bit_error_rate = 1;
-  while (bus.state(Bus::kHost) != Confinement::kPassive) {
+  while (bus.node(kHostNode).state() != Confinement::kPassive) {
     Bus::Heard heard;
     bus.Advance(&heard);
   }
@@ -316,13 +320,13 @@ TEST(FaultConfinement, AUnitThatIsOffComesBackAfter128TimesElevenRecessiveBits) 
   Bus bus = BusOf(2);
   bus.faults().bit_error_rate = 1;
   bus.Offer({FrameOf(7), true, 1}, {0});
-  while (bus.state(1) != Confinement::kOff) {
+  while (bus.node(1).state() != Confinement::kOff) {
     ASSERT_LT(bus.NextEvent().ns, Seconds(1).ns);
     Bus::Heard heard;
     bus.Advance(&heard);
   }
   bus.faults().bit_error_rate = 0;
-  const std::int64_t off_at = bus.counters().busy.ns + bus.counters().idle.ns;
+  const std::int64_t off_at = bus.counters().wire.busy.ns + bus.counters().wire.idle.ns;
   EXPECT_EQ(bus.NextEvent().ns, off_at + 128 * 11 * kBit);
   // Frames of other nodes count a row each: their end is eleven recessive bits.
   for (int i = 0; i < 50; ++i) bus.Offer({FrameOf(9), false, 0}, {off_at});
@@ -336,55 +340,55 @@ TEST(FaultConfinement, AUnitThatIsOffComesBackAfter128TimesElevenRecessiveBits) 
 TEST(FaultConfinement, TheHostComesBackOnRequestOrByItself) {
   Bus bus = BusOf(1, 1, {.host_restart = DurationNs{kNever.ns}});
   bus.Offer({FrameOf(7), false, 0}, {0});
-  bus.ThrowHostOff({50'000});
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kOff);
+  bus.disturb().ThrowHostOff({50'000});
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kOff);
   EXPECT_FALSE(bus.Offer({FrameOf(8), false, 0}, {60'000}));
   EXPECT_EQ(RunUntil(&bus, {Seconds(100).ns}).size(), 0u) << "cut off in mid-frame";
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kOff);
-  bus.RestartHost({Seconds(100).ns});
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kOff);
+  bus.disturb().RestartHost({Seconds(100).ns});
   RunUntil(&bus, {Seconds(100).ns + 128 * 11 * kBit - 1});
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kOff);
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kOff);
   RunUntil(&bus, {Seconds(100).ns + 128 * 11 * kBit});
-  EXPECT_EQ(bus.state(Bus::kHost), Confinement::kActive);
+  EXPECT_EQ(bus.node(kHostNode).state(), Confinement::kActive);
 
   Bus other = BusOf(1, 1, {.host_restart = Milliseconds(20)});
-  other.ThrowHostOff({0});
+  other.disturb().ThrowHostOff({0});
   RunUntil(&other, {Milliseconds(20).ns + 128 * 11 * kBit - 1});
-  EXPECT_EQ(other.state(Bus::kHost), Confinement::kOff);
+  EXPECT_EQ(other.node(kHostNode).state(), Confinement::kOff);
   RunUntil(&other, {Milliseconds(20).ns + 128 * 11 * kBit});
-  EXPECT_EQ(other.state(Bus::kHost), Confinement::kActive);
+  EXPECT_EQ(other.node(kHostNode).state(), Confinement::kActive);
 }
 
 TEST(FaultConfinement, ABabblerStarvesAllBelowItAndNobodyAbove) {
   Bus bus = BusOf(3);
-  bus.Babble(2, FrameOf(100), {0});
+  bus.disturb().Babble(2, FrameOf(100), {0});
   bus.Offer({FrameOf(200), false, 0}, {0});
   bus.Offer({FrameOf(99), true, 1}, {1'000'000});
   const auto heard = RunUntil(&bus, {Milliseconds(10).ns});
   EXPECT_EQ(bus.counters().babbled + 1, heard.size());
-  EXPECT_EQ(bus.counters().idle.ns, 0) << "no bit is left";
+  EXPECT_EQ(bus.counters().wire.idle.ns, 0) << "no bit is left";
   const auto other = std::ranges::find(heard, 99u, [](const auto& h) { return h.sent.frame.id; });
   ASSERT_NE(other, heard.end());
   EXPECT_LE(other->at.ns, 1'000'000 + (FrameBits(FrameOf(100)) + FrameBits(FrameOf(99))) * kBit);
   EXPECT_EQ(bus.waiting(), 2u) << "the host's frame and the one on the wire";
-  bus.Babble(2, std::nullopt, {Milliseconds(10).ns});
+  bus.disturb().Babble(2, std::nullopt, {Milliseconds(10).ns});
   EXPECT_EQ(RunUntil(&bus, {Milliseconds(20).ns}).back().sent.frame.id, 200u);
 }
 
 TEST(FaultConfinement, ABabblerNeverSendsBeforeItCan) {
   Bus bus = BusOf(3);
   constexpr std::int64_t kSecond = 1'000'000'000;
-  bus.Babble(2, FrameOf(100), {kSecond});
+  bus.disturb().Babble(2, FrameOf(100), {kSecond});
   EXPECT_EQ(bus.NextEvent().ns, kSecond);
   RunUntil(&bus, {kSecond + 1'000'000});
-  bus.PowerOff(2, {kSecond + 1'000'000});
+  bus.disturb().PowerOff(2, {kSecond + 1'000'000});
   RunUntil(&bus, {2 * kSecond});
-  bus.PowerOn(2, {2 * kSecond});
+  bus.disturb().PowerOn(2, {2 * kSecond});
   EXPECT_EQ(bus.NextEvent().ns, 2 * kSecond);
   RunUntil(&bus, {2 * kSecond + 1'000'000});
-  bus.Kill({2 * kSecond + 1'000'000});
+  bus.disturb().Kill({2 * kSecond + 1'000'000});
   EXPECT_EQ(bus.NextEvent(), kNever);
-  bus.Revive({3 * kSecond});
+  bus.disturb().Revive({3 * kSecond});
   EXPECT_EQ(bus.NextEvent().ns, 3 * kSecond);
 }
 
@@ -393,20 +397,21 @@ TEST(FaultConfinement, ADominantWireThrowsTheSenderOffAndMakesAllOthersPassive) 
   bus.Offer({FrameOf(7), true, 1}, {0});
   Bus::Heard heard;
   bus.Advance(&heard);
-  bus.Stick({40'000});
+  bus.disturb().Stick({40'000});
   RunUntil(&bus, {Seconds(1).ns});
   EXPECT_EQ(bus.NextEvent(), kNever);
-  EXPECT_EQ(bus.state(1), Confinement::kOff);
-  for (const std::uint32_t node : {0u, 2u, 3u}) EXPECT_EQ(bus.state(node), Confinement::kPassive);
-  bus.Release({Seconds(1).ns});
+  EXPECT_EQ(bus.node(1).state(), Confinement::kOff);
+  for (const std::uint32_t node : {0u, 2u, 3u})
+    EXPECT_EQ(bus.node(node).state(), Confinement::kPassive);
+  bus.disturb().Release({Seconds(1).ns});
   const std::int64_t over = Seconds(1).ns + 11 * kBit;
   EXPECT_EQ(bus.NextEvent().ns, over + 128 * 11 * kBit) << "only recessive bits count";
   ASSERT_EQ(RunUntil(&bus, {Seconds(2).ns}).size(), 1u);
-  EXPECT_EQ(bus.state(1), Confinement::kActive);
-  EXPECT_EQ(bus.errors(2).receive(), 119u);
-  const BusCounters& c = bus.counters();
-  EXPECT_EQ(c.stuck.ns, over - 40'000);
-  EXPECT_EQ((c.busy + c.idle).ns, over + 128 * 11 * kBit + FrameBits(FrameOf(7)) * kBit);
+  EXPECT_EQ(bus.node(1).state(), Confinement::kActive);
+  EXPECT_EQ(bus.node(2).errors.receive(), 119u);
+  const BusCounters c = bus.counters();
+  EXPECT_EQ(c.wire.stuck.ns, over - 40'000);
+  EXPECT_EQ((c.wire.busy + c.wire.idle).ns, over + 128 * 11 * kBit + FrameBits(FrameOf(7)) * kBit);
 }
 
 TEST(FaultConfinement, AUnitWhoseSupplyFailsInMidFrameCostsTheOthersAnErrorFrame) {
@@ -415,24 +420,24 @@ TEST(FaultConfinement, AUnitWhoseSupplyFailsInMidFrameCostsTheOthersAnErrorFrame
   bus.Offer({FrameOf(9), false, 0}, {0});
   Bus::Heard heard;
   bus.Advance(&heard);
-  bus.PowerOff(1, {60'000});
+  bus.disturb().PowerOff(1, {60'000});
   const auto all = RunUntil(&bus, {Seconds(1).ns});
   ASSERT_EQ(all.size(), 1u);
   EXPECT_EQ(all[0].at.ns, (CutOffAt(FrameOf(7), 60).bits + FrameBits(FrameOf(9))) * kBit);
-  EXPECT_EQ(bus.errors(2).receive(), 0u) << "one up, one down";
-  EXPECT_EQ(bus.errors(Bus::kHost).receive(), 1u);
+  EXPECT_EQ(bus.node(2).errors.receive(), 0u) << "one up, one down";
+  EXPECT_EQ(bus.node(kHostNode).errors.receive(), 1u);
 }
 
 TEST(FaultConfinement, AnUnpluggedUnitKeepsWhatItsMailboxesHoldAndIsPassiveWhenItIsBack) {
   Bus bus = BusOf(2);
-  bus.Unplug(1, {0});
+  bus.disturb().Unplug(1, {0});
   for (std::uint32_t i = 0; i < 5; ++i) bus.Offer({FrameOf(10 + i), true, 1}, {0});
   EXPECT_EQ(RunUntil(&bus, {Seconds(1).ns}).size(), 0u);
-  EXPECT_EQ(bus.counters().refused, 2u);
-  bus.Plug(1, {Seconds(1).ns});
-  EXPECT_EQ(bus.state(1), Confinement::kPassive);
+  EXPECT_EQ(bus.counters().mailboxes.refused, 2u);
+  bus.disturb().Plug(1, {Seconds(1).ns});
+  EXPECT_EQ(bus.node(1).state(), Confinement::kPassive);
   EXPECT_EQ(RunUntil(&bus, {Seconds(2).ns}).size(), 3u);
-  EXPECT_EQ(bus.errors(1).transmit(), 125u);
+  EXPECT_EQ(bus.node(1).errors.transmit(), 125u);
 }
 
 TEST(FaultConfinement, ADoubledFrameIsHeardTwiceByAllButTheOneThatRefusedIt) {
@@ -445,9 +450,9 @@ TEST(FaultConfinement, ADoubledFrameIsHeardTwiceByAllButTheOneThatRefusedIt) {
   bus.faults().duplicate = 0;
   const auto rest = RunUntil(&bus, {Seconds(1).ns});
   ASSERT_EQ(rest.size(), 1u);
-  EXPECT_NE(first.but_not, Bus::kNobody);
-  EXPECT_NE(first.but_not, Bus::kHost);
-  EXPECT_EQ(rest[0].but_not, Bus::kNobody);
+  EXPECT_NE(first.but_not, kNoNode);
+  EXPECT_NE(first.but_not, kHostNode);
+  EXPECT_EQ(rest[0].but_not, kNoNode);
   EXPECT_EQ(rest[0].at.ns, (RefusedByOne(FrameOf(7)).bits + FrameBits(FrameOf(7))) * kBit);
 }
 

@@ -1,9 +1,8 @@
 // The disturbances of a world: tests, load testers and planned faults cut power, break buses and
-// make units and buses misbehave.
+// make units and buses misbehave. World::disturb() gives them.
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <optional>
 
 #include "protocol/base/ids.h"
@@ -16,10 +15,10 @@ namespace focalfleet::sim {
 class WorldCore;
 
 /// Every disturbance acts at the world's now().
-class Disturbable {
+class Disturbances {
  public:
-  Disturbable(const Disturbable&) = delete;
-  Disturbable& operator=(const Disturbable&) = delete;
+  /// `core` outlives this.
+  explicit Disturbances(WorldCore* core) : core_(core) {}
 
   void PowerCut(UnitId unit);  // at once, whatever the unit does
   void PowerOn(UnitId unit);
@@ -38,11 +37,8 @@ class Disturbable {
   [[nodiscard]] UnitFaults* faults(UnitId unit);
   [[nodiscard]] BusFaults* faults(BusId bus);
 
- protected:
-  Disturbable();
-  ~Disturbable();
-
-  std::unique_ptr<WorldCore> core_;
+ private:
+  WorldCore* core_;
 };
 
 }  // namespace focalfleet::sim
