@@ -3,6 +3,7 @@
 // condition is open until the condition ends, any other one until somebody acknowledges it.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -68,6 +69,7 @@ enum class AlarmName : std::uint8_t {
   kUnitRetargeted,
 };
 inline constexpr AlarmName kLastAlarmName = AlarmName::kUnitRetargeted;
+inline constexpr std::size_t kAlarmNameCount = static_cast<std::size_t>(kLastAlarmName) + 1;
 
 /// When an open alarm is over.
 enum class AlarmLife : std::uint8_t {

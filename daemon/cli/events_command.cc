@@ -17,7 +17,7 @@
 namespace focalfleet::cli {
 namespace {
 
-constexpr std::chrono::seconds kLookEvery{1};
+constexpr std::chrono::seconds kFollowEvery{1};
 
 struct EventsOptions {
   std::string since;
@@ -76,7 +76,7 @@ ExitCode Follow(const Context& context, Json args) {
     }
     Show(context, ListIn(*answer, "events"));
     if (OutputError() != 0) return ExitCode::kOk;  // Main reports it
-    std::this_thread::sleep_for(kLookEvery);
+    std::this_thread::sleep_for(kFollowEvery);
   }
 }
 

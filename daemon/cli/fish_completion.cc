@@ -17,9 +17,9 @@ std::string Quote(std::string_view text) {
 }
 
 /// A function that prints the entry of a table: a case for each key.
-class Table {
+class FishTable {
  public:
-  explicit Table(std::string_view name)
+  explicit FishTable(std::string_view name)
       : text_(fmt::format("function {}\n  switch \"$argv[1]\"\n", name)) {}
   void Put(const std::string& key, const std::vector<std::string>& lines) {
     if (lines.empty()) return;
@@ -42,8 +42,8 @@ std::string WithDescription(const std::string& word, const std::string& what) {
 }
 
 std::string Tables(const std::vector<CompletionNode>& nodes) {
-  Table commands("__focalfleet_commands"), options("__focalfleet_options");
-  Table values("__focalfleet_values"), arguments("__focalfleet_arguments");
+  FishTable commands("__focalfleet_commands"), options("__focalfleet_options");
+  FishTable values("__focalfleet_values"), arguments("__focalfleet_arguments");
   for (const CompletionNode& node : nodes) {
     const std::string key = "/" + node.path;
     std::vector<std::string> lines;

@@ -43,8 +43,11 @@ std::string TextOf(const AlarmRow& alarm) {
 }
 
 void Log(const AlarmRow& alarm) {
-  const WithFields fields(
-      {.message_id = kAlarmMessageId, .unit = alarm.unit, .bus = alarm.bus, .configuration = {}});
+  const WithFields fields({.message_id = kAlarmMessageId,
+                           .unit = alarm.unit,
+                           .bus = alarm.bus,
+                           .configuration = {},
+                           .alarm = Name(alarm.name)});
   spdlog::log(LevelOf(alarm.severity), "alarm {} {}: {}", alarm.id, Name(alarm.name),
               TextOf(alarm));
 }

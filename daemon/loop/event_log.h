@@ -17,6 +17,7 @@ struct EventFields {
   std::optional<UnitId> unit;
   std::optional<BusId> bus;
   std::optional<std::uint64_t> configuration;
+  const char* alarm = nullptr;  // its name
 };
 
 /// MESSAGE_ID of each kind of event; `journalctl MESSAGE_ID=...` lists them.

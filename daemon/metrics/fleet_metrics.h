@@ -10,6 +10,7 @@
 #include "daemon/clock/wall_time.h"
 #include "daemon/dds/status_values.h"
 #include "daemon/metrics/histogram.h"
+#include "fleet/alarm_name.h"
 #include "fleet/coordinator.h"
 
 namespace focalfleet {
@@ -81,7 +82,7 @@ struct FleetMetrics {
   HistogramReading configuration_retries;
   HistogramReading start_skew_s;
   HistogramReading knowledge_age_s;
-  std::array<std::uint64_t, 3> alarms_by_severity{};
+  std::array<std::uint64_t, kAlarmNameCount> alarms_by_name{};
   double clock_rate_error = 0;  // the farthest from 0 of all units
   bool store_failing = false;
   std::uint64_t store_waiting = 0;  // batches

@@ -55,7 +55,7 @@ void MetricsSampler::Note(const FleetView& view, const Effects& effects) {
   NoteConfiguration(view);
   for (const Row& row : effects.rows) {
     if (const auto* alarm = std::get_if<AlarmRow>(&row))
-      ++alarms_by_severity_[static_cast<std::size_t>(alarm->severity)];
+      ++alarms_by_name_[static_cast<std::size_t>(KindOf(alarm->name).name)];
     const auto* measurement = std::get_if<MeasurementRow>(&row);
     if (measurement == nullptr || !measurement->place) continue;
     if (measurement->error_um) position_error_m_.Observe(1e-6 * *measurement->error_um);
@@ -100,7 +100,7 @@ void MetricsSampler::SampleIfDue(const FleetView& view) {
   out->limit_W = power_->limit_W;
   out->power_predicted_W = power_->peak_W;
   out->configurations_ended = configurations_ended_;
-  out->alarms_by_severity = alarms_by_severity_;
+  out->alarms_by_name = alarms_by_name_;
   out->position_error_m = position_error_m_.Read();
   out->configuration_retries = configuration_retries_.Read();
   out->start_skew_s = start_skew_s_.Read();

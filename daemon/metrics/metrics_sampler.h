@@ -62,7 +62,7 @@ class MetricsSampler {
   WallTime ended_;
 
   std::array<std::uint64_t, 3> configurations_ended_{};  // done, stopped, failed
-  std::array<std::uint64_t, 3> alarms_by_severity_{};
+  std::array<std::uint64_t, kAlarmNameCount> alarms_by_name_{};
   Histogram position_error_m_;
   Histogram configuration_retries_;
   Histogram start_skew_s_;

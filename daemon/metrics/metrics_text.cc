@@ -223,13 +223,10 @@ void PutOutside(const FleetMetrics& fleet, const WorkCounters& work, Exposition*
              "Unix time at which the last usable exposure was assigned to units. 0: none was.",
              work.exposed_at_s);
   out->BeginCounter("focalfleet_alarms_total", "Alarms that were raised.");
-  PutEach(
-      "severity", fleet.alarms_by_severity,
-      [](std::size_t i) {
-        constexpr const char* kNames[] = {"info", "warning", "error"};
-        return kNames[i];
-      },
-      out);
+  for (const AlarmKind& kind : AlarmKinds())
+    out->SampleOf(
+        fmt::format(FMT_COMPILE("name=\"{}\",severity=\"{}\""), kind.text, Name(kind.severity)),
+        AsDouble(fleet.alarms_by_name[static_cast<std::size_t>(kind.name)]));
 }
 
 void PutProcess(const FleetMetrics& fleet, const ProcessFacts& process, Exposition* out) {

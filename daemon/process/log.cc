@@ -88,6 +88,7 @@ class JournalSink : public spdlog::sinks::base_sink<std::mutex> {
         {"SYSLOG_IDENTIFIER", "focalfleetd"}};
     if (const EventFields* const fields = FieldsOfThisEvent()) {
       if (fields->message_id != nullptr) values.emplace_back("MESSAGE_ID", fields->message_id);
+      if (fields->alarm != nullptr) values.emplace_back("ALARM", fields->alarm);
       if (fields->unit) values.emplace_back("UNIT_ID", std::to_string(fields->unit->value));
       if (fields->bus) values.emplace_back("BUS", std::to_string(fields->bus->value));
       if (fields->configuration)

@@ -17,7 +17,7 @@
 namespace focalfleet {
 namespace {
 
-constexpr std::uint64_t kHistoryRowsMax = 1000;
+constexpr std::uint64_t kParameterRowsMax = 1000;
 constexpr double kWaitMaxS = 1e6;
 
 /// The newest value of each axis and parameter; `history` is newest first.
@@ -162,8 +162,8 @@ Result<Json> RequestHandler::AskParameters(const FleetView& view, const ControlR
   const UnitView& unit = view.coordinator->unit(i);
   const SerialNumber serial = unit.bound_serial.value != 0 ? unit.bound_serial : unit.serial;
   FOCALFLEET_TRY_ASSIGN(StoreReader* const reader, Reader());
-  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kHistoryRowsMax));
-  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kHistoryRowsMax));
+  FOCALFLEET_TRY_ASSIGN(const auto history, reader->Parameters(serial, kParameterRowsMax));
+  FOCALFLEET_TRY_ASSIGN(const auto tunings, reader->Tunings(serial, kParameterRowsMax));
   const Json known = UnitJson(view, i);
   Json drive = {{"mode", known["mode"]}, {"v_bus_V", known["v_bus_V"]}};
   for (const char* axis : {"theta", "phi"})

@@ -54,11 +54,6 @@ double RobustSd(const VectorXd& residuals) {
   return std::max(kNoiseLeast_V, 1.4826 * *middle);
 }
 
-double Rms(const VectorXd& residuals) {
-  return std::sqrt(residuals.squaredNorm() /
-                   static_cast<double>(std::max<Index>(1, residuals.size())));
-}
-
 // Huber's cost: squares up to `limit`, linear beyond.
 double Cost(const VectorXd& residuals, double limit) {
   double cost = 0;

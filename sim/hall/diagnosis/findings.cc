@@ -154,11 +154,6 @@ Size SizeOf(const HallHypothesis& one, const HallDiagnosis& found) {
   return {};
 }
 
-double Rms(const VectorXd& values) {
-  return values.size() == 0 ? 0
-                            : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
-}
-
 double MedianSize(const VectorXd& values) {
   std::vector<double> sizes(values.data(), values.data() + values.size());
   for (double& size : sizes) size = std::abs(size);

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -20,6 +21,11 @@
 
 namespace focalfleet::sim {
 
+/// The root mean square; 0 of no values.
+inline double Rms(const Eigen::VectorXd& values) {
+  return values.size() == 0 ? 0
+                            : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
 /// Eigen counts with a sign.
 inline Eigen::Index At(std::size_t k) { return static_cast<Eigen::Index>(k); }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <numeric>
 
 #include "tests/daemon/verbs/small_fleet.h"
 
@@ -81,13 +82,16 @@ TEST_F(MetricsSamplerTest, TakesTheShellsFacts) {
   EXPECT_EQ(sample->traffic.discarded, 15u);
 }
 
-TEST_F(MetricsSamplerTest, CountsAlarmsBySeverity) {
+TEST_F(MetricsSamplerTest, CountsAlarmsByName) {
   Effects effects;
-  effects.rows = {AlarmRow{.id = 1, .severity = Severity::kError},
-                  AlarmRow{.id = 2, .severity = Severity::kInfo},
-                  AlarmRow{.id = 3, .severity = Severity::kError}};
+  effects.rows = {AlarmRow{.id = 1, .name = AlarmName::kBusDown},
+                  AlarmRow{.id = 2, .name = AlarmName::kUnitSilent},
+                  AlarmRow{.id = 3, .name = AlarmName::kBusDown}};
   Note(std::move(effects));
-  EXPECT_EQ(Sample({0})->alarms_by_severity, (std::array<std::uint64_t, 3>{1, 0, 2}));
+  const auto sample = Sample({0});
+  EXPECT_EQ(sample->alarms_by_name[static_cast<std::size_t>(AlarmName::kBusDown)], 2u);
+  EXPECT_EQ(sample->alarms_by_name[static_cast<std::size_t>(AlarmName::kUnitSilent)], 1u);
+  EXPECT_EQ(std::accumulate(sample->alarms_by_name.begin(), sample->alarms_by_name.end(), 0u), 3u);
 }
 
 TEST_F(MetricsSamplerTest, ObservesEachErrorThatWasMeasured) {

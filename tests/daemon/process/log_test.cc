@@ -77,10 +77,12 @@ TEST(Log, EventsInTheJournalHaveFields) {
                   .severity = Severity::kError,
                   .unit = UnitId{4711},
                   .bus = BusId{3},
-                  .text = "unit 4711 is hot\nMESSAGE=forged"});
-  EXPECT_EQ(journal.Next(), std::string("MESSAGE=alarm 7: unit 4711 is hot\\nMESSAGE=forged\n"
-                                        "PRIORITY=3\nSYSLOG_IDENTIFIER=focalfleetd\nMESSAGE_ID=") +
-                                kAlarmMessageId + "\nUNIT_ID=4711\nBUS=3\n");
+                  .text = "unit 4711 is hot\nMESSAGE=forged",
+                  .name = AlarmName::kUnitFault});
+  EXPECT_EQ(journal.Next(),
+            std::string("MESSAGE=alarm 7 UnitFault: unit 4711 is hot\\nMESSAGE=forged\n"
+                        "PRIORITY=3\nSYSLOG_IDENTIFIER=focalfleetd\nMESSAGE_ID=") +
+                kAlarmMessageId + "\nALARM=UnitFault\nUNIT_ID=4711\nBUS=3\n");
   LogRow(ConfigurationRow{.id = 12});
   EXPECT_THAT(*journal.Next(), HasSubstr("\nCONFIGURATION=12\n"));
   LogLink({.bus = BusId{5}, .state = LinkState::kDown}, "can5", "gone");
