@@ -117,8 +117,9 @@ class StopBench {
     StopTaken stop;
     const std::vector<sim::BusCounters> after = Counters();
     for (std::size_t i = 0; i < after.size(); ++i)
-      stop.load_min = std::min(
-          stop.load_min, sim::BusCounters{.busy = after[i].busy - before[i].busy}.Load(passed));
+      stop.load_min =
+          std::min(stop.load_min,
+                   sim::WireUse{.busy = after[i].wire.busy - before[i].wire.busy}.Load(passed));
     return stop;
   }
   void Waits(HostInstant at, StopTaken* stop) const {
