@@ -129,7 +129,7 @@ std::string DescribeUploadAndStarts(const Json& c) {
     text += fmt::format(
         "\n  units began within at most {:.1f} ms of each other, at least {:.1f} ms (likely "
         "{:.1f}; "
-        "{} of {} told; plans allow for {:.0f} ms)",
+        "{} of {} reported; plans allow for {:.0f} ms)",
         1e3 * NumberIn(c, "start_skew_most_s"), 1e3 * NumberIn(c, "start_skew_least_s"),
         1e3 * NumberIn(c, "start_skew_s"), CountIn(c, "starts_known"), CountIn(c, "starts"),
         1e3 * NumberIn(c, "start_skew_allowed_s"));

@@ -24,7 +24,7 @@ constexpr std::array<ModeWord, 3> kModeWords = {{{WaveMode::kAsymmetric, "asymme
 constexpr double kLoadMax_uNm = 1000;  // a hundred times the motor's torque at 9 V
 constexpr int kSubdivisionMax = 6144;
 
-std::optional<double> NumberIn(const std::string& text) {
+std::optional<double> NumberOfText(const std::string& text) {
   double value = 0;
   const char* end = text.data() + text.size();
   const auto [rest, error] = std::from_chars(text.data(), end, value);
@@ -34,7 +34,7 @@ std::optional<double> NumberIn(const std::string& text) {
 
 CLI::Validator Subdivision() {
   const auto check = [](const std::string& text) -> std::string {
-    const auto value = NumberIn(text);
+    const auto value = NumberOfText(text);
     if (value && *value >= 6 && *value <= kSubdivisionMax && std::fmod(*value, 6) == 0) return "";
     return fmt::format(
         "{} is not a multiple of 6 from 6 to {}: the six sectors have the same vectors", text,
@@ -59,7 +59,7 @@ Result<sim::MotorParameters> MotorOf(const DriveOptions& options) {
     motor.load_Nm = sim::kBareLoad_Nm;
     return motor;
   }
-  const auto load_uNm = NumberIn(options.load);
+  const auto load_uNm = NumberOfText(options.load);
   if (!load_uNm || *load_uNm < 0 || *load_uNm > kLoadMax_uNm) {
     return Fail(ErrorCode::kInvalid,
                 fmt::format("--load {}: `bare`, `fleet` or a torque at the motor shaft, 0 to {:g} "
@@ -74,7 +74,7 @@ Result<sim::MotorParameters> MotorOf(const DriveOptions& options) {
 
 CLI::Validator PositiveNumberUpTo(double high, const std::string& why) {
   const auto check = [high, why](const std::string& text) -> std::string {
-    const auto value = NumberIn(text);
+    const auto value = NumberOfText(text);
     if (value && *value > 0 && *value <= high) return "";
     return fmt::format("{} is not a number above 0 and up to {:g}{}", text, high, why);
   };

@@ -42,8 +42,8 @@ struct Planned {
   std::size_t rows = 0;
 };
 
-std::vector<report::RailLimit> LimitsOf(const PlanCommandOptions& options,
-                                        const OfflineFleet& fleet) {
+std::vector<report::RailLimit> RailLimitsOf(const PlanCommandOptions& options,
+                                            const OfflineFleet& fleet) {
   std::set<std::uint32_t> rails;
   if (options.plan.power.rail_W > 0)
     for (const Unit& unit : fleet.layout.units()) rails.insert(unit.rail.value);
@@ -65,7 +65,7 @@ std::string PlotOf(const PlanCommandOptions& options, const OfflineFleet& fleet,
       .start = state,
       .targets = planned.targets,
       .plan = &planned.plan,
-      .rail_limits = LimitsOf(options, fleet)};
+      .rail_limits = RailLimitsOf(options, fleet)};
   return options.plot.ends_with(".svg") ? report::PlanPicture(scene, kPictureSpeed)
                                         : report::PlanPage(scene);
 }

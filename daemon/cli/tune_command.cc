@@ -80,7 +80,7 @@ void AddRuleOptions(CLI::App* command, TuneOptions* options) {
                    "Of 2V/(3r), that no phase current may exceed, turning or blocked")
       ->check(PositiveNumberUpTo(1))
       ->capture_default_str();
-  command->add_option("--move-deg", rule.move_deg, "Move for which time and energy are told")
+  command->add_option("--move-deg", rule.move_deg, "Move for which time and energy are reported")
       ->check(PositiveNumberUpTo(3600))
       ->capture_default_str();
   command->add_option("--ramp-stages", rule.ramp.stages, "Stages of a start")

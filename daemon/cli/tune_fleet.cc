@@ -130,7 +130,7 @@ std::string TunedText(const std::vector<AxisLoad>& loads, const std::vector<Axis
   return csv.Take();
 }
 
-struct Refused {
+struct RefusedAxis {
   AxisLoad of;
   std::string why;
 };
@@ -138,7 +138,7 @@ struct Refused {
 /// Writes the tunings into the store, in one transaction. Units without a serial number there are
 /// refused.
 Status WriteStore(const TuneOptions& options, const std::vector<AxisLoad>& loads,
-                  const std::vector<AxisTuning>& chosen, std::vector<Refused>* refused) {
+                  const std::vector<AxisTuning>& chosen, std::vector<RefusedAxis>* refused) {
   if (!std::filesystem::exists(options.store)) {
     return Fail(ErrorCode::kUnavailable, options.store + ": no such store");
   }
@@ -243,7 +243,7 @@ ExitCode TuneFleet(const Context& context, const TuneOptions& options, const Dri
     }
   }
   const std::vector<AxisTuning> chosen = ChooseFor(*loads, all, options.minimise);
-  std::vector<Refused> refused;
+  std::vector<RefusedAxis> refused;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const sim::LoadTuning& tuning = chosen[k].tuning;
     if (tuning.outcome == sim::TuningOutcome::kTuned) continue;
@@ -259,7 +259,7 @@ ExitCode TuneFleet(const Context& context, const TuneOptions& options, const Dri
   }
   Json named = Json::array();
   std::string lines;
-  for (const Refused& one : refused) {
+  for (const RefusedAxis& one : refused) {
     named.push_back({{"unit_id", one.of.unit.value},
                      {"axis", Name(one.of.axis)},
                      {"load_uNm", one.of.load_Nm * 1e6},

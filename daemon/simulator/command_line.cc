@@ -11,6 +11,7 @@
 #include "daemon/cli/command_line.h"
 #include "daemon/cli/context.h"
 #include "daemon/cli/exit_code.h"
+#include "daemon/control/id_ranges.h"
 #include "daemon/simulator/interface_names.h"
 #include "daemon/simulator/simulator.h"
 #include "daemon/simulator/subcommands.h"

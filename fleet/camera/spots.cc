@@ -28,7 +28,7 @@ std::uint64_t Mixed(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-std::string Seconds(std::int64_t ns) {
+std::string SecondsText(std::int64_t ns) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3f s", static_cast<double>(ns) * 1e-9);
   return text;
@@ -103,15 +103,15 @@ std::optional<Refusal> Admit(const Exposure& exposure, const AdmissionRules& rul
   const std::int64_t taken = exposure.taken_unix_ns;
   if (taken > rules.now_unix_ns + rules.clock_slack_ns)
     return Refusal{RefusalReason::kFuture, named + " was taken " +
-                                               Seconds(taken - rules.now_unix_ns) +
+                                               SecondsText(taken - rules.now_unix_ns) +
                                                " from now: the clocks differ"};
   if (taken < rules.motion_end_unix_ns)
     return Refusal{RefusalReason::kEarly, named + " was taken " +
-                                              Seconds(rules.motion_end_unix_ns - taken) +
+                                              SecondsText(rules.motion_end_unix_ns - taken) +
                                               " before the motion ended"};
   if (rules.now_unix_ns - taken > rules.age_max_ns)
-    return Refusal{RefusalReason::kLate, named + " is " + Seconds(rules.now_unix_ns - taken) +
-                                             " old, more than " + Seconds(rules.age_max_ns)};
+    return Refusal{RefusalReason::kLate, named + " is " + SecondsText(rules.now_unix_ns - taken) +
+                                             " old, more than " + SecondsText(rules.age_max_ns)};
   return std::nullopt;
 }
 

@@ -13,7 +13,7 @@ namespace {
 
 using enum UnitPhase;
 
-/// Sets when the unit counts as unheard. That instant comes early where the motion of others may
+/// Sets when the unit counts as unheard. The instant comes early where the motion of others may
 /// depend on its place before the question is given up.
 void MissSoon(const Coordination& fleet, PositionerIndex i) {
   UnitRecord& record = fleet.units[i];

@@ -30,7 +30,7 @@ void OnSensors(const Coordination& fleet, PositionerIndex i, const SensorsReply&
   Sensing& sensing = record.sensing;
   if (!sensing.under_way()) return;
   if (reply.part != sensing.next_part) {
-    SensorsDoNotAnswer(fleet, i, "it tells others than it was asked for");
+    SensorsDoNotAnswer(fleet, i, "it answers with another part than was asked");
     return;
   }
   for (std::size_t k = 0; k < kSensorsPerPart; ++k)

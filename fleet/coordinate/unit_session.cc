@@ -20,7 +20,7 @@ void NoAnswer(const Coordination& fleet, PositionerIndex i) {
   if (record.view.phase == kReady && record.sensing.under_way() &&
       record.request.question->answer_function == Function::kSensors) {
     fleet.requests.Forget(i);
-    SensorsDoNotAnswer(fleet, i, "it does not tell them");
+    SensorsDoNotAnswer(fleet, i, "it does not report their readings");
     fleet.timers.Set(
         i, record.next_poll = fleet.now());  // the next poll shows whether it answers at all
     return;

@@ -23,7 +23,7 @@ Status Complain(const UnitDescription& unit, const std::string& what) {
 Status ValidateUnit(const UnitDescription& unit, const FactoryDrive& drive) {
   if (unit.sensors > limits::kSensorsPerUnit) return Complain(unit, "has too many sensors");
   if (unit.sensors > 0 && !(unit.fibre_carrier_mm > 0 && std::isfinite(unit.fibre_carrier_mm)))
-    return Complain(unit, "has sensors at its joint, and no spine on it");
+    return Complain(unit, "has sensors at its joint, and no fibre carrier on it");
   if (unit.node == kBroadcastNode) return Complain(unit, "node 255 is the broadcast address");
   // A larger error would be a clock that stands still or runs back.
   constexpr double kClockErrorMax = 0.5;

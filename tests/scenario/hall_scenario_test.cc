@@ -115,7 +115,7 @@ TEST_F(HallScenario, WhoDoesNotTellItsSensorsIsNotLost) {
     EXPECT_EQ(view.phase, UnitPhase::kReady);
     EXPECT_EQ(view.knowledge[0].witness, Witness::kReported);
   }
-  EXPECT_TRUE(HasAlarm(*fleet_, "has sensors, but it does not tell them"));
+  EXPECT_TRUE(HasAlarm(*fleet_, "has sensors, but it does not report their readings"));
   EXPECT_TRUE(HasAlarm(*fleet_, "has sensors, but its firmware knows of none"));
   EXPECT_EQ(fleet_->coordinator().configuration().measured.back().measured, 18u);
 }

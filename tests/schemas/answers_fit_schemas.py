@@ -274,6 +274,7 @@ def retarget(s):
         s.ask(f"apply {targets}")
         s.until(lambda: s.moving() or s.ready(), "the motion begins")
         s.ask("status --buses")
+        s.ask("wait --timeout 0.01", exits=(0, 1, 3))
         answer = s.ask("retarget 5 10 90 --angles", exits=(0, 1, 3))
         if "goes" in answer[0]:
             return
@@ -289,15 +290,26 @@ def operate(s):
     watch = s.start("focalfleet", "watch", "--json", "--domain", s.domain,
                     stdout=open("watch.jsonl", "w", encoding="utf-8"), stderr=subprocess.DEVNULL)
     s.ask("watch --once --domain", s.domain)
+    s.ask("doctor --config focalfleet.toml", exits=(0, 1, 3))
+    s.ask("wait")
+    s.ask("apply targets.csv --dry-run", exits=(0, 3))
     s.ask("apply targets.csv --wait --correct 1", exits=(0, 3))
     retarget(s)
     s.ask("stop", exits=(0, 3))
     s.until(s.ready, "all units at rest after the stop")
     s.ask("measure --wait")
     s.ask("measurements")
+    s.ask("measure")
+    s.ask("wait", exits=(0, 3))
+    s.ask("apply other.csv")
+    s.ask("wait", exits=(0, 3))
     s.ask("state --out now.csv")
     s.ask("history")
     s.ask("history 3")
+    s.ask("history --since 1h --state done")
+    s.ask("events --since 1h")
+    s.ask("unit 3,7-8")
+    s.ask("params 3-4")
     s.ask("unit 3")
     s.ask("disable 5 --reason test")
     s.ask("enable 5")
@@ -305,9 +317,11 @@ def operate(s):
     s.ask("params 5 set theta repeat 100")
     s.ask("params 5")
     s.ask("home 5 --wait")
+    s.ask("home 5")
+    s.until(s.ready, "unit 5 is homed")
     s.ask("campaign run moves.csv --units units.csv --out measured", command="campaign run",
           exits=(0, 3))
-    s.ask("model load report/model.toml", command="model load")
+    s.ask("model load report/model.toml --yes", command="model load")
     s.ask("model show", command="model show")
     s.ask("model unload", command="model unload")
     s.ask("model rollback", command="model rollback")
@@ -323,18 +337,41 @@ def fail(s):
     s.simulation("misbehave", "--units", "6", "--foreign", "77")
     s.simulation("power-cut", "--units", "6", "--seconds", "1")
     s.until(lambda: s.phase(6) == "foreign", "other hardware is noticed")
-    s.ask("adopt 6")
+    s.ask("adopt 6 --yes")
     s.ask("apply targets.csv")
     s.simulation("power-cut", "--units", "2")
     s.simulation("fault", "--units", "4", "--code", "over_current")
     s.simulation("kill-bus", "--buses", "1")
     s.ask("status --buses")
+    s.ask("apply targets.csv --dry-run", exits=(0, 1, 3))
     s.ask("stop", exits=(0, 3, 5))
     for unit in ("2", "4", "8"):
         s.ask(f"unit {unit}")
     s.ask("state --allow-unknown --out some.csv", exits=(0, 1, 3))
     s.ask("history")
     s.ask("apply targets.csv --wait", exits=(0, 1, 3, 5))
+    s.until(lambda: s.seen("alarms").get("open", 0) > 0, "alarms are open")
+    s.ask("alarms mute UnitSilent --for 2h --reason test", command="alarms mute")
+    s.ask("alarms --all")
+    s.ask("alarms unmute UnitSilent", command="alarms unmute")
+    s.ask("alarms")
+    s.ask("alarms ack " + str(s.seen("alarms")["alarms"][0]["id"]), command="alarms ack")
+    s.ask("alarms --all --since 1h --severity warning")
+    s.ask("status")
+    s.ask("events")
+    s.ask("doctor --config focalfleet.toml", exits=(0, 1, 3))
+
+
+def follow(s):
+    """The events as they come, an object a line."""
+    path = pathlib.Path("events.jsonl")
+    with open(path, "w", encoding="utf-8") as file:
+        events = s.start("focalfleet", "events", "-f", "--json", stdout=file)
+    s.until(lambda: path.read_text(encoding="utf-8").count("\n") > 2, "events are told")
+    events.terminate()
+    events.wait(timeout=WAIT_S)
+    whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
+    s.take("events", whole, "focalfleet events -f")
 
 
 def simulation_answers(s):
@@ -364,6 +401,7 @@ def run(s, slow):
     s.until(s.ready, "all units ready")
     operate(s)
     fail(s)
+    follow(s)
     simulation_answers(s)
 
 

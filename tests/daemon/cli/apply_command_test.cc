@@ -106,7 +106,7 @@ TEST_F(DaemonCommands, ApplyWaitTellsUploadAndStarts) {
   EXPECT_THAT(result.out, HasSubstr("upload 0.002 s (its bits take 0.002 s), 1900 bits (1800 "
                                     "predicted)"));
   EXPECT_THAT(result.out, HasSubstr("units began within at most 2.7 ms of each other, at least "
-                                    "1.7 ms (likely 2.1; 2 of 2 told; plans allow for 40 ms)"));
+                                    "1.7 ms (likely 2.1; 2 of 2 reported; plans allow for 40 ms)"));
 }
 
 TEST_F(DaemonCommands, ApplyWaitNamesUnservedUnitsAndEndsWithThree) {
