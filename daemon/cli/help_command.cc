@@ -34,7 +34,7 @@ void Append(const CLI::App& app, Json* commands) {
   commands->push_back({{"command", usage::PathOf(app)},
                        {"what", app.get_description()},
                        {"group", app.get_group()},
-                       {"runs", below.empty()},
+                       {"runs", usage::RunsByItself(app)},
                        {"options", OptionsJson(app)}});
   for (const CLI::App* command : below) Append(*command, commands);
 }

@@ -197,9 +197,10 @@ bool EventLoop::StepIsDue() const {
 
 void EventLoop::Step() {
   // This order matters: a batch that is committed in between is reported one step later.
-  if (store_.failing != parts_.store->failing())
-    parts_.alarms->NoteStore(WallTime::Now(), parts_.store->failure());
-  store_.failing = parts_.store->failing();
+  // The store's thread may change its failure at any time, so it is read once.
+  const std::optional<Error> failure = parts_.store->failure();
+  if (store_.failing != failure.has_value()) parts_.alarms->NoteStore(WallTime::Now(), failure);
+  store_.failing = failure.has_value();
   store_.committed_through = parts_.store->committed_through();
   const std::vector<RefusedRow> refused = parts_.store->TakeRefused();
   effects_.Clear();
@@ -246,7 +247,9 @@ void EventLoop::SubmitPlan(PlanJob job) {
   const auto drives = parts_.coordinator->drives();
   PlannerWork work{
       std::move(job), {drives.begin(), drives.end()}, preview ? preview_given_up_ : nullptr};
-  if (!parts_.planner->Submit(&work)) spdlog::error("plan job {} found no room", work.job.job);
+  if (parts_.planner->Submit(&work)) return;
+  spdlog::error("plan job {} found no room", work.job.job);
+  if (preview) parts_.handler->RefusePreview();
 }
 
 void EventLoop::PublishStatus() {

@@ -54,7 +54,7 @@ class EventLoop {
     StatusScheduler* scheduler = nullptr;  // none: DDS is off
     MetricsSampler* metrics = nullptr;     // none: no metrics are served
     SyncPulse* sync = nullptr;             // none: no SYNC line
-    DdsTroubles* troubles = nullptr;       // none: DDS is used by no part
+    DdsTroubles* troubles = nullptr;       // none: no part has troubles to report
     const EventSignal* threads = nullptr;  // raised by planner, camera, store
     ServiceReport* service = nullptr;
     std::function<void()> hang_up;  // what SIGHUP asks for: the log is opened anew

@@ -59,8 +59,14 @@ std::vector<usage::ManualPage> DaemonManual() {
             "of every axis in a store that survives power cuts. focalfleet(1) asks and commands it "
             "through a control socket; it publishes status through DDS.",
             "The daemon stays in the foreground. SIGTERM and SIGINT end it within 2 s with "
-            "everything stored. Units that move go on by themselves."},
+            "everything stored. Units that move go on by themselves. SIGHUP opens log.file anew, "
+            "for "
+            "logrotate."},
        .exit_codes = ExitCodes(),
+       .environment = {{"NOTIFY_SOCKET, WATCHDOG_USEC, WATCHDOG_PID",
+                        "Of systemd: the daemon reports when it is ready, how it stands and that "
+                        "all its threads work."},
+                       {"JOURNAL_STREAM", "Of systemd: events go to the journal with fields."}},
        .files = {{"focalfleet.toml", "The configuration, see focalfleet.toml(5)."},
                  {"store.path", "The store, an SQLite file. One daemon at a time opens it."},
                  {"control.socket", "The control socket, for owner and group."}},

@@ -8,11 +8,6 @@
 #include "daemon/status/status_json.h"
 
 namespace focalfleet {
-namespace {
-
-
-}  // namespace
-
 Json HistoryJson(const std::vector<ConfigurationHistory>& configurations) {
   Json rows = Json::array();
   for (const auto& [row, began, changed] : configurations)

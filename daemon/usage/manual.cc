@@ -63,7 +63,7 @@ void PutSynopsis(const CLI::App& app, Roff* page) {
   page->Section("SYNOPSIS");
   const auto commands = app.get_subcommands({});
   const bool is_program = app.get_parent() == nullptr;
-  if (is_program || commands.empty()) page->Usage(SynopsisOf(app), WordsIn(PathOf(app)));
+  if (is_program || RunsByItself(app)) page->Usage(SynopsisOf(app), WordsIn(PathOf(app)));
   if (is_program) return;
   for (const CLI::App* command : commands)
     page->Usage(SynopsisOf(*command), WordsIn(PathOf(*command)));
@@ -78,17 +78,16 @@ ManualPage PageOf(const CLI::App& command, const ManualFrame& frame) {
   page.Paragraph(command.get_description() + ".");
   page.Paragraph(frame.closing.of_commands);
   const auto below = command.get_subcommands({});
-  if (below.empty()) {
+  if (RunsByItself(command)) {
     if (!ArgumentsOf(command).empty()) page.Section("ARGUMENTS");
     PutOptions(ArgumentsOf(command), &page);
     page.Section("OPTIONS");
     PutOptions(OptionsOf(command), &page);
     page.Section("EXAMPLES");
     page.Literal(Unindented(command.get_footer()));
-  } else {
-    page.Section("COMMANDS");
-    for (const CLI::App* child : below) PutSubsection(*child, &page);
   }
+  if (!below.empty()) page.Section("COMMANDS");
+  for (const CLI::App* child : below) PutSubsection(*child, &page);
   PutItems("EXIT STATUS", frame.exit_codes, &page);
   page.Section("SEE ALSO");
   page.References(Reference(frame.closing.manual, frame.section) + ", " + frame.see_also);

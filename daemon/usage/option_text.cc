@@ -123,6 +123,10 @@ std::string PathOf(const CLI::App& app) {
   return parent == nullptr ? app.get_name() : PathOf(*parent) + " " + app.get_name();
 }
 
+bool RunsByItself(const CLI::App& app) {
+  return app.get_subcommands({}).empty() || app.get_require_subcommand_min() == 0;
+}
+
 std::string SynopsisOf(const CLI::App& app) {
   std::string line = PathOf(app);
   for (const CLI::Option* option : OptionsOf(app)) {

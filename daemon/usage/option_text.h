@@ -27,6 +27,8 @@ std::vector<const CLI::Option*> ArgumentsOf(const CLI::App& app);
 
 /// The words of a command from the program on: "focalfleet layout hex".
 std::string PathOf(const CLI::App& app);
+/// Whether the command does something by itself, beside what its subcommands do.
+bool RunsByItself(const CLI::App& app);
 
 /// The usage line: path, required options, [OPTIONS], arguments or COMMAND.
 std::string SynopsisOf(const CLI::App& app);

@@ -349,6 +349,12 @@ void RequestHandler::PreviewDone(const FleetView& view, const PlanDone& done) {
                   : tl::unexpected<Error>(done.plan.error()));
 }
 
+void RequestHandler::RefusePreview() {
+  if (!dry_run_) return;
+  Answer(std::exchange(dry_run_, std::nullopt)->pending,
+         Fail(ErrorCode::kFull, "the planner has no room; ask again when it is done"));
+}
+
 void RequestHandler::ShowProgress(const FleetView& view) {
   if (waiting_ == 0) return;
   AnswerWaiters(view);

@@ -68,6 +68,8 @@ class RequestHandler {
   /// the configuration; its answer goes to PreviewDone.
   std::optional<PlanJob> TakePreview() { return std::exchange(preview_job_, std::nullopt); }
   void PreviewDone(const FleetView& view, const PlanDone& done);
+  /// The job that was taken found no room: its command is refused.
+  void RefusePreview();
   /// Clients that wait receive progress, when it is time, or the end that they wait for.
   void ShowProgress(const FleetView& view);
   /// The instant at which ShowProgress is due; kNever while no client waits.

@@ -144,6 +144,8 @@ void SettlePlace(const Coordination& fleet, PositionerIndex i, const StoreSays& 
                            ", " + result.reason);
   if (reading.status.state == UnitState::kFault) {
     fleet.units.SetPhase(i, kFault);
+    if (!fleet.ledger.Lasts(AlarmName::kUnitFault, i))
+      fleet.ledger.Raise(AlarmName::kUnitFault, i, {}, fleet.units.NameOf(i) + " is in fault");
     fleet.units.Report(i, UnitEventKind::kLost, "is in fault");
     return;
   }

@@ -68,6 +68,10 @@ void Ledger::Raise(AlarmName name, std::optional<PositionerIndex> unit, std::opt
   Note(std::move(row));
 }
 
+bool Ledger::Lasts(AlarmName name, PositionerIndex unit) const {
+  return conditions_.contains({name, layout_.unit(unit).id, {}});
+}
+
 void Ledger::End(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus) {
   if (conditions_.empty()) return;
   Condition condition{name, {}, bus};

@@ -33,6 +33,8 @@ class Ledger {
              std::string text);
   /// The condition of an alarm has ended, if it was one. Cost: a look-up among lasting conditions.
   void End(AlarmName name, std::optional<PositionerIndex> unit, std::optional<BusId> bus);
+  /// Whether the condition of an alarm lasts.
+  [[nodiscard]] bool Lasts(AlarmName name, PositionerIndex unit) const;
   /// Replies when this step's rows are durable; at once, with an error, where they cannot be
   /// written.
   void ReplyWhenDurable(std::uint64_t request, std::string text);

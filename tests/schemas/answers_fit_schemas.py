@@ -318,7 +318,7 @@ def operate(s):
     s.ask("params 5")
     s.ask("home 5 --wait")
     s.ask("home 5")
-    s.until(s.ready, "unit 5 is homed")
+    s.ask("wait", exits=(0, 3))
     s.ask("campaign run moves.csv --units units.csv --out measured", command="campaign run",
           exits=(0, 3))
     s.ask("model load report/model.toml --yes", command="model load")
