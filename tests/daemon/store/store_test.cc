@@ -68,8 +68,9 @@ TEST_F(StoreTest, AlarmsKeepTheirNamesAndStayOpenUntilTheyAreOver) {
   EXPECT_EQ(*OpenReader()->EarlierAlarms(9), std::vector{over});
   EXPECT_TRUE(OpenReader()->EarlierAlarms(9, {.since = {8}})->empty());
   Sql("UPDATE mute SET name = 'UnitQuiet'");
-  EXPECT_THAT(test::ErrorOf(OpenStore()->Load()).text,
-              ::testing::HasSubstr("there is no alarm of this name"));
+  fleet = OpenStore()->Load();
+  ASSERT_TRUE(fleet) << fleet.error().text << ": the name may be a later version's";
+  EXPECT_EQ(fleet->mutes.at(0).name, AlarmName::kUnnamed);
 }
 
 TEST_F(StoreTest, LoadGivesBackWhatWasCommitted) {

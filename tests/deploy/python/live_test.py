@@ -120,14 +120,21 @@ class Live(unittest.TestCase):
             self.simulated.cli("enable", 5)
         self.assertIn(5, [unit.unit_id for unit in caught.exception.unserved])
 
+    def place(self, number):
+        unit = self.fleet.unit(number)
+        return unit["theta"], unit["phi"]
+
     def test_a_preview_moves_nothing(self):
         before = self.fleet.status()["configuration"]["id"]
-        try:
-            plan = self.fleet.plan(self.targets)
-            self.assertEqual((plan.targeted, plan.served + len(plan.unserved)), (100, 100))
-        except Refused as error:
-            self.assertIn("too old for preview", str(error))
+        places = [self.place(number) for number in (1, 50, 100)]
+        plan = self.fleet.plan(self.targets)
+        self.assertEqual((plan.targeted, plan.served + len(plan.unserved)), (100, 100))
         self.assertEqual(self.fleet.status()["configuration"]["id"], before)
+        self.assertEqual([self.place(number) for number in (1, 50, 100)], places)
+
+    def test_alarms_are_listed_by_name(self):
+        answer = self.fleet.alarms()
+        self.assertEqual(answer["open"], len([a for a in answer["alarms"] if a["state"] == "open"]))
 
     def test_watch(self):
         program = PROGRAMS / "focalfleet"
