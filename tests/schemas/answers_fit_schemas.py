@@ -350,6 +350,7 @@ def fail(s):
     s.ask("state --allow-unknown --out some.csv", exits=(0, 1, 3))
     s.ask("history")
     s.ask("apply targets.csv --wait", exits=(0, 1, 3, 5))
+    s.ask("apply targets.csv --dry-run", exits=(0, 1, 3))
     s.until(lambda: s.seen("alarms").get("open", 0) > 0, "alarms are open")
     s.ask("alarms mute UnitSilent --for 2h --reason test", command="alarms mute")
     s.ask("alarms --all")

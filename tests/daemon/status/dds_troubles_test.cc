@@ -32,14 +32,14 @@ TEST(DdsTroubles, ATroubleThatEndedIsNotInTheSummary) {
 TEST(DdsTroubles, CountsTroublesAndPassesOnNotesOfOthers) {
   int woken = 0;
   DdsTroubles troubles([&] { ++woken; });
-  troubles.Note({Severity::kWarning, "a port is in use"});
+  troubles.Note({AlarmName::kMetricsMissing, "a port is in use"});
   EXPECT_EQ(woken, 1);
   EXPECT_EQ(troubles.reported(), 0u) << "no trouble of DDS";
   EXPECT_EQ(troubles.Summary(), "");
   ASSERT_EQ(troubles.TakeNotes().size(), 1u);
-  troubles.Report("status", "no domain");
-  troubles.Report("status", "");
-  troubles.Report("status", "no domain");
+  troubles.Report(AlarmName::kDdsMissing, "status", "no domain");
+  troubles.Report(AlarmName::kDdsMissing, "status", "");
+  troubles.Report(AlarmName::kDdsMissing, "status", "no domain");
   EXPECT_EQ(troubles.reported(), 2u);
 }
 
