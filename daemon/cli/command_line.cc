@@ -67,7 +67,8 @@ void AddGlobalOptions(CommandLine* line) {
   app.set_version_flag("--version", std::string("focalfleet ") + ClientVersion(),
                        "Show the version");
   app.add_flag("--json", line->context.json, "One JSON object on stdout, nothing else there");
-  app.add_flag("-q,--quiet", line->context.quiet, "No progress, no summary; errors are still reported");
+  app.add_flag("-q,--quiet", line->context.quiet,
+               "No progress, no summary; errors are still reported");
   app.add_option("--socket", line->context.socket,
                  fmt::format("Control socket of the daemon (default: $FOCALFLEET_SOCKET, else {})",
                              kDefaultSocket))

@@ -312,7 +312,8 @@ void AddEstimateCommand(CommandLine* line) {
         ModeWords());
   AddTunedStore(command, &options->store);
   AddFile(command, "--model", &options->model,
-          "model.toml of a diagnosis: each unit is commanded to the count that, by this model, leads to its target");
+          "model.toml of a diagnosis: each unit is commanded to the count that, by this model, "
+          "leads to its target");
   AxisDrive& axis = options->drive.axis[0];
   command->add_option("--v-bus", options->drive.v_bus_V, "Bus voltage, V")
       ->check(NumberBetween(0.1, kBridgeMax_V))

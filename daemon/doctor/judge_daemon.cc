@@ -56,7 +56,7 @@ Check JudgeAlarms(const Json& alarms) {
   if (open == 0) return Ok("alarms", "none is open");
   const std::string worst = TextIn(alarms, "worst");
   const std::string text =
-      fmt::format("{} open{}", open, worst.empty() ? "" : ", the worst an " + worst);
+      fmt::format("{} open{}", open, worst.empty() ? "" : ", the worst: " + worst);
   return worst == "error" ? Fail("alarms", text, "focalfleet alarms")
                           : Warn("alarms", text, "focalfleet alarms");
 }
@@ -68,7 +68,7 @@ Check JudgeUnits(const Json& status) {
   const std::uint64_t sick = CountIn(phases, "fault") + CountIn(phases, "foreign");
   if (away + sick == 0) return Ok("units", fmt::format("{} enabled, all answer", enabled));
   return Warn("units",
-              fmt::format("{} do not answer, {} have a fault or other hardware", away, sick),
+              fmt::format("without an answer: {}; with a fault or other hardware: {}", away, sick),
               "focalfleet status; focalfleet unit UNIT says why");
 }
 

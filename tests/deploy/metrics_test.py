@@ -154,6 +154,19 @@ def anchors_of(path):
     return anchors
 
 
+def entries_of(root):
+    """{anchor: text} of the entries of docs/runbook.md."""
+    with open(f"{root}/docs/runbook.md", encoding="utf-8") as file:
+        parts = re.split(r"^### (\w+)$", file.read(), flags=re.MULTILINE)
+    return {name.lower(): " ".join(text.split()) for name, text in zip(parts[1::2], parts[2::2])}
+
+
+def severity_in(entry):
+    """The severity of the alert: `(critical)`, or `(error; as an alert warning; ...` in the entry of an alarm."""
+    found = re.search(r"\((?:\w+; as an alert )?(critical|warning|info)(?:\)|; open)", entry)
+    return found.group(1) if found else "nothing"
+
+
 def rules_of(root):
     """[(name, lines of the rule)] of the file of rules."""
     with open(f"{root}/deploy/prometheus/focalfleet.rules.yml", encoding="utf-8") as file:
@@ -225,6 +238,7 @@ def check_rules(root):
     with open(f"{root}/tests/deploy/alert_rules_test.yml", encoding="utf-8") as file:
         tested = set(re.findall(r'alertname="(\w+)"', file.read()))
     anchors = anchors_of(f"{root}/docs/runbook.md")
+    entries = entries_of(root)
     names, pointed_at = set(), set()
     for name, rule in rules_of(root):
         names.add(name)
@@ -241,6 +255,9 @@ def check_rules(root):
         if anchor.group(1) not in (name.lower(), name.removeprefix("Focalfleet").lower()):
             fail(f"{name} points at the entry {anchor.group(1)}")
         pointed_at.add(anchor.group(1))
+        severity = re.search(r"severity: (\w+)", rule).group(1)
+        if severity_in(entries[anchor.group(1)]) != severity:
+            fail(f"{name} is {severity}, and its entry in docs/runbook.md says {severity_in(entries[anchor.group(1)])}")
     if names != tested:
         fail(f"alerts and their tests differ: {sorted(names ^ tested)}")
     orphans = {anchor for anchor in anchors if anchor.startswith("focalfleet") and " " not in anchor} - pointed_at

@@ -368,7 +368,7 @@ def follow(s):
     path = pathlib.Path("events.jsonl")
     with open(path, "w", encoding="utf-8") as file:
         events = s.start("focalfleet", "events", "-f", "--json", stdout=file)
-    s.until(lambda: path.read_text(encoding="utf-8").count("\n") > 2, "events are told")
+    s.until(lambda: path.read_text(encoding="utf-8").count("\n") > 2, "events are printed")
     events.terminate()
     events.wait(timeout=WAIT_S)
     whole = path.read_text(encoding="utf-8").rpartition("\n")[0]
