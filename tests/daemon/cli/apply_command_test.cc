@@ -97,7 +97,8 @@ TEST_F(DaemonCommands, ApplyWaitTellsTheSummaryWithAllItsKeys) {
                       {"start_first", {{"unit_id", 1}, {"bus_id", 0}}},
                       {"start_last", {{"unit_id", 2}, {"bus_id", 1}}},
                       {"bus_load_max", 0.375},
-                      {"unserved", Json::array()}};
+                      {"unserved", Json::array()},
+                      {"schema", 1}};
   EXPECT_EQ(reported, expected);
 }
 

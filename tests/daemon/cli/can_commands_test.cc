@@ -52,7 +52,8 @@ TEST(CanDecodeCommand, GivesAnObjectALine) {
   EXPECT_EQ(result.exit, 0) << result.err;
   const std::vector<Json> objects = Objects(result.out);
   ASSERT_EQ(objects.size(), 5u);
-  EXPECT_EQ(objects[0], Json({{"time", "1436509052.249713"},
+  EXPECT_EQ(objects[0], Json({{"schema", 1},
+                              {"time", "1436509052.249713"},
                               {"interface", "vcan0"},
                               {"id", "106152E1"},
                               {"data", "03E80300FFFFFF25"},
@@ -119,8 +120,10 @@ TEST(CanDecodeCommand, TellsErrorFramesInWordsAndFramesThatAreMissing) {
   EXPECT_EQ(json.err, "");
   const std::vector<Json> objects = Objects(json.out);
   ASSERT_EQ(objects.size(), 5u);
-  EXPECT_EQ(objects[2], Json({{"time", ""}, {"interface", "can0"}, {"error", "bus-error"}}));
-  EXPECT_EQ(objects[3], Json({{"interface", "can0"}, {"dropped", 3}, {"dropped_total", 4}}));
+  EXPECT_EQ(objects[2],
+            Json({{"schema", 1}, {"time", ""}, {"interface", "can0"}, {"error", "bus-error"}}));
+  EXPECT_EQ(objects[3],
+            Json({{"schema", 1}, {"interface", "can0"}, {"dropped", 3}, {"dropped_total", 4}}));
 }
 
 TEST(CanDecodeCommand, ACompressedLogIsReportedOnce) {

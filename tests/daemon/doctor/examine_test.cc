@@ -165,9 +165,9 @@ TEST(Examine, DiagnosesTheDaemon) {
        [](Facts* f) {
          f->daemon.status["alarms"] = {{"open", 1}, {"worst", "error"}};
        },
-       "alarms", Verdict::kFail, "an error", "focalfleet alarms"},
+       "alarms", Verdict::kFail, "worst: error", "focalfleet alarms"},
       {"silent units", [](Facts* f) { f->daemon.status["phases"]["absent"] = 7; }, "units",
-       Verdict::kWarn, "7 do not answer", "focalfleet status"},
+       Verdict::kWarn, "without an answer: 7", "focalfleet status"},
       {"bus down",
        [](Facts* f) {
          f->daemon.status["buses"][1]["link"] = "down";

@@ -261,6 +261,7 @@ TEST(Config, TheExampleHasEveryKeyWithItsDefault) {
   DaemonConfig expected;
   expected.bus.port = PortKind::kSocketCan;  // the example is for real buses
   expected.bus.interfaces = {"can0", "can1"};
+  expected.metrics.port = 9890;  // a daemon in service is watched
   EXPECT_EQ(EffectiveConfig(*example), EffectiveConfig(expected));
   for (const ConfigSection& section : DescribeConfig()) {
     const std::size_t begin = text.find("\n[" + section.name + "]");
