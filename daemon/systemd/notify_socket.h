@@ -21,7 +21,7 @@ class NotifySocket {
   /// variable, or where it names no such address, there is none.
   static NotifySocket FromEnvironment(const Environment& environment);
 
-  /// There is no manager; Send does nothing.
+  /// A socket of no manager: Send does nothing.
   NotifySocket() = default;
   NotifySocket(NotifySocket&& other) noexcept;
   NotifySocket& operator=(NotifySocket&& other) noexcept;
